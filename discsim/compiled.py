@@ -1,0 +1,47 @@
+"""One way to compile: numba in nopython mode, cached per state of the sources.
+
+Numba's own on-disk cache looks only at the file in which a function stands, so an edit to an
+effect would leave the compiled engines that call it stale. Here the cache folder's name holds a
+digest of all sources, so any edit starts a fresh one, and a read-only installation works too.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+import numba.core.config
+
+__all__ = ["compiled"]
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+@cache
+def _cache_folder() -> Path:
+    here = Path(__file__).resolve().parent
+    digest = hashlib.sha256(numba.__version__.encode())
+    for package in (here, here.parent / "estimators", here.parent / "validation"):
+        for source in sorted(package.rglob("*.py")):
+            digest.update(source.read_bytes())
+    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "discsim" / digest.hexdigest()[:16]
+
+
+def compiled(function: F) -> F:
+    """Compile ``function`` on first call (nopython, division by zero gives inf or nan, no fast-math)."""
+    config: Any = numba.core.config
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(_cache_folder())
+    try:
+        try:
+            return cast(F, numba.njit(cache=True, error_model="numpy")(function))
+        except RuntimeError:  # nowhere to write a cache: compile anew in each process
+            return cast(F, numba.njit(error_model="numpy")(function))
+    finally:
+        config.CACHE_DIR = before

@@ -1,0 +1,241 @@
+"""The disc and the spin-down rig: mass, inertia, aerodynamic coefficients, each with its stated uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import pi
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from discsim.arrays import FloatArray, readonly
+from discsim.errors import InputError
+from discsim.toml_table import TomlTable
+
+__all__ = ["Aero", "AeroTable", "Disc", "Release", "Rig", "YawDampingTable"]
+
+
+class Aero(NamedTuple):
+    """Coefficients of the baseline, (14)-(17); angles in rad, rates made dimensionless with d/(2 V)."""
+
+    CL0: float = 0.0
+    CLa: float = 0.0
+    CD0: float = 0.0
+    CDa: float = 0.0
+    alpha0: float = 0.0
+    CM0: float = 0.0
+    CMa: float = 0.0
+    CMq: float = 0.0
+    CRr: float = 0.0
+    CRp: float = 0.0
+    CNr: float = 0.0
+
+
+STATIC = ("CL0", "CLa", "CD0", "CDa", "alpha0", "CM0", "CMa")
+
+
+@dataclass(frozen=True)
+class AeroTable:
+    """C_L, C_D, C_M at nodes of alpha (rad, ascending): linear between them, constant outside; all (n,)."""
+
+    alpha: FloatArray
+    CL: FloatArray
+    CD: FloatArray
+    CM: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("alpha", "CL", "CD", "CM"):
+            object.__setattr__(self, name, readonly(getattr(self, name)))
+        sizes = {name: getattr(self, name).size for name in ("alpha", "CL", "CD", "CM")}
+        if len(set(sizes.values())) != 1 or self.alpha.size < 2:
+            raise ValueError(f"coefficient table: columns of one length, at least 2, expected; got {sizes}")
+        if np.any(np.diff(self.alpha) <= 0):
+            raise ValueError("coefficient table: alpha_rad must ascend")
+
+
+@dataclass(frozen=True)
+class YawDampingTable:
+    """C_Nr over spin rate and airspeed, (27)-(28): rate (nr,) rad/s, speed (nv,) m/s, CNr (nr, nv).
+
+    Between the nodes a bicubic spline (as in the paper's Fig. 11b); outside them an error.
+    """
+
+    rate: FloatArray
+    speed: FloatArray
+    CNr: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("rate", "speed", "CNr"):
+            object.__setattr__(self, name, readonly(getattr(self, name)))
+        if self.CNr.shape != (self.rate.size, self.speed.size) or min(self.CNr.shape) < 4:
+            raise ValueError(
+                f"CNr table: got {self.CNr.shape}, expected (rates, speeds) = "
+                f"({self.rate.size}, {self.speed.size}), at least 4 of each"
+            )
+        if np.any(np.diff(self.rate) <= 0) or np.any(np.diff(self.speed) <= 0):
+            raise ValueError("CNr table: rate_deg_s and speed_m_s must ascend")
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A disc; SI units. ``aero`` is None where no aerodynamics are stated (a free spin needs none)."""
+
+    mass: float
+    diameter: float
+    Ixx: float
+    Izz: float
+    aero: Aero | None = None
+    aero_table: AeroTable | None = None
+    yaw_damping_table: YawDampingTable | None = None
+    sigma: Mapping[str, float | FloatArray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("mass", "diameter", "Ixx", "Izz"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0):
+                raise ValueError(f"disc {name}: got {value!r}, expected a positive number in SI units")
+        if self.Izz > 2 * self.Ixx * (1 + 1e-9):
+            raise ValueError(
+                f"disc: Izz = {self.Izz:g} exceeds Ixx + Iyy = {2 * self.Ixx:g} kg m^2; no rigid body has that"
+            )
+        object.__setattr__(self, "sigma", MappingProxyType(dict(self.sigma)))
+
+    @property
+    def area(self) -> float:
+        """Planform area A = pi d^2/4, m^2."""
+        return pi * self.diameter**2 / 4
+
+    @classmethod
+    def from_toml(cls, table: TomlTable, *, aero_required: bool) -> Disc:
+        """Read a ``[disc]`` table with its sub-tables ``aero``, ``aero_table``, ``aero_sigma``, ``CNr_table``."""
+        mass = table.need("mass", "kg", positive=True)
+        diameter = table.need("diameter", "m", positive=True)
+        Ixx = table.need("Ixx", "kg_m2", positive=True)
+        Izz = table.need("Izz", "kg_m2", positive=True)
+        lookup = _aero_table(table.table("aero_table"))
+        damping = _yaw_damping_table(table.table("CNr_table"))
+        aero, sigma = _aero(table, lookup is not None, damping is not None, aero_required)
+        table.finish()
+        try:
+            return cls(mass, diameter, Ixx, Izz, aero, lookup, damping, {**table.sigma, **sigma})
+        except ValueError as error:
+            raise table.error(None, str(error)) from None
+
+
+def aero_key(name: str) -> str:
+    """Return a coefficient's key in a file (``alpha0`` has a unit)."""
+    return "alpha0_rad" if name == "alpha0" else name
+
+
+def _aero(
+    table: TomlTable, tabulated: bool, damping_tabulated: bool, required: bool
+) -> tuple[Aero | None, dict[str, float]]:
+    stated = table.table("aero", required=required)
+    sigma_table = table.table("aero_sigma")
+    sigma: dict[str, float] = {}
+    aero = None
+    if stated is not None:
+        values = {}
+        for name in Aero._fields:
+            optional = (tabulated and name in STATIC) or (damping_tabulated and name == "CNr")
+            unit = "rad" if name == "alpha0" else ""
+            values[name] = stated.number(name, unit, required=not optional) or 0.0
+        stated.finish()
+        aero = Aero(**values)
+        sigma.update({key: float(value) for key, value in stated.sigma.items()})
+    if sigma_table is not None:
+        if aero is None:
+            raise sigma_table.error(
+                None, "[disc.aero_sigma] without [disc.aero]; expected the coefficients it is about"
+            )
+        for name in Aero._fields:
+            value = sigma_table.number(aero_key(name), required=False, minimum=0.0)
+            if value is not None:
+                sigma[aero_key(name)] = value
+        sigma_table.finish()
+    return aero, sigma
+
+
+def _aero_table(table: TomlTable | None) -> AeroTable | None:
+    if table is None:
+        return None
+    columns = [table.numbers(key) for key in ("alpha_rad", "CL", "CD", "CM")]
+    table.finish()
+    try:
+        return AeroTable(*columns)
+    except ValueError as error:
+        raise table.error(None, str(error)) from None
+
+
+def _yaw_damping_table(table: TomlTable | None) -> YawDampingTable | None:
+    if table is None:
+        return None
+    rate_deg, speed = table.numbers("rate_deg_s"), table.numbers("speed_m_s")
+    matrix = table.numbers("CNr", dimensions=2)
+    table.finish()
+    assert rate_deg is not None
+    assert speed is not None
+    assert matrix is not None
+    try:
+        return YawDampingTable(np.radians(rate_deg), speed, matrix)
+    except ValueError as error:
+        raise table.error(None, str(error)) from None
+
+
+@dataclass(frozen=True)
+class Rig:
+    """The spin-down rig: ``Izz rdot = -viscous r``; Izz in kg m^2, viscous in N m s."""
+
+    Izz: float
+    viscous: float
+    sigma: Mapping[str, float | FloatArray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sigma", MappingProxyType(dict(self.sigma)))
+
+    @classmethod
+    def from_toml(cls, table: TomlTable) -> Rig:
+        """Read a ``[rig]`` table."""
+        Izz = table.need("Izz", "kg_m2", positive=True)
+        viscous = table.need("viscous", "N_m_s", minimum=0.0)
+        table.finish()
+        return cls(Izz, viscous, table.sigma)
+
+
+@dataclass(frozen=True)
+class Release:
+    """State at release, or what was measured of it; None where unknown.
+
+    Position and velocity (3,) of the centre of mass in North-East-Down (m, m/s); roll, pitch, yaw in rad in the
+    order ``C_BN = C3(yaw) C2(pitch) C1(roll)`` (A1); body rate (3,) rad/s. ``sigma`` by the file's key.
+    """
+
+    position: FloatArray | None = None
+    velocity: FloatArray | None = None
+    roll: float | None = None
+    pitch: float | None = None
+    yaw: float | None = None
+    body_rate: FloatArray | None = None
+    sigma: Mapping[str, float | FloatArray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("position", "velocity", "body_rate"):
+            value = getattr(self, name)
+            if value is not None:
+                array = readonly(value)
+                if array.shape != (3,) or not np.all(np.isfinite(array)):
+                    raise InputError(f"release {name}: got {value!r}, expected three finite numbers")
+                object.__setattr__(self, name, array)
+        object.__setattr__(self, "sigma", MappingProxyType(dict(self.sigma)))
+
+    @classmethod
+    def from_toml(cls, table: TomlTable) -> Release:
+        """Read a ``[release]`` table (or a throw file, which has the same keys)."""
+        position = table.vector("position", "m", frame="ned", required=False)
+        velocity = table.vector("velocity", "m_s", frame="ned", required=False)
+        angles = [table.number(name, "rad", required=False) for name in ("roll", "pitch", "yaw")]
+        body_rate = table.vector("body_rate", "rad_s", required=False)
+        table.finish()
+        return cls(position, velocity, angles[0], angles[1], angles[2], body_rate, table.sigma)

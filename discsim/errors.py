@@ -1,0 +1,17 @@
+"""The one error for bad input: it says what, where, and what was expected."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+__all__ = ["InputError"]
+
+
+class InputError(ValueError):
+    """Input that cannot be used; the message names the file, the line where there is one, and the remedy."""
+
+    @classmethod
+    def at(cls, path: Path | str, line: int | None, message: str) -> InputError:
+        """Return an error that starts with ``path:line:``."""
+        where = f"{path}:{line}" if line else f"{path}"
+        return cls(f"{where}: {message}")

@@ -1,0 +1,67 @@
+"""Files that appear whole or not at all, and where the shipped model files are."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+from discsim.errors import InputError
+
+__all__ = ["digest", "model_file", "model_names", "write_bytes", "write_text"]
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write ``path`` through a temporary file beside it and one rename."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(temporary, 0o666 & ~umask)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write UTF-8 text with LF line ends through `write_bytes`."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def digest(path: Path) -> str:
+    """Return the SHA-256 of a file, or of a folder's files with their names, as hex."""
+    total = hashlib.sha256()
+    if path.is_dir():
+        for child in sorted(p for p in path.rglob("*") if p.is_file()):
+            total.update(str(child.relative_to(path)).encode() + b"\0" + child.read_bytes() + b"\0")
+    else:
+        total.update(path.read_bytes())
+    return total.hexdigest()
+
+
+def _models() -> Traversable:
+    installed = files("discsim") / "models"  # in a wheel
+    return installed if installed.is_dir() else files("discsim") / ".." / "models"  # in a checkout
+
+
+def model_names(folder: str) -> list[str]:
+    """Return the names (without ending) of the shipped files in ``models/folder``."""
+    return sorted(
+        entry.name.rsplit(".", 1)[0] for entry in (_models() / folder).iterdir() if entry.name.endswith(".toml")
+    )
+
+
+def model_file(name: str) -> Path:
+    """Return the path of a shipped model file such as ``discs/driver.toml``; raises `InputError` if there is none."""
+    path = Path(str(_models() / name))
+    if not path.is_file():
+        folder = name.rpartition("/")[0]
+        raise InputError(f"no shipped file '{name}'; expected one of {', '.join(model_names(folder))}")
+    return path.resolve()

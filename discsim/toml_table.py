@@ -1,0 +1,203 @@
+"""TOML read strictly: every key is placed, typed and has its unit in its name; errors name file and line.
+
+A key is ``stem_unit``. Any number may carry a one-sigma uncertainty under ``stem_sigma_unit``; vectors drop
+their frame there (``velocity_ned_m_s`` has ``velocity_sigma_m_s``).
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from discsim.arrays import FloatArray, readonly
+from discsim.errors import InputError
+
+__all__ = ["TomlTable", "read_toml"]
+
+_HEADER = re.compile(r"^\s*\[+\s*([^\]]+?)\s*\]+")
+_KEY = re.compile(r"""^\s*(["']?)([A-Za-z0-9_\-.]+)\1\s*=""")
+
+
+def _line_index(text: str) -> dict[str, int]:
+    """Map ``table.key`` and ``table`` to their 1-based lines (first occurrence)."""
+    index: dict[str, int] = {}
+    table = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if header := _HEADER.match(line):
+            table = header.group(1).replace('"', "").replace(" ", "")
+            index.setdefault(table, number)
+        elif key := _KEY.match(line):
+            index.setdefault(f"{table}.{key.group(2)}".lstrip("."), number)
+    return index
+
+
+def read_toml(path: Path) -> TomlTable:
+    """Read a TOML file (UTF-8); raises `InputError` where it is absent or is no TOML."""
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise InputError.at(path, None, "no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError.at(path, None, f"cannot be read as UTF-8 text ({error})") from None
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        line = re.search(r"line (\d+)", str(error))
+        raise InputError.at(path, int(line.group(1)) if line else None, f"no valid TOML: {error}") from None
+    return TomlTable(content, path, "", _line_index(text))
+
+
+class TomlTable:
+    """One table of a TOML file; each getter takes a key off it, `finish` refuses what is left.
+
+    Attributes
+    ----------
+    sigma : dict
+        One-sigma uncertainties found so far, by the full key of the quantity they belong to.
+    """
+
+    def __init__(self, content: Mapping[str, Any], path: Path, name: str, lines: Mapping[str, int]) -> None:
+        self._left = dict(content)
+        self.path = path
+        self.name = name
+        self._lines = lines
+        self._known: list[str] = []
+        self.sigma: dict[str, float | FloatArray] = {}
+
+    def _full(self, key: str) -> str:
+        return f"{self.name}.{key}" if self.name else key
+
+    def error(self, key: str | None, message: str) -> InputError:
+        """Return an error at ``key``'s line (or this table's)."""
+        line = self._lines.get(self._full(key)) if key else None
+        return InputError.at(self.path, line or self._lines.get(self.name), message)
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._left
+
+    def keys(self) -> list[str]:
+        """Return the keys not yet taken."""
+        return list(self._left)
+
+    def _take(self, key: str, expected: str, required: bool) -> Any:
+        self._known.append(key)
+        if key not in self._left:
+            if required:
+                where = f"[{self.name}]" if self.name else "the top level"
+                raise self.error(None, f"missing key '{key}' in {where}; expected {expected}")
+            return None
+        return self._left.pop(key)
+
+    def text(self, key: str, *, required: bool = True, choices: tuple[str, ...] = ()) -> str | None:
+        """Take a string; one of ``choices`` where given."""
+        expected = f"one of {', '.join(choices)}" if choices else "a text"
+        value = self._take(key, expected, required)
+        if value is not None and (not isinstance(value, str) or (choices and value not in choices)):
+            raise self.error(key, f"'{self._full(key)}' is {value!r}, expected {expected}")
+        return value
+
+    def flag(self, key: str, default: bool = False) -> bool:
+        """Take true or false."""
+        value = self._take(key, "true or false", False)
+        if value is None:
+            return default
+        if not isinstance(value, bool):
+            raise self.error(key, f"'{self._full(key)}' is {value!r}, expected true or false")
+        return value
+
+    def raw(self, key: str) -> Any:
+        """Take whatever stands there (None if absent), unchecked."""
+        return self._take(key, "a value", False)
+
+    def table(self, key: str, *, required: bool = False) -> TomlTable | None:
+        """Take a sub-table."""
+        value = self._take(key, "a table", required)
+        if value is None:
+            return None
+        if not isinstance(value, dict):
+            raise self.error(key, f"'{self._full(key)}' is {value!r}, expected a table")
+        return TomlTable(value, self.path, self._full(key), self._lines)
+
+    def _check(self, key: str, value: Any, positive: bool, minimum: float | None) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise self.error(key, f"'{self._full(key)}' is {value!r}, expected a finite number")
+        if positive and value <= 0:
+            raise self.error(key, f"'{self._full(key)}' is {value!r}, expected a number above zero")
+        if minimum is not None and value < minimum:
+            raise self.error(key, f"'{self._full(key)}' is {value!r}, expected at least {minimum:g}")
+        return float(value)
+
+    def number(
+        self,
+        stem: str,
+        unit: str = "",
+        *,
+        required: bool = True,
+        positive: bool = False,
+        minimum: float | None = None,
+    ) -> float | None:
+        """Take ``stem_unit`` and, if present, its uncertainty ``stem_sigma_unit``."""
+        key = f"{stem}_{unit}" if unit else stem
+        value = self._take(key, "a number", required)
+        self._take_sigma(stem, unit, key, present=value is not None, length=None)
+        return None if value is None else self._check(key, value, positive, minimum)
+
+    def need(self, stem: str, unit: str = "", *, positive: bool = False, minimum: float | None = None) -> float:
+        """Like `number`, for a key that must be there."""
+        value = self.number(stem, unit, positive=positive, minimum=minimum)
+        assert value is not None
+        return value
+
+    def vector(
+        self, stem: str, unit: str, *, frame: str = "", required: bool = True, length: int = 3
+    ) -> FloatArray | None:
+        """Take ``stem_frame_unit`` as (length,) and, if present, ``stem_sigma_unit`` (one number or as many)."""
+        key = "_".join(part for part in (stem, frame, unit) if part)
+        value = self._take(key, f"{length} numbers", required)
+        self._take_sigma(stem, unit, key, present=value is not None, length=length)
+        if value is None:
+            return None
+        if not isinstance(value, list) or len(value) != length:
+            raise self.error(key, f"'{self._full(key)}' is {value!r}, expected a list of {length} numbers")
+        return readonly([self._check(key, item, False, None) for item in value])
+
+    def numbers(self, key: str, *, required: bool = True, dimensions: int = 1) -> FloatArray | None:
+        """Take a list of numbers (or a list of such lists, all of one length)."""
+        expected = "a list of numbers" if dimensions == 1 else "a matrix (equally long lists of numbers)"
+        value = self._take(key, expected, required)
+        if value is None:
+            return None
+        rows = value if dimensions == 2 else [value]
+        if (
+            not isinstance(value, list)
+            or not value
+            or not all(isinstance(row, list) and row and len(row) == len(rows[0]) for row in rows)
+        ):
+            raise self.error(key, f"'{self._full(key)}': expected {expected}")
+        checked = [[self._check(key, item, False, None) for item in row] for row in rows]
+        return readonly(checked if dimensions == 2 else checked[0])
+
+    def _take_sigma(self, stem: str, unit: str, key: str, *, present: bool, length: int | None) -> None:
+        sigma_key = f"{stem}_sigma_{unit}" if unit else f"{stem}_sigma"
+        value = self._take(sigma_key, "a number", False)
+        if value is None:
+            return
+        if not present:
+            raise self.error(sigma_key, f"'{self._full(sigma_key)}' is the uncertainty of '{key}', which is missing")
+        if isinstance(value, list) and length is not None and len(value) == length:
+            self.sigma[key] = readonly([self._check(sigma_key, item, False, 0.0) for item in value])
+        else:
+            self.sigma[key] = self._check(sigma_key, value, False, 0.0)
+
+    def finish(self) -> None:
+        """Raise `InputError` for the first key that was not taken, with the nearest known one."""
+        for key in self._left:
+            near = difflib.get_close_matches(key, self._known, n=1)
+            hint = f"; did you mean '{near[0]}'?" if near else ""
+            known = ", ".join(k for k in self._known if "sigma" not in k)
+            raise self.error(key, f"unknown key '{self._full(key)}'{hint} (expected {known or 'nothing here'})")

@@ -1,0 +1,57 @@
+"""`YawRate`: what every spin-rate estimator gives, so that comparing two is one line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from discsim.arrays import FloatArray, readonly
+
+__all__ = ["YawRate"]
+
+
+@dataclass(frozen=True)
+class YawRate:
+    """Spin rate over time.
+
+    Attributes
+    ----------
+    method : str
+        Name of the estimator.
+    t : (n,) array
+        Centre of the data used for each value, s, ascending.
+    rate, sd : (n,) array
+        Rate about +z_B and its one-sigma uncertainty, rad/s; NaN (both) where the data cannot tell.
+    signed : bool
+        False where the method cannot tell the direction of spin and gives the magnitude.
+    lower, upper : (n,) array or None
+        Worst-case bounds, rad/s, where the method has them (Eq. 11).
+    """
+
+    method: str
+    t: FloatArray
+    rate: FloatArray
+    sd: FloatArray
+    signed: bool = False
+    lower: FloatArray | None = None
+    upper: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("t", "rate", "sd", "lower", "upper"):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            array = readonly(value)
+            if array.shape != np.shape(self.t) or array.ndim != 1:
+                raise ValueError(f"{self.method}: {name} has shape {array.shape}, expected {np.shape(self.t)}")
+            object.__setattr__(self, name, array)
+        if np.any(np.isfinite(self.rate) != np.isfinite(self.sd)):
+            raise ValueError(f"{self.method}: rate and sd must be known (or NaN) together")
+
+    def __len__(self) -> int:
+        return int(self.t.size)
+
+    def at(self, t: FloatArray) -> FloatArray:
+        """Return the rate at times t (m,), linear between neighbours; NaN outside and next to unknown values."""
+        return np.interp(t, self.t, self.rate, left=np.nan, right=np.nan) if len(self) else np.full(np.shape(t), np.nan)

@@ -1,0 +1,72 @@
+"""The command ``discsim``: parses, calls, and turns errors into one clear line and an exit status.
+
+Each sub-command lives in ``validation.commands`` in a module of its own name and is imported only when it runs.
+Exit status: 0 done, 1 done but outside tolerance, 2 bad input or usage.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+
+import click
+import typer
+
+from discsim.errors import InputError
+from validation.run import package_version
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="discsim",
+    help="Physics validation testbed for a flying disc. --debug shows the traceback of an error.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+def _version(show: bool) -> None:
+    if show:
+        typer.echo(f"discsim {package_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Show the version."),
+) -> None:
+    """Physics validation testbed for a flying disc."""
+
+
+def _register() -> None:
+    from validation import commands
+
+    commands.register(app)
+
+
+def main() -> None:
+    """Run the command line."""
+    arguments = sys.argv[1:]
+    debug = "--debug" in arguments
+    sys.argv[1:] = [argument for argument in arguments if argument != "--debug"]
+    os.environ.setdefault("MPLBACKEND", "Agg")
+    _register()
+    try:
+        status = app(standalone_mode=False)
+    except (InputError, click.ClickException) as error:
+        if debug:
+            traceback.print_exc()
+        message = error.format_message() if isinstance(error, click.ClickException) else str(error)
+        typer.echo(f"discsim: {message}", err=True)
+        sys.exit(2)
+    except (KeyboardInterrupt, click.Abort):
+        typer.echo("discsim: interrupted", err=True)
+        sys.exit(130)
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+if __name__ == "__main__":
+    main()

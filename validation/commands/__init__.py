@@ -1,0 +1,18 @@
+"""The sub-commands, one module each; a module's ``command`` function is what typer calls."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import typer
+
+__all__ = ["COMMANDS", "register"]
+
+#: name on the command line -> module in this package
+COMMANDS: dict[str, str] = {}
+
+
+def register(app: typer.Typer) -> None:
+    """Add every sub-command to ``app``; heavy imports happen inside the commands, not here."""
+    for name, module in COMMANDS.items():
+        app.command(name)(import_module(f"validation.commands.{module}").command)

@@ -1,0 +1,106 @@
+"""One run of a command: its output folder, its seed, progress, and the ``run.json`` it leaves."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from discsim.errors import InputError
+from discsim.files import digest, write_text
+
+__all__ = ["Run", "package_version", "start_run"]
+
+T = TypeVar("T")
+
+
+def package_version() -> str:
+    """Return the installed version of discsim ("unknown" when run from a bare source tree)."""
+    try:
+        return version("discsim")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def json_text(content: Any) -> str:
+    """Return JSON with no NaN or Infinity in it: such numbers become null."""
+
+    def clean(value: Any) -> Any:
+        if isinstance(value, Mapping):
+            return {str(k): clean(v) for k, v in value.items()}
+        if isinstance(value, list | tuple):
+            return [clean(v) for v in value]
+        if isinstance(value, np.ndarray):
+            return clean(value.tolist())
+        if isinstance(value, np.generic):
+            return clean(value.item())
+        if isinstance(value, float) and not np.isfinite(value):
+            return None
+        return str(value) if isinstance(value, Path) else value
+
+    return json.dumps(clean(content), indent=2, allow_nan=False) + "\n"
+
+
+@dataclass
+class Run:
+    """A run in progress: where it writes, what it was given, its random generator."""
+
+    out: Path
+    command: list[str]
+    seed: int | None
+    inputs: list[Path] = field(default_factory=list)
+
+    @property
+    def rng(self) -> np.random.Generator:
+        """A fresh generator from the run's seed."""
+        return np.random.default_rng(self.seed)
+
+    def write_json(self, name: str, content: Any) -> None:
+        """Write ``out/name`` whole or not at all."""
+        write_text(self.out / name, json_text(content))
+
+    def step(self, text: str) -> None:
+        """Say what happens now: one line on stderr."""
+        print(text, file=sys.stderr, flush=True)
+
+    def progress(self, items: Iterable[T], total: int, what: str) -> Iterator[T]:
+        """Yield ``items`` with a bar on a terminal and one line per item elsewhere."""
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import track
+
+            yield from track(items, description=what, total=total, console=Console(stderr=True), transient=True)
+            return
+        for number, item in enumerate(items, start=1):
+            self.step(f"{what} {number}/{total}")
+            yield item
+
+
+@contextmanager
+def start_run(out: Path, seed: int | None = None, inputs: Iterable[Path] = ()) -> Iterator[Run]:
+    """Open a run that writes into ``out``; ``run.json`` is written when the block ends without an error."""
+    if out.exists() and not out.is_dir():
+        raise InputError(f"--out {out}: is a file; expected a folder (it is created where absent)")
+    out.mkdir(parents=True, exist_ok=True)
+    run = Run(out, sys.argv[1:], seed, list(inputs))
+    started = time.monotonic()
+    digests = {str(path): digest(path) for path in run.inputs}
+    yield run
+    run.write_json(
+        "run.json",
+        {
+            "command": ["discsim", *run.command],
+            "version": package_version(),
+            "seed": seed,
+            "inputs": digests,
+            "duration_s": round(time.monotonic() - started, 3),
+        },
+    )
