@@ -161,10 +161,14 @@ def _aero(
 def _aero_table(table: TomlTable | None) -> AeroTable | None:
     if table is None:
         return None
-    columns = [table.numbers(key) for key in ("alpha_rad", "CL", "CD", "CM")]
+    alpha, CL, CD, CM = (table.numbers(key) for key in ("alpha_rad", "CL", "CD", "CM"))
     table.finish()
+    assert alpha is not None
+    assert CL is not None
+    assert CD is not None
+    assert CM is not None
     try:
-        return AeroTable(*columns)
+        return AeroTable(alpha, CL, CD, CM)
     except ValueError as error:
         raise table.error(None, str(error)) from None
 

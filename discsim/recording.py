@@ -255,7 +255,7 @@ def read_dataset(folder: Path | str) -> list[Recording]:
 def _read_sheets(table: TomlTable | None, *, strict: bool) -> dict[str, SensorSheet]:
     assert table is not None
     sheets = {}
-    for sensor in table.keys():
+    for sensor in table:
         if sensor not in SENSORS:
             raise table.error(sensor, f"unknown sensor '{sensor}'; expected one of {', '.join(SENSORS)}")
         sheet = table.table(sensor)

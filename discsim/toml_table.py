@@ -10,7 +10,7 @@ import difflib
 import math
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -80,9 +80,9 @@ class TomlTable:
     def __contains__(self, key: str) -> bool:
         return key in self._left
 
-    def keys(self) -> list[str]:
-        """Return the keys not yet taken."""
-        return list(self._left)
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the keys not yet taken."""
+        return iter(list(self._left))
 
     def _take(self, key: str, expected: str, required: bool) -> Any:
         self._known.append(key)

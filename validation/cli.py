@@ -10,7 +10,6 @@ import os
 import sys
 import traceback
 
-import click
 import typer
 
 from discsim.errors import InputError
@@ -56,13 +55,13 @@ def main() -> None:
     _register()
     try:
         status = app(standalone_mode=False)
-    except (InputError, click.ClickException) as error:
+    except (InputError, typer.TyperException) as error:
         if debug:
             traceback.print_exc()
-        message = error.format_message() if isinstance(error, click.ClickException) else str(error)
+        message = error.format_message() if isinstance(error, typer.TyperException) else str(error)
         typer.echo(f"discsim: {message}", err=True)
         sys.exit(2)
-    except (KeyboardInterrupt, click.Abort):
+    except (KeyboardInterrupt, typer.Abort):
         typer.echo("discsim: interrupted", err=True)
         sys.exit(130)
     sys.exit(status if isinstance(status, int) else 0)
