@@ -1,0 +1,147 @@
+"""The catalogue: one row per effect that a baseline leaves out.
+
+Engines, sensors, model files, documentation and diagnosis all know the effects through these rows: a new row is a new
+term, a new hypothesis and a new line of the docs. Forms and parameters are those of docs/physics.md.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from discsim.effects import aero, air, body, events, rig, sensors
+from discsim.errors import InputError
+
+__all__ = ["CATALOGUE", "Effect", "Row", "effect", "row"]
+
+FLIGHT = ("flight",)
+AIRBORNE = ("flight", "free_spin")
+RIGS = ("rate_table", "spin_down")
+EVERYWHERE = ("flight", "rate_table", "spin_down", "free_spin")
+
+
+class Row(NamedTuple):
+    """One effect of the catalogue.
+
+    ``acts_on`` is "motion" or the sensor it belongs to ("clock" for all of a recording's sensors); ``scale`` gives a
+    small but visible size of each parameter, in its unit; an ``event`` happens in one recording.
+    """
+
+    id: str
+    type: type[Any]
+    acts_on: str
+    plants: tuple[str, ...]
+    scale: tuple[float, ...]
+    event: bool = False
+
+    @property
+    def key(self) -> str:
+        """The id as an identifier (``air_wind``)."""
+        return self.id.replace(".", "_")
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters, units in the name."""
+        return tuple(self.type._fields)
+
+    @property
+    def baseline(self) -> Any:
+        """The effect at its baseline: no effect."""
+        return self.type()
+
+
+_ROWS = (
+    Row("air.wind", air.Wind, "motion", FLIGHT, (0.1, 0.1)),
+    Row("air.wind_shear", air.WindShear, "motion", FLIGHT, (0.1, 0.1, 0.1)),
+    Row("air.gust", air.Gust, "motion", FLIGHT, (0.1, 0.1, 0.1, 0.1), event=True),
+    Row("air.density", air.Density, "motion", FLIGHT, (0.01,)),
+    Row("air.ground_effect", air.GroundEffect, "motion", FLIGHT, (0.05,)),
+    Row("aero.spin_side_force", aero.SpinSideForce, "motion", FLIGHT, (0.002,)),
+    Row("aero.spin_lift", aero.SpinLift, "motion", FLIGHT, (0.002,)),
+    Row("aero.spin_drag", aero.SpinDrag, "motion", FLIGHT, (0.002,)),
+    Row("aero.spin_pitching_moment", aero.SpinPitchingMoment, "motion", FLIGHT, (0.0002,)),
+    Row("aero.stall", aero.Stall, "motion", FLIGHT, (0.05, 0.01)),
+    Row("aero.yaw_reynolds", aero.YawReynolds, "motion", FLIGHT, (0.02,)),
+    Row("aero.yaw_quadratic", aero.YawQuadratic, "motion", FLIGHT, (0.0001,)),
+    Row("aero.yaw_alpha", aero.YawAlpha, "motion", FLIGHT, (0.005,)),
+    Row("body.mass_imbalance", body.MassImbalance, "motion", FLIGHT, (1e-4, 1e-4)),
+    Row("body.inertia_asymmetry", body.InertiaAsymmetry, "motion", AIRBORNE, (1e-6,)),
+    Row("event.impulse", events.Impulse, "motion", FLIGHT, (0.01, 0.05, 0.05, 0.05), event=True),
+    Row("event.spin_step", events.SpinStep, "motion", ("flight", "spin_down", "free_spin"), (0.01, 0.1), event=True),
+    Row("rig.coulomb_friction", rig.CoulombFriction, "motion", ("spin_down",), (1e-6,)),
+    Row("rig.quadratic_drag", rig.QuadraticDrag, "motion", ("spin_down",), (1e-8,)),
+    Row("rig.axis_tilt", rig.AxisTilt, "motion", RIGS, (0.002, 0.002)),
+    Row("rig.speed_ripple", rig.SpeedRipple, "motion", ("rate_table",), (0.1, 0.05, 0.1)),
+    Row("mag.hard_iron", sensors.HardIron, "magnetometer", EVERYWHERE, (0.5, 0.5, 0.5)),
+    Row("mag.soft_iron", sensors.SoftIron, "magnetometer", EVERYWHERE, (0.005,) * 6),
+    Row("mag.lag", sensors.Lag, "magnetometer", EVERYWHERE, (1e-4,)),
+    Row("mag.stray_field", sensors.StrayField, "magnetometer", FLIGHT, (0.5, 0.5, 0.5, 0.1)),
+    Row("mag.clock_rate", sensors.ClockRate, "magnetometer", EVERYWHERE, (1e-5,)),
+    Row("mag.dropped_samples", sensors.DroppedSamples, "magnetometer", EVERYWHERE, (0.001,)),
+    Row("accel.lag", sensors.Lag, "accelerometer", EVERYWHERE, (1e-4,)),
+    Row("accel.clock_rate", sensors.ClockRate, "accelerometer", EVERYWHERE, (1e-5,)),
+    Row("accel.dropped_samples", sensors.DroppedSamples, "accelerometer", EVERYWHERE, (0.001,)),
+    Row("accel.position_offset", sensors.PositionOffset, "accelerometer", EVERYWHERE, (5e-5, 5e-5, 5e-5)),
+    Row("accel.bias", sensors.AccelerometerBias, "accelerometer", EVERYWHERE, (0.02, 0.02, 0.02)),
+    Row("accel.bias_drift", sensors.BiasDrift, "accelerometer", EVERYWHERE, (0.01, 0.01, 0.01)),
+    Row("accel.scale", sensors.Scale, "accelerometer", EVERYWHERE, (0.002, 0.002, 0.002)),
+    Row("accel.cross_axis", sensors.CrossAxis, "accelerometer", EVERYWHERE, (0.002,) * 6),
+    Row("accel.saturation", sensors.AccelerometerSaturation, "accelerometer", EVERYWHERE, (1.0,)),
+    Row("gyro.lag", sensors.Lag, "gyroscope", EVERYWHERE, (1e-4,)),
+    Row("gyro.clock_rate", sensors.ClockRate, "gyroscope", EVERYWHERE, (1e-5,)),
+    Row("gyro.bias", sensors.GyroscopeBias, "gyroscope", EVERYWHERE, (1e-3, 1e-3, 1e-3)),
+    Row("gyro.scale", sensors.Scale, "gyroscope", EVERYWHERE, (0.002, 0.002, 0.002)),
+    Row("gyro.g_sensitivity", sensors.GSensitivity, "gyroscope", EVERYWHERE, (1e-5, 1e-5, 1e-5)),
+    Row("gps.clock_rate", sensors.ClockRate, "gps", FLIGHT, (1e-4,)),
+    Row("gps.latency", sensors.Latency, "gps", FLIGHT, (0.002,)),
+    Row("clock.rate", sensors.ClockRate, "clock", EVERYWHERE, (1e-5,)),
+)
+
+CATALOGUE: Mapping[str, Row] = MappingProxyType({row.id: row for row in _ROWS})
+
+
+def row(id: str) -> Row:
+    """Return the row of an effect; raises `InputError` naming the nearest ids."""
+    if id not in CATALOGUE:
+        near = difflib.get_close_matches(id, CATALOGUE, n=1)
+        hint = f"; did you mean '{near[0]}'?" if near else ""
+        raise InputError(f"unknown effect '{id}'{hint} (expected one of {', '.join(CATALOGUE)})")
+    return CATALOGUE[id]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect with its size: an id of the catalogue and a value of that row's type."""
+
+    id: str
+    value: Any
+
+    def __post_init__(self) -> None:
+        if type(self.value) is not row(self.id).type:
+            raise InputError(f"{self.id}: got {type(self.value).__name__}, expected {row(self.id).type.__name__}")
+
+
+def effect(id: str, **parameters: float) -> Effect:
+    """Return an effect by id and parameters; those left out stay at the baseline.
+
+    >>> effect("air.wind", w_north_m_s=1.1).value
+    Wind(w_north_m_s=1.1, w_east_m_s=0.0)
+    """
+    kind = row(id)
+    for name in parameters:
+        if name not in kind.parameters:
+            raise InputError(f"{id}: unknown parameter '{name}'; expected {', '.join(kind.parameters)}")
+    return Effect(id, kind.type(**{name: float(value) for name, value in parameters.items()}))
+
+
+def by_id(effects: Sequence[Effect]) -> dict[str, Any]:
+    """Return the values by id; raises `InputError` where one id appears twice."""
+    values: dict[str, Any] = {}
+    for item in effects:
+        if item.id in values:
+            raise InputError(f"effect '{item.id}' is given twice; expected each at most once in one recording")
+        values[item.id] = item.value
+    return values
