@@ -128,7 +128,7 @@ def multiply(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the quaternion product a b (..., 4): first b, then a, on body components."""
     aw, ax, ay, az = (a[..., i] for i in range(4))
     bw, bx, by, bz = (b[..., i] for i in range(4))
-    return np.stack(
+    product = np.stack(
         [
             aw * bw - ax * bx - ay * by - az * bz,
             aw * bx + ax * bw + ay * bz - az * by,
@@ -137,13 +137,14 @@ def multiply(a: FloatArray, b: FloatArray) -> FloatArray:
         ],
         axis=-1,
     )
+    return np.asarray(product)
 
 
 def turn(vector: FloatArray) -> FloatArray:
     """Return the quaternion (..., 4) of a rotation vector (..., 3) in rad."""
     angle = np.linalg.norm(vector, axis=-1, keepdims=True)
     # np.sinc(x) = sin(pi x)/(pi x), finite at zero
-    return np.concatenate([np.cos(angle / 2), 0.5 * np.sinc(angle / (2 * np.pi)) * vector], axis=-1)
+    return np.asarray(np.concatenate([np.cos(angle / 2), 0.5 * np.sinc(angle / (2 * np.pi)) * vector], axis=-1))
 
 
 def rotation_vector(q: FloatArray) -> FloatArray:
@@ -157,7 +158,7 @@ def rotation_vector(q: FloatArray) -> FloatArray:
 
 def conjugate(q: FloatArray) -> FloatArray:
     """Return the inverse of unit quaternions (..., 4)."""
-    return q * np.array([1.0, -1.0, -1.0, -1.0])
+    return np.multiply(q, [1.0, -1.0, -1.0, -1.0])
 
 
 def rotation_error(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -167,7 +168,7 @@ def rotation_error(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def flip_yz(v: ArrayLike) -> FloatArray:
     """Map vectors (..., 3) between N or B and MuJoCo's axes; of a quaternion pass its vector part."""
-    return np.asarray(v, dtype=float) * FLIP
+    return np.multiply(v, FLIP)
 
 
 @compiled

@@ -100,7 +100,7 @@ class YawReynolds(NamedTuple):
 @compiled
 def yaw_reynolds(effect: YawReynolds, V: float) -> float:
     """Factor on CNr."""
-    return (V / 15.0) ** effect.exponent
+    return float((V / 15.0) ** effect.exponent)
 
 
 class YawQuadratic(NamedTuple):

@@ -31,7 +31,7 @@ class WindShear(NamedTuple):
 @compiled
 def wind_shear(effect: WindShear, h: float) -> float:
     """Factor on the wind at 10 m; h is the height above ground in m."""
-    return (max(h, LOWEST_HEIGHT) / 10.0) ** effect.exponent
+    return float((max(h, LOWEST_HEIGHT) / 10.0) ** effect.exponent)
 
 
 class Gust(NamedTuple):

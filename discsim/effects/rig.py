@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import cos, sin, sqrt
 from typing import NamedTuple
 
 from discsim.compiled import compiled
@@ -54,7 +54,7 @@ class AxisTilt(NamedTuple):
 def axis(effect: AxisTilt) -> tuple[float, float, float]:
     """Unit vector of the axis in N."""
     n, e = effect.tilt_north_rad, effect.tilt_east_rad
-    length = (n * n + e * e + 1.0) ** 0.5
+    length = sqrt(n * n + e * e + 1.0)
     return n / length, e / length, 1.0 / length
 
 

@@ -50,7 +50,7 @@ class HardIron(NamedTuple):
 
 def hard_iron(effect: HardIron, m: FloatArray) -> FloatArray:
     """Return m + b, (n, 3) uT."""
-    return m + np.array(effect)
+    return np.add(m, effect)
 
 
 class SoftIron(NamedTuple):
@@ -68,7 +68,7 @@ def soft_iron(effect: SoftIron, m: FloatArray) -> FloatArray:
     """Return (I + S) m, (n, 3) uT."""
     xx, xy, xz, yy, yz, zz = effect
     S = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return m + m @ S  # S is symmetric
+    return np.add(m, np.matmul(m, S))  # S is symmetric
 
 
 class StrayField(NamedTuple):
@@ -82,7 +82,8 @@ class StrayField(NamedTuple):
 
 def stray_field(effect: StrayField, h: FloatArray) -> FloatArray:
     """Return the added field in N, (n, 3) uT, at heights h (n,) m above ground."""
-    return np.exp(-np.maximum(h, 0.02) / effect.height_m)[:, None] * np.array(effect[:3])
+    decay = np.exp(-np.maximum(h, 0.02) / effect.height_m)
+    return np.multiply(decay[:, None], effect[:3])
 
 
 class Lag(NamedTuple):
@@ -141,7 +142,7 @@ class BiasDrift(NamedTuple):
 
 def bias_drift(effect: BiasDrift, t: FloatArray) -> FloatArray:
     """Return the bias (n, 3) m/s^2 at times t (n,) s."""
-    return t[:, None] * np.array(effect)
+    return np.multiply(t[:, None], effect)
 
 
 class Scale(NamedTuple):
@@ -198,7 +199,7 @@ class GSensitivity(NamedTuple):
 
 def g_sensitivity(effect: GSensitivity, f: FloatArray) -> FloatArray:
     """Return the added rate (n, 3) rad/s for specific force f (n, 3) m/s^2."""
-    return f * np.array(effect)
+    return np.multiply(f, effect)
 
 
 class ClockRate(NamedTuple):

@@ -1,0 +1,154 @@
+"""From the relative wind to the force and moment of the air, (14)-(17), (20), (21): called by both engines.
+
+Everything here is compiled and works in any frame F whose z axis is z_B: body axes in MuJoCo, roll-pitch axes in the
+12-state model. ``p`` is the record of `discsim.parameters.PARAMETERS`.
+
+Departures from the paper, all fixed by docs/physics.md: V is the velocity relative to the air, not to the ground;
+alpha is that of the H frame (A2); (21) prints C2(-alpha) where (23) has C2(alpha), and the latter is right with (A1)
+and (A2).
+"""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.compiled import compiled
+from discsim.effects.aero import (
+    spin_drag,
+    spin_lift,
+    spin_pitching_moment,
+    spin_side_force,
+    stall,
+    yaw_alpha,
+    yaw_quadratic,
+    yaw_reynolds,
+)
+from discsim.effects.air import ground_effect, gust, wind_shear
+from discsim.frames import heading_angles, norm3
+from discsim.parameters import Tables
+
+__all__ = ["advance_ratio", "air_wrench", "wind"]
+
+#: below this airspeed (m/s) the air does nothing; d/(2 V) would lose its meaning
+STILL_AIR = 1e-6
+
+
+@compiled
+def advance_ratio(d: float, r: float, V: float) -> float:
+    """gamma = d r/(2 V), Eq. (15): rim speed over airspeed; positive for r > 0."""
+    return d * r / (2.0 * V)
+
+
+@compiled
+def wind(p: Any, t: float, h: float) -> tuple[float, float, float]:
+    """Wind in N (m/s) at time t and height h: the known one, and what a baseline leaves out of it."""
+    shear, peak = wind_shear(p.air_wind_shear, h), gust(p.air_gust, t)
+    north = p.air_wind.w_north_m_s + shear * p.air_wind_shear.w_north_m_s + peak * p.air_gust.w_north_m_s
+    east = p.air_wind.w_east_m_s + shear * p.air_wind_shear.w_east_m_s + peak * p.air_gust.w_east_m_s
+    e = p.environment
+    return e.wind_north + north, e.wind_east + east, e.wind_down
+
+
+@compiled
+def _cell(x: float, nodes: FloatArray) -> int:
+    """Index of the cell between ascending nodes that holds x; the first or the last where x lies outside."""
+    low, high = 0, nodes.size - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if nodes[middle] <= x:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@compiled
+def _interpolate(x: float, nodes: FloatArray, values: FloatArray) -> float:
+    """Linear between nodes, constant outside."""
+    k = _cell(x, nodes)
+    share = min(max((x - nodes[k]) / (nodes[k + 1] - nodes[k]), 0.0), 1.0)
+    return float(values[k] + (values[k + 1] - values[k]) * share)
+
+
+@compiled
+def static_coefficients(p: Any, tables: Tables, alpha: float) -> tuple[float, float, float]:
+    """C_L, C_D, C_M of a disc that does not spin: linear and quadratic forms, or the table in their place."""
+    if tables.static.shape[1] > 0:
+        nodes = tables.static[0]
+        return (
+            _interpolate(alpha, nodes, tables.static[1]),
+            _interpolate(alpha, nodes, tables.static[2]),
+            _interpolate(alpha, nodes, tables.static[3]),
+        )
+    a = p.aero
+    return a.CL0 + a.CLa * alpha, a.CD0 + a.CDa * (alpha - a.alpha0) ** 2, a.CM0 + a.CMa * alpha
+
+
+@compiled
+def yaw_damping(p: Any, tables: Tables, r: float, V: float) -> float:
+    """CNr, a constant or the spline of the (r, V) table (28); NaN outside the table."""
+    if tables.rate.size == 0:
+        return float(p.aero.CNr)
+    rate = abs(r)
+    nr, nv = tables.rate.size, tables.speed.size
+    if rate < tables.rate[0] or rate > tables.rate[nr - 1] or V < tables.speed[0] or V > tables.speed[nv - 1]:
+        return np.nan
+    i, j = _cell(rate, tables.rate), _cell(V, tables.speed)
+    x, y = rate - tables.rate[i], V - tables.speed[j]
+    c = tables.spline[i, j]
+    value = 0.0
+    for m in range(4):
+        row = ((c[m, 0] * y + c[m, 1]) * y + c[m, 2]) * y + c[m, 3]
+        value = value * x + row
+    return value
+
+
+@compiled
+def air_wrench(
+    p: Any, tables: Tables, h: float, u: float, v: float, w: float, P: float, Q: float, r: float
+) -> tuple[float, float, float, float, float, float]:
+    """Force (N) and moment (N m) of the air about the geometric centre, in the frame F of the arguments.
+
+    h is the height in m; u, v, w the velocity relative to the air, m/s; P, Q, r the body's angular velocity, rad/s.
+    The moment is NaN where a C_Nr table does not reach.
+    """
+    V = norm3(u, v, w)
+    if V < STILL_AIR:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    d = p.disc.d
+    A = pi * d * d / 4.0
+    cos_beta, sin_beta, alpha = heading_angles(u, v, w)
+    p_H, q_H = cos_beta * P + sin_beta * Q, cos_beta * Q - sin_beta * P
+    gamma = advance_ratio(d, r, V)
+    damping = d / (2.0 * V)
+
+    CL, CD, CM = static_coefficients(p, tables, alpha)
+    CL += spin_lift(p.aero_spin_lift, gamma) + stall(p.aero_stall, p.aero.CLa, alpha)
+    CL *= ground_effect(p.air_ground_effect, h, d)
+    CD += spin_drag(p.aero_spin_drag, gamma)
+    CM += p.aero.CMq * q_H * damping + spin_pitching_moment(p.aero_spin_pitching_moment, gamma)
+    CY = spin_side_force(p.aero_spin_side_force, gamma)
+    CR = p.aero.CRr * gamma + p.aero.CRp * p_H * damping  # (16)
+    CN = yaw_damping(p, tables, r, V) * yaw_reynolds(p.aero_yaw_reynolds, V) * gamma  # (17)
+    CN += yaw_quadratic(p.aero_yaw_quadratic, gamma) + yaw_alpha(p.aero_yaw_alpha, gamma, alpha)
+
+    QA = 0.5 * p.air_density.ratio * p.environment.air_density * V * V * A
+    L, D, Y = QA * CL, QA * CD, QA * CY  # (14)
+    R, M, N = QA * d * CR, QA * d * CM, QA * d * CN
+
+    # F_H = C2(alpha) [-D, Y, -L], M_H = C2(alpha) [R, M, 0] + [0, 0, N]: (20), (23)
+    cos_alpha, sin_alpha = np.cos(alpha), np.sin(alpha)
+    Fx, Fy, Fz = -D * cos_alpha + L * sin_alpha, Y, -D * sin_alpha - L * cos_alpha
+    Mx, My, Mz = R * cos_alpha, M, R * sin_alpha + N
+    return (
+        cos_beta * Fx - sin_beta * Fy,
+        sin_beta * Fx + cos_beta * Fy,
+        Fz,
+        cos_beta * Mx - sin_beta * My,
+        sin_beta * Mx + cos_beta * My,
+        Mz,
+    )

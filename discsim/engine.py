@@ -1,0 +1,322 @@
+"""The truth: a spinning disc in MuJoCo with our air on it.
+
+MuJoCo integrates the full spinning body (RK4); the air enters through ``mjcb_passive``, one slot for the whole
+process, which is on loan inside `passive_force` and never left in. On a free joint force is in world axes and acts at
+the body's origin, the geometric centre here; moment is in body axes about it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Literal
+
+import mujoco
+import numpy as np
+from scipy.optimize import brentq
+
+from discsim.aerodynamics import air_wrench, wind
+from discsim.arrays import FloatArray, readonly
+from discsim.compiled import compiled
+from discsim.disc import Disc, Release
+from discsim.effects.body import centre_of_mass, transverse_inertia
+from discsim.effects.catalogue import Effect
+from discsim.effects.events import impulse, spin_step
+from discsim.environment import Environment
+from discsim.errors import InputError
+from discsim.files import model_file
+from discsim.frames import attitude_matrix, body_to_ned, flip_yz, quaternion_from_matrix, rotate_by_quaternion
+from discsim.motion import Motion
+from discsim.parameters import PARAMETERS, Tables, parameters, tables
+
+__all__ = ["FlyingDisc", "check_model", "fly", "passive_force"]
+
+PassiveForce = Callable[[Any, Any], None]
+
+#: a disc is left to itself this high above the ground where a release states no position, m
+RELEASE_HEIGHT = 1.3
+
+
+@contextmanager
+def passive_force(apply: PassiveForce) -> Iterator[None]:
+    """Let ``apply(model, data)`` add to ``data.qfrc_passive`` inside the block, then restore what was there.
+
+    The callback fires for every model that is stepped meanwhile; ``apply`` must ignore those that are not its own.
+    Raises RuntimeError where a model is compiled inside the block: MuJoCo steps the half-built model through the
+    callback, cannot hand it to Python, and says only "Python exception raised".
+    """
+    previous = mujoco.get_mjcb_passive()
+    mujoco.set_mjcb_passive(apply)
+    try:
+        yield
+    except ValueError as error:
+        if "Python exception raised" in str(error):
+            raise RuntimeError(
+                "a MuJoCo model was compiled while a passive-force callback was installed, which MuJoCo cannot do; "
+                "compile every model before entering the block"
+            ) from error
+        raise
+    finally:
+        mujoco.set_mjcb_passive(previous)
+
+
+def check_model(model: Any) -> None:
+    """Refuse settings under which a spinning body is not integrated as it should be; raises `InputError`."""
+    integrator = mujoco.mjtIntegrator(model.opt.integrator)
+    if integrator != mujoco.mjtIntegrator.mjINT_RK4:
+        raise InputError(
+            f"integrator is {integrator.name.removeprefix('mjINT_')}, expected RK4: at 60 rad/s spin and 1 ms, 3 s "
+            "of Euler grow a wobble of 3 rad/s to 316 rad/s and implicitfast damps it to 0.03 rad/s"
+        )
+    both = mujoco.mjtDisableBit.mjDSBL_SPRING | mujoco.mjtDisableBit.mjDSBL_DAMPER
+    if model.opt.disableflags & both == both:
+        raise InputError("springs and dampers are both disabled, which silently switches the passive callback off")
+    if model.opt.density != 0.0 or model.opt.viscosity != 0.0:
+        raise InputError(
+            f"MuJoCo's own air is on (density {model.opt.density:g}, viscosity {model.opt.viscosity:g}), "
+            "expected zero: it would brake the disc besides ours"
+        )
+
+
+@compiled
+def flight_force(
+    flat: FloatArray, tables: Tables, t: float, qpos: FloatArray, qvel: FloatArray, qfrc: FloatArray
+) -> bool:
+    """Add the air and the events to a free joint's forces (6,); return False where a C_Nr table does not reach."""
+    p = flat.view(PARAMETERS)[0]
+    # MuJoCo's axes to N and B: (x, y, z) -> (x, -y, -z)
+    qw, qx, qy, qz = qpos[3], qpos[4], -qpos[5], -qpos[6]
+    P, Q, r = qvel[3], -qvel[4], -qvel[5]
+    ex, ey, ez = centre_of_mass(p.body_mass_imbalance)
+    _, _, centre_down = rotate_by_quaternion(qw, qx, qy, qz, ex, ey, ez)
+    h = qpos[2] - centre_down
+    sn, se, sd = rotate_by_quaternion(qw, qx, qy, qz, Q * ez - r * ey, r * ex - P * ez, P * ey - Q * ex)
+    wn, we, wd = wind(p, t, h)
+    u, v, w = rotate_by_quaternion(qw, -qx, -qy, -qz, qvel[0] + sn - wn, -qvel[1] + se - we, -qvel[2] + sd - wd)
+    Fx, Fy, Fz, Mx, My, Mz = air_wrench(p, tables, h, u, v, w, P, Q, r)
+
+    # a push through the centre of mass; about the geometric centre it has a moment
+    an, ae, ad = impulse(p.event_impulse, t)
+    bx, by, bz = rotate_by_quaternion(qw, -qx, -qy, -qz, an, ae, ad)
+    m = p.disc.mass
+    Fx, Fy, Fz = Fx + m * bx, Fy + m * by, Fz + m * bz
+    Mx, My, Mz = Mx + m * (ey * bz - ez * by), My + m * (ez * bx - ex * bz), Mz + m * (ex * by - ey * bx)
+    Mz += p.disc.Izz * spin_step(p.event_spin_step, t, r)
+
+    Fn, Fe, Fd = rotate_by_quaternion(qw, qx, qy, qz, Fx, Fy, Fz)
+    qfrc[0] += Fn
+    qfrc[1] -= Fe
+    qfrc[2] -= Fd
+    qfrc[3] += Mx
+    qfrc[4] -= My
+    qfrc[5] -= Mz
+    return not np.isnan(Mz)
+
+
+class FlyingDisc:
+    """A disc as a MuJoCo model with its data, and its air as a callback.
+
+    >>> flying = FlyingDisc(disc, Environment())          # doctest: +SKIP
+    >>> with flying.air():
+    ...     mujoco.mj_step(flying.model, flying.data)
+
+    Attributes
+    ----------
+    model, data : mujoco.MjModel, mujoco.MjData
+        The compiled model of ``models/disc.xml`` with this disc's mass, inertia, centre of mass and surroundings.
+    parameters : (n,) array
+        The flat parameters of `discsim.parameters`; may be changed between steps.
+    """
+
+    def __init__(
+        self,
+        disc: Disc,
+        environment: Environment,
+        effects: Sequence[Effect] = (),
+        *,
+        timestep: float = 1e-3,
+        contacts: bool = False,
+    ) -> None:
+        if disc.aero is None:
+            raise InputError("a flight needs the disc's aerodynamic coefficients; expected [disc.aero]")
+        if environment.air_density is None:
+            raise InputError("a flight needs air; expected air_density_kg_m3 in [environment]")
+        if mujoco.get_mjcb_passive() is not None:
+            raise RuntimeError("a passive-force callback is installed; build every disc before entering its block")
+        self.disc = disc
+        self.environment = environment
+        self.parameters = parameters(environment, disc, effects=effects)
+        self.tables = tables(disc)
+        record = self.parameters.view(PARAMETERS)[0]
+        self.centre_of_mass = readonly(centre_of_mass(record["body_mass_imbalance"]))
+        self.model = self._compile(timestep, contacts)
+        self.data = mujoco.MjData(self.model)
+        check_model(self.model)
+        self._views = (self.data.qpos, self.data.qvel, self.data.qfrc_passive)
+
+    def _compile(self, timestep: float, contacts: bool) -> Any:
+        spec = mujoco.MjSpec.from_file(str(model_file("disc.xml")))
+        spec.option.timestep = timestep
+        spec.option.gravity = [0.0, 0.0, -self.environment.gravity]
+        spec.option.magnetic = flip_yz(self.environment.magnetic_field)
+        body = spec.body("disc")
+        body.mass = self.disc.mass
+        asymmetry = self.parameters.view(PARAMETERS)[0]["body_inertia_asymmetry"]
+        body.inertia = [self.disc.Ixx, transverse_inertia(asymmetry, self.disc.Ixx), self.disc.Izz]
+        body.ipos = flip_yz(self.centre_of_mass)
+        grow = self.disc.diameter / 0.212  # the drawing is the driver's
+        for geom in body.geoms:
+            geom.size = np.asarray(geom.size) * [grow, grow if geom.name != "rim" else 1.0, 1.0]
+            geom.pos = np.asarray(geom.pos) * [grow, grow, 1.0]
+        if contacts:
+            for name in ("rim", "ground"):
+                geom = spec.geom(name)
+                geom.contype = geom.conaffinity = 1
+        return spec.compile()
+
+    def release(self, release: Release) -> None:
+        """Set the state: velocity and body rate must be known; raises `InputError` naming what is missing.
+
+        Attitude defaults to level, position to `RELEASE_HEIGHT` above the origin.
+        """
+        for name, key in (("velocity", "velocity_ned_m_s"), ("body_rate", "body_rate_rad_s")):
+            if getattr(release, name) is None:
+                raise InputError(f"a throw needs {key}; expected three numbers")
+        position = np.array([0.0, 0.0, -RELEASE_HEIGHT]) if release.position is None else release.position
+        assert release.velocity is not None
+        assert release.body_rate is not None
+        if position[2] >= 0.0:
+            raise InputError(f"release position is {-position[2]:g} m high, expected above the ground (down < 0)")
+        C_NB = attitude_matrix(release.roll or 0.0, release.pitch or 0.0, release.yaw or 0.0).T
+        q = quaternion_from_matrix(C_NB)
+        mujoco.mj_resetData(self.model, self.data)
+        # the release is the centre of mass's, the joint's origin the geometric centre
+        self.data.qpos[:3] = flip_yz(position - C_NB @ self.centre_of_mass)
+        self.data.qpos[3:7] = [q[0], *flip_yz(q[1:])]
+        swing = np.cross(release.body_rate, self.centre_of_mass)
+        self.data.qvel[:3] = flip_yz(release.velocity - C_NB @ swing)
+        self.data.qvel[3:6] = flip_yz(release.body_rate)
+
+    def apply(self, model: Any, data: Any) -> None:
+        """Add air and events to ``data.qfrc_passive``: the callback. A model that is not this disc's is ignored."""
+        if model is not self.model:
+            return
+        qpos, qvel, qfrc = self._views if data is self.data else (data.qpos, data.qvel, data.qfrc_passive)
+        if not flight_force(self.parameters, self.tables, data.time, qpos, qvel, qfrc):
+            raise InputError(
+                f"at {data.time:.3f} s the disc spins at {np.degrees(abs(qvel[5])):.0f} deg/s and flies at "
+                f"{np.linalg.norm(qvel[:3]):.1f} m/s over ground, outside its C_Nr table"
+            )
+
+    @contextmanager
+    def air(self) -> Iterator[None]:
+        """Install the callback for the block; raises `InputError` where the model's settings would spoil the flight."""
+        check_model(self.model)
+        with passive_force(self.apply):
+            yield
+
+
+@compiled
+def _centre_height(qpos: FloatArray, ex: float, ey: float, ez: float) -> float:
+    """Height of the centre of mass, m."""
+    _, _, down = rotate_by_quaternion(qpos[3], qpos[4], -qpos[5], -qpos[6], ex, ey, ez)
+    return float(qpos[2] - down)
+
+
+def fly(
+    disc: Disc,
+    environment: Environment,
+    release: Release,
+    effects: Sequence[Effect] = (),
+    *,
+    timestep: float = 1e-3,
+    duration: float = 30.0,
+    ground: Literal["stop", "skip"] = "stop",
+) -> Motion:
+    """Fly a disc in MuJoCo and return its true motion.
+
+    The flight ends where the centre of mass reaches the ground (found to better than 1e-7 s), or after ``duration``
+    (s). With ``ground="skip"`` the rim has contact and friction with the ground, and the disc skips and slides on
+    until it rests or ``duration`` ends.
+    """
+    flying = FlyingDisc(disc, environment, effects, timestep=timestep, contacts=ground == "skip")
+    flying.release(release)
+    model, data = flying.model, flying.data
+    ex, ey, ez = (float(x) for x in flying.centre_of_mass)
+    steps = max(1, round(duration / timestep))
+    size, rows = 1024, 0
+    log = np.empty((size, 20))
+
+    def note() -> None:
+        nonlocal log, rows, size
+        if rows == size:
+            size *= 2
+            log = np.resize(log, (size, 20))
+        row = log[rows]
+        row[0], row[1:8], row[8:14], row[14:20] = data.time, data.qpos, data.qvel, data.qacc
+        rows += 1
+
+    touched = False
+    with flying.air():
+        mujoco.mj_forward(model, data)
+        note()
+        for _ in range(steps):
+            mujoco.mj_step(model, data)
+            if ground == "stop" and _centre_height(data.qpos, ex, ey, ez) <= 0.0:
+                _land(flying, log[rows - 1])
+                touched = True
+            mujoco.mj_forward(model, data)
+            if touched and data.time - log[rows - 1, 0] < 1e-9:
+                rows -= 1  # the previous instant already is touch-down
+            note()
+            if touched or (ground == "skip" and _rests(data)):
+                break
+    return _motion(log[:rows], flying, touched)
+
+
+def _rests(data: Any) -> bool:
+    return bool(data.qpos[2] < 0.05 and np.abs(data.qvel[:3]).max() < 0.02 and np.abs(data.qvel[3:]).max() < 0.2)
+
+
+def _land(flying: FlyingDisc, before: FloatArray) -> None:
+    """Redo the last step so that it ends where the centre of mass reaches the ground."""
+    model, data = flying.model, flying.data
+    whole = model.opt.timestep
+    centre = tuple(float(x) for x in flying.centre_of_mass)
+
+    def height_after(step: float) -> float:
+        data.time, data.qpos[:], data.qvel[:] = before[0], before[1:8], before[8:14]
+        model.opt.timestep = max(step, 1e-12)
+        mujoco.mj_step(model, data)
+        return float(_centre_height(data.qpos, *centre))
+
+    try:
+        # brentq's last call need not be its answer, so step once more to it
+        height_after(brentq(height_after, 0.0, whole, xtol=1e-9) if height_after(0.0) > 0.0 else 0.0)
+    finally:
+        model.opt.timestep = whole
+
+
+def _motion(log: FloatArray, flying: FlyingDisc, touched: bool) -> Motion:
+    """Turn MuJoCo's states of the geometric centre into N axes and the motion of the centre of mass."""
+    attitude = np.column_stack((log[:, 4], flip_yz(log[:, 5:8])))
+    rate, turning = flip_yz(log[:, 11:14]), flip_yz(log[:, 17:20])
+    e = flying.centre_of_mass
+    C_NB = body_to_ned(attitude)
+    swing = np.cross(rate, e)
+
+    def in_ned(v: FloatArray) -> FloatArray:
+        return np.asarray(np.einsum("nij,nj->ni", C_NB, np.broadcast_to(v, rate.shape)))
+
+    return Motion(
+        t=log[:, 0],
+        position=flip_yz(log[:, 1:4]) + in_ned(e),
+        velocity=flip_yz(log[:, 8:11]) + in_ned(swing),
+        acceleration=flip_yz(log[:, 14:17]) + in_ned(np.cross(turning, e) + np.cross(rate, swing)),
+        attitude=attitude,
+        rate=rate,
+        angular_acceleration=turning,
+        environment=flying.environment,
+        centre_of_mass=e,
+        touched_down=touched,
+    )

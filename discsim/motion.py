@@ -1,0 +1,156 @@
+"""`Motion`: the truth, on a time grid and at any instant between; no `Recording` carries one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
+
+from discsim.arrays import FloatArray, readonly, vector3
+from discsim.environment import Environment
+from discsim.frames import conjugate, euler_angles, multiply, rotation_vector, to_body, turn
+
+__all__ = ["Motion", "State"]
+
+
+class State(NamedTuple):
+    """Motion at instants t (n,) s; vectors (n, 3) in SI, position to acceleration in N, rates in B."""
+
+    t: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    attitude: FloatArray
+    rate: FloatArray
+    angular_acceleration: FloatArray
+
+    def in_body(self, vector_ned: FloatArray) -> FloatArray:
+        """Return an N vector (3,) or (n, 3) in B, (n, 3)."""
+        return to_body(self.attitude, vector_ned)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """True motion of a disc or a rig.
+
+    Attributes
+    ----------
+    t : (n,) array
+        Ascending times, s; the last is touch-down where ``touched_down``.
+    position, velocity, acceleration : (n, 3) arrays
+        Of the centre of mass, in N.
+    attitude : (n, 4) array
+        Quaternion that turns B components into N.
+    rate, angular_acceleration : (n, 3) arrays
+        Body rates p, q, r in B and their derivatives.
+    environment : Environment
+        Where it happened.
+    centre_of_mass : (3,) array
+        From the geometric centre, in B, m.
+    touched_down : bool
+        Whether the motion ends on the ground.
+    """
+
+    t: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    attitude: FloatArray
+    rate: FloatArray
+    angular_acceleration: FloatArray
+    environment: Environment
+    centre_of_mass: FloatArray = field(default_factory=lambda: readonly([0.0, 0.0, 0.0]))
+    touched_down: bool = False
+
+    def __post_init__(self) -> None:
+        n = np.size(self.t)
+        widths = {"t": (), "attitude": (4,)}
+        for name in ("t", "position", "velocity", "acceleration", "attitude", "rate", "angular_acceleration"):
+            array = readonly(getattr(self, name))
+            expected = (n, *widths.get(name, (3,)))
+            if array.shape != expected:
+                raise ValueError(f"motion {name}: got {array.shape}, expected {expected}")
+            object.__setattr__(self, name, array)
+        object.__setattr__(self, "centre_of_mass", vector3(self.centre_of_mass, "centre of mass (m)"))
+        if n < 2 or np.any(np.diff(self.t) <= 0):
+            raise ValueError(f"motion: got {n} times, expected at least two, ascending")
+
+    @property
+    def start(self) -> float:
+        """First instant, s."""
+        return float(self.t[0])
+
+    @property
+    def end(self) -> float:
+        """Last instant, s."""
+        return float(self.t[-1])
+
+    @property
+    def euler_angles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Roll, pitch, yaw (n,) in rad."""
+        return euler_angles(self.attitude)
+
+    @cached_property
+    def _position(self) -> CubicHermiteSpline:
+        return CubicHermiteSpline(self.t, self.position, self.velocity)
+
+    @cached_property
+    def _velocity(self) -> CubicHermiteSpline:
+        return CubicHermiteSpline(self.t, self.velocity, self.acceleration)
+
+    @cached_property
+    def _acceleration(self) -> CubicSpline:
+        return CubicSpline(self.t, self.acceleration)
+
+    @cached_property
+    def _rate(self) -> CubicHermiteSpline:
+        return CubicHermiteSpline(self.t, self.rate, self.angular_acceleration)
+
+    @cached_property
+    def _angular_acceleration(self) -> CubicSpline:
+        return CubicSpline(self.t, self.angular_acceleration)
+
+    def at(self, t: FloatArray) -> State:
+        """Return the motion at instants t (m,) s between start and end.
+
+        Fourth order in the grid's spacing; attitude is a cubic in the rotation vector of each step that meets both
+        its attitudes and its rates. Raises ValueError outside.
+        """
+        t = np.asarray(t, dtype=float)
+        if t.size and (t.min() < self.start - 1e-12 or t.max() > self.end + 1e-12):
+            raise ValueError(f"motion runs from {self.start:g} to {self.end:g} s, asked for {t.min():g} to {t.max():g}")
+        return State(
+            t,
+            self._position(t),
+            self._velocity(t),
+            self._acceleration(t),
+            self._attitude(t),
+            self._rate(t),
+            self._angular_acceleration(t),
+        )
+
+    def _attitude(self, t: FloatArray) -> FloatArray:
+        k = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, self.t.size - 2)
+        h = (self.t[k + 1] - self.t[k])[:, None]
+        s = (t - self.t[k])[:, None] / h
+        first, second = self.attitude[k], self.attitude[k + 1]
+        whole = rotation_vector(multiply(conjugate(first), second))
+        # slopes of the rotation vector: the rate at its start, J_r^-1(whole) rate at its end
+        slope0, slope1 = h * self.rate[k], h * _right_jacobian_inverse(whole, self.rate[k + 1])
+        vector = s * (1 - s) ** 2 * slope0 + s**2 * (3 - 2 * s) * whole - s**2 * (1 - s) * slope1
+        return multiply(first, turn(vector))
+
+
+def _right_jacobian_inverse(phi: FloatArray, w: FloatArray) -> FloatArray:
+    """Return d(phi)/dt (n, 3) of a rotation vector phi (n, 3) whose body rate is w (n, 3)."""
+    angle2 = np.sum(phi * phi, axis=-1, keepdims=True)
+    half = np.sqrt(angle2) / 2
+    small = angle2 < 1e-4
+    safe = np.where(small, 1.0, half)
+    # (1 - (a/2) cot(a/2))/a^2, with its series near zero
+    factor = np.where(small, 1 / 12 + angle2 / 720, (1 - safe / np.tan(safe)) / np.where(small, 1.0, angle2))
+    cross = np.cross(phi, w)
+    return np.asarray(w + 0.5 * cross + factor * np.cross(phi, cross))

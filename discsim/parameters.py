@@ -1,0 +1,100 @@
+"""All parameters of the physics in one flat array, and names for its places.
+
+Both engines, and later every fit, hand the compiled physics one float64 array. `PARAMETERS` gives its structure: the
+environment, the disc, the rig, and one group per catalogued effect on motion, all at their baseline unless changed.
+Inside compiled code ``array.view(PARAMETERS)[0]`` is a record whose fields read like the equations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from discsim.arrays import FloatArray
+from discsim.disc import Aero, Disc, Rig
+from discsim.effects.catalogue import CATALOGUE, Effect, by_id
+from discsim.environment import Environment
+from discsim.errors import InputError
+
+__all__ = ["PARAMETERS", "Tables", "parameter_index", "parameters", "tables"]
+
+_MOTION = tuple(row for row in CATALOGUE.values() if row.acts_on == "motion")
+
+
+def _group(names: Sequence[str]) -> np.dtype[np.void]:
+    return np.dtype([(name, np.float64) for name in names])
+
+
+PARAMETERS = np.dtype(
+    [
+        ("environment", _group(("gravity", "air_density", "wind_north", "wind_east", "wind_down"))),
+        ("disc", _group(("mass", "d", "Ixx", "Izz"))),
+        ("aero", _group(Aero._fields)),
+        ("rig", _group(("Izz", "viscous"))),
+        *((row.key, _group(row.parameters)) for row in _MOTION),
+    ]
+)
+
+
+def parameter_index(group: str, name: str) -> int:
+    """Return the place of ``group.name`` in the flat array; group is an effect's id or environment, disc, aero, rig."""
+    key = group.replace(".", "_")
+    try:
+        offset = PARAMETERS.fields[key][1] + PARAMETERS[key].fields[name][1]  # type: ignore[index]
+    except KeyError:
+        raise KeyError(f"no parameter '{name}' of '{group}'") from None
+    return offset // 8
+
+
+def parameters(
+    environment: Environment, disc: Disc | None = None, rig: Rig | None = None, effects: Sequence[Effect] = ()
+) -> FloatArray:
+    """Return the flat array (PARAMETERS.itemsize / 8,) of a baseline with effects on it.
+
+    Effects on sensors are passed over: they belong to the sensors. Raises `InputError` for an effect given twice.
+    """
+    flat = np.zeros(PARAMETERS.itemsize // 8)
+    record = flat.view(PARAMETERS)[0]
+    density = environment.air_density
+    record["environment"] = (environment.gravity, 0.0 if density is None else density, *environment.wind)
+    if disc is not None:
+        record["disc"] = (disc.mass, disc.diameter, disc.Ixx, disc.Izz)
+        record["aero"] = tuple(disc.aero or Aero())
+    if rig is not None:
+        record["rig"] = (rig.Izz, rig.viscous)
+    given = by_id(effects)
+    for row in _MOTION:
+        record[row.key] = tuple(given.get(row.id, row.baseline))
+    if not np.all(np.isfinite(flat)):
+        raise InputError("a parameter of the physics is not finite; expected finite numbers only")
+    return flat
+
+
+class Tables(NamedTuple):
+    """Tabulated coefficients as arrays for compiled code; empty where the linear forms hold.
+
+    static is (4, n): alpha, C_L, C_D, C_M. rate (nr,) rad/s and speed (nv,) m/s are the knots of C_Nr, and spline
+    (nr - 1, nv - 1, 4, 4) its bicubic coefficients, highest powers first.
+    """
+
+    static: FloatArray
+    rate: FloatArray
+    speed: FloatArray
+    spline: FloatArray
+
+
+def tables(disc: Disc | None) -> Tables:
+    """Return the tables of a disc."""
+    static = np.empty((4, 0))
+    rate, speed, spline = np.empty(0), np.empty(0), np.empty((0, 0, 4, 4))
+    if disc is not None and (lookup := disc.aero_table) is not None:
+        static = np.stack([lookup.alpha, lookup.CL, lookup.CD, lookup.CM])
+    if disc is not None and (damping := disc.yaw_damping_table) is not None:
+        rate, speed = np.array(damping.rate), np.array(damping.speed)
+        along_rate = CubicSpline(rate, damping.CNr, axis=0).c  # (4, nr - 1, nv)
+        along_both = CubicSpline(speed, along_rate, axis=2).c  # (4, nv - 1, 4, nr - 1)
+        spline = np.ascontiguousarray(np.transpose(along_both, (3, 1, 2, 0)))
+    return Tables(static, rate, speed, spline)
