@@ -168,7 +168,7 @@ def rotation_error(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def flip_yz(v: ArrayLike) -> FloatArray:
     """Map vectors (..., 3) between N or B and MuJoCo's axes; of a quaternion pass its vector part."""
-    return np.multiply(v, FLIP)
+    return np.asarray(np.multiply(v, FLIP), dtype=np.float64)
 
 
 @compiled

@@ -227,9 +227,9 @@ def read_recording(folder: Path | str) -> Recording:
             raise InputError.at(
                 file, None, f"a sensor file without its table; expected [sensors.{sensor}] in recording.toml"
             )
-        samples[sensor] = _read_csv(file, kind.header)
+        samples[sensor] = read_csv(file, kind.header)
     command = folder / "command.csv"
-    knots = _read_csv(command, COMMAND_HEADER, gaps_allowed=False) if command.exists() else None
+    knots = read_csv(command, COMMAND_HEADER, gaps_allowed=False) if command.exists() else None
     if knots is not None and plant != "rate_table":
         raise InputError.at(command, None, f"a command in a {plant} recording; expected it in rate_table only")
     if not samples:
@@ -285,7 +285,7 @@ def _read_sheet(table: TomlTable, sensor: str, *, strict: bool) -> SensorSheet:
 _EMPTY_CELL = re.compile(r"(?<=,)[ \t]*(?=,|$)", re.MULTILINE)
 
 
-def _read_csv(path: Path, header: str, *, gaps_allowed: bool = True) -> Samples:
+def read_csv(path: Path, header: str, *, gaps_allowed: bool = True) -> Samples:
     """Read a CSV file of the format; numpy's parser first, line by line only to say where it failed."""
     try:
         text = path.read_bytes().decode("utf-8-sig")

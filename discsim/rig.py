@@ -1,0 +1,211 @@
+"""Rigs in MuJoCo: a rate table that follows a commanded profile, and a spinner that runs down in its bearing.
+
+Both turn about one hinge, its axis straight down unless tilted; the yaw phase at the start is free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.compiled import compiled
+from discsim.disc import Rig
+from discsim.effects.catalogue import Effect
+from discsim.effects.events import spin_step
+from discsim.effects.rig import axis, coulomb_friction, quadratic_drag, speed_ripple
+from discsim.engine import check_model, passive_force
+from discsim.environment import Environment
+from discsim.errors import InputError
+from discsim.files import model_file
+from discsim.frames import flip_yz, multiply, turn
+from discsim.motion import Motion
+from discsim.parameters import PARAMETERS, parameters
+from discsim.recording import COMMAND_HEADER, Samples, read_csv
+
+__all__ = ["default_profile", "read_profile", "spin_down", "turn_table"]
+
+#: plateaus of the default profile, deg/s
+PLATEAUS_DEG_S = (0, 300, 600, 1000, 1500, 2000, 2500, 3000, 3500, 4000, 4500, 5000)
+#: stiffness of the table's speed loop, 1/s: an error of speed dies out within some 10 ms
+SPEED_LOOP = 100.0
+
+
+def default_profile(plateaus_deg_s: Sequence[float] = PLATEAUS_DEG_S, hold: float = 5.0, ramp: float = 1.0) -> Samples:
+    """Return the knots of a profile of plateaus (deg/s) held for ``hold`` s, with ramps of ``ramp`` s between."""
+    t, rate = [0.0], [np.radians(plateaus_deg_s[0])]
+    for index, plateau in enumerate(plateaus_deg_s):
+        if index:
+            t.append(t[-1] + ramp)
+            rate.append(np.radians(plateau))
+        t.append(t[-1] + hold)
+        rate.append(np.radians(plateau))
+    return Samples(np.array(t), np.array(rate))
+
+
+def read_profile(path: Path) -> Samples:
+    """Read a profile: a CSV file with columns ``time_s,rate_rad_s`` or ``time_s,rate_deg_s``, one row per knot."""
+    if not path.is_file():
+        raise InputError.at(path, None, f"no such file; expected a profile with columns {COMMAND_HEADER}")
+    with path.open(encoding="utf-8-sig", errors="replace") as stream:
+        degrees = stream.readline().strip() == "time_s,rate_deg_s"
+    knots = read_csv(path, "time_s,rate_deg_s" if degrees else COMMAND_HEADER, gaps_allowed=False)
+    if len(knots) < 2:
+        raise InputError.at(path, 2, "one knot only; expected at least two")
+    return Samples(knots.t, np.radians(knots.value)) if degrees else knots
+
+
+@compiled
+def bearing_force(flat: FloatArray, t: float, qvel: FloatArray, qfrc: FloatArray) -> None:
+    """Add the torque of a spin-down rig: ``Izz rdot = -viscous r`` and what a baseline leaves out."""
+    p = flat.view(PARAMETERS)[0]
+    r = qvel[0]
+    torque = -p.rig.viscous * r + coulomb_friction(p.rig_coulomb_friction, r)
+    torque += quadratic_drag(p.rig_quadratic_drag, r)
+    qfrc[0] += torque + p.rig.Izz * spin_step(p.event_spin_step, t, r)
+
+
+@compiled
+def drive_force(
+    flat: FloatArray, segment: FloatArray, t: float, qpos: FloatArray, qvel: FloatArray, qfrc: FloatArray
+) -> None:
+    """Add the torque of a rate table's drive, which follows the running segment of its profile.
+
+    segment is (start s, rate there rad/s, slope rad/s^2, yaw at the recording's start rad, inertia kg m^2).
+    """
+    p = flat.view(PARAMETERS)[0]
+    start, rate, slope, yaw, inertia = segment[0], segment[1], segment[2], segment[3], segment[4]
+    r = qvel[0]
+    command = rate + slope * (t - start)
+    ripple, ripple_slope = speed_ripple(p.rig_speed_ripple, qpos[0] - yaw, r)
+    if command == 0.0 and slope == 0.0:  # the ripple is there while the table turns
+        ripple, ripple_slope = 0.0, 0.0
+    qfrc[0] += inertia * (slope + ripple_slope + SPEED_LOOP * (command + ripple - r))
+
+
+class _Hinge:
+    """The compiled rate-table model and the log of its states."""
+
+    def __init__(self, environment: Environment, flat: FloatArray, inertia: float, yaw: float) -> None:
+        if mujoco.get_mjcb_passive() is not None:
+            raise RuntimeError("a passive-force callback is installed; build every rig before entering its block")
+        spec = mujoco.MjSpec.from_file(str(model_file("rate_table.xml")))
+        spec.option.gravity = [0.0, 0.0, -environment.gravity]
+        spec.option.magnetic = flip_yz(environment.magnetic_field)
+        spec.body("table").inertia = [inertia, inertia, inertia]
+        self.tilt = _tilt(flat)
+        spec.body("axis").quat = [self.tilt[0], *flip_yz(self.tilt[1:])]
+        self.model = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        check_model(self.model)
+        self.environment = environment
+        self.data.qpos[0] = yaw
+        self.log: list[tuple[float, float, float, float]] = []
+
+    def note(self) -> None:
+        data = self.data
+        mujoco.mj_forward(self.model, data)
+        self.log.append((data.time, float(data.qpos[0]), float(data.qvel[0]), float(data.qacc[0])))
+
+    def run(self, until: float, timestep: float) -> None:
+        """Step to ``until`` in equal steps of at most ``timestep``, noting each state."""
+        span = until - self.data.time
+        steps = max(1, int(np.ceil(span / timestep - 1e-9)))
+        self.model.opt.timestep = span / steps
+        for _ in range(steps):
+            mujoco.mj_step(self.model, self.data)
+            self.note()
+        self.data.time = until
+
+    def motion(self) -> Motion:
+        t, yaw, rate, acceleration = np.array(self.log).T
+        along_z = np.array([0.0, 0.0, 1.0])
+        still = np.zeros((t.size, 3))
+        attitude = multiply(np.broadcast_to(self.tilt, (t.size, 4)), turn(yaw[:, None] * along_z))
+        return Motion(
+            t=t,
+            position=still,
+            velocity=still,
+            acceleration=still,
+            attitude=attitude,
+            rate=rate[:, None] * along_z,
+            angular_acceleration=acceleration[:, None] * along_z,
+            environment=self.environment,
+        )
+
+
+def _tilt(flat: FloatArray) -> FloatArray:
+    """Return the quaternion that turns z of N onto the rig's axis the short way."""
+    n, e, d = axis(flat.view(PARAMETERS)[0]["rig_axis_tilt"])
+    across = np.hypot(n, e)
+    angle = np.arctan2(across, d)
+    return turn(np.array([-e, n, 0.0]) * (angle / across if across > 0 else 0.0))
+
+
+def turn_table(
+    profile: Samples,
+    environment: Environment,
+    effects: Sequence[Effect] = (),
+    *,
+    yaw: float = 0.0,
+    inertia: float = 1.1e-3,
+    timestep: float = 1e-3,
+) -> Motion:
+    """Turn a rate table through a profile (t (n,) s, rate (n,) rad/s, piecewise linear) and return its true motion.
+
+    ``yaw`` is the phase at t = 0 in rad, ``inertia`` the table's in kg m^2. Steps end on the profile's knots, so the
+    table follows ramps without error; `discsim.effects.rig` can add ripple and tilt.
+    """
+    if len(profile) < 2 or profile.value.ndim != 1 or np.any(np.isnan(profile.value)):
+        raise InputError("profile: expected at least two knots (time, rate) without gaps")
+    flat = parameters(environment, effects=effects)
+    hinge = _Hinge(environment, flat, inertia, yaw)
+    model, data = hinge.model, hinge.data
+    segment = np.zeros(5)
+    views = (data.qpos, data.qvel, data.qfrc_passive)
+
+    def drive(stepped_model: Any, stepped_data: Any) -> None:
+        if stepped_model is model and stepped_data is data:
+            drive_force(flat, segment, data.time, *views)
+
+    data.time = profile.t[0]
+    data.qvel[0] = profile.value[0]
+    slopes = np.diff(profile.value) / np.diff(profile.t)
+    with passive_force(drive):
+        for k, slope in enumerate(slopes):
+            segment[:] = profile.t[k], profile.value[k], slope, yaw, inertia
+            if k == 0:
+                hinge.note()
+            hinge.run(float(profile.t[k + 1]), timestep)
+    return hinge.motion()
+
+
+def spin_down(
+    rig: Rig,
+    environment: Environment,
+    rate: float,
+    duration: float,
+    effects: Sequence[Effect] = (),
+    *,
+    yaw: float = 0.0,
+    timestep: float = 1e-3,
+) -> Motion:
+    """Let a rig run down from ``rate`` (rad/s) for ``duration`` (s) and return its true motion."""
+    flat = parameters(environment, rig=rig, effects=effects)
+    hinge = _Hinge(environment, flat, rig.Izz, yaw)
+    model, data = hinge.model, hinge.data
+    views = (data.qvel, data.qfrc_passive)
+
+    def brake(stepped_model: Any, stepped_data: Any) -> None:
+        if stepped_model is model and stepped_data is data:
+            bearing_force(flat, data.time, *views)
+
+    data.qvel[0] = rate
+    with passive_force(brake):
+        hinge.note()
+        hinge.run(duration, timestep)
+    return hinge.motion()

@@ -1,0 +1,76 @@
+"""Gyroscope: body rates, clipped at its range, with the errors of a real one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from discsim.arrays import FloatArray, readonly, vector3
+from discsim.effects.sensors import GSensitivity, GyroscopeBias, Lag, Scale, g_sensitivity, sensitivity
+from discsim.frames import body_to_ned, turn
+from discsim.motion import Motion
+from discsim.recording import Samples, SensorSheet
+from discsim.sensors.accelerometer import specific_force
+from discsim.sensors.sampling import Noise, Sampling, digitise, filtered
+
+__all__ = ["Gyroscope"]
+
+
+@dataclass(frozen=True)
+class Gyroscope:
+    """A gyroscope of one to three axes; every error starts at zero, so a bare one is ideal.
+
+    ``axes`` tells which of x, y, z exist; absent ones read NaN. ``position`` (3,) m in B is the accelerometer's, where
+    the specific force that fakes rates is taken. ``noise``, ``resolution`` and ``range`` are in rad/s.
+    """
+
+    sampling: Sampling = field(default_factory=lambda: Sampling(200.0))
+    axes: tuple[bool, bool, bool] = (True, True, True)
+    misalignment: FloatArray = field(default_factory=lambda: readonly([0.0, 0.0, 0.0]))
+    scale: Scale = field(default_factory=Scale)
+    bias: GyroscopeBias = field(default_factory=GyroscopeBias)
+    g_sensitivity: GSensitivity = field(default_factory=GSensitivity)
+    position: FloatArray = field(default_factory=lambda: readonly([-0.0161, 0.0, 0.0]))
+    lag: Lag = field(default_factory=Lag)
+    noise: Noise = field(default_factory=Noise)
+    resolution: float = 0.0
+    range: float = float("inf")
+
+    def __post_init__(self) -> None:
+        for name in ("position", "misalignment"):
+            object.__setattr__(self, name, vector3(getattr(self, name), f"gyroscope {name}"))
+
+    def ideal(self, motion: Motion, t: FloatArray) -> FloatArray:
+        """Return the reading (n, 3) rad/s before lag and noise at instants t (n,)."""
+        state = motion.at(t)
+        turned = state.rate @ body_to_ned(turn(self.misalignment))
+        reading = turned @ sensitivity(self.scale).T + np.array(self.bias)
+        if any(self.g_sensitivity):
+            reading = reading + g_sensitivity(self.g_sensitivity, specific_force(state, motion, self.position))
+        return np.asarray(reading)
+
+    def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
+        """Return the samples of a motion, value (n, 3) rad/s."""
+        written, taken = self.sampling.instants(motion.start, motion.end, rng)
+        value = filtered(self.lag, motion, lambda t: self.ideal(motion, t), taken)
+        reading = digitise(
+            value,
+            written,
+            self.noise,
+            rng,
+            resolution=self.resolution,
+            limit=self.range,
+            axes=np.array(self.axes),
+        )
+        return Samples(written, reading)
+
+    @property
+    def sheet(self) -> SensorSheet:
+        """What its data sheet states; the hidden errors are not in it."""
+        return SensorSheet(
+            self.sampling.rate_hz,
+            self.noise.white,
+            self.resolution or None,
+            self.range if np.isfinite(self.range) else None,
+        )

@@ -1,0 +1,217 @@
+"""The instruments on board: parts from their parameter files, the effects upon them, and the recording they make."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from discsim.disc import Disc, Release, Rig
+from discsim.effects.catalogue import CATALOGUE, Effect, by_id
+from discsim.effects.sensors import ClockRate
+from discsim.errors import InputError
+from discsim.files import model_file
+from discsim.motion import Motion
+from discsim.recording import SENSORS, Plant, Recording, Samples
+from discsim.sensors.accelerometer import Accelerometer
+from discsim.sensors.gyroscope import Gyroscope
+from discsim.sensors.magnetometer import Magnetometer
+from discsim.sensors.position import Gps, Tracker
+from discsim.sensors.rate_reference import RateReference
+from discsim.sensors.sampling import Noise, Sampling
+from discsim.toml_table import TomlTable, read_toml
+
+__all__ = ["Instruments", "Sensor", "read_part", "record"]
+
+Sensor: TypeAlias = Accelerometer | Gyroscope | Magnetometer | Gps | RateReference | Tracker
+
+#: where an effect of the catalogue sits in its sensor: id -> field (clocks and losses are the sampling's)
+_FIELDS: Mapping[str, str] = MappingProxyType(
+    {
+        "mag.hard_iron": "hard_iron",
+        "mag.soft_iron": "soft_iron",
+        "mag.lag": "lag",
+        "mag.stray_field": "stray_field",
+        "accel.lag": "lag",
+        "accel.position_offset": "offset",
+        "accel.bias": "bias",
+        "accel.bias_drift": "drift",
+        "accel.scale": "scale",
+        "accel.cross_axis": "cross_axis",
+        "accel.saturation": "saturation",
+        "gyro.lag": "lag",
+        "gyro.bias": "bias",
+        "gyro.scale": "scale",
+        "gyro.g_sensitivity": "g_sensitivity",
+        "gps.latency": "latency",
+    }
+)
+_SAMPLING_FIELDS: Mapping[str, str] = MappingProxyType({"clock_rate": "clock", "dropped_samples": "dropped"})
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """The sensors of one module by name (`discsim.recording.SENSORS`), and the clock they share."""
+
+    sensors: Mapping[str, Sensor] = field(default_factory=dict)
+    clock: ClockRate = field(default_factory=ClockRate)
+
+    def __post_init__(self) -> None:
+        for name in self.sensors:
+            if name not in SENSORS:
+                raise InputError(f"unknown sensor '{name}'; expected one of {', '.join(SENSORS)}")
+        object.__setattr__(self, "sensors", MappingProxyType(dict(self.sensors)))
+
+    @classmethod
+    def from_parts(cls, *names: str) -> Instruments:
+        """Put together shipped parts or part files; of two that have the same sensor the later one counts."""
+        sensors: dict[str, Sensor] = {}
+        for name in names:
+            sensors.update(read_part(name))
+        return cls(sensors)
+
+    def without(self, *names: str) -> Instruments:
+        """Return the module less some sensors."""
+        return replace(self, sensors={name: sensor for name, sensor in self.sensors.items() if name not in names})
+
+    def fitted(self, name: str, **changes: Any) -> Instruments:
+        """Return the module with fields of one sensor changed (``fitted("accelerometer", position=...)``)."""
+        if name not in self.sensors:
+            raise InputError(f"no {name} in this module; it has {', '.join(self.sensors) or 'no sensor'}")
+        return replace(self, sensors={**self.sensors, name: replace(self.sensors[name], **changes)})
+
+    def with_effects(self, effects: Sequence[Effect]) -> Instruments:
+        """Return the module with the effects that act on sensors; those of absent sensors are passed over."""
+        module = self
+        for id, value in by_id(effects).items():
+            target = CATALOGUE[id].acts_on
+            if target == "clock":
+                module = replace(module, clock=value)
+            elif target in module.sensors:
+                if id in _FIELDS:
+                    module = module.fitted(target, **{_FIELDS[id]: value})
+                else:
+                    key = _SAMPLING_FIELDS[id.split(".")[1]]
+                    sampling = replace(module.sensors[target].sampling, **{key: value})
+                    module = module.fitted(target, sampling=sampling)
+        return module
+
+
+def record(
+    motion: Motion,
+    instruments: Instruments,
+    rng: np.random.Generator,
+    *,
+    plant: Plant,
+    name: str,
+    disc: Disc | None = None,
+    rig: Rig | None = None,
+    release: Release | None = None,
+    command: Samples | None = None,
+) -> Recording:
+    """Let the instruments measure a motion; each sensor draws from a random stream of its own."""
+    streams = dict(zip(SENSORS, rng.spawn(len(SENSORS)), strict=True))
+    samples, sheets = {}, {}
+    for sensor_name in SENSORS:
+        sensor = instruments.sensors.get(sensor_name)
+        if sensor is None:
+            continue
+        own = sensor.sampling
+        shared = replace(own, clock=ClockRate(own.clock.ratio * instruments.clock.ratio))
+        taken = replace(sensor, sampling=shared).measure(motion, streams[sensor_name])
+        if len(taken):
+            samples[sensor_name], sheets[sensor_name] = taken, sensor.sheet
+    return Recording(plant, name, motion.environment, disc, rig, release, sheets, samples, command)
+
+
+# ------------------------------------------------------------------------------------------------ part files
+
+
+def read_part(name: str) -> dict[str, Sensor]:
+    """Read a part: the name of a shipped one (``mpu9250``) or a TOML file; returns its sensors by name."""
+    path = Path(name) if name.endswith(".toml") else model_file(f"parts/{name}.toml")
+    top = read_toml(path)
+    top.text("name")
+    sensors: dict[str, Sensor] = {}
+    for sensor_name, read in _READERS.items():
+        table = top.table(sensor_name)
+        if table is not None:
+            sensors[sensor_name] = read(table)
+            _worst_case(table)
+            table.finish()
+    top.finish()
+    if not sensors:
+        raise InputError.at(path, None, f"no sensor in this part; expected one of {', '.join(_READERS)}")
+    return sensors
+
+
+def _worst_case(table: TomlTable) -> dict[str, Any]:
+    """Take what a data sheet allows at worst: documentation, and bounds for the envelopes of Eq. (11)."""
+    worst = table.table("worst_case")
+    return {} if worst is None else {key: worst.raw(key) for key in worst}
+
+
+def _common(table: TomlTable, unit: str) -> dict[str, Any]:
+    return {
+        "sampling": Sampling(table.need("rate", "hz", positive=True)),
+        "noise": _noise(table, "noise_rms", unit),
+        "resolution": table.number("resolution", unit, required=False, minimum=0.0) or 0.0,
+    }
+
+
+def _noise(table: TomlTable, stem: str, unit: str) -> Noise:
+    return Noise(table.number(stem, unit, required=False, minimum=0.0) or 0.0)
+
+
+def _range(table: TomlTable, unit: str) -> float:
+    return table.number("range", unit, required=False, positive=True) or float("inf")
+
+
+def _accelerometer(table: TomlTable) -> Accelerometer:
+    position = table.vector("position", "m")
+    assert position is not None
+    return Accelerometer(**_common(table, "m_s2"), range=_range(table, "m_s2"), position=position)
+
+
+def _gyroscope(table: TomlTable) -> Gyroscope:
+    axes = table.text("axes", required=False) or "xyz"
+    if not axes or set(axes) - set("xyz"):
+        raise table.error("axes", f"axes is '{axes}', expected letters out of 'xyz'")
+    present = ("x" in axes, "y" in axes, "z" in axes)
+    return Gyroscope(**_common(table, "rad_s"), range=_range(table, "rad_s"), axes=present)
+
+
+def _magnetometer(table: TomlTable) -> Magnetometer:
+    return Magnetometer(**_common(table, "uT"), range=_range(table, "uT"))
+
+
+def _gps(table: TomlTable) -> Gps:
+    return Gps(
+        Sampling(table.need("rate", "hz", positive=True)),
+        position_noise=_noise(table, "position_noise_rms", "m"),
+        velocity_noise=_noise(table, "velocity_noise_rms", "m_s"),
+    )
+
+
+def _rate_reference(table: TomlTable) -> RateReference:
+    return RateReference(**_common(table, "rad_s"))
+
+
+def _track(table: TomlTable) -> Tracker:
+    return Tracker(Sampling(table.need("rate", "hz", positive=True)), _noise(table, "noise_rms", "m"))
+
+
+_READERS: Mapping[str, Callable[[TomlTable], Sensor]] = MappingProxyType(
+    {
+        "magnetometer": _magnetometer,
+        "accelerometer": _accelerometer,
+        "gyroscope": _gyroscope,
+        "gps": _gps,
+        "rate_reference": _rate_reference,
+        "track": _track,
+    }
+)

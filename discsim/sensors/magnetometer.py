@@ -1,0 +1,63 @@
+"""Magnetometer: the local field in body axes, bent and shifted by iron, late, noisy and rounded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from discsim.arrays import FloatArray, readonly, vector3
+from discsim.effects.sensors import HardIron, Lag, SoftIron, StrayField, hard_iron, soft_iron, stray_field
+from discsim.frames import body_to_ned, turn
+from discsim.motion import Motion
+from discsim.recording import Samples, SensorSheet
+from discsim.sensors.sampling import Noise, Sampling, digitise, filtered
+
+__all__ = ["Magnetometer"]
+
+
+@dataclass(frozen=True)
+class Magnetometer:
+    """A three-axis magnetometer; every error starts at zero, so a bare one is ideal.
+
+    ``noise``, ``resolution`` and ``range`` are in uT; ``misalignment`` (3,) rad turns its axes. Scale and cross-axis
+    errors are the diagonal and the rest of ``soft_iron``.
+    """
+
+    sampling: Sampling = field(default_factory=lambda: Sampling(100.0))
+    misalignment: FloatArray = field(default_factory=lambda: readonly([0.0, 0.0, 0.0]))
+    soft_iron: SoftIron = field(default_factory=SoftIron)
+    hard_iron: HardIron = field(default_factory=HardIron)
+    stray_field: StrayField = field(default_factory=StrayField)
+    lag: Lag = field(default_factory=Lag)
+    noise: Noise = field(default_factory=Noise)
+    resolution: float = 0.0
+    range: float = float("inf")
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "misalignment", vector3(self.misalignment, "magnetometer misalignment"))
+
+    def ideal(self, motion: Motion, t: FloatArray) -> FloatArray:
+        """Return the reading (n, 3) uT before lag and noise at instants t (n,)."""
+        state = motion.at(t)
+        field_b = state.in_body(motion.environment.magnetic_field)
+        stray = state.in_body(stray_field(self.stray_field, -state.position[:, 2]))
+        bent = hard_iron(self.hard_iron, soft_iron(self.soft_iron, field_b)) + stray
+        return np.asarray(bent @ body_to_ned(turn(self.misalignment)))
+
+    def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
+        """Return the samples of a motion, value (n, 3) uT."""
+        written, taken = self.sampling.instants(motion.start, motion.end, rng)
+        value = filtered(self.lag, motion, lambda t: self.ideal(motion, t), taken)
+        reading = digitise(value, written, self.noise, rng, resolution=self.resolution, limit=self.range)
+        return Samples(written, reading)
+
+    @property
+    def sheet(self) -> SensorSheet:
+        """What its data sheet states; the hidden errors are not in it."""
+        return SensorSheet(
+            self.sampling.rate_hz,
+            self.noise.white,
+            self.resolution or None,
+            self.range if np.isfinite(self.range) else None,
+        )
