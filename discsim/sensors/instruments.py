@@ -10,9 +10,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from discsim.arrays import FloatArray, readonly
 from discsim.disc import Disc, Release, Rig
 from discsim.effects.catalogue import CATALOGUE, Effect, by_id
-from discsim.effects.sensors import ClockRate
+from discsim.effects.sensors import AccelerometerBias, ClockRate, CrossAxis, GSensitivity, GyroscopeBias, Scale
 from discsim.errors import InputError
 from discsim.files import model_file
 from discsim.motion import Motion
@@ -54,11 +55,44 @@ _SAMPLING_FIELDS: Mapping[str, str] = MappingProxyType({"clock_rate": "clock", "
 
 
 @dataclass(frozen=True)
+class WorstCase:
+    """Largest errors a data sheet allows; SI, relative where no unit is said. Zero where it says nothing."""
+
+    nonlinearity: float = 0.0
+    cross_axis: float = 0.0
+    scale: float = 0.0
+    bias: FloatArray = field(default_factory=lambda: readonly([0.0, 0.0, 0.0]))
+    g_sensitivity: float = 0.0
+
+    def draw(self, sensor: str, rng: np.random.Generator) -> dict[str, Any]:
+        """Return the fields of one specimen of ``sensor``, each error even within its bounds."""
+        diagonal = (self.nonlinearity + self.scale) * rng.uniform(-1, 1, 3)
+        off_diagonal = self.cross_axis * rng.uniform(-1, 1, 6)
+        bias = self.bias * rng.uniform(-1, 1, 3)
+        faked = self.g_sensitivity * rng.uniform(-1, 1, 3)
+        if sensor == "accelerometer":
+            return {
+                "scale": Scale(*diagonal.tolist()),
+                "cross_axis": CrossAxis(*off_diagonal.tolist()),
+                "bias": AccelerometerBias(*bias.tolist()),
+            }
+        return {
+            "scale": Scale(*diagonal.tolist()),
+            "bias": GyroscopeBias(*bias.tolist()),
+            "g_sensitivity": GSensitivity(*faked.tolist()),
+        }
+
+
+@dataclass(frozen=True)
 class Instruments:
-    """The sensors of one module by name (`discsim.recording.SENSORS`), and the clock they share."""
+    """The sensors of one module by name (`discsim.recording.SENSORS`), and the clock they share.
+
+    ``worst_case`` holds, by sensor, what the data sheets allow of errors that differ from part to part.
+    """
 
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
     clock: ClockRate = field(default_factory=ClockRate)
+    worst_case: Mapping[str, WorstCase] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in self.sensors:
@@ -70,9 +104,20 @@ class Instruments:
     def from_parts(cls, *names: str) -> Instruments:
         """Put together shipped parts or part files; of two that have the same sensor the later one counts."""
         sensors: dict[str, Sensor] = {}
+        worst: dict[str, WorstCase] = {}
         for name in names:
-            sensors.update(read_part(name))
-        return cls(sensors)
+            part = read_part(name)
+            sensors.update(part.sensors)
+            worst.update(part.worst_case)
+        return cls(sensors, worst_case=worst)
+
+    def drawn(self, rng: np.random.Generator) -> Instruments:
+        """Return one specimen: part-to-part errors drawn evenly within what the data sheets allow."""
+        module = self
+        for name, worst in self.worst_case.items():
+            if name in module.sensors:
+                module = module.fitted(name, **worst.draw(name, rng))
+        return module
 
     def without(self, *names: str) -> Instruments:
         """Return the module less some sensors."""
@@ -131,28 +176,36 @@ def record(
 # ------------------------------------------------------------------------------------------------ part files
 
 
-def read_part(name: str) -> dict[str, Sensor]:
-    """Read a part: the name of a shipped one (``mpu9250``) or a TOML file; returns its sensors by name."""
+def read_part(name: str) -> Instruments:
+    """Read a part: the name of a shipped one (``mpu9250``) or a TOML file."""
     path = Path(name) if name.endswith(".toml") else model_file(f"parts/{name}.toml")
     top = read_toml(path)
     top.text("name")
     sensors: dict[str, Sensor] = {}
+    worst: dict[str, WorstCase] = {}
     for sensor_name, read in _READERS.items():
         table = top.table(sensor_name)
         if table is not None:
             sensors[sensor_name] = read(table)
-            _worst_case(table)
+            if sensor_name in ("accelerometer", "gyroscope"):
+                worst[sensor_name] = _worst_case(table.table("worst_case"), SENSORS[sensor_name].unit)
             table.finish()
     top.finish()
     if not sensors:
         raise InputError.at(path, None, f"no sensor in this part; expected one of {', '.join(_READERS)}")
-    return sensors
+    return Instruments(sensors, worst_case=worst)
 
 
-def _worst_case(table: TomlTable) -> dict[str, Any]:
-    """Take what a data sheet allows at worst: documentation, and bounds for the envelopes of Eq. (11)."""
-    worst = table.table("worst_case")
-    return {} if worst is None else {key: worst.raw(key) for key in worst}
+def _worst_case(table: TomlTable | None, unit: str) -> WorstCase:
+    if table is None:
+        return WorstCase()
+    relative = {
+        name: table.number(name, required=False, minimum=0.0) or 0.0 for name in ("nonlinearity", "cross_axis", "scale")
+    }
+    bias = table.vector("bias", unit, required=False)
+    faked = table.number("g_sensitivity", "rad_s_per_m_s2", required=False, minimum=0.0) or 0.0
+    table.finish()
+    return WorstCase(**relative, bias=readonly([0, 0, 0]) if bias is None else bias, g_sensitivity=faked)
 
 
 def _common(table: TomlTable, unit: str) -> dict[str, Any]:

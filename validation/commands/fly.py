@@ -1,0 +1,66 @@
+"""``discsim fly``: one flight of a disc in MuJoCo, as its instruments record it, with the truth beside it."""
+
+from __future__ import annotations
+
+import enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from validation.options import EffectOption, OutOption, SeedOption, parse_effects
+
+__all__ = ["command"]
+
+
+class Ground(enum.StrEnum):
+    """What the ground does to a flight."""
+
+    stop = "stop"
+    skip = "skip"
+
+
+def command(
+    disc: Annotated[str, typer.Option(help="A shipped disc's name, or a TOML file with [disc] and [environment].")] = (
+        "driver"
+    ),
+    throw: Annotated[
+        str, typer.Option(help="A shipped throw's name, or a TOML file with the keys of [release].")
+    ] = "driver",
+    parts: Annotated[
+        str, typer.Option(help="Sensor parts on board, shipped names or TOML files, separated by commas.")
+    ] = "mpu9250,neo_m8n",
+    effect: EffectOption = None,
+    ground: Annotated[Ground, typer.Option(help="The ground ends the flight, or the disc skips on.")] = Ground.stop,
+    duration: Annotated[float, typer.Option(min=0.01, help="Longest flight, s.")] = 30.0,
+    out: OutOption = Path("flight"),
+    seed: SeedOption = 0,
+) -> None:
+    """Fly a disc and write what its instruments record.
+
+    Writes a recording folder (recording.toml and one CSV file per sensor) and truth.csv into --out.
+
+    Example: discsim fly --disc driver --effect air.wind:w_north_m_s=2 --out flight
+    """
+    from discsim.engine import fly
+    from discsim.recording import write_recording
+    from discsim.sensors import Instruments, record
+    from discsim.shipped import load_disc, load_throw
+    from validation.run import start_run
+    from validation.truth import write_flight_truth
+
+    body, environment = load_disc(disc)
+    release = load_throw(throw)
+    effects = parse_effects(effect)
+    instruments = Instruments.from_parts(*parts.split(",")).with_effects(effects)
+    inputs = [Path(name) for name in (disc, throw) if name.endswith(".toml")]
+    with start_run(out, seed, inputs) as run:
+        motion = fly(body, environment, release, effects, duration=duration, ground=ground.value)
+        recording = record(motion, instruments, run.rng, plant="flight", name=out.resolve().name, disc=body)
+        write_recording(recording, out)
+        write_flight_truth(out / "truth.csv", motion)
+        end, north, east = motion.end, *motion.position[-1, :2]
+        what = "touches down" if motion.touched_down else "is left"
+        typer.echo(
+            f"{out}: {what} after {end:.2f} s, {(north**2 + east**2) ** 0.5:.1f} m away ({north:.1f}, {east:.1f})"
+        )

@@ -1,0 +1,56 @@
+"""Options that several commands share, parsed into what the code works with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+import typer
+
+from discsim.arrays import FloatArray, readonly
+from discsim.effects.catalogue import Effect, effect
+from discsim.errors import InputError
+
+__all__ = ["EffectOption", "OutOption", "SeedOption", "parse_effects", "parse_vector"]
+
+OutOption: TypeAlias = Annotated[Path, typer.Option("--out", help="Folder to write into; created where absent.")]
+SeedOption: TypeAlias = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
+EffectOption: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--effect",
+        help="An effect of the catalogue, ID:name=value,name=value; may repeat. Example: air.wind:w_north_m_s=1.5",
+    ),
+]
+
+
+def parse_effects(texts: Sequence[str] | None) -> list[Effect]:
+    """Return the effects of ``--effect ID:name=value,...``; raises `InputError` saying what was expected."""
+    effects = []
+    for text in texts or ():
+        id, _, rest = text.partition(":")
+        sizes = {}
+        for item in filter(None, rest.split(",")):
+            name, _, number = item.partition("=")
+            try:
+                sizes[name.strip()] = float(number)
+            except ValueError:
+                raise InputError(f"--effect {text}: '{item}' is no name=number; expected ID:name=number,...") from None
+        effects.append(effect(id.strip(), **sizes))
+    return effects
+
+
+def parse_vector(text: str, option: str, unit: str, largest: float) -> FloatArray:
+    """Return three numbers separated by commas, (3,); refuses what is larger than ``largest`` as a wrong unit."""
+    try:
+        values = [float(item) for item in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != 3:
+        raise InputError(f"{option} {text}: expected three numbers separated by commas, in {unit}")
+    if max(map(abs, values)) > largest:
+        raise InputError(
+            f"{option} {text}: expected at most {largest:g} {unit} along each axis (are these millimetres?)"
+        )
+    return readonly(values)

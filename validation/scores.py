@@ -1,0 +1,74 @@
+"""Scores: a figure, what it should be, how far it may be off, and whether it is; as a table, JSON and JUnit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+from discsim.files import write_bytes
+
+__all__ = ["Score", "all_ok", "at_most", "score", "write_junit"]
+
+
+@dataclass(frozen=True)
+class Score:
+    """One figure of a validation run; ok where it lies within ``tolerance`` of ``expected``."""
+
+    name: str
+    value: float
+    unit: str
+    expected: float
+    tolerance: float
+    ok: bool
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the entry of ``scores.json``."""
+        return asdict(self)
+
+    @property
+    def text(self) -> str:
+        """One line for a log."""
+        verdict = "ok  " if self.ok else "FAIL"
+        return f"{verdict} {self.name}: {self.value:.6g} {self.unit} (expected {self.expected:g} +- {self.tolerance:g})"
+
+
+def score(name: str, value: float, unit: str, expected: float, tolerance: float) -> Score:
+    """Return a score that is ok where |value - expected| <= tolerance; NaN never is."""
+    return Score(name, float(value), unit, float(expected), float(tolerance), bool(abs(value - expected) <= tolerance))
+
+
+def at_most(name: str, value: float, unit: str, limit: float) -> Score:
+    """Return a score of an error that should be zero and may reach ``limit``."""
+    return score(name, value, unit, 0.0, limit)
+
+
+def all_ok(scores: Sequence[Score]) -> bool:
+    """Tell whether every score is within tolerance."""
+    return all(item.ok for item in scores)
+
+
+def write_junit(path: Path, scores: Sequence[Score], duration_s: float) -> None:
+    """Write the scores as a JUnit XML file: one test case each, a failure where one is outside tolerance."""
+    failures = sum(not item.ok for item in scores)
+    suite = ElementTree.Element(
+        "testsuite",
+        name="discsim validate",
+        tests=str(len(scores)),
+        failures=str(failures),
+        errors="0",
+        skipped="0",
+        time=f"{duration_s:.3f}",
+    )
+    for item in scores:
+        group, _, name = item.name.partition(": ")
+        case = ElementTree.SubElement(suite, "testcase", classname=f"discsim.{group}", name=name or group, time="0")
+        if not item.ok:
+            failure = ElementTree.SubElement(case, "failure", message=item.text, type="OutsideTolerance")
+            failure.text = item.text
+        ElementTree.SubElement(case, "system-out").text = item.text
+    root = ElementTree.Element("testsuites", tests=str(len(scores)), failures=str(failures))
+    root.append(suite)
+    ElementTree.indent(root)
+    write_bytes(path, ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
