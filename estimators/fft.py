@@ -1,0 +1,245 @@
+"""Spin rate from the magnetometer by a moving, zero-padded FFT: the paper's steps (P-1) to (P-7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import scipy.fft
+from numpy.lib.stride_tricks import sliding_window_view
+
+from discsim.arrays import BoolArray, FloatArray
+from discsim.errors import InputError
+from discsim.recording import Samples
+from estimators.rate import YawRate
+
+__all__ = ["FftSettings", "fft"]
+
+#: Windows transformed at once: 256 spectra of 8193 complex values are 34 MB.
+CHUNK = 256
+
+#: Below this share of the window's variance the line is smeared by a change of rate of more than about four bins
+#: over the window; its spectrum then has several peaks of one height and the highest says little.
+COHERENT_SHARE = 0.4
+
+
+@dataclass(frozen=True)
+class FftSettings:
+    """Settings of `fft`; the defaults are the paper's.
+
+    Attributes
+    ----------
+    window : int
+        n of (P-1), samples: 128 at 100 Hz.
+    pad : int
+        k of (P-2), zeros appended to each window: 2^14 - n.
+    threshold : float
+        Lowest rate looked for, rad/s (500 deg/s, Section 3).
+    step : int
+        Samples between the starts of successive windows (P-7).
+    stamp : {"centre", "unshifted"}
+        Each value's time: the window's centre, or its last sample, which shows the delay of Fig. 7.
+    remove_mean : bool
+        Subtract the window's mean before the transform. The paper does not; with a hard iron of the size of the
+        horizontal field it removes most of the error below about 2000 deg/s.
+    false_alarm : float
+        Chance that white noise alone passes for a line in one window.
+    """
+
+    window: int = 128
+    pad: int = 2**14 - 128
+    threshold: float = np.radians(500.0)
+    step: int = 1
+    stamp: Literal["centre", "unshifted"] = "centre"
+    remove_mean: bool = False
+    false_alarm: float = 1e-4
+
+    def __post_init__(self) -> None:
+        if self.window < 8:
+            raise InputError(f"fft window: got {self.window} samples, expected at least 8")
+        if self.pad < 0:
+            raise InputError(f"fft pad: got {self.pad} zeros, expected none or more")
+        if self.step < 1:
+            raise InputError(f"fft step: got {self.step} samples, expected at least 1")
+        if not self.threshold > 0:
+            raise InputError(f"fft threshold: got {np.degrees(self.threshold):g} deg/s, expected more than zero")
+        if self.stamp not in ("centre", "unshifted"):
+            raise InputError(f"fft stamp: got '{self.stamp}', expected 'centre' or 'unshifted'")
+        if not 0 < self.false_alarm < 1:
+            raise InputError(f"fft false alarm level: got {self.false_alarm:g}, expected between 0 and 1")
+
+
+def fft(magnetometer: Samples, settings: FftSettings | None = None) -> YawRate:
+    """Spin rate from the peak of the padded spectrum of each window, (P-1) to (P-7).
+
+    ``magnetometer.value`` is (m, 3) in any unit; of x and y the axis with the larger variance in the window is used.
+    The rate has no sign. (PE1) runs to n + k, one element more than the n + k amplitudes it is matched with: here the
+    frequencies are ``[0 .. n + k - 1] / (n + k)`` times the sampling rate, of which a real signal needs the first
+    half. The sampling rate is that of the window's own time stamps.
+
+    A value is NaN where
+
+    - a sample in the window is missing, or its time stamps leave an even grid by more than half a sample;
+    - the peak is no local maximum, as on the skirt of something slower than the threshold;
+    - without its mean, the window has a stronger line below the threshold (whose side lobes are local maxima too);
+    - the line does not stand out: a sinusoid and an offset fitted at the peak must reduce the sum of squares about the
+      mean by more than white noise does with the chance ``false_alarm`` (`_false_alarm`);
+    - leakage moves the peak by a quarter of a bin (sampling rate / n) or more: it is no longer known whose it is.
+
+    The standard deviation has five parts, in quadrature: noise by the Cramer-Rao bound with the noise left in the
+    window; the grid's step / sqrt(12); leakage of the negative frequency and of the offset (`_leakage`); a smeared
+    line; a change of angular acceleration inside the window, from the estimates half a window before and after. In
+    flight the field's phase also precesses, which moves every estimate of this kind by up to 5 to 15 deg/s: that is
+    not in it.
+
+    Raises
+    ------
+    InputError
+        If the recording is shorter than one window, or the threshold is not below half the sampling rate.
+    """
+    settings = settings or FftSettings()
+    n, total = settings.window, settings.window + settings.pad
+    t = magnetometer.t
+    if t.size < n:
+        interval = magnetometer.interval
+        have = f"{t.size} samples" + (f" ({t.size * interval:.2f} s)" if t.size > 1 else "")
+        want = f"{n} samples" + (f" ({n * interval:.2f} s)" if t.size > 1 else "")
+        raise InputError(f"fft: the magnetometer has {have}; a window needs {want}")
+    nyquist = np.pi / magnetometer.interval
+    if settings.threshold >= nyquist:
+        raise InputError(
+            f"fft threshold: {np.degrees(settings.threshold):.0f} deg/s is not below half the magnetometer's sampling "
+            f"rate ({np.degrees(nyquist):.0f} deg/s)"
+        )
+    starts = np.arange(0, t.size - n + 1, settings.step)
+    rate, sd = np.full(starts.size, np.nan), np.full(starts.size, np.nan)
+    stamps = sliding_window_view(t, n)
+    values = sliding_window_view(magnetometer.value[:, :2], n, axis=0)  # (windows, 2, n)
+    for first in range(0, starts.size, CHUNK):
+        chosen = starts[first : first + CHUNK]
+        spacing = (t[chosen + n - 1] - t[chosen]) / (n - 1)
+        usable = _evenly_spaced(stamps[chosen], spacing) & np.all(np.isfinite(values[chosen]), axis=(1, 2))
+        if not usable.any():
+            continue
+        block, spacing = values[chosen[usable]], spacing[usable]
+        axis = np.argmax(np.var(block, axis=2), axis=1)
+        x = block[np.arange(axis.size), axis]
+        peak, known = _spectral_peak(x, spacing, settings)
+        omega = 2 * np.pi * peak / (total * spacing)  # (PE2), rad/s
+        spread, certain = _uncertainty(x, omega * spacing, settings)
+        slots = first + np.flatnonzero(usable)
+        rate[slots] = np.where(known & certain, omega, np.nan)
+        sd[slots] = np.where(known & certain, spread / spacing, np.nan)
+    centre = (t[starts] + t[starts + n - 1]) / 2
+    half = (n - 1) * magnetometer.interval / 2
+    sd = np.hypot(sd, _uneven_acceleration(centre, rate, sd, half))
+    return YawRate("fft", centre if settings.stamp == "centre" else t[starts + n - 1], rate, sd)
+
+
+def _evenly_spaced(t: FloatArray, interval: FloatArray) -> BoolArray:
+    """Tell in which windows, (w, n), no time stamp strays more than half a sample from another's even grid."""
+    stray = t - t[:, :1] - interval[:, None] * np.arange(t.shape[1])
+    return np.asarray(np.ptp(stray, axis=1) <= interval / 2)
+
+
+def _spectral_peak(x: FloatArray, interval: FloatArray, settings: FftSettings) -> tuple[FloatArray, BoolArray]:
+    """Return the order of the peak at or above the threshold, (P-3) to (P-5), and whether it is a line of its own."""
+    n, total = settings.window, settings.window + settings.pad
+    mean = x.mean(axis=1, keepdims=True)
+    spectrum = scipy.fft.rfft(x - mean if settings.remove_mean else x, total, axis=1)
+    amplitude = spectrum.real**2 + spectrum.imag**2  # its square: the peak is the same
+    orders = np.arange(amplitude.shape[1])
+    lowest = np.ceil(settings.threshold * total * interval / (2 * np.pi)).astype(int)  # per window
+    beginning = int(lowest.min())
+    searched = amplitude[:, beginning:]
+    searched[orders[beginning:] < lowest[:, None]] = -1.0
+    window = np.arange(x.shape[0])
+    peak = beginning + np.argmax(searched, axis=1)
+
+    inside = (peak > lowest) & (peak < orders[-1])
+    slow = spectrum[:, : int(lowest.max()) + 1]
+    at_peak = spectrum[window, peak]
+    if not settings.remove_mean:  # the spectrum of the window without its mean, by linearity
+        box = scipy.fft.rfft(np.ones(n), total)
+        slow = slow - mean * box[: slow.shape[1]]
+        at_peak = at_peak - mean[:, 0] * box[peak]
+    slower = np.abs(slow)
+    slower[orders[: slow.shape[1]] >= lowest[:, None]] = 0.0
+    return peak, inside & (np.abs(at_peak) > slower.max(axis=1))
+
+
+def _uncertainty(x: FloatArray, omega: FloatArray, settings: FftSettings) -> tuple[FloatArray, BoolArray]:
+    """Return one sigma of the rate, rad per sample, and whether the line at ``omega`` (rad per sample) is certain."""
+    n, total = settings.window, settings.window + settings.pad
+    mean = x.mean(axis=1)
+    index = np.arange(n) - (n - 1) / 2
+    cosine, sine = np.cos(omega[:, None] * index), np.sin(omega[:, None] * index)
+    # About the window's centre a cosine is even and a sine odd: only the offset and the cosine share anything.
+    level = cosine.mean(axis=1)
+    even = np.sum(cosine * x, axis=1) - n * level * mean
+    even /= np.sum(cosine**2, axis=1) - n * level**2
+    odd = np.sum(sine * x, axis=1) / np.sum(sine**2, axis=1)
+    offset = mean - even * level
+    left = x - offset[:, None] - even[:, None] * cosine - odd[:, None] * sine
+    about_mean = np.sum((x - mean[:, None]) ** 2, axis=1)
+    residual = np.sum(left**2, axis=1)
+    share = 1 - np.divide(residual, about_mean, out=np.ones_like(residual), where=about_mean > 0)
+    amplitude = np.maximum(np.hypot(even, odd), np.finfo(float).tiny)
+
+    bin_width = 2 * np.pi / n
+    noise = np.sqrt(12 * residual / (n - 4) / (n * (n**2 - 1))) / amplitude
+    grid = 2 * np.pi / total / np.sqrt(12)
+    shown = offset - mean if settings.remove_mean else offset
+    leakage = _leakage(omega / bin_width, 2 * shown / amplitude, n) * bin_width
+    smear = np.where(share < COHERENT_SHARE, COHERENT_SHARE / np.maximum(share, 1e-3), 0.0) * bin_width
+    certain = (_false_alarm(share, n, settings) < settings.false_alarm) & (leakage < bin_width / 4)
+    return np.sqrt(noise**2 + grid**2 + leakage**2 + smear**2), certain
+
+
+def _leakage(order: FloatArray, offset: FloatArray, n: int) -> FloatArray:
+    """Shift of the peak by leakage, root mean square over the line's phase, in bins.
+
+    With phases counted from the window's centre a line at ``order`` bins (turns per window) has the spectrum
+    ``e^{i phase} D(y - order) + e^{-i phase} D(y + order) + offset D(y)``, ``D(y) = sin(pi y) / (n sin(pi y / n))``,
+    offset in units of half the amplitude. To first order the other two terms move the maximum of the first by their
+    slope there over its curvature, ``(pi^2 / 3)(1 - 1 / n^2)``, times the cosine of their phase against it.
+    """
+    curvature = np.pi**2 / 3 * (1 - 1 / n**2)
+    mirrored, still = _dirichlet_slope(2 * order, n), offset * _dirichlet_slope(order, n)
+    return np.asarray(np.hypot(mirrored, still) / curvature / np.sqrt(2))
+
+
+def _dirichlet_slope(y: FloatArray, n: int) -> FloatArray:
+    sine, cosine = np.sin(np.pi * y / n), np.cos(np.pi * y / n)
+    return np.asarray(np.pi * (np.cos(np.pi * y) / sine - np.sin(np.pi * y) * cosine / (n * sine**2)) / n)
+
+
+def _false_alarm(share: FloatArray, n: int, settings: FftSettings) -> FloatArray:
+    """Chance that white noise has a peak that explains ``share`` of the sum of squares about its mean.
+
+    At one frequency a fitted sinusoid and offset (three parameters) leave 1 - share or less with the chance
+    ``e^-z = (1 - share)^((n - 3) / 2)``. Over a band of W bins there are ``W sqrt(pi z / 3) e^-z`` such peaks to be
+    expected (Baluev 2008, MNRAS 385, 1279); the band is taken up to half the sampling rate.
+    """
+    bins = n / 2
+    z = -(n - 3) / 2 * np.log(np.clip(1 - share, 1e-300, 1.0))
+    return np.asarray(np.minimum(1.0, np.exp(-z) * (1 + bins * np.sqrt(np.pi / 3 * z))))
+
+
+def _uneven_acceleration(t: FloatArray, rate: FloatArray, sd: FloatArray, half: float) -> FloatArray:
+    """Error where the angular acceleration changes inside a window, (w,) rad/s.
+
+    Where the rate has a knot at the window's centre, the line's best frequency is off by 0.094 of the change of slope
+    times the window's length, which is 0.3 of the second difference over half windows; a straight ramp gives none.
+    The second difference counts only beyond its own scatter. Where a neighbour is unknown the nearest known one stands.
+    """
+    if t.size < 2:
+        return np.zeros(t.size)
+    before = np.interp(t - half, t, rate, left=np.nan, right=np.nan)
+    after = np.interp(t + half, t, rate, left=np.nan, right=np.nan)
+    second = (after - 2 * rate + before) ** 2 - 6 * sd**2
+    known = np.isfinite(second)
+    if not known.any():
+        return np.zeros(t.size)
+    return np.asarray(0.3 * np.sqrt(np.maximum(0.0, np.interp(t, t[known], second[known]))))

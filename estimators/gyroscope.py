@@ -1,0 +1,50 @@
+"""Rates that a sensor measures directly: a gyroscope's z axis, and a rate reference."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.recording import Samples, SensorSheet
+from estimators.rate import YawRate
+
+__all__ = ["gyroscope", "rate_reference"]
+
+#: Standard deviation of a Gaussian over its median absolute value.
+MEDIAN_TO_SD = 1.4826
+
+
+def gyroscope(samples: Samples, sheet: SensorSheet) -> YawRate:
+    """Rate about +z_B as the gyroscope gives it, signed; ``samples.value`` is (n, 3) rad/s.
+
+    NaN where z is missing or stands at its range (an MPU-9250 clips at 2000 deg/s). The standard deviation is the
+    noise alone, the larger of stated and observed: scale and bias, which a data sheet gives as a spread over parts and
+    which need a rate table to be known, are not in it.
+    """
+    z = samples.value[:, 2]
+    return _measured("gyroscope", samples.t, np.where(sheet.clipped(z), np.nan, z), sheet)
+
+
+def rate_reference(samples: Samples, sheet: SensorSheet) -> YawRate:
+    """Rate of an encoder, a tachometer or a table's own read-out, signed; ``samples.value`` is (n,) rad/s.
+
+    NaN and standard deviation as in `gyroscope`.
+    """
+    value = samples.value
+    return _measured("rate_reference", samples.t, np.where(sheet.clipped(value), np.nan, value), sheet)
+
+
+def _measured(method: str, t: FloatArray, rate: FloatArray, sheet: SensorSheet) -> YawRate:
+    noise = max(sheet.noise_rms or 0.0, _observed_noise(rate))
+    sd = np.hypot(noise, (sheet.resolution or 0.0) / np.sqrt(12))
+    return YawRate(method, t, rate, np.where(np.isfinite(rate), sd, np.nan), signed=True)
+
+
+def _observed_noise(rate: FloatArray) -> float:
+    """Scatter of the second differences, which a steady acceleration leaves alone; 0 for fewer than three in a row.
+
+    The median bears steps and short disturbances; for white noise the second difference has sqrt(6) times its sd.
+    """
+    second = np.diff(rate, 2)
+    second = second[np.isfinite(second)]
+    return float(MEDIAN_TO_SD * np.median(np.abs(second)) / np.sqrt(6)) if second.size else 0.0

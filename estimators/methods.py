@@ -1,0 +1,126 @@
+"""The spin-rate methods by the names a person types, and ``best``: the best that a recording allows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from discsim.errors import InputError
+from discsim.recording import Recording
+from estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors, accelerometer
+from estimators.fft import FftSettings, fft
+from estimators.gyroscope import gyroscope, rate_reference
+from estimators.rate import YawRate
+
+__all__ = ["METHODS", "Method", "Options", "best", "estimate", "missing_sensors", "sampling_notes"]
+
+#: `best` takes the first method that knows the rate for at least this share of its samples.
+ENOUGH = 0.5
+
+#: A sampling rate from time stamps further than this from the sheet's is worth a note.
+RATE_TOLERANCE = 0.01
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the methods may be told; the defaults are the paper's."""
+
+    fft: FftSettings = field(default_factory=FftSettings)
+    accelerometer: AccelerometerErrors = field(default_factory=AccelerometerErrors)
+
+
+class Method(NamedTuple):
+    """A way to the spin rate: the sensors it needs, and its function."""
+
+    sensors: tuple[str, ...]
+    estimate: Callable[[Recording, Options], YawRate]
+
+
+def _fft(recording: Recording, options: Options) -> YawRate:
+    return fft(recording.need("magnetometer"), options.fft)
+
+
+def _accelerometer(recording: Recording, options: Options) -> YawRate:
+    errors = options.accelerometer
+    if recording.plant in ("flight", "free_spin") and errors.origin == 0:
+        # A disc decelerates at up to about one g in its plane and lifts up to about two; a rate table stands still.
+        errors = replace(errors, origin=STANDARD_GRAVITY, vertical=2 * STANDARD_GRAVITY)
+    return accelerometer(recording.need("accelerometer"), recording.sheets["accelerometer"], errors)
+
+
+def _gyroscope(recording: Recording, _: Options) -> YawRate:
+    return gyroscope(recording.need("gyroscope"), recording.sheets["gyroscope"])
+
+
+def _rate_reference(recording: Recording, _: Options) -> YawRate:
+    return rate_reference(recording.need("rate_reference"), recording.sheets["rate_reference"])
+
+
+#: Every method, in the order in which `best` prefers them where they know the rate.
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        "rate_reference": Method(("rate_reference",), _rate_reference),
+        "gyroscope": Method(("gyroscope",), _gyroscope),
+        "fft": Method(("magnetometer",), _fft),
+        "accelerometer": Method(("accelerometer",), _accelerometer),
+    }
+)
+
+
+def estimate(recording: Recording, name: str, options: Options | None = None) -> YawRate:
+    """Spin rate of a recording by the method of that name, or by `best`.
+
+    Raises `InputError` for an unknown name (listing those there are), a missing sensor, or what the method raises.
+    """
+    options = options or Options()
+    if name == "best":
+        return best(recording, options)
+    if name not in METHODS:
+        raise InputError(f"no method '{name}'; expected one of best, {', '.join(METHODS)}")
+    return METHODS[name].estimate(recording, options)
+
+
+def best(recording: Recording, options: Options | None = None) -> YawRate:
+    """Spin rate by the first of `METHODS` that knows it for half of its samples, else by the one that knows most.
+
+    A gyroscope that clips for most of a recording thus gives way to a magnetometer. The result bears the name of the
+    method taken. Raises `InputError` where no method can be used, with each one's reason.
+    """
+    options = options or Options()
+    reasons, candidates = [], []
+    for name, method in METHODS.items():
+        if absent := missing_sensors(recording, name):
+            reasons.append(f"{name}: no {', '.join(absent)}")
+            continue
+        try:
+            candidate = method.estimate(recording, options)
+        except InputError as error:
+            reasons.append(str(error))
+            continue
+        share = float(np.mean(np.isfinite(candidate.rate)))
+        if share >= ENOUGH:
+            return candidate
+        candidates.append((share, candidate))
+    if not candidates:
+        raise InputError(f"{recording.path or recording.name}: no method can be used ({'; '.join(reasons)})")
+    return max(candidates, key=lambda pair: pair[0])[1]  # of equals the first, which is the one preferred
+
+
+def missing_sensors(recording: Recording, name: str) -> tuple[str, ...]:
+    """Return the sensors that a method needs and a recording has not."""
+    return tuple(sensor for sensor in METHODS[name].sensors if sensor not in recording)
+
+
+def sampling_notes(recording: Recording) -> list[str]:
+    """Say where a sensor's time stamps contradict the sampling rate that its sheet states; the stamps are used."""
+    notes = []
+    for sensor, samples in recording.samples.items():
+        stated = recording.sheets[sensor].rate_hz
+        found = 1 / samples.interval
+        if abs(found / stated - 1) > RATE_TOLERANCE:
+            notes.append(f"{sensor}: time stamps say {found:.4g} Hz, its sheet {stated:.4g} Hz; the stamps are used")
+    return notes
