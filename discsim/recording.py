@@ -2,15 +2,19 @@
 
 A recording is a folder with ``recording.toml`` and one CSV file per sensor (format ``discsim-recording/1``,
 docs/recording-format.md). The reader is strict and names file, line and what it expected; the writer is atomic:
-the folder appears whole or not at all.
+a new folder appears whole or not at all.
 """
 
 from __future__ import annotations
 
 import io
+import os
 import re
-from collections.abc import Mapping
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, cast
@@ -22,7 +26,7 @@ from discsim.arrays import BoolArray, FloatArray, readonly
 from discsim.disc import Aero, Disc, Release, Rig, aero_key
 from discsim.environment import Environment
 from discsim.errors import InputError
-from discsim.files import write_text
+from discsim.files import read_text, write_text
 from discsim.toml_table import TomlTable, read_toml
 
 __all__ = [
@@ -195,6 +199,13 @@ class Recording:
 def read_recording(folder: Path | str) -> Recording:
     """Read a recording folder; raises `InputError` naming file, line and what was expected."""
     folder = Path(folder)
+    try:
+        return _read_folder(folder)
+    except OSError as error:  # a folder that may not be looked into, a name that is too long
+        raise InputError.at(folder, None, f"cannot be read ({error.strerror}); expected a recording") from None
+
+
+def _read_folder(folder: Path) -> Recording:
     if not folder.is_dir():
         raise InputError.at(folder, None, "no such folder; expected a recording (a folder with recording.toml)")
     top = read_toml(folder / "recording.toml")
@@ -221,7 +232,7 @@ def read_recording(folder: Path | str) -> Recording:
     samples = {}
     for sensor, kind in SENSORS.items():
         file = folder / f"{sensor}.csv"
-        if not file.exists():
+        if not _there(file):
             continue
         if sensor not in sheets:
             raise InputError.at(
@@ -229,7 +240,7 @@ def read_recording(folder: Path | str) -> Recording:
             )
         samples[sensor] = read_csv(file, kind.header)
     command = folder / "command.csv"
-    knots = read_csv(command, COMMAND_HEADER, gaps_allowed=False) if command.exists() else None
+    knots = read_csv(command, COMMAND_HEADER, gaps_allowed=False) if _there(command) else None
     if knots is not None and plant != "rate_table":
         raise InputError.at(command, None, f"a command in a {plant} recording; expected it in rate_table only")
     if not samples:
@@ -242,14 +253,26 @@ def read_recording(folder: Path | str) -> Recording:
 def read_dataset(folder: Path | str) -> list[Recording]:
     """Read a data set: its sub-folders with a ``recording.toml``, in name order (or one recording's own folder)."""
     folder = Path(folder)
-    if (folder / "recording.toml").exists():
-        return [read_recording(folder)]
-    if not folder.is_dir():
-        raise InputError.at(folder, None, "no such folder; expected a recording or a data set of recordings")
-    members = sorted(child for child in folder.iterdir() if (child / "recording.toml").exists())
+    try:
+        if (folder / "recording.toml").exists():
+            return [read_recording(folder)]
+        if not folder.is_dir():
+            raise InputError.at(folder, None, "no such folder; expected a recording or a data set of recordings")
+        # a hidden folder is one that was being written when its writer was killed
+        members = sorted(
+            child
+            for child in folder.iterdir()
+            if not child.name.startswith(".") and (child / "recording.toml").exists()
+        )
+    except OSError as error:
+        raise InputError.at(folder, None, f"cannot be read ({error.strerror}); expected recordings") from None
     if not members:
         raise InputError.at(folder, None, "no recording in it; expected sub-folders with a recording.toml")
     return [read_recording(member) for member in members]
+
+
+def _there(file: Path) -> bool:
+    return file.exists() or file.is_symlink()  # a link that leads nowhere is a missing file, not an absent sensor
 
 
 def _read_sheets(table: TomlTable | None, *, strict: bool) -> dict[str, SensorSheet]:
@@ -257,17 +280,21 @@ def _read_sheets(table: TomlTable | None, *, strict: bool) -> dict[str, SensorSh
     sheets = {}
     for sensor in table:
         if sensor not in SENSORS:
-            raise table.error(sensor, f"unknown sensor '{sensor}'; expected one of {', '.join(SENSORS)}")
+            near = get_close_matches(sensor, SENSORS, n=1)
+            hint = f"; did you mean '{near[0]}'?" if near else ""
+            raise table.error(sensor, f"unknown sensor '{sensor}'{hint} (expected one of {', '.join(SENSORS)})")
         sheet = table.table(sensor)
         assert sheet is not None
-        sheets[sensor] = _read_sheet(sheet, sensor, strict=strict)
+        sheets[sensor] = read_sheet(sheet, sensor, strict=strict)
     table.finish()
     return sheets
 
 
-def _read_sheet(table: TomlTable, sensor: str, *, strict: bool) -> SensorSheet:
+def read_sheet(table: TomlTable, sensor: str, *, strict: bool, rate_required: bool = True) -> SensorSheet:
+    """Read a ``[sensors.NAME]`` table; a rate that may be absent, and is, becomes NaN."""
     unit = SENSORS[sensor].unit
-    rate_hz = table.need("rate", "hz", positive=True)
+    stated_rate = table.number("rate", "hz", required=rate_required, positive=True)
+    rate_hz = float("nan") if stated_rate is None else stated_rate
     if sensor == "gps":
         noise = table.number("position_noise_rms", "m", required=False, minimum=0.0)
         velocity_noise = table.number("velocity_noise_rms", "m_s", required=False, minimum=0.0)
@@ -283,68 +310,90 @@ def _read_sheet(table: TomlTable, sensor: str, *, strict: bool) -> SensorSheet:
 
 
 _EMPTY_CELL = re.compile(r"(?<=,)[ \t]*(?=,|$)", re.MULTILINE)
+_CELL = re.compile(r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan)", re.ASCII | re.IGNORECASE)
+_BLOCK = 1 << 22  # characters parsed at a time
 
 
 def read_csv(path: Path, header: str, *, gaps_allowed: bool = True) -> Samples:
-    """Read a CSV file of the format; numpy's parser first, line by line only to say where it failed."""
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError.at(path, None, f"cannot be read as UTF-8 text ({error})") from None
-    text = text.replace("\r\n", "\n")
-    first, _, body = text.partition("\n")
-    if first.strip() != header:
-        raise InputError.at(path, 1, f"header is '{first.strip()[:120]}', expected '{header}'")
+    """Read a CSV file of the format; raises `InputError` naming its first faulty line.
+
+    Numpy's parser reads block by block; a block that it refuses is gone through line by line to say where and why.
+    """
+    first, _, body = read_text(path).partition("\n")
+    if first != header:
+        raise InputError.at(path, 1, f"header is '{first[:120]}', expected '{header}'")
     body = body.rstrip("\n \t")
     if not body:
         raise InputError.at(path, 2, "no samples; expected at least one row (or leave the file out)")
     width = header.count(",") + 1
+    tables: list[FloatArray] = []
+    line, previous = 2, -np.inf
+    for block in _blocks(body):
+        table = _parse(block, width)
+        if table is None or table[0, 0] <= previous:
+            raise _first_fault(path, block, header, line, previous)
+        if not gaps_allowed and np.any(np.isnan(table)):
+            row = int(np.argmax(np.any(np.isnan(table), axis=1)))
+            raise InputError.at(path, line + row, f"a cell is empty; expected a number in every cell of {path.name}")
+        tables.append(table)
+        line, previous = line + len(table), float(table[-1, 0])
+    table = np.concatenate(tables)
+    return Samples(table[:, 0], table[:, 1] if width == 2 else table[:, 1:])
+
+
+def _blocks(body: str) -> Iterator[str]:
+    start = 0
+    while start < len(body):
+        stop = body.find("\n", start + _BLOCK)
+        stop = len(body) if stop < 0 else stop
+        yield body[start:stop]
+        start = stop + 1
+
+
+def _parse(block: str, width: int) -> FloatArray | None:
+    """Return the block's rows (n, width), or None where a row breaks a rule."""
+    rows = block.count("\n") + 1
+    if not block.isascii() or not block.strip():
+        return None
+    if ",," in block or ",\n" in block or block.endswith(",") or " " in block or "\t" in block:
+        block = _EMPTY_CELL.sub("nan", block)
     try:
-        table = np.loadtxt(io.StringIO(_EMPTY_CELL.sub("nan", body)), delimiter=",", comments=None, ndmin=2)
-        # numpy's reader passes over blank lines, and a text of one width may have the wrong one
-        sound = table.shape == (body.count("\n") + 1, width)
+        table = np.loadtxt(io.StringIO(block), delimiter=",", comments=None, ndmin=2)
     except ValueError:
-        sound = False
-    if (
-        not sound
-        or np.any(np.isinf(table))
-        or not np.all(np.isfinite(table[:, 0]))
-        or np.any(np.diff(table[:, 0]) <= 0)
-    ):
-        raise _first_fault(path, body.split("\n"), header)
-    if not gaps_allowed and np.any(np.isnan(table)):
-        row = int(np.argmax(np.any(np.isnan(table), axis=1)))
-        raise InputError.at(path, row + 2, "a cell is empty; expected a number in every cell of a command")
-    value = table[:, 1] if width == 2 else table[:, 1:]
-    return Samples(table[:, 0], value)
+        return None
+    # numpy's reader passes over blank lines, and rows of one width may have the wrong one
+    if table.shape != (rows, width) or np.any(np.isinf(table)):
+        return None
+    t = table[:, 0]
+    return table if np.all(np.isfinite(t)) and np.all(np.diff(t) > 0) else None
 
 
-def _first_fault(path: Path, lines: list[str], header: str) -> InputError:
+def _first_fault(path: Path, block: str, header: str, start: int, previous: float) -> InputError:
     columns = header.split(",")
-    previous = -np.inf
-    for number, line in enumerate(lines, start=2):
-        cells = line.split(",")
+    rows = block.split("\n")
+    for number, row in enumerate(rows, start):
+        cells = [cell.strip(" \t") for cell in row.split(",")]
+        if not row.strip(" \t"):
+            return InputError.at(path, number, f"a blank line between rows; expected {len(columns)} cells: {header}")
         if len(cells) != len(columns):
             return InputError.at(
-                path, number, f"{len(cells)} cells in '{line[:80]}', expected {len(columns)}: {header}"
+                path,
+                number,
+                f"{len(cells)} cells in '{row[:80]}', expected {len(columns)} with commas between them and decimal "
+                f"points: {header}",
             )
         for column, cell in zip(columns, cells, strict=True):
-            cell = cell.strip()
-            try:
-                value = float(cell) if cell and "_" not in cell else float("nan")
-            except ValueError:
-                value = float("inf")
-            if np.isinf(value) or "_" in cell:
+            if cell and not (_CELL.fullmatch(cell) and not np.isinf(float(cell))):
                 return InputError.at(
                     path, number, f"{column} is '{cell[:40]}', expected a finite number or an empty cell"
                 )
-            if column == "time_s" and np.isnan(value):
-                return InputError.at(path, number, f"time_s is '{cell}', expected a finite number")
-        time = float(cells[0])
+        time = float(cells[0] or "nan")
+        if np.isnan(time):
+            return InputError.at(path, number, f"time_s is '{cells[0]}', expected a finite number")
         if time <= previous:
-            return InputError.at(path, number, f"time {time:.9g} s follows {previous:.9g} s; expected ascending time")
+            return InputError.at(path, number, f"time {time!r} s follows {previous!r} s; expected ascending time")
         previous = time
-    return InputError.at(path, None, "no table of numbers; expected " + header)
+    return InputError.at(path, start, f"no table of numbers in the {len(rows)} lines from here; expected {header}")
 
 
 # ---------------------------------------------------------------------------------------------- writing
@@ -353,22 +402,53 @@ def _first_fault(path: Path, lines: list[str], header: str) -> InputError:
 def write_recording(recording: Recording, folder: Path | str) -> None:
     """Write ``recording`` as a folder of the format; values survive a round trip to the last bit.
 
-    Every file appears whole or not at all, ``recording.toml`` last, so a folder that has it is complete.
+    A new folder appears whole or not at all. In a folder that is there, the files of a recording are replaced one by
+    one once all are written, ``recording.toml`` last: a folder that has it is complete. Other files stay.
+    Raises `InputError` for what the reader would refuse: a sensor without samples, an uncertainty of nothing.
     """
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "recording.toml").unlink(missing_ok=True)
-    for sensor, kind in SENSORS.items():
-        file = folder / f"{sensor}.csv"
-        if sensor in recording.samples:
-            write_text(file, _csv(recording.samples[sensor], kind.header))
+    texts = _texts(recording)
+    if folder.exists() and not folder.is_dir():
+        raise InputError.at(folder, None, "is a file; expected a folder (it is created where absent)")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    stage = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+    try:
+        for name, text in texts.items():
+            write_text(stage / name, text)
+        if folder.exists():
+            _replace_files(stage, folder)
         else:
-            file.unlink(missing_ok=True)
+            umask = os.umask(0)
+            os.umask(umask)
+            stage.chmod(0o777 & ~umask)
+            stage.rename(folder)
+    finally:
+        shutil.rmtree(stage, ignore_errors=True)
+
+
+def _replace_files(stage: Path, folder: Path) -> None:
+    (folder / "recording.toml").unlink(missing_ok=True)
+    for name in [*(f"{sensor}.csv" for sensor in SENSORS), "command.csv", "recording.toml"]:
+        if (stage / name).exists():
+            (stage / name).replace(folder / name)
+        else:
+            (folder / name).unlink(missing_ok=True)
+
+
+def _texts(recording: Recording) -> dict[str, str]:
+    """Return the text of every file of the folder by its name."""
+    texts = {"recording.toml": recording_toml(recording)}
+    for sensor, samples in recording.samples.items():
+        if len(samples) == 0:
+            raise InputError(f"{recording.name}: {sensor} has no samples; expected some, or the sensor left out")
+        texts[f"{sensor}.csv"] = _csv(samples, SENSORS[sensor].header)
+    if not recording.samples:
+        raise InputError(f"{recording.name}: no sensor has samples; expected at least one of {', '.join(SENSORS)}")
     if recording.command is not None:
-        write_text(folder / "command.csv", _csv(recording.command, COMMAND_HEADER))
-    else:
-        (folder / "command.csv").unlink(missing_ok=True)
-    write_text(folder / "recording.toml", recording_toml(recording))
+        if len(recording.command) == 0 or recording.command.gaps:
+            raise InputError(f"{recording.name}: the command has no knots or a gap; expected numbers throughout")
+        texts["command.csv"] = _csv(recording.command, COMMAND_HEADER)
+    return texts
 
 
 def _csv(samples: Samples, header: str) -> str:
@@ -429,6 +509,8 @@ def disc_toml(disc: Disc) -> list[str]:
     if disc.aero is not None:
         lines += _table("disc.aero", {aero_key(k): v for k, v in disc.aero._asdict().items()}, {})
     if aero_sigma := {key: value for key, value in disc.sigma.items() if key in aero_keys}:
+        if disc.aero is None:
+            raise InputError("[disc.aero_sigma] without [disc.aero]; expected the coefficients it is about")
         lines += _table("disc.aero_sigma", aero_sigma, {})
     if (table := disc.aero_table) is not None:
         lines += _table(
@@ -437,7 +519,7 @@ def disc_toml(disc: Disc) -> list[str]:
     if (damping := disc.yaw_damping_table) is not None:
         lines += _table(
             "disc.CNr_table",
-            {"rate_deg_s": np.degrees(damping.rate), "speed_m_s": damping.speed, "CNr": damping.CNr},
+            {"rate_deg_s": [_degrees(rate) for rate in damping.rate], "speed_m_s": damping.speed, "CNr": damping.CNr},
             {},
         )
     return lines
@@ -476,6 +558,13 @@ def _sheet_keys(sensor: str, sheet: SensorSheet) -> dict[str, Any]:
     }
 
 
+def _degrees(radians: float) -> float:
+    """Return the shortest degrees that read back as ``radians`` to the last bit, where there are any."""
+    exact = float(np.degrees(radians))
+    near = [round(exact, 9), exact, float(np.nextafter(exact, -np.inf)), float(np.nextafter(exact, np.inf))]
+    return next((degrees for degrees in near if np.radians(degrees) == radians), exact)
+
+
 _UNITS = ("kg_m2", "kg_m3", "N_m_s", "rad_s", "m_s2", "m_s", "uT", "kg", "rad", "hz", "m")
 
 
@@ -495,13 +584,15 @@ def _table(name: str, values: Mapping[str, Any], sigma: Mapping[str, Any]) -> li
         lines.append(f"{key} = {_toml(value)}")
         if key in sigma:
             lines.append(f"{sigma_key(key)} = {_toml(sigma[key])}")
+    if lost := [key for key in sigma if values.get(key) is None]:
+        raise InputError(f"[{name}]: uncertainty of '{lost[0]}', which is not stated; expected both or neither")
     return lines
 
 
 def _toml(value: ArrayLike | str | bool) -> str:
     if isinstance(value, str):
         escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'
+        return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in escaped) + '"'
     if isinstance(value, bool):
         return "true" if value else "false"
     array = np.asarray(value, dtype=float)
