@@ -1,0 +1,173 @@
+"""``discsim estimate``: spin rate over time by each method."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from validation.options import OutOption
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from discsim.recording import Recording
+    from estimators.methods import Options
+    from estimators.rate import YawRate
+    from validation.comparison import Disagreement
+
+__all__ = ["command", "estimate_all", "rate_csv", "summary"]
+
+
+def command(
+    recording: Annotated[Path, typer.Argument(help="A recording folder (with recording.toml).", show_default=False)],
+    method: Annotated[
+        str, typer.Option(help="A method's name, 'best' that the sensors allow, or 'all' whose sensors are present.")
+    ] = "best",
+    out: OutOption = Path("estimate"),
+    window: Annotated[int, typer.Option(help="fft: window, samples (P-1).")] = 128,
+    pad: Annotated[int | None, typer.Option(help="fft: zeros appended, (P-2). Default: 2^14 less the window.")] = None,
+    threshold: Annotated[float, typer.Option(help="fft: lowest rate looked for, deg/s.")] = 500.0,
+    step: Annotated[int, typer.Option(help="fft: samples between windows (P-7).")] = 1,
+    stamp: Annotated[
+        Literal["centre", "unshifted"],
+        typer.Option(help="fft: time of a window, its centre or (unshifted) its end, which delays as in Fig. 7."),
+    ] = "centre",
+    remove_mean: Annotated[
+        bool, typer.Option("--remove-mean", help="fft: take each window's mean off first; the paper does not.")
+    ] = False,
+    mount_error: Annotated[float, typer.Option(help="accelerometer: bound on its installation error, mm.")] = 1.0,
+) -> None:
+    """Estimate the spin rate of a recording and its standard deviation over time.
+
+    Writes rate.csv (time_s,method,rate_rad_s,sd_rad_s; a cell is empty where a method cannot tell), rate.png and
+    estimate.json into --out. fft and accelerometer give magnitudes. Methods that contradict each other beyond their
+    standard deviations are named, not averaged.
+
+    Example: discsim estimate throw-01 --method all --out throw-01-rate
+    """
+    import numpy as np
+
+    from discsim.files import write_text
+    from discsim.recording import read_recording
+    from estimators.accelerometer import AccelerometerErrors
+    from estimators.fft import FftSettings
+    from estimators.methods import Options, sampling_notes
+    from validation.comparison import disagreements
+    from validation.figures import draw_rates, new_figure, save_figure
+    from validation.run import start_run
+
+    zeros = max(0, 2**14 - window) if pad is None else pad
+    options = Options(
+        FftSettings(window, zeros, float(np.radians(threshold)), step, stamp, remove_mean),
+        AccelerometerErrors(mount=mount_error / 1000),
+    )
+    data = read_recording(recording)
+    rates, left_out = estimate_all(data, method, options)
+    notes = sampling_notes(data)
+    found = disagreements(rates)
+    with start_run(out, inputs=[recording]) as run:
+        write_text(out / "rate.csv", rate_csv(rates))
+        run.write_json("estimate.json", summary(data, method, rates, left_out, found, notes))
+        figure, axes = new_figure(width=10.0, height=5.0)
+        draw_rates(axes, rates)
+        axes.set_title(f"Spin rate of {data.name}, with bands of one standard deviation")
+        save_figure(figure, out / "rate.png")
+    _print(rates, left_out, found, notes)
+
+
+def estimate_all(recording: Recording, name: str, options: Options) -> tuple[list[YawRate], dict[str, str]]:
+    """Return what the named method gives (of all for "all"), and the methods left out with the reason.
+
+    Raises `InputError` for an unknown name, or where nothing can be estimated.
+    """
+    from discsim.errors import InputError
+    from estimators.methods import METHODS, estimate, missing_sensors
+
+    if name != "all":
+        if name != "best" and name not in METHODS:
+            raise InputError(f"--method {name}: unknown; expected one of best, all, {', '.join(METHODS)}")
+        return [estimate(recording, name, options)], {}
+    rates: list[YawRate] = []
+    left_out: dict[str, str] = {}
+    for method in METHODS:
+        if absent := missing_sensors(recording, method):
+            left_out[method] = f"no {', '.join(absent)} in the recording"
+            continue
+        try:
+            rates.append(estimate(recording, method, options))
+        except InputError as error:
+            left_out[method] = str(error)
+    if not rates:
+        reasons = "; ".join(f"{method}: {reason}" for method, reason in left_out.items())
+        raise InputError(f"{recording.path or recording.name}: no method can be used ({reasons})")
+    return rates, left_out
+
+
+def rate_csv(rates: Sequence[YawRate]) -> str:
+    """Return the text of rate.csv: method by method in time order, cells empty where a value is unknown."""
+    lines = ["time_s,method,rate_rad_s,sd_rad_s"]
+    for rate in rates:
+        for t, value, sd in zip(rate.t.tolist(), rate.rate.tolist(), rate.sd.tolist(), strict=True):
+            known = "," if value != value else f"{value:.9g},{sd:.4g}"  # value != value: NaN
+            lines.append(f"{t:.9g},{rate.method},{known}")
+    return "\n".join([*lines, ""])
+
+
+def summary(
+    recording: Recording,
+    asked: str,
+    rates: Sequence[YawRate],
+    left_out: dict[str, str],
+    found: Sequence[Disagreement],
+    notes: Sequence[str],
+) -> dict[str, Any]:
+    """Return the content of estimate.json."""
+    from dataclasses import asdict
+
+    return {
+        "recording": recording.name,
+        "asked": asked,
+        "methods": {rate.method: _figures(rate) for rate in rates},
+        "left_out": left_out,
+        "disagreements": [{**asdict(item), "text": item.text} for item in found],
+        "notes": list(notes),
+    }
+
+
+def _figures(rate: YawRate) -> dict[str, Any]:
+    import numpy as np
+
+    known = np.isfinite(rate.rate)
+    median = float(np.median(rate.rate[known])) if known.any() else float("nan")
+    sd = float(np.median(rate.sd[known])) if known.any() else float("nan")
+    return {
+        "count": len(rate),
+        "share_unknown": float(1 - known.mean()) if len(rate) else float("nan"),
+        "median_rate_rad_s": median,
+        "median_sd_rad_s": sd,
+        "signed": rate.signed,
+    }
+
+
+def _print(
+    rates: Sequence[YawRate], left_out: dict[str, str], found: Sequence[Disagreement], notes: Sequence[str]
+) -> None:
+    import numpy as np
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("method", "values", "unknown", "median, deg/s", "median sd, deg/s")
+    for rate in rates:
+        figures = _figures(rate)
+        cells = [np.degrees(figures["median_rate_rad_s"]), np.degrees(figures["median_sd_rad_s"])]
+        shown = ["" if np.isnan(cell) else f"{cell:.2f}" for cell in cells]
+        table.add_row(rate.method, str(len(rate)), f"{100 * figures['share_unknown']:.0f} %", *shown)
+    Console().print(table)
+    for method, reason in left_out.items():
+        typer.echo(f"left out: {method} ({reason})")
+    for item in found:
+        typer.echo(f"contradiction: {item.text}")
+    for note in notes:
+        typer.echo(f"note: {note}")

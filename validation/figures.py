@@ -1,0 +1,120 @@
+"""One look for all figures of the project, and figures that are written whole or not at all."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from discsim.files import write_bytes
+from estimators.rate import YawRate
+
+__all__ = ["COLOURS", "STYLE", "colour", "draw_rates", "new_figure", "save_figure"]
+
+#: One colour per method wherever it is drawn: Okabe and Ito's, which colour-blind readers can tell apart.
+COLOURS: Mapping[str, str] = MappingProxyType(
+    {
+        "truth": "#000000",
+        "rate_reference": "#000000",
+        "fft": "#d55e00",
+        "accelerometer": "#0072b2",
+        "gyroscope": "#cc79a7",
+        "adxrs649": "#009e73",
+    }
+)
+_OTHERS = ("#e69f00", "#56b4e9", "#6a3d9a", "#8c6d31", "#7f7f7f")
+
+#: matplotlib settings of every figure.
+STYLE: Mapping[Any, Any] = MappingProxyType(
+    {
+        "font.size": 9.0,
+        "axes.titlesize": 10.0,
+        "axes.titlelocation": "left",
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.grid": True,
+        "grid.color": "#dddddd",
+        "grid.linewidth": 0.6,
+        "axes.axisbelow": True,
+        "legend.frameon": False,
+        "lines.linewidth": 1.2,
+        "svg.hashsalt": "discsim",  # the same figure gives the same bytes
+    }
+)
+
+
+def colour(method: str, others: Sequence[str] = ()) -> str:
+    """Return a method's colour; one without its own takes the next free one by its place in ``others``."""
+    if method in COLOURS:
+        return COLOURS[method]
+    unlisted = [name for name in others if name not in COLOURS]
+    return _OTHERS[unlisted.index(method) % len(_OTHERS) if method in unlisted else 0]
+
+
+def new_figure(
+    rows: int = 1, columns: int = 1, *, width: float = 9.0, height: float = 4.5, **options: Any
+) -> tuple[Figure, Any]:
+    """Return a figure (inches) and its axes as ``Figure.subplots`` does (one, or an array of them)."""
+    mpl.rcParams.update(dict(STYLE))  # not in a context: titles and legends come later and take it too
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, figure.subplots(rows, columns, **options)
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure as ``path``'s ending says (``.png`` or ``.svg``), without a date."""
+    kind = path.suffix.removeprefix(".")
+    metadata = {"Date": None} if kind == "svg" else {"Software": None}
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=kind, dpi=150, metadata=metadata)
+    write_bytes(path, buffer.getvalue())
+
+
+def draw_rates(axes: Axes, rates: Sequence[YawRate]) -> None:
+    """Draw spin rates over time in deg/s with bands of one standard deviation, and the bounds of those that have them.
+
+    Where one method has no sign all are drawn as magnitudes. The scale is set by the rates, not by their bands.
+    """
+    signless = any(not rate.signed for rate in rates)
+    names = [rate.method for rate in rates]
+    # The scattered methods first, so that the smooth ones lie on top of them.
+    for rate in sorted(rates, key=lambda rate: -_scatter(rate)):
+        shade = colour(rate.method, names)
+        look: dict[str, Any] = (
+            {"ls": "--", "lw": 0.9} if rate.method == "rate_reference" else {}
+        )  # what it covers must show
+        value = np.degrees(np.abs(rate.rate) if signless else rate.rate)
+        sd = np.degrees(rate.sd)
+        known = np.isfinite(value)
+        if not known.any():
+            axes.plot([], [], color=shade, label=f"{rate.method} (unknown throughout)")
+            continue
+        axes.fill_between(rate.t, value - sd, value + sd, where=known.tolist(), color=shade, alpha=0.2, lw=0)
+        isolated = known & ~np.append(known[1:], False) & ~np.append(False, known[:-1])
+        axes.plot(rate.t, value, color=shade, label=rate.method, **look)
+        axes.plot(rate.t[isolated], value[isolated], ".", color=shade, ms=3)
+        if rate.lower is not None and rate.upper is not None:
+            for number, bound in enumerate((rate.lower, rate.upper)):
+                label = f"{rate.method}, worst case (11)" if number == 0 else None
+                axes.plot(rate.t, np.degrees(bound), color=shade, lw=0.7, ls=":", label=label)
+    shown = np.concatenate([np.degrees(np.abs(r.rate) if signless else r.rate) for r in rates] or [np.zeros(0)])
+    shown = shown[np.isfinite(shown)]
+    if shown.size:
+        low, high = np.percentile(shown, (0.1, 99.9))
+        margin = max(0.08 * (high - low), 0.006 * abs(high), 1.0, *(1.3 * np.degrees(_scatter(r)) for r in rates))
+        axes.set_ylim(max(0.0, low - margin) if signless else low - margin, high + margin)
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel("magnitude of spin rate (deg/s)" if signless else "spin rate (deg/s)")
+    axes.legend(loc="best", fontsize=8)
+
+
+def _scatter(rate: YawRate) -> float:
+    return float(np.nanmedian(rate.sd)) if np.isfinite(rate.sd).any() else 0.0
