@@ -48,11 +48,13 @@ class AeroTable:
     def __post_init__(self) -> None:
         for name in ("alpha", "CL", "CD", "CM"):
             object.__setattr__(self, name, readonly(getattr(self, name)))
+            if not np.all(np.isfinite(getattr(self, name))):
+                raise ValueError(f"coefficient table: {name} has a number that is not finite, expected finite ones")
         sizes = {name: getattr(self, name).size for name in ("alpha", "CL", "CD", "CM")}
         if len(set(sizes.values())) != 1 or self.alpha.size < 2:
             raise ValueError(f"coefficient table: columns of one length, at least 2, expected; got {sizes}")
         if np.any(np.diff(self.alpha) <= 0):
-            raise ValueError("coefficient table: alpha_rad must ascend")
+            raise ValueError("coefficient table: expected alpha_rad to ascend")
 
 
 @dataclass(frozen=True)
@@ -69,13 +71,15 @@ class YawDampingTable:
     def __post_init__(self) -> None:
         for name in ("rate", "speed", "CNr"):
             object.__setattr__(self, name, readonly(getattr(self, name)))
+            if not np.all(np.isfinite(getattr(self, name))):
+                raise ValueError(f"CNr table: {name} has a number that is not finite, expected finite ones")
         if self.CNr.shape != (self.rate.size, self.speed.size) or min(self.CNr.shape) < 4:
             raise ValueError(
-                f"CNr table: got {self.CNr.shape}, expected (rates, speeds) = "
-                f"({self.rate.size}, {self.speed.size}), at least 4 of each"
+                f"CNr table: CNr is {' x '.join(map(str, self.CNr.shape))}, expected rates x speeds = "
+                f"{self.rate.size} x {self.speed.size}, at least 4 of each"
             )
         if np.any(np.diff(self.rate) <= 0) or np.any(np.diff(self.speed) <= 0):
-            raise ValueError("CNr table: rate_deg_s and speed_m_s must ascend")
+            raise ValueError("CNr table: expected rate_deg_s and speed_m_s to ascend")
 
 
 @dataclass(frozen=True)
@@ -98,7 +102,7 @@ class Disc:
                 raise ValueError(f"disc {name}: got {value!r}, expected a positive number in SI units")
         if self.Izz > 2 * self.Ixx * (1 + 1e-9):
             raise ValueError(
-                f"disc: Izz = {self.Izz:g} exceeds Ixx + Iyy = {2 * self.Ixx:g} kg m^2; no rigid body has that"
+                f"disc: Izz = {self.Izz:g} exceeds Ixx + Iyy = {2 * self.Ixx:g} kg m^2, expected at most that"
             )
         object.__setattr__(self, "sigma", MappingProxyType(dict(self.sigma)))
 
@@ -135,25 +139,38 @@ def _aero(
     stated = table.table("aero", required=required)
     sigma_table = table.table("aero_sigma")
     sigma: dict[str, float] = {}
+    absent: set[str] = set()
     aero = None
     if stated is not None:
         values = {}
         for name in Aero._fields:
             optional = (tabulated and name in STATIC) or (damping_tabulated and name == "CNr")
             unit = "rad" if name == "alpha0" else ""
-            values[name] = stated.number(name, unit, required=not optional) or 0.0
+            values[name] = stated.number(name, unit, required=not optional)
         stated.finish()
-        aero = Aero(**values)
+        aero = Aero(**{name: value or 0.0 for name, value in values.items()})
         sigma.update({key: float(value) for key, value in stated.sigma.items()})
+        absent = {aero_key(name) for name, value in values.items() if value is None}
     if sigma_table is not None:
         if aero is None:
             raise sigma_table.error(
                 None, "[disc.aero_sigma] without [disc.aero]; expected the coefficients it is about"
             )
-        for name in Aero._fields:
-            value = sigma_table.number(aero_key(name), required=False, minimum=0.0)
-            if value is not None:
-                sigma[aero_key(name)] = value
+        for key in map(aero_key, Aero._fields):
+            value = sigma_table.number(key, required=False, minimum=0.0)
+            if value is None:
+                continue
+            if key in absent:
+                raise sigma_table.error(
+                    key, f"uncertainty of '{key}', which [disc.aero] lacks; expected both or neither"
+                )
+            if key in sigma:
+                raise sigma_table.error(
+                    key, f"uncertainty of '{key}' is stated twice; expected it here or in [disc.aero]"
+                )
+            sigma[key] = value
+        if sigma_table.sigma:
+            raise sigma_table.error(None, "uncertainty of an uncertainty; expected names of coefficients as keys")
         sigma_table.finish()
     return aero, sigma
 
@@ -197,6 +214,11 @@ class Rig:
     sigma: Mapping[str, float | FloatArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if not (np.isfinite(self.Izz) and self.Izz > 0 and np.isfinite(self.viscous) and self.viscous >= 0):
+            raise ValueError(
+                f"rig: got Izz = {self.Izz!r} kg m^2, viscous = {self.viscous!r} N m s; "
+                "expected Izz above zero and viscous not below it"
+            )
         object.__setattr__(self, "sigma", MappingProxyType(dict(self.sigma)))
 
     @classmethod

@@ -8,6 +8,7 @@ from datetime import date
 from types import MappingProxyType
 
 from discsim.arrays import FloatArray, readonly, vector3
+from discsim.errors import InputError
 from discsim.toml_table import TomlTable
 
 __all__ = ["Environment", "world_magnetic_field"]
@@ -48,10 +49,11 @@ class Environment:
         gravity = table.need("gravity", "m_s2", positive=True)
         magnetic_field = table.vector("magnetic_field", "uT", frame="ned")
         density = table.number("air_density", "kg_m3", required=air_required, positive=True)
-        wind = table.vector("wind", "m_s", frame="ned", required=False)
+        wind = table.vector("wind", "m_s", frame="ned", default=(0.0, 0.0, 0.0))
         table.finish()
         assert magnetic_field is not None
-        return cls(gravity, magnetic_field, density, readonly([0, 0, 0] if wind is None else wind), table.sigma)
+        assert wind is not None
+        return cls(gravity, magnetic_field, density, wind, table.sigma)
 
 
 def world_magnetic_field(latitude_deg: float, longitude_deg: float, day: date, height_m: float = 0.0) -> FloatArray:
@@ -59,14 +61,21 @@ def world_magnetic_field(latitude_deg: float, longitude_deg: float, day: date, h
 
     Takes the model of the five-year epoch that ``day`` falls in, as shipped with `pygeomag`. Uncertainty of the
     model is about 0.15 uT per component; buildings, cars and iron in the ground add more.
-    Raises ValueError outside the epochs shipped.
+    Height is above the WGS-84 ellipsoid. Raises `InputError` outside the epochs shipped, and for no place on Earth.
     """
     import pygeomag
 
+    if not (abs(latitude_deg) <= 90 and abs(longitude_deg) <= 360):
+        raise InputError(
+            f"no place at latitude {latitude_deg:g} deg, longitude {longitude_deg:g} deg; "
+            "expected -90 to 90 and -180 to 360"
+        )
+    if not -10e3 <= height_m <= 850e3:
+        raise InputError(f"no field model at {height_m:g} m above the ellipsoid; expected -10 km to 850 km")
     year = day.year + (day.timetuple().tm_yday - 1) / 365.25
     epoch = int(year // 5) * 5
     if not 2010 <= epoch <= 2025:
-        raise ValueError(f"no world magnetic model for {day}; shipped are 2010 to 2030")
+        raise InputError(f"no world magnetic model for {day}; expected a day from 2010-01-01 to 2029-12-31")
     name = {2010: "WMM_2010", 2015: "WMM_2015v2", 2020: "WMM_2020", 2025: "WMM_2025"}[epoch]
     model = pygeomag.GeoMag(coefficients_file=f"wmm/{name}.COF")
     result = model.calculate(glat=latitude_deg, glon=longitude_deg, alt=height_m / 1000.0, time=year)

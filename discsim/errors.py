@@ -12,6 +12,6 @@ class InputError(ValueError):
 
     @classmethod
     def at(cls, path: Path | str, line: int | None, message: str) -> InputError:
-        """Return an error that starts with ``path:line:``."""
+        """Return an error that starts with ``path:line:``, in one line: what does not print is escaped."""
         where = f"{path}:{line}" if line else f"{path}"
-        return cls(f"{where}: {message}")
+        return cls("".join(c if c.isprintable() else ascii(c)[1:-1] for c in f"{where}: {message}"))

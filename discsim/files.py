@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import hashlib
 import os
 import tempfile
@@ -11,7 +12,23 @@ from pathlib import Path
 
 from discsim.errors import InputError
 
-__all__ = ["digest", "model_file", "model_names", "write_bytes", "write_text"]
+__all__ = ["digest", "model_file", "model_names", "read_text", "write_bytes", "write_text"]
+
+
+def read_text(path: Path) -> str:
+    """Return a UTF-8 file's text with LF line ends and no byte order mark; raises `InputError` where it is none."""
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise InputError.at(path, None, "no such file; expected a readable UTF-8 file") from None
+    except OSError as error:
+        raise InputError.at(path, None, f"cannot be read ({error.strerror}); expected a readable UTF-8 file") from None
+    content = content.removeprefix(codecs.BOM_UTF8)
+    try:
+        return content.decode("utf-8").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise InputError.at(path, line, f"byte 0x{content[error.start]:02x} is no UTF-8; expected UTF-8 text") from None
 
 
 def write_bytes(path: Path, content: bytes) -> None:
@@ -52,10 +69,11 @@ def _models() -> Traversable:
 
 
 def model_names(folder: str) -> list[str]:
-    """Return the names (without ending) of the shipped files in ``models/folder``."""
-    return sorted(
-        entry.name.rsplit(".", 1)[0] for entry in (_models() / folder).iterdir() if entry.name.endswith(".toml")
-    )
+    """Return the names (without ending) of the shipped TOML files in ``models/folder``; empty where it is none."""
+    place = _models() / folder
+    if not place.is_dir():
+        return []
+    return sorted(entry.name.removesuffix(".toml") for entry in place.iterdir() if entry.name.endswith(".toml"))
 
 
 def model_file(name: str) -> Path:
@@ -63,5 +81,6 @@ def model_file(name: str) -> Path:
     path = Path(str(_models() / name))
     if not path.is_file():
         folder = name.rpartition("/")[0]
-        raise InputError(f"no shipped file '{name}'; expected one of {', '.join(model_names(folder))}")
+        known = ", ".join(model_names(folder)) or "a file of models/"
+        raise InputError(f"no shipped file '{name}'; expected one of {known}")
     return path.resolve()

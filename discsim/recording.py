@@ -499,7 +499,7 @@ def environment_toml(environment: Environment) -> list[str]:
 
 def disc_toml(disc: Disc) -> list[str]:
     """Return the lines of a ``[disc]`` table and its sub-tables."""
-    aero_keys = {aero_key(name) for name in Aero._fields}
+    aero_keys = [aero_key(name) for name in Aero._fields]
     body = {key: value for key, value in disc.sigma.items() if key not in aero_keys}
     lines = _table(
         "disc",
@@ -508,7 +508,7 @@ def disc_toml(disc: Disc) -> list[str]:
     )
     if disc.aero is not None:
         lines += _table("disc.aero", {aero_key(k): v for k, v in disc.aero._asdict().items()}, {})
-    if aero_sigma := {key: value for key, value in disc.sigma.items() if key in aero_keys}:
+    if aero_sigma := {key: disc.sigma[key] for key in aero_keys if key in disc.sigma}:
         if disc.aero is None:
             raise InputError("[disc.aero_sigma] without [disc.aero]; expected the coefficients it is about")
         lines += _table("disc.aero_sigma", aero_sigma, {})

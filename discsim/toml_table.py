@@ -7,19 +7,21 @@ their frame there (``velocity_ned_m_s`` has ``velocity_sigma_m_s``).
 from __future__ import annotations
 
 import difflib
-import math
 import re
+import sys
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from discsim.arrays import FloatArray, readonly
 from discsim.errors import InputError
+from discsim.files import read_text
 
 __all__ = ["TomlTable", "read_toml"]
 
-_HEADER = re.compile(r"^\s*\[+\s*([^\]]+?)\s*\]+")
+# a table's name, not a row of a matrix that is written over several lines
+_HEADER = re.compile(r"""^\s*\[+\s*(["'A-Za-z_][\w\-.\s"']*?)\s*\]+\s*(?:#.*)?$""")
 _KEY = re.compile(r"""^\s*(["']?)([A-Za-z0-9_\-.]+)\1\s*=""")
 
 
@@ -29,26 +31,34 @@ def _line_index(text: str) -> dict[str, int]:
     table = ""
     for number, line in enumerate(text.splitlines(), start=1):
         if header := _HEADER.match(line):
-            table = header.group(1).replace('"', "").replace(" ", "")
+            table = re.sub(r"[\s\"']", "", header.group(1))
             index.setdefault(table, number)
         elif key := _KEY.match(line):
-            index.setdefault(f"{table}.{key.group(2)}".lstrip("."), number)
+            parts = f"{table}.{key.group(2)}".lstrip(".").split(".")
+            for length in range(1, len(parts) + 1):  # a dotted key states the tables on its way, too
+                index.setdefault(".".join(parts[:length]), number)
     return index
+
+
+def _shown(value: Any) -> str:
+    text = str(value).lower() if isinstance(value, bool) else repr(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def read_toml(path: Path) -> TomlTable:
     """Read a TOML file (UTF-8); raises `InputError` where it is absent or is no TOML."""
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        raise InputError.at(path, None, "no such file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError.at(path, None, f"cannot be read as UTF-8 text ({error})") from None
+    text = read_text(path)
     try:
         content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise InputError.at(path, None, "no valid TOML: nested too deeply; expected tables of plain values") from None
+    except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
         line = re.search(r"line (\d+)", str(error))
-        raise InputError.at(path, int(line.group(1)) if line else None, f"no valid TOML: {error}") from None
+        raise InputError.at(
+            path,
+            int(line.group(1)) if line else (text.count("\n") + 1 if "end of document" in str(error) else None),
+            f"no valid TOML: {error}; expected lines of `key = value`, each key once",
+        ) from None
     return TomlTable(content, path, "", _line_index(text))
 
 
@@ -73,9 +83,11 @@ class TomlTable:
         return f"{self.name}.{key}" if self.name else key
 
     def error(self, key: str | None, message: str) -> InputError:
-        """Return an error at ``key``'s line (or this table's)."""
-        line = self._lines.get(self._full(key)) if key else None
-        return InputError.at(self.path, line or self._lines.get(self.name), message)
+        """Return an error at ``key``'s line, or its table's, or that of the table around it."""
+        place = self._full(key) if key else self.name
+        while place and place not in self._lines:
+            place = place.rpartition(".")[0]
+        return InputError.at(self.path, self._lines.get(place), message)
 
     def __contains__(self, key: str) -> bool:
         return key in self._left
@@ -88,17 +100,26 @@ class TomlTable:
         self._known.append(key)
         if key not in self._left:
             if required:
-                where = f"[{self.name}]" if self.name else "the top level"
-                raise self.error(None, f"missing key '{key}' in {where}; expected {expected}")
+                raise self._missing(key, expected)
             return None
         return self._left.pop(key)
+
+    def _missing(self, key: str, expected: str) -> InputError:
+        where = f"[{self.name}]" if self.name else "the top level"
+        message = f"missing key '{key}' in {where}; expected {expected}"
+        # 0.8 tells a misspelling (gravty_m_s2, mass_g) from a neighbour (Ixx_kg_m2 and Izz_kg_m2: 0.78)
+        near = difflib.get_close_matches(key, [k for k in self._left if "sigma" not in k], n=1, cutoff=0.8)
+        near = near or [k for k in self._left if k.casefold() == key.casefold()]
+        if near:
+            return self.error(near[0], f"{message} (there is '{near[0]}'; did you mean '{key}'?)")
+        return self.error(None, message)
 
     def text(self, key: str, *, required: bool = True, choices: tuple[str, ...] = ()) -> str | None:
         """Take a string; one of ``choices`` where given."""
         expected = f"one of {', '.join(choices)}" if choices else "a text"
         value = self._take(key, expected, required)
         if value is not None and (not isinstance(value, str) or (choices and value not in choices)):
-            raise self.error(key, f"'{self._full(key)}' is {value!r}, expected {expected}")
+            raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected {expected}")
         return value
 
     def flag(self, key: str, default: bool = False) -> bool:
@@ -107,7 +128,7 @@ class TomlTable:
         if value is None:
             return default
         if not isinstance(value, bool):
-            raise self.error(key, f"'{self._full(key)}' is {value!r}, expected true or false")
+            raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected true or false")
         return value
 
     def raw(self, key: str) -> Any:
@@ -120,16 +141,16 @@ class TomlTable:
         if value is None:
             return None
         if not isinstance(value, dict):
-            raise self.error(key, f"'{self._full(key)}' is {value!r}, expected a table")
+            raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected a table")
         return TomlTable(value, self.path, self._full(key), self._lines)
 
     def _check(self, key: str, value: Any, positive: bool, minimum: float | None) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise self.error(key, f"'{self._full(key)}' is {value!r}, expected a finite number")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= sys.float_info.max:
+            raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected a finite number")
         if positive and value <= 0:
-            raise self.error(key, f"'{self._full(key)}' is {value!r}, expected a number above zero")
+            raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected a number above zero")
         if minimum is not None and value < minimum:
-            raise self.error(key, f"'{self._full(key)}' is {value!r}, expected at least {minimum:g}")
+            raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected at least {minimum:g}")
         return float(value)
 
     def number(
@@ -154,16 +175,26 @@ class TomlTable:
         return value
 
     def vector(
-        self, stem: str, unit: str, *, frame: str = "", required: bool = True, length: int = 3
+        self,
+        stem: str,
+        unit: str,
+        *,
+        frame: str = "",
+        required: bool = True,
+        length: int = 3,
+        default: Sequence[float] | None = None,
     ) -> FloatArray | None:
-        """Take ``stem_frame_unit`` as (length,) and, if present, ``stem_sigma_unit`` (one number or as many)."""
+        """Take ``stem_frame_unit`` as (length,) and, if present, ``stem_sigma_unit`` (one number or as many).
+
+        A vector with a ``default`` may be left out, and its uncertainty is then that of the default.
+        """
         key = "_".join(part for part in (stem, frame, unit) if part)
-        value = self._take(key, f"{length} numbers", required)
-        self._take_sigma(stem, unit, key, present=value is not None, length=length)
+        value = self._take(key, f"{length} numbers", required and default is None)
+        self._take_sigma(stem, unit, key, present=value is not None or default is not None, length=length)
         if value is None:
-            return None
+            return None if default is None else readonly(default)
         if not isinstance(value, list) or len(value) != length:
-            raise self.error(key, f"'{self._full(key)}' is {value!r}, expected a list of {length} numbers")
+            raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected a list of {length} numbers")
         return readonly([self._check(key, item, False, None) for item in value])
 
     def numbers(self, key: str, *, required: bool = True, dimensions: int = 1) -> FloatArray | None:
@@ -188,7 +219,10 @@ class TomlTable:
         if value is None:
             return
         if not present:
-            raise self.error(sigma_key, f"'{self._full(sigma_key)}' is the uncertainty of '{key}', which is missing")
+            raise self.error(
+                sigma_key,
+                f"'{self._full(sigma_key)}' is the uncertainty of '{key}', which is missing; expected both or neither",
+            )
         if isinstance(value, list) and length is not None and len(value) == length:
             self.sigma[key] = readonly([self._check(sigma_key, item, False, 0.0) for item in value])
         else:

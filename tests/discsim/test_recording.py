@@ -1,0 +1,617 @@
+"""Recordings: what is refused and how it is said, what is accepted, and that writing loses nothing."""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as npst
+from recording_folder import AERO_TABLE, CNR_TABLE, CSV, HEADER, RATE_TABLE, SPIN_DOWN, TOML, line_of, make, refusal
+
+from discsim import recording as module
+from discsim.disc import Aero, AeroTable, Disc, Release, Rig, YawDampingTable
+from discsim.environment import Environment
+from discsim.errors import InputError
+from discsim.recording import (
+    FORMAT,
+    SENSORS,
+    Recording,
+    Samples,
+    SensorSheet,
+    read_csv,
+    read_dataset,
+    read_recording,
+    write_recording,
+)
+
+
+@pytest.fixture
+def flight(tmp_path: Path) -> Path:
+    return make(tmp_path / "flight")
+
+
+# ------------------------------------------------------------------------------------------ what is accepted
+
+
+def test_a_recording_is_read_as_it_stands(flight):
+    recording = read_recording(flight)
+    assert (recording.plant, recording.name, recording.path) == ("flight", "field", flight)
+    np.testing.assert_array_equal(recording.need("magnetometer").t, [0.0, 0.01, 0.02])
+    np.testing.assert_array_equal(recording.need("accelerometer").value, [[-9.0, 0.1, -9.8], [-9.1, 0.2, -9.7]])
+    assert recording.disc is not None
+    assert recording.disc.aero == Aero(0.13, 2.1, 0.062, 1.35, -0.05, -0.012, 0.12, -0.15, 0.0035, -0.12, -0.0045)
+    assert recording.release is not None
+    np.testing.assert_array_equal(recording.release.velocity, [23.6, 5.5, -4.2])
+    assert recording.release.position is None
+    np.testing.assert_array_equal(recording.sheets["accelerometer"].position, [-0.0161, 0.0, 0.0])
+    np.testing.assert_array_equal(recording.environment.wind, [0.0, 0.0, 0.0])
+    assert recording.end == 0.02
+
+
+MAGNETOMETER = CSV["magnetometer.csv"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param("\ufeff" + MAGNETOMETER, id="byte order mark"),
+        pytest.param(MAGNETOMETER.replace("\n", "\r\n"), id="CRLF"),
+        pytest.param(MAGNETOMETER.rstrip("\n"), id="no line end at the end"),
+        pytest.param(MAGNETOMETER + "\n\n", id="blank lines at the end"),
+        pytest.param(MAGNETOMETER + "\r\n \r\n", id="blank CRLF lines at the end"),
+        pytest.param(MAGNETOMETER.replace(",1.1,", ", +1.1 ,"), id="spaces around a number"),
+        pytest.param(MAGNETOMETER.replace(",1.1,", ",110E-2,"), id="exponent"),
+    ],
+)
+def test_spellings_of_the_same_numbers_are_read_as_the_same(flight, text):
+    (flight / "magnetometer.csv").write_bytes(text.encode())
+    samples = read_recording(flight).need("magnetometer")
+    np.testing.assert_array_equal(samples.value, [[1.0, 2.0, 3.0], [1.1, 2.1, 3.1], [1.2, 2.2, 3.2]])
+    assert samples.gaps == 0
+
+
+@pytest.mark.parametrize("cell", ["", " ", "nan", "NaN", "\t"])
+@pytest.mark.parametrize("column", [1, 2, 3])
+def test_an_empty_cell_or_nan_is_a_gap_and_is_counted(flight, cell, column):
+    rows = [line.split(",") for line in MAGNETOMETER.splitlines()]
+    rows[2][column] = cell
+    (flight / "magnetometer.csv").write_text("\n".join(",".join(row) for row in rows))
+    samples = read_recording(flight).need("magnetometer")
+    assert samples.gaps == 1
+    assert np.isnan(samples.value[1, column - 1])
+    assert np.count_nonzero(np.isfinite(samples.value)) == 8
+
+
+def test_a_table_without_a_file_is_a_sensor_that_was_not_present(flight):
+    (flight / "accelerometer.csv").unlink()
+    recording = read_recording(flight)
+    assert "accelerometer" not in recording
+    assert recording.get("accelerometer") is None
+    with pytest.raises(InputError, match=r"flight: needs accelerometer samples; this recording has magnetometer$"):
+        recording.need("accelerometer")
+
+
+def test_files_that_are_no_part_of_the_format_are_ignored(flight):
+    (flight / "truth.csv").write_text("anything")
+    (flight / "notes").mkdir()
+    assert list(read_recording(flight).samples) == ["magnetometer", "accelerometer"]
+
+
+def test_sensors_are_read_with_their_own_columns(tmp_path):
+    toml = TOML + "[sensors.gps]\nrate_hz = 10\n[sensors.rate_reference]\nrate_hz = 50\n[sensors.track]\nrate_hz = 60\n"
+    csv = {
+        "gps.csv": SENSORS["gps"].header + "\n0,1,2,-3,4,5,6\n",
+        "rate_reference.csv": "time_s,rate_rad_s\n0,70\n1,\n",
+        "track.csv": "time_s,north_m,east_m,down_m\n0,1,,-1.5\n",
+    }
+    recording = read_recording(make(tmp_path / "many", toml, csv))
+    assert recording.need("gps").value.shape == (1, 6)
+    assert recording.need("rate_reference").value.shape == (2,)
+    assert recording.need("rate_reference").gaps == 1
+    assert recording.need("track").gaps == 1
+
+
+def test_a_rate_table_has_a_command(tmp_path):
+    folder = make(tmp_path / "table", RATE_TABLE, CSV | {"command.csv": "time_s,rate_rad_s\n0,0\n5,87.3\n"})
+    command = read_recording(folder).command
+    assert command is not None
+    np.testing.assert_array_equal(command.value, [0.0, 87.3])
+
+
+def test_a_spin_down_has_a_rig(tmp_path):
+    rig = read_recording(make(tmp_path / "rig", SPIN_DOWN)).rig
+    assert rig is not None
+    assert (rig.Izz, rig.viscous) == (0.0011, 3.0e-5)
+
+
+SIGMAS = {
+    "gravity_m_s2": "gravity_sigma_m_s2",
+    "magnetic_field_ned_uT": "magnetic_field_sigma_uT",
+    "air_density_kg_m3": "air_density_sigma_kg_m3",
+    "wind_ned_m_s": "wind_sigma_m_s",
+    "mass_kg": "mass_sigma_kg",
+    "diameter_m": "diameter_sigma_m",
+    "Ixx_kg_m2": "Ixx_sigma_kg_m2",
+    "Izz_kg_m2": "Izz_sigma_kg_m2",
+    "alpha0_rad": "alpha0_sigma_rad",
+    "CNr": "CNr_sigma",
+    "viscous_N_m_s": "viscous_sigma_N_m_s",
+    "position_ned_m": "position_sigma_m",
+    "velocity_ned_m_s": "velocity_sigma_m_s",
+    "roll_rad": "roll_sigma_rad",
+    "pitch_rad": "pitch_sigma_rad",
+    "yaw_rad": "yaw_sigma_rad",
+    "body_rate_rad_s": "body_rate_sigma_rad_s",
+    "rate_hz": "rate_sigma_hz",
+    "noise_rms_uT": "noise_rms_sigma_uT",
+    "resolution_m_s2": "resolution_sigma_m_s2",
+    "range_rad_s": "range_sigma_rad_s",
+    "position_noise_rms_m": "position_noise_rms_sigma_m",
+    "velocity_noise_rms_m_s": "velocity_noise_rms_sigma_m_s",
+    "position_m": "position_sigma_m",
+}
+VECTORS = (
+    "magnetic_field_ned_uT",
+    "wind_ned_m_s",
+    "position_ned_m",
+    "velocity_ned_m_s",
+    "body_rate_rad_s",
+    "position_m",
+)
+
+
+def sigmas_of(recording: Recording) -> dict[str, object]:
+    parts = (recording.environment, recording.disc, recording.rig, recording.release, *recording.sheets.values())
+    return {key: value for part in parts if part is not None for key, value in part.sigma.items()}
+
+
+def with_every_key(key: str) -> str:
+    """Return a recording.toml in which ``key`` occurs once with a value."""
+    text = SPIN_DOWN
+    values = dict.fromkeys(SIGMAS, "0.5") | dict.fromkeys(VECTORS, "[0.1, 0.2, 0.3]")
+    places = {
+        "wind_ned_m_s": "[environment]",
+        "position_ned_m": "[release]",
+        "roll_rad": "[release]",
+        "pitch_rad": "[release]",
+        "yaw_rad": "[release]",
+        "body_rate_rad_s": "[release]",
+        "resolution_m_s2": "[sensors.accelerometer]",
+    }
+    if key in places:
+        text = text.replace(places[key], f"{places[key]}\n{key} = {values[key]}")
+    elif key == "range_rad_s":
+        text += "[sensors.gyroscope]\nrate_hz = 10\nrange_rad_s = 35\n"
+    elif "_noise_rms_m" in key:
+        text += f"[sensors.gps]\nrate_hz = 10\n{key} = 0.5\n"
+    return text
+
+
+@pytest.mark.parametrize(("key", "sigma"), SIGMAS.items())
+def test_every_number_takes_an_uncertainty_before_its_unit(tmp_path, key, sigma):
+    text = with_every_key(key)
+    folder = make(tmp_path / "rig", re.sub(rf"^({key} = .*)$", rf"\1\n{sigma} = 0.25", text, count=1, flags=re.M))
+    assert sigmas_of(read_recording(folder)) == {key: 0.25}
+
+
+@pytest.mark.parametrize(("key", "sigma"), SIGMAS.items())
+def test_an_uncertainty_survives_writing(tmp_path, key, sigma):
+    text = re.sub(rf"^({key} = .*)$", rf"\1\n{sigma} = 0.25", with_every_key(key), count=1, flags=re.M)
+    recording = read_recording(make(tmp_path / "first", text))
+    write_recording(recording, tmp_path / "second")
+    assert sigmas_of(read_recording(tmp_path / "second")) == {key: 0.25}
+
+
+@pytest.mark.parametrize(
+    ("key", "sigma"),
+    [
+        item
+        for item in SIGMAS.items()
+        if item[0] not in ("wind_ned_m_s", "CNr", "alpha0_rad", "rate_hz", "position_m") and "inertia" not in item[0]
+    ],
+)
+def test_an_uncertainty_of_nothing_is_refused(tmp_path, key, sigma):
+    text = re.sub(rf"^{key} = .*$", f"{sigma} = 0.25", with_every_key(key), count=1, flags=re.M)
+    message = refusal(make(tmp_path / "rig", text))
+    required = key in ("gravity_m_s2", "magnetic_field_ned_uT", "mass_kg", "diameter_m", "Ixx_kg_m2", "Izz_kg_m2")
+    if required or key == "viscous_N_m_s":
+        assert re.search(rf"missing key '{key}'", message)
+    else:
+        assert message.startswith(f"recording.toml:{line_of(text, sigma)}: ")
+        assert re.search(rf"'[a-z.]*{sigma}' is the uncertainty of '{key}', which is missing", message)
+
+
+def test_a_vector_takes_one_uncertainty_or_one_for_each_component(tmp_path):
+    text = TOML.replace("[release]", "[release]\nvelocity_sigma_m_s = [0.1, 0.2, 0.3]")
+    release = read_recording(make(tmp_path / "flight", text)).release
+    assert release is not None
+    np.testing.assert_array_equal(release.sigma["velocity_ned_m_s"], [0.1, 0.2, 0.3])
+
+
+def test_an_unstated_wind_is_calm_and_may_be_uncertain(tmp_path):
+    text = TOML.replace("[environment]", "[environment]\nwind_sigma_m_s = 0.5")
+    environment = read_recording(make(tmp_path / "flight", text)).environment
+    np.testing.assert_array_equal(environment.wind, [0.0, 0.0, 0.0])
+    assert environment.sigma["wind_ned_m_s"] == 0.5
+
+
+def test_a_table_of_coefficients_replaces_lift_drag_and_pitch(tmp_path):
+    linear = re.compile(r"^(CL0|CLa|CD0|CDa|alpha0_rad|CM0|CMa) = .*\n", re.M)
+    folder = make(tmp_path / "flight", linear.sub("", TOML) + AERO_TABLE + "CM = [-0.02, -0.012, 0.0]\n")
+    disc = read_recording(folder).disc
+    assert disc is not None
+    assert disc.aero_table is not None
+    np.testing.assert_array_equal(disc.aero_table.CL, [-0.1, 0.13, 0.34])
+    assert disc.aero is not None
+    assert disc.aero.CMq == -0.15
+
+
+def test_a_table_of_CNr_may_stand_on_several_lines(tmp_path):
+    text = TOML.replace("CNr = -0.0045\n", "") + CNR_TABLE.replace("], ", "],\n  ").replace("[[", "[\n  [")
+    disc = read_recording(make(tmp_path / "flight", text)).disc
+    assert disc is not None
+    assert disc.yaw_damping_table is not None
+    assert disc.yaw_damping_table.CNr.shape == (4, 4)
+    np.testing.assert_allclose(np.degrees(disc.yaw_damping_table.rate), [4500, 4550, 4600, 4650], rtol=1e-15)
+
+
+def test_the_line_of_an_error_is_right_after_a_matrix_on_several_lines(tmp_path):
+    matrix = CNR_TABLE.replace("], ", "]\n  ,").replace("[[", "[\n  [")
+    text = TOML.replace("[release]", f"{matrix}\n[release]\nrol_rad = 1.0")
+    message = refusal(make(tmp_path / "flight", text))
+    assert message.startswith(f"recording.toml:{line_of(text, 'rol_rad')}: ")
+
+
+# ------------------------------------------------------------------------------------------ data sets
+
+
+def test_a_data_set_is_its_recordings_in_name_order(tmp_path):
+    for name in ("02", "10", "01"):
+        make(tmp_path / name, TOML.replace('"field"', f'"throw {name}"'))
+    (tmp_path / "answer.toml").write_text("not = 'read'")
+    (tmp_path / "figures").mkdir()
+    assert [recording.name for recording in read_dataset(tmp_path)] == ["throw 01", "throw 02", "throw 10"]
+
+
+def test_one_recording_is_a_data_set_of_one(flight):
+    assert [recording.name for recording in read_dataset(flight)] == ["field"]
+
+
+def test_a_data_set_without_recordings_is_refused(tmp_path):
+    (tmp_path / "answer.toml").write_text("")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match=r"no recording in it; expected sub-folders with a recording.toml"):
+        read_dataset(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["nowhere", "file"])
+def test_a_data_set_that_is_no_folder_is_refused(tmp_path, name):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=rf"{name}: no such folder; expected a recording or a data set"):
+        read_dataset(tmp_path / name)
+
+
+def test_one_damaged_recording_of_a_data_set_is_named(tmp_path):
+    make(tmp_path / "01")
+    make(tmp_path / "02", TOML.replace("gravity", "levity"))
+    with pytest.raises(InputError, match=r"02/recording.toml:5: missing key 'gravity_m_s2'"):
+        read_dataset(tmp_path)
+
+
+# ------------------------------------------------------------------------------------------ types
+
+
+@pytest.mark.parametrize(
+    ("t", "value", "says"),
+    [
+        ([0.0, 1.0], [1.0], "expected \\(n,\\) and"),
+        ([[0.0]], [[1.0]], "expected \\(n,\\) and"),
+        ([0.0, 0.0], [1.0, 2.0], "time runs from 0 to 0 s; expected ascending"),
+        ([0.0, np.nan], [1.0, 2.0], "time stamp 1 is not finite"),
+        ([0.0, 1.0], [1.0, np.inf], "a value is infinite; expected finite"),
+    ],
+)
+def test_samples_check_their_shapes_and_times(t, value, says):
+    with pytest.raises(ValueError, match=says):
+        Samples(np.array(t), np.array(value))
+
+
+def test_samples_are_copies_that_cannot_be_written():
+    value = np.array([1.0, 2.0])
+    samples = Samples(np.array([0.0, 1.0]), value)
+    value[0] = 9.0
+    assert samples.value[0] == 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        samples.value[0] = 9.0
+
+
+def test_a_recording_has_known_sensors_with_sheets_and_the_right_width():
+    t, sheets = np.array([0.0]), {"magnetometer": SensorSheet(100.0)}
+    with pytest.raises(ValueError, match="unknown sensor 'compass'"):
+        Recording("flight", "x", Environment(), samples={"compass": Samples(t, t)})
+    with pytest.raises(ValueError, match="gyroscope has samples but no sheet"):
+        Recording("flight", "x", Environment(), sheets=sheets, samples={"gyroscope": Samples(t, np.zeros((1, 3)))})
+    with pytest.raises(ValueError, match="magnetometer: got values \\(1, 2\\)"):
+        Recording("flight", "x", Environment(), sheets=sheets, samples={"magnetometer": Samples(t, np.zeros((1, 2)))})
+
+
+# ------------------------------------------------------------------------------------------ round trip
+
+reals = st.floats(allow_nan=False, allow_infinity=False)
+positives = st.floats(1e-9, 1e9)
+vectors = npst.arrays(np.float64, 3, elements=reals)
+sigma_values = st.one_of(st.floats(0, 1e6), npst.arrays(np.float64, 3, elements=st.floats(0, 1e6)))
+
+
+@st.composite
+def samples_of(draw: st.DrawFn, width: int, gaps: bool = True) -> Samples:
+    t = np.sort(draw(npst.arrays(np.float64, st.integers(1, 6), elements=reals, unique=True)))
+    elements = st.floats(allow_infinity=False, allow_nan=gaps)
+    return Samples(t, draw(npst.arrays(np.float64, t.shape if width == 1 else (t.size, width), elements=elements)))
+
+
+@st.composite
+def maybe_sigma(draw: st.DrawFn, keys: dict[str, bool]) -> dict[str, object]:
+    """Return uncertainties of some of ``keys`` (key -> whether it is a vector)."""
+    chosen = draw(st.lists(st.sampled_from(sorted(keys)), unique=True)) if keys else []
+    return {key: draw(sigma_values if keys[key] else st.floats(0, 1e6)) for key in chosen}
+
+
+@st.composite
+def discs(draw: st.DrawFn) -> Disc:
+    Ixx = draw(positives)
+    aero = Aero(*(draw(reals) for _ in Aero._fields))
+    table = None
+    if draw(st.booleans()):
+        alpha = np.sort(draw(npst.arrays(np.float64, st.integers(2, 5), elements=reals, unique=True)))
+        table = AeroTable(alpha, *(draw(npst.arrays(np.float64, alpha.size, elements=reals)) for _ in range(3)))
+    damping = None
+    if draw(st.booleans()):
+        rate = np.radians(4500.0 + 50.0 * np.arange(draw(st.integers(4, 51))))
+        speed = 6.0 + 0.5 * np.arange(5)
+        damping = YawDampingTable(rate, speed, draw(npst.arrays(np.float64, (rate.size, 5), elements=reals)))
+    keys = dict.fromkeys(("mass_kg", "diameter_m", "Ixx_kg_m2", "Izz_kg_m2", "CL0", "alpha0_rad", "CNr"), False)
+    return Disc(
+        draw(positives),
+        draw(positives),
+        Ixx,
+        Ixx * draw(st.floats(0.1, 2.0)),
+        aero,
+        table,
+        damping,
+        draw(maybe_sigma(keys)),
+    )
+
+
+@st.composite
+def recordings(draw: st.DrawFn) -> Recording:
+    plant = draw(st.sampled_from(module.PLANTS))
+    sensors = draw(st.lists(st.sampled_from(sorted(SENSORS)), min_size=1, unique=True))
+    maybe = lambda strategy: draw(st.one_of(st.none(), strategy))  # noqa: E731
+    sheets = {}
+    for sensor in sensors:
+        gps = sensor == "gps"
+        sheets[sensor] = SensorSheet(
+            draw(positives),
+            maybe(st.floats(0, 1e6)),
+            None if gps else maybe(st.floats(0, 1e6)),
+            None if gps else maybe(positives),
+            maybe(st.floats(0, 1e6)) if gps else None,
+            draw(vectors) if sensor == "accelerometer" else None,
+            draw(maybe_sigma({"rate_hz": False} | ({"position_m": True} if sensor == "accelerometer" else {}))),
+        )
+    fields = {"position_ned_m": maybe(vectors), "velocity_ned_m_s": maybe(vectors), "roll_rad": maybe(reals)}
+    fields |= {"pitch_rad": maybe(reals), "yaw_rad": maybe(reals), "body_rate_rad_s": maybe(vectors)}
+    known = {key: isinstance(value, np.ndarray) for key, value in fields.items() if value is not None}
+    environment = Environment(
+        draw(positives),
+        draw(vectors),
+        draw(positives),
+        draw(vectors),
+        draw(maybe_sigma({"gravity_m_s2": False, "magnetic_field_ned_uT": True, "wind_ned_m_s": True})),
+    )
+    return Recording(
+        plant,
+        draw(st.text(st.characters(exclude_categories=["Cs"]))),
+        environment,
+        draw(discs()) if plant == "flight" else maybe(discs()),
+        Rig(draw(positives), draw(st.floats(0, 1)), draw(maybe_sigma({"viscous_N_m_s": False})))
+        if plant == "spin_down"
+        else None,
+        maybe(st.just(Release(*fields.values(), sigma=draw(maybe_sigma(known))))),
+        sheets,
+        {sensor: draw(samples_of(len(SENSORS[sensor].columns))) for sensor in sensors},
+        draw(samples_of(1, gaps=False)) if plant == "rate_table" and draw(st.booleans()) else None,
+    )
+
+
+def assert_same(ours: object, theirs: object) -> None:
+    """Assert that two parts of recordings are equal to the last bit (but for a NaN's payload)."""
+    if hasattr(ours, "__dataclass_fields__"):
+        assert type(ours) is type(theirs)
+        for name in ours.__dataclass_fields__:
+            if name != "path":
+                assert_same(getattr(ours, name), getattr(theirs, name))
+    elif hasattr(ours, "keys"):
+        assert set(ours) == set(theirs)  # type: ignore[call-overload]
+        for key in ours:  # type: ignore[attr-defined]
+            assert_same(ours[key], theirs[key])  # type: ignore[index]
+    elif isinstance(ours, np.ndarray | float):
+        ours, theirs = np.asarray(ours, dtype=float), np.asarray(theirs, dtype=float)
+        np.testing.assert_array_equal(ours, theirs)
+        np.testing.assert_array_equal(np.signbit(ours)[~np.isnan(ours)], np.signbit(theirs)[~np.isnan(theirs)])
+    else:
+        assert ours == theirs
+
+
+@settings(max_examples=60, deadline=None)
+@given(recording=recordings())
+def test_writing_and_reading_gives_the_same_bits(tmp_path_factory, recording):
+    folder = tmp_path_factory.mktemp("round") / "trip"
+    write_recording(recording, folder)
+    assert_same(recording, read_recording(folder))
+    second = folder.with_name("again")
+    write_recording(read_recording(folder), second)
+    assert {file.name: file.read_bytes() for file in folder.iterdir()} == {
+        f.name: f.read_bytes() for f in second.iterdir()
+    }
+
+
+def test_a_folder_of_the_format_is_what_is_written(flight, tmp_path):
+    write_recording(read_recording(flight), tmp_path / "copy")
+    assert sorted(file.name for file in (tmp_path / "copy").iterdir()) == [*sorted(CSV), "recording.toml"]
+    assert (tmp_path / "copy" / "magnetometer.csv").read_text() == CSV["magnetometer.csv"]
+    assert FORMAT in (tmp_path / "copy" / "recording.toml").read_text()
+    umask = os.umask(0)
+    os.umask(umask)
+    assert (tmp_path / "copy").stat().st_mode & 0o777 == 0o777 & ~umask
+    assert (tmp_path / "copy" / "recording.toml").stat().st_mode & 0o777 == 0o666 & ~umask
+
+
+def test_overwriting_removes_sensors_that_are_gone_and_keeps_other_files(flight, tmp_path):
+    recording = read_recording(flight)
+    (flight / "truth.csv").write_text("kept")
+    (flight / "command.csv").write_text("stale")
+    write_recording(
+        Recording(
+            "free_spin",
+            "new",
+            Environment(),
+            sheets=recording.sheets,
+            samples={"magnetometer": recording.need("magnetometer")},
+        ),
+        flight,
+    )
+    assert sorted(file.name for file in flight.iterdir()) == ["magnetometer.csv", "recording.toml", "truth.csv"]
+    assert read_recording(flight).name == "new"
+    assert [child.name for child in tmp_path.iterdir()] == ["flight"]
+
+
+@pytest.mark.parametrize("fails_at", [1, 2, 3])
+@pytest.mark.parametrize("kill", [OSError("disk full"), KeyboardInterrupt()], ids=["disk full", "interrupt"])
+def test_a_write_that_fails_leaves_nothing_behind(flight, tmp_path, monkeypatch, fails_at, kill):
+    recording = read_recording(flight)
+    before = {file.name: file.read_bytes() for file in flight.iterdir()}
+    written = 0
+
+    def failing(path: Path, text: str) -> None:
+        nonlocal written
+        written += 1
+        if written == fails_at:
+            raise kill
+        path.write_text(text)
+
+    monkeypatch.setattr(module, "write_text", failing)
+    for folder in (tmp_path / "new", flight):
+        written = 0
+        with pytest.raises(type(kill)):
+            write_recording(recording, folder)
+    assert [child.name for child in tmp_path.iterdir()] == ["flight"]
+    assert {file.name: file.read_bytes() for file in flight.iterdir()} == before
+
+
+def test_a_folder_left_by_a_killed_writer_is_no_recording(flight, tmp_path):
+    make(tmp_path / ".flight.abcdef")
+    assert [recording.path for recording in read_dataset(tmp_path)] == [flight]
+
+
+def test_a_write_that_is_cut_short_while_replacing_leaves_no_recording(flight, tmp_path, monkeypatch):
+    """The one moment in which an older recording is lost: nothing half old, half new may be read afterwards."""
+    recording = read_recording(flight)
+    replace = Path.replace
+
+    def failing(path: Path, target: Path) -> Path:
+        if path.name == "accelerometer.csv" and target.parent == flight:
+            raise OSError("disk full")
+        return replace(path, target)
+
+    monkeypatch.setattr(Path, "replace", failing)
+    with pytest.raises(OSError, match="disk full"):
+        write_recording(recording, flight)
+    assert refusal(flight).startswith("recording.toml: no such file")
+
+
+def test_what_the_reader_would_refuse_is_not_written(flight, tmp_path):
+    recording = read_recording(flight)
+    none = Samples(np.empty(0), np.empty((0, 3)))
+    folder = tmp_path / "new"
+    disc = Disc(0.2, 0.2, 1e-3, 1e-3, sigma={"CL0": 0.1})
+    for broken, says in [
+        (Recording("free_spin", "x", Environment(), sheets=recording.sheets), "no sensor has samples"),
+        (
+            Recording("free_spin", "x", Environment(), sheets=recording.sheets, samples={"magnetometer": none}),
+            "magnetometer has no samples",
+        ),
+        (
+            Recording("free_spin", "x", Environment(), disc, sheets=recording.sheets, samples=recording.samples),
+            r"\[disc.aero_sigma\] without \[disc.aero\]",
+        ),
+        (
+            Recording(
+                "free_spin", "x", Environment(sigma={"air": 1.0}), sheets=recording.sheets, samples=recording.samples
+            ),
+            r"\[environment\]: uncertainty of 'air', which is not stated",
+        ),
+        (
+            Recording(
+                "rate_table",
+                "x",
+                Environment(),
+                sheets=recording.sheets,
+                samples=recording.samples,
+                command=Samples(np.array([0.0]), np.array([np.nan])),
+            ),
+            "the command has no knots or a gap",
+        ),
+    ]:
+        with pytest.raises(InputError, match=says):
+            write_recording(broken, folder)
+    assert not folder.exists()
+
+
+def test_a_recording_is_not_written_over_a_file(flight, tmp_path):
+    (tmp_path / "file").write_text("kept")
+    with pytest.raises(InputError, match=r"file: is a file; expected a folder"):
+        write_recording(read_recording(flight), tmp_path / "file")
+    assert (tmp_path / "file").read_text() == "kept"
+
+
+# ------------------------------------------------------------------------------------------ speed, practice
+
+
+def test_an_hour_at_200_hz_is_read_in_seconds(tmp_path):
+    """A limit of 3 s for 720 000 rows; here a twentieth of both, in one of ten attempts (other work may run beside)."""
+    rows = 36_000
+    cells = np.random.default_rng(0).normal(size=(rows, 3)).tolist()
+    file = tmp_path / "magnetometer.csv"
+    file.write_text("\n".join([HEADER, *(f"{k / 200!r},{x!r},{y!r},{z!r}" for k, (x, y, z) in enumerate(cells))]))
+
+    def seconds() -> float:
+        started = time.perf_counter()
+        assert len(read_csv(file, HEADER)) == rows
+        return time.perf_counter() - started
+
+    assert any(seconds() < 3.0 * rows / 720_000 for _ in range(10))
+
+
+def practice_recordings() -> list[Path]:
+    root = os.environ.get("DISCSIM_RECORDINGS") or Path(__file__).parents[3] / "shared" / "recordings"
+    return sorted(file.parent for file in Path(root).glob("practice/**/recording.toml"))
+
+
+def test_the_practice_recordings_are_read_and_survive_a_round_trip(tmp_path):
+    folders = practice_recordings()
+    if not folders:
+        pytest.skip("no practice recordings; set DISCSIM_RECORDINGS to a folder that has practice/")
+    for folder in folders:
+        recording = read_recording(folder)
+        assert recording.samples
+        assert sum(samples.gaps for samples in recording.samples.values()) < recording.end * 1000
+    write_recording(recording, tmp_path / "copy")
+    assert_same(recording, read_recording(tmp_path / "copy"))
