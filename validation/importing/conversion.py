@@ -1,0 +1,380 @@
+"""From a raw logger file to a recording: columns, units, axes, time base, and a list of what was repaired."""
+
+from __future__ import annotations
+
+import csv
+import io
+from bisect import bisect_left
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from discsim.arrays import BoolArray, FloatArray
+from discsim.disc import Release
+from discsim.errors import InputError
+from discsim.recording import SENSORS, Recording, Samples, SensorSheet
+from validation.importing.import_map import ImportMap, SensorMap
+from validation.importing.raw_table import RawRow, RawTable, Repair, RepairList, number, read_raw
+
+__all__ = ["Imported", "import_recording", "parse_rows", "repairs_csv"]
+
+#: Share of a sensor's rows that may be left out before the import says that the file is in a bad state.
+MUCH_LOST = 0.05
+#: Time stamps are kept to this many decimals: what is below is rounding of the subtraction, not a clock.
+TIME_DECIMALS = 9
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A recording from a raw file, what was repaired on the way, and what a user should know of it."""
+
+    recording: Recording
+    repairs: tuple[Repair, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def summary(self) -> str:
+        """One line on the repairs."""
+        if not self.repairs:
+            return "repairs: none"
+        counts = Counter(repair.action for repair in self.repairs)
+        listed = ", ".join(f"{action} ({count})" for action, count in counts.most_common(6))
+        return f"repairs: {len(self.repairs)} in repairs.csv: {listed}{', ...' * (len(counts) > 6)}"
+
+
+class _Readings(NamedTuple):
+    """A sensor's sound rows: their numbers, time (s, on the file's clock) and values in recording units and axes."""
+
+    number: FloatArray
+    time: FloatArray
+    value: FloatArray
+
+
+def parse_rows(text: str) -> slice:
+    """Return the slice that ``A:B`` means (either may be left out or count from the end); raises `InputError`."""
+    start, colon, stop = text.partition(":")
+    try:
+        if not colon:
+            raise ValueError
+        return slice(int(start) if start.strip() else None, int(stop) if stop.strip() else None)
+    except ValueError:
+        raise InputError(f"--rows {text}: expected A:B, two whole numbers such as 1590:1830") from None
+
+
+def import_recording(raw: Path, import_map: ImportMap, rows: slice | None = None) -> Imported:
+    """Read ``raw`` (a file, or a folder with one file per sensor) by a map.
+
+    ``rows`` are 0-based data rows of the file of the map's first sensor, as numbered in that file: the header,
+    comments and blank lines have no number, a row that was left out keeps its own. Sensors in other files are cut to
+    the same span of time. Time zero is the first sample that is used. Raises `InputError`: no such file or column, a
+    damage that the map does not allow to repair, rows out of range, nothing usable left.
+    """
+    repairs = RepairList(import_map.repairs)
+    tables = _read_tables(raw, import_map, repairs)
+    notes = []
+    readings: dict[str, _Readings] = {}
+    main = None
+    for sensor, sensor_map in import_map.sensors.items():
+        table = tables.get(sensor)
+        names = None if table is None else _columns(table, sensor_map, import_map)
+        if table is None or names is None:
+            notes.append(f"no {sensor} in it")
+            continue
+        main = main or table
+        found = _readings(table, sensor, names, sensor_map, import_map, repairs)
+        chosen = _chosen_rows(table, sensor_map)
+        lost = chosen - found.time.size
+        if found.time.size == 0:
+            raise InputError.at(table.path, None, f"no usable row of the {sensor}; expected numbers in {names}")
+        if lost > MUCH_LOST * chosen:
+            notes.append(f"WARNING: {lost} of the {sensor}'s {chosen} rows were left out; is this the right map?")
+        readings[sensor] = found
+    if main is None:
+        wanted = "; or ".join(_quoted(sensor_map.columns[0]) for sensor_map in import_map.sensors.values())
+        raise InputError.at(
+            raw, None, f"no sensor of the map '{import_map.name}' in it; expected {wanted}; {_there(tables, raw)}"
+        )
+    if rows is not None:
+        whole, readings = readings, _cut(readings, tables, main, rows)
+        notes += [f"no {sensor} in these rows" for sensor in whole if sensor not in readings]
+    zero = min(found.time[0] for found in readings.values())
+    samples = {
+        sensor: Samples(np.round(found.time - zero, TIME_DECIMALS), found.value[:, 0] if one else found.value)
+        for sensor, found in readings.items()
+        for one in [len(SENSORS[sensor].columns) == 1]
+    }
+    release = _release(raw, import_map, readings)
+    if release is None and (import_map.release is not None or import_map.throws):
+        notes.append("no release conditions: the map has none for this file, or the first row is not used")
+    if not import_map.field_known and "magnetometer" in samples:
+        notes.append("magnetic field not known: zeros stand in recording.toml; fill it in, or give it in the map")
+    recording = Recording(
+        import_map.plant,
+        f"{import_map.name}-{raw.resolve().stem}",
+        import_map.environment,
+        import_map.disc,
+        None,
+        release,
+        {sensor: _sheet(import_map.sensors[sensor], samples[sensor]) for sensor in samples},
+        samples,
+    )
+    return Imported(recording, tuple(repairs.listed()), tuple(notes))
+
+
+def repairs_csv(repairs: Sequence[Repair]) -> str:
+    """Return the text of ``repairs.csv``."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(Repair._fields)
+    writer.writerows(repairs)
+    return text.getvalue()
+
+
+# ------------------------------------------------------------------------------------------- files and columns
+
+
+def _read_tables(raw: Path, import_map: ImportMap, repairs: RepairList) -> dict[str, RawTable]:
+    """Read each file once; a sensor whose file is absent has no table (which must be allowed)."""
+    if not raw.exists():
+        raise InputError.at(raw, None, "no such file or folder; expected what a logger wrote")
+    read: dict[Path, RawTable] = {}
+    tables = {}
+    for sensor, sensor_map in import_map.sensors.items():
+        path = _file(raw, sensor, sensor_map)
+        if path is None:
+            continue
+        if path not in read:
+            read[path] = read_raw(path, import_map.layout, repairs)
+        tables[sensor] = read[path]
+    return tables
+
+
+def _file(raw: Path, sensor: str, sensor_map: SensorMap) -> Path | None:
+    if raw.is_file():
+        return raw
+    present = sorted(child for child in raw.iterdir() if child.is_file() and not child.name.startswith("."))
+    pattern = sensor_map.file or "*.csv"
+    matching = [child for child in present if fnmatch(child.name, pattern)]
+    if len(matching) == 1:
+        return matching[0]
+    if not matching and sensor_map.optional:
+        return None
+    names = ", ".join(child.name for child in matching or present) or "nothing"
+    raise InputError.at(raw, None, f"{sensor}: expected one file {pattern}, there is {names}; name one file as RAW")
+
+
+def _columns(table: RawTable, sensor_map: SensorMap, import_map: ImportMap) -> list[str] | None:
+    """Return the sensor's column names in this file, or None for an optional sensor that is not there."""
+    known = set(table.columns)
+    here = next((names for names in sensor_map.columns if known.issuperset(names)), None)
+    if here is None and sensor_map.optional:
+        return None
+    time = import_map.time
+    needed = list(here or min(sensor_map.columns, key=lambda names: len(set(names) - known)))
+    needed += [name for name in (time.column, time.counter) if name is not None]
+    needed += [sensor_map.where[0]] if sensor_map.where is not None else []
+    missing = [name for name in needed if name not in known]
+    if missing:
+        raise InputError.at(
+            table.path,
+            table.header_line or None,
+            f"no column {_quoted(missing)}; the columns there are {_quoted(table.columns)}",
+        )
+    twice = [name for name in needed if table.columns.count(name) > 1]
+    if twice:
+        raise InputError.at(table.path, table.header_line or None, f"two columns are called {_quoted(twice)}")
+    return list(here or ())
+
+
+def _quoted(names: Sequence[str]) -> str:
+    return ", ".join(f"'{name}'" for name in names)
+
+
+def _there(tables: dict[str, RawTable], raw: Path) -> str:
+    if not tables:
+        return f"the files there are {_quoted(sorted(child.name for child in raw.iterdir()))}"
+    return f"the columns there are {_quoted(next(iter(tables.values())).columns)}"
+
+
+# ---------------------------------------------------------------------------------------------------- readings
+
+
+def _chosen_rows(table: RawTable, sensor_map: SensorMap) -> int:
+    if sensor_map.where is None:
+        return table.total
+    column = table.columns.index(sensor_map.where[0])
+    return sum(row.cells[column] == sensor_map.where[1] for row in table.rows)
+
+
+def _readings(
+    table: RawTable, sensor: str, names: list[str], sensor_map: SensorMap, import_map: ImportMap, repairs: RepairList
+) -> _Readings:
+    """Return the rows of one sensor that hold numbers and whose time ascends."""
+    indices = [table.columns.index(name) for name in names]
+    filter_at = table.columns.index(sensor_map.where[0]) if sensor_map.where is not None else -1
+    rows: list[RawRow] = []
+    times: list[float] = []
+    values: list[list[float]] = []
+    counters = _counters(table, import_map, repairs)
+    for row in table.rows:
+        if sensor_map.where is not None and row.cells[filter_at] != sensor_map.where[1]:
+            continue
+        time = _time(table, row, counters, import_map, repairs)
+        if time is None:
+            continue
+        value = _value(table, row, sensor, names, indices, import_map, repairs)
+        if value is None:
+            continue
+        rows.append(row)
+        times.append(time)
+        values.append(value)
+    kept = _ascending(table, rows, times, repairs)
+    read = sensor_map.factor * np.array([values[k] for k in kept]).reshape(len(kept), len(names))
+    if len(SENSORS[sensor].columns) == 3:
+        unseen = np.full(len(kept), np.nan)
+        # + 0.0 turns the -0.0 of a reversed zero into 0.0
+        columns = [unseen if axis is None else axis[1] * read[:, axis[0]] + 0.0 for axis in sensor_map.axes]
+        read = np.column_stack(columns)
+    return _Readings(np.array([rows[k].number for k in kept]), np.array([times[k] for k in kept]), read)
+
+
+def _counters(table: RawTable, import_map: ImportMap, repairs: RepairList) -> dict[int, float]:
+    """Return the counter of each row (by row number), with its jumps listed."""
+    name, decimal = import_map.time.counter, import_map.layout.decimal
+    if name is None:
+        return {}
+    index = table.columns.index(name)
+    counters: dict[int, float] = {}
+    previous = None
+    for row in table.rows:
+        count = number(row.cells[index], decimal)
+        if count is None or np.isnan(count):
+            repairs.add("number", table.path, row.line, f"'{name}' is '{row.cells[index][:40]}'", "row left out")
+            continue
+        if previous is not None and count > previous + 1:
+            lost = f"{count - previous - 1:.0f} missing; time keeps their place"
+            repairs.add("counter", table.path, row.line, f"'{name}' jumps from {previous:.0f} to {count:.0f}", lost)
+        counters[row.number] = previous = count
+    return counters
+
+
+def _time(
+    table: RawTable, row: RawRow, counters: dict[int, float], import_map: ImportMap, repairs: RepairList
+) -> float | None:
+    base = import_map.time
+    if base.counter is not None and row.number not in counters:
+        return None
+    if base.column is None:
+        assert base.step is not None
+        return (counters[row.number] if base.counter is not None else row.number) * base.step
+    cell = row.cells[table.columns.index(base.column)]
+    time = number(cell, import_map.layout.decimal)
+    if time is None or np.isnan(time):
+        repairs.add("number", table.path, row.line, f"'{base.column}' is '{cell[:40]}'", "row left out")
+        return None
+    return time * base.scale
+
+
+def _value(
+    table: RawTable,
+    row: RawRow,
+    sensor: str,
+    names: list[str],
+    indices: list[int],
+    import_map: ImportMap,
+    repairs: RepairList,
+) -> list[float] | None:
+    value = []
+    for name, index in zip(names, indices, strict=True):
+        reading = number(row.cells[index], import_map.layout.decimal)
+        if reading is None:
+            what = f"'{name}' is '{row.cells[index][:40]}', no number"
+            repairs.add("number", table.path, row.line, what, f"row left out of {sensor}")
+            return None
+        if np.isnan(reading):
+            repairs.add("number", table.path, row.line, f"'{name}' is empty", "gap")
+        value.append(reading)
+    return value
+
+
+def _ascending(table: RawTable, rows: list[RawRow], times: list[float], repairs: RepairList) -> list[int]:
+    """Return the indices to keep so that time ascends strictly and the fewest rows are lost."""
+    # longest strictly ascending subsequence; of two equal stamps the first stays
+    ends: list[float] = []
+    chain: list[int] = []
+    before: list[int] = []
+    for index, time in enumerate(times):
+        place = bisect_left(ends, time)
+        before.append(chain[place - 1] if place else -1)
+        if place == len(ends):
+            ends.append(time)
+            chain.append(index)
+        elif time < ends[place]:
+            ends[place], chain[place] = time, index
+    kept = []
+    index = chain[-1] if chain else -1
+    while index >= 0:
+        kept.append(index)
+        index = before[index]
+    kept.reverse()
+    sound = set(kept)
+    for index, row in enumerate(rows):
+        if index not in sound:
+            what = f"time {times[index]:.9g} s is doubled or out of order"
+            repairs.add("time", table.path, row.line, what, "row left out")
+    return kept
+
+
+# --------------------------------------------------------------------------------------------- the recording
+
+
+def _cut(
+    readings: dict[str, _Readings], tables: dict[str, RawTable], main: RawTable, rows: slice
+) -> dict[str, _Readings]:
+    start = 0 if rows.start is None else rows.start + (main.total if rows.start < 0 else 0)
+    stop = main.total if rows.stop is None else rows.stop + (main.total if rows.stop < 0 else 0)
+    if not 0 <= start < stop <= main.total:
+        asked = f"{'' if rows.start is None else rows.start}:{'' if rows.stop is None else rows.stop}"
+        raise InputError.at(main.path, None, f"--rows {asked}: expected rows within 0:{main.total}, at least one")
+    cut = {}
+    spans = []
+    for sensor, found in readings.items():
+        if tables[sensor] is main:
+            cut[sensor] = _select(found, (found.number >= start) & (found.number < stop))
+            spans += [cut[sensor].time[:1], cut[sensor].time[-1:]]
+    span = np.concatenate(spans)
+    if span.size == 0:
+        raise InputError.at(main.path, None, f"--rows {start}:{stop}: no usable row among them")
+    for sensor, found in readings.items():
+        if tables[sensor] is not main:
+            cut[sensor] = _select(found, (found.time >= span.min()) & (found.time <= span.max()))
+    return {sensor: cut[sensor] for sensor in readings if cut[sensor].time.size}
+
+
+def _select(found: _Readings, chosen: BoolArray) -> _Readings:
+    return _Readings(found.number[chosen], found.time[chosen], found.value[chosen])
+
+
+def _sheet(sensor_map: SensorMap, samples: Samples) -> SensorSheet:
+    if np.isfinite(sensor_map.sheet.rate_hz):
+        return sensor_map.sheet
+    if not samples.interval > 0:
+        raise InputError("one sample and no rate_hz in the map; expected a rate or at least two samples")
+    return replace(sensor_map.sheet, rate_hz=float(f"{1 / samples.interval:.4g}"))
+
+
+def _release(raw: Path, import_map: ImportMap, readings: dict[str, _Readings]) -> Release | None:
+    """Return what was measured of the release, which is the file's first row; None where that row is not used."""
+    if any(found.number[0] > 0 for found in readings.values()):
+        return None
+    throw = import_map.throws.get(raw.stem)
+    if throw is None:
+        return import_map.release
+    # the place in the plan is where the track begins
+    north, east = readings["track"].value[0, :2]
+    return throw.release(float(north), float(east), import_map.sensors["track"].sheet.noise_rms or 0.0)
