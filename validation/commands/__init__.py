@@ -9,7 +9,9 @@ import typer
 __all__ = ["COMMANDS", "register"]
 
 #: name on the command line -> module in this package
-COMMANDS: dict[str, str] = {}
+COMMANDS: dict[str, str] = {
+    "import": "import_",
+}
 
 
 def register(app: typer.Typer) -> None:
