@@ -1,0 +1,90 @@
+"""Methods by name, and the choice of the best."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from discsim.environment import Environment
+from discsim.errors import InputError
+from discsim.recording import Recording, Samples, SensorSheet
+from estimators import METHODS, best, estimate
+from estimators.methods import sampling_notes
+
+SHEETS = {
+    "magnetometer": SensorSheet(100.0, 0.6, 0.15, 4912.0),
+    "accelerometer": SensorSheet(200.0, 0.08, 0.005, 156.9, position=np.array([-0.0161, 0.0, 0.0])),
+    "gyroscope": SensorSheet(200.0, 0.003, 0.001, np.radians(2000.0)),
+    "rate_reference": SensorSheet(100.0, 0.0006),
+}
+
+
+def spinning(rate_deg_s, sensors, duration=3.0, plant="rate_table"):
+    """A level steady spin as every sensor sees it, without noise."""
+    rate = np.radians(rate_deg_s)
+    t, fast = np.arange(round(100 * duration)) / 100, np.arange(round(200 * duration)) / 200
+    one = np.ones_like(fast)
+    values = {
+        "magnetometer": Samples(t, np.stack([30 * np.cos(rate * t), -30 * np.sin(rate * t), 0 * t + 39], axis=1)),
+        "accelerometer": Samples(fast, np.stack([one * rate**2 * 0.0161, 0 * fast, -9.8 * one], axis=1)),
+        "gyroscope": Samples(fast, np.clip(np.outer(one, [0, 0, rate]), -np.radians(2000.0), np.radians(2000.0))),
+        "rate_reference": Samples(t, np.full(t.size, rate)),
+    }
+    chosen = {name: values[name] for name in sensors}
+    return Recording(plant, "spin", Environment(), sheets={n: SHEETS[n] for n in sensors}, samples=chosen)
+
+
+@pytest.mark.parametrize("name", ["rate_reference", "gyroscope", "fft", "accelerometer"])
+def test_every_method_finds_a_steady_spin_and_bears_its_name(name):
+    """6 deg/s is the leakage of the negative frequency for the fft at 1800 deg/s; the others are exact."""
+    found = estimate(spinning(1800.0, SHEETS), name)
+    assert found.method == name
+    np.testing.assert_allclose(np.degrees(found.rate), 1800.0, atol=8.0 if name == "fft" else 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("rate", "sensors", "expected"),
+    [
+        (4000.0, SHEETS, "rate_reference"),
+        (1800.0, ("magnetometer", "accelerometer", "gyroscope"), "gyroscope"),
+        (4000.0, ("magnetometer", "accelerometer", "gyroscope"), "fft"),
+        (4000.0, ("accelerometer", "gyroscope"), "accelerometer"),
+        (300.0, ("magnetometer", "accelerometer"), "accelerometer"),
+    ],
+)
+def test_the_best_is_the_first_that_knows_the_rate(rate, sensors, expected):
+    """A clipped gyroscope and a spin below the threshold give way."""
+    recording = spinning(rate, sensors)
+    order = [name for name in METHODS if name in ("rate_reference", "gyroscope", "fft", "accelerometer")]
+    assert order == ["rate_reference", "gyroscope", "fft", "accelerometer"]
+    assert best(recording).method == expected
+
+
+def test_where_nothing_can_be_used_each_reason_is_given():
+    with pytest.raises(InputError, match=r"gyroscope: no gyroscope.*a window needs 128 samples"):
+        best(spinning(4000.0, ("magnetometer",), duration=1.0))
+
+
+def test_an_unknown_name_is_answered_with_those_there_are():
+    with pytest.raises(InputError, match=r"no method 'ftt'; expected one of best, .*fft"):
+        estimate(spinning(4000.0, SHEETS), "ftt")
+
+
+def test_a_missing_sensor_is_named():
+    with pytest.raises(InputError, match="needs magnetometer samples; this recording has gyroscope"):
+        estimate(spinning(4000.0, ("gyroscope",)), "fft")
+
+
+def test_the_accelerometer_knows_less_in_flight_than_on_a_table():
+    """There the body's own acceleration turns with the spin."""
+    on_table = estimate(spinning(4000.0, ("accelerometer",)), "accelerometer")
+    in_flight = estimate(spinning(4000.0, ("accelerometer",), plant="free_spin"), "accelerometer")
+    assert in_flight.sd[0] > 1.5 * on_table.sd[0]
+
+
+def test_time_stamps_that_contradict_the_sheet_are_noted():
+    recording = spinning(4000.0, ("gyroscope", "rate_reference"))
+    assert sampling_notes(recording) == []
+    slow = Samples(recording.need("gyroscope").t * 1.04, recording.need("gyroscope").value)
+    off = Recording("rate_table", "x", Environment(), sheets=recording.sheets, samples={"gyroscope": slow})
+    assert sampling_notes(off) == ["gyroscope: time stamps say 192.3 Hz, its sheet 200 Hz; the stamps are used"]
