@@ -1,0 +1,106 @@
+"""The packages build on one another in one direction, so that an estimator sees no truth."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+OURS = ("discsim", "estimators", "validation", "tests", "benchmarks")
+
+#: package -> what of ours it may import: a name stands for itself and everything below it
+MAY_IMPORT = {
+    "discsim": ("discsim",),
+    "estimators": (
+        "estimators",
+        "discsim.arrays",
+        "discsim.compiled",
+        "discsim.disc",
+        "discsim.errors",
+        "discsim.recording",
+    ),
+    "validation": ("discsim", "estimators", "validation"),
+}
+SOURCES = [(package, source) for package in MAY_IMPORT for source in sorted((ROOT / package).rglob("*.py"))]
+
+
+def imported(source: str, module: str, is_package: bool) -> set[str]:
+    """Return the full names of what ``source``, the text of ``module``, imports anywhere in it.
+
+    ``from a import b`` counts as ``a.b``, for b may be a module.
+    """
+    names = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            parts = module.split(".")
+            base = parts[: len(parts) + is_package - node.level] if node.level else []
+            origin = [*base, *filter(None, [node.module])]
+            names |= {".".join([*origin, alias.name]) for alias in node.names}
+        elif isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
+            function = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            if function in ("import_module", "__import__") and isinstance(node.args[0].value, str):
+                names.add(node.args[0].value)
+    return names
+
+
+def forbidden(package: str, names: set[str]) -> set[str]:
+    """Return those of ``names`` that ``package`` may not import."""
+
+    def within(name: str, allowed: str) -> bool:
+        return name == allowed or name.startswith(f"{allowed}.")
+
+    ours = {name for name in names if name.split(".")[0] in OURS}
+    return {name for name in ours if not any(within(name, allowed) for allowed in MAY_IMPORT[package])}
+
+
+@pytest.mark.parametrize(("package", "source"), SOURCES, ids=[str(source.relative_to(ROOT)) for _, source in SOURCES])
+def test_no_import_points_the_wrong_way(package, source):
+    relative = source.relative_to(ROOT)
+    is_package = relative.name == "__init__.py"
+    module = ".".join(relative.parent.parts if is_package else relative.with_suffix("").parts)
+    assert forbidden(package, imported(source.read_text(encoding="utf-8"), module, is_package)) == set()
+
+
+def test_every_package_is_looked_at():
+    assert {package for package, _ in SOURCES} == set(MAY_IMPORT)
+
+
+def test_models_holds_no_python():
+    assert sorted(file for file in (ROOT / "models").rglob("*.py*")) == []
+
+
+@pytest.mark.parametrize(
+    ("package", "text"),
+    [
+        ("discsim", "import estimators"),
+        ("discsim", "from validation.run import start_run"),
+        ("discsim", "def f():\n    from estimators.rate import YawRate"),
+        ("discsim", "import_module('validation.cli')"),
+        ("discsim", "from .. import validation"),
+        ("estimators", "import discsim"),
+        ("estimators", "from discsim import engine"),
+        ("estimators", "from discsim.motion import Motion"),
+        ("estimators", "import discsim.recordings"),
+        ("estimators", "from ..discsim import motion"),
+        ("estimators", "if TYPE_CHECKING:\n    from discsim.motion import Motion"),
+        ("validation", "from tests.conftest import x"),
+    ],
+)
+def test_an_import_that_points_the_wrong_way_is_found(package, text):
+    assert forbidden(package, imported(text, f"{package}.module", is_package=False))
+
+
+@pytest.mark.parametrize(
+    ("package", "text"),
+    [
+        ("discsim", "import numpy\nfrom discsim.arrays import readonly\nfrom .arrays import readonly"),
+        ("estimators", "from discsim.recording import Recording\nfrom estimators import YawRate\nfrom . import rate"),
+        ("validation", "import discsim.engine\nfrom estimators import fft\nfrom validation.run import start_run"),
+    ],
+)
+def test_an_import_that_points_the_right_way_is_allowed(package, text):
+    assert forbidden(package, imported(text, f"{package}.module", is_package=False)) == set()
