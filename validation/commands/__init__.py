@@ -10,6 +10,7 @@ __all__ = ["COMMANDS", "register"]
 
 #: name on the command line -> module in this package
 COMMANDS: dict[str, str] = {
+    "estimate": "estimate",
     "import": "import_",
 }
 
