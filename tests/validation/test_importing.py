@@ -289,6 +289,14 @@ def test_every_shipped_map_reads(name):
     assert read_map(find_map(name)).name == name
 
 
+def test_the_map_in_the_documentation_reads(tmp_path):
+    text = (Path(__file__).parents[2] / "docs" / "importing.md").read_text()
+    (tmp_path / "mine.toml").write_text(text.split("```toml\n")[1].split("```")[0])
+    own = read_map(tmp_path / "mine.toml")
+    assert own.disc is not None
+    assert own.sensors["magnetometer"].axes == ((1, 1.0), (0, -1.0), (2, 1.0))
+
+
 # ------------------------------------------------------------------------------------- plain CSV and phyphox
 
 
