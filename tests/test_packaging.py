@@ -1,0 +1,57 @@
+"""What users are told to run is what CI runs, and everything that a wheel needs is declared."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+CI = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def shell_lines(text: str) -> list[str]:
+    """Return the lines of a Markdown text's shell blocks."""
+    blocks = re.findall(r"^```sh\n(.*?)^```", text, re.M | re.S)
+    return [line for block in blocks for line in block.splitlines() if line]
+
+
+@pytest.mark.parametrize("job", ["pytest", "discsim validate"])
+def test_ci_runs_the_readmes_own_line(job):
+    done = subprocess.run([ROOT / ".ci" / "readme-line", job], capture_output=True, text=True, check=True)
+    line = done.stdout.rstrip("\n")
+    assert shell_lines(README).count(line) == 1
+    assert line.startswith("python3 -m venv .venv && .venv/bin/pip install ")
+    assert line.endswith(f" && .venv/bin/{job}")
+    assert re.search(rf'^\w+=\$\(\.ci/readme-line "?{job}"?\)$', CI, re.M)
+
+
+def test_ci_runs_both_lines_that_it_takes_from_the_readme():
+    assert 'bash -c "$test_line"\n' in CI
+    assert 'bash -c "$main_line --quick"\n' in CI
+
+
+def test_a_line_that_the_readme_lacks_is_an_error():
+    done = subprocess.run([ROOT / ".ci" / "readme-line", "make"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "expected exactly one line of README.md" in done.stderr
+
+
+def test_the_workflow_runs_ci_and_the_same_tests():
+    workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
+    assert "- run: .ci/run\n" in workflow
+    assert '- run: bash -c "$(.ci/readme-line pytest)"\n' in workflow
+
+
+def test_the_wheel_holds_every_package_and_the_models():
+    wheel = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
+    packages = sorted(path.parent.name for path in ROOT.glob("*/__init__.py") if path.parent.name != "tests")
+    assert sorted(wheel["packages"]) == packages
+    assert wheel["force-include"] == {"models": "discsim/models"}
+    for package in packages:
+        assert (ROOT / package / "py.typed").exists()
