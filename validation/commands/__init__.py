@@ -10,8 +10,11 @@ __all__ = ["COMMANDS", "register"]
 
 #: name on the command line -> module in this package
 COMMANDS: dict[str, str] = {
-    "estimate": "estimate",
     "import": "import_",
+    "estimate": "estimate",
+    "fly": "fly",
+    "rate-table": "rate_table",
+    "validate": "validate",
 }
 
 

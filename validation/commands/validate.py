@@ -1,0 +1,38 @@
+"""``discsim validate``: the main job, headless. Everything is run, scored against truth, and reported."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from validation.options import OutOption, SeedOption
+
+__all__ = ["command"]
+
+
+def command(
+    quick: Annotated[bool, typer.Option("--quick", help="A shorter profile and fewer throws.")] = False,
+    junit: Annotated[Path | None, typer.Option(help="Also write the scores as a JUnit XML file.")] = None,
+    out: OutOption = Path("validation-report"),
+    seed: SeedOption = 0,
+) -> None:
+    """Run the rate table and a set of throws, score every estimator against truth, and write a report.
+
+    Writes scores.json, report.html and figures into --out. Exit status 1 if a score is outside its tolerance.
+
+    Example: discsim validate --quick --junit scores.xml --out validation-report
+    """
+    from validation.headless import validate
+    from validation.run import start_run
+    from validation.scores import all_ok
+
+    with start_run(out, seed) as run:
+        scores = validate(run, quick=quick, junit=junit)
+    for item in scores:
+        typer.echo(item.text)
+    failed = sum(not item.ok for item in scores)
+    typer.echo(f"{len(scores) - failed} of {len(scores)} scores within tolerance; report: {out / 'report.html'}")
+    if not all_ok(scores):
+        raise typer.Exit(1)

@@ -1,0 +1,231 @@
+"""A rate-table run as in the paper's section 3: all methods on one profile, scored on its plateaus."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from discsim.arrays import BoolArray, FloatArray
+from discsim.effects.catalogue import Effect
+from discsim.effects.sensors import PositionOffset
+from discsim.environment import Environment
+from discsim.files import write_text
+from discsim.motion import Motion
+from discsim.recording import Recording, Samples
+from discsim.rig import turn_table
+from discsim.sensors import Instruments, record
+from estimators.accelerometer import AccelerometerErrors, accelerometer
+from estimators.fft import FftSettings, fft
+from estimators.gyroscope import gyroscope
+from estimators.rate import YawRate
+from validation.scores import Score, at_most, score
+
+__all__ = ["Plateau", "RateTableRun", "plateau_table", "rate_table_checks", "run_rate_table", "write_plateaus"]
+
+#: margin kept from a plateau's ends: half the paper's window of 128 samples at 100 Hz, and a little
+MARGIN_S = 0.7
+#: mount errors of the paper's Fig. 7, m
+MOUNT_ERRORS = (0.001, 0.005)
+
+
+@dataclass(frozen=True)
+class RateTableRun:
+    """What one run gave.
+
+    ``recording`` is the module's (MPU-9250 and the table's read-out), ``wide`` that of the wide-range rate sensor
+    beside it; ``rates`` holds each method's estimate by name, ``envelopes`` the accelerometer's by mount error in m.
+    """
+
+    profile: Samples
+    motion: Motion
+    recording: Recording
+    wide: Recording
+    rates: Mapping[str, YawRate]
+    envelopes: Mapping[float, YawRate]
+
+
+@dataclass(frozen=True)
+class Plateau:
+    """Errors of one method on one plateau, rad/s; NaN where the method says nothing."""
+
+    method: str
+    rate: float
+    known: float
+    bias: float
+    sd: float
+    worst: float
+
+
+def run_rate_table(
+    profile: Samples,
+    environment: Environment,
+    rng: np.random.Generator,
+    *,
+    mount: FloatArray | None = None,
+    effects: tuple[Effect, ...] = (),
+    name: str = "rate-table",
+) -> RateTableRun:
+    """Turn the table through ``profile`` and estimate its rate by each method of the paper.
+
+    The module is one MPU-9250 drawn within its data sheet; its accelerometer sits ``mount`` (3,) m off its stated
+    place. The yaw phase at the start is drawn too.
+    """
+    draw_module, draw_wide, draw_yaw, noise_module, noise_wide = rng.spawn(5)
+    motion = turn_table(profile, environment, effects, yaw=float(draw_yaw.uniform(0, 2 * np.pi)))
+    module = Instruments.from_parts("mpu9250", "ac1120s").drawn(draw_module)
+    if mount is not None:
+        module = module.fitted("accelerometer", offset=PositionOffset(*(float(x) for x in mount)))
+    module = module.with_effects(effects)
+    recording = record(motion, module, noise_module, plant="rate_table", name=name, command=profile)
+    wide_module = Instruments.from_parts("adxrs649").drawn(draw_wide)
+    wide = record(motion, wide_module, noise_wide, plant="rate_table", name=f"{name}-adxrs649", command=profile)
+
+    rates = {
+        "fft": fft(recording.need("magnetometer")),
+        "accelerometer": accelerometer(recording.need("accelerometer"), recording.sheets["accelerometer"]),
+        "gyroscope": gyroscope(recording.need("gyroscope"), recording.sheets["gyroscope"]),
+        "adxrs649": replace(gyroscope(wide.need("gyroscope"), wide.sheets["gyroscope"]), method="adxrs649"),
+    }
+    envelopes = {
+        error: accelerometer(
+            recording.need("accelerometer"), recording.sheets["accelerometer"], AccelerometerErrors(mount=error)
+        )
+        for error in MOUNT_ERRORS
+    }
+    return RateTableRun(profile, motion, recording, wide, rates, envelopes)
+
+
+def plateaus(profile: Samples) -> list[tuple[float, float, float]]:
+    """Return (start s, stop s, rate rad/s) of the level stretches of a profile that outlast their margins."""
+    knots = list(zip(profile.t.tolist(), profile.value.tolist(), strict=True))
+    return [
+        (a[0] + MARGIN_S, b[0] - MARGIN_S, a[1])
+        for a, b in pairwise(knots)
+        if a[1] == b[1] and b[0] - a[0] > 2 * MARGIN_S
+    ]
+
+
+def errors_within(rate: YawRate, motion: Motion, start: float, stop: float) -> tuple[FloatArray, BoolArray]:
+    """Return errors (n,) rad/s against truth of the estimates from start to stop, and which of them are known."""
+    chosen = (rate.t >= start) & (rate.t <= stop)
+    truth = motion.at(rate.t[chosen]).rate[:, 2]
+    error = rate.rate[chosen] - (truth if rate.signed else np.abs(truth))
+    return error, np.isfinite(error)
+
+
+def plateau_table(run: RateTableRun) -> list[Plateau]:
+    """Return the errors of each method on each plateau."""
+    table = []
+    for start, stop, rate in plateaus(run.profile):
+        for method, estimate in run.rates.items():
+            error, known = errors_within(estimate, run.motion, start, stop)
+            share = float(np.mean(known)) if known.size else 0.0
+            seen = error[known]
+            figures = (seen.mean(), seen.std(), np.abs(seen).max()) if seen.size else (np.nan,) * 3
+            table.append(Plateau(method, rate, share, *(float(figure) for figure in figures)))
+    return table
+
+
+def write_plateaus(path: Path, table: list[Plateau]) -> None:
+    """Write the table as CSV, in deg/s and per cent of the plateau's rate."""
+    lines = ["rate_deg_s,method,known_share,bias_deg_s,sd_deg_s,worst_deg_s,bias_percent,sd_percent,worst_percent"]
+    for row in table:
+        degrees = [np.degrees(x) for x in (row.bias, row.sd, row.worst)]
+        percent = [100 * x / row.rate if row.rate else np.nan for x in (row.bias, row.sd, row.worst)]
+        cells = ["" if np.isnan(x) else f"{x:.4f}" for x in (*degrees, *percent)]
+        lines.append(f"{np.degrees(row.rate):.6g},{row.method},{row.known:.3f}," + ",".join(cells))
+    write_text(path, "\n".join([*lines, ""]))
+
+
+def rate_table_checks(run: RateTableRun, table: list[Plateau]) -> list[Score]:
+    """Turn what the paper says of its Fig. 7 into figures that can be off.
+
+    Its words: the gyroscope saturates; the wide-range one is noisy; the FFT is the most accurate at high rates, with
+    a small distortion even at a static rate, a delay of half its window, and nothing below its threshold; the
+    accelerometer's envelope widens with the mount error, and holds the truth.
+    """
+    at = {(row.method, round(np.degrees(row.rate))): row for row in table}
+    rates = sorted({round(np.degrees(row.rate)) for row in table})
+    threshold, clip = np.degrees(FftSettings().threshold), np.degrees(run.recording.sheets["gyroscope"].range or np.inf)
+    high = [rate for rate in rates if rate > max(2000.0, clip - 1)]
+    low = [rate for rate in rates if rate < threshold - 150]
+    middle = [rate for rate in rates if rate > threshold + 50]
+    scores = []
+
+    def rms(method: str, rate: int) -> float:
+        row = at[method, rate]
+        return float(np.degrees(np.hypot(row.bias, row.sd)))
+
+    if low:
+        below = max(at["fft", rate].known for rate in low)
+        scores.append(at_most("rate table: share of fft values below its threshold", below, "1", 0.0))
+    if middle:
+        # leakage from the negative frequency shifts the peak by up to a tenth of the window's resolution
+        worst = max(np.degrees(abs(at["fft", rate].bias)) for rate in middle)
+        resolution = 360.0 / (FftSettings().window * run.recording.need("magnetometer").interval)
+        scores.append(at_most("rate table: largest bias of fft on a plateau", worst, "deg/s", 0.1 * resolution))
+        distortion = max(np.degrees(at["fft", rate].sd) for rate in middle)
+        scores.append(score("rate table: largest distortion of fft at a static rate", distortion, "deg/s", 2.5, 2.49))
+    if high:
+        worst = max(abs(at["fft", rate].bias) / np.radians(rate) for rate in high)
+        scores.append(at_most("rate table: largest relative bias of fft at high rates", 100 * worst, "%", 0.15))
+        share = max(at["gyroscope", rate].known for rate in high)
+        scores.append(at_most("rate table: share of gyroscope values beyond its range", share, "1", 0.0))
+        noise = float(np.median([np.degrees(at["adxrs649", rate].sd) for rate in high]))
+        scores.append(score("rate table: noise of the wide-range gyroscope", noise, "deg/s", 14.0, 1.4))
+        ratio = max(rms("fft", rate) / min(rms("adxrs649", rate), rms("accelerometer", rate)) for rate in high)
+        scores.append(score("rate table: fft error over the next best method's at high rates", ratio, "1", 0.0, 1.0))
+        scores.extend(_envelope_checks(run, high[-1]))
+    lag = fft_delay(run)
+    if np.isfinite(lag):
+        expected = (FftSettings().window - 1) / 2 * run.recording.need("magnetometer").interval
+        scores.append(score("rate table: delay of the unshifted fft", lag, "s", expected, 0.05 * expected))
+    return scores
+
+
+def _envelope_checks(run: RateTableRun, rate_deg_s: int) -> list[Score]:
+    start, stop, rate = next(p for p in plateaus(run.profile) if round(np.degrees(p[2])) == rate_deg_s)
+    widths, outside = {}, 0.0
+    for error, estimate in run.envelopes.items():
+        assert estimate.lower is not None
+        assert estimate.upper is not None
+        chosen = (estimate.t >= start) & (estimate.t <= stop)
+        low, high = estimate.lower[chosen], estimate.upper[chosen]
+        widths[error] = float(np.nanmedian(high - low)) / rate
+        outside = max(outside, float(np.mean((low > rate) | (high < rate))))
+    small, large = MOUNT_ERRORS
+    distance = float(np.hypot(*np.asarray(run.recording.sheets["accelerometer"].position)[:2]))
+    scores = []
+    for error in MOUNT_ERRORS:
+        # (9) at the corners of mount error and (13), at high rate; what bias and gravity add is in the margin
+        spread = (1.005 + 0.02) * error
+        predicted = np.sqrt(distance / (0.995 * distance - spread)) - np.sqrt(distance / (1.005 * distance + spread))
+        name = f"rate table: envelope width for {1000 * error:g} mm at {rate_deg_s} deg/s over (9)"
+        scores.append(score(name, widths[error] / predicted, "1", 1.0, 0.15))
+    ratio = widths[large] / widths[small]
+    scores.append(score("rate table: envelope width of 5 mm over that of 1 mm", ratio, "1", 5.0, 1.5))
+    scores.append(at_most("rate table: share of truth outside the envelopes", outside, "1", 0.0))
+    return scores
+
+
+def fft_delay(run: RateTableRun) -> float:
+    """Return by how much the unshifted estimate lags on ramps, s: its error over the slope, median."""
+    late = fft(run.recording.need("magnetometer"), FftSettings(stamp="unshifted"))
+    delays = []
+    knots = list(zip(run.profile.t.tolist(), run.profile.value.tolist(), strict=True))
+    for (t0, r0), (t1, r1) in pairwise(knots):
+        slope = (r1 - r0) / (t1 - t0)
+        if slope == 0:
+            continue
+        # the middle of the ramp reaches the stamp half a window later; take it where the window's centre is central
+        window = FftSettings().window * run.recording.need("magnetometer").interval
+        middle = (t0 + t1) / 2 + window / 2
+        near = np.abs(late.t - middle) < 0.1
+        command = r0 + slope * (late.t[near] - t0)
+        delays.extend(((command - late.rate[near]) / slope).tolist())
+    known = np.array(delays)[np.isfinite(delays)] if delays else np.array([])
+    return float(np.median(known)) if known.size else float("nan")

@@ -1,0 +1,46 @@
+"""Reports: one self-contained HTML page that a person reads from top to bottom."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from discsim.files import write_text
+from validation.run import package_version
+
+__all__ = ["Section", "write_report"]
+
+_NUMBER = re.compile(r"^[-+\u2212]?\d[\d,.]*(e[-+]?\d+)?( ?%)?$")
+
+
+@dataclass(frozen=True)
+class Section:
+    """One part of a report: paragraphs, a table, figures (caption, PNG file)."""
+
+    title: str
+    text: Sequence[str] = ()
+    header: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+    figures: Sequence[tuple[str, Path]] = field(default=())
+
+    @property
+    def images(self) -> list[tuple[str, str]]:
+        """The figures with their files as base64 text."""
+        return [(caption, base64.b64encode(path.read_bytes()).decode()) for caption, path in self.figures]
+
+
+def write_report(path: Path, title: str, lead: str, sections: Sequence[Section]) -> None:
+    """Write the page to ``path``, figures embedded."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("validation"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    environment.tests["number_cell"] = lambda cell: bool(_NUMBER.match(str(cell)))
+    page = environment.get_template("report.html").render(
+        title=title, lead=lead, sections=sections, footer=f"discsim {package_version()}"
+    )
+    write_text(path, page)
