@@ -190,7 +190,7 @@ class Recording:
     @property
     def end(self) -> float:
         """Time of the last sample of any sensor, s."""
-        return max((float(samples.t[-1]) for samples in self.samples.values()), default=0.0)
+        return max((float(samples.t[-1]) for samples in self.samples.values() if len(samples)), default=0.0)
 
 
 # ---------------------------------------------------------------------------------------------- reading
