@@ -13,11 +13,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 from discsim.files import write_bytes
 from estimators.rate import YawRate
 
-__all__ = ["COLOURS", "STYLE", "colour", "draw_rates", "new_figure", "save_figure"]
+__all__ = ["COLOURS", "STYLE", "colour", "draw_rates", "new_figure", "save_figure", "symmetric_log"]
 
 #: One colour per method wherever it is drawn: Okabe and Ito's, which colour-blind readers can tell apart.
 COLOURS: Mapping[str, str] = MappingProxyType(
@@ -76,6 +77,16 @@ def save_figure(figure: Figure, path: Path) -> None:
     buffer = io.BytesIO()
     figure.savefig(buffer, format=kind, dpi=150, metadata=metadata)
     write_bytes(path, buffer.getvalue())
+
+
+def symmetric_log(axes: Axes, *, linear: float, limit: float) -> None:
+    """Give the y axis a scale that is linear within +-``linear`` and logarithmic to +-``limit``, with plain numbers."""
+    axes.set_yscale("symlog", linthresh=linear)
+    axes.set_ylim(-limit, limit)
+    decades = [linear * factor for factor in (1.0, 3.0, 10.0, 30.0, 100.0) if linear * factor <= limit]
+    axes.set_yticks([-value for value in reversed(decades)] + [0.0] + decades)
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_locator(NullLocator())
 
 
 def draw_rates(axes: Axes, rates: Sequence[YawRate]) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from discsim.rig import PLATEAUS_DEG_S, default_profile
 from discsim.shipped import load_disc
 from validation.closed_forms import closed_form_checks
-from validation.figures import COLOURS, new_figure, save_figure
+from validation.figures import COLOURS, new_figure, save_figure, symmetric_log
 from validation.rate_table import plateau_table, rate_table_checks, run_rate_table, write_plateaus
 from validation.rate_table_figures import draw_methods, draw_waveform
 from validation.report import Section, write_report
@@ -77,7 +77,7 @@ def draw_throws(results: Sequence[ThrowResult], path: Path) -> None:
     axes[0].set_ylabel("north, m")
     axes[0].set_aspect("equal", adjustable="datalim")
     axes[0].legend(fontsize=7)
-    axes[1].set_yscale("symlog", linthresh=20)
+    symmetric_log(axes[1], linear=20.0, limit=600.0)
     axes[1].axhline(0, color=COLOURS["truth"], lw=0.8)
     axes[1].set_title("Error of the estimated spin rate on every throw")
     axes[1].set_xlabel("time, s")

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from estimators.fft import FftSettings
-from validation.figures import COLOURS, new_figure, save_figure
+from validation.figures import COLOURS, new_figure, save_figure, symmetric_log
 from validation.rate_table import RateTableRun, errors_within, plateaus
 
 __all__ = ["draw_methods", "draw_waveform"]
@@ -30,7 +30,7 @@ def draw_methods(run: RateTableRun, path: Path) -> None:
     top.legend(loc="upper left", ncols=5, fontsize=8)
     if spans := plateaus(run.profile):
         start, stop, level = max(spans, key=lambda span: abs(span[2]))
-        inset = top.inset_axes((0.64, 0.10, 0.34, 0.40))
+        inset = top.inset_axes((0.66, 0.07, 0.33, 0.34))
         for method in ("accelerometer", "fft"):
             rate = run.rates[method]
             inset.plot(rate.t, np.degrees(rate.rate), color=COLOURS[method], lw=0.9)
@@ -63,9 +63,8 @@ def draw_methods(run: RateTableRun, path: Path) -> None:
         error, _ = errors_within(rate, run.motion, run.motion.start, run.motion.end)
         inside = (rate.t >= run.motion.start) & (rate.t <= run.motion.end)
         bottom.plot(rate.t[inside], np.degrees(error), color=COLOURS[method], lw=0.7)
-    bottom.set_yscale("symlog", linthresh=10)
-    bottom.set_ylim(-400, 400)
-    bottom.set_title("Error of each method (linear within +-10 deg/s, logarithmic beyond)")
+    symmetric_log(bottom, linear=10.0, limit=300.0)
+    bottom.set_title("Error of each method (logarithmic beyond 10 deg/s)")
     bottom.set_ylabel("error, deg/s")
     bottom.set_xlabel("time, s")
     for panel in axes[:-1]:
@@ -92,7 +91,7 @@ def draw_waveform(run: RateTableRun, path: Path) -> None:
     axes[0].set_title("Magnetometer on the turning table")
     axes[0].set_xlabel("time, s")
     axes[0].set_ylabel("field, uT")
-    axes[0].legend(loc="upper right")
+    axes[0].legend(loc="lower left", bbox_to_anchor=(0.7, 1.0), ncols=2)
     axes[1].plot(frequency, amplitude, color=COLOURS["fft"], lw=1.0)
     axes[1].axvline(abs(level) / (2 * np.pi), color=COLOURS["truth"], lw=0.9, ls="--", label="truth")
     axes[1].axvspan(0, settings.threshold / (2 * np.pi), color="0.85", label="below the threshold")

@@ -71,7 +71,9 @@ def _print(table: list[Plateau]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    shown = Table("plateau, deg/s", "method", "known", "bias, deg/s", "sd, deg/s", "worst, deg/s", "bias, %")
+    shown = Table(title="errors by plateau, deg/s")
+    for name in ("plateau", "method", "known", "bias", "sd", "worst", "bias, %"):
+        shown.add_column(name, justify="left" if name == "method" else "right", no_wrap=True)
     for row in table:
         figures = [np.degrees(x) for x in (row.bias, row.sd, row.worst)]
         cells = ["" if np.isnan(x) else f"{x:.2f}" for x in figures]
