@@ -14,7 +14,7 @@ LOWEST_HEIGHT = 0.02
 
 
 class Wind(NamedTuple):
-    """Steady wind beside the known one (air.wind); V is relative to it."""
+    """Steady wind beside the known one; V is relative to it (air.wind)."""
 
     w_north_m_s: float = 0.0
     w_east_m_s: float = 0.0

@@ -203,7 +203,7 @@ def g_sensitivity(effect: GSensitivity, f: FloatArray) -> FloatArray:
 
 
 class ClockRate(NamedTuple):
-    """A clock that runs wrong, ``written time = ratio x true time`` (clock.rate and each sensor's clock_rate)."""
+    """A clock that runs wrong, ``written time = ratio x true time``."""
 
     ratio: float = 1.0
 
