@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
@@ -10,9 +11,11 @@ import typer
 
 from discsim.arrays import FloatArray, readonly
 from discsim.effects.catalogue import Effect, effect
+from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.shipped import load_site
 
-__all__ = ["EffectOption", "OutOption", "SeedOption", "parse_effects", "parse_vector"]
+__all__ = ["EffectOption", "OutOption", "SeedOption", "SiteOption", "at_site", "parse_effects", "parse_vector"]
 
 OutOption: TypeAlias = Annotated[Path, typer.Option("--out", help="Folder to write into; created where absent.")]
 SeedOption: TypeAlias = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
@@ -23,6 +26,17 @@ EffectOption: TypeAlias = Annotated[
         help="An effect of the catalogue, ID:name=value,name=value; may repeat. Example: air.wind:w_north_m_s=1.5",
     ),
 ]
+
+SiteOption: TypeAlias = Annotated[
+    str | None, typer.Option("--site", help="A shipped place's name or a TOML file: its magnetic field is taken.")
+]
+
+
+def at_site(environment: Environment, site: str | None) -> Environment:
+    """Return the environment with the magnetic field of a place, or as it is where none is named."""
+    if site is None:
+        return environment
+    return replace(environment, magnetic_field=load_site(site).environment.magnetic_field)
 
 
 def parse_effects(texts: Sequence[str] | None) -> list[Effect]:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from validation.options import EffectOption, OutOption, SeedOption, parse_effects
+from validation.options import EffectOption, OutOption, SeedOption, SiteOption, at_site, parse_effects
 
 __all__ = ["command"]
 
@@ -30,6 +30,7 @@ def command(
     parts: Annotated[
         str, typer.Option(help="Sensor parts on board, shipped names or TOML files, separated by commas.")
     ] = "mpu9250,neo_m8n",
+    site: SiteOption = None,
     effect: EffectOption = None,
     ground: Annotated[Ground, typer.Option(help="The ground ends the flight, or the disc skips on.")] = Ground.stop,
     duration: Annotated[float, typer.Option(min=0.01, help="Longest flight, s.")] = 30.0,
@@ -49,7 +50,8 @@ def command(
     from validation.run import start_run
     from validation.truth import write_flight_truth
 
-    body, environment = load_disc(disc)
+    body, surroundings = load_disc(disc)
+    environment = at_site(surroundings, site)
     release = load_throw(throw)
     effects = parse_effects(effect)
     instruments = Instruments.from_parts(*parts.split(",")).with_effects(effects)
@@ -59,8 +61,6 @@ def command(
         recording = record(motion, instruments, run.rng, plant="flight", name=out.resolve().name, disc=body)
         write_recording(recording, out)
         write_flight_truth(out / "truth.csv", motion)
-        end, north, east = motion.end, *motion.position[-1, :2]
+        north, east = motion.position[-1, :2]
         what = "touches down" if motion.touched_down else "is left"
-        typer.echo(
-            f"{out}: {what} after {end:.2f} s, {(north**2 + east**2) ** 0.5:.1f} m away ({north:.1f}, {east:.1f})"
-        )
+        typer.echo(f"{out}: {what} after {motion.end:.2f} s, {north:.1f} m north and {east:.1f} m east")

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from validation.options import EffectOption, OutOption, SeedOption, parse_effects, parse_vector
+from validation.options import (
+    EffectOption,
+    OutOption,
+    SeedOption,
+    SiteOption,
+    at_site,
+    parse_effects,
+    parse_vector,
+)
 
 if TYPE_CHECKING:
     from validation.rate_table import Plateau
@@ -23,6 +31,7 @@ def command(
     mount: Annotated[
         str, typer.Option(help="Installation error dx,dy,dz of the accelerometer in m, added to its stated place.")
     ] = "0,0,0",
+    site: SiteOption = None,
     effect: EffectOption = None,
     out: OutOption = Path("rate-table"),
     seed: SeedOption = 0,
@@ -48,7 +57,12 @@ def command(
     with start_run(out, seed, [] if profile is None else [profile]) as run:
         run.step("turning the table and measuring")
         result = run_rate_table(
-            knots, Environment(), run.rng, mount=offset, effects=effects, name=out.resolve().name or "rate-table"
+            knots,
+            at_site(Environment(), site),
+            run.rng,
+            mount=offset,
+            effects=effects,
+            name=out.resolve().name or "rate-table",
         )
         write_recording(result.recording, out)
         write_recording(result.wide, out / "adxrs649")

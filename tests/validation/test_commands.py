@@ -1,0 +1,146 @@
+"""The commands as a person types them: files, exit statuses, one clear line for every error, the same bytes again."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from discsim.recording import read_recording
+from validation import headless
+from validation.cli import main
+from validation.scores import at_most
+
+
+def run(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
+    """Call the command line in this process and return its exit status."""
+    monkeypatch.setattr(sys, "argv", ["discsim", *arguments])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    return int(stop.value.code or 0)
+
+
+@pytest.fixture
+def short_profile(tmp_path: Path) -> Path:
+    path = tmp_path / "profile.csv"
+    path.write_text("time_s,rate_deg_s\n0,0\n1,1500\n3.5,1500\n4.5,3000\n7,3000\n")
+    return path
+
+
+def test_a_flight_leaves_a_recording_and_its_truth_which_ends_on_the_ground(monkeypatch, tmp_path, capsys):
+    out = tmp_path / "flight"
+    assert run(monkeypatch, "fly", "--out", str(out), "--seed", "3") == 0
+    recording = read_recording(out)
+    assert recording.plant == "flight"
+    assert set(recording.samples) == {"magnetometer", "accelerometer", "gyroscope", "gps"}
+    truth = np.genfromtxt(out / "truth.csv", delimiter=",", names=True)
+    assert truth.dtype.names[:4] == ("time_s", "north_m", "east_m", "down_m")
+    assert abs(truth["down_m"][-1]) < 1e-6
+    assert recording.end <= truth["time_s"][-1]
+    assert "touches down" in capsys.readouterr().out
+    left = json.loads((out / "run.json").read_text())
+    assert left["seed"] == 3
+    assert left["command"][:2] == ["discsim", "fly"]
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_one_does_not(monkeypatch, tmp_path, short_profile):
+    for name, seed in (("a", "1"), ("b", "1"), ("c", "2")):
+        arguments = [
+            "rate-table",
+            "--profile",
+            str(short_profile),
+            "--out",
+            str(tmp_path / name / "run"),
+            "--seed",
+            seed,
+        ]
+        assert run(monkeypatch, *arguments) == 0
+    names = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*") if path.is_file())
+    assert Path("run/adxrs649/recording.toml") in names
+    assert Path("run/methods.png") in names
+    for name in names:
+        if name.name != "run.json":
+            assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
+    first, other = ((tmp_path / name / "run" / "magnetometer.csv").read_bytes() for name in ("a", "c"))
+    assert first != other
+
+
+def test_an_effect_on_the_command_line_reaches_flight_and_sensors(monkeypatch, tmp_path):
+    for name, effects in (
+        ("plain", []),
+        ("windy", ["--effect", "air.wind:w_north_m_s=3", "--effect", "mag.hard_iron:bz_uT=25"]),
+    ):
+        assert run(monkeypatch, "fly", "--out", str(tmp_path / name), *effects) == 0
+    plain, windy = (read_recording(tmp_path / name) for name in ("plain", "windy"))
+    shift = windy.need("magnetometer").value[:100, 2].mean() - plain.need("magnetometer").value[:100, 2].mean()
+    assert shift == pytest.approx(25.0, abs=1.0)
+    # less airspeed is less lift: a tail wind of 3 m/s ends this flight more than a second sooner
+    assert windy.end < plain.end - 1.0
+    # what is concealed is not stated
+    assert "hard_iron" not in (tmp_path / "windy" / "recording.toml").read_text()
+
+
+def test_a_site_replaces_the_field(monkeypatch, tmp_path):
+    assert run(monkeypatch, "fly", "--out", str(tmp_path / "flight"), "--site", "berlin") == 0
+    north, _, down = read_recording(tmp_path / "flight").environment.magnetic_field
+    assert 18.0 < north < 20.0
+    assert 45.0 < down < 47.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["fly", "--disc", "frizbee"], "driver"),
+        (["fly", "--effect", "air.wnd:w_north_m_s=1"], "did you mean 'air.wind'"),
+        (["fly", "--effect", "air.wind:north=1"], "w_north_m_s"),
+        (["fly", "--effect", "air.wind:w_north_m_s=strong"], "no name=number"),
+        (["fly", "--throw", "nowhere.toml"], "nowhere.toml"),
+        (["fly", "--parts", "mpu6050"], "mpu9250"),
+        (["fly", "--site", "atlantis"], "berlin"),
+        (["fly", "--ground", "bounce"], "'--ground'"),
+        (["rate-table", "--mount", "1,1,0"], "millimetres"),
+        (["rate-table", "--mount", "0.001"], "three numbers"),
+        (["rate-table", "--profile", "missing.csv"], "missing.csv"),
+        (["validate", "--seed", "-1"], "--seed"),
+        (["vaildate"], "vaildate"),
+    ],
+)
+def test_a_wrong_call_is_one_line_and_status_2(monkeypatch, tmp_path, capsys, arguments, expected):
+    monkeypatch.chdir(tmp_path)
+    assert run(monkeypatch, *arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith("discsim: ")
+    assert captured.err.count("\n") == 1
+    assert expected in captured.err
+    assert "Traceback" not in captured.err
+    assert not any(tmp_path.iterdir()), "a refused call leaves nothing behind"
+
+
+def test_debug_shows_the_traceback(monkeypatch, capsys):
+    assert run(monkeypatch, "fly", "--disc", "frizbee", "--debug") == 2
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_validate_scores_everything_and_leaves_its_report(monkeypatch, tmp_path, capsys):
+    out, junit = tmp_path / "report", tmp_path / "scores.xml"
+    assert run(monkeypatch, "validate", "--quick", "--out", str(out), "--junit", str(junit)) == 0
+    scores = json.loads((out / "scores.json").read_text())
+    assert len(scores) >= 10
+    assert set(scores[0]) == {"name", "value", "unit", "expected", "tolerance", "ok"}
+    assert all(score["ok"] for score in scores)
+    page = (out / "report.html").read_text()
+    assert page.count("data:image/png;base64,") == 3
+    suite = ElementTree.parse(junit).getroot()[0]
+    assert int(suite.get("tests")) == len(scores)
+    assert suite.get("failures") == "0"
+    assert f"{len(scores)} of {len(scores)} scores" in capsys.readouterr().out
+
+
+def test_validate_exits_with_1_where_a_score_is_outside_its_tolerance(monkeypatch, tmp_path):
+    monkeypatch.setattr(headless, "throw_checks", lambda results: [at_most("throws: made up", 2.0, "m", 1.0)])
+    assert run(monkeypatch, "validate", "--quick", "--out", str(tmp_path / "report")) == 1
+    assert "FAIL" in (tmp_path / "report" / "report.html").read_text()
