@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -122,6 +123,9 @@ class Effect:
     def __post_init__(self) -> None:
         if type(self.value) is not row(self.id).type:
             raise InputError(f"{self.id}: got {type(self.value).__name__}, expected {row(self.id).type.__name__}")
+        for name, size, none in zip(self.value._fields, self.value, row(self.id).baseline, strict=True):
+            if not isfinite(size) and size != none:
+                raise InputError(f"{self.id}: {name} is not finite ({size}); expected a finite number")
 
 
 def effect(id: str, **parameters: float) -> Effect:

@@ -18,10 +18,11 @@ from discsim.effects.sensors import (
     bias_drift,
     sensitivity,
 )
+from discsim.errors import InputError
 from discsim.frames import body_to_ned, turn
 from discsim.motion import Motion, State
 from discsim.recording import Samples, SensorSheet
-from discsim.sensors.sampling import Noise, Sampling, digitise, filtered
+from discsim.sensors.sampling import Noise, Sampling, check_lag, digitise, filtered
 
 __all__ = ["Accelerometer", "specific_force"]
 
@@ -64,6 +65,9 @@ class Accelerometer:
     def __post_init__(self) -> None:
         for name in ("position", "misalignment"):
             object.__setattr__(self, name, vector3(getattr(self, name), f"accelerometer {name}"))
+        check_lag(self.lag)
+        if not self.saturation.limit_m_s2 > 0:
+            raise InputError(f"accelerometer saturates at {self.saturation.limit_m_s2:g} m/s^2, expected above zero")
 
     def ideal(self, motion: Motion, t: FloatArray) -> FloatArray:
         """Return the reading (n, 3) m/s^2 before lag and noise, S_T f + bias, Eq. (5), at instants t (n,)."""

@@ -12,7 +12,7 @@ from discsim.frames import body_to_ned, turn
 from discsim.motion import Motion
 from discsim.recording import Samples, SensorSheet
 from discsim.sensors.accelerometer import specific_force
-from discsim.sensors.sampling import Noise, Sampling, digitise, filtered
+from discsim.sensors.sampling import Noise, Sampling, check_lag, digitise, filtered
 
 __all__ = ["Gyroscope"]
 
@@ -21,8 +21,9 @@ __all__ = ["Gyroscope"]
 class Gyroscope:
     """A gyroscope of one to three axes; every error starts at zero, so a bare one is ideal.
 
-    ``axes`` tells which of x, y, z exist; absent ones read NaN. ``position`` (3,) m in B is the accelerometer's, where
-    the specific force that fakes rates is taken. ``noise``, ``resolution`` and ``range`` are in rad/s.
+    ``axes`` tells which of x, y, z exist; absent ones read NaN. ``position`` (3,) m in B is the accelerometer's stated
+    place, where the specific force that fakes rates is taken (`Instruments` sees to it). ``noise``, ``resolution`` and
+    ``range`` are in rad/s.
     """
 
     sampling: Sampling = field(default_factory=lambda: Sampling(200.0))
@@ -40,6 +41,7 @@ class Gyroscope:
     def __post_init__(self) -> None:
         for name in ("position", "misalignment"):
             object.__setattr__(self, name, vector3(getattr(self, name), f"gyroscope {name}"))
+        check_lag(self.lag)
 
     def ideal(self, motion: Motion, t: FloatArray) -> FloatArray:
         """Return the reading (n, 3) rad/s before lag and noise at instants t (n,)."""

@@ -98,7 +98,12 @@ class Instruments:
         for name in self.sensors:
             if name not in SENSORS:
                 raise InputError(f"unknown sensor '{name}'; expected one of {', '.join(SENSORS)}")
-        object.__setattr__(self, "sensors", MappingProxyType(dict(self.sensors)))
+        sensors = dict(self.sensors)
+        accelerometer, gyroscope = sensors.get("accelerometer"), sensors.get("gyroscope")
+        if isinstance(accelerometer, Accelerometer) and isinstance(gyroscope, Gyroscope):
+            # both sit on one chip: what fakes a rate is the specific force there, wherever it was moved to
+            sensors["gyroscope"] = replace(gyroscope, position=accelerometer.position)
+        object.__setattr__(self, "sensors", MappingProxyType(sensors))
 
     @classmethod
     def from_parts(cls, *names: str) -> Instruments:

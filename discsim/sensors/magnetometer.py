@@ -8,10 +8,11 @@ import numpy as np
 
 from discsim.arrays import FloatArray, readonly, vector3
 from discsim.effects.sensors import HardIron, Lag, SoftIron, StrayField, hard_iron, soft_iron, stray_field
+from discsim.errors import InputError
 from discsim.frames import body_to_ned, turn
 from discsim.motion import Motion
 from discsim.recording import Samples, SensorSheet
-from discsim.sensors.sampling import Noise, Sampling, digitise, filtered
+from discsim.sensors.sampling import Noise, Sampling, check_lag, digitise, filtered
 
 __all__ = ["Magnetometer"]
 
@@ -36,6 +37,9 @@ class Magnetometer:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "misalignment", vector3(self.misalignment, "magnetometer misalignment"))
+        check_lag(self.lag)
+        if not self.stray_field.height_m > 0:
+            raise InputError(f"stray field dies out over {self.stray_field.height_m:g} m, expected above zero")
 
     def ideal(self, motion: Motion, t: FloatArray) -> FloatArray:
         """Return the reading (n, 3) uT before lag and noise at instants t (n,)."""

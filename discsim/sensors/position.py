@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discsim.effects.sensors import Latency
+from discsim.errors import InputError
 from discsim.motion import Motion
 from discsim.recording import Samples, SensorSheet
 from discsim.sensors.sampling import Noise, Sampling
@@ -25,6 +26,10 @@ class Gps:
     latency: Latency = field(default_factory=Latency)
     position_noise: Noise = field(default_factory=Noise)
     velocity_noise: Noise = field(default_factory=Noise)
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.latency.delay_s < np.inf:
+            raise InputError(f"gps latency is {self.latency.delay_s:g} s, expected zero or more")
 
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
         """Return the fixes of a motion, value (n, 6): position in m, velocity in m/s, in N."""
@@ -52,6 +57,10 @@ class Tracker:
     sampling: Sampling = field(default_factory=lambda: Sampling(30.0))
     noise: Noise = field(default_factory=Noise)
     unseen: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.unseen < 1:
+            raise InputError(f"share of coordinates unseen is {self.unseen:g}, expected 0 to below 1")
 
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
         """Return the track of a motion, value (n, 3) m in N, NaN where unseen."""

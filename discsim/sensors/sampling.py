@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
-from scipy.signal import lfilter
 
 from discsim.arrays import BoolArray, FloatArray
+from discsim.compiled import compiled
 from discsim.effects.sensors import ClockRate, DroppedSamples, Lag, lag, true_time
+from discsim.errors import InputError
 from discsim.motion import Motion
 
-__all__ = ["Noise", "Sampling", "digitise", "filtered"]
+__all__ = ["Noise", "Sampling", "check_lag", "digitise", "filtered"]
 
 #: an ideal reading (n, k) at instants (n,) s
 Signal: TypeAlias = Callable[[FloatArray], FloatArray]
@@ -39,24 +40,24 @@ class Sampling:
     dropped: DroppedSamples = field(default_factory=DroppedSamples)
 
     def __post_init__(self) -> None:
-        if not self.rate_hz > 0:
-            raise ValueError(f"sampling rate is {self.rate_hz:g} Hz, expected above zero")
+        for name, value, unit in (("rate", self.rate_hz, " Hz"), ("clock rate", self.clock.ratio, "")):
+            if not 0 < value < np.inf:
+                raise InputError(f"sampling {name} is {value:g}{unit}, expected above zero")
+        for name, value in (("phase", self.phase_s), ("jitter", self.jitter_s)):
+            if not 0 <= value < np.inf:
+                raise InputError(f"sampling {name} is {value:g} s, expected zero or more")
         for name, share in (("gaps", self.gaps), ("dropped", self.dropped.fraction)):
             if not 0 <= share < 1:
-                raise ValueError(f"share of samples lost ({name}) is {share:g}, expected 0 to below 1")
+                raise InputError(f"share of samples lost ({name}) is {share:g}, expected 0 to below 1")
 
-    def instants(
-        self, start: float, stop: float, rng: np.random.Generator, common_clock: ClockRate | None = None
-    ) -> tuple[FloatArray, FloatArray]:
+    def instants(self, start: float, stop: float, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
         """Return written and true times (n,) s of the samples taken from ``start`` to ``stop``.
 
-        ``start`` is time zero of the recording. A clock common to all sensors multiplies the sensor's own.
+        ``start`` is time zero of the recording.
         """
-        ratio = self.clock.ratio * (common_clock.ratio if common_clock else 1.0)
-        clock = ClockRate(ratio)
-        count = int(np.floor(((stop - start) * ratio - self.phase_s) * self.rate_hz + 1e-9)) + 1
+        count = int(np.floor(((stop - start) * self.clock.ratio - self.phase_s) * self.rate_hz + 1e-9)) + 1
         nominal = self.phase_s + np.arange(max(count, 0)) / self.rate_hz
-        taken = start + true_time(clock, nominal)
+        taken = start + true_time(self.clock, nominal)
         written = nominal
         if self.dropped.fraction > 0:
             taken = taken[rng.random(taken.size) >= self.dropped.fraction]
@@ -81,6 +82,13 @@ class Noise:
     correlation_s: float = 1.0
     walk: float = 0.0
 
+    def __post_init__(self) -> None:
+        for name in ("white", "correlated", "walk"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise InputError(f"{name} noise is {getattr(self, name):g}, expected zero or more")
+        if not self.correlation_s > 0:
+            raise InputError(f"correlation time of noise is {self.correlation_s:g} s, expected above zero")
+
     def sample(self, t: FloatArray, width: int, rng: np.random.Generator) -> FloatArray:
         """Return noise (n, width) at times t (n,) s; only what is not zero draws from ``rng``."""
         shape = (t.size, width)
@@ -91,13 +99,26 @@ class Noise:
         if self.white > 0:
             noise += self.white * rng.standard_normal(shape)
         if self.correlated > 0:
-            kept = np.exp(-float(np.median(steps[1:] if t.size > 1 else 1.0)) / self.correlation_s)
-            drive = rng.standard_normal(shape)
-            drive[1:] *= np.sqrt(1 - kept**2)
-            noise += self.correlated * lfilter([1.0], [1.0, -kept], drive, axis=0)
+            noise += self.correlated * _remembering(np.exp(-steps / self.correlation_s), rng.standard_normal(shape))
         if self.walk > 0:
             noise += self.walk * np.cumsum(np.sqrt(steps)[:, None] * rng.standard_normal(shape), axis=0)
         return noise
+
+
+@compiled
+def _remembering(kept: FloatArray, drive: FloatArray) -> FloatArray:
+    """Unit noise (n, k) of which the share kept[i] of the sample before lives on, driven by unit white noise."""
+    y = drive.copy()
+    for i in range(1, kept.size):
+        for j in range(drive.shape[1]):
+            y[i, j] = kept[i] * y[i - 1, j] + np.sqrt(1.0 - kept[i] ** 2) * drive[i, j]
+    return y
+
+
+def check_lag(effect: Lag) -> None:
+    """Refuse a lag that is no time; raises `InputError`."""
+    if not 0 <= effect.tau_s < np.inf:
+        raise InputError(f"lag is {effect.tau_s:g} s, expected zero or more")
 
 
 def filtered(effect: Lag, motion: Motion, signal: Signal, taken: FloatArray) -> FloatArray:
