@@ -17,11 +17,11 @@ from discsim.compiled import compiled
 from discsim.disc import Rig
 from discsim.effects.catalogue import Effect
 from discsim.effects.events import spin_step
-from discsim.effects.rig import axis, coulomb_friction, quadratic_drag, speed_ripple
+from discsim.effects.rig import SpeedRipple, axis, coulomb_friction, quadratic_drag, speed_ripple
 from discsim.engine import check_model, passive_force
 from discsim.environment import Environment
 from discsim.errors import InputError
-from discsim.files import model_file
+from discsim.files import model_file, read_text
 from discsim.frames import flip_yz, multiply, turn
 from discsim.motion import Motion
 from discsim.parameters import PARAMETERS, parameters
@@ -49,13 +49,12 @@ def default_profile(plateaus_deg_s: Sequence[float] = PLATEAUS_DEG_S, hold: floa
 
 def read_profile(path: Path) -> Samples:
     """Read a profile: a CSV file with columns ``time_s,rate_rad_s`` or ``time_s,rate_deg_s``, one row per knot."""
-    if not path.is_file():
-        raise InputError.at(path, None, f"no such file; expected a profile with columns {COMMAND_HEADER}")
-    with path.open(encoding="utf-8-sig", errors="replace") as stream:
-        degrees = stream.readline().strip() == "time_s,rate_deg_s"
+    degrees = read_text(path).partition("\n")[0] == "time_s,rate_deg_s"
     knots = read_csv(path, "time_s,rate_deg_s" if degrees else COMMAND_HEADER, gaps_allowed=False)
     if len(knots) < 2:
         raise InputError.at(path, 2, "one knot only; expected at least two")
+    if knots.t[0] != 0.0:
+        raise InputError.at(path, 2, f"first knot at {knots.t[0]:g} s, expected 0 s (the start of the recording)")
     return Samples(knots.t, np.radians(knots.value)) if degrees else knots
 
 
@@ -116,10 +115,11 @@ class _Hinge:
         span = until - self.data.time
         steps = max(1, int(np.ceil(span / timestep - 1e-9)))
         self.model.opt.timestep = span / steps
-        for _ in range(steps):
+        for left in reversed(range(steps)):
             mujoco.mj_step(self.model, self.data)
+            if left == 0:
+                self.data.time = until  # so that thousands of steps add up to the knot itself
             self.note()
-        self.data.time = until
 
     def motion(self) -> Motion:
         t, yaw, rate, acceleration = np.array(self.log).T
@@ -162,6 +162,8 @@ def turn_table(
     """
     if len(profile) < 2 or profile.value.ndim != 1 or np.any(np.isnan(profile.value)):
         raise InputError("profile: expected at least two knots (time, rate) without gaps")
+    if profile.t[0] != 0.0:
+        raise InputError(f"profile: first knot at {profile.t[0]:g} s, expected 0 s (the start of the recording)")
     flat = parameters(environment, effects=effects)
     hinge = _Hinge(environment, flat, inertia, yaw)
     model, data = hinge.model, hinge.data
@@ -172,8 +174,9 @@ def turn_table(
         if stepped_model is model and stepped_data is data:
             drive_force(flat, segment, data.time, *views)
 
-    data.time = profile.t[0]
     data.qvel[0] = profile.value[0]
+    if profile.value[0] != 0.0:  # it turns already, ripple and all
+        data.qvel[0] += speed_ripple(SpeedRipple(*flat.view(PARAMETERS)[0]["rig_speed_ripple"]), 0.0, 0.0)[0]
     slopes = np.diff(profile.value) / np.diff(profile.t)
     with passive_force(drive):
         for k, slope in enumerate(slopes):
