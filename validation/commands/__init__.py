@@ -15,6 +15,7 @@ COMMANDS: dict[str, str] = {
     "fly": "fly",
     "rate-table": "rate_table",
     "validate": "validate",
+    "view": "view",
 }
 
 

@@ -1,0 +1,137 @@
+"""``discsim view``: a throw or a recording to look at, in a window or as a video."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from discsim.errors import InputError
+
+if TYPE_CHECKING:
+    from validation.replay import Replay
+    from validation.viewing import Look
+
+__all__ = ["command"]
+
+ENDINGS = (".gif", ".mp4", ".png")
+
+
+def command(
+    recording: Annotated[Path | None, typer.Argument(help="A recording's folder.", show_default=False)] = None,
+    disc: Annotated[
+        str | None, typer.Option(help="Fly a disc: a shipped name, or a TOML file with [disc] and [environment].")
+    ] = None,
+    throw: Annotated[
+        str | None, typer.Option(help="Its throw: a shipped name, or a TOML file. Default: driver.")
+    ] = None,
+    video: Annotated[
+        Path | None, typer.Option(help="Draw off screen into this .gif, .mp4 or .png, placed in --out if relative.")
+    ] = None,
+    speed: Annotated[float, typer.Option(help="Times real time; 0.1 is slow motion.")] = 1.0,
+    camera: Annotated[
+        str, typer.Option(help="track (from behind), side, top, or path (a whole flight from its right).")
+    ] = "track",
+    span: Annotated[str | None, typer.Option(help="Show only A:B, in seconds.")] = None,
+    at: Annotated[
+        str | None, typer.Option(help="For a .png: stills at these seconds, separated by commas, side by side.")
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(help="Pixels, WIDTHxHEIGHT. Default: 640x360, a whole flight in one .png 1200x500.")
+    ] = None,
+    fps: Annotated[float, typer.Option(help="Frames per second of a video.")] = 30.0,
+    enlarge: Annotated[float, typer.Option(help="Draw the disc so many times its size.")] = 1.0,
+    out: Annotated[Path, typer.Option("--out", help="Folder to write into; created where absent.")] = Path("."),
+) -> None:
+    """Show a flight or a rate table in MuJoCo's interactive viewer, or draw it off screen with --video.
+
+    A .png shows a whole flight in one picture, with --at single stills. run.json is left beside FILE.
+
+    Example: discsim view --disc driver --video throw.gif --speed 0.1 --span 0:1
+    """
+    if (recording is None) == (disc is None):
+        raise InputError("expected either the folder of a recording or --disc NAME")
+    if throw is not None and disc is None:
+        raise InputError(f"--throw {throw}: a recording has its own motion; expected --disc NAME with it")
+    if video is not None and video.suffix not in ENDINGS:
+        raise InputError(f"--video {video}: expected a name that ends in {', '.join(ENDINGS)}")
+    if at is not None and (video is None or video.suffix != ".png"):
+        raise InputError(f"--at {at}: stills go into a .png; expected --video FILE.png with it")
+    pixels = _pixels(size) if size is not None else None
+    times = _seconds(at, ",", "--at") if at is not None else None
+    cut = _seconds(span, ":", "--span") if span is not None else None
+
+    from validation.offscreen import opengl
+
+    if video is not None:
+        opengl()  # MuJoCo, imported from here on, gives no clear error for a MUJOCO_GL that it does not know
+
+    from validation.run import start_run
+    from validation.viewing import Look, draw_stills, draw_whole, show, write_picture
+
+    replay = _replay(recording, disc, throw or "driver")
+    if cut is not None:
+        if len(cut) != 2:
+            raise InputError(f"--span {span}: expected A:B, two numbers of seconds")
+        replay = replay.between(*cut)
+    whole = video is not None and video.suffix == ".png" and times is None and replay.travels
+    look = Look(*(pixels or ((1200, 500) if whole else (640, 360))), camera, enlarge)
+    for note in replay.notes:
+        typer.echo(note)
+    if video is None:
+        show(replay, look, speed)
+        return
+    file = out / video
+    inputs = [recording] if recording is not None else [Path(x) for x in (disc, throw) if x and x.endswith(".toml")]
+    with start_run(file.parent, None, inputs):
+        if whole:
+            write_picture(file, draw_whole(replay, look))
+        elif file.suffix == ".png":
+            write_picture(file, draw_stills(replay, look, times or [replay.start]))
+        else:
+            _draw_video(file, replay, look, fps, speed)
+    typer.echo(f"{file}")
+
+
+def _replay(recording: Path | None, disc: str | None, throw: str) -> Replay:
+    from discsim.engine import fly
+    from discsim.shipped import load_disc, load_throw
+    from validation.replay import replay_motion, replay_recording
+
+    if recording is not None:
+        return replay_recording(recording)
+    assert disc is not None
+    body, environment = load_disc(disc)
+    motion = fly(body, environment, load_throw(throw))
+    return replay_motion(motion, body.diameter, f"flown in MuJoCo: disc {disc}, throw {throw}")
+
+
+def _draw_video(file: Path, replay: Replay, look: Look, fps: float, speed: float) -> None:
+    from validation.viewing import frame_times, write_video
+
+    times = frame_times(file, replay, fps, speed)
+    if not sys.stderr.isatty():
+        typer.echo(f"drawing {times.size} frames", err=True)
+        write_video(file, replay, look, times, fps)
+        return
+    from rich.console import Console
+    from rich.progress import track
+
+    with_bar = track(times.tolist(), "drawing", console=Console(stderr=True), transient=True)
+    write_video(file, replay, look, with_bar, fps)
+
+
+def _pixels(text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise InputError(f"--size {text}: expected WIDTHxHEIGHT in pixels, such as 640x360")
+    return int(width), int(height)
+
+
+def _seconds(text: str, separator: str, option: str) -> list[float]:
+    try:
+        return [float(item) for item in text.split(separator)]
+    except ValueError:
+        raise InputError(f"{option} {text}: expected seconds separated by '{separator}'") from None
