@@ -12,7 +12,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -468,11 +468,7 @@ def recording_toml(recording: Recording) -> str:
     if recording.disc is not None:
         lines += disc_toml(recording.disc)
     if recording.rig is not None:
-        lines += _table(
-            "rig",
-            {"Izz_kg_m2": recording.rig.Izz, "viscous_N_m_s": recording.rig.viscous},
-            recording.rig.sigma,
-        )
+        lines += rig_toml(recording.rig)
     if recording.release is not None:
         lines += release_toml(recording.release)
     lines += ["", "[sensors]"]
@@ -523,6 +519,11 @@ def disc_toml(disc: Disc) -> list[str]:
             {},
         )
     return lines
+
+
+def rig_toml(rig: Rig) -> list[str]:
+    """Return the lines of a ``[rig]`` table."""
+    return _table("rig", {"Izz_kg_m2": rig.Izz, "viscous_N_m_s": rig.viscous}, rig.sigma)
 
 
 def release_toml(release: Release, name: str = "release") -> list[str]:
@@ -589,12 +590,19 @@ def _table(name: str, values: Mapping[str, Any], sigma: Mapping[str, Any]) -> li
     return lines
 
 
-def _toml(value: ArrayLike | str | bool) -> str:
+def toml_lines(values: Mapping[str, Any]) -> list[str]:
+    """Return one line ``key = value`` for each text, truth value, number, array, or list of texts."""
+    return [f"{key} = {_toml(value)}" for key, value in values.items()]
+
+
+def _toml(value: ArrayLike | str | bool | Sequence[str]) -> str:
     if isinstance(value, str):
         escaped = value.replace("\\", "\\\\").replace('"', '\\"')
         return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in escaped) + '"'
     if isinstance(value, bool):
         return "true" if value else "false"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_toml(item) for item in value) + "]"
     array = np.asarray(value, dtype=float)
     if array.ndim == 0:
         return repr(float(array))

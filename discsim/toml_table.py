@@ -144,6 +144,15 @@ class TomlTable:
             raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected a table")
         return TomlTable(value, self.path, self._full(key), self._lines)
 
+    def tables(self, key: str) -> list[TomlTable]:
+        """Take an array of tables (``[[key]]``); none where the key is absent."""
+        value = self._take(key, "an array of tables", False)
+        if value is None:
+            return []
+        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
+            raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected an array of tables [[{key}]]")
+        return [TomlTable(item, self.path, self._full(key), self._lines) for item in value]
+
     def _check(self, key: str, value: Any, positive: bool, minimum: float | None) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= sys.float_info.max:
             raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected a finite number")

@@ -1,0 +1,119 @@
+"""Model files (`model.toml`): a disc or a rig with its surroundings and the effects upon it, for every command.
+
+The tables ``[environment]``, ``[disc]`` and ``[rig]`` are those of a recording. Each ``[[effects]]`` names one effect of
+the catalogue with its parameters and their standard deviations, and the recordings that it belongs to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+
+from discsim.disc import Disc, Rig
+from discsim.effects.catalogue import Effect, effect, row
+from discsim.environment import Environment
+from discsim.errors import InputError
+from discsim.files import write_text
+from discsim.recording import disc_toml, environment_toml, rig_toml, toml_lines
+from discsim.toml_table import TomlTable, read_toml
+
+__all__ = ["MODEL_FORMAT", "Model", "ModelEffect", "read_model", "write_model"]
+
+MODEL_FORMAT = "discsim-model/1"
+
+
+@dataclass(frozen=True)
+class ModelEffect:
+    """An effect of a model: its size, one standard deviation per parameter (absent: unknown), where it acts.
+
+    ``recordings`` is None for an effect that all recordings share, else the names of those that have it.
+    """
+
+    effect: Effect
+    sigma: Mapping[str, float] = field(default_factory=dict)
+    recordings: tuple[str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sigma", MappingProxyType(dict(self.sigma)))
+
+
+@dataclass(frozen=True)
+class Model:
+    """What a simulation needs beside the throw: surroundings, a disc or a rig, and effects."""
+
+    environment: Environment
+    disc: Disc | None = None
+    rig: Rig | None = None
+    effects: tuple[ModelEffect, ...] = ()
+
+    def effects_in(self, recording: str | None = None) -> list[Effect]:
+        """Return the effects that all recordings share, and those of the named one."""
+        return [
+            item.effect
+            for item in self.effects
+            if item.recordings is None or (recording is not None and recording in item.recordings)
+        ]
+
+
+def read_model(path: Path | str) -> Model:
+    """Read a model file; raises `InputError` naming file, line and what was expected."""
+    top = read_toml(Path(path))
+    top.text("format", choices=(MODEL_FORMAT,))
+    disc_table, rig_table = top.table("disc"), top.table("rig")
+    environment_table = top.table("environment", required=True)
+    assert environment_table is not None
+    environment = Environment.from_toml(environment_table, air_required=disc_table is not None)
+    disc = Disc.from_toml(disc_table, aero_required=False) if disc_table is not None else None
+    rig = Rig.from_toml(rig_table) if rig_table is not None else None
+    effects = tuple(_read_effect(table) for table in top.tables("effects"))
+    top.finish()
+    return Model(environment, disc, rig, effects)
+
+
+def _read_effect(table: TomlTable) -> ModelEffect:
+    id = table.text("id")
+    assert id is not None
+    names = table.raw("recordings")
+    if (
+        names is not None
+        and names != "all"
+        and not (isinstance(names, list) and all(isinstance(n, str) for n in names))
+    ):
+        raise table.error("recordings", f"'effects.recordings' is {names!r}, expected \"all\" or a list of names")
+    sizes, sigmas = table.table("parameters", required=True), table.table("sigma")
+    assert sizes is not None
+    try:
+        known = row(id).parameters
+    except InputError as error:
+        raise table.error("id", str(error)) from None
+    size = {name: sizes.number(name, required=False) for name in known}
+    sizes.finish()
+    sigma: dict[str, float | None] = {}
+    if sigmas is not None:
+        sigma = {name: sigmas.number(name, required=False, minimum=0.0) for name in known}
+        sigmas.finish()
+    table.finish()
+    return ModelEffect(
+        effect(id, **{name: value for name, value in size.items() if value is not None}),
+        {name: value for name, value in sigma.items() if value is not None},
+        None if names in (None, "all") else tuple(names),
+    )
+
+
+def write_model(model: Model, path: Path) -> None:
+    """Write a model file, whole or not at all; what is read back is equal to the last bit."""
+    lines = [f'format = "{MODEL_FORMAT}"', *environment_toml(model.environment)]
+    if model.disc is not None:
+        lines += disc_toml(model.disc)
+    if model.rig is not None:
+        lines += rig_toml(model.rig)
+    for item in model.effects:
+        sizes = item.effect.value._asdict()
+        lines += ["", "[[effects]]", f'id = "{item.effect.id}"']
+        lines += toml_lines({"recordings": "all" if item.recordings is None else list(item.recordings)})
+        lines += ["[effects.parameters]", *toml_lines(sizes)]
+        if item.sigma:
+            lines += ["[effects.sigma]", *toml_lines(dict(item.sigma))]
+    write_text(path, "\n".join([*lines, ""]))

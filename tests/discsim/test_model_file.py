@@ -1,0 +1,74 @@
+"""model.toml: what is written is read back, and what does not belong there is refused by name."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from discsim.disc import Rig
+from discsim.effects import effect
+from discsim.environment import Environment
+from discsim.errors import InputError
+from discsim.model_file import Model, ModelEffect, read_model, write_model
+from discsim.shipped import load_disc
+
+
+@pytest.fixture
+def model() -> Model:
+    disc, environment = load_disc("dd2")
+    return Model(
+        environment,
+        disc,
+        effects=(
+            ModelEffect(effect("air.wind", w_north_m_s=1.1, w_east_m_s=-0.7), {"w_north_m_s": 0.02}),
+            ModelEffect(effect("event.impulse", t_s=1.4, dv_east_m_s=-0.6), recordings=("02",)),
+        ),
+    )
+
+
+def test_a_model_survives_a_round_trip_to_the_last_bit(model, tmp_path):
+    write_model(model, tmp_path / "model.toml")
+    again = read_model(tmp_path / "model.toml")
+    assert again.effects == model.effects
+    assert again.disc is not None
+    assert model.disc is not None
+    assert again.disc.aero == model.disc.aero
+    np.testing.assert_array_equal(again.disc.aero_table.CL, model.disc.aero_table.CL)
+    np.testing.assert_array_equal(again.environment.magnetic_field, model.environment.magnetic_field)
+
+
+def test_a_rig_is_a_model_too(tmp_path):
+    rig = Rig(1.1e-3, 3e-5, {"viscous_N_m_s": 3e-6})
+    write_model(Model(Environment(air_density=None), rig=rig), tmp_path / "model.toml")
+    again = read_model(tmp_path / "model.toml")
+    assert again.disc is None
+    assert again.rig == rig
+
+
+def test_an_effect_of_one_recording_is_not_in_the_others(model):
+    assert [item.id for item in model.effects_in("02")] == ["air.wind", "event.impulse"]
+    assert [item.id for item in model.effects_in("01")] == ["air.wind"]
+    assert [item.id for item in model.effects_in()] == ["air.wind"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ('id = "air.wind"', 'id = "air.wnd"', "did you mean 'air.wind'"),
+        ("w_north_m_s = 1.1", "w_nort_m_s = 1.1", "unknown key 'effects.parameters.w_nort_m_s'"),
+        ("w_north_m_s = 0.02", "w_north_m_s = -0.02", "at least 0"),
+        ('recordings = "all"', "recordings = 3", "list of names"),
+        ("discsim-model/1", "discsim-model/9", "discsim-model/1"),
+        ("mass_kg", "mass_g", "missing key 'mass_kg'"),
+        ("[disc.aero]", "[disc.air]", "aero"),
+    ],
+)
+def test_what_does_not_belong_is_refused_by_name(model, tmp_path, old, new, expected):
+    path = tmp_path / "model.toml"
+    write_model(model, path)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match=expected) as refusal:
+        read_model(path)
+    assert str(path) in str(refusal.value)
