@@ -1,7 +1,7 @@
 """Model files (`model.toml`): a disc or a rig with its surroundings and the effects upon it, for every command.
 
-The tables ``[environment]``, ``[disc]`` and ``[rig]`` are those of a recording. Each ``[[effects]]`` names one effect of
-the catalogue with its parameters and their standard deviations, and the recordings that it belongs to.
+The tables ``[environment]``, ``[disc]`` and ``[rig]`` are those of a recording. Each ``[[effects]]`` names one effect
+of the catalogue with its parameters and their standard deviations, and the recordings that it belongs to.
 """
 
 from __future__ import annotations
