@@ -13,8 +13,11 @@ from discsim.errors import InputError
 from discsim.recording import Recording
 from estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors, accelerometer
 from estimators.fft import FftSettings, fft
+from estimators.fusion import accelerometer_calibrated, fusion
 from estimators.gyroscope import gyroscope, rate_reference
+from estimators.likelihood import likelihood
 from estimators.rate import YawRate
+from estimators.tracking import tracking
 
 __all__ = ["METHODS", "Method", "Options", "best", "estimate", "missing_sensors", "sampling_notes"]
 
@@ -64,8 +67,14 @@ def _rate_reference(recording: Recording, _: Options) -> YawRate:
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
         "rate_reference": Method(("rate_reference",), _rate_reference),
+        "fusion": Method(("magnetometer",), lambda recording, _: fusion(recording)),
         "gyroscope": Method(("gyroscope",), _gyroscope),
+        "tracking": Method(("magnetometer",), lambda recording, _: tracking(recording)),
+        "likelihood": Method(("magnetometer",), lambda recording, _: likelihood(recording)),
         "fft": Method(("magnetometer",), _fft),
+        "accelerometer_calibrated": Method(
+            ("accelerometer",), lambda recording, _: accelerometer_calibrated(recording)
+        ),
         "accelerometer": Method(("accelerometer",), _accelerometer),
     }
 )

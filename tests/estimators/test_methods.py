@@ -46,23 +46,23 @@ def test_every_method_finds_a_steady_spin_and_bears_its_name(name):
     ("rate", "sensors", "expected"),
     [
         (4000.0, SHEETS, "rate_reference"),
-        (1800.0, ("magnetometer", "accelerometer", "gyroscope"), "gyroscope"),
-        (4000.0, ("magnetometer", "accelerometer", "gyroscope"), "fft"),
-        (4000.0, ("accelerometer", "gyroscope"), "accelerometer"),
-        (300.0, ("magnetometer", "accelerometer"), "accelerometer"),
+        (4000.0, ("magnetometer", "accelerometer", "gyroscope"), "fusion"),
+        (1800.0, ("accelerometer", "gyroscope"), "gyroscope"),
+        (4000.0, ("accelerometer", "gyroscope"), "accelerometer_calibrated"),
+        (300.0, ("magnetometer", "accelerometer"), "fusion"),
     ],
 )
 def test_the_best_is_the_first_that_knows_the_rate(rate, sensors, expected):
-    """A clipped gyroscope and a spin below the threshold give way."""
+    """A clipped gyroscope gives way."""
     recording = spinning(rate, sensors)
-    order = [name for name in METHODS if name in ("rate_reference", "gyroscope", "fft", "accelerometer")]
-    assert order == ["rate_reference", "gyroscope", "fft", "accelerometer"]
+    order = [name for name in METHODS if name in ("rate_reference", "fusion", "gyroscope", "fft", "accelerometer")]
+    assert order == ["rate_reference", "fusion", "gyroscope", "fft", "accelerometer"]
     assert best(recording).method == expected
 
 
 def test_where_nothing_can_be_used_each_reason_is_given():
     with pytest.raises(InputError, match=r"gyroscope: no gyroscope.*a window needs 128 samples"):
-        best(spinning(4000.0, ("magnetometer",), duration=1.0))
+        best(spinning(4000.0, ("magnetometer",), duration=0.1))
 
 
 def test_an_unknown_name_is_answered_with_those_there_are():

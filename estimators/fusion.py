@@ -1,0 +1,510 @@
+"""Spin rate from magnetometer, accelerometer and gyroscope together, each with its faults estimated along.
+
+The magnetometer counts turns and needs no calibration, so it leads (`estimators.tracking`). The accelerometer's
+centripetal part is separated from gravity and translation, which turn with the spin and average out over a turn; its
+mount offset, scale and bias are unknowns with priors. The gyroscope's z counts where it does not clip, with unknown
+scale and bias. A sensor that contradicts the magnetometer beyond its faults' priors is left out and named with numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from discsim.arrays import BoolArray, FloatArray
+from discsim.errors import InputError
+from discsim.recording import Recording, Samples, SensorSheet
+from estimators.likelihood import span_of
+from estimators.rate import YawRate
+from estimators.tracking import RateRows, Track, TrackingSettings, joined, tracks_of
+
+__all__ = [
+    "Agreement",
+    "FusionSettings",
+    "accelerometer_calibrated",
+    "centripetal",
+    "compare_sensors",
+    "fusion",
+    "unfolding",
+]
+
+
+@dataclass(frozen=True)
+class FusionSettings:
+    """Settings of `fusion`; the priors are standard deviations.
+
+    Attributes
+    ----------
+    tracking : TrackingSettings
+        Of the smoother.
+    mount : float
+        Of the accelerometer's place where the recording states none, m; scale and cross-axis faults count in it.
+    accelerometer_bias : float
+        m/s^2; 60 mg is an MPU-9250's.
+    gyroscope_scale, gyroscope_bias : float
+        Relative and rad/s, along z.
+    turns, shortest : float
+        Turns, and at least seconds, over which the accelerometer is averaged.
+    contradiction : float
+        A sensor whose calibration must leave its prior by more than this many sigma, or whose residual exceeds its
+        noise as many times, contradicts.
+    """
+
+    tracking: TrackingSettings = field(default_factory=TrackingSettings)
+    mount: float = 0.003
+    accelerometer_bias: float = 0.6
+    gyroscope_scale: float = 0.03
+    gyroscope_bias: float = 0.1
+    turns: float = 2.0
+    shortest: float = 0.1
+    contradiction: float = 4.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if name != "tracking" and not value > 0:
+                raise InputError(f"fusion {name}: got {value}, expected a positive number")
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How a sensor compares with the magnetometer's spin rate once its calibration has been estimated.
+
+    ``difference`` and ``scatter`` are mean and rms of its rate less the magnetometer's with the data sheet's
+    calibration, rad/s; ``residual`` the rms left after calibration, and ``chi2`` its square over the expected, per
+    reading; ``calibration`` and ``covariance`` what was found, ``departure`` the largest departure of one from
+    its prior in prior sigma; ``readings`` the number used.
+    """
+
+    sensor: str
+    agrees: bool
+    readings: int
+    difference: float
+    scatter: float
+    residual: float
+    chi2: float
+    departure: float
+    calibration: FloatArray
+    covariance: FloatArray
+
+    def __str__(self) -> str:
+        """One line for a person, in deg/s."""
+        degrees = np.degrees([self.difference, self.scatter, self.residual])
+        verdict = "agrees with" if self.agrees else "CONTRADICTS"
+        return (
+            f"{self.sensor} {verdict} the magnetometer: as stated it differs by {degrees[0]:+.2f} deg/s on average"
+            f" (rms {degrees[1]:.2f}), calibrated by rms {degrees[2]:.2f} deg/s; chi-square {self.chi2:.2f} per reading"
+            f" over {self.readings} readings, calibration {self.departure:.1f} sigma from what was expected"
+        )
+
+
+# ---------------------------------------------------------------------------------------------- accelerometer
+
+
+@dataclass(frozen=True)
+class Centripetal:
+    """The part of the specific force that stays in the body: t (n,) s, value (n, 2) m/s^2 and sd per axis (n,).
+
+    It is ``(-r^2 + i r') (d_x + i d_y) + bias`` as a complex number.
+    """
+
+    t: FloatArray
+    value: FloatArray
+    sd: FloatArray
+
+
+def centripetal(
+    accelerometer: Samples,
+    sheet: SensorSheet,
+    t: FloatArray,
+    rate: FloatArray,
+    *,
+    turns: float = 2.0,
+    shortest: float = 0.1,
+) -> Centripetal:
+    """Separate the centripetal force from what turns with the spin, block by block.
+
+    In each block of ``turns`` turns, at least ``shortest`` s, ``a_x + i a_y = c + c' t + (f + f' t) exp(-i psi)``
+    is solved by least squares: c is the centripetal part, f gravity and translation, fixed in N and so turning in B.
+    psi is the angle turned by ``rate`` (m,) rad/s given at times ``t``. Blocks with a clipped reading, or outside
+    the known rate, are left out.
+    """
+    known = np.isfinite(rate)
+    empty = Centripetal(np.zeros(0), np.zeros((0, 2)), np.zeros(0))
+    if np.count_nonzero(known) < 2 or len(accelerometer) < 8:
+        return empty
+    value = accelerometer.value[:, :2]
+    good = np.all(np.isfinite(value), axis=1) & ~np.any(sheet.clipped(value), axis=1)
+    times = accelerometer.t
+    r = np.interp(times, t[known], rate[known], left=np.nan, right=np.nan)
+    # a hole in the known rate is no rate
+    index = np.clip(np.searchsorted(t[known], times), 1, np.count_nonzero(known) - 1)
+    r[np.diff(t[known])[index - 1] > 0.5] = np.nan
+    steps = np.diff(times)
+    psi = np.concatenate([[0.0], np.cumsum(steps * 0.5 * np.nan_to_num(r[1:] + r[:-1]))])
+    a = value[:, 0] + 1j * value[:, 1]
+    out_t, out_value, out_share, squares, freedoms = [], [], [], 0.0, 0
+    start = 0
+    while start < times.size:
+        if not np.isfinite(r[start]) or abs(r[start]) < 1e-3:
+            start += 1
+            continue
+        length = max(shortest, turns * 2 * np.pi / abs(r[start]))
+        stop = int(np.searchsorted(times, times[start] + length - 1e-9))
+        if stop >= times.size and times[-1] - times[start] < 0.9 * length:
+            break
+        chosen = np.arange(start, min(stop, times.size))
+        start = max(stop, start + 1)
+        whole = chosen.size >= 0.8 * length / accelerometer.interval
+        if chosen.size < 8 or not whole or not np.all(good[chosen]) or not np.all(np.isfinite(r[chosen])):
+            continue
+        centre = float(np.mean(times[chosen]))
+        tau = (times[chosen] - centre) / length
+        turning = np.exp(-1j * (psi[chosen] - psi[chosen[0]]))
+        columns = np.column_stack([np.ones_like(turning), tau, turning, tau * turning])
+        normal = columns.conj().T @ columns
+        if np.linalg.cond(normal) > 1e6:
+            continue
+        inverse = np.linalg.inv(normal)
+        solution = inverse @ (columns.conj().T @ a[chosen])
+        residual = a[chosen] - columns @ solution
+        squares += float(np.sum(np.abs(residual) ** 2))
+        freedoms += 2 * chosen.size - 8
+        out_t.append(centre)
+        out_value.append(solution[0])
+        out_share.append(float(np.sqrt(inverse[0, 0].real)))
+    if not out_t:
+        return empty
+    noise = np.sqrt(squares / max(freedoms, 1))
+    if sheet.noise_rms is not None:
+        noise = max(noise, float(np.hypot(sheet.noise_rms, (sheet.resolution or 0.0) / np.sqrt(12))))
+    values = np.array(out_value)
+    return Centripetal(np.array(out_t), np.column_stack([values.real, values.imag]), noise * np.array(out_share))
+
+
+def _accelerometer_rows(
+    recording: Recording, t: FloatArray, rate: FloatArray, settings: FusionSettings
+) -> RateRows | None:
+    if "accelerometer" not in recording:
+        return None
+    sheet = recording.sheets["accelerometer"]
+    if sheet.position is None or float(np.hypot(*sheet.position[:2])) < 1e-4:
+        return None
+    block = centripetal(
+        recording.need("accelerometer"), sheet, t, rate, turns=settings.turns, shortest=settings.shortest
+    )
+    if block.t.size == 0:
+        return None
+    stated = sheet.sigma.get("position_m")
+    mount = np.full(2, settings.mount)
+    if stated is not None:
+        # scale and cross-axis faults of a per cent or two count in the place
+        mount = np.hypot(np.broadcast_to(stated, (3,))[:2], 0.02 * float(np.hypot(*sheet.position[:2])))
+    calibration = np.array([sheet.position[0], sheet.position[1], 0.0, 0.0])
+    prior = np.array([mount[0], mount[1], settings.accelerometer_bias, settings.accelerometer_bias])
+    return RateRows("centripetal", block.t, block.value, block.sd, calibration, prior)
+
+
+def _gyroscope_rows(recording: Recording, settings: FusionSettings) -> RateRows | None:
+    """Means of the unclipped z readings over blocks of 0.05 s."""
+    gyroscope = recording.get("gyroscope")
+    if gyroscope is None:
+        return None
+    sheet = recording.sheets["gyroscope"]
+    z = gyroscope.value[:, 2]
+    # beside a clipped reading the sensor's own filter may still be held
+    clipped = sheet.clipped(z)
+    beside = clipped | np.roll(clipped, 1) | np.roll(clipped, -1)
+    good: BoolArray = np.isfinite(z) & ~beside
+    if np.count_nonzero(good) < 4:
+        return None
+    t, z = gyroscope.t[good], z[good]
+    length = 0.05
+    label = np.floor((t - t[0]) / length).astype(int)
+    _, first, count = np.unique(label, return_index=True, return_counts=True)
+    mean_t, mean_z = np.add.reduceat(t, first) / count, np.add.reduceat(z, first) / count
+    # noise from second differences of the readings: motion is smooth
+    rough = np.diff(z, 2)
+    noise = float(1.4826 * np.median(np.abs(rough)) / np.sqrt(6)) if rough.size else 0.0
+    noise = max(noise, float(np.hypot(sheet.noise_rms or 0.0, (sheet.resolution or 0.0) / np.sqrt(12))), 1e-4)
+    return RateRows(
+        "linear",
+        mean_t,
+        mean_z,
+        noise / np.sqrt(count),
+        np.zeros(2),
+        np.array([settings.gyroscope_scale, settings.gyroscope_bias]),
+    )
+
+
+# ---------------------------------------------------------------------------------------------- agreement
+
+
+@dataclass(frozen=True)
+class _Reference:
+    """The magnetometer's rate: t, rate and sd (n,), slope of the rate, and the blur of its knots."""
+
+    t: FloatArray
+    rate: FloatArray
+    sd: FloatArray
+    slope: FloatArray
+    blur: FloatArray
+
+
+def _reference(recording: Recording, tracks: list[Track], settings: TrackingSettings) -> _Reference:
+    whole = joined("tracking", tracks, settings, span_of(recording))
+    slope = np.gradient(whole.rate, whole.t) if len(whole) > 1 else np.zeros(len(whole))
+    blur = np.zeros(len(whole))
+    for track in tracks:
+        blur = np.maximum(blur, np.interp(whole.t, track.t, track.blur, left=0.0, right=0.0))
+    return _Reference(whole.t, whole.rate, whole.sd, slope, blur)
+
+
+def _compare(
+    sensor: str, row: RateRows, reference: _Reference, settings: FusionSettings
+) -> tuple[Agreement, RateRows] | None:
+    """Calibrate a sensor against the magnetometer and judge what is left; return it with noise as large as found."""
+    known = np.isfinite(reference.rate)
+    if np.count_nonzero(known) < 2:
+        return None
+    at = reference.t[known]
+    r = np.interp(row.t, at, reference.rate[known], left=np.nan, right=np.nan)
+    index = np.clip(np.searchsorted(at, row.t), 1, at.size - 1)
+    r[np.diff(at)[index - 1] > 0.5] = np.nan
+    inside = np.isfinite(r)
+    # at the ends the smoother knows little
+    sd_r = np.interp(row.t, at, reference.sd[known])
+    if np.count_nonzero(inside) < 4:
+        return None
+    slope = np.interp(row.t, at, reference.slope[known])
+    r, sd_r, slope = r[inside], sd_r[inside], slope[inside]
+    if row.kind == "linear":
+        design = np.column_stack([r, np.ones_like(r)])
+        y = row.value[inside] - r
+        sd = np.hypot(row.sd[inside], sd_r)
+        difference = y
+    else:
+        shape = -(r**2) + 1j * slope
+        design_c = np.column_stack([shape, 1j * shape, np.ones_like(shape), 1j * np.ones_like(shape)])
+        design = np.concatenate([design_c.real, design_c.imag])
+        measured = row.value[inside, 0] + 1j * row.value[inside, 1]
+        y = np.concatenate([measured.real, measured.imag])
+        d = complex(row.calibration[0], row.calibration[1])
+        own = np.hypot(row.sd[inside], 2 * np.abs(r) * abs(d) * sd_r * np.abs(d.real) / abs(d))
+        other = np.hypot(row.sd[inside], 2 * np.abs(r) * abs(d) * sd_r * np.abs(d.imag) / abs(d))
+        sd = np.concatenate([own, other])
+        radial = -(measured * np.conj(d)).real / abs(d)
+        difference = np.sqrt(np.maximum(radial, 0.0) / abs(d)) - np.abs(r)
+    precision = np.diag(1 / row.prior**2)
+    weighted = design / sd[:, None]
+    covariance = np.linalg.inv(weighted.T @ weighted + precision)
+    found = covariance @ (weighted.T @ (y / sd) + precision @ row.calibration)
+    error = y - design @ found
+    # the noise that was found may exceed the sensor's own: unmodelled motion; a robust measure of it
+    chi2 = float(np.mean((error / sd) ** 2))
+    departure = float(np.max(np.abs(found - row.calibration) / row.prior))
+    if row.kind == "linear":
+        residual = float(np.sqrt(np.mean(error**2)))
+    else:
+        half = error.size // 2
+        d = complex(found[0], found[1])
+        radial_error = (error[:half] * d.real + error[half:] * d.imag) / abs(d)
+        residual = float(np.sqrt(np.mean((radial_error / (2 * np.abs(r) * abs(d))) ** 2)))
+    # the smoother's errors hold for about half a second and are shared by the readings within it
+    spacing = float(np.median(np.diff(row.t))) if row.t.size > 1 else 0.5
+    shared = max(1.0, 0.5 / spacing)
+    agrees = chi2 <= settings.contradiction**2 and departure <= settings.contradiction
+    agreement = Agreement(
+        sensor=sensor,
+        agrees=agrees,
+        readings=int(np.count_nonzero(inside)),
+        difference=float(np.mean(difference)),
+        scatter=float(np.sqrt(np.mean(difference**2))),
+        residual=residual,
+        chi2=chi2,
+        departure=departure,
+        calibration=found,
+        covariance=np.asarray(covariance * max(1.0, chi2) * shared, dtype=np.float64),
+    )
+    blur = np.interp(row.t, reference.t, reference.blur)
+    if row.kind == "centripetal":
+        blur = blur * 2 * np.abs(np.interp(row.t, at, reference.rate[known])) * np.hypot(found[0], found[1])
+    return agreement, replace(row, sd=np.hypot(row.sd * max(1.0, np.sqrt(chi2)), blur))
+
+
+def _judged(
+    recording: Recording, settings: FusionSettings
+) -> tuple[list[Track], list[Agreement], list[RateRows], tuple[int, bool]]:
+    """Return the magnetometer's tracks, every other sensor's agreement, the rows of those that agree, the folding."""
+    turns, known = unfolding(recording, settings)
+    tracks = tracks_of(recording, settings.tracking, unfold=turns) if known else []
+    reference = _reference(recording, tracks, settings.tracking)
+    agreements, rows = [], []
+    gyroscope = _gyroscope_rows(recording, settings)
+    accelerometer = _accelerometer_rows(recording, reference.t, reference.rate, settings)
+    for sensor, row in (("gyroscope", gyroscope), ("accelerometer", accelerometer)):
+        result = _compare(sensor, row, reference, settings) if row is not None else None
+        if result is not None:
+            agreements.append(result[0])
+            if result[0].agrees:
+                rows.append(result[1])
+    return tracks, agreements, rows, (turns, known)
+
+
+def compare_sensors(recording: Recording, settings: FusionSettings | None = None) -> list[Agreement]:
+    """Say of each other sensor whether it agrees with the magnetometer, with numbers (``str`` of each is a line)."""
+    return _judged(recording, settings or FusionSettings())[1]
+
+
+def unfolding(recording: Recording, settings: FusionSettings | None = None) -> tuple[int, bool]:
+    """Tell how many whole turns per sampling interval the magnetometer misses, and whether that is known.
+
+    Above half its sampling rate the field shows r - 2 pi f_s k. The gyroscope's z, or the centripetal force, tells k;
+    a clipped one only bounds it. Without another sensor k is taken as zero, as far as that is known; where a sensor
+    excludes zero and cannot choose among the rest the answer is unknown.
+    """
+    settings = settings or FusionSettings()
+    magnetometer = recording.need("magnetometer")
+    if len(magnetometer) < 16:
+        return 0, True
+    fold = 2 * np.pi / magnetometer.interval
+    plain = tracks_of(recording, replace(settings.tracking, knots=0.4), unfold=0) if _may_fold(recording, fold) else []
+    if not plain:
+        return 0, True
+    rates = np.concatenate([track.rate for track in plain])
+    middle = float(np.median(rates))
+    candidates = [k for k in (0, -1, 1, -2, 2)]
+    votes: list[set[int]] = []
+    gyroscope, accelerometer = recording.get("gyroscope"), recording.get("accelerometer")
+    if gyroscope is not None:
+        z = gyroscope.value[:, 2]
+        z = z[np.isfinite(z)]
+        if z.size:
+            clipped = recording.sheets["gyroscope"].clipped(z)
+            level = float(np.median(z))
+            if np.mean(clipped) < 0.5:
+                votes.append({k for k in candidates if abs(middle + k * fold - level) < 0.1 * fold})
+            else:
+                votes.append({k for k in candidates if (middle + k * fold) * np.sign(level) > 0.9 * abs(level)})
+    if accelerometer is not None:
+        sheet = recording.sheets["accelerometer"]
+        radius = float(np.hypot(*sheet.position[:2])) if sheet.position is not None else 0.0
+        if radius > 1e-4:
+            value = accelerometer.value[:, :2]
+            value = value[np.all(np.isfinite(value), axis=1)]
+            force = float(np.hypot(*np.mean(value, axis=0)))
+            seen = np.sqrt(force / radius)
+            bias = settings.accelerometer_bias + 0.05 * force
+            low = np.sqrt(max(force - 3 * bias, 0.0) / (radius + 2 * settings.mount))
+            high = np.sqrt((force + 3 * bias) / max(radius - 2 * settings.mount, 0.2 * radius))
+            clipped = np.any(sheet.clipped(value), axis=1)
+            if np.mean(clipped) > 0.05:
+                high = np.inf
+            if seen > 0:
+                votes.append({k for k in candidates if low <= abs(middle + k * fold) <= high})
+    possible = set(candidates)
+    for vote in votes:
+        possible &= vote
+    if not votes or 0 in possible:
+        return 0, True
+    if len(possible) == 1:
+        return possible.pop(), True
+    return 0, False
+
+
+def _may_fold(recording: Recording, fold: float) -> bool:
+    """Tell whether another sensor shows a rate that the magnetometer cannot show plainly."""
+    gyroscope, accelerometer = recording.get("gyroscope"), recording.get("accelerometer")
+    if gyroscope is not None:
+        z = np.abs(gyroscope.value[:, 2])
+        if np.any(np.isfinite(z)) and float(np.nanmedian(z)) > 0.45 * fold:
+            return True
+    if accelerometer is not None:
+        position = recording.sheets["accelerometer"].position
+        if position is not None and np.hypot(*position[:2]) > 1e-4:
+            mean = np.nanmean(accelerometer.value[:, :2], axis=0)
+            if float(np.sqrt(np.hypot(*mean) / np.hypot(*position[:2]))) > 0.4 * fold:
+                return True
+    return False
+
+
+# ---------------------------------------------------------------------------------------------- methods
+
+
+def fusion(recording: Recording, settings: FusionSettings | None = None) -> YawRate:
+    """Spin rate, signed, from all sensors that agree. Raises `InputError` if the recording has no magnetometer.
+
+    All NaN where the magnetometer's sampling is too slow for the spin and no other sensor tells by how much.
+    """
+    settings = settings or FusionSettings()
+    tracks, _, rows, (turns, _) = _judged(recording, settings)
+    if rows and tracks:
+        tracks = tracks_of(recording, settings.tracking, rows, unfold=turns)
+    return joined("fusion", tracks, settings.tracking, span_of(recording))
+
+
+def accelerometer_calibrated(recording: Recording, settings: FusionSettings | None = None) -> YawRate:
+    """Spin rate by the accelerometer alone, done well: averaged over turns, calibrated by the magnetometer if present.
+
+    ``r = sqrt(-Re((c - bias) conj(d))/|d|^2)`` with c the centripetal part and d, bias from the comparison with the
+    magnetometer, else from the data sheet. The sign is the magnetometer's; without one the rate is unsigned.
+    """
+    settings = settings or FusionSettings()
+    accelerometer = recording.need("accelerometer")
+    sheet = recording.sheets["accelerometer"]
+    if sheet.position is None or float(np.hypot(*sheet.position[:2])) < 1e-4:
+        raise InputError(f"{recording.path or recording.name}: the accelerometer's position_m is needed, off the axis")
+    if "magnetometer" in recording:
+        turns, known = unfolding(recording, settings)
+        tracks = tracks_of(recording, settings.tracking, unfold=turns) if known else []
+        reference = _reference(recording, tracks, settings.tracking)
+        row = _accelerometer_rows(recording, reference.t, reference.rate, settings)
+        result = _compare("accelerometer", row, reference, settings) if row is not None else None
+        if row is not None and result is not None:
+            agreement = result[0]
+            sign = np.sign(np.interp(row.t, reference.t, np.nan_to_num(reference.rate)))
+            return _centripetal_rate(row, agreement.calibration, agreement.covariance, agreement.chi2, sign)
+    rate = _rough_rate(accelerometer, sheet)
+    row = _accelerometer_rows(recording, accelerometer.t, rate, settings)
+    if row is None:
+        blank = np.full(len(accelerometer), np.nan)
+        return YawRate("accelerometer_calibrated", accelerometer.t, blank, blank)
+    return _centripetal_rate(row, row.calibration, np.diag(row.prior**2), 1.0, None)
+
+
+def _rough_rate(accelerometer: Samples, sheet: SensorSheet) -> FloatArray:
+    """First guess from the force averaged over half a second."""
+    assert sheet.position is not None
+    value = np.nan_to_num(accelerometer.value[:, :2])
+    width = max(3, round(0.5 / accelerometer.interval))
+    kernel = np.ones(width) / width
+    count = np.convolve(np.ones(len(value)), kernel, mode="same")
+    mean = np.stack([np.convolve(value[:, i], kernel, mode="same") / count for i in range(2)], axis=1)
+    d = sheet.position[:2]
+    return np.asarray(np.sqrt(np.maximum(-(mean @ d), 0.0)) / float(np.hypot(*d)))
+
+
+def _centripetal_rate(
+    row: RateRows, calibration: FloatArray, covariance: FloatArray, chi2: float, sign: FloatArray | None
+) -> YawRate:
+    d = complex(calibration[0], calibration[1])
+    error = row.value[:, 0] + 1j * row.value[:, 1] - complex(calibration[2], calibration[3])
+    square = -(error * np.conj(d)).real / abs(d) ** 2
+    rate = np.sqrt(np.where(square > 0, square, np.nan))
+    along = calibration[:2] / abs(d) ** 2
+    # r^2 = -Re((c - b) conj(d))/|d|^2 and c - b = -r^2 d to first order
+    gradient = np.concatenate([-np.outer(rate**2, along), np.tile(along, (rate.size, 1))], axis=1)
+    variance = (row.sd * np.sqrt(max(1.0, chi2)) / abs(d)) ** 2 + np.einsum(
+        "ij,jk,ik->i", gradient, covariance, gradient
+    )
+    sd = np.sqrt(variance) / (2 * rate)
+    known = np.isfinite(rate) & (sd < 0.5 * rate)
+    if sign is not None:
+        rate = rate * sign
+    return YawRate(
+        "accelerometer_calibrated",
+        row.t,
+        np.where(known, rate, np.nan),
+        np.where(known, sd, np.nan),
+        signed=sign is not None,
+    )

@@ -1,0 +1,845 @@
+"""Spin rate over a whole recording: a smoother of the field vector with precession, hard and soft iron estimated.
+
+The readings are modelled as vectors, ``m_k = (I + S) C(t_k) m_0 + b + noise``, where the attitude C integrates the
+body rates (p, q, r): p and q from the gyroscope, r(t) a spline with a smoothness prior whose strength the data decide
+(largest marginal likelihood). So precession drops out exactly and not to first order. Maximum a posteriori by
+Gauss-Newton; standard deviations from the inverse Hessian. Without a gyroscope p and q are smooth unknown functions
+in the frame that does not spin, and what the field cannot show of them stays in the standard deviation.
+Derivation, and what is unobservable: docs/spin-phase.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from dataclasses import field as dataclass_field
+from math import cos, sin, sqrt
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from discsim.arrays import BoolArray, FloatArray
+from discsim.compiled import compiled
+from discsim.errors import InputError
+from discsim.recording import Recording, Samples
+from estimators.likelihood import LEAST, LikelihoodSettings, ToneFit, fit_windows, span_of, usable_field, window_centres
+from estimators.precession import STRENGTH_SD, AxialField, axial_field, transverse_rates
+from estimators.rate import YawRate
+from estimators.spin_spline import IndexArray, SpinSpline
+
+__all__ = ["RateRows", "Track", "TrackingSettings", "joined", "track_spin", "tracking", "tracks_of"]
+
+
+@dataclass(frozen=True)
+class TrackingSettings:
+    """Settings of `tracking`; the priors are standard deviations.
+
+    Attributes
+    ----------
+    knots : float
+        Spacing of the spin rate's knots, s.
+    step : float
+        Spacing of the answers, s.
+    segment, overlap : float
+        A longer recording is cut into segments, s, that share ``overlap`` s with each neighbour: memory stays bounded.
+    hard_iron, soft_iron : float
+        uT, and relative.
+    gyroscope_bias, gyroscope_gain : float
+        Of p and q: rad/s, and relative (scale and turning about z; lag shows as turning).
+    strength : float
+        Relative, of the field's strength.
+    precession, precession_knots : float
+        Where no gyroscope shows p and q: transverse rate in the frame that does not spin, rad/s, and its knots, s.
+    largest_sd : float
+        Answers less certain than this, rad/s, are NaN.
+    misfit : float
+        Answers are NaN where the residual over half a second exceeds this many times the recording's own noise.
+    window : float
+        Of the likelihood windows that start the search, s.
+    """
+
+    knots: float = 0.1
+    step: float = 0.05
+    segment: float = 16.0
+    overlap: float = 2.0
+    hard_iron: float = 100.0
+    soft_iron: float = 0.05
+    gyroscope_bias: float = 0.2
+    gyroscope_gain: float = 0.03
+    strength: float = STRENGTH_SD
+    precession: float = 0.15
+    precession_knots: float = 0.4
+    largest_sd: float = np.radians(60.0)
+    misfit: float = 4.0
+    window: float = 0.8
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not value > 0:
+                raise InputError(f"tracking {name}: got {value}, expected a positive number")
+        if self.segment < 2 * self.overlap:
+            raise InputError(f"tracking segment: got {self.segment} s, expected at least twice the overlap")
+
+
+@dataclass(frozen=True)
+class RateRows:
+    """Another sensor's say on the spin rate: readings ``value`` (n,) = r-dependent model, with unknown calibration.
+
+    ``kind`` is "linear" for ``(1 + a) r + b`` (a gyroscope) and "centripetal" for complex ``(-r^2 + i r') d + b``
+    (an accelerometer averaged over turns). ``calibration`` is the prior mean, ``prior`` its standard deviations.
+    """
+
+    kind: str
+    t: FloatArray
+    value: FloatArray
+    sd: FloatArray
+    calibration: FloatArray
+    prior: FloatArray
+
+
+@dataclass(frozen=True)
+class Track:
+    """One segment's answer.
+
+    ``t`` (n,) s, ``rate`` and ``sd`` (n,) rad/s; ``blur`` (n,) the share of sd that the knots' spacing makes at a
+    corner; ``covariance`` (n, n) of the rate; ``phase`` (k,) rad, the angle turned at the magnetometer's times
+    ``times`` (k,); ``residual`` (k, 3) uT; ``noise`` per axis, uT; ``hard_iron`` (3,) uT; ``field`` (3,) uT at the
+    start; ``calibration`` of other sensors; ``chi2`` of their rows per degree of freedom; ``spline``,
+    ``coefficients``; ``roughness`` the spectral density of r'' found.
+    """
+
+    t: FloatArray
+    rate: FloatArray
+    sd: FloatArray
+    blur: FloatArray
+    covariance: FloatArray
+    times: FloatArray
+    phase: FloatArray
+    residual: FloatArray
+    noise: float
+    hard_iron: FloatArray
+    field: FloatArray
+    spline: SpinSpline
+    coefficients: FloatArray
+    roughness: float
+    calibration: list[FloatArray] = dataclass_field(default_factory=list)
+    calibration_sd: list[FloatArray] = dataclass_field(default_factory=list)
+    chi2: list[float] = dataclass_field(default_factory=list)
+    gyroscope_gain: complex = 0j
+
+
+@compiled
+def _integrate(
+    times: FloatArray,
+    substeps: int,
+    r: FloatArray,
+    w_re: FloatArray,
+    w_im: FloatArray,
+    despun: bool,
+    attitude: FloatArray,
+    psi_at: FloatArray,
+    axes: FloatArray,
+    psi_middle: FloatArray,
+) -> None:
+    """Integrate the attitude from rates at the middle of equal sub-steps between ``times`` (n,).
+
+    Written: ``attitude`` (n, 3, 3) C_BN, the identity at the first time; ``psi_at`` (n,) the angle turned;
+    ``axes`` (k, 3, 3), whose rows are the axes of the frame that does not spin, in N, at the middle of each sub-step,
+    and ``psi_middle`` (k,). ``despun`` tells that p and q are given in the frame that does not spin.
+    """
+    D = np.eye(3)
+    psi = 0.0
+    attitude[0] = D
+    psi_at[0] = 0.0
+    for k in range(times.size - 1):
+        h = (times[k + 1] - times[k]) / substeps
+        for j in range(substeps):
+            s = k * substeps + j
+            middle = psi + 0.5 * h * r[s]
+            p, q = w_re[s], w_im[s]
+            if despun:
+                a, b = p, q
+            else:  # C3(psi)^T takes body components to the frame that does not spin
+                a = cos(middle) * p - sin(middle) * q
+                b = sin(middle) * p + cos(middle) * q
+            # exp(-[v x]) with v = (a, b, 0) h/2 twice, so that the axes are there at the middle too
+            x, y = 0.5 * h * a, 0.5 * h * b
+            angle = sqrt(x * x + y * y)
+            f1 = sin(angle) / angle if angle > 1e-9 else 1.0
+            f2 = (1.0 - cos(angle)) / (angle * angle) if angle > 1e-4 else 0.5
+            for half in range(2):
+                for i in range(3):
+                    d0, d1, d2 = D[0, i], D[1, i], D[2, i]
+                    dot = x * d0 + y * d1
+                    D[0, i] = d0 - f1 * y * d2 + f2 * (x * dot - angle * angle * d0)
+                    D[1, i] = d1 + f1 * x * d2 + f2 * (y * dot - angle * angle * d1)
+                    D[2, i] = d2 - f1 * (x * d1 - y * d0) - f2 * angle * angle * d2
+                if half == 0:
+                    axes[s] = D
+                    psi_middle[s] = middle
+            psi += h * r[s]
+        c, si = cos(psi), sin(psi)
+        for i in range(3):
+            attitude[k + 1, 0, i] = c * D[0, i] + si * D[1, i]
+            attitude[k + 1, 1, i] = -si * D[0, i] + c * D[1, i]
+            attitude[k + 1, 2, i] = D[2, i]
+        psi_at[k + 1] = psi
+
+
+def _segments(t: FloatArray, settings: TrackingSettings) -> list[tuple[float, float]]:
+    """Cut start..stop into pieces of at most ``segment`` that share ``overlap`` with their neighbours."""
+    start, stop = float(t[0]), float(t[-1])
+    count = max(1, int(np.ceil((stop - start - settings.overlap) / (settings.segment - settings.overlap))))
+    length = (stop - start + (count - 1) * settings.overlap) / count
+    return [
+        (start + i * (length - settings.overlap), start + i * (length - settings.overlap) + length)
+        for i in range(count)
+    ]
+
+
+class _Problem:
+    """The least-squares problem of one segment: parameters, residuals and derivatives.
+
+    Parameters in order: spin spline, transverse rates (bias and gain of p, q, or splines), field (3), hard iron (3),
+    soft iron (6), calibrations of other sensors' rows.
+    """
+
+    def __init__(
+        self,
+        t: FloatArray,
+        m: FloatArray,
+        settings: TrackingSettings,
+        *,
+        gyroscope: Samples | None,
+        strength: float | None,
+        fixed_axis: bool,
+        decaying: bool,
+        rows: list[RateRows],
+        top_rate: float,
+    ) -> None:
+        self.t, self.m, self.settings, self.rows = t, m, settings, rows
+        self.strength, self.decaying = strength, decaying
+        # a quarter of a radian per sub-step: the midpoint rule then errs by 1 % of the wobble's own share
+        finest = min(0.005, 0.25 / max(top_rate, 1.0))
+        self.spline = SpinSpline.over(float(t[0]), float(t[-1]), settings.knots)
+        self.despun = gyroscope is None
+        if gyroscope is not None:
+            rates, self.substeps = transverse_rates(gyroscope, t, finest)
+            self.w = np.where(np.isfinite(rates), rates, 0.0).ravel()
+        else:
+            self.substeps = max(1, int(np.ceil(float(np.median(np.diff(t))) / finest)))
+            self.w = np.zeros((t.size - 1) * self.substeps, dtype=complex)
+        fraction = (np.arange(self.substeps) + 0.5) / self.substeps
+        self.h = np.repeat(np.diff(t) / self.substeps, self.substeps)
+        self.middle = (t[:-1, None] + np.diff(t)[:, None] * fraction).ravel()
+        self.interval = np.repeat(np.arange(t.size - 1), self.substeps)
+        self.first, self.weights = self.spline.local(self.middle)
+        self.slow: SpinSpline | None = None
+        if gyroscope is None and not fixed_axis:
+            self.slow = SpinSpline.over(float(t[0]), float(t[-1]), settings.precession_knots)
+            self.slow_first, self.slow_weights = self.slow.local(self.middle)
+        transverse = 0 if fixed_axis else 4 if self.slow is None else 2 * self.slow.size
+        sizes = [self.spline.size, transverse, 3, 3, 6] + [row.calibration.size for row in rows]
+        ends = np.cumsum(sizes)
+        self.parts = [slice(int(end - size), int(end)) for size, end in zip(sizes, ends, strict=True)]
+        self.size = int(ends[-1])
+        self.fixed_axis = fixed_axis
+        #: precision of each interval's roughness over the common one: small at the corner of a ramp or at a knock
+        self.local = np.ones(self.spline.size - 2)
+
+    # -------------------------------------------------------------------------------- prior
+
+    def prior(self, precession: float) -> tuple[FloatArray, FloatArray]:
+        """Return the precision (size, size) and mean (size,) of everything but the spin's roughness and strength."""
+        s = self.settings
+        precision = np.zeros((self.size, self.size))
+        mean = np.zeros(self.size)
+        spin, transverse, _, iron, soft = self.parts[:5]
+        # a spline needs some prior where there are no data at all; this one says nothing: 1e4 rad/s
+        precision[spin, spin] = np.eye(self.spline.size) * 1e-8
+        if self.slow is not None:
+            distance = np.abs(np.subtract.outer(np.arange(self.slow.size), np.arange(self.slow.size)))
+            # precession changes with the air's moment, over a second or two, about a level that stays
+            correlation = 0.5 + 0.5 * np.exp(-distance * self.slow.spacing / 2.0)
+            inverse = np.linalg.inv(correlation) / precession**2
+            middle = transverse.start + self.slow.size
+            precision[transverse.start : middle, transverse.start : middle] = inverse
+            precision[middle : transverse.stop, middle : transverse.stop] = inverse
+        elif not self.fixed_axis:
+            sd = np.repeat([s.gyroscope_bias, s.gyroscope_gain], 2)
+            precision[transverse, transverse] = np.diag(1 / sd**2)
+        precision[iron, iron] = np.eye(3) / s.hard_iron**2
+        precision[soft, soft] = np.eye(6) / s.soft_iron**2
+        for part, row in zip(self.parts[5:], self.rows, strict=True):
+            precision[part, part] = np.diag(1 / row.prior**2)
+            mean[part] = row.calibration
+        return precision, mean
+
+    def roughness_rows(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return rows (k, spline size) and their targets (k,): r'' is white noise, about r'^2/r for a decay."""
+        rows = self.spline.second_difference()
+        target = np.zeros(rows.shape[0])
+        if self.decaying:
+            c = x[self.parts[0]]
+            level = (c[:-2] + c[1:-1] + c[2:]) / 3
+            slope = (c[2:] - c[:-2]) / (2 * self.spline.spacing)
+            bend = np.where(np.abs(level) > 3.0, slope**2 / np.where(np.abs(level) > 3.0, level, 1.0), 0.0)
+            # steeper than a time constant of two seconds is no spin-down in air
+            target = np.where(np.abs(slope) < 0.5 * np.abs(level), bend, 0.0) * np.sqrt(self.spline.spacing)
+        return rows, target
+
+    # -------------------------------------------------------------------------------- model
+
+    def evaluate(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the magnetometer's residual (n, 3), its derivative (n, 3, size) and the angle turned (n,)."""
+        spin, transverse, vector, iron, soft = self.parts[:5]
+        c = x[spin]
+        r = np.einsum("ki,ki->k", self.weights, c[self.first[:, None] + np.arange(4)])
+        w = self.w
+        if self.slow is not None:
+            half = self.slow.size
+            PQ = x[transverse][:half] + 1j * x[transverse][half:]
+            w = np.einsum("ki,ki->k", self.slow_weights, PQ[self.slow_first[:, None] + np.arange(4)])
+        elif not self.fixed_axis:
+            bias = complex(*x[transverse][:2])
+            gain = complex(*x[transverse][2:])
+            w = (1 + gain) * (self.w - bias)
+        n, k = self.t.size, self.middle.size
+        C, psi = np.empty((n, 3, 3)), np.empty(n)
+        axes, psi_middle = np.empty((k, 3, 3)), np.empty(k)
+        _integrate(
+            self.t, self.substeps, r, np.ascontiguousarray(w.real), np.ascontiguousarray(w.imag),
+            self.despun, C, psi, axes, psi_middle,
+        )  # fmt: skip
+        m0 = x[vector]
+        M = np.eye(3) + _symmetric(x[soft])
+        turned = C @ m0
+        residual = self.m - turned @ M.T - x[iron]
+        MC = M @ C
+        J = np.zeros((n, 3, self.size))
+        # rotation vectors in N per unit of each parameter, summed up to each time
+        if self.despun:
+            weight = _accumulate(self.first, self.weights * self.h[:, None], self.interval, n, self.spline.size)
+            theta = weight[:, :, None] * C[:, None, 2, :]
+        else:
+            moment = self.weights[:, :, None] * (self.h[:, None] * axes[:, 2, :])[:, None, :]
+            theta = _accumulate(self.first, moment, self.interval, n, self.spline.size)
+        # theta @ skew = m0 x theta, by which the field turns in N
+        skew = np.array([[0.0, m0[2], -m0[1]], [-m0[2], 0.0, m0[0]], [m0[1], -m0[0], 0.0]])
+        J[:, :, spin] = MC @ np.swapaxes(theta @ skew, 1, 2)
+        if self.slow is not None:
+            for i in range(2):
+                moment = self.slow_weights[:, :, None] * (self.h[:, None] * axes[:, i, :])[:, None, :]
+                theta = _accumulate(self.slow_first, moment, self.interval, n, self.slow.size)
+                part = slice(transverse.start + i * self.slow.size, transverse.start + (i + 1) * self.slow.size)
+                J[:, :, part] = MC @ np.swapaxes(theta @ skew, 1, 2)
+        elif not self.fixed_axis:
+            cm, sm = np.cos(psi_middle)[:, None], np.sin(psi_middle)[:, None]
+            ex = cm * axes[:, 0] + sm * axes[:, 1]
+            ey = -sm * axes[:, 0] + cm * axes[:, 1]
+            read = self.w - complex(*x[transverse][:2])
+            p, q = read.real[:, None], read.imag[:, None]
+            moment = np.stack([-ex, -ey, p * ex + q * ey, p * ey - q * ex], 1) * self.h[:, None, None]
+            total = np.zeros((n, 4, 3))
+            total[1:] = np.cumsum(np.add.reduceat(moment, np.arange(0, k, self.substeps), axis=0), axis=0)
+            J[:, :, transverse] = MC @ np.swapaxes(total @ skew, 1, 2)
+        J[:, :, vector] = MC
+        J[:, :, iron] = np.eye(3)
+        for column, (i, j) in enumerate(_SOFT):
+            J[:, i, soft.start + column] = turned[:, j]
+            J[:, j, soft.start + column] = turned[:, i]
+        return residual, J, psi
+
+    def evaluate_rows(self, x: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+        """Return the whitened residual and derivative of each other sensor's rows."""
+        out = []
+        c = x[self.parts[0]]
+        for part, row in zip(self.parts[5:], self.rows, strict=True):
+            B = self.spline.basis(row.t)
+            r = B @ c
+            a = x[part]
+            if row.kind == "linear":
+                J = np.zeros((row.t.size, self.size))
+                J[:, self.parts[0]] = (1 + a[0]) * B
+                J[:, part.start] = r
+                J[:, part.start + 1] = 1.0
+                residual = row.value - (1 + a[0]) * r - a[1]
+                out.append((residual / row.sd, J / row.sd[:, None]))
+            else:
+                B1 = self.spline.basis(row.t, 1)
+                d = complex(a[0], a[1])
+                shape = -(r**2) + 1j * (B1 @ c)
+                error = row.value[:, 0] + 1j * row.value[:, 1] - shape * d - complex(a[2], a[3])
+                J2 = np.zeros((row.t.size, self.size), dtype=complex)
+                J2[:, self.parts[0]] = d * (-2 * r[:, None] * B + 1j * B1)
+                J2[:, part.start] = shape
+                J2[:, part.start + 1] = 1j * shape
+                J2[:, part.start + 2] = 1.0
+                J2[:, part.start + 3] = 1j
+                sd = np.concatenate([row.sd, row.sd])
+                residual = np.concatenate([error.real, error.imag]) / sd
+                out.append((residual, np.concatenate([J2.real, J2.imag]) / sd[:, None]))
+        return out
+
+
+_SOFT = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+
+
+def _symmetric(s: FloatArray) -> FloatArray:
+    return np.array([[s[0], s[1], s[2]], [s[1], s[3], s[4]], [s[2], s[4], s[5]]])
+
+
+def _accumulate(first: IndexArray, moment: FloatArray, interval: IndexArray, n: int, size: int) -> FloatArray:
+    """Sum ``moment`` (k, 4, ...) of four coefficients from ``first`` (k,) on, up to each of n times: (n, size, ...)."""
+    total = np.zeros((n, size, *moment.shape[2:]))
+    for i in range(4):
+        np.add.at(total, (interval + 1, first + i), moment[:, i])
+    return np.asarray(np.cumsum(total, axis=0))
+
+
+# ---------------------------------------------------------------------------------------------- solution
+
+
+@dataclass
+class _Linear:
+    """The problem about its current point: data information, its right side, and the prior beside the roughness."""
+
+    information: FloatArray
+    right: FloatArray
+    cost: float
+
+
+#: Spectral densities of r'' tried, (rad/s^3)^2 s.
+_GRID = np.logspace(-4, 7, 23)
+
+
+def _linearise(
+    problem: _Problem, x: FloatArray, noise: float, weights: FloatArray, precision: FloatArray, mean: FloatArray
+) -> tuple[_Linear, FloatArray, FloatArray]:
+    residual, J, psi = problem.evaluate(x)
+    scaled = weights[:, None] / noise
+    flat = (J * scaled[:, :, None]).reshape(-1, problem.size)
+    error = (residual * scaled).ravel()
+    information = flat.T @ flat + precision
+    right = flat.T @ error - precision @ (x - mean)
+    cost = float(error @ error + (x - mean) @ precision @ (x - mean))
+    for row_error, row_J in problem.evaluate_rows(x):
+        # a reading far outside its calibration's reach must not bend the track: Huber's weight at four sigma
+        weight = np.minimum(1.0, 4.0 / np.maximum(np.abs(row_error), 1e-12))
+        information += row_J.T @ (row_J * weight[:, None])
+        right += row_J.T @ (row_error * weight)
+        cost += float(np.sum(np.where(weight < 1, 8 * np.abs(row_error) - 16, row_error**2)))
+    if problem.strength is not None:
+        vector = problem.parts[2]
+        m0 = x[vector]
+        length = float(np.linalg.norm(m0))
+        sd = problem.settings.strength * problem.strength
+        gradient = np.zeros(problem.size)
+        gradient[vector] = m0 / length / sd
+        gap = (problem.strength - length) / sd
+        information += np.outer(gradient, gradient)
+        right += gradient * gap
+        cost += gap**2
+    return _Linear(information, right, cost), residual, psi
+
+
+def _with_roughness(
+    problem: _Problem, linear: _Linear, x: FloatArray, target: FloatArray, roughness: float
+) -> tuple[FloatArray, FloatArray, float]:
+    scale = np.sqrt(problem.local)
+    rows = scale[:, None] * problem.spline.second_difference()
+    spin = problem.parts[0]
+    information = linear.information.copy()
+    information[spin, spin] += rows.T @ rows / roughness
+    gap = scale * target - rows @ x[spin]
+    right = linear.right.copy()
+    right[spin] += rows.T @ gap / roughness
+    return information, right, linear.cost + float(gap @ gap) / roughness
+
+
+def _solve(
+    problem: _Problem, x: FloatArray, noise: float, weights: FloatArray, roughness: float, precession: float, most: int
+) -> tuple[FloatArray, _Linear, FloatArray, FloatArray, FloatArray]:
+    """Gauss-Newton with damping until a step is worth less than a hundredth of a standard deviation."""
+    precision, mean = problem.prior(precession)
+    _, target = problem.roughness_rows(x)
+    linear, residual, psi = _linearise(problem, x, noise, weights, precision, mean)
+    damping = 0.0
+    for _ in range(most):
+        information, right, cost = _with_roughness(problem, linear, x, target, roughness)
+        diagonal = np.diag(information)
+        step = cho_solve(cho_factor(information + np.diag(damping * diagonal)), right)
+        trial = x + step
+        moved, trial_residual, trial_psi = _linearise(problem, trial, noise, weights, precision, mean)
+        _, _, trial_cost = _with_roughness(problem, moved, trial, target, roughness)
+        if trial_cost <= cost + 1e-9:
+            x, linear, residual, psi = trial, moved, trial_residual, trial_psi
+            _, target = problem.roughness_rows(x)
+            damping = 0.0 if damping < 1e-4 else damping * 0.1
+            if float(step @ right) < 1e-4:
+                break
+        else:
+            damping = max(1e-4, 10 * damping)
+            if damping > 1e6:
+                break
+    return x, linear, residual, psi, target
+
+
+def _evidence(
+    problem: _Problem, linear: _Linear, x: FloatArray, target: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Integrate over the roughness, each value of a grid weighed by its marginal likelihood (Laplace).
+
+    Returns the weights of the grid, the mean of the spin's coefficients and their covariance. What is not spin is
+    eliminated first; then only the diagonal prior of the second differences changes over the grid.
+    """
+    count = problem.spline.size - 2
+    spin = problem.parts[0]
+    size = spin.stop
+    A, B, C = linear.information[:size, :size], linear.information[:size, size:], linear.information[size:, size:]
+    inner = cho_factor(C)
+    reduced = A - B @ cho_solve(inner, B.T)
+    right0 = linear.right[:size] - B @ cho_solve(inner, linear.right[size:])
+    rows = np.sqrt(problem.local)[:, None] * problem.spline.second_difference()
+    penalty = rows.T @ rows
+    gap = np.sqrt(problem.local) * target - rows @ x[spin]
+    pull = rows.T @ gap
+
+    def solved(roughness: float) -> tuple[float, FloatArray, tuple[FloatArray, bool]]:
+        factor = cho_factor(reduced + penalty / roughness, check_finite=False)
+        right = right0 + pull / roughness
+        step = cho_solve(factor, right, check_finite=False)
+        determinant = 2 * float(np.sum(np.log(np.diag(factor[0]))))
+        cost = float(gap @ gap) / roughness - float(step @ right)
+        return -0.5 * (cost + determinant + count * np.log(roughness)), step, factor
+
+    results = [solved(roughness) for roughness in _GRID]
+    log = np.array([result[0] for result in results])
+    weight = np.exp(log - np.max(log))
+    weight = np.where(weight < 1e-3, 0.0, weight)
+    weight /= np.sum(weight)
+    steps = np.array([result[1] for result in results])
+    mean = weight @ steps
+    covariance = np.zeros((size, size))
+    for share, (_, step, factor) in zip(weight, results, strict=True):
+        if share > 0:
+            spread = step - mean
+            covariance += share * (cho_solve(factor, np.eye(size), check_finite=False) + np.outer(spread, spread))
+    return weight, x[spin] + mean, covariance
+
+
+def _adapt(problem: _Problem, linear: _Linear, x: FloatArray, target: FloatArray) -> float:
+    """Find the roughness, and where it is larger than elsewhere: Student's t with one degree of freedom for r''.
+
+    A flight is alike smooth throughout and keeps weights near one; a rate table is quiet between the corners of its
+    ramps. Expectation-maximisation with the posterior variance of r'', so that intervals without data stay at one.
+    """
+    rows = problem.spline.second_difference()
+    roughness = 0.0
+    for _ in range(12):
+        share, answer, covariance = _evidence(problem, linear, x, target)
+        roughness = float(np.exp(np.sum(share * np.log(_GRID))))
+        bend = rows @ answer - target
+        square = bend**2 + np.sum((rows @ covariance) * rows, axis=1)
+        # corners fall between knots: neighbours share them
+        smooth = np.maximum(square, 0.5 * np.maximum(np.roll(square, 1), np.roll(square, -1)))
+        local = 2.0 / (1.0 + smooth / roughness)
+        change = float(np.max(np.abs(np.log(local / problem.local))))
+        problem.local = local
+        if change < 0.1:
+            break
+    return roughness
+
+
+def track_spin(
+    t: FloatArray,
+    m: FloatArray,
+    start_rate: FloatArray,
+    settings: TrackingSettings,
+    *,
+    gyroscope: Samples | None = None,
+    strength: float | None = None,
+    fixed_axis: bool = False,
+    decaying: bool = True,
+    axial: AxialField | None = None,
+    rows: list[RateRows] | None = None,
+    noise: float | None = None,
+) -> Track:
+    """Smooth one segment: field m (n, 3) uT at times t (n,), from a first guess ``start_rate`` (n,) rad/s.
+
+    ``strength`` is the field's, uT; ``axial`` a first guess of the hard iron along z; ``noise`` the data sheet's,
+    uT, taken as a floor. ``rows`` are other sensors' readings of the rate.
+    """
+    rows = rows or []
+    problem = _Problem(
+        t, m, settings, gyroscope=gyroscope, strength=strength, fixed_axis=fixed_axis, decaying=decaying,
+        rows=rows, top_rate=float(np.max(np.abs(start_rate))),
+    )  # fmt: skip
+    x = _start(problem, start_rate, axial)
+    precession = settings.precession
+    weights = np.ones(t.size)
+    residual, _, _ = problem.evaluate(x)
+    floor = 0.7 * noise if noise else 1e-6
+    sigma = max(float(np.sqrt(np.mean(residual**2))), floor)
+    roughness = 100.0
+    target = np.zeros(0)
+    for outer in range(4):
+        x, linear, residual, psi, target = _solve(problem, x, sigma, weights, roughness, precession, 15)
+        length = np.sqrt(np.mean(residual**2, axis=1))
+        sigma = max(_noise(residual, weights, problem, linear, roughness), floor)
+        # Huber's weight for single bad readings
+        weights = np.sqrt(np.minimum(1.0, 4.0 * sigma / np.maximum(length, 1e-12)))
+        precision, mean = problem.prior(precession)
+        linear, residual, psi = _linearise(problem, x, sigma, weights, precision, mean)
+        previous = roughness
+        roughness = _adapt(problem, linear, x, target)
+        if problem.slow is not None:
+            # the part of the precession that the field shows tells the size of the part that it does not
+            PQ = x[problem.parts[1]]
+            shown = 1 - np.diag(np.linalg.inv(linear.information))[problem.parts[1]] / precession**2
+            weight = np.clip(shown, 0, 1)
+            seen = float(np.sum(weight * PQ**2) + 2 * settings.precession**2) / (float(np.sum(weight)) + 2)
+            precession = max(settings.precession, float(np.sqrt(seen)))
+        if outer > 0 and abs(np.log(roughness / previous)) < 0.2:
+            break
+    _, coefficients, covariance = _evidence(problem, linear, x, target)
+    first = int(np.ceil(t[0] / settings.step - 1e-9))
+    count = int(np.floor(t[-1] / settings.step + 1e-9)) + 1 - first
+    grid = settings.step * (first + np.arange(count, dtype=np.float64))
+    B = problem.spline.basis(grid)
+    inflation = _correlation(problem, residual, x)
+    covariance *= inflation
+    blur = _blur(problem.spline, coefficients, grid)
+    rate_covariance = B @ covariance @ B.T
+    everything = np.linalg.inv(_with_roughness(problem, linear, x, target, roughness)[0])
+    parts = problem.parts[5:]
+    return Track(
+        t=grid,
+        rate=B @ coefficients,
+        sd=np.hypot(np.sqrt(np.diag(rate_covariance)), blur),
+        blur=blur,
+        covariance=rate_covariance,
+        times=t,
+        phase=psi,
+        residual=residual,
+        noise=sigma,
+        hard_iron=x[problem.parts[3]],
+        field=x[problem.parts[2]],
+        spline=problem.spline,
+        coefficients=coefficients,
+        roughness=roughness,
+        calibration=[x[part] for part in parts],
+        calibration_sd=[np.sqrt(np.diag(everything)[part]) for part in parts],
+        chi2=[float(np.mean(error**2)) for error, _ in problem.evaluate_rows(x)],
+        gyroscope_gain=complex(*x[problem.parts[1]][2:]) if not problem.despun and not fixed_axis else 0j,
+    )
+
+
+def _blur(spline: SpinSpline, coefficients: FloatArray, t: FloatArray) -> FloatArray:
+    """Return what the knots' spacing hides at t, rad/s, one sigma.
+
+    A cubic spline through the corner of a ramp, where the slope jumps by s, errs by up to s h/6 within a knot's spacing
+    h; the second difference of its coefficients there is about s h.
+    """
+    bend = np.abs(np.diff(coefficients, 2))
+    centres = spline.start + spline.spacing * np.arange(bend.size)
+    # a corner between two knots shows in both
+    wide = np.maximum(bend, np.maximum(np.roll(bend, 1), np.roll(bend, -1)))
+    return np.asarray(np.interp(t, centres, wide) / 6)
+
+
+def _start(problem: _Problem, start_rate: FloatArray, axial: AxialField | None) -> FloatArray:
+    """Return a first point: the spline through the rates, then field and hard iron by linear least squares."""
+    x = np.zeros(problem.size)
+    B = problem.spline.basis(problem.t)
+    rows = problem.spline.second_difference()
+    x[problem.parts[0]] = np.linalg.solve(B.T @ B + 1e-4 * rows.T @ rows, B.T @ start_rate)
+    for part, row in zip(problem.parts[5:], problem.rows, strict=True):
+        x[part] = row.calibration
+    residual, J, _ = problem.evaluate(x)  # the field is zero: residual = m, derivative by field = C
+    vector, iron = problem.parts[2], problem.parts[3]
+    columns = np.concatenate([J[:, :, vector], J[:, :, iron]], axis=2).reshape(-1, 6)
+    # along z field and hard iron are nearly the same column: draw the latter to its first guess
+    guess = np.array([0.0, 0.0, 0.0, 0.0, 0.0, axial.offset if axial is not None else 0.0])
+    weight = np.diag([1e-9, 1e-9, 1e-9, 1e-6, 1e-6, 10.0])
+    x[vector.start : iron.stop] = np.linalg.solve(
+        columns.T @ columns + weight, columns.T @ residual.ravel() + weight @ guess
+    )
+    return x
+
+
+def _noise(residual: FloatArray, weights: FloatArray, problem: _Problem, linear: _Linear, roughness: float) -> float:
+    rows = np.sqrt(problem.local)[:, None] * problem.spline.second_difference()
+    information = linear.information.copy()
+    information[problem.parts[0], problem.parts[0]] += rows.T @ rows / roughness
+    # parameters that the data and not the prior decide
+    precision, _ = problem.prior(problem.settings.precession)
+    precision[problem.parts[0], problem.parts[0]] += rows.T @ rows / roughness
+    freedom = problem.size - float(np.trace(np.linalg.solve(information, precision)))
+    count = 3 * float(np.sum(weights**2))
+    square = float(np.sum((weights[:, None] * residual) ** 2))
+    return sqrt(square / max(count - freedom, 0.2 * count))
+
+
+def _correlation(problem: _Problem, residual: FloatArray, x: FloatArray) -> float:
+    """Return how much the phase's error correlates: its spectral density at low frequency over a white one's, >= 1.
+
+    The residual across the field's direction, in turns of the spin; faster than the spin's own spline follows.
+    """
+    iron = problem.parts[3]
+    z = (problem.m[:, 0] - x[iron][0]) + 1j * (problem.m[:, 1] - x[iron][1])
+    error = (residual[:, 0] + 1j * residual[:, 1]) * np.exp(-1j * np.angle(z))
+    across = error.imag - np.mean(error.imag)
+    variance = float(np.mean(across**2))
+    if variance <= 0 or across.size < 60:
+        return 1.0
+    lags = min(10, across.size // 20)
+    total = sum(
+        float(np.mean(across[lag:] * across[:-lag])) / variance * (1 - lag / (lags + 1)) for lag in range(1, lags + 1)
+    )
+    # white noise alone gives a scatter of about this size
+    scatter = 2 * np.sqrt(lags / 3 / across.size)
+    return float(max(1.0, 1 + 2 * (total - scatter)))
+
+
+def tracking(recording: Recording, settings: TrackingSettings | None = None) -> YawRate:
+    """Spin rate, signed, of a whole recording from its magnetometer, and p, q of its gyroscope where it has one.
+
+    Raises `InputError` if the recording has no magnetometer.
+    """
+    settings = settings or TrackingSettings()
+    span = span_of(recording)
+    return joined("tracking", tracks_of(recording, settings), settings, span)
+
+
+def tracks_of(
+    recording: Recording, settings: TrackingSettings, rows: list[RateRows] | None = None, unfold: int = 0
+) -> list[Track]:
+    """Return the segments' tracks, in time order; none where no window shows a spin.
+
+    ``rows`` are other sensors' readings of the rate. ``unfold`` turns more per sampling interval than the field shows
+    are made by a spin faster than half the sampling rate; only another sensor can tell (`estimators.fusion`).
+    """
+    magnetometer = recording.need("magnetometer")
+    sheet = recording.sheets.get("magnetometer")
+    t, m = usable_field(magnetometer, sheet)
+    gyroscope = recording.get("gyroscope")
+    fixed_axis = recording.plant in ("rate_table", "spin_down")
+    strength = float(np.linalg.norm(recording.environment.magnetic_field))
+    if t.size < LEAST:
+        return []
+    windows = LikelihoodSettings(window=settings.window, step=settings.window / 8, degree=1)
+    centres = window_centres(t, windows)
+    fits = fit_windows(t, m, centres, windows)
+    axial = axial_field(fits.amplitude, fits.axial, strength)
+    fold = 2 * np.pi / float(np.median(np.diff(t))) * unfold
+    if gyroscope is not None and not fixed_axis and unfold == 0:
+        turned = fit_windows(t, m, centres, windows, gyroscope=gyroscope, axial=axial, start=fits)
+        fits = turned if np.any(np.isfinite(turned.phase_rate)) else fits
+    noise = None
+    if sheet is not None and sheet.noise_rms is not None:
+        noise = float(np.hypot(sheet.noise_rms, (sheet.resolution or 0.0) / np.sqrt(12)))
+    tracks = []
+    for first, last, rate in _runs(t, replace(fits, phase_rate=fits.phase_rate - fold), gyroscope, recording):
+        for start, stop in _segments(t[first:last], settings):
+            chosen = slice(
+                first + int(np.searchsorted(t[first:last], start - 1e-9)),
+                first + int(np.searchsorted(t[first:last], stop + 1e-9)),
+            )
+            if chosen.stop - chosen.start < LEAST:
+                continue
+            track = track_spin(
+                t[chosen],
+                m[chosen],
+                rate[chosen.start - first : chosen.stop - first],
+                settings,
+                gyroscope=None if fixed_axis else gyroscope,
+                strength=strength,
+                fixed_axis=fixed_axis,
+                decaying=recording.plant != "rate_table",
+                axial=axial,
+                rows=_between(rows or [], float(t[chosen][0]), float(t[chosen][-1])),
+                noise=noise,
+            )
+            tracks.append(track)
+    return tracks
+
+
+def _between(rows: list[RateRows], start: float, stop: float) -> list[RateRows]:
+    """Return what each sensor has to say from start to stop, leaving out those that say nothing."""
+    out = []
+    for row in rows:
+        chosen = (row.t >= start) & (row.t <= stop)
+        if np.any(chosen):
+            out.append(replace(row, t=row.t[chosen], value=row.value[chosen], sd=row.sd[chosen]))
+    return out
+
+
+def _runs(
+    t: FloatArray, fits: ToneFit, gyroscope: Samples | None, recording: Recording
+) -> list[tuple[int, int, FloatArray]]:
+    """Return stretches of the readings, as index ranges, over which the turns can be counted, with a first rate.
+
+    Between windows that are less than a second apart, or where the gyroscope's z is within its range, the rate is
+    known well enough to carry the phase; elsewhere the turns are lost and a new stretch begins.
+    """
+    known = np.isfinite(fits.phase_rate)
+    times, rates = fits.t[known], -fits.phase_rate[known]
+    lengths = fits.length[known]
+    if gyroscope is not None:
+        z = gyroscope.value[:, 2]
+        good = np.isfinite(z) & ~recording.sheets["gyroscope"].clipped(z)
+        smooth = np.interp(t, gyroscope.t[good], z[good]) if np.count_nonzero(good) > 1 else np.full(t.size, np.nan)
+        near = np.zeros(t.size, dtype=bool)
+        if np.count_nonzero(good) > 1:
+            index = np.clip(np.searchsorted(gyroscope.t[good], t), 1, np.count_nonzero(good) - 1)
+            near = np.diff(gyroscope.t[good])[index - 1] < 0.1
+            near &= (t >= gyroscope.t[good][0] - 0.02) & (t <= gyroscope.t[good][-1] + 0.02)
+    else:
+        smooth, near = np.full(t.size, np.nan), np.zeros(t.size, dtype=bool)
+    covered = near.copy()
+    for centre, length in zip(times, lengths, strict=True):
+        covered |= np.abs(t - centre) <= 0.5 * length + 0.25
+    rate = np.interp(t, times, rates) if times.size else np.zeros(t.size)
+    rate = np.where(near, smooth, rate)
+    runs = []
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], covered, [False]]).astype(int)))
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        # a hole in the time stamps loses the turns as well
+        holes = first + 1 + np.flatnonzero(np.diff(t[first:last]) > 1.0)
+        for a, b in zip([first, *holes], [*holes, last], strict=True):
+            runs.append((int(a), int(b), rate[a:b]))
+    return runs
+
+
+def joined(method: str, tracks: list[Track], settings: TrackingSettings, span: tuple[float, float]) -> YawRate:
+    """Join segments where they overlap, each up to the middle of the overlap; NaN between them and where they misfit.
+
+    ``span`` is the recording's first and last time, s; the answers stand at whole steps within it.
+    """
+    first, last = int(np.ceil(span[0] / settings.step - 1e-9)), int(np.floor(span[1] / settings.step + 1e-9))
+    grid = settings.step * np.arange(first, last + 1, dtype=np.float64)
+    rate, sd = np.full(grid.size, np.nan), np.full(grid.size, np.nan)
+    for index, track in enumerate(tracks):
+        good = _trusted(track, settings)
+        if index > 0:
+            good &= track.t > 0.5 * (tracks[index - 1].times[-1] + track.times[0])
+        if index + 1 < len(tracks):
+            good &= track.t <= 0.5 * (track.times[-1] + tracks[index + 1].times[0])
+        place = np.rint(track.t[good] / settings.step).astype(int) - first
+        rate[place], sd[place] = track.rate[good], track.sd[good]
+    return YawRate(method, grid, rate, sd, signed=True)
+
+
+def _trusted(track: Track, settings: TrackingSettings) -> BoolArray:
+    good = (track.sd <= settings.largest_sd) & np.isfinite(track.rate)
+    square = np.mean(track.residual**2, axis=1)
+    cumulative = np.concatenate([[0.0], np.cumsum(square)])
+    lo = np.searchsorted(track.times, track.t - 0.25)
+    hi = np.searchsorted(track.times, track.t + 0.25)
+    local = (cumulative[hi] - cumulative[lo]) / np.maximum(hi - lo, 1)
+    usual = float(np.median(square)) * 1.27  # the mean of chi-square of three is 1.27 times its median
+    good &= (local <= settings.misfit**2 * max(usual, 1e-12)) & (hi - lo >= 3)
+    field = float(np.linalg.norm(track.field))
+    if track.noise > 0.2 * field:
+        good[:] = False
+    return np.asarray(good)
