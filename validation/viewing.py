@@ -221,10 +221,17 @@ def _image(pixels: Pixels) -> Image.Image:
     return Image.fromarray(pixels)
 
 
-def _write(image: Image.Image, lines: Sequence[str], place: str = "top") -> Image.Image:
-    """Write lines of text into a picture's upper or lower left corner, on a dark band where they stand."""
-    size = max(11, min(18, image.width // 42))
+def _write(image: Image.Image, phrases: Sequence[str], place: str = "top") -> Image.Image:
+    """Write phrases into a picture's upper or lower left corner, in as few lines as its width allows."""
+    size = max(10, min(17, image.width // 42))
     font = ImageFont.load_default(size)
+    lines = [phrases[0]]
+    for phrase in phrases[1:]:
+        longer = f"{lines[-1]}   |   {phrase}"
+        if font.getlength(longer) < image.width - 2 * size:
+            lines[-1] = longer
+        else:
+            lines.append(phrase)
     height = round(1.35 * size)
     above = 0 if place == "top" else image.height - height * len(lines) - size // 2
     widest = max(font.getlength(line) for line in lines)
