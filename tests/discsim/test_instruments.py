@@ -331,7 +331,6 @@ class TestRecord:
         np.testing.assert_array_equal(read.environment.magnetic_field, FIELD.magnetic_field)
         for name, sheet in written.sheets.items():
             for what in ("rate_hz", "noise_rms", "resolution", "range", "velocity_noise_rms"):
-                # a resolution of nothing is not stated
                 assert getattr(read.sheets[name], what) == getattr(sheet, what), (name, what)
             np.testing.assert_array_equal(read.sheets[name].position, sheet.position)
         if knots is not None:
