@@ -63,7 +63,7 @@ def parse_vector(text: str, option: str, unit: str, largest: float) -> FloatArra
         values = []
     if len(values) != 3:
         raise InputError(f"{option} {text}: expected three numbers separated by commas, in {unit}")
-    if max(map(abs, values)) > largest:
+    if not all(abs(value) <= largest for value in values):  # NaN is no more than anything
         raise InputError(
             f"{option} {text}: expected at most {largest:g} {unit} along each axis (are these millimetres?)"
         )

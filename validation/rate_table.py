@@ -13,6 +13,7 @@ from discsim.arrays import BoolArray, FloatArray
 from discsim.effects.catalogue import Effect
 from discsim.effects.sensors import PositionOffset
 from discsim.environment import Environment
+from discsim.errors import InputError
 from discsim.files import write_text
 from discsim.motion import Motion
 from discsim.recording import Recording, Samples
@@ -38,6 +39,7 @@ class RateTableRun:
 
     ``recording`` is the module's (MPU-9250 and the table's read-out), ``wide`` that of the wide-range rate sensor
     beside it; ``rates`` holds each method's estimate by name, ``envelopes`` the accelerometer's by mount error in m.
+    ``mount`` is how far off its stated place the accelerometer truly sits, the larger of x and y, m.
     """
 
     profile: Samples
@@ -46,6 +48,7 @@ class RateTableRun:
     wide: Recording
     rates: Mapping[str, YawRate]
     envelopes: Mapping[float, YawRate]
+    mount: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -72,8 +75,11 @@ def run_rate_table(
     """Turn the table through ``profile`` and estimate its rate by each method of the paper.
 
     The module is one MPU-9250 drawn within its data sheet; its accelerometer sits ``mount`` (3,) m off its stated
-    place. The yaw phase at the start is drawn too.
+    place. The yaw phase at the start is drawn too. An effect on a sensor takes the place of what was drawn of its
+    kind. Raises `InputError` where both ``mount`` and ``effects`` move the accelerometer.
     """
+    if mount is not None and np.any(mount) and any(item.id == "accel.position_offset" for item in effects):
+        raise InputError("a mount error and accel.position_offset both move the accelerometer; expected one of them")
     draw_module, draw_wide, draw_yaw, noise_module, noise_wide = rng.spawn(5)
     motion = turn_table(profile, environment, effects, yaw=float(draw_yaw.uniform(0, 2 * np.pi)))
     module = Instruments.from_parts("mpu9250", "ac1120s").drawn(draw_module)
@@ -96,7 +102,8 @@ def run_rate_table(
         )
         for error in MOUNT_ERRORS
     }
-    return RateTableRun(profile, motion, recording, wide, rates, envelopes)
+    off = float(np.abs(module.sensors["accelerometer"].offset[:2]).max())  # type: ignore[union-attr]
+    return RateTableRun(profile, motion, recording, wide, rates, envelopes, off)
 
 
 def plateaus(profile: Samples) -> list[tuple[float, float, float]]:
@@ -135,7 +142,7 @@ def write_plateaus(path: Path, table: list[Plateau]) -> None:
     lines = ["rate_deg_s,method,known_share,bias_deg_s,sd_deg_s,worst_deg_s,bias_percent,sd_percent,worst_percent"]
     for row in table:
         degrees = [np.degrees(x) for x in (row.bias, row.sd, row.worst)]
-        percent = [100 * x / row.rate if row.rate else np.nan for x in (row.bias, row.sd, row.worst)]
+        percent = [100 * x / abs(row.rate) if row.rate else np.nan for x in (row.bias, row.sd, row.worst)]
         cells = ["" if np.isnan(x) else f"{x:.4f}" for x in (*degrees, *percent)]
         lines.append(f"{np.degrees(row.rate):.6g},{row.method},{row.known:.3f}," + ",".join(cells))
     write_text(path, "\n".join([*lines, ""]))
@@ -148,72 +155,89 @@ def rate_table_checks(run: RateTableRun, table: list[Plateau]) -> list[Score]:
     a small distortion even at a static rate, a delay of half its window, and nothing below its threshold; the
     accelerometer's envelope widens with the mount error, and holds the truth.
     """
-    at = {(row.method, round(np.degrees(row.rate))): row for row in table}
-    rates = sorted({round(np.degrees(row.rate)) for row in table})
-    threshold, clip = np.degrees(FftSettings().threshold), np.degrees(run.recording.sheets["gyroscope"].range or np.inf)
-    high = [rate for rate in rates if rate > max(2000.0, clip - 1)]
-    low = [rate for rate in rates if rate < threshold - 150]
-    middle = [rate for rate in rates if rate > threshold + 50]
+
+    def of(method: str, above: float, below: float = np.inf) -> list[Plateau]:
+        """Return the method's plateaus with a rate between, either way round, deg/s."""
+        return [row for row in table if row.method == method and above <= abs(np.degrees(row.rate)) < below]
+
+    threshold = float(np.degrees(FftSettings().threshold))
+    # beyond what a gyroscope that reads 3 % and 5 deg/s low still shows
+    high = max(2000.0, 1.04 * float(np.degrees(run.recording.sheets["gyroscope"].range or np.inf)))
+    interval = run.recording.need("magnetometer").interval
     scores = []
-
-    def rms(method: str, rate: int) -> float:
-        row = at[method, rate]
-        return float(np.degrees(np.hypot(row.bias, row.sd)))
-
-    if low:
-        below = max(at["fft", rate].known for rate in low)
-        scores.append(at_most("rate table: share of fft values below its threshold", below, "1", 0.0))
-    if middle:
+    if low := of("fft", 0.0, threshold - 150):
+        scores.append(at_most("rate table: share of fft values below its threshold", _most(low, "known"), "1", 0.0))
+    if middle := of("fft", threshold + 50):
+        share = min(row.known for row in middle)
+        scores.append(score("rate table: smallest share of a plateau that fft knows", share, "1", 1.0, 0.02))
         # leakage from the negative frequency shifts the peak by up to a tenth of the window's resolution
-        worst = max(np.degrees(abs(at["fft", rate].bias)) for rate in middle)
-        resolution = 360.0 / (FftSettings().window * run.recording.need("magnetometer").interval)
+        worst, resolution = np.degrees(_most(middle, "bias")), 360.0 / (FftSettings().window * interval)
         scores.append(at_most("rate table: largest bias of fft on a plateau", worst, "deg/s", 0.1 * resolution))
-        distortion = max(np.degrees(at["fft", rate].sd) for rate in middle)
+        distortion = np.degrees(_most(middle, "sd"))
         scores.append(score("rate table: largest distortion of fft at a static rate", distortion, "deg/s", 2.5, 2.49))
-    if high:
-        worst = max(abs(at["fft", rate].bias) / np.radians(rate) for rate in high)
+    if fast := of("fft", high):
+        worst = np.max([abs(row.bias / row.rate) for row in fast])
         scores.append(at_most("rate table: largest relative bias of fft at high rates", 100 * worst, "%", 0.15))
-        share = max(at["gyroscope", rate].known for rate in high)
+        share = _most(of("gyroscope", high), "known")
         scores.append(at_most("rate table: share of gyroscope values beyond its range", share, "1", 0.0))
-        noise = float(np.median([np.degrees(at["adxrs649", rate].sd) for rate in high]))
+        noise = float(np.median([np.degrees(row.sd) for row in of("adxrs649", high)]))
         scores.append(score("rate table: noise of the wide-range gyroscope", noise, "deg/s", 14.0, 1.4))
-        # a single accelerometer may by chance be a good one; what it can be trusted to is its envelope
-        trusted = [(rate, np.degrees(_envelope(run, MOUNT_ERRORS[0], rate)[1]) / 2) for rate in high]
-        ratio = max(rms("fft", rate) / min(rms("adxrs649", rate), half) for rate, half in trusted)
+        # a single accelerometer may by chance be a good one; what it can be trusted to is its envelope, and beyond its
+        # range nothing, where the wide-range gyroscope is the next best
+        trusted = np.array([_envelope(run, MOUNT_ERRORS[0], row.rate)[0] / 2 for row in fast])
+        ratio = np.max(_rms(fast) / np.fmin(_rms(of("adxrs649", high)), trusted))
         scores.append(score("rate table: fft error over the next best method's at high rates", ratio, "1", 0.0, 1.0))
-        scores.extend(_envelope_checks(run, high[-1]))
+    if known := [row for row in of("accelerometer", high) if row.known > 0.5]:
+        scores.extend(_envelope_checks(run, max(known, key=lambda row: abs(row.rate)).rate))
     lag = fft_delay(run)
     if np.isfinite(lag):
-        expected = (FftSettings().window - 1) / 2 * run.recording.need("magnetometer").interval
+        expected = (FftSettings().window - 1) / 2 * interval
         scores.append(score("rate table: delay of the unshifted fft", lag, "s", expected, 0.05 * expected))
     return scores
 
 
-def _envelope(run: RateTableRun, mount: float, rate_deg_s: int) -> tuple[float, float, float]:
-    """Return a plateau's rate and the envelope's median width there (rad/s), and the share that misses the truth."""
-    start, stop, rate = next(p for p in plateaus(run.profile) if round(np.degrees(p[2])) == rate_deg_s)
+def _most(rows: list[Plateau], figure: str) -> float:
+    """Return the largest size of a figure; NaN where one of them is, so that nothing unknown passes."""
+    return float(np.max([abs(getattr(row, figure)) for row in rows]))
+
+
+def _rms(rows: list[Plateau]) -> FloatArray:
+    return np.array([np.hypot(row.bias, row.sd) for row in rows])
+
+
+def _envelope(run: RateTableRun, mount: float, rate: float) -> tuple[float, float]:
+    """Return the envelope's median width on the plateau of a rate (rad/s) and the share of it that misses the truth.
+
+    NaN where the accelerometer is beyond its range.
+    """
+    start, stop, _ = next(span for span in plateaus(run.profile) if span[2] == rate)
     estimate = run.envelopes[mount]
     assert estimate.lower is not None
     assert estimate.upper is not None
-    chosen = (estimate.t >= start) & (estimate.t <= stop)
+    chosen = (estimate.t >= start) & (estimate.t <= stop) & np.isfinite(estimate.lower)
+    if not chosen.any():
+        return float("nan"), float("nan")
     low, high = estimate.lower[chosen], estimate.upper[chosen]
-    return rate, float(np.nanmedian(high - low)), float(np.mean((low > rate) | (high < rate)))
+    return float(np.median(high - low)), float(np.mean((low > abs(rate)) | (high < abs(rate))))
 
 
-def _envelope_checks(run: RateTableRun, rate_deg_s: int) -> list[Score]:
+def _envelope_checks(run: RateTableRun, rate: float) -> list[Score]:
+    """Score the envelopes on a plateau (rad/s) against (9); they hold the truth if they allow for the mount."""
     distance = float(np.hypot(*np.asarray(run.recording.sheets["accelerometer"].position)[:2]))
-    scores, widths, missed = [], {}, 0.0
+    scores, widths, missed = [], {}, []
     for mount in MOUNT_ERRORS:
-        rate, width, outside = _envelope(run, mount, rate_deg_s)
-        widths[mount], missed = width, max(missed, outside)
+        widths[mount], outside = _envelope(run, mount, rate)
+        if mount >= run.mount:
+            missed.append(outside)
         # (9) at the corners of mount error and (13), at high rate; what bias and gravity add is in the margin
         spread = (1.005 + 0.02) * mount
         predicted = np.sqrt(distance / (0.995 * distance - spread)) - np.sqrt(distance / (1.005 * distance + spread))
-        name = f"rate table: envelope width for {1000 * mount:g} mm at {rate_deg_s} deg/s over (9)"
-        scores.append(score(name, width / rate / predicted, "1", 1.0, 0.15))
+        name = f"rate table: envelope width for {1000 * mount:g} mm at {abs(np.degrees(rate)):.0f} deg/s over (9)"
+        scores.append(score(name, widths[mount] / abs(rate) / predicted, "1", 1.0, 0.15))
     ratio = widths[MOUNT_ERRORS[1]] / widths[MOUNT_ERRORS[0]]
     scores.append(score("rate table: envelope width of 5 mm over that of 1 mm", ratio, "1", 5.0, 1.5))
-    scores.append(at_most("rate table: share of truth outside the envelopes", missed, "1", 0.0))
+    if missed:
+        scores.append(at_most("rate table: share of truth outside the envelopes", np.max(missed), "1", 0.0))
     return scores
 
 
@@ -223,9 +247,10 @@ def fft_delay(run: RateTableRun) -> float:
     delays = []
     knots = list(zip(run.profile.t.tolist(), run.profile.value.tolist(), strict=True))
     for (t0, r0), (t1, r1) in pairwise(knots):
-        slope = (r1 - r0) / (t1 - t0)
-        if slope == 0:
+        if r0 == r1 or r0 * r1 < 0:  # level, or through zero, where the estimate has no sign
             continue
+        r0, r1 = abs(r0), abs(r1)
+        slope = (r1 - r0) / (t1 - t0)
         # the middle of the ramp reaches the stamp half a window later; take it where the window's centre is central
         window = FftSettings().window * run.recording.need("magnetometer").interval
         middle = (t0 + t1) / 2 + window / 2
