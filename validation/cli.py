@@ -1,7 +1,7 @@
 """The command ``discsim``: parses, calls, and turns errors into one clear line and an exit status.
 
 Each sub-command lives in ``validation.commands`` in a module of its own name and is imported only when it runs.
-Exit status: 0 done, 1 done but outside tolerance, 2 bad input or usage.
+Exit status: 0 done, 1 done but outside tolerance, 2 bad input or usage, 3 a fault of the program itself.
 """
 
 from __future__ import annotations
@@ -64,6 +64,11 @@ def main() -> None:
     except (KeyboardInterrupt, typer.Abort):
         typer.echo("discsim: interrupted", err=True)
         sys.exit(130)
+    except Exception as error:
+        if debug:
+            raise
+        typer.echo(f"discsim: internal error, {type(error).__name__}: {error} (--debug shows where)", err=True)
+        sys.exit(3)
     sys.exit(status if isinstance(status, int) else 0)
 
 

@@ -18,7 +18,7 @@ from matplotlib.ticker import NullLocator
 from discsim.files import write_bytes
 from estimators.rate import YawRate
 
-__all__ = ["COLOURS", "STYLE", "colour", "draw_rates", "new_figure", "save_figure", "symmetric_log"]
+__all__ = ["COLOURS", "STYLE", "colour", "draw_differences", "draw_rates", "new_figure", "save_figure", "symmetric_log"]
 
 #: One colour per method wherever it is drawn: Okabe and Ito's, which colour-blind readers can tell apart.
 COLOURS: Mapping[str, str] = MappingProxyType(
@@ -29,6 +29,7 @@ COLOURS: Mapping[str, str] = MappingProxyType(
         "accelerometer": "#0072b2",
         "gyroscope": "#cc79a7",
         "adxrs649": "#009e73",
+        "best": "#009e73",
     }
 )
 _OTHERS = ("#e69f00", "#56b4e9", "#6a3d9a", "#8c6d31", "#7f7f7f")
@@ -125,6 +126,25 @@ def draw_rates(axes: Axes, rates: Sequence[YawRate]) -> None:
     axes.set_xlabel("time (s)")
     axes.set_ylabel("magnitude of spin rate (deg/s)" if signless else "spin rate (deg/s)")
     axes.legend(loc="best", fontsize=8)
+
+
+def draw_differences(axes: Axes, rates: Sequence[YawRate], reference: YawRate) -> None:
+    """Draw each rate less ``reference``, in deg/s with bands of one standard deviation of its own.
+
+    Where one of the two has no sign magnitudes are compared. The scale is linear to 10 deg/s, logarithmic beyond.
+    """
+    names = [rate.method for rate in rates]
+    for rate in sorted(rates, key=lambda rate: -_scatter(rate)):
+        middle = reference.at(rate.t)
+        signless = not (rate.signed and reference.signed)
+        value = np.degrees(np.abs(rate.rate) - np.abs(middle) if signless else rate.rate - middle)
+        shade, sd = colour(rate.method, names), np.degrees(rate.sd)
+        known = np.isfinite(value)
+        axes.fill_between(rate.t, value - sd, value + sd, where=known.tolist(), color=shade, alpha=0.2, lw=0)
+        axes.plot(rate.t, value, color=shade, lw=0.9)
+    symmetric_log(axes, linear=10.0, limit=300.0)
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel(f"rate less {reference.method} (deg/s)")
 
 
 def _scatter(rate: YawRate) -> float:

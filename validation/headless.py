@@ -61,7 +61,7 @@ def draw_throws(results: Sequence[ThrowResult], path: Path) -> None:
     for number, result in enumerate(results):
         position = result.motion.position
         axes[0].plot(position[:, 1], position[:, 0], lw=1.2, label=result.throw.name)
-        for method in ("accelerometer", "fft"):
+        for method in ("accelerometer", "fft", "best"):
             rate = result.rates[method]
             inner = (rate.t >= EDGE_S) & (rate.t <= result.motion.end - EDGE_S)
             axes[1].plot(
@@ -122,8 +122,9 @@ def _write_report(run: Run, scores: Sequence[Score], results: Sequence[ThrowResu
         Section(
             "Throws",
             (
-                "The driver disc with the same module, its accelerometer 1 mm off along x and y. Figures are rms errors "
-                "of the spin rate in deg/s away from the ends of the flight; a dash where a method knows nothing.",
+                "The driver disc with the same module, its accelerometer 1 mm off along x and y. Figures are rms "
+                "errors of the spin rate in deg/s away from the ends of the flight; a dash where a method knows "
+                "nothing.",
             ),
             ("throw", *methods),
             throw_rows,

@@ -55,7 +55,6 @@ def command(
     from estimators.fft import FftSettings
     from estimators.methods import Options, sampling_notes
     from validation.comparison import disagreements
-    from validation.figures import draw_rates, new_figure, save_figure
     from validation.run import start_run
 
     zeros = max(0, 2**14 - window) if pad is None else pad
@@ -70,11 +69,27 @@ def command(
     with start_run(out, inputs=[recording]) as run:
         write_text(out / "rate.csv", rate_csv(rates))
         run.write_json("estimate.json", summary(data, method, rates, left_out, found, notes))
+        draw(rates, data.name, out / "rate.png")
+    _print(rates, left_out, found, notes)
+
+
+def draw(rates: Sequence[YawRate], name: str, path: Path) -> None:
+    """Draw the rates, and below them their differences from the most preferred method that knows the rate."""
+    import numpy as np
+
+    from validation.figures import draw_differences, draw_rates, new_figure, save_figure
+
+    knowing = [rate for rate in rates if np.isfinite(rate.rate).any()]
+    if len(knowing) < 2:
         figure, axes = new_figure(width=10.0, height=5.0)
         draw_rates(axes, rates)
-        axes.set_title(f"Spin rate of {data.name}, with bands of one standard deviation")
-        save_figure(figure, out / "rate.png")
-    _print(rates, left_out, found, notes)
+    else:
+        figure, (axes, lower) = new_figure(2, 1, width=10.0, height=8.0, sharex=True, height_ratios=(3, 2))
+        draw_rates(axes, rates)
+        axes.set_xlabel("")
+        draw_differences(lower, knowing, max(knowing, key=lambda rate: bool(np.mean(np.isfinite(rate.rate)) >= 0.5)))
+    axes.set_title(f"Spin rate of {name}, with bands of one standard deviation")
+    save_figure(figure, path)
 
 
 def estimate_all(recording: Recording, name: str, options: Options) -> tuple[list[YawRate], dict[str, str]]:
