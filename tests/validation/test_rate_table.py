@@ -15,6 +15,7 @@ from discsim.errors import InputError
 from discsim.recording import Samples
 from discsim.rig import default_profile
 from estimators.rate import YawRate
+from validation.options import parse_vector
 from validation.rate_table import (
     MARGIN_S,
     Plateau,
@@ -213,6 +214,11 @@ class TestOtherProfiles:
         difference = shifted.recording.need("magnetometer").value - plain.recording.need("magnetometer").value
         # both are rounded to 0.15 uT
         np.testing.assert_allclose(difference, np.tile([0.0, 0.0, 30.0], (221, 1)), atol=0.151)
+
+    @pytest.mark.parametrize("text", ["nan,0,0", "0,0,inf", "0.06,0,0", "1,2", "a,b,c"])
+    def test_a_mount_that_is_no_place_on_the_board_is_refused(self, text):
+        with pytest.raises(InputError, match=f"--mount {text}: expected"):
+            parse_vector(text, "--mount", "m", 0.05)
 
     def test_two_places_for_one_accelerometer_are_refused(self):
         moved = (effect("accel.position_offset", dx_m=0.001),)
