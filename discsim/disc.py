@@ -148,7 +148,7 @@ def _aero(
             unit = "rad" if name == "alpha0" else ""
             values[name] = stated.number(name, unit, required=not optional)
         stated.finish()
-        aero = Aero(**{name: value or 0.0 for name, value in values.items()})
+        aero = Aero(**{name: 0.0 if value is None else value for name, value in values.items()})
         sigma.update({key: float(value) for key, value in stated.sigma.items()})
         absent = {aero_key(name) for name, value in values.items() if value is None}
     if sigma_table is not None:
