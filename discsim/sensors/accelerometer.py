@@ -22,7 +22,7 @@ from discsim.errors import InputError
 from discsim.frames import body_to_ned, turn
 from discsim.motion import Motion, State
 from discsim.recording import Samples, SensorSheet
-from discsim.sensors.sampling import Noise, Sampling, check_lag, digitise, filtered
+from discsim.sensors.sampling import Noise, Sampling, check_lag, digitise, filtered, stated
 
 __all__ = ["Accelerometer", "specific_force"]
 
@@ -87,10 +87,4 @@ class Accelerometer:
     @property
     def sheet(self) -> SensorSheet:
         """What its data sheet states; the hidden errors are not in it."""
-        return SensorSheet(
-            self.sampling.rate_hz,
-            self.noise.white,
-            self.resolution or None,
-            self.range if np.isfinite(self.range) else None,
-            position=self.position,
-        )
+        return stated(self.sampling, self.noise, self.resolution, self.range, self.position)

@@ -12,7 +12,7 @@ from discsim.frames import body_to_ned, turn
 from discsim.motion import Motion
 from discsim.recording import Samples, SensorSheet
 from discsim.sensors.accelerometer import specific_force
-from discsim.sensors.sampling import Noise, Sampling, check_lag, digitise, filtered
+from discsim.sensors.sampling import Noise, Sampling, check_lag, digitise, filtered, stated
 
 __all__ = ["Gyroscope"]
 
@@ -70,9 +70,4 @@ class Gyroscope:
     @property
     def sheet(self) -> SensorSheet:
         """What its data sheet states; the hidden errors are not in it."""
-        return SensorSheet(
-            self.sampling.rate_hz,
-            self.noise.white,
-            self.resolution or None,
-            self.range if np.isfinite(self.range) else None,
-        )
+        return stated(self.sampling, self.noise, self.resolution, self.range)

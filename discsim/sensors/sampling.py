@@ -13,8 +13,9 @@ from discsim.compiled import compiled
 from discsim.effects.sensors import ClockRate, DroppedSamples, Lag, lag, true_time
 from discsim.errors import InputError
 from discsim.motion import Motion
+from discsim.recording import SensorSheet
 
-__all__ = ["Noise", "Sampling", "check_lag", "digitise", "filtered"]
+__all__ = ["Noise", "Sampling", "check_lag", "digitise", "filtered", "stated"]
 
 #: an ideal reading (n, k) at instants (n,) s
 Signal: TypeAlias = Callable[[FloatArray], FloatArray]
@@ -131,6 +132,14 @@ def filtered(effect: Lag, motion: Motion, signal: Signal, taken: FloatArray) -> 
     fine = np.linspace(motion.start, motion.end, int(np.ceil((motion.end - motion.start) / FINE_STEP)) + 1)
     grid = np.union1d(fine, taken)
     return lag(effect, grid, signal(grid))[np.searchsorted(grid, taken)]
+
+
+def stated(
+    sampling: Sampling, noise: Noise, resolution: float, limit: float, position: FloatArray | None = None
+) -> SensorSheet:
+    """Return what a data sheet states of a sensor; the errors that are hidden in it are not there."""
+    finite = limit if np.isfinite(limit) else None
+    return SensorSheet(sampling.rate_hz, noise.white, resolution or None, finite, position=position)
 
 
 def digitise(
