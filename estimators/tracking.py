@@ -408,8 +408,9 @@ class _Linear:
     cost: float
 
 
-#: Spectral densities of r'' tried, (rad/s^3)^2 s.
-_GRID = np.logspace(-4, 7, 23)
+#: Spectral densities of r'' tried, (rad/s^3)^2 s. Their prior falls with the fourth root: where the data cannot tell, a
+#: steady change of rate is likelier than a rough one.
+_GRID = np.logspace(-10, 7, 35)
 
 
 def _linearise(
@@ -484,13 +485,20 @@ def _solve(
     return x, linear, residual, psi, target
 
 
-def _evidence(
-    problem: _Problem, linear: _Linear, x: FloatArray, target: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+@dataclass(frozen=True)
+class _Mixture:
+    """Weights of the grid of roughness, the spin's mean coefficients and covariance, and the best log evidence."""
+
+    weight: FloatArray
+    mean: FloatArray
+    covariance: FloatArray
+    log: float
+
+
+def _evidence(problem: _Problem, linear: _Linear, x: FloatArray, target: FloatArray) -> _Mixture:
     """Integrate over the roughness, each value of a grid weighed by its marginal likelihood (Laplace).
 
-    Returns the weights of the grid, the mean of the spin's coefficients and their covariance. What is not spin is
-    eliminated first; then only the diagonal prior of the second differences changes over the grid.
+    What is not spin is eliminated first; then only the prior of the second differences changes over the grid.
     """
     count = problem.spline.size - 2
     spin = problem.parts[0]
@@ -513,7 +521,7 @@ def _evidence(
         return -0.5 * (cost + determinant + count * np.log(roughness)), step, factor
 
     results = [solved(roughness) for roughness in _GRID]
-    log = np.array([result[0] for result in results])
+    log = np.array([result[0] for result in results]) - 0.25 * np.log(_GRID)
     weight = np.exp(log - np.max(log))
     weight = np.where(weight < 1e-3, 0.0, weight)
     weight /= np.sum(weight)
@@ -524,30 +532,40 @@ def _evidence(
         if share > 0:
             spread = step - mean
             covariance += share * (cho_solve(factor, np.eye(size), check_finite=False) + np.outer(spread, spread))
-    return weight, x[spin] + mean, covariance
+    # Student's t with one degree of freedom: a normal law whose precision is Gamma(1/2, 1/2), by its logarithm
+    own = float(np.sum(np.log(problem.local) - 0.5 * problem.local + 0.5))
+    return _Mixture(weight, x[spin] + mean, covariance, float(np.max(log)) + own)
 
 
 def _adapt(problem: _Problem, linear: _Linear, x: FloatArray, target: FloatArray) -> float:
     """Find the roughness, and where it is larger than elsewhere: Student's t with one degree of freedom for r''.
 
-    A flight is alike smooth throughout and keeps weights near one; a rate table is quiet between the corners of its
-    ramps. Expectation-maximisation with the posterior variance of r'', so that intervals without data stay at one.
+    A flight is alike smooth throughout; a rate table is quiet between the corners of its ramps. Which of both it is,
+    the evidence says. Expectation-maximisation with the posterior variance of r'', so that intervals without data
+    keep the common roughness.
     """
     rows = problem.spline.second_difference()
-    roughness = 0.0
+    problem.local = np.ones(problem.spline.size - 2)
+    best = mixture = _evidence(problem, linear, x, target)
+    kept, needed = problem.local, best.log + 10.0  # corners must be plain
     for _ in range(12):
-        share, answer, covariance = _evidence(problem, linear, x, target)
-        roughness = float(np.exp(np.sum(share * np.log(_GRID))))
-        bend = rows @ answer - target
-        square = bend**2 + np.sum((rows @ covariance) * rows, axis=1)
+        roughness = _mean_roughness(mixture)
+        bend = rows @ mixture.mean - target
+        square = bend**2 + np.sum((rows @ mixture.covariance) * rows, axis=1)
         # corners fall between knots: neighbours share them
         smooth = np.maximum(square, 0.5 * np.maximum(np.roll(square, 1), np.roll(square, -1)))
-        local = 2.0 / (1.0 + smooth / roughness)
-        change = float(np.max(np.abs(np.log(local / problem.local))))
-        problem.local = local
-        if change < 0.1:
-            break
-    return roughness
+        problem.local = 2.0 / (1.0 + smooth / roughness)
+        mixture = _evidence(problem, linear, x, target)
+        if mixture.log < max(best.log, needed - 10.0):
+            break  # without end it would gather all roughness in ever fewer intervals
+        if mixture.log > max(best.log, needed):
+            best, kept = mixture, problem.local
+    problem.local = kept
+    return _mean_roughness(best)
+
+
+def _mean_roughness(mixture: _Mixture) -> float:
+    return float(np.exp(np.sum(mixture.weight * np.log(_GRID))))
 
 
 def track_spin(
@@ -601,7 +619,8 @@ def track_spin(
             precession = max(settings.precession, float(np.sqrt(seen)))
         if outer > 0 and abs(np.log(roughness / previous)) < 0.2:
             break
-    _, coefficients, covariance = _evidence(problem, linear, x, target)
+    mixture = _evidence(problem, linear, x, target)
+    coefficients, covariance = mixture.mean, mixture.covariance
     first = int(np.ceil(t[0] / settings.step - 1e-9))
     count = int(np.floor(t[-1] / settings.step + 1e-9)) + 1 - first
     grid = settings.step * (first + np.arange(count, dtype=np.float64))
@@ -833,6 +852,8 @@ def joined(method: str, tracks: list[Track], settings: TrackingSettings, span: t
 def _trusted(track: Track, settings: TrackingSettings) -> BoolArray:
     good = (track.sd <= settings.largest_sd) & np.isfinite(track.rate)
     square = np.mean(track.residual**2, axis=1)
+    # a single wild reading, which had no weight, is no misfit
+    square = np.minimum(square, 40 * float(np.median(square)))
     cumulative = np.concatenate([[0.0], np.cumsum(square)])
     lo = np.searchsorted(track.times, track.t - 0.25)
     hi = np.searchsorted(track.times, track.t + 0.25)

@@ -1,0 +1,167 @@
+"""All sensors together: better than the magnetometer alone, calibrated on the way, no contradiction averaged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from spinning_sensor import MPU9250, Faults, Spin, move, record, without
+
+from discsim.recording import Recording, Samples, SensorSheet
+from estimators.fusion import FusionSettings, accelerometer_calibrated, centripetal, compare_sensors, fusion, unfolding
+from estimators.tracking import tracking
+
+FAULTS = Faults(
+    hard_iron=(11.0, 4.0, -12.0),
+    mount_error=(0.0011, -0.0006),
+    accelerometer_bias=(0.3, -0.2),
+    gyroscope_bias=(0.01, -0.02, 0.0),
+)
+
+
+@pytest.fixture(scope="module")
+def thrown():
+    spin = Spin()
+    return spin, move(spin)
+
+
+def rms(value):
+    return float(np.sqrt(np.nanmean(np.square(value))))
+
+
+def exchanged(recording, **samples):
+    """The recording with some sensors' samples exchanged."""
+    return Recording(
+        recording.plant, recording.name, recording.environment, sheets=recording.sheets,
+        samples={**recording.samples, **samples},
+    )  # fmt: skip
+
+
+def test_a_throw_is_known_to_half_a_degree_per_second(thrown):
+    """The goal, with mount, bias, iron and precession on; and the accelerometer helps although it is not calibrated."""
+    spin, truth = thrown
+    fused, tracked, normal = [], [], []
+    for seed in range(6):
+        recording, _ = record(spin, np.random.default_rng(seed), FAULTS, truth=truth)
+        found, plain = fusion(recording), tracking(recording)
+        fused.append(np.degrees(found.rate - truth.r(found.t)))
+        tracked.append(np.degrees(plain.rate - truth.r(plain.t)))
+        normal.append(fused[-1] / np.degrees(found.sd))
+    assert rms(fused) < 0.5
+    assert rms(fused) < 0.9 * rms(tracked)
+    assert 0.5 < rms(normal) < 1.3
+
+
+def test_gravity_and_translation_average_out_over_a_turn(thrown):
+    """5 m/s^2 that turns with the spin is 35 % of the centripetal force's change that one deg/s makes a thousand of."""
+    spin, truth = thrown
+    recording, _ = record(spin, np.random.default_rng(1), truth=truth)
+    sheet = replace(MPU9250["accelerometer"])
+    block = centripetal(recording.need("accelerometer"), sheet, truth.t, truth.w[:, 2])
+    expected = 0.0161 * truth.r(block.t) ** 2
+    assert np.all(np.abs(block.value[:, 0] - expected) < 5 * block.sd)
+    assert np.median(block.sd) < 0.03  # 0.08 m/s^2 over some 30 readings
+
+
+def test_the_mount_is_calibrated_by_the_magnetometer(thrown):
+    """Eq. (9): 1.1 mm of 16.1 mm is 3.5 % of rate, 140 deg/s; calibrated, the accelerometer is within its noise."""
+    spin, truth = thrown
+    recording, _ = record(spin, np.random.default_rng(2), FAULTS, truth=truth)
+    calibrated = accelerometer_calibrated(recording)
+    error = np.degrees(calibrated.rate - truth.r(calibrated.t))
+    assert calibrated.signed
+    assert rms(error) < 1.5
+    assert rms(error / np.degrees(calibrated.sd)) < 1.7
+    (agreement,) = compare_sensors(recording)
+    assert agreement.sensor == "accelerometer"
+    assert agreement.agrees
+    assert abs(np.degrees(agreement.difference)) > 80.0
+    np.testing.assert_allclose(agreement.calibration[:2], [-0.0150, -0.0006], atol=2e-4)
+
+
+def test_alone_the_accelerometer_says_how_little_it_knows_of_its_mount(thrown):
+    spin, truth = thrown
+    recording, _ = record(spin, np.random.default_rng(3), FAULTS, truth=truth, sensors=("accelerometer",))
+    alone = accelerometer_calibrated(recording)
+    error = alone.rate - truth.r(alone.t)
+    assert not alone.signed
+    assert rms(error / alone.sd) < 1.5
+    # 3 mm of 16.1 mm: 9 % of the rate
+    assert 0.06 < np.nanmedian(alone.sd / alone.rate) < 0.13
+
+
+def test_a_gyroscope_in_range_counts_with_its_scale_estimated():
+    spin = Spin(rate=1500.0, decay=5.0)
+    truth = move(spin)
+    faults = Faults(gyroscope_scale=(0.0, 0.0, 0.02), gyroscope_bias=(0.0, 0.0, 0.03))
+    recording, _ = record(spin, np.random.default_rng(4), faults, truth=truth, sensors=("magnetometer", "gyroscope"))
+    found, plain = fusion(recording), tracking(recording)
+    assert rms(np.degrees(found.rate - truth.r(found.t))) < 0.8 * rms(np.degrees(plain.rate - truth.r(plain.t)))
+    (agreement,) = compare_sensors(recording)
+    assert agreement.agrees
+    assert agreement.calibration[0] == pytest.approx(0.02, abs=4 * np.sqrt(agreement.covariance[0, 0]) + 1e-3)
+
+
+def test_a_contradiction_is_named_with_numbers_and_left_out(thrown):
+    """An accelerometer whose force is that of another spin: 30 % too large and falling twice as fast."""
+    spin, truth = thrown
+    recording, _ = record(spin, np.random.default_rng(5), FAULTS, truth=truth)
+    accelerometer = recording.need("accelerometer")
+    false = accelerometer.value * (1.6 - 0.1 * accelerometer.t[:, None])
+    wrong = exchanged(recording, accelerometer=Samples(accelerometer.t, false))
+    (agreement,) = compare_sensors(wrong)
+    assert not agreement.agrees
+    assert "CONTRADICTS" in str(agreement)
+    assert "deg/s" in str(agreement)
+    found, plain = fusion(wrong), tracking(wrong)
+    np.testing.assert_allclose(found.rate, plain.rate, rtol=1e-12)
+
+
+def test_clipped_readings_are_no_readings():
+    """Above 5660 deg/s this accelerometer clips; what is left must not draw the rate down."""
+    spin = Spin(rate=6400.0, decay=12.0)
+    truth = move(spin)
+    recording, _ = record(spin, np.random.default_rng(6), truth=truth)
+    assert np.any(recording.sheets["accelerometer"].clipped(recording.need("accelerometer").value[:, 0]))
+    found = fusion(recording)
+    assert rms(np.degrees(found.rate - truth.r(found.t))) < 0.6
+    assert abs(np.degrees(np.nanmean(found.rate - truth.r(found.t)))) < 0.4
+
+
+@pytest.mark.parametrize("helper", ["gyroscope", "accelerometer"])
+@pytest.mark.parametrize("rate", [2600.0, -2600.0])
+def test_a_spin_above_half_the_sampling_rate_is_unfolded(helper, rate):
+    """At 10 Hz the field shows 2600 deg/s as -1000. The gyroscope, in range, or the centripetal force tells better."""
+    sheets = {
+        "magnetometer": SensorSheet(10.0, 0.6, 0.15, 4912.0),
+        "accelerometer": MPU9250["accelerometer"],
+        "gyroscope": SensorSheet(200.0, 0.003, 0.001, np.radians(4000.0)),
+    }
+    spin = without(Spin(rate=rate, duration=8.0, decay=200.0), precession=False)
+    truth = move(spin)
+    recording, _ = record(spin, np.random.default_rng(7), sheets=sheets, sensors=("magnetometer", helper), truth=truth)
+    # a gyroscope in range gives the smoother its first guess, so that nothing is left to unfold
+    assert unfolding(recording) == (int(np.sign(rate)) if helper == "accelerometer" else 0, True)
+    found = fusion(recording)
+    inner = (found.t > 1.0) & (found.t < 7.0)
+    assert rms(np.degrees(found.rate - truth.r(found.t))[inner]) < 3.0
+
+
+def test_a_folded_spin_that_cannot_be_unfolded_is_nan():
+    """A gyroscope that clips at 2000 deg/s excludes what the field shows but not what it is: 2600 or 6200 deg/s."""
+    sheets = {
+        "magnetometer": SensorSheet(10.0, 0.6, 0.15, 4912.0),
+        "gyroscope": SensorSheet(200.0, 0.003, 0.001, np.radians(2000.0)),
+    }
+    spin = without(Spin(rate=2600.0, duration=6.0, decay=200.0), precession=False)
+    recording, _ = record(spin, np.random.default_rng(8), sheets=sheets, sensors=("magnetometer", "gyroscope"))
+    assert unfolding(recording)[1] is False
+    assert np.all(np.isnan(fusion(recording).rate))
+
+
+def test_standing_still_is_no_spin():
+    spin = without(Spin(rate=0.001, duration=3.0), precession=False)
+    recording, _ = record(spin, np.random.default_rng(9), sensors=("magnetometer", "accelerometer"))
+    assert np.all(np.isnan(fusion(recording).rate))
+    assert np.all(np.isnan(accelerometer_calibrated(recording, FusionSettings()).rate))
