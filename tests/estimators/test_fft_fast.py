@@ -24,7 +24,7 @@ def windows(rng, n, count, offset):
     return offset + 30 * np.cos(rate * k + phase) + rng.normal(0, rng.choice([0.1, 3.0, 30.0]), (count, n))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
     n=st.sampled_from([16, 31, 64, 128]),
