@@ -93,15 +93,35 @@ def _search_all(coarse: FloatArray, first: IndexArray, last: IndexArray, order: 
 
 @compiled
 def _power_at(x: FloatArray, table: ComplexArray, order: int) -> float:
-    real, imaginary = 0.0, 0.0
-    total = table.size
-    index = 0
-    for k in range(x.size):
-        real += x[k] * table[index].real
-        imaginary += x[k] * table[index].imag
-        index += order
-        if index >= total:
-            index -= total
+    """One value of the padded power spectrum; four running sums, since one would wait for its own last addition."""
+    n, total = x.size, table.size
+    re0, re1, re2, re3 = 0.0, 0.0, 0.0, 0.0
+    im0, im1, im2, im3 = 0.0, 0.0, 0.0, 0.0
+    stride = (4 * order) % total
+    i0, i1, i2, i3 = 0, order % total, (2 * order) % total, (3 * order) % total
+    whole = n - n % 4
+    for k in range(0, whole, 4):
+        re0 += x[k] * table[i0].real
+        im0 += x[k] * table[i0].imag
+        re1 += x[k + 1] * table[i1].real
+        im1 += x[k + 1] * table[i1].imag
+        re2 += x[k + 2] * table[i2].real
+        im2 += x[k + 2] * table[i2].imag
+        re3 += x[k + 3] * table[i3].real
+        im3 += x[k + 3] * table[i3].imag
+        i0 += stride
+        i1 += stride
+        i2 += stride
+        i3 += stride
+        i0 -= total if i0 >= total else 0
+        i1 -= total if i1 >= total else 0
+        i2 -= total if i2 >= total else 0
+        i3 -= total if i3 >= total else 0
+    for k in range(whole, n):
+        angle = (k * order) % total
+        re0 += x[k] * table[angle].real
+        im0 += x[k] * table[angle].imag
+    real, imaginary = re0 + re1 + re2 + re3, im0 + im1 + im2 + im3
     return real * real + imaginary * imaginary
 
 
