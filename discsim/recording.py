@@ -404,7 +404,8 @@ def write_recording(recording: Recording, folder: Path | str) -> None:
 
     A new folder appears whole or not at all. In a folder that is there, the files of a recording are replaced one by
     one once all are written, ``recording.toml`` last: a folder that has it is complete. Other files stay.
-    Raises `InputError` for what the reader would refuse: a sensor without samples, an uncertainty of nothing.
+    Raises `InputError` for what the reader would refuse (a sensor without samples, an uncertainty of nothing), and for
+    a folder with files by the names of the format that are no recording: they are somebody else's.
     """
     folder = Path(folder)
     texts = _texts(recording)
@@ -416,6 +417,7 @@ def write_recording(recording: Recording, folder: Path | str) -> None:
         for name, text in texts.items():
             write_text(stage / name, text)
         if folder.exists():
+            _refuse_strangers(folder)
             _replace_files(stage, folder)
         else:
             umask = os.umask(0)
@@ -424,6 +426,17 @@ def write_recording(recording: Recording, folder: Path | str) -> None:
             stage.rename(folder)
     finally:
         shutil.rmtree(stage, ignore_errors=True)
+
+
+def _refuse_strangers(folder: Path) -> None:
+    """Raise `InputError` where a folder that no command has written holds files by the names of the format."""
+    if any((folder / name).exists() for name in ("recording.toml", "run.json")):
+        return
+    names = [f"{name}.csv" for name in (*SENSORS, "command") if (folder / f"{name}.csv").exists()]
+    if names:
+        raise InputError(
+            f"{folder}: holds {', '.join(names)} but no recording; expected an empty folder, or a recording"
+        )
 
 
 def _replace_files(stage: Path, folder: Path) -> None:

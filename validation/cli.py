@@ -52,8 +52,8 @@ def main() -> None:
     debug = "--debug" in arguments
     sys.argv[1:] = [argument for argument in arguments if argument != "--debug"]
     os.environ.setdefault("MPLBACKEND", "Agg")
-    _register()
     try:
+        _register()
         status = app(standalone_mode=False)
     except (InputError, typer.TyperException) as error:
         if debug:

@@ -42,8 +42,8 @@ def validate(run: Run, *, quick: bool, junit: Path | None = None) -> list[Score]
     draw_methods(table_run, run.out / "rate-table.png")
     draw_waveform(table_run, run.out / "waveform.png")
 
-    run.step("throws")
-    results = fly_throws(QUICK_SET if quick else FULL_SET, disc, environment, throw_stream)
+    throws = QUICK_SET if quick else FULL_SET
+    results = list(run.progress(fly_throws(throws, disc, environment, throw_stream), len(throws), "throw"))
     scores += throw_checks(results)
     draw_throws(results, run.out / "throws.png")
 

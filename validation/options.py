@@ -10,9 +10,10 @@ from typing import Annotated, TypeAlias
 import typer
 
 from discsim.arrays import FloatArray, readonly
-from discsim.effects.catalogue import Effect, effect
+from discsim.effects.catalogue import Effect, effect, row
 from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.recording import Plant
 from discsim.shipped import load_site
 
 __all__ = ["EffectOption", "OutOption", "SeedOption", "SiteOption", "at_site", "parse_effects", "parse_vector"]
@@ -39,8 +40,11 @@ def at_site(environment: Environment, site: str | None) -> Environment:
     return replace(environment, magnetic_field=load_site(site).environment.magnetic_field)
 
 
-def parse_effects(texts: Sequence[str] | None) -> list[Effect]:
-    """Return the effects of ``--effect ID:name=value,...``; raises `InputError` saying what was expected."""
+def parse_effects(texts: Sequence[str] | None, plant: Plant, sensors: Sequence[str]) -> list[Effect]:
+    """Return the effects of ``--effect ID:name=value,...``; raises `InputError` saying what was expected.
+
+    An effect that cannot act is refused: one of another plant, or of a sensor that is not among ``sensors``.
+    """
     effects = []
     for text in texts or ():
         id, _, rest = text.partition(":")
@@ -51,7 +55,13 @@ def parse_effects(texts: Sequence[str] | None) -> list[Effect]:
                 sizes[name.strip()] = float(number)
             except ValueError:
                 raise InputError(f"--effect {text}: '{item}' is no name=number; expected ID:name=number,...") from None
-        effects.append(effect(id.strip(), **sizes))
+        given = effect(id.strip(), **sizes)
+        kind = row(given.id)
+        if plant not in kind.plants:
+            raise InputError(f"--effect {given.id}: acts on {', '.join(kind.plants)}; this is a {plant}")
+        if kind.acts_on not in ("motion", "clock", *sensors):
+            raise InputError(f"--effect {given.id}: there is no {kind.acts_on} on board, only {', '.join(sensors)}")
+        effects.append(given)
     return effects
 
 

@@ -34,10 +34,10 @@ def draw_methods(run: RateTableRun, path: Path) -> None:
         for method in ("accelerometer", "fft"):
             rate = run.rates[method]
             inset.plot(rate.t, np.degrees(rate.rate), color=COLOURS[method], lw=0.9)
-        inset.plot(truth_t, truth, color=COLOURS["truth"], lw=0.9, ls="--")
+        inset.plot(truth_t, np.abs(truth), color=COLOURS["truth"], lw=0.9, ls="--")
         inset.set_xlim(start, min(stop, start + 3.0))
-        inset.set_ylim(np.degrees(level) - 15, np.degrees(level) + 35)
-        inset.set_title(f"at {np.degrees(level):.0f} deg/s", fontsize=8)
+        inset.set_ylim(abs(np.degrees(level)) - 15, abs(np.degrees(level)) + 35)
+        inset.set_title(f"at {abs(np.degrees(level)):.0f} deg/s", fontsize=8)
         inset.tick_params(labelsize=7)
 
     for panel, (mount, estimate) in zip(axes[1:-1], run.envelopes.items(), strict=True):
@@ -53,7 +53,7 @@ def draw_methods(run: RateTableRun, path: Path) -> None:
             label="accelerometer, worst case (11)",
         )
         panel.plot(fft.t, np.degrees(fft.rate), color=COLOURS["fft"], lw=1.2, label="fft")
-        panel.plot(truth_t, truth, color=COLOURS["truth"], lw=0.9, ls="--", label="truth")
+        panel.plot(truth_t, np.abs(truth), color=COLOURS["truth"], lw=0.9, ls="--", label="truth")
         panel.set_title(f"Envelope for a mount error of {1000 * mount:g} mm")
         panel.legend(loc="upper left", fontsize=8)
 
@@ -69,7 +69,8 @@ def draw_methods(run: RateTableRun, path: Path) -> None:
     bottom.set_xlabel("time, s")
     for panel in axes[:-1]:
         panel.set_ylabel("rate, deg/s")
-        panel.set_ylim(-300, 1.15 * truth.max() + 300)
+        fastest = float(np.abs(truth).max())
+        panel.set_ylim(min(0.0, 1.1 * float(truth.min())) - 300, 1.25 * fastest + 300)
     save_figure(figure, path)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,17 +96,15 @@ class ThrowResult:
 
 def fly_throws(
     throws: Sequence[Throw], disc: Disc, environment: Environment, rng: np.random.Generator
-) -> list[ThrowResult]:
+) -> Iterator[ThrowResult]:
     """Fly each throw with a specimen of the paper's module and estimate its spin by each method of `SCORED`."""
     module_stream, *streams = rng.spawn(1 + len(throws))
     module = Instruments.from_parts("mpu9250", "neo_m8n").drawn(module_stream)
     module = module.fitted("accelerometer", offset=PositionOffset(MOUNT_ERROR, MOUNT_ERROR))
-    results = []
     for throw, stream in zip(throws, streams, strict=True):
         motion = fly(disc, environment, throw.release)
         recording = record(motion, module, stream, plant="flight", name=throw.name, disc=disc)
-        results.append(ThrowResult(throw, motion, recording, {name: estimate(recording, name) for name in SCORED}))
-    return results
+        yield ThrowResult(throw, motion, recording, {name: estimate(recording, name) for name in SCORED})
 
 
 def rms(error: FloatArray) -> float:

@@ -105,6 +105,9 @@ def test_a_site_replaces_the_field(monkeypatch, tmp_path):
         (["rate-table", "--mount", "1,1,0"], "millimetres"),
         (["rate-table", "--mount", "0.001"], "three numbers"),
         (["rate-table", "--profile", "missing.csv"], "missing.csv"),
+        (["fly", "--effect", "rig.axis_tilt:tilt_north_rad=0.1"], "acts on rate_table, spin_down; this is a flight"),
+        (["fly", "--parts", "neo_m8n", "--effect", "mag.lag:tau_s=0.01"], "no magnetometer on board"),
+        (["validate", "--junit", "report/"], "no place for a file"),
         (["validate", "--seed", "-1"], "--seed"),
         (["vaildate"], "vaildate"),
     ],
@@ -118,6 +121,21 @@ def test_a_wrong_call_is_one_line_and_status_2(monkeypatch, tmp_path, capsys, ar
     assert expected in captured.err
     assert "Traceback" not in captured.err
     assert not any(tmp_path.iterdir()), "a refused call leaves nothing behind"
+
+
+def test_files_that_are_no_recordings_are_left_alone(monkeypatch, tmp_path, capsys):
+    (tmp_path / "track.csv").write_text("my notes")
+    assert run(monkeypatch, "fly", "--out", str(tmp_path)) == 2
+    assert "track.csv" in capsys.readouterr().err
+    assert (tmp_path / "track.csv").read_text() == "my notes"
+
+
+def test_a_recording_is_not_written_over_by_what_is_estimated_from_it(monkeypatch, tmp_path, capsys):
+    assert run(monkeypatch, "fly", "--out", str(tmp_path / "flight")) == 0
+    left = (tmp_path / "flight" / "run.json").read_bytes()
+    assert run(monkeypatch, "estimate", str(tmp_path / "flight"), "--out", str(tmp_path / "flight")) == 2
+    assert "is the input" in capsys.readouterr().err
+    assert (tmp_path / "flight" / "run.json").read_bytes() == left
 
 
 def test_debug_shows_the_traceback(monkeypatch, capsys):

@@ -122,7 +122,7 @@ class TestSets:
 
 @pytest.fixture(scope="module")
 def results() -> list[ThrowResult]:
-    return fly_throws(QUICK_SET, DISC, FIELD, np.random.default_rng(0))
+    return list(fly_throws(QUICK_SET, DISC, FIELD, np.random.default_rng(0)))
 
 
 class TestFlown:

@@ -53,9 +53,10 @@ def command(
     body, surroundings = load_disc(disc)
     environment = at_site(surroundings, site)
     release = load_throw(throw)
-    effects = parse_effects(effect)
-    instruments = Instruments.from_parts(*parts.split(",")).with_effects(effects)
-    inputs = [Path(name) for name in (disc, throw) if name.endswith(".toml")]
+    instruments = Instruments.from_parts(*parts.split(","))
+    effects = parse_effects(effect, "flight", list(instruments.sensors))
+    instruments = instruments.with_effects(effects)
+    inputs = [Path(name) for name in (disc, throw, site or "", *parts.split(",")) if name.endswith(".toml")]
     with start_run(out, seed, inputs) as run:
         motion = fly(body, environment, release, effects, duration=duration, ground=ground.value)
         recording = record(motion, instruments, run.rng, plant="flight", name=out.resolve().name, disc=body)

@@ -53,8 +53,10 @@ def command(
 
     knots = default_profile() if profile is None else read_profile(profile)
     offset = parse_vector(mount, "--mount", "m", 0.05)
-    effects = tuple(parse_effects(effect))
-    with start_run(out, seed, [] if profile is None else [profile]) as run:
+    sensors = ("magnetometer", "accelerometer", "gyroscope", "rate_reference")
+    effects = tuple(parse_effects(effect, "rate_table", sensors))
+    inputs = [path for path in (profile, Path(site) if site and site.endswith(".toml") else None) if path]
+    with start_run(out, seed, inputs) as run:
         run.step("turning the table and measuring")
         result = run_rate_table(
             knots,
