@@ -89,7 +89,8 @@ def start_run(out: Path, seed: int | None = None, inputs: Iterable[Path] = ()) -
     """Open a run that writes into ``out``; ``run.json`` is written when the block ends without an error."""
     if out.exists() and not out.is_dir():
         raise InputError(f"--out {out}: is a file; expected a folder (it is created where absent)")
-    if any(path.resolve() == out.resolve() for path in (paths := list(inputs))):
+    paths = list(inputs)
+    if any(path.resolve() == out.resolve() for path in paths):
         raise InputError(f"--out {out}: is the input; expected another folder, to leave that as it is")
     out.mkdir(parents=True, exist_ok=True)
     run = Run(out, sys.argv[1:], seed, paths)
