@@ -28,10 +28,11 @@ from discsim.effects.aero import (
     yaw_reynolds,
 )
 from discsim.effects.air import ground_effect, gust, wind_shear
+from discsim.errors import InputError
 from discsim.frames import heading_angles, norm3
 from discsim.parameters import Tables
 
-__all__ = ["advance_ratio", "air_wrench", "wind"]
+__all__ = ["advance_ratio", "air_wrench", "outside_table", "wind"]
 
 #: below this airspeed (m/s) the air does nothing; d/(2 V) would lose its meaning
 STILL_AIR = 1e-6
@@ -105,6 +106,16 @@ def yaw_damping(p: Any, tables: Tables, r: float, V: float) -> float:
         row = ((c[m, 0] * y + c[m, 1]) * y + c[m, 2]) * y + c[m, 3]
         value = value * x + row
     return value
+
+
+def outside_table(tables: Tables, t: float, r: float, V: float) -> InputError:
+    """Return the error of a flight that leaves its C_Nr table: time s, spin rate rad/s, airspeed m/s."""
+    rate = np.degrees(tables.rate)
+    return InputError(
+        f"at {t:.3f} s the disc spins at {np.degrees(abs(r)):.0f} deg/s and flies at {V:.1f} m/s through the air, "
+        f"outside its C_Nr table; expected {rate[0]:.0f} to {rate[-1]:.0f} deg/s and "
+        f"{tables.speed[0]:g} to {tables.speed[-1]:g} m/s"
+    )
 
 
 @compiled

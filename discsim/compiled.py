@@ -17,7 +17,7 @@ from typing import Any, TypeVar, cast
 import numba
 import numba.core.config
 
-__all__ = ["compiled"]
+__all__ = ["compiled", "compiled_nogil"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -35,13 +35,22 @@ def _cache_folder() -> Path:
 
 def compiled(function: F) -> F:
     """Compile ``function`` on first call (nopython, division by zero gives inf or nan, no fast-math)."""
+    return _compile(function, nogil=False)
+
+
+def compiled_nogil(function: F) -> F:
+    """Compile like `compiled`, and let other threads run meanwhile: for loops that last."""
+    return _compile(function, nogil=True)
+
+
+def _compile(function: F, nogil: bool) -> F:
     config: Any = numba.core.config
     before = config.CACHE_DIR
     config.CACHE_DIR = str(_cache_folder())
     try:
         try:
-            return cast(F, numba.njit(cache=True, error_model="numpy")(function))
+            return cast(F, numba.njit(cache=True, error_model="numpy", nogil=nogil)(function))
         except RuntimeError:  # nowhere to write a cache: compile anew in each process
-            return cast(F, numba.njit(error_model="numpy")(function))
+            return cast(F, numba.njit(error_model="numpy", nogil=nogil)(function))
     finally:
         config.CACHE_DIR = before

@@ -12,9 +12,13 @@ import numpy as np
 
 from discsim.arrays import FloatArray, readonly
 from discsim.errors import InputError
+from discsim.frames import attitude_matrix
 from discsim.toml_table import TomlTable
 
-__all__ = ["Aero", "AeroTable", "Disc", "Release", "Rig", "YawDampingTable"]
+__all__ = ["RELEASE_HEIGHT", "Aero", "AeroTable", "Disc", "Release", "Rig", "YawDampingTable"]
+
+#: a disc is left to itself this high above the ground where a release states no position, m
+RELEASE_HEIGHT = 1.3
 
 
 class Aero(NamedTuple):
@@ -255,6 +259,23 @@ class Release:
                     raise InputError(f"release {name}: got {value!r}, expected three finite numbers")
                 object.__setattr__(self, name, array)
         object.__setattr__(self, "sigma", MappingProxyType(dict(self.sigma)))
+
+    def start(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return position, velocity (3,), C_NB (3, 3) and body rate (3,) of a throw.
+
+        Position defaults to `RELEASE_HEIGHT` above the origin, attitude to level. Raises `InputError` where velocity
+        or body rate is unknown, and for a position that is not above the ground.
+        """
+        for name, key in (("velocity", "velocity_ned_m_s"), ("body_rate", "body_rate_rad_s")):
+            if getattr(self, name) is None:
+                raise InputError(f"a throw needs {key}; expected three numbers")
+        assert self.velocity is not None
+        assert self.body_rate is not None
+        position = np.array([0.0, 0.0, -RELEASE_HEIGHT]) if self.position is None else self.position
+        if position[2] >= 0.0:
+            raise InputError(f"release position is {-position[2]:g} m high, expected above the ground (down < 0)")
+        C_NB = attitude_matrix(self.roll or 0.0, self.pitch or 0.0, self.yaw or 0.0).T
+        return position, self.velocity, C_NB, self.body_rate
 
     @classmethod
     def from_toml(cls, table: TomlTable) -> Release:

@@ -15,26 +15,23 @@ import mujoco
 import numpy as np
 from scipy.optimize import brentq
 
-from discsim.aerodynamics import air_wrench, wind
+from discsim.aerodynamics import air_wrench, outside_table, wind
 from discsim.arrays import FloatArray, readonly
 from discsim.compiled import compiled
-from discsim.disc import Disc, Release
+from discsim.disc import RELEASE_HEIGHT, Disc, Release
 from discsim.effects.body import centre_of_mass, transverse_inertia
 from discsim.effects.catalogue import Effect
 from discsim.effects.events import impulse, spin_step
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import model_file
-from discsim.frames import attitude_matrix, body_to_ned, flip_yz, quaternion_from_matrix, rotate_by_quaternion
+from discsim.frames import body_to_ned, flip_yz, norm3, quaternion_from_matrix, rotate_by_quaternion
 from discsim.motion import Motion
-from discsim.parameters import PARAMETERS, Tables, parameters, tables
+from discsim.parameters import PARAMETERS, Tables, flight_parameters, tables
 
-__all__ = ["FlyingDisc", "check_model", "fly", "passive_force"]
+__all__ = ["RELEASE_HEIGHT", "FlyingDisc", "check_model", "fly", "passive_force"]
 
 PassiveForce = Callable[[Any, Any], None]
-
-#: a disc is left to itself this high above the ground where a release states no position, m
-RELEASE_HEIGHT = 1.3
 
 
 @contextmanager
@@ -60,6 +57,43 @@ def passive_force(apply: PassiveForce) -> Iterator[None]:
         mujoco.set_mjcb_passive(previous)
 
 
+#: MuJoCo's warnings of a state that is not finite, or beyond all bounds
+_DIVERGED = [
+    int(warning)
+    for warning in (
+        mujoco.mjtWarning.mjWARN_BADQPOS,
+        mujoco.mjtWarning.mjWARN_BADQVEL,
+        mujoco.mjtWarning.mjWARN_BADQACC,
+    )
+]
+
+
+def check_state(data: Any) -> None:
+    """Raise `InputError` where a motion has diverged: MuJoCo itself would start it anew without a word."""
+    if data.warning.number[_DIVERGED].any():
+        raise InputError(
+            f"at {data.time:.4f} s the motion is no longer finite; expected rates and speeds that a step can follow "
+            "(lower them, or take a smaller step)"
+        )
+
+
+@contextmanager
+def own_warnings() -> Iterator[None]:
+    """Keep MuJoCo's warnings off the console and out of a log file in the working folder; `check_state` raises them."""
+    previous = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda message: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(previous)
+
+
+def without_reset(spec: Any) -> Any:
+    """Return a model specification that lets a diverged state be seen instead of starting it anew."""
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return spec
+
+
 def check_model(model: Any) -> None:
     """Refuse settings under which a spinning body is not integrated as it should be; raises `InputError`."""
     integrator = mujoco.mjtIntegrator(model.opt.integrator)
@@ -79,11 +113,10 @@ def check_model(model: Any) -> None:
 
 
 @compiled
-def flight_force(
-    flat: FloatArray, tables: Tables, t: float, qpos: FloatArray, qvel: FloatArray, qfrc: FloatArray
-) -> bool:
-    """Add the air and the events to a free joint's forces (6,); return False where a C_Nr table does not reach."""
-    p = flat.view(PARAMETERS)[0]
+def _flow(
+    p: Any, t: float, qpos: FloatArray, qvel: FloatArray
+) -> tuple[float, float, float, float, float, float, float]:
+    """Height of the centre of mass, its velocity relative to the air in B, and the body rates, of a free joint."""
     # MuJoCo's axes to N and B: (x, y, z) -> (x, -y, -z)
     qw, qx, qy, qz = qpos[3], qpos[4], -qpos[5], -qpos[6]
     P, Q, r = qvel[3], -qvel[4], -qvel[5]
@@ -93,9 +126,28 @@ def flight_force(
     sn, se, sd = rotate_by_quaternion(qw, qx, qy, qz, Q * ez - r * ey, r * ex - P * ez, P * ey - Q * ex)
     wn, we, wd = wind(p, t, h)
     u, v, w = rotate_by_quaternion(qw, -qx, -qy, -qz, qvel[0] + sn - wn, -qvel[1] + se - we, -qvel[2] + sd - wd)
+    return h, u, v, w, P, Q, r
+
+
+@compiled
+def airspeed(flat: FloatArray, t: float, qpos: FloatArray, qvel: FloatArray) -> float:
+    """Speed of the centre of mass through the air, m/s."""
+    _, u, v, w, _, _, _ = _flow(flat.view(PARAMETERS)[0], t, qpos, qvel)
+    return float(norm3(u, v, w))
+
+
+@compiled
+def flight_force(
+    flat: FloatArray, tables: Tables, t: float, qpos: FloatArray, qvel: FloatArray, qfrc: FloatArray
+) -> bool:
+    """Add the air and the events to a free joint's forces (6,); return False where a C_Nr table does not reach."""
+    p = flat.view(PARAMETERS)[0]
+    h, u, v, w, P, Q, r = _flow(p, t, qpos, qvel)
     Fx, Fy, Fz, Mx, My, Mz = air_wrench(p, tables, h, u, v, w, P, Q, r)
 
     # a push through the centre of mass; about the geometric centre it has a moment
+    qw, qx, qy, qz = qpos[3], qpos[4], -qpos[5], -qpos[6]
+    ex, ey, ez = centre_of_mass(p.body_mass_imbalance)
     an, ae, ad = impulse(p.event_impulse, t)
     bx, by, bz = rotate_by_quaternion(qw, -qx, -qy, -qz, an, ae, ad)
     m = p.disc.mass
@@ -137,15 +189,11 @@ class FlyingDisc:
         timestep: float = 1e-3,
         contacts: bool = False,
     ) -> None:
-        if disc.aero is None:
-            raise InputError("a flight needs the disc's aerodynamic coefficients; expected [disc.aero]")
-        if environment.air_density is None:
-            raise InputError("a flight needs air; expected air_density_kg_m3 in [environment]")
         if mujoco.get_mjcb_passive() is not None:
             raise RuntimeError("a passive-force callback is installed; build every disc before entering its block")
         self.disc = disc
         self.environment = environment
-        self.parameters = parameters(environment, disc, effects=effects)
+        self.parameters = flight_parameters(disc, environment, effects)
         self.tables = tables(disc)
         record = self.parameters.view(PARAMETERS)[0]
         self.centre_of_mass = readonly(centre_of_mass(record["body_mass_imbalance"]))
@@ -155,7 +203,7 @@ class FlyingDisc:
         self._views = (self.data.qpos, self.data.qvel, self.data.qfrc_passive)
 
     def _compile(self, timestep: float, contacts: bool) -> Any:
-        spec = mujoco.MjSpec.from_file(str(model_file("disc.xml")))
+        spec = without_reset(mujoco.MjSpec.from_file(str(model_file("disc.xml"))))
         spec.option.timestep = timestep
         spec.option.gravity = [0.0, 0.0, -self.environment.gravity]
         spec.option.magnetic = flip_yz(self.environment.magnetic_field)
@@ -172,30 +220,25 @@ class FlyingDisc:
             for name in ("rim", "ground"):
                 geom = spec.geom(name)
                 geom.contype = geom.conaffinity = 1
-        return spec.compile()
+        try:
+            return spec.compile()
+        except ValueError as error:
+            raise InputError(f"no rigid body has these inertias or masses: {str(error).splitlines()[0]}") from None
 
     def release(self, release: Release) -> None:
         """Set the state: velocity and body rate must be known; raises `InputError` naming what is missing.
 
         Attitude defaults to level, position to `RELEASE_HEIGHT` above the origin.
         """
-        for name, key in (("velocity", "velocity_ned_m_s"), ("body_rate", "body_rate_rad_s")):
-            if getattr(release, name) is None:
-                raise InputError(f"a throw needs {key}; expected three numbers")
-        position = np.array([0.0, 0.0, -RELEASE_HEIGHT]) if release.position is None else release.position
-        assert release.velocity is not None
-        assert release.body_rate is not None
-        if position[2] >= 0.0:
-            raise InputError(f"release position is {-position[2]:g} m high, expected above the ground (down < 0)")
-        C_NB = attitude_matrix(release.roll or 0.0, release.pitch or 0.0, release.yaw or 0.0).T
+        position, velocity, C_NB, body_rate = release.start()
         q = quaternion_from_matrix(C_NB)
         mujoco.mj_resetData(self.model, self.data)
         # the release is the centre of mass's, the joint's origin the geometric centre
         self.data.qpos[:3] = flip_yz(position - C_NB @ self.centre_of_mass)
         self.data.qpos[3:7] = [q[0], *flip_yz(q[1:])]
-        swing = np.cross(release.body_rate, self.centre_of_mass)
-        self.data.qvel[:3] = flip_yz(release.velocity - C_NB @ swing)
-        self.data.qvel[3:6] = flip_yz(release.body_rate)
+        swing = np.cross(body_rate, self.centre_of_mass)
+        self.data.qvel[:3] = flip_yz(velocity - C_NB @ swing)
+        self.data.qvel[3:6] = flip_yz(body_rate)
 
     def apply(self, model: Any, data: Any) -> None:
         """Add air and events to ``data.qfrc_passive``: the callback. A model that is not this disc's is ignored."""
@@ -203,10 +246,10 @@ class FlyingDisc:
             return
         qpos, qvel, qfrc = self._views if data is self.data else (data.qpos, data.qvel, data.qfrc_passive)
         if not flight_force(self.parameters, self.tables, data.time, qpos, qvel, qfrc):
-            raise InputError(
-                f"at {data.time:.3f} s the disc spins at {np.degrees(abs(qvel[5])):.0f} deg/s and flies at "
-                f"{np.linalg.norm(qvel[:3]):.1f} m/s over ground, outside its C_Nr table"
-            )
+            if self.tables.rate.size == 0:
+                raise InputError(f"at {data.time:.4f} s the force of the air is no number; expected finite speeds")
+            V = airspeed(self.parameters, data.time, qpos, qvel)
+            raise outside_table(self.tables, data.time, float(qvel[5]), V)
 
     @contextmanager
     def air(self) -> Iterator[None]:
@@ -257,11 +300,12 @@ def fly(
         rows += 1
 
     touched = False
-    with flying.air():
+    with own_warnings(), flying.air():
         mujoco.mj_forward(model, data)
         note()
         for _ in range(steps):
             mujoco.mj_step(model, data)
+            check_state(data)
             if ground == "stop" and _centre_height(data.qpos, ex, ey, ez) <= 0.0:
                 _land(flying, log[rows - 1])
                 touched = True

@@ -19,7 +19,7 @@ from discsim.effects.catalogue import CATALOGUE, Effect, by_id
 from discsim.environment import Environment
 from discsim.errors import InputError
 
-__all__ = ["PARAMETERS", "Tables", "parameter_index", "parameters", "tables"]
+__all__ = ["PARAMETERS", "Tables", "flight_parameters", "parameter_index", "parameters", "tables"]
 
 _MOTION = tuple(row for row in CATALOGUE.values() if row.acts_on == "motion")
 
@@ -71,6 +71,15 @@ def parameters(
     if not np.all(np.isfinite(flat)):
         raise InputError("a parameter of the physics is not finite; expected finite numbers only")
     return flat
+
+
+def flight_parameters(disc: Disc, environment: Environment, effects: Sequence[Effect] = ()) -> FloatArray:
+    """Return the flat array of a flight; raises `InputError` where the disc has no coefficients or the place no air."""
+    if disc.aero is None:
+        raise InputError("a flight needs the disc's aerodynamic coefficients; expected [disc.aero]")
+    if environment.air_density is None:
+        raise InputError("a flight needs air; expected air_density_kg_m3 in [environment]")
+    return parameters(environment, disc, effects=effects)
 
 
 class Tables(NamedTuple):
