@@ -18,7 +18,7 @@ from discsim.disc import Rig
 from discsim.effects.catalogue import Effect
 from discsim.effects.events import spin_step
 from discsim.effects.rig import SpeedRipple, axis, coulomb_friction, quadratic_drag, speed_ripple
-from discsim.engine import check_model, passive_force
+from discsim.engine import check_model, check_state, own_warnings, passive_force, without_reset
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import model_file, read_text
@@ -92,7 +92,7 @@ class _Hinge:
     def __init__(self, environment: Environment, flat: FloatArray, inertia: float, yaw: float) -> None:
         if mujoco.get_mjcb_passive() is not None:
             raise RuntimeError("a passive-force callback is installed; build every rig before entering its block")
-        spec = mujoco.MjSpec.from_file(str(model_file("rate_table.xml")))
+        spec = without_reset(mujoco.MjSpec.from_file(str(model_file("rate_table.xml"))))
         spec.option.gravity = [0.0, 0.0, -environment.gravity]
         spec.option.magnetic = flip_yz(environment.magnetic_field)
         spec.body("table").inertia = [inertia, inertia, inertia]
@@ -108,6 +108,7 @@ class _Hinge:
     def note(self) -> None:
         data = self.data
         mujoco.mj_forward(self.model, data)
+        check_state(data)
         self.log.append((data.time, float(data.qpos[0]), float(data.qvel[0]), float(data.qacc[0])))
 
     def run(self, until: float, timestep: float) -> None:
@@ -178,7 +179,7 @@ def turn_table(
     if profile.value[0] != 0.0:  # it turns already, ripple and all
         data.qvel[0] += speed_ripple(SpeedRipple(*flat.view(PARAMETERS)[0]["rig_speed_ripple"]), 0.0, 0.0)[0]
     slopes = np.diff(profile.value) / np.diff(profile.t)
-    with passive_force(drive):
+    with own_warnings(), passive_force(drive):
         for k, slope in enumerate(slopes):
             segment[:] = profile.t[k], profile.value[k], slope, yaw, inertia
             if k == 0:
@@ -208,7 +209,7 @@ def spin_down(
             bearing_force(flat, data.time, *views)
 
     data.qvel[0] = rate
-    with passive_force(brake):
+    with own_warnings(), passive_force(brake):
         hinge.note()
         hinge.run(duration, timestep)
     return hinge.motion()

@@ -113,6 +113,10 @@ def row(id: str) -> Row:
     return CATALOGUE[id]
 
 
+#: parameters of motion that have no meaning at or below zero; each sensor checks its own
+_POSITIVE = frozenset({("air.density", "ratio"), ("air.gust", "width_s")})
+
+
 @dataclass(frozen=True)
 class Effect:
     """An effect with its size: an id of the catalogue and a value of that row's type."""
@@ -126,6 +130,8 @@ class Effect:
         for name, size, none in zip(self.value._fields, self.value, row(self.id).baseline, strict=True):
             if not isfinite(size) and size != none:
                 raise InputError(f"{self.id}: {name} is not finite ({size}); expected a finite number")
+            if (self.id, name) in _POSITIVE and size <= 0:
+                raise InputError(f"{self.id}: {name} is {size:g}; expected a number above zero")
 
 
 def effect(id: str, **parameters: float) -> Effect:

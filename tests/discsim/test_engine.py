@@ -620,3 +620,31 @@ def test_flights_repeat_to_the_last_bit():
     flights = [fly(DRIVER, FIELD, throw(), duration=1.0) for _ in range(2)]
     for name, (one, two) in itertools.product(("position", "attitude", "rate"), [flights]):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+
+
+class TestDivergence:
+    @pytest.mark.parametrize(
+        ("velocity", "rate", "expected"),
+        [([24.0, 0.0, -4.0], 7300.0, "no longer finite"), ([1e200, 0.0, -4.0], 73.0, "no number")],
+    )
+    def test_a_motion_that_diverges_is_one_error_and_leaves_no_log(
+        self, velocity, rate, expected, tmp_path, monkeypatch
+    ):
+        """7300 rad/s turn a disc seven times in a step; MuJoCo itself would start such a state anew without a word."""
+        monkeypatch.chdir(tmp_path)
+        disc, environment = load_disc("driver")
+        with pytest.raises(InputError, match=expected):
+            fly(disc, environment, Release(velocity=velocity, body_rate=[0.0, 0.0, rate]))
+        assert not any(tmp_path.iterdir())
+        assert mujoco.get_mjcb_passive() is None
+
+    def test_inertias_that_no_body_has_are_refused(self):
+        disc, environment = load_disc("driver")
+        throw = Release(velocity=[24.0, 0.0, -4.0], body_rate=[0.0, 0.0, 73.0])
+        with pytest.raises(InputError, match="no rigid body"):
+            fly(disc, environment, throw, [effect("body.inertia_asymmetry", dIyy_kg_m2=-1.0)])
+
+    @pytest.mark.parametrize(("id", "name"), [("air.density", "ratio"), ("air.gust", "width_s")])
+    def test_sizes_without_a_meaning_are_refused(self, id, name):
+        with pytest.raises(InputError, match=f"{id}: {name} is 0; expected a number above zero"):
+            effect(id, **{name: 0.0})

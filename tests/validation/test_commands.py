@@ -107,7 +107,7 @@ def test_a_site_replaces_the_field(monkeypatch, tmp_path):
         (["rate-table", "--profile", "missing.csv"], "missing.csv"),
         (["fly", "--effect", "rig.axis_tilt:tilt_north_rad=0.1"], "acts on rate_table, spin_down; this is a flight"),
         (["fly", "--parts", "neo_m8n", "--effect", "mag.lag:tau_s=0.01"], "no magnetometer on board"),
-        (["validate", "--junit", "report/"], "no place for a file"),
+        (["validate", "--junit", "."], "no place for a file"),
         (["validate", "--seed", "-1"], "--seed"),
         (["vaildate"], "vaildate"),
     ],

@@ -29,7 +29,7 @@ def command(
     from validation.run import start_run
     from validation.scores import all_ok
 
-    if junit is not None and (junit.is_dir() or str(junit).endswith("/") or junit.parent.is_file()):
+    if junit is not None and (junit.is_dir() or junit.parent.is_file()):
         raise InputError(f"--junit {junit}: is no place for a file; expected the name of one")
     with start_run(out, seed) as run:
         scores = validate(run, quick=quick, junit=junit)
