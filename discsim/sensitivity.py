@@ -10,6 +10,7 @@ curved.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +32,9 @@ RELEASE_COLUMNS = (
     *(f"attitude_{axis}" for axis in "xyz"),
     *("p", "q", "r"),
 )
+#: longest step of a neighbour, in radians of nutation: a flight that does not wobble takes steps in which one that
+#: does would blow up
+NUTATION_STEP = 1.0
 #: half the width of a difference: m, m/s, rad, rad/s, and per unit of a parameter's size; ten times more leaves 1e-4
 #: of curvature in some columns, ten times less shows rounding
 _RELEASE_STEPS = np.repeat([1e-3, 1e-4, 1e-5, 1e-4], 3)
@@ -88,18 +92,29 @@ def sensitivities(
     `InputError` where a perturbed flight leaves its C_Nr table.
     """
     t = flight.t if t is None else np.ascontiguousarray(t, dtype=np.float64)
-    start, columns = flight.state[0], []
+    start, times, columns = flight.state[0], _steps(flight), []
     for k, size in enumerate(_RELEASE_STEPS):
-        columns.append(_column(flight, *(_released(start, k, sign * size) for sign in (1, -1)), t=t, step=size))
+        columns.append(
+            _column(flight, *(_released(start, k, sign * size) for sign in (1, -1)), times=times, t=t, step=size)
+        )
     for group, name in parameters:
         place = parameter_index(group, name)
         size = _PARAMETER_STEP * _size(group, name, flight.parameters[place])
         flats = [flight.parameters.copy() for _ in range(2)]
         flats[0][place] += size
         flats[1][place] -= size
-        columns.append(_column(flight, start, start, t=t, step=size, flats=flats))
+        columns.append(_column(flight, start, start, times=times, t=t, step=size, flats=flats))
     names = (*RELEASE_COLUMNS, *(f"{group}.{name}" for group, name in parameters))
     return Sensitivity(t, np.stack(columns, axis=-1), names)
+
+
+def _steps(flight: Flight) -> FloatArray:
+    """Return the times of the flight's steps, divided where they are long against the nutation."""
+    p = flight.parameters.view(PARAMETERS)[0]
+    nutation = np.maximum(np.abs(flight.state[:-1, 12]), 1.0) * p["disc"]["Izz"] / p["disc"]["Ixx"]
+    parts = np.ceil(np.diff(flight.t) * nutation / NUTATION_STEP).astype(int)
+    pieces = [np.linspace(a, b, n, endpoint=False) for (a, b), n in zip(pairwise(flight.t), parts, strict=True)]
+    return np.append(np.concatenate(pieces), flight.t[-1])
 
 
 def _size(group: str, name: str, value: float) -> float:
@@ -125,6 +140,7 @@ def _column(
     plus: FloatArray,
     minus: FloatArray,
     *,
+    times: FloatArray,
     t: FloatArray,
     step: float,
     flats: Sequence[FloatArray] | None = None,
@@ -132,7 +148,7 @@ def _column(
     """Return (m, 12): half the difference of two flights over the step."""
     rows = []
     for flat, state in zip(flats or (flight.parameters,) * 2, (plus, minus), strict=True):
-        path = _fly_in_steps(flat, flight.tables, flight.t, state, t)
+        path = _fly_in_steps(flat, flight.tables, times, state, t)
         if not np.all(np.isfinite(path)):
             raise InputError(
                 f"sensitivities need the flight's neighbours, and one of them leaves the C_Nr table before "

@@ -14,6 +14,7 @@ The integrator is Dormand and Prince's explicit Runge-Kutta pair of order 8(5,3)
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -158,7 +159,7 @@ def _error(h: float, K: FloatArray, y: FloatArray, rtol: float, atol: float) -> 
         third += (e3 / scale) ** 2
     if fifth == 0.0 and third == 0.0:
         return 0.0
-    return h * fifth / sqrt((fifth + 0.01 * third) * WIDTH)
+    return float(h * fifth / sqrt((fifth + 0.01 * third) * WIDTH))
 
 
 @compiled
@@ -359,7 +360,7 @@ def evaluate(times: FloatArray, states: FloatArray, dense: FloatArray, t: FloatA
 
 @compiled_nogil
 def in_body(flat: FloatArray, tables: Tables, t: FloatArray, states: FloatArray) -> FloatArray:
-    """Return motion (m, 19) of states (m, 14): position, velocity, acceleration (N), attitude, rates, their rates (B)."""
+    """Return motion (m, 19) of states (m, 14): position to acceleration in N, attitude, body rates and theirs in B."""
     p = flat.view(PARAMETERS)[0]
     rows, dy = np.empty((t.size, 19)), np.empty(WIDTH)
     for k in range(t.size):
@@ -569,7 +570,7 @@ def predict_many(
     count = threads or len(os.sched_getaffinity(0))
     # a few pieces for each thread, for flights differ in length
     edges = np.linspace(0, n, min(n, 4 * count) + 1).astype(int)
-    pieces = [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a]
+    pieces = [slice(a, b) for a, b in itertools.pairwise(edges) if b > a]
     with ThreadPoolExecutor(count) as pool:
         list(pool.map(fly, pieces))
     return Landings(end, last, touched, track)
