@@ -30,9 +30,13 @@ COLOURS: Mapping[str, str] = MappingProxyType(
         "gyroscope": "#cc79a7",
         "adxrs649": "#009e73",
         "best": "#009e73",
+        "fusion": "#6a3d9a",
+        "tracking": "#8c6d31",
+        "likelihood": "#56b4e9",
+        "accelerometer_calibrated": "#7f7f7f",
     }
 )
-_OTHERS = ("#e69f00", "#56b4e9", "#6a3d9a", "#8c6d31", "#7f7f7f")
+_OTHERS = ("#e69f00", "#117733", "#882255", "#44aa99", "#999933")
 
 #: matplotlib settings of every figure.
 STYLE: Mapping[Any, Any] = MappingProxyType(
