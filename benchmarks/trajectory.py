@@ -29,7 +29,8 @@ FLIGHT_S = 3.0
 FRISPY = """
 import sys, time
 import numpy as np
-from frispy import Disc, Model
+from frispy.disc import Disc
+from frispy.model import Model
 disc = Disc(model=Model(PL0=0.13, PLa=2.1, PD0=0.062, PDa=1.35, alpha_0=-0.05, PTy0=-0.012, PTya=0.12),
             z=1.3, vx=23.635386, vz=4.167556, phi=-0.20944, theta=-0.139626, dgamma=-73.303829,
             area=0.0352989, mass=0.179, air_density=1.204, g=9.798)

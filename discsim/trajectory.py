@@ -43,7 +43,7 @@ __all__ = ["ATOL", "RTOL", "Flight", "Landings", "evaluate", "integrate", "predi
 #: places of the state: position and velocity in N, quaternion of S, rates P, Q (in S) and r, spin angle psi
 WIDTH = 14
 #: default tolerances; docs/trajectory.md says what they are worth
-RTOL, ATOL = 1e-8, 1e-8
+RTOL, ATOL = 1e-10, 1e-10
 
 # coefficients of the pair, as scipy publishes them
 _A, _B, _C = np.array(DOP853.A), np.array(DOP853.B), np.array(DOP853.C)
