@@ -245,7 +245,7 @@ def _land(
             break
         trial = trial + correction if low < trial + correction < high else 0.5 * (low + high)
     new[:] = work
-    return trial
+    return float(trial)
 
 
 @compiled
