@@ -3,7 +3,8 @@
 The magnetometer counts turns and needs no calibration, so it leads (`estimators.tracking`). The accelerometer's
 centripetal part is separated from gravity and translation, which turn with the spin and average out over a turn; its
 mount offset, scale and bias are unknowns with priors. The gyroscope's z counts where it does not clip, with unknown
-scale and bias. A sensor that contradicts the magnetometer beyond its faults' priors is left out and named with numbers.
+scale and bias. A sensor that contradicts the magnetometer beyond its faults' priors is named with numbers and never
+averaged with it.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from discsim.arrays import BoolArray, FloatArray
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples, SensorSheet
-from estimators.likelihood import span_of
+from estimators.likelihood import LEAST, span_of
 from estimators.rate import YawRate
 from estimators.tracking import RateRows, Track, TrackingSettings, joined, tracks_of
 
@@ -25,6 +26,7 @@ __all__ = [
     "accelerometer_calibrated",
     "centripetal",
     "compare_sensors",
+    "contradictions",
     "fusion",
     "unfolding",
 ]
@@ -49,6 +51,8 @@ class FusionSettings:
     contradiction : float
         A sensor whose calibration must leave its prior by more than this many sigma, or whose residual exceeds its
         noise as many times, contradicts.
+    tolerance : float
+        A residual below this share of the rate is no contradiction, however small the noise.
     """
 
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
@@ -59,6 +63,7 @@ class FusionSettings:
     turns: float = 2.0
     shortest: float = 0.1
     contradiction: float = 4.0
+    tolerance: float = 0.003
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -313,7 +318,8 @@ def _compare(
     # the smoother's errors hold for about half a second and are shared by the readings within it
     spacing = float(np.median(np.diff(row.t))) if row.t.size > 1 else 0.5
     shared = max(1.0, 0.5 / spacing)
-    agrees = chi2 <= settings.contradiction**2 and departure <= settings.contradiction
+    alike = chi2 <= settings.contradiction**2 or residual <= settings.tolerance * float(np.mean(np.abs(r)))
+    agrees = alike and departure <= settings.contradiction
     agreement = Agreement(
         sensor=sensor,
         agrees=agrees,
@@ -354,6 +360,13 @@ def _judged(
 def compare_sensors(recording: Recording, settings: FusionSettings | None = None) -> list[Agreement]:
     """Say of each other sensor whether it agrees with the magnetometer, with numbers (``str`` of each is a line)."""
     return _judged(recording, settings or FusionSettings())[1]
+
+
+def contradictions(recording: Recording) -> list[str]:
+    """Return a line for each sensor that contradicts the magnetometer; none where there is nothing to compare."""
+    if "magnetometer" not in recording or len(recording.need("magnetometer")) < LEAST:
+        return []
+    return [str(agreement) for agreement in compare_sensors(recording) if not agreement.agrees]
 
 
 def unfolding(recording: Recording, settings: FusionSettings | None = None) -> tuple[int, bool]:
@@ -434,20 +447,52 @@ def _may_fold(recording: Recording, fold: float) -> bool:
 def fusion(recording: Recording, settings: FusionSettings | None = None) -> YawRate:
     """Spin rate, signed, from all sensors that agree. Raises `InputError` if the recording has no magnetometer.
 
-    All NaN where the magnetometer's sampling is too slow for the spin and no other sensor tells by how much.
+    An accelerometer alone against the magnetometer is left out: its mount is the likelier fault. A gyroscope in range
+    against it is believed if the accelerometer agrees with the gyroscope; else nothing can tell which of them is wrong
+    and the answer is NaN, as it is where the magnetometer's sampling is too slow for the spin and no other sensor tells
+    by how much.
     """
     settings = settings or FusionSettings()
-    tracks, _, rows, (turns, _) = _judged(recording, settings)
+    tracks, agreements, rows, (turns, _) = _judged(recording, settings)
+    verdict = {agreement.sensor: agreement for agreement in agreements}
+    if "gyroscope" in verdict and not verdict["gyroscope"].agrees:
+        return _without_magnetometer(recording, settings, verdict)
     if rows and tracks:
         tracks = tracks_of(recording, settings.tracking, rows, unfold=turns)
     return joined("fusion", tracks, settings.tracking, span_of(recording))
+
+
+def _without_magnetometer(recording: Recording, settings: FusionSettings, verdict: dict[str, Agreement]) -> YawRate:
+    """Return the gyroscope's rate where the accelerometer bears it out, else NaN."""
+    gyroscope = _gyroscope_rows(recording, settings)
+    assert gyroscope is not None
+    blank = np.full(gyroscope.t.size, np.nan)
+    unknown = YawRate("fusion", gyroscope.t, blank, blank, signed=True)
+    if "accelerometer" not in verdict:
+        return unknown
+    force = _accelerometer_rows(recording, gyroscope.t, gyroscope.value, settings)
+    if force is None:
+        return unknown
+    alone = _centripetal_rate(force, force.calibration, np.diag(force.prior**2), 1.0, None)
+    if not np.any(np.isfinite(alone.rate)):
+        return unknown
+    by_gyroscope = np.abs(np.interp(alone.t, gyroscope.t, gyroscope.value))
+    sd = float(np.nanmean(np.hypot(alone.sd, settings.gyroscope_scale * by_gyroscope)))
+    from_gyroscope = abs(float(np.nanmean(alone.rate - by_gyroscope)))
+    from_magnetometer = abs(verdict["accelerometer"].difference)
+    # within two sigma of the one, and beyond that of the other at more than twice the distance
+    if not (from_gyroscope < 2 * sd and from_magnetometer > max(2 * sd, 2 * from_gyroscope)):
+        return unknown
+    own = np.hypot(settings.gyroscope_scale * gyroscope.value, settings.gyroscope_bias)
+    return YawRate("fusion", gyroscope.t, gyroscope.value, np.hypot(own, gyroscope.sd), signed=True)
 
 
 def accelerometer_calibrated(recording: Recording, settings: FusionSettings | None = None) -> YawRate:
     """Spin rate by the accelerometer alone, done well: averaged over turns, calibrated by the magnetometer if present.
 
     ``r = sqrt(-Re((c - bias) conj(d))/|d|^2)`` with c the centripetal part and d, bias from the comparison with the
-    magnetometer, else from the data sheet. The sign is the magnetometer's; without one the rate is unsigned.
+    magnetometer, or from the data sheet where there is none or it is contradicted. The sign is the magnetometer's;
+    without one the rate is unsigned.
     """
     settings = settings or FusionSettings()
     accelerometer = recording.need("accelerometer")
@@ -460,7 +505,7 @@ def accelerometer_calibrated(recording: Recording, settings: FusionSettings | No
         reference = _reference(recording, tracks, settings.tracking)
         row = _accelerometer_rows(recording, reference.t, reference.rate, settings)
         result = _compare("accelerometer", row, reference, settings) if row is not None else None
-        if row is not None and result is not None:
+        if row is not None and result is not None and result[0].agrees:
             agreement = result[0]
             sign = np.sign(np.interp(row.t, reference.t, np.nan_to_num(reference.rate)))
             return _centripetal_rate(row, agreement.calibration, agreement.covariance, agreement.chi2, sign)

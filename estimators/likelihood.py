@@ -9,7 +9,7 @@ one its stated size is part of the standard deviation.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -34,6 +34,10 @@ __all__ = [
 
 #: Fewest readings that a spin rate is looked for in.
 LEAST = 16
+
+
+#: Residuals more correlated than this from sample to sample are no noise: the window is no answer.
+LARGEST_CORRELATION = 0.6
 
 
 @dataclass(frozen=True)
@@ -229,7 +233,7 @@ def fit_windows(
             half = 0.5 * float(t[hi - 1] - t[lo])
             window = _Window(t[lo:hi], z[lo:hi], float(centre), half, interval)
             if rates is None:
-                result = _search(window, settings, previous, guess)
+                result = _search(window, settings, previous, length is lengths[0])
             else:
                 assert axial is not None
                 along_z = float(np.mean(m[lo:hi, 2])) - axial.offset
@@ -237,7 +241,7 @@ def fit_windows(
             if result is None:
                 previous = None
                 continue
-            parameters, covariance, variance, along = result
+            parameters, covariance, variance, along, u = result
             rate = parameters[1] / half
             powers = settings.degree + 2
             if abs(rate) * 2 * half < 2 * np.pi * settings.turns and length is not lengths[-1]:
@@ -247,6 +251,12 @@ def fit_windows(
                 continue
             if sd > settings.largest_sd or sd > 0.25 * abs(rate) or variance > 0.1 * parameters[powers] ** 2:
                 continue
+            correlation = _correlation(window, parameters, powers, u)
+            if correlation > LARGEST_CORRELATION:
+                continue
+            # n white samples are worth more than n correlated ones
+            variance *= (1 + correlation) / (1 - correlation)
+            sd = float(np.sqrt(covariance[1, 1] * variance)) / half
             out["phase"][index] = parameters[0]
             out["phase_sd"][index] = np.sqrt(covariance[0, 0] * variance)
             out["phase_rate"][index] = rate
@@ -254,7 +264,7 @@ def fit_windows(
             out["chirp"][index] = 2 * parameters[2] / half**2 if powers > 2 else 0.0
             out["amplitude"][index] = parameters[powers]
             out["axial"][index] = np.mean(m[lo:hi, 2])
-            out["noise"][index] = np.sqrt(variance)
+            out["noise"][index] = np.sqrt(variance * (1 - correlation) / (1 + correlation))
             out["length"][index] = length
             out["along"][index] = along
             offset[index] = complex(parameters[powers + 1], parameters[powers + 2])
@@ -283,28 +293,27 @@ class _Window:
         return (self.t - self.centre) / self.half
 
 
-_Result = tuple[FloatArray, FloatArray, float, float]
+_Result = tuple[FloatArray, FloatArray, float, float, ComplexArray]
 
 
 def _search(
-    window: _Window, settings: LikelihoodSettings, previous: FloatArray | None, guess: tuple[float, float] | None
+    window: _Window, settings: LikelihoodSettings, previous: FloatArray | None, chirping: bool
 ) -> _Result | None:
     """Fit from every likely start and keep the best; None where two different rates explain the data alike."""
-    del guess
     tau = window.t - window.centre
-    starts = [(rate, 0.0) for rate in _peaks(tau, window.z, window.interval)]
+    starts = [(rate, 0.0) for rate, _ in _peaks(tau, window.z, window.interval)]
     if previous is not None:
         starts.insert(0, (previous[0] + previous[1] * (window.centre - previous[2]), previous[1]))
     power = float(np.sum(np.abs(window.z - np.mean(window.z)) ** 2))
     results = _fits(window, starts, settings)
-    if not results or results[0][2] * 2 * len(tau) > 0.2 * power:
+    if chirping and (not results or results[0][2] * 2 * len(tau) > 0.2 * power):
         # a strong change of rate smears the line: look for it on a grid of chirps
+        smeared = []
         for chirp in _chirp_grid(window.half):
-            turned = window.z * np.exp(-0.5j * chirp * tau**2)
-            # hard iron would be smeared instead
-            turned -= np.mean(window.z) * np.exp(-0.5j * chirp * tau**2)
-            starts = [(rate, chirp) for rate in _peaks(tau, turned, window.interval, count=1)]
-            results += _fits(window, starts, settings)
+            # about the mean, for hard iron would be smeared instead
+            turned = (window.z - np.mean(window.z)) * np.exp(-0.5j * chirp * tau**2)
+            smeared += [(height, rate, chirp) for rate, height in _peaks(tau, turned, window.interval, count=1)]
+        results += _fits(window, [(rate, chirp) for _, rate, chirp in sorted(smeared)[-3:]], settings)
         results.sort(key=lambda result: result[2])
     if not results:
         return None
@@ -330,7 +339,7 @@ def _fits(window: _Window, starts: list[tuple[float, float]], settings: Likeliho
         outside = abs(parameters[1] / window.half) > 1.02 * np.pi / window.interval
         if steps < 0 or outside or not np.all(np.isfinite(parameters)):
             continue
-        results.append((_positive(parameters, settings.degree + 2), covariance, float(variance), 0.0))
+        results.append((_positive(parameters, settings.degree + 2), covariance, float(variance), 0.0, u))
     results.sort(key=lambda result: result[2])
     return results
 
@@ -377,11 +386,30 @@ def _with_turning(
         variance, steps = fit_tone(window.x, window.z, u, parameters, covariance, powers, settings.ellipse_sd, 0.0, 30)
         if steps < 0:
             return None
-    return _positive(parameters, powers), covariance, float(variance), float(along)
+    return _positive(parameters, powers), covariance, float(variance), float(along), u
 
 
-def _peaks(tau: FloatArray, z: ComplexArray, interval: float, count: int = 3) -> list[float]:
-    """Return the angular frequencies of the highest peaks of the periodogram with floating mean."""
+def _correlation(window: _Window, parameters: FloatArray, powers: int, u: ComplexArray) -> float:
+    """Return how much neighbouring residuals correlate beyond chance, the larger of as read and turned with the field.
+
+    A wandering axis, or a rate that no polynomial follows, leaves a residual that is smooth in one of both.
+    """
+    phase = np.polynomial.polynomial.polyval(window.x, parameters[:powers])
+    E = u * np.exp(1j * phase)
+    A, b, c = parameters[powers], complex(*parameters[powers + 1 : powers + 3]), complex(*parameters[powers + 3 :])
+    residual = window.z - b - A * (E + c * np.conj(E))
+    total = float(np.sum(np.abs(residual) ** 2))
+    if total <= 0:
+        return 0.0
+    as_read = float(np.sum(residual[1:] * np.conj(residual[:-1])).real) / total
+    turned = residual * np.exp(-1j * phase)
+    with_field = float(np.sum(turned[1:] * np.conj(turned[:-1])).real) / total
+    # of white noise the real part scatters by 1/sqrt(2 n)
+    return float(max(0.0, max(as_read, with_field) - 3 / np.sqrt(2 * len(residual))))
+
+
+def _peaks(tau: FloatArray, z: ComplexArray, interval: float, count: int = 3) -> list[tuple[float, float]]:
+    """Return angular frequency and power of the highest peaks of the periodogram with floating mean."""
     span = tau[-1] - tau[0] + interval
     size = int(2 ** np.ceil(np.log2(4 * span / interval)))
     slots = np.rint((tau - tau[0]) / interval)
@@ -404,7 +432,7 @@ def _peaks(tau: FloatArray, z: ComplexArray, interval: float, count: int = 3) ->
     candidates = np.flatnonzero(local)
     order = candidates[np.argsort(power[candidates])[::-1][:count]]
     best = power[order[0]] if order.size else 0.0
-    return [float(frequency[i]) for i in order if power[i] > 0.1 * best]
+    return [(float(frequency[i]), float(power[i])) for i in order if power[i] > 0.1 * best]
 
 
 def _chirp_grid(half: float) -> FloatArray:
@@ -413,8 +441,3 @@ def _chirp_grid(half: float) -> FloatArray:
     most = min(150.0, 24 * spacing)
     steps = int(np.ceil(most / spacing))
     return spacing * np.array([k for k in range(-steps, steps + 1) if k != 0], dtype=float)
-
-
-def with_window(settings: LikelihoodSettings, window: float) -> LikelihoodSettings:
-    """Return the settings with another window length."""
-    return replace(settings, window=window, longest_window=max(window, settings.longest_window))

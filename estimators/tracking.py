@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
 from math import cos, sin, sqrt
+from typing import Any
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -408,7 +409,7 @@ class _Linear:
     cost: float
 
 
-#: Spectral densities of r'' tried, (rad/s^3)^2 s. Their prior falls with the fourth root: where the data cannot tell, a
+#: Spectral densities of r'' tried, (rad/s^3)^2 s. Their prior falls slowly: where the data cannot tell, a
 #: steady change of rate is likelier than a rough one.
 _GRID = np.logspace(-10, 7, 35)
 
@@ -521,7 +522,7 @@ def _evidence(problem: _Problem, linear: _Linear, x: FloatArray, target: FloatAr
         return -0.5 * (cost + determinant + count * np.log(roughness)), step, factor
 
     results = [solved(roughness) for roughness in _GRID]
-    log = np.array([result[0] for result in results]) - 0.25 * np.log(_GRID)
+    log = np.array([result[0] for result in results]) - 0.18 * np.log(_GRID)
     weight = np.exp(log - np.max(log))
     weight = np.where(weight < 1e-3, 0.0, weight)
     weight /= np.sum(weight)
@@ -766,7 +767,7 @@ def tracks_of(
             )
             if chosen.stop - chosen.start < LEAST:
                 continue
-            track = track_spin(
+            track = _tracked(
                 t[chosen],
                 m[chosen],
                 rate[chosen.start - first : chosen.stop - first],
@@ -779,8 +780,17 @@ def tracks_of(
                 rows=_between(rows or [], float(t[chosen][0]), float(t[chosen][-1])),
                 noise=noise,
             )
-            tracks.append(track)
+            if track is not None:
+                tracks.append(track)
     return tracks
+
+
+def _tracked(t: FloatArray, *arguments: Any, **options: Any) -> Track | None:
+    """Return the track, or None where the readings are so unlike a turning field that nothing can be solved."""
+    try:
+        return track_spin(t, *arguments, **options)
+    except np.linalg.LinAlgError:
+        return None
 
 
 def _between(rows: list[RateRows], start: float, stop: float) -> list[RateRows]:
@@ -818,8 +828,12 @@ def _runs(
     covered = near.copy()
     for centre, length in zip(times, lengths, strict=True):
         covered |= np.abs(t - centre) <= 0.5 * length + 0.25
-    rate = np.interp(t, times, rates) if times.size else np.zeros(t.size)
-    rate = np.where(near, smooth, rate)
+    rate = np.interp(t, times, rates) if times.size else np.where(near, smooth, 0.0)
+    distance = np.min(np.abs(np.subtract.outer(t, times)), axis=1) if times.size else np.full(t.size, np.inf)
+    # where no window tells, the gyroscope does; where both do, it tells how many turns a slow sampling missed
+    fold = 2 * np.pi / float(np.median(np.diff(t)))
+    missed = np.where(near, np.rint((np.nan_to_num(smooth) - rate) / fold), 0.0)
+    rate = np.where(near & (distance > 0.5), smooth, rate + fold * missed)
     runs = []
     edges = np.flatnonzero(np.diff(np.concatenate([[False], covered, [False]]).astype(int)))
     for first, last in zip(edges[::2], edges[1::2], strict=True):

@@ -118,6 +118,24 @@ def test_a_contradiction_is_named_with_numbers_and_left_out(thrown):
     np.testing.assert_allclose(found.rate, plain.rate, rtol=1e-12)
 
 
+def test_a_gyroscope_and_an_accelerometer_outvote_a_magnetometer_with_wrong_time_stamps():
+    """Stamps that run slow make the magnetometer's rate 30 % too large; without the accelerometer: no answer."""
+    spin = Spin(rate=1700.0, duration=4.0)
+    recording, truth = record(spin, np.random.default_rng(13), FAULTS)
+    samples = recording.need("magnetometer")
+    # what was taken over four seconds is stamped as if it had been over three
+    hurried = exchanged(recording, magnetometer=Samples(samples.t / 1.3, samples.value))
+    assert not compare_sensors(hurried)[0].agrees
+    found = fusion(hurried)
+    error = found.rate - truth.r(found.t)
+    assert rms(error / found.sd) < 1.5
+    alone = Recording(
+        "flight", "two", recording.environment, sheets=recording.sheets,
+        samples={name: hurried.samples[name] for name in ("magnetometer", "gyroscope")},
+    )  # fmt: skip
+    assert np.all(np.isnan(fusion(alone).rate))
+
+
 def test_clipped_readings_are_no_readings():
     """Above 5660 deg/s this accelerometer clips; what is left must not draw the rate down."""
     spin = Spin(rate=6400.0, decay=12.0)
