@@ -113,7 +113,7 @@ AWKWARD = {
 }
 
 
-#: straight up, dd2 passes alpha = +-90 deg, where its tabulated coefficients jump: no step across a jump can be accurate
+#: straight up, dd2 passes alpha = +-90 deg, where its coefficients jump: no step across a jump can be accurate
 PILES_UP = pytest.mark.xfail(strict=True, reason="steps pile up where a table jumps; they should end on its nodes")
 
 
