@@ -147,9 +147,9 @@ def test_clipped_readings_are_no_readings():
     assert abs(np.degrees(np.nanmean(found.rate - truth.r(found.t)))) < 0.4
 
 
-@pytest.mark.parametrize("helper", ["gyroscope", "accelerometer"])
+@pytest.mark.parametrize("companion", ["gyroscope", "accelerometer"])
 @pytest.mark.parametrize("rate", [2600.0, -2600.0])
-def test_a_spin_above_half_the_sampling_rate_is_unfolded(helper, rate):
+def test_a_spin_above_half_the_sampling_rate_is_unfolded(companion, rate):
     """At 10 Hz the field shows 2600 deg/s as -1000. The gyroscope, in range, or the centripetal force tells better."""
     sheets = {
         "magnetometer": SensorSheet(10.0, 0.6, 0.15, 4912.0),
@@ -158,9 +158,9 @@ def test_a_spin_above_half_the_sampling_rate_is_unfolded(helper, rate):
     }
     spin = without(Spin(rate=rate, duration=8.0, decay=200.0), precession=False)
     truth = move(spin)
-    recording, _ = record(spin, np.random.default_rng(7), sheets=sheets, sensors=("magnetometer", helper), truth=truth)
+    recording, _ = record(spin, np.random.default_rng(7), sheets=sheets, sensors=("magnetometer", companion), truth=truth)
     # a gyroscope in range gives the smoother its first guess, so that nothing is left to unfold
-    assert unfolding(recording) == (int(np.sign(rate)) if helper == "accelerometer" else 0, True)
+    assert unfolding(recording) == (int(np.sign(rate)) if companion == "accelerometer" else 0, True)
     found = fusion(recording)
     inner = (found.t > 1.0) & (found.t < 7.0)
     assert rms(np.degrees(found.rate - truth.r(found.t))[inner]) < 3.0
