@@ -158,7 +158,8 @@ def test_a_spin_above_half_the_sampling_rate_is_unfolded(companion, rate):
     }
     spin = without(Spin(rate=rate, duration=8.0, decay=200.0), precession=False)
     truth = move(spin)
-    recording, _ = record(spin, np.random.default_rng(7), sheets=sheets, sensors=("magnetometer", companion), truth=truth)
+    sensors = ("magnetometer", companion)
+    recording, _ = record(spin, np.random.default_rng(7), sheets=sheets, sensors=sensors, truth=truth)
     # a gyroscope in range gives the smoother its first guess, so that nothing is left to unfold
     assert unfolding(recording) == (int(np.sign(rate)) if companion == "accelerometer" else 0, True)
     found = fusion(recording)
