@@ -90,7 +90,7 @@ class ToneFit:
 
     ``t`` window centre, s; ``phase`` of the field at it, rad; ``phase_rate`` rad/s, and the sd of both; ``chirp``
     rad/s^2; ``amplitude`` and its unit; ``offset`` hard iron x + i y; ``noise`` residual per axis; ``length`` s;
-    ``along`` mean of the transverse rate along the field, rad/s.
+    ``along`` mean of the transverse rate along the field, rad/s; ``correlation`` of neighbouring residuals.
     """
 
     t: FloatArray
@@ -105,6 +105,7 @@ class ToneFit:
     noise: FloatArray
     length: FloatArray
     along: FloatArray
+    correlation: FloatArray
 
 
 def likelihood(recording: Recording, settings: LikelihoodSettings | None = None) -> YawRate:
@@ -161,6 +162,7 @@ def likelihood_from_samples(
             slack = np.hypot(fits.axial - axial.offset, axial.sd) / fits.amplitude * settings.precession_sd
         rate, sd = -fits.phase_rate, np.hypot(fits.phase_rate_sd, slack)
     known = np.isfinite(rate) & np.isfinite(sd) & (sd <= settings.largest_sd)
+    known &= np.nan_to_num(fits.correlation, nan=1.0) <= LARGEST_CORRELATION
     return YawRate("likelihood", fits.t, np.where(known, rate, np.nan), np.where(known, sd, np.nan), signed=True)
 
 
@@ -212,6 +214,7 @@ def fit_windows(
     """
     z = m[:, 0] + 1j * m[:, 1]
     interval = float(np.median(np.diff(t))) if t.size > 1 else 1.0
+    span = float(t[-1] - t[0]) if t.size else 0.0
     count = len(centres)
     out = {name: np.full(count, np.nan) for name in ToneFit.__dataclass_fields__ if name not in ("t", "offset")}
     offset = np.full(count, complex(np.nan, np.nan))
@@ -227,7 +230,7 @@ def fit_windows(
             guess = (float(start.phase_rate[index]), float(start.chirp[index]))
         for length in lengths:
             lo, hi = np.searchsorted(t, (centre - 0.5 * length - 1e-9, centre + 0.5 * length + 1e-9))
-            if hi - lo < settings.degree + 12 or hi - lo < 0.5 * length / interval:
+            if hi - lo < settings.degree + 12 or hi - lo < 0.5 * min(length, span) / interval:
                 previous = None
                 continue
             half = 0.5 * float(t[hi - 1] - t[lo])
@@ -252,10 +255,8 @@ def fit_windows(
             if sd > settings.largest_sd or sd > 0.25 * abs(rate) or variance > 0.1 * parameters[powers] ** 2:
                 continue
             correlation = _correlation(window, parameters, powers, u)
-            if correlation > LARGEST_CORRELATION:
-                continue
             # n white samples are worth more than n correlated ones
-            variance *= (1 + correlation) / (1 - correlation)
+            variance *= (1 + correlation) / max(1 - correlation, 0.05)
             sd = float(np.sqrt(covariance[1, 1] * variance)) / half
             out["phase"][index] = parameters[0]
             out["phase_sd"][index] = np.sqrt(covariance[0, 0] * variance)
@@ -264,7 +265,8 @@ def fit_windows(
             out["chirp"][index] = 2 * parameters[2] / half**2 if powers > 2 else 0.0
             out["amplitude"][index] = parameters[powers]
             out["axial"][index] = np.mean(m[lo:hi, 2])
-            out["noise"][index] = np.sqrt(variance * (1 - correlation) / (1 + correlation))
+            out["noise"][index] = np.sqrt(variance * max(1 - correlation, 0.05) / (1 + correlation))
+            out["correlation"][index] = correlation
             out["length"][index] = length
             out["along"][index] = along
             offset[index] = complex(parameters[powers + 1], parameters[powers + 2])

@@ -27,7 +27,7 @@ from estimators.precession import STRENGTH_SD, AxialField, axial_field, transver
 from estimators.rate import YawRate
 from estimators.spin_spline import IndexArray, SpinSpline
 
-__all__ = ["RateRows", "Track", "TrackingSettings", "joined", "track_spin", "tracking", "tracks_of"]
+__all__ = ["RateRows", "Track", "TrackingSettings", "joined", "track_bound", "track_spin", "tracking", "tracks_of"]
 
 
 @dataclass(frozen=True)
@@ -63,9 +63,9 @@ class TrackingSettings:
     segment: float = 16.0
     overlap: float = 2.0
     hard_iron: float = 100.0
-    soft_iron: float = 0.05
+    soft_iron: float = 0.03
     gyroscope_bias: float = 0.2
-    gyroscope_gain: float = 0.03
+    gyroscope_gain: float = 0.02
     strength: float = STRENGTH_SD
     precession: float = 0.15
     precession_knots: float = 0.4
@@ -536,6 +536,33 @@ def _evidence(problem: _Problem, linear: _Linear, x: FloatArray, target: FloatAr
     # Student's t with one degree of freedom: a normal law whose precision is Gamma(1/2, 1/2), by its logarithm
     own = float(np.sum(np.log(problem.local) - 0.5 * problem.local + 0.5))
     return _Mixture(weight, x[spin] + mean, covariance, float(np.max(log)) + own)
+
+
+def track_bound(
+    t: FloatArray,
+    m: FloatArray,
+    rate: FloatArray,
+    noise: float,
+    at: float,
+    settings: TrackingSettings,
+    *,
+    gyroscope: Samples | None,
+    strength: float | None,
+) -> float:
+    """Return the Bayesian Cramer-Rao bound of the rate at one instant, rad/s, of the whole model of `track_spin`.
+
+    The inverse Fisher matrix for a rate that changes steadily (r'' = 0) with field, hard and soft iron, and the
+    gyroscope's bias and gain unknown within their priors. ``m`` (n, 3), ``rate`` (n,) and ``gyroscope`` are true ones.
+    """
+    problem = _Problem(
+        t, m, settings, gyroscope=gyroscope, strength=strength, fixed_axis=False, decaying=False, rows=[],
+        top_rate=float(np.max(np.abs(rate))),
+    )  # fmt: skip
+    x, linear, *_ = _solve(problem, _start(problem, rate, None), noise, np.ones(t.size), 1e-6, settings.precession, 20)
+    information, _, _ = _with_roughness(problem, linear, x, np.zeros(problem.spline.size - 2), 1e-10)
+    B = np.zeros(problem.size)
+    B[problem.parts[0]] = problem.spline.basis(np.array([at]))[0]
+    return float(np.sqrt(B @ np.linalg.solve(information, B)))
 
 
 def _adapt(problem: _Problem, linear: _Linear, x: FloatArray, target: FloatArray) -> float:
