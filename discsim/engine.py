@@ -29,7 +29,7 @@ from discsim.frames import body_to_ned, flip_yz, norm3, quaternion_from_matrix, 
 from discsim.motion import Motion
 from discsim.parameters import PARAMETERS, Tables, flight_parameters, tables
 
-__all__ = ["RELEASE_HEIGHT", "FlyingDisc", "check_model", "fly", "passive_force"]
+__all__ = ["RELEASE_HEIGHT", "FlyingDisc", "check_model", "fly", "follow", "passive_force"]
 
 PassiveForce = Callable[[Any, Any], None]
 
@@ -197,12 +197,16 @@ class FlyingDisc:
         self.tables = tables(disc)
         record = self.parameters.view(PARAMETERS)[0]
         self.centre_of_mass = readonly(centre_of_mass(record["body_mass_imbalance"]))
-        self.model = self._compile(timestep, contacts)
+        try:
+            self.model = self.specification(timestep, contacts).compile()
+        except ValueError as error:
+            raise InputError(f"no rigid body has these inertias or masses: {str(error).splitlines()[0]}") from None
         self.data = mujoco.MjData(self.model)
         check_model(self.model)
         self._views = (self.data.qpos, self.data.qvel, self.data.qfrc_passive)
 
-    def _compile(self, timestep: float, contacts: bool) -> Any:
+    def specification(self, timestep: float, contacts: bool) -> Any:
+        """Return the mujoco.MjSpec that is compiled; a disc with more parts adds them to the body ``disc``."""
         spec = without_reset(mujoco.MjSpec.from_file(str(model_file("disc.xml"))))
         spec.option.timestep = timestep
         spec.option.gravity = [0.0, 0.0, -self.environment.gravity]
@@ -220,10 +224,7 @@ class FlyingDisc:
             for name in ("rim", "ground"):
                 geom = spec.geom(name)
                 geom.contype = geom.conaffinity = 1
-        try:
-            return spec.compile()
-        except ValueError as error:
-            raise InputError(f"no rigid body has these inertias or masses: {str(error).splitlines()[0]}") from None
+        return spec
 
     def release(self, release: Release) -> None:
         """Set the state: velocity and body rate must be known; raises `InputError` naming what is missing.
@@ -283,20 +284,27 @@ def fly(
     until it rests or ``duration`` ends.
     """
     flying = FlyingDisc(disc, environment, effects, timestep=timestep, contacts=ground == "skip")
+    return follow(flying, release, duration=duration, ground=ground)
+
+
+def follow(
+    flying: FlyingDisc, release: Release, *, duration: float = 30.0, ground: Literal["stop", "skip"] = "stop"
+) -> Motion:
+    """Release a disc that is built and return the true motion of its body ``disc``; see `fly`."""
     flying.release(release)
     model, data = flying.model, flying.data
     ex, ey, ez = (float(x) for x in flying.centre_of_mass)
-    steps = max(1, round(duration / timestep))
+    steps = max(1, round(duration / model.opt.timestep))
+    width = 1 + model.nq + 2 * model.nv
     size, rows = 1024, 0
-    log = np.empty((size, 20))
+    log = np.empty((size, width))
 
     def note() -> None:
         nonlocal log, rows, size
         if rows == size:
             size *= 2
-            log = np.resize(log, (size, 20))
-        row = log[rows]
-        row[0], row[1:8], row[8:14], row[14:20] = data.time, data.qpos, data.qvel, data.qacc
+            log = np.resize(log, (size, width))
+        np.concatenate(([data.time], data.qpos, data.qvel, data.qacc), out=log[rows])
         rows += 1
 
     touched = False
@@ -325,11 +333,12 @@ def _rests(data: Any) -> bool:
 def _land(flying: FlyingDisc, before: FloatArray) -> None:
     """Redo the last step so that it ends where the centre of mass reaches the ground."""
     model, data = flying.model, flying.data
+    nq, nv = model.nq, model.nv
     whole = model.opt.timestep
     centre = tuple(float(x) for x in flying.centre_of_mass)
 
     def height_after(step: float) -> float:
-        data.time, data.qpos[:], data.qvel[:] = before[0], before[1:8], before[8:14]
+        data.time, data.qpos[:], data.qvel[:] = before[0], *np.split(before[1:-nv], [nq])
         model.opt.timestep = max(step, 1e-12)
         mujoco.mj_step(model, data)
         return float(_centre_height(data.qpos, *centre))
@@ -343,8 +352,10 @@ def _land(flying: FlyingDisc, before: FloatArray) -> None:
 
 def _motion(log: FloatArray, flying: FlyingDisc, touched: bool) -> Motion:
     """Turn MuJoCo's states of the geometric centre into N axes and the motion of the centre of mass."""
-    attitude = np.column_stack((log[:, 4], flip_yz(log[:, 5:8])))
-    rate, turning = flip_yz(log[:, 11:14]), flip_yz(log[:, 17:20])
+    nq, nv = flying.model.nq, flying.model.nv
+    pose, speed, push = log[:, 1:8], log[:, 1 + nq : 7 + nq], log[:, 1 + nq + nv : 7 + nq + nv]
+    attitude = np.column_stack((pose[:, 3], flip_yz(pose[:, 4:7])))
+    rate, turning = flip_yz(speed[:, 3:6]), flip_yz(push[:, 3:6])
     e = flying.centre_of_mass
     C_NB = body_to_ned(attitude)
     swing = np.cross(rate, e)
@@ -354,9 +365,9 @@ def _motion(log: FloatArray, flying: FlyingDisc, touched: bool) -> Motion:
 
     return Motion(
         t=log[:, 0],
-        position=flip_yz(log[:, 1:4]) + in_ned(e),
-        velocity=flip_yz(log[:, 8:11]) + in_ned(swing),
-        acceleration=flip_yz(log[:, 14:17]) + in_ned(np.cross(turning, e) + np.cross(rate, swing)),
+        position=flip_yz(pose[:, :3]) + in_ned(e),
+        velocity=flip_yz(speed[:, :3]) + in_ned(swing),
+        acceleration=flip_yz(push[:, :3]) + in_ned(np.cross(turning, e) + np.cross(rate, swing)),
         attitude=attitude,
         rate=rate,
         angular_acceleration=turning,
