@@ -1,0 +1,1 @@
+"""Diagnosis: where recordings part from the baseline, which physics was left out, and its size."""
