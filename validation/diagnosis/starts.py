@@ -1,0 +1,789 @@
+"""Where a fit of short pieces starts: path, attitude and body rates at given instants, from the data alone.
+
+Three steps, each with a fall-back where a sensor is missing. The angle turned about the spin axis, psi, comes from the
+field in the disc's plane (`_spin`): hard iron and the ellipse of soft iron are taken out by a conic through the
+readings. In the frame S, which does not spin (B turned back by psi), everything is slow: the transverse rates
+of the gyroscope make the relative attitude D of S, and field and specific force are smoothed there. They are compared
+with the field and with the path's acceleration less gravity in N (Wahba's problem), locally in time, so that sensors
+whose clocks differ by some per cent still agree within each comparison.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import cos, sin, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from discsim.arrays import FloatArray
+from discsim.compiled import compiled
+from discsim.disc import Release
+from discsim.frames import attitude_matrix, body_to_ned, multiply, quaternion_from_matrix, rotation_vector, turn
+from discsim.recording import Recording
+
+__all__ = ["Starts", "flight_starts", "rig_starts", "spin_starts"]
+
+ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
+
+#: spacing of the instants at which attitudes are found before they are smoothed, s
+GRID = 0.1
+#: half a window of the path's fit, s: 9 fixes at 10 Hz
+PATH_HALF = 0.45
+#: fewest readings of a sensor that is used at all
+FEWEST = 12
+#: of the smoothing of the spin's phase, s (one sigma)
+PHASE_SIGMA = 0.05
+#: of the smoothing of field and specific force in S, s
+VECTOR_SIGMA = 0.15
+#: over which a local attitude is averaged after the gyroscope's turning is taken out, s
+ATTITUDE_SIGMA = 0.4
+#: prior standard deviation of hard iron along the spin axis, uT, and of the field's gain
+IRON_SD, GAIN_SD = 8.0, 0.06
+#: a throw of which nothing is known: height and speed to the north, m and m/s
+GUESSED_HEIGHT, GUESSED_SPEED = 1.3, 20.0
+
+
+class Starts(NamedTuple):
+    """States at instants, for a fit to start from.
+
+    ``t`` (k,) s in written time; ``position`` (k, 3) m and ``velocity`` (k, 3) m/s in N; ``attitude`` (k, 4)
+    quaternions of C_NB; ``rate`` (k, 3) rad/s in B; ``ambiguous`` holds other attitudes (4,) worth trying at t[0].
+    """
+
+    t: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    attitude: FloatArray
+    rate: FloatArray
+    ambiguous: tuple[FloatArray, ...]
+
+
+class _Readings(NamedTuple):
+    t: FloatArray
+    value: FloatArray
+
+
+class _Spin(NamedTuple):
+    """Angle turned by the field in the disc's plane, and what belongs to it.
+
+    ``grid`` (n,) s; ``phase`` and ``rate`` (n,) of the turning vector, rad and rad/s; ``amplitude`` (n,) its length;
+    ``plane`` (m,) the readings' complex x + i y with iron removed, at the times ``t`` (m,).
+    """
+
+    grid: FloatArray
+    phase: FloatArray
+    rate: FloatArray
+    amplitude: FloatArray
+    t: FloatArray
+    plane: ComplexArray
+
+    def phase_at(self, t: FloatArray) -> FloatArray:
+        """Return the phase (k,) at t (k,), which runs on at the last rate outside."""
+        return _curve(self.grid, self.phase, self.rate, t)
+
+
+class _Attitude(NamedTuple):
+    """The frame that does not spin: ``psi`` and ``r`` on ``grid``; ``D`` (n, 4) turns S into S at the start."""
+
+    grid: FloatArray
+    psi: FloatArray
+    r: FloatArray
+    D: FloatArray
+    transverse: ComplexArray | None
+
+    def psi_at(self, t: FloatArray) -> FloatArray:
+        return _curve(self.grid, self.psi, self.r, t)
+
+    def D_at(self, t: FloatArray) -> FloatArray:
+        return _between(self.grid, self.D, t)
+
+
+# ---------------------------------------------------------------------------------------------- the three plants
+
+
+def flight_starts(recording: Recording, t: FloatArray) -> Starts:
+    """Return states at instants t (k,) s of a flight; always finite.
+
+    Without GPS and track the path is dead reckoning from the stated release, or from a guess. Without path or
+    accelerometer the attitude's turn about the field is the one that keeps the disc most level, unless the release
+    states it; the others are in ``ambiguous``.
+    """
+    t = np.asarray(t, dtype=float)
+    frame = _frame(recording)
+    grid = _even(t, recording)
+    path = _path(recording, grid)
+    force = None if path is None else path[2] - np.array([0.0, 0.0, recording.environment.gravity])
+    G, certain = _turned_to_ned(recording, frame, grid, force)
+    attitude, rate = _states(recording, frame, grid, G, t)
+    if path is not None:
+        position, velocity, _ = _path_at(recording, t)
+    else:
+        position, velocity = _dead_reckoning(recording, frame, grid, G, t)
+    return _finite(Starts(t, position, velocity, attitude, rate, () if certain else _others(recording, attitude[0])))
+
+
+def spin_starts(recording: Recording, t: FloatArray) -> Starts:
+    """Return attitudes and rates at instants t (k,) s of a free spin; position and velocity are zero.
+
+    The field alone cannot tell a turn about itself: the attitude given is the one that starts most level.
+    """
+    t = np.asarray(t, dtype=float)
+    frame = _frame(recording)
+    grid = _even(t, recording)
+    G, _ = _turned_to_ned(recording, frame, grid, None)
+    attitude, rate = _states(recording, frame, grid, G, t)
+    nothing = np.zeros((t.size, 3))
+    return _finite(Starts(t, nothing, nothing.copy(), attitude, rate, _others(recording, attitude[0])))
+
+
+def rig_starts(recording: Recording, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the yaw angle psi (k,) rad, unwrapped, and the rate r (k,) rad/s, at instants t (k,) s of a rig run.
+
+    The axis points straight down. Without magnetometer psi counts from zero at the recording's start.
+    """
+    t = np.asarray(t, dtype=float)
+    expected = _expected_rate(recording)
+    spin = _spin(recording, "magnetometer", expected, steady=True)
+    if spin is None:
+        grid = np.arange(0.0, max(recording.end, float(np.max(t, initial=0.0))) + 0.02, 0.01)
+        r = np.zeros(grid.size) if expected is None else expected(grid)
+        psi = np.concatenate([[0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(grid))])
+        return np.interp(t, grid, psi), np.interp(t, grid, r)
+    north, east, _ = recording.environment.magnetic_field
+    # m_B = C3(psi) B: the complex field in B is that in N times exp(-i psi)
+    psi = np.arctan2(east, north) - spin.phase_at(t)
+    return psi, -np.interp(t, spin.grid, spin.rate)
+
+
+# ---------------------------------------------------------------------------------------------- readings
+
+
+def _readings(recording: Recording, sensor: str, columns: slice | int = slice(None)) -> _Readings | None:
+    """Return the readings of which every asked column is there and not clipped, or None for too few."""
+    samples = recording.get(sensor)
+    if samples is None:
+        return None
+    value = np.where(recording.sheets[sensor].clipped(samples.value), np.nan, samples.value)
+    value = value.reshape(len(samples), -1)[:, columns]
+    good = np.isfinite(value).reshape(len(samples), -1).all(axis=1)
+    if np.count_nonzero(good) < FEWEST:
+        return None
+    return _Readings(samples.t[good], value[good])
+
+
+def _even(t: FloatArray, recording: Recording) -> FloatArray:
+    start = min(0.0, float(np.min(t, initial=0.0)))
+    stop = max(recording.end, float(np.max(t, initial=0.0)), start + GRID)
+    return np.linspace(start, stop, int(np.ceil((stop - start) / GRID)) + 1)
+
+
+def _smoothed(t: FloatArray, value: FloatArray | ComplexArray, at: FloatArray, sigma: float) -> FloatArray:
+    """Return values (n, k) smoothed by a Gaussian, evaluated at (m,) instants, linear near the ends of the data.
+
+    A local straight line, so that a drift across an end or a gap does not bias.
+    """
+    out = np.empty((at.size, *value.shape[1:]), dtype=value.dtype)
+    lo = np.searchsorted(t, at - 3.5 * sigma)
+    hi = np.searchsorted(t, at + 3.5 * sigma)
+    for i, instant in enumerate(at):
+        first, last = int(lo[i]), int(hi[i])
+        if last - first < 4:  # a gap, or outside: the nearest readings
+            nearest = int(np.clip(np.searchsorted(t, instant), 2, max(t.size - 2, 2)))
+            out[i] = np.mean(value[max(nearest - 2, 0) : nearest + 2], axis=0)
+            continue
+        x = (t[first:last] - instant) / sigma
+        w = np.exp(-0.5 * x * x)
+        w0, w1, w2 = w.sum(), w @ x, w @ (x * x)
+        # the slope's ridge keeps one-sided windows from extrapolating noise
+        out[i] = (w * (w2 + 0.05 * w0 - w1 * x)) @ value[first:last] / (w0 * (w2 + 0.05 * w0) - w1 * w1)
+    return out
+
+
+def _curve(grid: FloatArray, value: FloatArray, slope: FloatArray, t: FloatArray) -> FloatArray:
+    inside = np.clip(t, grid[0], grid[-1])
+    ends = np.where(t < grid[0], slope[0], slope[-1])
+    return np.asarray(CubicHermiteSpline(grid, value, slope)(inside) + ends * (t - inside))
+
+
+def _between(grid: FloatArray, q: FloatArray, t: FloatArray) -> FloatArray:
+    """Return quaternions at t between neighbours (n, 4) that are close together."""
+    k = np.clip(np.searchsorted(grid, t) - 1, 0, grid.size - 2)
+    x = np.clip((t - grid[k]) / (grid[k + 1] - grid[k]), 0.0, 1.0)[:, None]
+    mixed = (1 - x) * q[k] + x * q[k + 1]
+    return np.asarray(mixed / np.linalg.norm(mixed, axis=1, keepdims=True))
+
+
+# ---------------------------------------------------------------------------------------------- spin
+
+
+def _expected_rate(recording: Recording) -> Callable[[FloatArray], FloatArray] | None:
+    """Return the spin rate as a function of time from a sensor that shows it directly, or None.
+
+    A rate reference, an unclipped gyroscope, a command; each is trusted to a few per cent only.
+    """
+    for sensor, column in (("rate_reference", 0), ("gyroscope", 2)):
+        samples = recording.get(sensor)
+        readings = _readings(recording, sensor, column)
+        if samples is None or readings is None or readings.t.size < 0.9 * len(samples):
+            continue
+        return _line(readings.t, readings.value)
+    if recording.command is not None:
+        return _line(recording.command.t, recording.command.value)
+    return None
+
+
+def _line(t: FloatArray, value: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    return lambda at: np.asarray(np.interp(at, t, value))
+
+
+def _centripetal(recording: Recording) -> Callable[[FloatArray], FloatArray] | None:
+    """Return the spin rate without its sign from the accelerometer's mean reading towards the axis, (12)."""
+    readings = _readings(recording, "accelerometer", slice(0, 2))
+    position = recording.sheets["accelerometer"].position if readings is not None else None
+    if readings is None or position is None or np.hypot(*position[:2]) < 1e-3:
+        return None
+    radius = float(np.hypot(*position[:2]))
+    inward = -(readings.value @ position[:2]) / radius
+    grid = np.arange(readings.t[0], readings.t[-1] + 0.05, 0.05)
+    mean = _smoothed(readings.t, inward, grid, 0.1)
+    r = np.sqrt(np.maximum(mean, 0.0) / radius)
+    return _line(grid, r)
+
+
+def _conic(t: FloatArray, z: ComplexArray, knots: float, scale: float) -> tuple[ComplexArray, complex]:
+    """Remove hard iron and the ellipse of soft iron from x + i y; return what is left (n,) and the centre.
+
+    The conic ``z^T Q z - 2 b^T z = c(t)`` is linear in Q (trace 2), b and c; c changes slowly as the axis tilts.
+    """
+    x, y = z.real / scale, z.imag / scale
+    count = max(1, round((t[-1] - t[0]) / knots))
+    place = np.clip((t - t[0]) / max(t[-1] - t[0], 1e-9) * count, 0, count - 1e-9)
+    k = place.astype(int)
+    hats = np.zeros((t.size, count + 1))
+    rows = np.arange(t.size)
+    hats[rows, k], hats[rows, k + 1] = 1 - (place - k), place - k
+    A = np.column_stack([2 * x, 2 * y, -(x * x - y * y), -2 * x * y, hats])
+    target = x * x + y * y
+    # priors: 15 uT of hard iron, 0.1 of ellipse; the readings' own scatter about the conic is a few per cent
+    prior = np.zeros(A.shape[1])
+    prior[:4] = 0.05 / np.array([15.0 / scale, 15.0 / scale, 0.15, 0.15])
+    prior[4:] = 1e-3
+    weight = np.ones(t.size)
+    solution = np.zeros(A.shape[1])
+    for _ in range(4):
+        normal = (A * weight[:, None]).T @ A + np.diag(prior**2)
+        solution = np.linalg.solve(normal, (A * weight[:, None]).T @ target)
+        misfit = np.abs(target - A @ solution)
+        spread = 3.0 * float(np.median(misfit)) + 1e-6
+        weight = 1 / (1 + (misfit / spread) ** 2)
+    e = float(np.clip(solution[2], -0.6, 0.6)), float(np.clip(solution[3], -0.6, 0.6))
+    Q = np.array([[1 + e[0], e[1]], [e[1], 1 - e[0]]])
+    if np.linalg.det(Q) < 0.2:
+        Q = np.eye(2)
+    centre = np.linalg.solve(Q, solution[:2]) * scale
+    values, vectors = np.linalg.eigh(Q / sqrt(np.linalg.det(Q)))
+    root = vectors @ np.diag(np.sqrt(values)) @ vectors.T
+    X, Y = z.real - centre[0], z.imag - centre[1]
+    return (root[0, 0] * X + root[0, 1] * Y) + 1j * (root[1, 0] * X + root[1, 1] * Y), complex(*centre)
+
+
+def _kernel(sigma: float, step: float) -> FloatArray:
+    half = max(1, int(np.ceil(3.5 * sigma / step)))
+    return np.asarray(np.exp(-0.5 * (np.arange(-half, half + 1) * step / sigma) ** 2))
+
+
+def _spread(grid: FloatArray, t: FloatArray, value: ComplexArray, sigma: float) -> tuple[ComplexArray, FloatArray]:
+    """Return Gaussian sums of value (n,) and of its weight on an even grid."""
+    step = grid[1] - grid[0]
+    slot = np.clip(np.rint((t - grid[0]) / step).astype(int), 0, grid.size - 1)
+    sums = np.bincount(slot, value.real, grid.size) + 1j * np.bincount(slot, value.imag, grid.size)
+    kernel = _kernel(sigma, step)
+    if kernel.size > grid.size:
+        kernel = kernel[(kernel.size - grid.size) // 2 :][: grid.size - (1 - grid.size % 2)]
+    return (
+        np.asarray(np.convolve(sums, kernel, "same")),
+        np.asarray(np.convolve(np.bincount(slot, minlength=grid.size).astype(float), kernel, "same")),
+    )
+
+
+def _spin(
+    recording: Recording, sensor: str, expected: Callable[[FloatArray], FloatArray] | None, *, steady: bool
+) -> _Spin | None:
+    """Follow the phase of a vector that is fixed, or slow, in N: the field, or else the specific force.
+
+    ``steady`` tells that the axis stands still, so that the vector's length across it is constant.
+    """
+    readings = _readings(recording, sensor, slice(0, 2))
+    if readings is None or readings.t[-1] <= readings.t[0]:
+        return None
+    t, z = readings.t, readings.value[:, 0] + 1j * readings.value[:, 1]
+    step = float(np.median(np.diff(t)))
+    grid = t[0] + step * np.arange(int(np.ceil((t[-1] - t[0]) / step - 1e-6)) + 1)
+    if grid.size < FEWEST:
+        return None
+    field = float(np.linalg.norm(recording.environment.magnetic_field)) if sensor == "magnetometer" else 10.0
+    rough = -expected(grid) if expected is not None else _rough_rate(grid, t, z - np.mean(z), step)
+    typical = float(np.median(np.abs(rough)))
+    if sensor == "magnetometer":
+        knots = t[-1] - t[0] if steady else max(0.5, 4 * np.pi / max(typical, 0.1))
+        plane, _ = _conic(t, z, knots, field)
+    else:
+        plane = z - _complex_smooth(grid, t, z, 0.3)
+    rate = rough if expected is not None else _rough_rate(grid, t, plane, step)
+    if expected is None and (centripetal := _centripetal(recording)) is not None:
+        rate = _unfolded(rate, centripetal(grid), step)
+    smooth = np.zeros(grid.size, dtype=complex)
+    phase = np.zeros(grid.size)
+    weight = np.ones(grid.size)
+    for sigma in (3 * PHASE_SIGMA, PHASE_SIGMA, PHASE_SIGMA):
+        sigma = max(sigma, 1.5 * step)
+        turned = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)])
+        base = plane * np.exp(-1j * _curve(grid, turned, rate, t))
+        smooth, weight = _spread(grid, t, base, sigma)
+        delta = np.unwrap(np.angle(np.where(np.abs(smooth) > 0, smooth, 1.0)))
+        phase = turned + delta
+        rate = rate + np.gradient(delta, step)
+    amplitude = np.abs(smooth) / np.maximum(weight, 1e-9)
+    return _Spin(grid, phase, rate, amplitude, t, plane)
+
+
+def _complex_smooth(grid: FloatArray, t: FloatArray, z: ComplexArray, sigma: float) -> ComplexArray:
+    sums, weight = _spread(grid, t, z, sigma)
+    mean = sums / np.maximum(weight, 1e-9)
+    return np.asarray(np.interp(t, grid, mean.real) + 1j * np.interp(t, grid, mean.imag))
+
+
+def _rough_rate(grid: FloatArray, t: FloatArray, z: ComplexArray, step: float) -> FloatArray:
+    """Return the turning rate (n,) on the grid from the mean phase step of neighbours."""
+    gap = np.diff(t)
+    near = gap < 1.5 * step
+    if np.count_nonzero(near) < 4:
+        return np.zeros(grid.size)
+    sums, _ = _spread(grid, 0.5 * (t[1:] + t[:-1])[near], (z[1:] * np.conj(z[:-1]))[near], 0.15)
+    return np.asarray(np.angle(sums) / step)
+
+
+def _unfolded(rate: FloatArray, expected: FloatArray, step: float) -> FloatArray:
+    """Return the rate, by whole turns per sample nearest to what the accelerometer expects, of either sign.
+
+    Only where the expectation is beyond the fold: a quarter less than half a turn per sample.
+    """
+    if float(np.median(expected)) * step < 0.75 * np.pi:
+        return rate
+    fold = 2 * np.pi / step
+    both = []
+    for sign in (1.0, -1.0):
+        shifted = rate + fold * np.rint((sign * expected - rate) / fold)
+        both.append((float(np.median(np.abs(shifted - sign * expected))), shifted))
+    return min(both, key=lambda pair: pair[0])[1]
+
+
+# ---------------------------------------------------------------------------------------------- the slow frame
+
+
+@compiled
+def _composed(step: FloatArray) -> FloatArray:
+    """Return attitudes (n + 1, 4) after rotation vectors (n, 3), each in the frame reached, from the identity."""
+    out = np.empty((step.shape[0] + 1, 4))
+    w, x, y, z = 1.0, 0.0, 0.0, 0.0
+    out[0] = np.array([w, x, y, z])
+    for i in range(step.shape[0]):
+        a, b, c = step[i, 0], step[i, 1], step[i, 2]
+        angle = sqrt(a * a + b * b + c * c)
+        f = sin(0.5 * angle) / angle if angle > 1e-9 else 0.5
+        s, a, b, c = cos(0.5 * angle), f * a, f * b, f * c
+        w, x, y, z = (
+            w * s - x * a - y * b - z * c,
+            w * a + x * s + y * c - z * b,
+            w * b - x * c + y * s + z * a,
+            w * c + x * b - y * a + z * s,
+        )
+        out[i + 1, 0], out[i + 1, 1], out[i + 1, 2], out[i + 1, 3] = w, x, y, z
+    return out
+
+
+def _frame(recording: Recording) -> _Attitude:
+    """Return psi, r and the relative attitude of the frame that does not spin over the whole recording."""
+    expected = _expected_rate(recording)
+    spin = _spin(recording, "magnetometer", expected, steady=False)
+    magnetic = spin is not None
+    if spin is None:
+        spin = _spin(recording, "accelerometer", expected, steady=False)
+    gyroscope = _readings(recording, "gyroscope", slice(0, 2))
+    grid = spin.grid if gyroscope is None and spin is not None else gyroscope.t if gyroscope is not None else None
+    if grid is None:
+        grid = np.arange(0.0, max(recording.end, 1.0), 0.01)
+    if spin is None:
+        r = np.zeros(grid.size) if expected is None else expected(grid)
+        if expected is None and (centripetal := _centripetal(recording)) is not None:
+            r = _sign(recording) * centripetal(grid)
+        psi = np.concatenate([[0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(grid))])
+    else:
+        psi, r = -spin.phase_at(grid), -np.interp(grid, spin.grid, spin.rate)
+    if gyroscope is None:
+        identity = np.tile([1.0, 0.0, 0.0, 0.0], (grid.size, 1))
+        return _Attitude(grid, psi, r, identity, None)
+    w = gyroscope.value[:, 0] + 1j * gyroscope.value[:, 1]
+    if abs(psi[-1] - psi[0]) > 10 * np.pi:
+        w = w - np.mean(w)  # over many turns p and q average to the sensor's bias
+    if magnetic and spin is not None:
+        psi, r = _without_precession(recording, spin, grid, psi, r, w)
+    W = w * np.exp(1j * psi)
+    middle = 0.5 * (W[1:] + W[:-1]) * np.diff(grid)
+    D = _composed(np.column_stack([middle.real, middle.imag, np.zeros(middle.size)]))
+    return _Attitude(grid, psi, r, D, w)
+
+
+def _sign(recording: Recording) -> float:
+    """Return the direction of spin: of the gyroscope's clipped z, or of the stated release."""
+    gyroscope = recording.get("gyroscope")
+    if gyroscope is not None and np.any(np.isfinite(gyroscope.value[:, 2])):
+        return 1.0 if float(np.nanmedian(gyroscope.value[:, 2])) >= 0 else -1.0
+    if recording.release is not None and recording.release.body_rate is not None:
+        return 1.0 if recording.release.body_rate[2] >= 0 else -1.0
+    return 1.0
+
+
+def _without_precession(
+    recording: Recording, spin: _Spin, grid: FloatArray, psi: FloatArray, r: FloatArray, w: ComplexArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return psi and r without the turning of the field's phase by p and q: m_z (p m_x + q m_y)/(m_x^2 + m_y^2)."""
+    axial = _readings(recording, "magnetometer", 2)
+    if axial is None:
+        return psi, r
+    across = np.interp(grid, spin.grid, spin.amplitude)
+    strength = float(np.linalg.norm(recording.environment.magnetic_field))
+    along = _smoothed(axial.t, axial.value, spin.grid[::10], 0.1)
+    m_z = np.clip(np.interp(grid, spin.grid[::10], along), -strength, strength)
+    # below a tenth of the field the phase is noise and the term has a pole
+    eta = (w * np.exp(1j * psi)).real * m_z / np.maximum(across, 0.1 * strength)
+    added = np.concatenate([[0.0], np.cumsum(0.5 * (eta[1:] + eta[:-1]) * np.diff(grid))])
+    step = float(np.median(np.diff(grid)))
+    kernel = _kernel(PHASE_SIGMA, step)
+    if kernel.size < grid.size:
+        eta = np.convolve(eta, kernel, "same") / np.convolve(np.ones(eta.size), kernel, "same")
+    return psi + added, r + eta
+
+
+# ---------------------------------------------------------------------------------------------- attitude
+
+
+def _turned_to_ned(
+    recording: Recording, frame: _Attitude, grid: FloatArray, force: FloatArray | None
+) -> tuple[FloatArray, bool]:
+    """Return C (n, 3, 3) from S at the start to N, found locally at the instants of ``grid``, and if it is unique.
+
+    With a perfect gyroscope all would be the same matrix. ``force`` (n, 3) is the specific force in N.
+    """
+    field = recording.environment.magnetic_field
+    fast = float(np.median(np.abs(frame.r)))
+    sigma = float(np.clip(3.0 / max(fast, 0.1), VECTOR_SIGMA, 0.5))
+    axis = body_to_ned(frame.D_at(grid))[:, :, 2]
+    magnetic = _in_start_frame(recording, "magnetometer", frame, grid, sigma)
+    felt = _in_start_frame(recording, "accelerometer", frame, grid, sigma) if force is not None else None
+    if magnetic is not None:
+        gyroscope = frame.transverse is not None
+        magnetic = _without_axial_iron(magnetic, axis, field, felt, force, wandering=not gyroscope)
+    sigma = ATTITUDE_SIGMA if frame.transverse is not None else GRID
+    if magnetic is None and felt is None:
+        return _level(recording, frame, grid), False
+    if magnetic is not None and felt is not None and force is not None:
+        return _averaged(_wahba(magnetic, felt, field, force), sigma), True
+    if magnetic is not None:
+        # one direction: in S at the start the field stands still, so all instants share it
+        turns = np.array([_level_about(mean, field, axis[0]) for mean in _windowed(magnetic, 1.0)])
+        return _stated_turn(recording, frame, _connected(turns, field), field), False
+    assert felt is not None
+    assert force is not None
+    turns = np.array([_level_about(f, g, a) for f, g, a in zip(felt, force, axis, strict=True)])
+    return _averaged(turns, sigma), False
+
+
+def _in_start_frame(
+    recording: Recording, sensor: str, frame: _Attitude, grid: FloatArray, sigma: float
+) -> FloatArray | None:
+    """Return a sensor's vector, smoothed, in S at the start, (n, 3); None where the sensor cannot tell."""
+    readings = _readings(recording, sensor)
+    if readings is None:
+        return None
+    t, value = readings
+    psi = frame.psi_at(t)
+    plane = value[:, 0] + 1j * value[:, 1]
+    if sensor == "magnetometer":
+        spin = _spin(recording, sensor, _line(frame.grid, frame.r), steady=False)
+        if spin is not None and spin.t.size == t.size:
+            plane = spin.plane
+    else:
+        position = recording.sheets[sensor].position
+        if position is not None:
+            plane = plane + np.interp(t, frame.grid, frame.r) ** 2 * complex(*position[:2])
+    plane = plane * np.exp(1j * psi)
+    C = body_to_ned(frame.D_at(t))
+    vector = np.einsum("nij,nj->ni", C, np.column_stack([plane.real, plane.imag, value[:, 2]]))
+    return _smoothed(t, vector, grid, sigma)
+
+
+def _without_axial_iron(
+    m: FloatArray,
+    axis: FloatArray,
+    field: FloatArray,
+    felt: FloatArray | None,
+    force: FloatArray | None,
+    *,
+    wandering: bool,
+) -> FloatArray:
+    """Return the field (n, 3) without the hard iron along the axis, which no turning shows.
+
+    Least squares over that iron and a gain: the field has its stated length, makes its stated angle with the specific
+    force, and stands still (not where the frame wanders for want of a gyroscope).
+    """
+    strength = float(np.linalg.norm(field))
+    x = np.array([0.0, 1.0])
+    known = None
+    if felt is not None and force is not None:
+        f = felt / np.maximum(np.linalg.norm(felt, axis=1, keepdims=True), 1e-6)
+        g = force / np.maximum(np.linalg.norm(force, axis=1, keepdims=True), 1e-6)
+        # a small force has no direction worth the name
+        known = f, g @ field, np.minimum(np.linalg.norm(force, axis=1) / 5.0, 1.0)
+    scale = 1 / sqrt(len(m) / 8.0)  # neighbours share their errors: about eight are independent
+
+    def errors(x: FloatArray) -> FloatArray:
+        u = x[1] * (m - x[0] * axis)
+        parts = [(np.linalg.norm(u, axis=1) - strength) / (0.04 * strength) * scale]
+        if known is not None:
+            parts.append((np.einsum("ni,ni->n", u, known[0]) - known[1]) / (0.08 * strength) * known[2] * scale)
+        if not wandering:
+            parts.append(((u - np.mean(u, axis=0)) / (0.06 * strength) * scale).ravel())
+        parts.append(np.array([x[0] / IRON_SD, (x[1] - 1.0) / GAIN_SD]))
+        return np.concatenate(parts)
+
+    for _ in range(6):
+        e = errors(x)
+        J = np.column_stack([(errors(x + h) - e) / np.sum(h) for h in (np.array([1e-3, 0.0]), np.array([0.0, 1e-5]))])
+        x = x - np.linalg.solve(J.T @ J, J.T @ e)
+        x = np.clip(x, [-0.8 * strength, 0.5], [0.8 * strength, 2.0])
+    return np.asarray(x[1] * (m - x[0] * axis))
+
+
+def _wahba(m: FloatArray, f: FloatArray, field: FloatArray, force: FloatArray) -> FloatArray:
+    """Return rotations (n, 3, 3) that take m and f (n, 3) to field (3,) and force (n, 3)."""
+
+    def unit(v: FloatArray) -> FloatArray:
+        return np.asarray(v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9))
+
+    strong = np.minimum(np.linalg.norm(force, axis=1) / 5.0, 1.0) ** 2
+    pairs = (
+        (0.3 * np.ones(len(m)), unit(np.broadcast_to(field, m.shape)), unit(m)),
+        (strong, unit(force), unit(f)),
+        (0.1 * strong, unit(np.cross(field, force)), unit(np.cross(m, f))),
+    )
+    return _rotations(sum(np.einsum("n,ni,nj->nij", *pair) for pair in pairs))
+
+
+def _rotations(K: FloatArray) -> FloatArray:
+    U, _, Vt = np.linalg.svd(K)
+    U[:, :, 2] *= np.linalg.det(U @ Vt)[:, None]
+    return np.asarray(U @ Vt)
+
+
+def _weights(n: int, sigma: float) -> FloatArray:
+    index = GRID * np.arange(n)
+    W = np.exp(-0.5 * ((index[:, None] - index[None, :]) / sigma) ** 2)
+    return np.asarray(W / W.sum(axis=1, keepdims=True))
+
+
+def _windowed(value: FloatArray, sigma: float) -> FloatArray:
+    return np.asarray(np.tensordot(_weights(len(value), sigma), value, axes=1))
+
+
+def _averaged(turns: FloatArray, sigma: float) -> FloatArray:
+    return _rotations(_windowed(turns, sigma))
+
+
+def _level_about(v: FloatArray, reference: FloatArray, axis: FloatArray) -> FloatArray:
+    """Return the rotation (3, 3) that takes v to reference and, of all those, ``axis`` nearest to straight down."""
+    down = np.array([0.0, 0.0, 1.0])
+    K = np.outer(reference, v) / (np.linalg.norm(reference) * max(float(np.linalg.norm(v)), 1e-9))
+    # the cross products decide the turn about v and leave v itself alone
+    a, b = np.cross(reference, down), np.cross(v, axis)
+    K = K + 1e-3 * np.outer(a, b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-9)
+    return np.asarray(_rotations(K[None] + 1e-9 * np.eye(3))[0])
+
+
+def _connected(turns: FloatArray, field: FloatArray) -> FloatArray:
+    """Return rotations that change from instant to instant by no turn about the field."""
+    out = turns.copy()
+    n = np.asarray(field / np.linalg.norm(field))
+    for i in range(1, len(out)):
+        q = quaternion_from_matrix(out[i - 1] @ out[i].T)
+        angle = 2 * np.arctan2(q[1:] @ n, q[0])
+        out[i] = body_to_ned(turn(angle * n)) @ out[i]
+    return out
+
+
+def _stated_turn(recording: Recording, frame: _Attitude, turns: FloatArray, field: FloatArray) -> FloatArray:
+    """Return the rotations turned about the field so that they meet a stated release as well as they can."""
+    stated = _stated_attitude(recording.release)
+    if stated is None:
+        return turns
+    found = turns[0] @ body_to_ned(frame.D_at(np.zeros(1)))[0] @ _z_turn(float(frame.psi_at(np.zeros(1))[0]))
+    n = np.asarray(field / np.linalg.norm(field))
+    q = quaternion_from_matrix(stated @ found.T)
+    angle = 2 * np.arctan2(q[1:] @ n, q[0])
+    return np.asarray(body_to_ned(turn(angle * n)) @ turns)
+
+
+def _stated_attitude(release: Release | None) -> FloatArray | None:
+    if release is None or release.roll is None or release.pitch is None or release.yaw is None:
+        return None
+    return attitude_matrix(release.roll, release.pitch, release.yaw).T
+
+
+def _z_turn(angle: float) -> FloatArray:
+    return np.array([[cos(angle), -sin(angle), 0.0], [sin(angle), cos(angle), 0.0], [0.0, 0.0, 1.0]])
+
+
+def _level(recording: Recording, frame: _Attitude, grid: FloatArray) -> FloatArray:
+    """Return the rotation of a disc that starts as its release states, or level."""
+    stated = _stated_attitude(recording.release)
+    first = np.eye(3) if stated is None else stated @ _z_turn(float(-frame.psi_at(np.zeros(1))[0]))
+    return np.tile(first, (grid.size, 1, 1))
+
+
+def _states(
+    recording: Recording, frame: _Attitude, grid: FloatArray, G: FloatArray, t: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return attitudes (k, 4) and body rates (k, 3) at t."""
+    turns = np.array([quaternion_from_matrix(C) for C in G])
+    for i in range(1, len(turns)):
+        if turns[i] @ turns[i - 1] < 0:
+            turns[i] = -turns[i]
+    psi = frame.psi_at(t)
+    slow = multiply(_between(grid, turns, t), frame.D_at(t))
+    attitude = multiply(slow, turn(psi[:, None] * np.array([0.0, 0.0, 1.0])))
+    attitude /= np.linalg.norm(attitude, axis=1, keepdims=True)
+    r = np.interp(t, frame.grid, frame.r)
+    if frame.transverse is not None:
+        # in the frame that does not spin p and q change least between readings
+        W = frame.transverse * np.exp(1j * frame.psi)
+        w = (np.interp(t, frame.grid, W.real) + 1j * np.interp(t, frame.grid, W.imag)) * np.exp(-1j * psi)
+    else:
+        reach = 2 * GRID
+        before, after = _between(grid, turns, t - reach), _between(grid, turns, t + reach)
+        inverse = before * np.array([1.0, -1.0, -1.0, -1.0])
+        W3 = rotation_vector(multiply(inverse, after)) / (2 * reach)
+        w = (W3[:, 0] + 1j * W3[:, 1]) * np.exp(-1j * psi)
+        # at the ends half of the span is missing and the rate comes out half as large: no harm to a start
+    rate = np.column_stack([w.real, w.imag, r])
+    return attitude, rate
+
+
+def _others(recording: Recording, attitude: FloatArray) -> tuple[FloatArray, ...]:
+    field = recording.environment.magnetic_field
+    n = np.asarray(field / max(float(np.linalg.norm(field)), 1e-9))
+    return tuple(multiply(turn(angle * n), attitude) for angle in (np.pi / 2, -np.pi / 2, np.pi))
+
+
+# ---------------------------------------------------------------------------------------------- path
+
+
+def _path(recording: Recording, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Return position, velocity and acceleration (k, 3) in N at t from fixes, or None where there are none."""
+    for sensor in ("gps", "track"):
+        samples = recording.get(sensor)
+        if samples is None or np.count_nonzero(np.isfinite(samples.value[:, :3]).all(axis=1)) < 4:
+            continue
+        return _path_fit(recording, sensor, t)
+    return None
+
+
+def _path_at(recording: Recording, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    path = _path(recording, t)
+    assert path is not None
+    return path
+
+
+def _path_fit(recording: Recording, sensor: str, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Fit a quadratic to the fixes around each instant; outliers lose their weight step by step."""
+    samples, sheet = recording.samples[sensor], recording.sheets[sensor]
+    sd = sheet.noise_rms or 0.2
+    velocity_sd = sheet.velocity_noise_rms or 0.1
+    good = np.asarray(np.all(np.isfinite(samples.value[:, :3]), axis=1))
+    times, value = samples.t[good], samples.value[good]
+    fast = value[:, 3:6] if value.shape[1] >= 6 else np.full((times.size, 3), np.nan)
+    moving = np.asarray(np.all(np.isfinite(fast), axis=1))
+    position, velocity, acceleration = (np.empty((t.size, 3)) for _ in range(3))
+    for i, instant in enumerate(t):
+        centre = float(np.clip(instant, times[0] + PATH_HALF, max(times[-1] - PATH_HALF, times[0] + PATH_HALF)))
+        half = PATH_HALF + 1e-9
+        while np.count_nonzero(np.abs(times - centre) <= half) < min(7, times.size):
+            half *= 1.3
+        chosen = np.abs(times - centre) <= half
+        tau = times[chosen] - instant
+        one, zero = np.ones(tau.size), np.zeros(tau.size)
+        with_rate = moving[chosen]
+        A = np.concatenate(
+            [
+                np.column_stack([one, tau, 0.5 * tau**2]) / sd,
+                np.column_stack([zero, one, tau])[with_rate] / velocity_sd,
+            ]
+        )
+        y = np.concatenate([value[chosen, :3] / sd, fast[chosen][with_rate] / velocity_sd])
+        weight = np.ones(len(A))
+        solution = np.zeros((3, 3))
+        # a throw's acceleration is below 3 g: keeps few fixes from inventing one
+        ridge = np.diag([1e-9, 1e-9, 1.0 / 30.0**2])
+        for scale in (None, 30.0, 10.0, 4.0, 3.0):
+            if scale is not None:
+                misfit = np.linalg.norm(y - A @ solution, axis=1)
+                # noise may be larger than stated: outliers are told by the others' median
+                usual = max(1.0, float(np.median(misfit)) / 1.5)
+                weight = 1 / (1 + (misfit / (scale * usual)) ** 2) ** 2
+            weighted = A * weight[:, None]
+            solution = np.linalg.solve(weighted.T @ A + ridge, weighted.T @ y)
+        position[i], velocity[i], acceleration[i] = solution
+    return position, velocity, acceleration
+
+
+def _dead_reckoning(
+    recording: Recording, frame: _Attitude, grid: FloatArray, G: FloatArray, t: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return position and velocity (k, 3) at t from the stated release, or a guess, and the specific force."""
+    release = recording.release
+    position = np.array([0.0, 0.0, -GUESSED_HEIGHT])
+    velocity = np.array([GUESSED_SPEED, 0.0, 0.0])
+    if release is not None and release.position is not None:
+        position = np.array(release.position)
+    if release is not None and release.velocity is not None:
+        velocity = np.array(release.velocity)
+    felt = _in_start_frame(recording, "accelerometer", frame, grid, VECTOR_SIGMA)
+    acceleration = np.zeros((grid.size, 3))
+    if felt is not None:
+        # a wrong attitude must not carry the disc away: specific force of a glide is below 2 g
+        strength = np.linalg.norm(felt, axis=1, keepdims=True)
+        felt = felt * np.minimum(1.0, 20.0 / np.maximum(strength, 1e-9))
+        acceleration = np.einsum("nij,nj->ni", G, felt) + np.array([0.0, 0.0, recording.environment.gravity])
+    step = np.diff(grid)[:, None]
+    zero = int(np.argmin(np.abs(grid)))
+    gained = np.concatenate([np.zeros((1, 3)), np.cumsum(0.5 * (acceleration[1:] + acceleration[:-1]) * step, axis=0)])
+    v = velocity + gained - gained[zero]
+    moved = np.concatenate([np.zeros((1, 3)), np.cumsum(0.5 * (v[1:] + v[:-1]) * step, axis=0)])
+    x = position + moved - moved[zero]
+    return (
+        np.column_stack([np.interp(t, grid, x[:, i]) for i in range(3)]),
+        np.column_stack([np.interp(t, grid, v[:, i]) for i in range(3)]),
+    )
+
+
+def _finite(starts: Starts) -> Starts:
+    """Return the starts with anything that is not finite replaced by what a level, resting disc has."""
+    level = np.array([1.0, 0.0, 0.0, 0.0])
+    lost = np.asarray(~np.all(np.isfinite(starts.attitude), axis=1))
+    return starts._replace(
+        position=np.nan_to_num(starts.position, nan=0.0, posinf=0.0, neginf=0.0),
+        velocity=np.nan_to_num(starts.velocity, nan=0.0, posinf=0.0, neginf=0.0),
+        attitude=np.where(lost[:, None], level, starts.attitude),
+        rate=np.nan_to_num(starts.rate, nan=0.0, posinf=0.0, neginf=0.0),
+    )
