@@ -72,15 +72,17 @@ class Run:
         print(text, file=sys.stderr, flush=True)
 
     def progress(self, items: Iterable[T], total: int, what: str) -> Iterator[T]:
-        """Yield ``items`` with a bar on a terminal and one line per item elsewhere."""
+        """Yield ``items`` with a bar on a terminal and one line per item elsewhere, both with the time left."""
         if sys.stderr.isatty():
             from rich.console import Console
             from rich.progress import track
 
             yield from track(items, description=what, total=total, console=Console(stderr=True), transient=True)
             return
+        started = time.monotonic()
         for number, item in enumerate(items, start=1):
-            self.step(f"{what} {number}/{total}")
+            left = (time.monotonic() - started) / number * (total - number)
+            self.step(f"{what} {number}/{total}" + (f", {left:.0f} s left" if number > 1 and left >= 1 else ""))
             yield item
 
 

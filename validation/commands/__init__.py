@@ -14,6 +14,7 @@ COMMANDS: dict[str, str] = {
     "estimate": "estimate",
     "fly": "fly",
     "rate-table": "rate_table",
+    "sweep": "sweep",
     "validate": "validate",
     "view": "view",
 }
