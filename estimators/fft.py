@@ -6,18 +6,20 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import scipy.fft
 from numpy.lib.stride_tricks import sliding_window_view
 
 from discsim.arrays import BoolArray, FloatArray
 from discsim.errors import InputError
 from discsim.recording import Samples
+from estimators.fft_fast import dirichlet, highest, spectra, transform_at
 from estimators.rate import YawRate
+from estimators.spin_spline import IndexArray
+from estimators.tone import ComplexArray
 
 __all__ = ["FftSettings", "fft"]
 
-#: Windows transformed at once: 256 spectra of 8193 complex values are 34 MB.
-CHUNK = 256
+#: Windows looked at together: their coarse spectra stay in a core's cache, whatever the length of the recording.
+CHUNK = 128
 
 #: Below this share of the window's variance the line is smeared by a change of rate of more than about four bins
 #: over the window; its spectrum then has several peaks of one height and the highest says little.
@@ -122,15 +124,16 @@ def fft(magnetometer: Samples, settings: FftSettings | None = None) -> YawRate:
         usable = _evenly_spaced(stamps[chosen], spacing) & np.all(np.isfinite(values[chosen]), axis=(1, 2))
         if not usable.any():
             continue
-        block, spacing = values[chosen[usable]], spacing[usable]
-        axis = np.argmax(np.var(block, axis=2), axis=1)
-        x = block[np.arange(axis.size), axis]
-        peak, known = _spectral_peak(x, spacing, settings)
-        omega = 2 * np.pi * peak / (total * spacing)  # (PE2), rad/s
-        spread, certain = _uncertainty(x, omega * spacing, settings)
-        slots = first + np.flatnonzero(usable)
-        rate[slots] = np.where(known & certain, omega, np.nan)
-        sd[slots] = np.where(known & certain, spread / spacing, np.nan)
+        spacing = spacing[usable]
+        still, mean = _wider_axis(values[chosen[usable]])
+        peak, line, known = _spectral_peak(still, mean, spacing, settings)
+        if not known.any():
+            continue
+        omega = 2 * np.pi * peak[known] / total  # (PE2), rad per sample
+        spread, certain = _uncertainty(still[known], mean[known], line[known], omega, settings)
+        slots = (first + np.flatnonzero(usable))[known]
+        rate[slots] = np.where(certain, omega / spacing[known], np.nan)
+        sd[slots] = np.where(certain, spread / spacing[known], np.nan)
     centre = (t[starts] + t[starts + n - 1]) / 2
     half = (n - 1) * magnetometer.interval / 2
     sd = np.hypot(sd, _uneven_acceleration(centre, rate, sd, half))
@@ -143,47 +146,55 @@ def _evenly_spaced(t: FloatArray, interval: FloatArray) -> BoolArray:
     return np.asarray(np.ptp(stray, axis=1) <= interval / 2)
 
 
-def _spectral_peak(x: FloatArray, interval: FloatArray, settings: FftSettings) -> tuple[FloatArray, BoolArray]:
-    """Return the order of the peak at or above the threshold, (P-3) to (P-5), and whether it is a line of its own."""
+def _wider_axis(block: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return windows (w, n) of the axis that varies more, less their means, and those means, from (w, 2, n)."""
+    mean = block.mean(axis=2)
+    still = block - mean[:, :, None]
+    axis = np.argmax(np.einsum("wan,wan->wa", still, still), axis=1)
+    window = np.arange(axis.size)
+    return still[window, axis], mean[window, axis]
+
+
+def _spectral_peak(
+    still: FloatArray, mean: FloatArray, interval: FloatArray, settings: FftSettings
+) -> tuple[IndexArray, ComplexArray, BoolArray]:
+    """Return the order of the peak at or above the threshold, (P-3) to (P-5), and whether it is a line of its own.
+
+    ``still`` (w, n) are the windows less their means. Between the two stands the transform of ``still`` at the peak,
+    phases counted from the window's centre.
+    """
+    total = settings.window + settings.pad
+    lowest = np.ceil(settings.threshold * total * interval / (2 * np.pi)).astype(np.int64)  # per window
+    start, last, none = np.zeros_like(lowest), np.full(lowest.size, total // 2), np.full(lowest.size, -1)
+    windows = spectra(still, mean, total)
+    # Where a line below the threshold is the strongest, it is found first and few windows have more to be looked at.
+    slow = windows.strongest_order < lowest
+    _, slower = highest(windows, start, np.where(slow, lowest - 1, none), offset=False)
+    rival, _ = highest(windows, lowest, np.where(slow, last, none), offset=False, above=slower)
+    searched = ~slow | (rival >= 0)
+    peak, _ = highest(windows, lowest, np.where(searched, last, none), offset=not settings.remove_mean)
+    line = transform_at(windows, np.maximum(peak, 0))
+    slower_peak, _ = highest(
+        windows, start, np.where(searched, lowest - 1, none), offset=False, above=line.real**2 + line.imag**2
+    )
+    return peak, line, (slower_peak < 0) & (peak > lowest) & (peak < last)
+
+
+def _uncertainty(
+    still: FloatArray, mean: FloatArray, line: ComplexArray, omega: FloatArray, settings: FftSettings
+) -> tuple[FloatArray, BoolArray]:
+    """Return one sigma of the rate, rad per sample, and whether the line at ``omega`` (rad per sample) is certain.
+
+    ``line`` is the transform of ``still`` there, ``sum(x cos) - i sum(x sin)`` with angles counted from the centre.
+    """
     n, total = settings.window, settings.window + settings.pad
-    mean = x.mean(axis=1, keepdims=True)
-    spectrum = scipy.fft.rfft(x - mean if settings.remove_mean else x, total, axis=1)
-    amplitude = spectrum.real**2 + spectrum.imag**2  # its square: the peak is the same
-    orders = np.arange(amplitude.shape[1])
-    lowest = np.ceil(settings.threshold * total * interval / (2 * np.pi)).astype(int)  # per window
-    beginning = int(lowest.min())
-    searched = amplitude[:, beginning:]
-    searched[orders[beginning:] < lowest[:, None]] = -1.0
-    window = np.arange(x.shape[0])
-    peak = beginning + np.argmax(searched, axis=1)
-
-    inside = (peak > lowest) & (peak < orders[-1])
-    slow = spectrum[:, : int(lowest.max()) + 1]
-    at_peak = spectrum[window, peak]
-    if not settings.remove_mean:  # the spectrum of the window without its mean, by linearity
-        box = scipy.fft.rfft(np.ones(n), total)
-        slow = slow - mean * box[: slow.shape[1]]
-        at_peak = at_peak - mean[:, 0] * box[peak]
-    slower = np.abs(slow)
-    slower[orders[: slow.shape[1]] >= lowest[:, None]] = 0.0
-    return peak, inside & (np.abs(at_peak) > slower.max(axis=1))
-
-
-def _uncertainty(x: FloatArray, omega: FloatArray, settings: FftSettings) -> tuple[FloatArray, BoolArray]:
-    """Return one sigma of the rate, rad per sample, and whether the line at ``omega`` (rad per sample) is certain."""
-    n, total = settings.window, settings.window + settings.pad
-    mean = x.mean(axis=1)
-    index = np.arange(n) - (n - 1) / 2
-    cosine, sine = np.cos(omega[:, None] * index), np.sin(omega[:, None] * index)
     # About the window's centre a cosine is even and a sine odd: only the offset and the cosine share anything.
-    level = cosine.mean(axis=1)
-    even = np.sum(cosine * x, axis=1) - n * level * mean
-    even /= np.sum(cosine**2, axis=1) - n * level**2
-    odd = np.sum(sine * x, axis=1) / np.sum(sine**2, axis=1)
+    level, twice = dirichlet(omega, n) / n, dirichlet(2 * omega, n)
+    cosines, sines = (n + twice) / 2 - n * level**2, (n - twice) / 2  # sums of squares
+    even, odd = line.real / cosines, -line.imag / sines
     offset = mean - even * level
-    left = x - offset[:, None] - even[:, None] * cosine - odd[:, None] * sine
-    about_mean = np.sum((x - mean[:, None]) ** 2, axis=1)
-    residual = np.sum(left**2, axis=1)
+    about_mean = np.einsum("wn,wn->w", still, still)
+    residual = np.maximum(about_mean - even**2 * cosines - odd**2 * sines, 0.0)
     share = 1 - np.divide(residual, about_mean, out=np.ones_like(residual), where=about_mean > 0)
     amplitude = np.maximum(np.hypot(even, odd), np.finfo(float).tiny)
 

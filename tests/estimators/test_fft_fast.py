@@ -8,7 +8,7 @@ import scipy.fft
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimators.fft_fast import padded_peak
+from estimators.fft_fast import highest, padded_peak, spectra, transform_at
 
 
 def padded(x, total, first, last):
@@ -62,3 +62,37 @@ def test_an_empty_range_has_no_peak(total):
     assert order[0] == -1
     assert power[0] == -1.0
     assert order[1] == 9
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    total=st.sampled_from([64, 500, 4099, 16384]),
+    share=st.sampled_from([0.5, 0.999, 1.001]),
+)
+def test_a_peak_counts_only_above_what_it_must_exceed(seed, total, share):
+    """A thousandth either way is far above rounding."""
+    rng = np.random.default_rng(seed)
+    x = windows(rng, 64, 8, 30.0)
+    first, last = np.zeros(8, dtype=int), np.full(8, total // 2)
+    mean = x.mean(axis=1)
+    still = x - mean[:, None]
+    expected, greatest = padded(still, total, first, last)
+    order, power = highest(spectra(still, mean, total), first, last, offset=False, above=share * greatest)
+    if share > 1:
+        assert np.all(order == -1)
+        assert np.all(power == -1)
+    else:
+        np.testing.assert_allclose(power, greatest, rtol=1e-9)
+        np.testing.assert_array_equal(order, expected)
+
+
+def test_one_value_is_that_of_the_padded_transform_counted_from_the_centre():
+    rng = np.random.default_rng(2)
+    x = windows(rng, 31, 5, 3.0)
+    mean, orders = x.mean(axis=1), np.array([0, 3, 100, 249, 250])
+    still = x - mean[:, None]
+    value = transform_at(spectra(still, mean, 500), orders)
+    angle = 2 * np.pi * orders[:, None] / 500 * (np.arange(31) - 15)
+    np.testing.assert_allclose(value.real, np.sum(still * np.cos(angle), axis=1), atol=1e-10)
+    np.testing.assert_allclose(value.imag, -np.sum(still * np.sin(angle), axis=1), atol=1e-10)
