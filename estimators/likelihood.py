@@ -18,7 +18,7 @@ from discsim.errors import InputError
 from discsim.recording import Recording, Samples, SensorSheet
 from estimators.precession import AxialField, axial_field, transverse_rates
 from estimators.rate import YawRate
-from estimators.tone import ComplexArray, field_shape, fit_tone, floating_mean_power
+from estimators.tone import ComplexArray, field_shape, fit_tone
 
 __all__ = [
     "LEAST",
@@ -38,6 +38,9 @@ LEAST = 16
 
 #: Residuals more correlated than this from sample to sample are no noise: the window is no answer.
 LARGEST_CORRELATION = 0.6
+
+#: Most steps of a fit. One that starts at its line converges within eight; the rest are no tones.
+MOST_STEPS = 15
 
 
 @dataclass(frozen=True)
@@ -336,7 +339,7 @@ def _fits(window: _Window, starts: list[tuple[float, float]], settings: Likeliho
         parameters = _linear_start(window, rate, chirp, settings)
         covariance = np.zeros((parameters.size, parameters.size))
         variance, steps = fit_tone(
-            x, window.z, u, parameters, covariance, settings.degree + 2, settings.ellipse_sd, 0.0, 30
+            x, window.z, u, parameters, covariance, settings.degree + 2, settings.ellipse_sd, 0.0, MOST_STEPS
         )
         outside = abs(parameters[1] / window.half) > 1.02 * np.pi / window.interval
         if steps < 0 or outside or not np.all(np.isfinite(parameters)):
@@ -349,15 +352,19 @@ def _fits(window: _Window, starts: list[tuple[float, float]], settings: Likeliho
 def _linear_start(window: _Window, rate: float, chirp: float, settings: LikelihoodSettings) -> FloatArray:
     tau = window.t - window.centre
     tone = np.exp(1j * (rate * tau + 0.5 * chirp * tau**2))
-    solution = np.linalg.lstsq(np.column_stack((tone, np.ones_like(tone))), window.z, rcond=None)[0]
+    # least squares of tone and mean: two equations
+    overlap, mean = complex(np.mean(np.conj(tone))), complex(np.mean(window.z))
+    left = max(1 - abs(overlap) ** 2, 1e-9)
+    amplitude = (complex(np.mean(np.conj(tone) * window.z)) - overlap * mean) / left
+    offset = mean - amplitude * np.conj(overlap)
     parameters = np.zeros(settings.degree + 7)
-    parameters[0] = np.angle(solution[0])
+    parameters[0] = np.angle(amplitude)
     parameters[1] = rate * window.half
     if settings.degree > 0:
         parameters[2] = 0.5 * chirp * window.half**2
-    parameters[settings.degree + 2] = abs(solution[0])
-    parameters[settings.degree + 3] = solution[1].real
-    parameters[settings.degree + 4] = solution[1].imag
+    parameters[settings.degree + 2] = abs(amplitude)
+    parameters[settings.degree + 3] = offset.real
+    parameters[settings.degree + 4] = offset.imag
     return parameters
 
 
@@ -385,7 +392,9 @@ def _with_turning(
     variance, steps, along = 0.0, 0, 0.0
     for _ in range(3):
         along = field_shape(window.t, window.centre, window.half, parameters, powers, axial, rates, substeps, u)
-        variance, steps = fit_tone(window.x, window.z, u, parameters, covariance, powers, settings.ellipse_sd, 0.0, 30)
+        variance, steps = fit_tone(
+            window.x, window.z, u, parameters, covariance, powers, settings.ellipse_sd, 0.0, MOST_STEPS
+        )
         if steps < 0:
             return None
     return _positive(parameters, powers), covariance, float(variance), float(along), u
@@ -411,30 +420,52 @@ def _correlation(window: _Window, parameters: FloatArray, powers: int, u: Comple
 
 
 def _peaks(tau: FloatArray, z: ComplexArray, interval: float, count: int = 3) -> list[tuple[float, float]]:
-    """Return angular frequency and power of the highest peaks of the periodogram with floating mean."""
+    """Return angular frequency and power of the highest peaks of the periodogram with floating mean.
+
+    The power that a tone of each frequency takes with the mean fitted along, zero where tone and mean cannot be told
+    apart.
+    """
+    n = float(tau.size)
     span = tau[-1] - tau[0] + interval
     size = int(2 ** np.ceil(np.log2(4 * span / interval)))
-    slots = np.rint((tau - tau[0]) / interval)
-    even = np.max(np.abs(tau - tau[0] - slots * interval)) < 0.1 * interval
-    frequency = np.asarray(2 * np.pi * np.fft.fftfreq(size, interval), dtype=np.float64)
-    if even:
-        grid = np.zeros(size, dtype=complex)
-        mask = np.zeros(size)
-        grid[slots.astype(int)] = z
-        mask[slots.astype(int)] = 1.0
-        n = float(tau.size)
-        tone = np.fft.fft(mask)
-        left = n - np.abs(tone) ** 2 / n
-        value = np.fft.fft(grid) - tone * np.sum(z) / n
-        power = np.where(left > 1e-3 * n, np.abs(value) ** 2 / np.maximum(left, 1e-9 * n), 0.0)
-    else:
-        power = np.empty(size)
-        floating_mean_power(tau, z, frequency, power)
+    frequency = 2 * np.pi * np.fft.fftfreq(size, interval)
+    tone, value = _transforms(tau - tau[0], z, frequency, interval)
+    left = n - np.abs(tone) ** 2 / n
+    value -= tone * np.sum(z) / n
+    power = np.where(left > 1e-3 * n, np.abs(value) ** 2 / np.maximum(left, 1e-9 * n), 0.0)
     local = (power >= np.roll(power, 1)) & (power >= np.roll(power, -1))
     candidates = np.flatnonzero(local)
     order = candidates[np.argsort(power[candidates])[::-1][:count]]
     best = power[order[0]] if order.size else 0.0
     return [(float(frequency[i]), float(power[i])) for i in order if power[i] > 0.1 * best]
+
+
+def _transforms(
+    t: FloatArray, z: ComplexArray, frequency: FloatArray, interval: float
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return the sums of exp(-i w t) and of z exp(-i w t) at the FFT's frequencies w, for time stamps t >= 0 (n,).
+
+    Each stamp is rounded to the grid and the rest d expanded, ``exp(-i w d) = sum (-i w d)^j/j!``: one FFT per term,
+    as many as leave less than a thousandth at half the sampling rate; one on an even grid.
+    """
+    slots = np.rint(t / interval).astype(np.int64)
+    rest = t - slots * interval
+    most = np.pi / interval * float(np.max(np.abs(rest)))
+    tone, value = np.zeros(frequency.size, dtype=complex), np.zeros(frequency.size, dtype=complex)
+    share, term, factor = 1.0, np.ones_like(rest), np.ones(frequency.size, dtype=complex)
+    power = 0
+    while share > 1e-3:
+        grid = np.zeros((2, frequency.size), dtype=complex)
+        np.add.at(grid[0], slots, term)
+        np.add.at(grid[1], slots, term * z)
+        once = np.fft.fft(grid)
+        tone += factor * once[0]
+        value += factor * once[1]
+        power += 1
+        share *= most / power
+        term = term * rest
+        factor = factor * (-1j * frequency / power)
+    return tone, value
 
 
 def _chirp_grid(half: float) -> FloatArray:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from discsim.arrays import FloatArray
 from discsim.compiled import compiled
 
-__all__ = ["ComplexArray", "field_shape", "fit_tone", "floating_mean_power"]
+__all__ = ["ComplexArray", "field_shape", "fit_tone"]
 
 ComplexArray = NDArray[np.complex128]
 
@@ -258,25 +258,3 @@ def field_shape(
     for i in range(n):
         u[i] /= at_centre
     return float(mean_rate / (t[n - 1] - t[0]))
-
-
-@compiled
-def floating_mean_power(t: FloatArray, z: ComplexArray, frequency: FloatArray, power: FloatArray) -> None:
-    """Write the power (m,) that a tone of each angular frequency takes, with the mean fitted along.
-
-    The periodogram of least squares with floating mean, for complex data at any time stamps; in units of the
-    signal's sum of squares. Zero where tone and mean cannot be told apart.
-    """
-    n = t.size
-    total = z.sum()
-    for i in range(frequency.size):
-        tone = complex(0.0, 0.0)
-        product = complex(0.0, 0.0)
-        for k in range(n):
-            angle = frequency[i] * t[k]
-            e = complex(cos(angle), -sin(angle))
-            tone += e
-            product += e * z[k]
-        left = n - abs(tone) ** 2 / n
-        value = product - tone * total / n
-        power[i] = abs(value) ** 2 / left if left > 1e-3 * n else 0.0

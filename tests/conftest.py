@@ -2,6 +2,9 @@
 
 import os
 
+# before numpy is loaded, as in `validation`: many small matrices, and often fewer idle cores than threads
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 from hypothesis import settings
 
 # the first example of a test may compile a function, which takes seconds on a busy machine; a gate tries the same
