@@ -28,7 +28,7 @@ from discsim.toml_table import read_toml
 from validation.challenge.cases import Case, Coast, Kind, Run, Turning, draw_case
 from validation.challenge.physics import HiddenDisc, coast, haunted
 
-__all__ = ["Answer", "conceal", "read_answer", "recordings", "seal"]
+__all__ = ["Answer", "conceal", "read_answer", "recordings", "seal", "write_recordings"]
 
 #: no throw of the challenge stays up this long, s
 LONGEST_FLIGHT = 20.0
@@ -191,10 +191,15 @@ def _flight(case: Case, release: Release, effects: Sequence[Effect], number: int
 # ---------------------------------------------------------------------------------------------- writing
 
 
-def conceal(case: Case, folder: Path, answer: Path) -> dict[str, str]:
-    """Write a case's recordings into ``folder`` and its answer to the file ``answer``; return the digests of both."""
+def write_recordings(case: Case, folder: Path) -> None:
+    """Write a case's recordings into ``folder``, numbered from 01."""
     for number, recording in enumerate(recordings(case), start=1):
         write_recording(recording, folder / f"{number:02d}")
+
+
+def conceal(case: Case, folder: Path, answer: Path) -> dict[str, str]:
+    """Write a case's recordings into ``folder`` and its answer to the file ``answer``; return the digests of both."""
+    write_recordings(case, folder)
     write_text(answer, Answer.of(case).text)
     return {"recordings": digest(folder), "answer": digest(answer)}
 

@@ -1,0 +1,119 @@
+"""Run a diagnosis blind: answers are sealed first, and another process gets a folder of recordings and nothing else."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from discsim.errors import InputError
+from discsim.files import digest, write_text
+from discsim.recording import Plant
+from validation.challenge.cases import Kind, draw_case
+from validation.challenge.conceal import Answer, read_answer, write_recordings
+
+__all__ = ["DIAGNOSE", "Request", "diagnose_blind", "open_answers", "seal_answers"]
+
+#: the command that is put to the test; the folder of recordings and ``--out DIR`` are appended
+DIAGNOSE = (sys.executable, "-m", "validation.cli", "diagnose")
+#: what a diagnosis gets of the environment: where programs and compiled code are, how many threads it may use
+_PASSED_ON = ("PATH", "HOME", "LANG", "TMPDIR", "NUMBA_CACHE_DIR", "OMP_NUM_THREADS", "VIRTUAL_ENV")
+#: a diagnosis that takes longer has failed, s
+PATIENCE_S = 1800.0
+
+
+class Request(NamedTuple):
+    """What a case is drawn from; see `validation.challenge.cases.draw_case`."""
+
+    seed: int
+    plant: Plant | None = None
+    effects: tuple[str, ...] = ()
+    kind: Kind | None = None
+
+    @property
+    def name(self) -> str:
+        """The case's name in files."""
+        return f"case-{self.seed:05d}"
+
+    def draw(self) -> Any:
+        """Return the case."""
+        return draw_case(self.seed, self.plant, self.effects, self.kind)
+
+
+def seal_answers(requests: Sequence[Request], out: Path) -> dict[str, str]:
+    """Write each answer to ``out/answers`` and the digests of all to ``out/sealed.json``; return the digests.
+
+    This comes before any diagnosis. Where it was done before, the digests must be the same.
+    """
+    texts = {request.name: Answer.of(request.draw()).text for request in requests}
+    digests = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
+    file = out / "sealed.json"
+    if file.exists() and (known := json.loads(file.read_text("utf-8"))) != digests:
+        changed = [name for name in known if known[name] != digests.get(name, known[name])]
+        raise InputError(
+            f"{file}: the answers are sealed, and {', '.join(changed[:3]) or 'the list of cases'} would differ; "
+            "expected the same command, or another --out"
+        )
+    for name, text in texts.items():
+        write_text(out / "answers" / f"{name}.toml", text)
+    write_text(file, json.dumps(digests, indent=2) + "\n")
+    return digests
+
+
+def open_answers(requests: Sequence[Request], out: Path) -> list[Answer]:
+    """Return the sealed answers in order; raises `InputError` where one is not what was sealed."""
+    digests = json.loads((out / "sealed.json").read_text("utf-8"))
+    answers = []
+    for request in requests:
+        file = out / "answers" / f"{request.name}.toml"
+        if digest(file) != digests[request.name]:
+            raise InputError(f"{file}: is not the answer that was sealed; expected digest {digests[request.name]}")
+        answers.append(read_answer(file))
+    return answers
+
+
+def diagnose_blind(request: tuple[Any, ...], command: Sequence[str] | None) -> dict[str, Any]:
+    """Conceal a case in a folder of its own, let another process diagnose it, and return what that wrote.
+
+    The process gets the folder's name (which tells nothing), an empty folder to write to, and a bare environment; its
+    working folder is empty too. No file with an answer is in reach by these. Returns ``diagnosis`` (None where there
+    is none), ``error``, ``seconds`` and the digest of the recordings.
+    """
+    case = Request(*request).draw()
+    with tempfile.TemporaryDirectory(prefix="recordings-") as place:
+        dataset, out, desk = (Path(place) / name for name in ("concealed", "out", "desk"))
+        desk.mkdir()
+        write_recordings(case, dataset)
+        fingerprint = digest(dataset)
+        started = time.monotonic()
+        error = None
+        try:
+            done = subprocess.run(
+                [*(command or DIAGNOSE), str(dataset), "--out", str(out)],
+                cwd=desk,
+                env={name: os.environ[name] for name in _PASSED_ON if name in os.environ},
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                timeout=PATIENCE_S,
+                check=False,
+            )
+            if done.returncode != 0:
+                error = f"exit status {done.returncode}: {done.stderr.strip()[-600:]}"
+        except subprocess.TimeoutExpired:
+            error = f"no answer within {PATIENCE_S:g} s"
+        seconds = round(time.monotonic() - started, 2)
+        diagnosis = None
+        if error is None:
+            try:
+                diagnosis = json.loads((out / "diagnosis.json").read_text("utf-8"))
+            except (OSError, ValueError) as fault:
+                error = f"no diagnosis.json that can be read ({fault})"
+    return {"diagnosis": diagnosis, "error": error, "seconds": seconds, "recordings_sha256": fingerprint}

@@ -1,0 +1,277 @@
+"""Score diagnoses against opened answers: verdict, set, place, parameters, and what they add up to over many cases.
+
+Everything here is told by two documents, an `Answer` and the content of a ``diagnosis.json``; nothing is simulated.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from math import isfinite, pi
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.stats import beta
+
+from discsim.effects.catalogue import CATALOGUE, row
+from discsim.errors import InputError
+from validation.challenge.conceal import Answer
+
+__all__ = ["NOTHING", "CaseScore", "Deviation", "Rate", "confusion", "rate", "score_case", "summary"]
+
+#: an event is in the right place within this, s (docs/diagnosis contract)
+INSTANT_S = 0.1
+#: kinds of case in which the baseline, with what it states, explains the recordings
+NOTHING = ("nothing", "noise", "within_sigma", "beyond_sigma")
+#: the verdicts that claim that something is missing
+_ALARMS = ("explained", "unexplained")
+#: keys under which a rig's friction may stand in ``recalibrated``
+_RIG_KEYS = {"viscous_N_m_s": ("viscous_N_m_s", "viscous")}
+
+
+class Deviation(NamedTuple):
+    """One parameter: what was concealed, what was found, its standard deviation (None: not determined)."""
+
+    effect: str
+    name: str
+    true: float
+    value: float
+    sd: float | None
+
+    @property
+    def in_sd(self) -> float | None:
+        """The error in standard deviations; None where the data do not determine the parameter."""
+        if self.sd is None or self.sd <= 0:
+            return None
+        return (self.value - self.true) / self.sd
+
+
+@dataclass(frozen=True)
+class CaseScore:
+    """How one diagnosis compares with its answer.
+
+    ``right_place`` is None where nothing was concealed that has a place (an event, a sensor). ``named`` are the ids
+    that the diagnosis names; ``within_confusion`` tells that each concealed effect is named or listed as
+    indistinguishable from one that is, and nothing else is named.
+    """
+
+    named: tuple[str, ...]
+    right_verdict: bool
+    right_set: bool
+    within_confusion: bool
+    right_place: bool | None
+    deviations: tuple[Deviation, ...]
+    heldout_before: float | None
+    heldout_after: float | None
+    crashed: bool = False
+
+    @property
+    def right(self) -> bool:
+        """Verdict, set and place are all right."""
+        return self.right_verdict and self.right_set and self.right_place is not False
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what ``challenge.json`` keeps of it."""
+        kept = asdict(self)
+        kept["deviations"] = [{**item._asdict(), "in_sd": item.in_sd} for item in self.deviations]
+        return kept
+
+
+def score_case(answer: Answer, diagnosis: Mapping[str, Any] | None) -> CaseScore:
+    """Compare a diagnosis (the content of ``diagnosis.json``; None where there is none) with its answer.
+
+    Raises `InputError` where the diagnosis breaks its contract.
+    """
+    if diagnosis is None:
+        return CaseScore((), False, False, False, None, (), None, None, crashed=True)
+    try:
+        effects = list(diagnosis["effects"])
+        named = tuple(sorted({effect["id"] for effect in effects}))
+        found = diagnosis["verdict"]
+        fit = diagnosis["fit"]
+        before, after = (fit[stage]["heldout_chi2_per_sample"] for stage in ("baseline", "final"))
+        hidden = set(answer.effects)
+        return CaseScore(
+            named=named,
+            right_verdict=found in answer.verdict.split("|"),
+            right_set=set(named) == hidden and (bool(hidden) or found not in _ALARMS or answer.verdict == found),
+            within_confusion=_within_confusion(hidden, effects),
+            right_place=_right_place(answer, effects, diagnosis["located"]),
+            deviations=tuple(_deviations(answer, effects, diagnosis["recalibrated"])),
+            heldout_before=before,
+            heldout_after=after,
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"the diagnosis of seed {answer.seed} is not as its contract says ({type(error).__name__}: {error}); "
+            "expected the content of a diagnosis.json"
+        ) from None
+
+
+def _within_confusion(hidden: set[str], effects: Sequence[Mapping[str, Any]]) -> bool:
+    """Tell whether the named effects can be matched with the concealed ones, each by id or by a listed confusion."""
+    groups = {effect["id"]: {effect["id"], *(other["id"] for other in effect["confused_with"])} for effect in effects}
+    if len(groups) != len(hidden):
+        return False
+    left = set(hidden)
+    for id in [*(id for id in groups if id in hidden), *(id for id in groups if id not in hidden)]:
+        match = {id} & left or groups[id] & left
+        if not match:
+            return False
+        left.discard(min(match))
+    return not left
+
+
+def _right_place(
+    answer: Answer, effects: Sequence[Mapping[str, Any]], located: Sequence[Mapping[str, Any]]
+) -> bool | None:
+    """Tell whether events are named in their recording at their instant, and faults of sensors located at them."""
+    verdicts = []
+    for id in answer.effects:
+        kind = row(id)
+        if kind.event:
+            verdicts.append(any(effect["id"] == id and _at_instant(answer, effect) for effect in effects))
+        elif kind.acts_on not in ("motion", "clock"):
+            verdicts.append(any(place["sensor"] in ("all", kind.acts_on) for place in located))
+    return all(verdicts) if verdicts else None
+
+
+def _at_instant(answer: Answer, effect: Mapping[str, Any]) -> bool:
+    if effect["recordings"] == "all" or tuple(effect["recordings"]) != answer.recordings:
+        return False
+    instant = effect["parameters"].get("t_s")
+    return instant is not None and abs(instant["value"] - answer.parameters["t_s"]) <= INSTANT_S
+
+
+def _deviations(
+    answer: Answer, effects: Sequence[Mapping[str, Any]], recalibrated: Mapping[str, Mapping[str, Any]]
+) -> Iterable[Deviation]:
+    """Yield every parameter that was concealed and found; one that is not in the answer stands at its baseline."""
+    for effect in effects:
+        id = effect["id"]
+        if id not in answer.effects:
+            continue
+        if row(id).event and not _at_instant(answer, effect):
+            continue  # another event: its numbers have no true ones
+        none = row(id).baseline._asdict()
+        found = {name: (item["value"], item["sd"]) for name, item in effect["parameters"].items()}
+        for name, (value, sd) in _one_way_to_say_it(id, found).items():
+            true = answer.parameters.get(name, none[name])
+            if isfinite(true):
+                yield Deviation(id, name, true, _near(name, value, true), sd)
+    for name, true in answer.moved.items():
+        for key in _RIG_KEYS.get(name, (name,)):
+            if key in recalibrated:
+                yield Deviation("recalibrated", name, true, recalibrated[key]["value"], recalibrated[key]["sd"])
+
+
+def _one_way_to_say_it(id: str, found: dict[str, tuple[float, float | None]]) -> dict[str, tuple[float, float | None]]:
+    """Turn a ripple of negative amplitude into one of positive amplitude half a turn on: they are the same."""
+    if id == "rig.speed_ripple" and "amplitude_rad_s" in found and found["amplitude_rad_s"][0] < 0:
+        value, sd = found["amplitude_rad_s"]
+        found["amplitude_rad_s"] = (-value, sd)
+        if "phase_rad" in found:
+            value, sd = found["phase_rad"]
+            found["phase_rad"] = (value + pi, sd)
+    return found
+
+
+def _near(name: str, value: float, true: float) -> float:
+    """Return a phase as the one of its turns nearest to the true one, anything else as it is."""
+    if name != "phase_rad":
+        return value
+    return true + (value - true + pi) % (2 * pi) - pi
+
+
+# ---------------------------------------------------------------------------------------------- over many cases
+
+
+class Rate(NamedTuple):
+    """A share of cases: ``hits`` of ``of``, with Clopper and Pearson's exact interval of 95 %."""
+
+    hits: int
+    of: int
+    low: float
+    high: float
+
+    @property
+    def value(self) -> float:
+        """The share; NaN of no cases."""
+        return self.hits / self.of if self.of else float("nan")
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the entry of ``challenge.json``."""
+        return {"value": self.value, "interval_95": [self.low, self.high], "count": self.hits, "of": self.of}
+
+
+def rate(outcomes: Iterable[bool]) -> Rate:
+    """Return the share of outcomes that are true; of none the interval is 0 to 1."""
+    list_ = list(outcomes)
+    count, of = sum(list_), len(list_)
+    low = float(beta.ppf(0.025, count, of - count + 1)) if count else 0.0
+    high = float(beta.ppf(0.975, count + 1, of - count)) if count < of else 1.0
+    return Rate(count, of, low, high)
+
+
+def summary(
+    scored: Sequence[tuple[Answer, Mapping[str, Any] | None, CaseScore]], strengths: Sequence[float | None] = ()
+) -> dict[str, Rate]:
+    """Return the shares that the challenge is judged by.
+
+    ``strengths`` (where given) holds each case's smallest concealed size in units of its detection limit: the rate of
+    right sets is also told for the cases above twice that. A diagnosis that crashed is never right, and no false
+    alarm. Parameters of one case are not independent, so intervals of the coverage are a little too narrow.
+    """
+    strengths = list(strengths) or [None] * len(scored)
+    blank = [(d, s) for a, d, s in scored if a.kind in NOTHING]
+    hidden = [s for a, _, s in scored if a.effects]
+    strong = [
+        s for (a, _, s), size in zip(scored, strengths, strict=True) if a.effects and size is not None and size >= 2.0
+    ]
+    unknown = [(d, s) for a, d, s in scored if a.kind == "off_catalogue"]
+    deviates = [z for _, _, s in scored for item in s.deviations if (z := item.in_sd) is not None]
+    placed = [s.right_place for _, _, s in scored if s.right_place is not None]
+    gained = [
+        s.heldout_after < s.heldout_before
+        for s in hidden
+        if s.right_set and s.heldout_before is not None and s.heldout_after is not None
+    ]
+    return {
+        "false_alarm_rate": rate(d is not None and d["verdict"] in _ALARMS for d, _ in blank),
+        "right_set_rate": rate(s.right_set for s in hidden),
+        "right_set_rate_above_twice_the_limit": rate(s.right_set for s in strong),
+        "right_set_or_listed_confusion_rate": rate(s.within_confusion for s in hidden),
+        "right_verdict_rate": rate(s.right_verdict for _, _, s in scored),
+        "right_place_rate": rate(bool(place) for place in placed),
+        "coverage_1sd": rate(abs(z) <= 1.0 for z in deviates),
+        "coverage_2sd": rate(abs(z) <= 2.0 for z in deviates),
+        "off_catalogue_misnamed_rate": rate(d is not None and d["verdict"] == "explained" for d, _ in unknown),
+        "off_catalogue_noticed_rate": rate(d is not None and d["verdict"] == "unexplained" for d, _ in unknown),
+        "heldout_improved_rate": rate(gained),
+        "crash_rate": rate(s.crashed for _, _, s in scored),
+    }
+
+
+def confusion(scored: Sequence[tuple[Answer, Mapping[str, Any] | None, CaseScore]]) -> dict[str, Counter[str]]:
+    """Return, by what was concealed (an id, "nothing", "off-catalogue"), how often each thing was named.
+
+    Of two concealed effects each is a row; one that is not named counts for whatever else was named in its place, or
+    for the verdict where nothing was.
+    """
+    table: dict[str, Counter[str]] = {}
+    for answer, diagnosis, score in scored:
+        rows = answer.effects or ("off-catalogue" if answer.kind == "off_catalogue" else "nothing",)
+        verdict = "no answer" if diagnosis is None else str(diagnosis["verdict"])
+        wrong = [id for id in score.named if id not in answer.effects]
+        for concealed in rows:
+            cells = [concealed] if concealed in score.named else wrong or [verdict]
+            table.setdefault(concealed, Counter()).update(cells)
+    order = [*CATALOGUE, "nothing", "off-catalogue"]
+    return {name: table[name] for name in order if name in table}
+
+
+def median(values: Iterable[float]) -> float:
+    """Return the median of what is finite; NaN of nothing."""
+    finite = [value for value in values if isfinite(value)]
+    return float(np.median(finite)) if finite else float("nan")
