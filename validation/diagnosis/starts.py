@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from discsim.arrays import FloatArray
+from discsim.arrays import BoolArray, FloatArray
 from discsim.compiled import compiled
 from discsim.disc import Release
 from discsim.frames import attitude_matrix, body_to_ned, multiply, quaternion_from_matrix, rotation_vector, turn
@@ -35,8 +35,12 @@ PATH_HALF = 0.45
 FEWEST = 12
 #: of the smoothing of the spin's phase, s (one sigma)
 PHASE_SIGMA = 0.05
+#: of the smoothing of the spin rate given, s: lost readings make steps of phase that are no rate
+RATE_SIGMA = 0.15
 #: of the smoothing of field and specific force in S, s
 VECTOR_SIGMA = 0.15
+#: slower than this, rad/s, an unclipped gyroscope tells the spin better than the field's phase, which precession bends
+SLOW = 12.0
 #: over which a local attitude is averaged after the gyroscope's turning is taken out, s
 ATTITUDE_SIGMA = 0.4
 #: prior standard deviation of hard iron along the spin axis, uT, and of the field's gain
@@ -85,18 +89,27 @@ class _Spin(NamedTuple):
 
 
 class _Attitude(NamedTuple):
-    """The frame that does not spin: ``psi`` and ``r`` on ``grid``; ``D`` (n, 4) turns S into S at the start."""
+    """The frame that does not spin: ``psi`` and ``r`` on ``grid``; ``D`` (n, 4) turns S into S at the start.
+
+    ``transverse`` (n,) is p + i q of the gyroscope, ``field`` the magnetometer's readings in B less the iron across
+    the axis; both None where they are missing.
+    """
 
     grid: FloatArray
     psi: FloatArray
     r: FloatArray
     D: FloatArray
     transverse: ComplexArray | None
+    field: _Readings | None
 
     def psi_at(self, t: FloatArray) -> FloatArray:
-        return _curve(self.grid, self.psi, self.r, t)
+        """Return psi (k,) at t (k,), which runs on at the last rate outside."""
+        inside = np.clip(t, self.grid[0], self.grid[-1])
+        ends = np.where(t < self.grid[0], self.r[0], self.r[-1])
+        return np.asarray(np.interp(inside, self.grid, self.psi) + ends * (t - inside))
 
     def D_at(self, t: FloatArray) -> FloatArray:
+        """Return the relative attitudes (k, 4) of S at t (k,)."""
         return _between(self.grid, self.D, t)
 
 
@@ -149,7 +162,7 @@ def rig_starts(recording: Recording, t: FloatArray) -> tuple[FloatArray, FloatAr
     if spin is None:
         grid = np.arange(0.0, max(recording.end, float(np.max(t, initial=0.0))) + 0.02, 0.01)
         r = np.zeros(grid.size) if expected is None else expected(grid)
-        psi = np.concatenate([[0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(grid))])
+        psi = _integral(grid, r)
         return np.interp(t, grid, psi), np.interp(t, grid, r)
     north, east, _ = recording.environment.magnetic_field
     # m_B = C3(psi) B: the complex field in B is that in N times exp(-i psi)
@@ -407,33 +420,87 @@ def _composed(step: FloatArray) -> FloatArray:
 def _frame(recording: Recording) -> _Attitude:
     """Return psi, r and the relative attitude of the frame that does not spin over the whole recording."""
     expected = _expected_rate(recording)
-    spin = _spin(recording, "magnetometer", expected, steady=False)
-    magnetic = spin is not None
-    if spin is None:
-        spin = _spin(recording, "accelerometer", expected, steady=False)
     gyroscope = _readings(recording, "gyroscope", slice(0, 2))
-    grid = spin.grid if gyroscope is None and spin is not None else gyroscope.t if gyroscope is not None else None
-    if grid is None:
-        grid = np.arange(0.0, max(recording.end, 1.0), 0.01)
+    if gyroscope is not None and expected is not None and _median(expected(gyroscope.t)) < SLOW:
+        return _slow_frame(recording, gyroscope, expected(gyroscope.t))
+    spin = _spin(recording, "magnetometer", expected, steady=False)
+    field = None
+    if spin is not None:
+        full = _readings(recording, "magnetometer")
+        if full is not None:
+            across = np.interp(full.t, spin.t, spin.plane.real), np.interp(full.t, spin.t, spin.plane.imag)
+            field = _Readings(full.t, np.column_stack([*across, full.value[:, 2]]))
+    else:
+        spin = _spin(recording, "accelerometer", expected, steady=False)
+    if gyroscope is not None:
+        grid = gyroscope.t
+    else:
+        grid = spin.grid if spin is not None else np.arange(0.0, max(recording.end, 1.0), 0.01)
     if spin is None:
         r = np.zeros(grid.size) if expected is None else expected(grid)
         if expected is None and (centripetal := _centripetal(recording)) is not None:
             r = _sign(recording) * centripetal(grid)
-        psi = np.concatenate([[0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(grid))])
+        psi = _integral(grid, r)
     else:
         psi, r = -spin.phase_at(grid), -np.interp(grid, spin.grid, spin.rate)
     if gyroscope is None:
         identity = np.tile([1.0, 0.0, 0.0, 0.0], (grid.size, 1))
-        return _Attitude(grid, psi, r, identity, None)
+        return _Attitude(grid, psi, _calm(grid, r), identity, None, field)
     w = gyroscope.value[:, 0] + 1j * gyroscope.value[:, 1]
     if abs(psi[-1] - psi[0]) > 10 * np.pi:
         w = w - np.mean(w)  # over many turns p and q average to the sensor's bias
-    if magnetic and spin is not None:
+    if field is not None and spin is not None:
         psi, r = _without_precession(recording, spin, grid, psi, r, w)
+    return _Attitude(grid, psi, _calm(grid, r), _despun(grid, psi, w), w, field)
+
+
+def _slow_frame(recording: Recording, gyroscope: _Readings, r: FloatArray) -> _Attitude:
+    """Return the frame of a disc that turns slowly, from the gyroscope alone; iron from a field that stands still."""
+    grid, w = gyroscope.t, gyroscope.value[:, 0] + 1j * gyroscope.value[:, 1]
+    psi = _integral(grid, r)
+    frame = _Attitude(grid, psi, r, _despun(grid, psi, w), w, None)
+    readings = _readings(recording, "magnetometer")
+    if readings is None:
+        return frame
+    strength = float(np.linalg.norm(recording.environment.magnetic_field))
+    about = frame.psi_at(readings.t)[:, None] * np.array([0.0, 0.0, 1.0])
+    C = body_to_ned(multiply(frame.D_at(readings.t), turn(about)))
+    # C (m - b) = m_0: linear in b and m_0, whose length is drawn to the field's
+    iron, still = np.zeros(3), np.mean(np.einsum("nij,nj->ni", C, readings.value), axis=0)
+    rows = np.concatenate([C, np.broadcast_to(np.eye(3), C.shape)], axis=2).reshape(-1, 6)
+    target = np.einsum("nij,nj->ni", C, readings.value).ravel()
+    share = len(rows) / 60.0  # the gyroscope's drift makes errors of readings nearby the same
+    for _ in range(5):
+        n = still / max(float(np.linalg.norm(still)), 1e-9)
+        information = rows.T @ rows / (share * (0.06 * strength) ** 2)
+        pull = rows.T @ target / (share * (0.06 * strength) ** 2)
+        information[:3, :3] += np.eye(3) / IRON_SD**2
+        information[3:, 3:] += np.outer(n, n) / (0.05 * strength) ** 2 + 1e-9 * np.eye(3)
+        pull[3:] += n * strength / (0.05 * strength) ** 2
+        solution = np.linalg.solve(information, pull)
+        iron, still = solution[:3], solution[3:]
+    return frame._replace(field=_Readings(readings.t, readings.value - iron))
+
+
+def _median(value: FloatArray) -> float:
+    return float(np.median(np.abs(value)))
+
+
+def _integral(grid: FloatArray, r: FloatArray) -> FloatArray:
+    return np.concatenate([[0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(grid))])
+
+
+def _calm(grid: FloatArray, r: FloatArray) -> FloatArray:
+    """Return a rate (n,) without its changes within a tenth of a second."""
+    coarse = np.linspace(grid[0], grid[-1], max(2, int((grid[-1] - grid[0]) / 0.05)))
+    return np.asarray(np.interp(grid, coarse, _smoothed(grid, r, coarse, RATE_SIGMA)))
+
+
+def _despun(grid: FloatArray, psi: FloatArray, w: ComplexArray) -> FloatArray:
+    """Return the relative attitudes (n, 4) of S from p + i q (n,)."""
     W = w * np.exp(1j * psi)
     middle = 0.5 * (W[1:] + W[:-1]) * np.diff(grid)
-    D = _composed(np.column_stack([middle.real, middle.imag, np.zeros(middle.size)]))
-    return _Attitude(grid, psi, r, D, w)
+    return _composed(np.column_stack([middle.real, middle.imag, np.zeros(middle.size)]))
 
 
 def _sign(recording: Recording) -> float:
@@ -478,11 +545,12 @@ def _turned_to_ned(
     With a perfect gyroscope all would be the same matrix. ``force`` (n, 3) is the specific force in N.
     """
     field = recording.environment.magnetic_field
-    fast = float(np.median(np.abs(frame.r)))
-    sigma = float(np.clip(3.0 / max(fast, 0.1), VECTOR_SIGMA, 0.5))
+    # a turn or so, except that at a slow spin nothing needs to average out
+    fast = _median(frame.r)
+    sigma = float(np.clip(3.0 / max(fast, 0.1), VECTOR_SIGMA, 0.4)) if fast > 2.0 else VECTOR_SIGMA
     axis = body_to_ned(frame.D_at(grid))[:, :, 2]
-    magnetic = _in_start_frame(recording, "magnetometer", frame, grid, sigma)
-    felt = _in_start_frame(recording, "accelerometer", frame, grid, sigma) if force is not None else None
+    magnetic = None if frame.field is None else _field_in_start(frame.field, frame, grid, sigma)
+    felt = _force_in_start(recording, frame, grid, sigma) if force is not None else None
     if magnetic is not None:
         gyroscope = frame.transverse is not None
         magnetic = _without_axial_iron(magnetic, axis, field, felt, force, wandering=not gyroscope)
@@ -490,39 +558,85 @@ def _turned_to_ned(
     if magnetic is None and felt is None:
         return _level(recording, frame, grid), False
     if magnetic is not None and felt is not None and force is not None:
-        return _averaged(_wahba(magnetic, felt, field, force), sigma), True
+        return _rotations(_windowed(_pairs(magnetic, felt, field, force), sigma)), True
     if magnetic is not None:
         # one direction: in S at the start the field stands still, so all instants share it
         turns = np.array([_level_about(mean, field, axis[0]) for mean in _windowed(magnetic, 1.0)])
         return _stated_turn(recording, frame, _connected(turns, field), field), False
     assert felt is not None
     assert force is not None
-    turns = np.array([_level_about(f, g, a) for f, g, a in zip(felt, force, axis, strict=True)])
-    return _averaged(turns, sigma), False
+    # the force alone, but it moves: over the whole flight there is one best turn, from which each instant departs
+    K = _pairs(None, felt, field, force)
+    whole = _rotations(np.sum(K, axis=0, keepdims=True))
+    return _rotations(_windowed(K, sigma) + 0.05 * whole), False
 
 
-def _in_start_frame(
-    recording: Recording, sensor: str, frame: _Attitude, grid: FloatArray, sigma: float
-) -> FloatArray | None:
-    """Return a sensor's vector, smoothed, in S at the start, (n, 3); None where the sensor cannot tell."""
-    readings = _readings(recording, sensor)
-    if readings is None:
-        return None
-    t, value = readings
-    psi = frame.psi_at(t)
-    plane = value[:, 0] + 1j * value[:, 1]
-    if sensor == "magnetometer":
-        spin = _spin(recording, sensor, _line(frame.grid, frame.r), steady=False)
-        if spin is not None and spin.t.size == t.size:
-            plane = spin.plane
-    else:
-        position = recording.sheets[sensor].position
-        if position is not None:
-            plane = plane + np.interp(t, frame.grid, frame.r) ** 2 * complex(*position[:2])
-    plane = plane * np.exp(1j * psi)
+def _field_in_start(field: _Readings, frame: _Attitude, grid: FloatArray, sigma: float) -> FloatArray:
+    """Return the field, smoothed, in S at the start, (n, 3)."""
+    t, value = field
+    plane = (value[:, 0] + 1j * value[:, 1]) * np.exp(1j * frame.psi_at(t))
     C = body_to_ned(frame.D_at(t))
     vector = np.einsum("nij,nj->ni", C, np.column_stack([plane.real, plane.imag, value[:, 2]]))
     return _smoothed(t, vector, grid, sigma)
+
+
+def _force_in_start(recording: Recording, frame: _Attitude, grid: FloatArray, sigma: float) -> FloatArray | None:
+    """Return the specific force of the centre, smoothed, in S at the start, (n, 3); None where it cannot be told.
+
+    Around each instant, by least squares, f_x + i f_y = c + F exp(-i psi): c is what the sensor's place and bias make
+    and stands still in B, F what stands still in S. So a clipped axis leaves the other one to tell F.
+    """
+    samples = recording.get("accelerometer")
+    if samples is None:
+        return None
+    sheet = recording.sheets["accelerometer"]
+    lost = sheet.clipped(samples.value) | ~np.isfinite(samples.value) | _stuck(samples.value, sheet.resolution or 0.0)
+    x, y, z = np.where(lost, 0.0, samples.value).T
+    seen = (~lost).astype(float)
+    if np.count_nonzero(seen[:, 2]) < FEWEST or np.count_nonzero(seen[:, 0] + seen[:, 1]) < FEWEST:
+        return None
+    t = samples.t
+    c, s = np.cos(frame.psi_at(t)), np.sin(frame.psi_at(t))
+    one, zero = np.ones(t.size), np.zeros(t.size)
+    rows = (np.stack([one, zero, c, s], axis=1), np.stack([zero, one, -s, c], axis=1))
+    products = [
+        np.concatenate([(a[:, :, None] * a[:, None, :]).reshape(-1, 16), a * value[:, None]], axis=1) * weight[:, None]
+        for a, value, weight in zip(rows, (x, y), (seen[:, 0], seen[:, 1]), strict=True)
+    ]
+    sums = _sums(t, np.column_stack([products[0] + products[1], z, seen[:, 2]]), grid, sigma)
+    r = np.interp(grid, frame.grid, frame.r)
+    place = np.zeros(2) if sheet.position is None else sheet.position[:2]
+    still = -(r**2)[:, None] * place
+    # prior of c: a sixth of the centripetal share (1.5 mm in 16) and a bias of 1 m/s^2; of F: 20 m/s^2
+    precision = 1 / (1.0 + 0.15 * np.linalg.norm(still, axis=1)) ** 2
+    information = sums[:, :16].reshape(-1, 4, 4) + 1e-3 * np.eye(4)
+    information[:, 0, 0] += precision
+    information[:, 1, 1] += precision
+    pull = sums[:, 16:20].copy()
+    pull[:, :2] += precision[:, None] * still
+    solution = np.linalg.solve(information, pull[:, :, None])[:, :, 0]
+    along = sums[:, 20] / np.maximum(sums[:, 21], 1e-9)
+    vector = np.column_stack([solution[:, 2:], along])
+    vector[sums[:, 21] < 2.0] = 0.0  # nothing read here: a vector without length has no weight
+    return np.asarray(np.einsum("nij,nj->ni", body_to_ned(frame.D_at(grid)), vector))
+
+
+def _stuck(value: FloatArray, resolution: float) -> BoolArray:
+    """Tell which readings (n, k) stand at an axis's own extreme again and again: it clips below its stated range."""
+    top = np.nanmax(np.where(np.isfinite(value), np.abs(value), 0.0), axis=0)
+    at_top = np.abs(value) >= top - 0.5 * resolution - 1e-9
+    # of noisy readings that are rounded only a few share the largest value
+    return np.asarray(at_top & (np.count_nonzero(at_top, axis=0) > max(8, 0.02 * len(value))))
+
+
+def _sums(t: FloatArray, columns: FloatArray, at: FloatArray, sigma: float) -> FloatArray:
+    """Return sums (m, k) of columns (n, k) with Gaussian weights around the instants (m,)."""
+    lo, hi = np.searchsorted(t, at - 3.5 * sigma), np.searchsorted(t, at + 3.5 * sigma)
+    out = np.zeros((at.size, columns.shape[1]))
+    for i, instant in enumerate(at):
+        x = (t[lo[i] : hi[i]] - instant) / sigma
+        out[i] = np.exp(-0.5 * x * x) @ columns[lo[i] : hi[i]]
+    return out
 
 
 def _without_axial_iron(
@@ -567,19 +681,23 @@ def _without_axial_iron(
     return np.asarray(x[1] * (m - x[0] * axis))
 
 
-def _wahba(m: FloatArray, f: FloatArray, field: FloatArray, force: FloatArray) -> FloatArray:
-    """Return rotations (n, 3, 3) that take m and f (n, 3) to field (3,) and force (n, 3)."""
+def _pairs(m: FloatArray | None, f: FloatArray, field: FloatArray, force: FloatArray) -> FloatArray:
+    """Return the matrices (n, 3, 3) of Wahba's problem for m and f (n, 3) to be taken to field (3,) and force (n, 3).
+
+    The specific force counts where felt and path agree on its size, and is large enough to have a direction.
+    """
 
     def unit(v: FloatArray) -> FloatArray:
         return np.asarray(v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9))
 
-    strong = np.minimum(np.linalg.norm(force, axis=1) / 5.0, 1.0) ** 2
-    pairs = (
-        (0.3 * np.ones(len(m)), unit(np.broadcast_to(field, m.shape)), unit(m)),
-        (strong, unit(force), unit(f)),
-        (0.1 * strong, unit(np.cross(field, force)), unit(np.cross(m, f))),
-    )
-    return _rotations(sum(np.einsum("n,ni,nj->nij", *pair) for pair in pairs))
+    size, other = np.linalg.norm(force, axis=1), np.linalg.norm(f, axis=1)
+    agreement = 1 / (1 + ((size - other) / (1.0 + 0.1 * size)) ** 2)
+    strong = np.minimum(np.minimum(size, other) / 5.0, 1.0) ** 2 * agreement**2 + 1e-3 * (other > 0)
+    K = np.einsum("n,ni,nj->nij", strong, unit(force), unit(f))
+    if m is not None:
+        K += 0.3 * np.einsum("i,nj->nij", unit(field), unit(m))
+        K += np.einsum("n,ni,nj->nij", 0.1 * strong, unit(np.cross(field, force)), unit(np.cross(m, f)))
+    return np.asarray(K)
 
 
 def _rotations(K: FloatArray) -> FloatArray:
@@ -596,10 +714,6 @@ def _weights(n: int, sigma: float) -> FloatArray:
 
 def _windowed(value: FloatArray, sigma: float) -> FloatArray:
     return np.asarray(np.tensordot(_weights(len(value), sigma), value, axes=1))
-
-
-def _averaged(turns: FloatArray, sigma: float) -> FloatArray:
-    return _rotations(_windowed(turns, sigma))
 
 
 def _level_about(v: FloatArray, reference: FloatArray, axis: FloatArray) -> FloatArray:
@@ -706,7 +820,7 @@ def _path_at(recording: Recording, t: FloatArray) -> tuple[FloatArray, FloatArra
 
 
 def _path_fit(recording: Recording, sensor: str, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Fit a quadratic to the fixes around each instant; outliers lose their weight step by step."""
+    """Fit a cubic to the fixes around each instant; outliers lose their weight step by step."""
     samples, sheet = recording.samples[sensor], recording.sheets[sensor]
     sd = sheet.noise_rms or 0.2
     velocity_sd = sheet.velocity_noise_rms or 0.1
@@ -726,15 +840,15 @@ def _path_fit(recording: Recording, sensor: str, t: FloatArray) -> tuple[FloatAr
         with_rate = moving[chosen]
         A = np.concatenate(
             [
-                np.column_stack([one, tau, 0.5 * tau**2]) / sd,
-                np.column_stack([zero, one, tau])[with_rate] / velocity_sd,
+                np.column_stack([one, tau, tau**2 / 2, tau**3 / 6]) / sd,
+                np.column_stack([zero, one, tau, tau**2 / 2])[with_rate] / velocity_sd,
             ]
         )
         y = np.concatenate([value[chosen, :3] / sd, fast[chosen][with_rate] / velocity_sd])
         weight = np.ones(len(A))
-        solution = np.zeros((3, 3))
-        # a throw's acceleration is below 3 g: keeps few fixes from inventing one
-        ridge = np.diag([1e-9, 1e-9, 1.0 / 30.0**2])
+        solution = np.zeros((4, 3))
+        # a throw's acceleration is below 3 g, its change a few g per second: keeps few fixes from inventing more
+        ridge = np.diag([1e-9, 1e-9, 1.0 / 30.0**2, 1.0 / 40.0**2])
         for scale in (None, 30.0, 10.0, 4.0, 3.0):
             if scale is not None:
                 misfit = np.linalg.norm(y - A @ solution, axis=1)
@@ -743,7 +857,7 @@ def _path_fit(recording: Recording, sensor: str, t: FloatArray) -> tuple[FloatAr
                 weight = 1 / (1 + (misfit / (scale * usual)) ** 2) ** 2
             weighted = A * weight[:, None]
             solution = np.linalg.solve(weighted.T @ A + ridge, weighted.T @ y)
-        position[i], velocity[i], acceleration[i] = solution
+        position[i], velocity[i], acceleration[i] = solution[:3]
     return position, velocity, acceleration
 
 
@@ -758,7 +872,7 @@ def _dead_reckoning(
         position = np.array(release.position)
     if release is not None and release.velocity is not None:
         velocity = np.array(release.velocity)
-    felt = _in_start_frame(recording, "accelerometer", frame, grid, VECTOR_SIGMA)
+    felt = _force_in_start(recording, frame, grid, VECTOR_SIGMA)
     acceleration = np.zeros((grid.size, 3))
     if felt is not None:
         # a wrong attitude must not carry the disc away: specific force of a glide is below 2 g
