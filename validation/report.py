@@ -7,11 +7,12 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from discsim.files import write_text
 from validation.run import package_version
 
-__all__ = ["Section", "write_report"]
+__all__ = ["Section", "write_page", "write_report"]
 
 _NUMBER = re.compile(r"^[-+\u2212]?\d[\d,.]*(e[-+]?\d+)?( ?%)?$")
 
@@ -34,13 +35,16 @@ class Section:
 
 def write_report(path: Path, title: str, lead: str, sections: Sequence[Section]) -> None:
     """Write the page to ``path``, figures embedded."""
+    write_page(path, "report.html", title=title, lead=lead, sections=sections)
+
+
+def write_page(path: Path, template: str, **content: Any) -> None:
+    """Write a page to ``path`` from one of ``validation/templates``; raises where the template lacks some content."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
         loader=PackageLoader("validation"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
     environment.tests["number_cell"] = lambda cell: bool(_NUMBER.match(str(cell)))
-    page = environment.get_template("report.html").render(
-        title=title, lead=lead, sections=sections, footer=f"discsim {package_version()}"
-    )
+    page = environment.get_template(template).render(footer=f"discsim {package_version()}", **content)
     write_text(path, page)

@@ -156,7 +156,7 @@ def test_an_effect_appears_twice_only_in_disjoint_recordings_and_events_as_often
     ],
 )
 def test_what_may_not_be_written_is_refused_where_it_is_made(wrong):
-    with pytest.raises(ValueError, match="expected|never moves"):
+    with pytest.raises(ValueError, match=r"expected|never moves"):
         wrong()
 
 

@@ -1,0 +1,185 @@
+"""Figures of a diagnosis: residuals before and after, over all recordings and sensor by sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+
+from discsim.arrays import FloatArray
+from discsim.recording import SENSORS
+from validation.diagnosis.answer import Located, Residuals
+from validation.figures import new_figure
+
+__all__ = ["draw_overview", "draw_sensor", "readable_axis", "sensors_of"]
+
+#: Okabe and Ito's colours and two more; recordings beyond these share them in turn
+_SHADES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#6a3d9a", "#7f7f7f")
+_MARK = "#e8b400"
+#: residuals are drawn linear to this many standard deviations and logarithmic beyond
+_LINEAR = 3.0
+#: most points drawn of one axis of one recording; of more the largest of each run is kept
+_MOST_POINTS = 3000
+#: a span shorter than this share of the time shown is shaded over the whole height
+_SHORT = 0.25
+#: the overview's colours change at these multiples of the noise, and it has room for this many recordings
+_STEPS = (0.0, 1.15, 1.5, 2.0, 4.0, 10.0, 30.0, 100.0)
+_MOST_ROWS = 30
+
+
+def readable_axis(axis: str) -> str:
+    """Return ``v_north_m_s`` as "v north": a column's name without its unit."""
+    units = ("uT", "m_s2", "rad_s", "m_s", "m")
+    ending = next((f"_{unit}" for unit in units if axis.endswith(f"_{unit}")), "")
+    return axis.removesuffix(ending).replace("_", " ")
+
+
+def sensors_of(residuals: Iterable[Residuals]) -> list[str]:
+    """Return the sensors that have residuals, in the order of the recording format, others after them."""
+    present = list(dict.fromkeys(item.sensor for item in residuals))
+    return [sensor for sensor in SENSORS if sensor in present] + [s for s in present if s not in SENSORS]
+
+
+def _rms(values: FloatArray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
+
+
+def draw_overview(residuals: Sequence[Residuals]) -> Figure:
+    """Draw the rms of each axis of each recording over its noise, before and after: where the mismatch is, at a glance.
+
+    A recording is a row; of more than fit the worst are shown.
+    """
+    columns = [
+        (sensor, axis)
+        for sensor in sensors_of(residuals)
+        for axis in dict.fromkeys(item.axis for item in residuals if item.sensor == sensor)
+    ]
+    before = {(item.recording, item.sensor, item.axis): _rms(item.before) for item in residuals}
+    after = {(item.recording, item.sensor, item.axis): _rms(item.after) for item in residuals}
+    names = list(dict.fromkeys(item.recording for item in residuals))
+    worst = {name: max(v for (recording, *_), v in before.items() if recording == name) for name in names}
+    kept = sorted(names, key=lambda name: -np.nan_to_num(worst[name]))[:_MOST_ROWS]
+    rows = [name for name in names if name in kept]
+    height = 2.0 + 0.5 * len(rows)
+    figure, panels = new_figure(2, 1, width=10.0, height=height, sharex=True)
+    _lay_out(figure, height, 2, left=min(2.5, 0.4 + 0.075 * max(map(len, rows))), bottom=1.1, gap=0.35)
+    titles = ("Before: the baseline", "After: the final model")
+    for axes, title, values in zip(panels, titles, (before, after), strict=True):
+        cells = np.array([[values.get((row, *column), np.nan) for column in columns] for row in rows])
+        norm = BoundaryNorm(_STEPS, 256, extend="max")
+        axes.imshow(np.ma.masked_invalid(cells), cmap="YlOrRd", norm=norm, aspect="auto")
+        axes.set_title(f"{title}. Residuals (rms) over the noise; 1 is noise alone")
+        axes.set_yticks(range(len(rows)), rows)
+        axes.set_facecolor("#eeeeee")
+        labels = [f"{sensor.replace('_', ' ')} {readable_axis(axis)}" for sensor, axis in columns]
+        axes.set_xticks(range(len(columns)), labels, rotation=40, ha="right", rotation_mode="anchor")
+        axes.grid(False)
+        axes.tick_params(length=0)
+        axes.spines[:].set_visible(False)
+        for (i, j), cell in np.ndenumerate(cells):
+            if np.isfinite(cell):
+                shade = "white" if cell >= 10.0 else "black"
+                axes.text(j, i, _short(float(cell)), ha="center", va="center", fontsize=7, color=shade)
+        for k in range(1, len(columns)):
+            if columns[k][0] != columns[k - 1][0]:
+                axes.axvline(k - 0.5, color="white", lw=5)
+    return figure
+
+
+def _short(value: float) -> str:
+    return f"{value:.2f}" if value < 9.995 else f"{value:.0f}" if value < 9999.5 else f"{value:.0e}"
+
+
+def _lay_out(figure: Figure, height: float, rows: int, *, left: float, bottom: float, gap: float = 0.12) -> None:
+    """Set the margins in inches; matplotlib's own layout engine would take longer than the drawing."""
+    figure.set_layout_engine(None)
+    panel = (height - bottom - 0.35 - gap * (rows - 1)) / rows
+    figure.subplots_adjust(
+        left=left / 10.0, right=0.99, bottom=bottom / height, top=1.0 - 0.35 / height, hspace=gap / panel, wspace=0.03
+    )
+
+
+def draw_sensor(sensor: str, residuals: Sequence[Residuals], located: Sequence[Located]) -> Figure:
+    """Draw a sensor's residuals over time, a row per axis, before on the left and after on the right.
+
+    The grey band holds 95 % of plain noise. Located spans are marked in the left column: a bar above the axis, and
+    shading where they are short.
+    """
+    mine = [item for item in residuals if item.sensor == sensor]
+    axes_names = list(dict.fromkeys(item.axis for item in mine))
+    names = list(dict.fromkeys(item.recording for item in residuals))
+    shades = {name: _SHADES[k % len(_SHADES)] for k, name in enumerate(names)}
+    height = 1.15 + 1.45 * len(axes_names)
+    figure, panels = new_figure(len(axes_names), 2, width=10.0, height=height, sharex=True, sharey="row", squeeze=False)
+    _lay_out(figure, height, len(axes_names), left=0.75, bottom=0.8)
+    for row, axis in zip(panels, axes_names, strict=True):
+        items = [item for item in mine if item.axis == axis]
+        for axes, which in zip(row, ("before", "after"), strict=True):
+            axes.axhspan(-1.96, 1.96, color="#000000", alpha=0.07, lw=0)
+            for item in items:
+                t, value = _thinned(item.t, item.before if which == "before" else item.after)
+                axes.plot(t, value, ".", ms=2.4, mew=0, color=shades[item.recording], alpha=0.7, rasterized=True)
+            if not any(np.isfinite(item.before).any() or np.isfinite(item.after).any() for item in items):
+                axes.text(0.5, 0.7, "no usable reading", transform=axes.transAxes, ha="center", color="#5b6773")
+        _scale(row[0], items)
+        _mark(row[0], items, located, shades)
+        row[0].set_ylabel(f"{readable_axis(axis)}\n(noise sd)")
+    for axes, title in zip(panels[0], ("before: the baseline", "after: the final model"), strict=True):
+        axes.set_title(f"{sensor.replace('_', ' ')}, {title}")
+    for axes in panels[-1]:
+        axes.set_xlabel("time (s)")
+    shown = list(dict.fromkeys(item.recording for item in mine))[: 2 * len(_SHADES)]
+    handles = [panels[0][1].plot([], [], "o", ms=4, color=shades[name], label=name)[0] for name in shown]
+    if len(shown) > 1:
+        figure.legend(handles=handles, loc="lower center", ncols=min(len(shown), 8), fontsize=8)
+    return figure
+
+
+def _thinned(t: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the known points, of many the largest of each run, so that a short fault stays visible."""
+    known = np.isfinite(value) & np.isfinite(t)
+    t, value = t[known], value[known]
+    run = -(-t.size // _MOST_POINTS)
+    if run <= 1:
+        return t, value
+    whole = t.size // run * run
+    largest = np.argmax(np.abs(value[:whole]).reshape(-1, run), axis=1) + np.arange(0, whole, run)
+    return t[largest], value[largest]
+
+
+def _scale(axes: Axes, items: Sequence[Residuals]) -> None:
+    """Scale the y axis: linear where all is within some standard deviations, else logarithmic beyond the noise."""
+    values = np.abs(np.concatenate([array for item in items for array in (item.before, item.after)]))
+    values = values[np.isfinite(values)]
+    limit = max(5.0, 1.15 * float(values.max())) if values.size else 5.0
+    if limit <= 4 * _LINEAR:
+        axes.set_ylim(-limit, limit)
+        return
+    axes.set_yscale("symlog", linthresh=_LINEAR)
+    axes.set_ylim(-limit, limit)
+    ticks = [tick for k in range(12) for tick in (10.0**k, 3.0 * 10.0**k) if _LINEAR <= tick <= 0.9 * limit]
+    ticks = ticks[:: -(-len(ticks) // 3)]
+    axes.set_yticks([*(-tick for tick in reversed(ticks)), 0.0, *ticks])
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_locator(NullLocator())
+
+
+def _mark(axes: Axes, items: Sequence[Residuals], located: Sequence[Located], shades: dict[str, str]) -> None:
+    """Mark the located spans; one of a single recording in that recording's colour."""
+    start = min((float(item.t[0]) for item in items if item.t.size), default=0.0)
+    stop = max((float(item.t[-1]) for item in items if item.t.size), default=1.0)
+    spans: list[tuple[float, float, str]] = [(*span, shades[item.recording]) for item in items for span in item.marks]
+    for place in located:
+        if any(place.covers(item.recording, item.sensor, item.axis) for item in items):
+            spans.append((place.from_s, place.to_s, shades.get(place.recording, _MARK)))
+    for begin, end, shade in dict.fromkeys(spans):
+        least = 0.004 * (stop - start)  # an instant must be seen, too
+        left, right = max(start, min(begin, (begin + end - least) / 2)), min(stop, max(end, (begin + end + least) / 2))
+        axes.axvspan(left, right, ymin=0.955, ymax=1.0, color=_MARK, lw=0)
+        if right - left < _SHORT * (stop - start):
+            axes.axvspan(left, right, color=shade, alpha=0.22, lw=0)
