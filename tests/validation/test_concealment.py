@@ -1,0 +1,245 @@
+"""Concealed effects: they are in the recordings, they are nowhere else, and the same seed gives the same bytes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from discsim.disc import Rig
+from discsim.effects.catalogue import CATALOGUE, effect
+from discsim.environment import Environment
+from discsim.errors import InputError
+from discsim.files import digest
+from discsim.recording import PLANTS, SENSORS, Samples, read_dataset
+from discsim.rig import spin_down
+from discsim.sensors import Noise
+from validation.challenge.cases import Case, Coast, Turning, draw_case
+from validation.challenge.conceal import Answer, conceal, read_answer, recordings
+from validation.challenge.physics import OFF_CATALOGUE, coast, play
+from validation.challenge.sizes import HIDING, conceivable, draw_effect
+
+#: which plant each effect is tried on here: the first of its own
+TRIED = [(id, row.plants[0]) for id, row in CATALOGUE.items()]
+SECRETS = [(name, plant) for name, kind in OFF_CATALOGUE.items() for plant in kind.plants]
+
+
+def brief(case: Case) -> Case:
+    """One run of a case, short on a rig."""
+    run = case.runs[0]
+    if isinstance(run, Coast):
+        run = replace(run, duration=3.0)
+    if isinstance(run, Turning):
+        up_and_down = Samples(np.array([0.0, 1.0, 2.0, 3.0, 4.0]), np.array([0.0, 60.0, 60.0, 20.0, 20.0]))
+        run = replace(run, profile=up_and_down)
+    here = tuple(replace(item, recording=0 if item.recording is not None else None) for item in case.concealed)
+    return replace(case, runs=(run,), concealed=here, stated_releases=case.stated_releases[:1])
+
+
+def short(case: Case) -> Case:
+    """One short run without noise: what is left differs by physics alone."""
+    quiet = case.instruments
+    for name in quiet.sensors:
+        still = ("position_noise", "velocity_noise") if name == "gps" else ("noise",)
+        quiet = quiet.fitted(name, **dict.fromkeys(still, Noise()))
+    return replace(brief(case), instruments=quiet)
+
+
+def difference(case: Case) -> float:
+    """Largest rms difference that what is concealed makes to an axis of a sensor, in steps of its stated noise."""
+    bare = replace(case, concealed=(), secret=None)
+    largest = 0.0
+    for with_it, without in zip(recordings(case), recordings(bare), strict=True):
+        assert list(with_it.samples) == list(without.samples)
+        for name, samples in with_it.samples.items():
+            other = without.samples[name]
+            if len(samples) != len(other):
+                return np.inf  # a fix that is not there, a flight that lasts longer
+            noise = with_it.sheets[name].noise_rms
+            assert noise is not None
+            apart = np.sqrt(np.nanmean((samples.value - other.value) ** 2, axis=0)) / noise
+            largest = max(largest, float(np.max(apart)))
+    return largest
+
+
+def test_every_effect_of_the_catalogue_has_a_hiding_place():
+    assert list(HIDING) == [id for id in CATALOGUE if id in HIDING]
+    assert set(HIDING) == set(CATALOGUE)
+
+
+@pytest.mark.parametrize("id", HIDING)
+def test_sizes_run_from_the_limit_to_large_and_fill_the_row(id):
+    rng = np.random.default_rng(0)
+    hiding = HIDING[id]
+    for plant in CATALOGUE[id].plants:
+        smallest, largest = hiding.limits(plant)
+        drawn = [draw_effect(id, plant, rng).value._asdict() for _ in range(50)]
+        shift = {name: hiding.about for name in hiding.sized}
+        sizes = [np.linalg.norm([values[name] - shift[name] for name in hiding.sized]) for values in drawn]
+        # drawn values are kept to seven digits
+        assert np.min(sizes) >= smallest * (1 - 1e-5) - 1e-6 * hiding.about
+        assert np.max(sizes) <= largest * (1 + 1e-5) + 1e-6 * hiding.about
+        assert np.log(np.max(sizes) / np.min(sizes)) > 0.5 * np.log(largest / smallest)
+        assert {*hiding.sized, *hiding.ranges} <= set(CATALOGUE[id].parameters)
+
+
+@pytest.mark.parametrize(("id", "plant"), TRIED)
+def test_a_concealed_effect_is_in_the_recordings(id, plant):
+    case = short(draw_case(11, plant, [id]))
+    largest = {
+        name: getattr(draw_effect(id, plant, np.random.default_rng(3)).value, name) for name in HIDING[id].ranges
+    }
+    size = HIDING[id].limits(plant)[0 if id == "accel.saturation" else 1]
+    values = {name: HIDING[id].about + size / np.sqrt(len(HIDING[id].sized)) for name in HIDING[id].sized}
+    loud = replace(
+        case.concealed[0], effect=effect(id, **{**largest, **values, **({"t_s": 1.0} if "t_s" in largest else {})})
+    )
+    # an error as large as the noise of one sample shows in hundreds of them
+    assert difference(replace(case, concealed=(loud,))) > 0.5
+
+
+@pytest.mark.parametrize(("name", "plant"), SECRETS)
+def test_physics_of_no_catalogue_is_in_the_recordings(name, plant):
+    case = short(draw_case(11, plant, [name]))
+    assert case.verdict == "unexplained"
+    assert difference(case) > 0.5
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_recordings_are_plain_and_say_nothing_of_what_is_concealed(plant, tmp_path):
+    """What is stated is, to the byte, what is stated of the same case with nothing in it."""
+    case = brief(next(case for seed in range(200) if (case := draw_case(seed, plant)).kind == "two"))
+    bare = replace(case, concealed=(), disc=case.stated_disc, rig=case.stated_rig, kind="nothing")
+    conceal(case, tmp_path / "set", tmp_path / "answers" / "it.toml")
+    conceal(bare, tmp_path / "bare", tmp_path / "answers" / "none.toml")
+    (recording,) = read_dataset(tmp_path / "set")
+    assert recording.plant == plant
+    assert recording.name == "concealed-01"
+    written = {file.name for file in (tmp_path / "set" / "01").iterdir()}
+    assert written <= {"recording.toml", "command.csv", *(f"{name}.csv" for name in SENSORS)}
+    stated = [(tmp_path / folder / "01" / "recording.toml").read_text() for folder in ("set", "bare")]
+    assert stated[0] == stated[1]
+
+
+def test_true_coefficients_are_not_stated():
+    case = brief(draw_case(5, "flight", kind="beyond_sigma"))
+    recording = recordings(case)[0]
+    assert recording.disc == case.stated_disc
+    assert case.disc is not None
+    assert case.stated_disc is not None
+    assert case.disc.aero != case.stated_disc.aero
+    moved = [
+        abs(true - getattr(case.stated_disc.aero, name)) / case.stated_disc.sigma[name]
+        for name, true in case.moved.items()
+    ]
+    # one coefficient is beyond three sigma, the others well within
+    assert sorted(np.array(moved) > 3.0)[-2:] == [False, True]
+
+
+def test_coefficients_within_their_sigma_stay_within():
+    for seed in range(20):
+        case = draw_case(seed, "flight", kind="within_sigma")
+        assert case.verdict == "consistent"
+        assert case.stated_disc is not None
+        for name, true in case.moved.items():
+            assert abs(true - getattr(case.stated_disc.aero, name)) < 2.3 * case.stated_disc.sigma[name]
+
+
+def test_noise_that_is_not_as_stated_is_not_stated():
+    case = brief(draw_case(3, "spin_down", kind="noise"))
+    recording = recordings(case)[0]
+    assert any(case.instruments.sensors[name].noise != case.sheets_of.sensors[name].noise for name in recording.samples)
+    for name, sheet in recording.sheets.items():
+        assert sheet.noise_rms == case.sheets_of.sensors[name].sheet.noise_rms
+
+
+def test_the_same_seed_gives_the_same_bytes(tmp_path):
+    for number in range(2):
+        case = draw_case(21, "free_spin")
+        case = replace(case, runs=case.runs[:2])
+        conceal(case, tmp_path / f"set{number}", tmp_path / f"answer{number}.toml")
+    assert digest(tmp_path / "set0") == digest(tmp_path / "set1")
+    assert digest(tmp_path / "answer0.toml") == digest(tmp_path / "answer1.toml")
+
+
+def test_an_answer_survives_its_file(tmp_path):
+    for seed in range(60):
+        answer = Answer.of(draw_case(seed))
+        (tmp_path / "answer.toml").write_text(answer.text)
+        assert read_answer(tmp_path / "answer.toml") == answer
+
+
+def test_kinds_of_case_have_their_shares():
+    """None in a third, one effect in a third, two in a sixth, physics of no catalogue in a sixth."""
+    drawn = [draw_case(seed) for seed in range(600)]
+    share = {kind: sum(case.kind == kind for case in drawn) / 600 for kind in ("one", "two", "off_catalogue")}
+    nothing = sum(not case.concealed and case.secret is None for case in drawn) / 600
+    # four standard deviations of a binomial share of 600
+    assert abs(nothing - 1 / 3) < 0.08
+    assert abs(share["one"] - 1 / 3) < 0.08
+    assert abs(share["two"] - 1 / 6) < 0.06
+    assert abs(share["off_catalogue"] - 1 / 6) < 0.06
+    assert {case.plant for case in drawn} == set(PLANTS)
+    assert all(3 <= len(case.runs) <= 8 for case in drawn)
+
+
+def test_an_effect_is_only_drawn_where_its_sensor_is_on_board():
+    for seed in range(300):
+        case = draw_case(seed)
+        sensors = tuple(case.instruments.sensors)
+        for item in case.concealed:
+            assert item.effect.id in conceivable(case.plant, sensors)
+
+
+def test_what_cannot_be_concealed_there_is_refused():
+    with pytest.raises(InputError, match="acts on flight"):
+        draw_case(0, "rate_table", ["air.wind"])
+    with pytest.raises(InputError, match="turbulence: cannot act on a spin_down"):
+        draw_case(0, "spin_down", ["turbulence"])
+
+
+RIG, BENCH = Rig(1.1e-3, 3e-5), Environment(air_density=None)
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        (),
+        (effect("rig.coulomb_friction", torque_N_m=1e-4),),
+        (effect("rig.quadratic_drag", coefficient_N_m_s2=2e-7),),
+        (effect("rig.axis_tilt", tilt_north_rad=0.03, tilt_east_rad=-0.02),),
+        (effect("event.spin_step", t_s=1.0, dr_rad_s=-1.0),),
+    ],
+    ids=lambda effects: effects[0].id if effects else "viscous",
+)
+def test_the_joints_own_friction_is_what_the_catalogue_says(effects):
+    """Damping, friction loss and tilt of MuJoCo's joint against the formulas: two routes to one motion."""
+    own = coast(RIG, BENCH, -70.0, 3.0, effects, yaw=0.4)
+    formula = spin_down(RIG, BENCH, -70.0, 3.0, effects, yaw=0.4)
+    # friction loss is a soft constraint of the solver: to 1e-6 of the rate
+    np.testing.assert_allclose(own.rate[-1], formula.rate[-1], atol=1e-4)
+    np.testing.assert_allclose(np.abs(own.attitude[-1]), np.abs(formula.attitude[-1]), atol=1e-4)
+
+
+def test_a_wind_seen_by_one_who_moves_is_a_wind():
+    """Galileo: the flight in still air plus the wind's drift is the flight that the wind's own formula gives."""
+    from discsim.engine import fly
+
+    case = brief(draw_case(2, "flight", ["air.wind"]))
+    concealed = case.concealed[0].effect
+    assert case.disc is not None
+    seen = recordings(short(case))[0]
+    truth = fly(case.disc, case.environment, case.runs[0], [concealed])  # type: ignore[arg-type]
+    name = "gps" if "gps" in seen else "track"
+    samples = seen.need(name)
+    # readings are rounded to 1e-9; both integrate with the same steps of 1 ms
+    np.testing.assert_allclose(samples.value[:, :3], truth.at(samples.t).position, atol=1e-6, equal_nan=True)
+
+
+def test_a_play_follows_late_both_ways():
+    x = np.concatenate([np.linspace(0, 5, 50), np.linspace(5, 0, 50)])
+    y = play(x, 1.0)
+    assert y[49] == pytest.approx(4.0)
+    assert y[-1] == pytest.approx(1.0)
+    assert np.all(np.abs(x - y) <= 1.0 + 1e-12)
