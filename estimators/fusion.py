@@ -106,6 +106,12 @@ class Agreement:
 # ---------------------------------------------------------------------------------------------- accelerometer
 
 
+#: A block of the accelerometer that leaves this many times the residual of most blocks does not show the model.
+MISFIT = 4.0
+#: Residual from which on blocks are compared, m/s^2: a few steps of a 16-bit sensor's scale.
+LEAST_RESIDUAL = 0.02
+
+
 @dataclass(frozen=True)
 class Centripetal:
     """The part of the specific force that stays in the body: t (n,) s, value (n, 2) m/s^2 and sd per axis (n,).
@@ -132,7 +138,8 @@ def centripetal(
     In each block of ``turns`` turns, at least ``shortest`` s, ``a_x + i a_y = c + c' t + (f + f' t) exp(-i psi)``
     is solved by least squares: c is the centripetal part, f gravity and translation, fixed in N and so turning in B.
     psi is the angle turned by ``rate`` (m,) rad/s given at times ``t``. Blocks with a clipped reading, or outside
-    the known rate, are left out.
+    the known rate, are left out, and so are those that leave more than `MISFIT` times the residual of most: there the
+    sensor does not show this (one that recovers from a throw's jerk drifts for some tenths of a second).
     """
     known = np.isfinite(rate)
     empty = Centripetal(np.zeros(0), np.zeros((0, 2)), np.zeros(0))
@@ -148,7 +155,7 @@ def centripetal(
     steps = np.diff(times)
     psi = np.concatenate([[0.0], np.cumsum(steps * 0.5 * np.nan_to_num(r[1:] + r[:-1]))])
     a = value[:, 0] + 1j * value[:, 1]
-    out_t, out_value, out_share, squares, freedoms = [], [], [], 0.0, 0
+    out_t, out_value, out_share, squares, freedoms = [], [], [], [], []
     start = 0
     while start < times.size:
         if not np.isfinite(r[start]) or abs(r[start]) < 1e-3:
@@ -173,18 +180,21 @@ def centripetal(
         inverse = np.linalg.inv(normal)
         solution = inverse @ (columns.conj().T @ a[chosen])
         residual = a[chosen] - columns @ solution
-        squares += float(np.sum(np.abs(residual) ** 2))
-        freedoms += 2 * chosen.size - 8
+        squares.append(float(np.sum(np.abs(residual) ** 2)))
+        freedoms.append(2 * chosen.size - 8)
         out_t.append(centre)
         out_value.append(solution[0])
         out_share.append(float(np.sqrt(inverse[0, 0].real)))
     if not out_t:
         return empty
-    noise = np.sqrt(squares / max(freedoms, 1))
-    if sheet.noise_rms is not None:
-        noise = max(noise, float(np.hypot(sheet.noise_rms, (sheet.resolution or 0.0) / np.sqrt(12))))
-    values = np.array(out_value)
-    return Centripetal(np.array(out_t), np.column_stack([values.real, values.imag]), noise * np.array(out_share))
+    stated = float(np.hypot(sheet.noise_rms or 0.0, (sheet.resolution or 0.0) / np.sqrt(12)))
+    left = np.sqrt(np.array(squares) / np.array(freedoms))
+    fits = left <= MISFIT * max(float(np.median(left)), stated, LEAST_RESIDUAL)
+    noise = max(float(np.sqrt(np.array(squares)[fits].sum() / np.array(freedoms)[fits].sum())), stated)
+    values = np.array(out_value)[fits]
+    return Centripetal(
+        np.array(out_t)[fits], np.column_stack([values.real, values.imag]), noise * np.array(out_share)[fits]
+    )
 
 
 def _accelerometer_rows(
@@ -287,6 +297,7 @@ def _compare(
         design = np.column_stack([r, np.ones_like(r)])
         y = row.value[inside] - r
         sd = np.hypot(row.sd[inside], sd_r)
+        lean = -sd_r
         difference = y
     else:
         shape = -(r**2) + 1j * slope
@@ -298,6 +309,7 @@ def _compare(
         own = np.hypot(row.sd[inside], 2 * np.abs(r) * abs(d) * sd_r * np.abs(d.real) / abs(d))
         other = np.hypot(row.sd[inside], 2 * np.abs(r) * abs(d) * sd_r * np.abs(d.imag) / abs(d))
         sd = np.concatenate([own, other])
+        lean = np.concatenate([2 * r * sd_r * d.real, 2 * r * sd_r * d.imag])
         radial = -(measured * np.conj(d)).real / abs(d)
         difference = np.sqrt(np.maximum(radial, 0.0) / abs(d)) - np.abs(r)
     precision = np.diag(1 / row.prior**2)
@@ -315,9 +327,8 @@ def _compare(
         d = complex(found[0], found[1])
         radial_error = (error[:half] * d.real + error[half:] * d.imag) / abs(d)
         residual = float(np.sqrt(np.mean((radial_error / (2 * np.abs(r) * abs(d))) ** 2)))
-    # the smoother's errors hold for about half a second and are shared by the readings within it
-    spacing = float(np.median(np.diff(row.t))) if row.t.size > 1 else 0.5
-    shared = max(1.0, 0.5 / spacing)
+    # The magnetometer's error (precession, the gain of p and q) may hold throughout: it passes into the calibration.
+    drift = covariance @ (weighted.T @ (lean / sd))
     alike = chi2 <= settings.contradiction**2 or residual <= settings.tolerance * float(np.mean(np.abs(r)))
     agrees = alike and departure <= settings.contradiction
     agreement = Agreement(
@@ -330,7 +341,7 @@ def _compare(
         chi2=chi2,
         departure=departure,
         calibration=found,
-        covariance=np.asarray(covariance * max(1.0, chi2) * shared, dtype=np.float64),
+        covariance=np.asarray(covariance * max(1.0, chi2) + np.outer(drift, drift), dtype=np.float64),
     )
     blur = np.interp(row.t, reference.t, reference.blur)
     if row.kind == "centripetal":
@@ -490,30 +501,33 @@ def _without_magnetometer(recording: Recording, settings: FusionSettings, verdic
 def accelerometer_calibrated(recording: Recording, settings: FusionSettings | None = None) -> YawRate:
     """Spin rate by the accelerometer alone, done well: averaged over turns, calibrated by the magnetometer if present.
 
-    ``r = sqrt(-Re((c - bias) conj(d))/|d|^2)`` with c the centripetal part and d, bias from the comparison with the
-    magnetometer, or from the data sheet where there is none or it is contradicted. The sign is the magnetometer's;
-    without one the rate is unsigned.
+    ``r = sqrt(-Re((c - bias) conj(d))/|d|^2)``, c the centripetal part. d (which holds the scale) and bias come from
+    the comparison with the magnetometer's rate, and so does the sign; the standard deviation holds the noise, the
+    uncertainty of that calibration, and the magnetometer's own error as far as it may be the same throughout. Where a
+    sensor contradicts the magnetometer there is no calibration and every value is NaN; `contradictions` says why.
+    Without a magnetometer that knows the rate d and bias are the data sheet's within their priors; there is no sign.
     """
     settings = settings or FusionSettings()
     accelerometer = recording.need("accelerometer")
     sheet = recording.sheets["accelerometer"]
     if sheet.position is None or float(np.hypot(*sheet.position[:2])) < 1e-4:
         raise InputError(f"{recording.path or recording.name}: the accelerometer's position_m is needed, off the axis")
+    blank = np.full(len(accelerometer), np.nan)
+    unknown = YawRate("accelerometer_calibrated", accelerometer.t, blank, blank)
     if "magnetometer" in recording:
-        turns, known = unfolding(recording, settings)
-        tracks = tracks_of(recording, settings.tracking, unfold=turns) if known else []
+        tracks, agreements, _, _ = _judged(recording, settings)
+        if any(not agreement.agrees for agreement in agreements):
+            return unknown
         reference = _reference(recording, tracks, settings.tracking)
         row = _accelerometer_rows(recording, reference.t, reference.rate, settings)
-        result = _compare("accelerometer", row, reference, settings) if row is not None else None
-        if row is not None and result is not None and result[0].agrees:
-            agreement = result[0]
+        found = [agreement for agreement in agreements if agreement.sensor == "accelerometer"]
+        if row is not None and found:
             sign = np.sign(np.interp(row.t, reference.t, np.nan_to_num(reference.rate)))
-            return _centripetal_rate(row, agreement.calibration, agreement.covariance, agreement.chi2, sign)
+            return _centripetal_rate(row, found[0].calibration, found[0].covariance, found[0].chi2, sign)
     rate = _rough_rate(accelerometer, sheet)
     row = _accelerometer_rows(recording, accelerometer.t, rate, settings)
     if row is None:
-        blank = np.full(len(accelerometer), np.nan)
-        return YawRate("accelerometer_calibrated", accelerometer.t, blank, blank)
+        return unknown
     return _centripetal_rate(row, row.calibration, np.diag(row.prior**2), 1.0, None)
 
 
