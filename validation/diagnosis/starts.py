@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
+from scipy.ndimage import median_filter
 
 from discsim.arrays import BoolArray, FloatArray
 from discsim.compiled import compiled
@@ -40,7 +41,7 @@ RATE_SIGMA = 0.15
 #: of the smoothing of field and specific force in S, s
 VECTOR_SIGMA = 0.15
 #: slower than this, rad/s, an unclipped gyroscope tells the spin better than the field's phase, which precession bends
-SLOW = 12.0
+SLOW = 6.0
 #: over which a local attitude is averaged after the gyroscope's turning is taken out, s
 ATTITUDE_SIGMA = 0.4
 #: prior standard deviation of hard iron along the spin axis, uT, and of the field's gain
@@ -69,16 +70,47 @@ class _Readings(NamedTuple):
     value: FloatArray
 
 
+class _Fixes(NamedTuple):
+    """Fixes of a path: t (n,) s, position and velocity (n, 3) in N, the latter NaN where unknown, and their noise."""
+
+    t: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    position_sd: float
+    velocity_sd: float
+
+
+class _Felt(NamedTuple):
+    """Specific force in S at the start, (n, 3) on ``grid`` (n,), and its first and second integral from the start."""
+
+    grid: FloatArray
+    force: FloatArray
+    gained: FloatArray
+    moved: FloatArray
+
+    def integrals_at(self, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the second and the first integral (k, 3) at t, the force standing still outside the grid."""
+        inside = np.clip(t, self.grid[0], self.grid[-1])
+        outside = (t - inside)[:, None]
+        force, gained, moved = (
+            np.column_stack([np.interp(inside, self.grid, column) for column in part.T])
+            for part in (self.force, self.gained, self.moved)
+        )
+        return moved + gained * outside + 0.5 * force * outside**2, gained + force * outside
+
+
 class _Spin(NamedTuple):
     """Angle turned by the field in the disc's plane, and what belongs to it.
 
-    ``grid`` (n,) s; ``phase`` and ``rate`` (n,) of the turning vector, rad and rad/s; ``amplitude`` (n,) its length;
+    ``grid`` (n,) s; ``phase`` and ``rate`` (n,) of the turning vector, rad and rad/s; ``turning`` (n,) the rate
+    between readings that were not lost silently, rad/s; ``amplitude`` (n,) its length;
     ``plane`` (m,) the readings' complex x + i y with iron removed, at the times ``t`` (m,).
     """
 
     grid: FloatArray
     phase: FloatArray
     rate: FloatArray
+    turning: FloatArray
     amplitude: FloatArray
     t: FloatArray
     plane: ComplexArray
@@ -126,14 +158,17 @@ def flight_starts(recording: Recording, t: FloatArray) -> Starts:
     t = np.asarray(t, dtype=float)
     frame = _frame(recording)
     grid = _even(t, recording)
-    path = _path(recording, grid)
-    force = None if path is None else path[2] - np.array([0.0, 0.0, recording.environment.gravity])
-    G, certain = _turned_to_ned(recording, frame, grid, force)
+    fixes = _fixes(recording)
+    felt = _felt(recording, frame)
+    pair = None if fixes is None else _compared(fixes, felt, grid, recording.environment.gravity)
+    G, certain = _turned_to_ned(recording, frame, grid, pair)
     attitude, rate = _states(recording, frame, grid, G, t)
-    if path is not None:
-        position, velocity, _ = _path_at(recording, t)
+    if felt is not None:
+        felt = _in_ned(felt, grid, G, recording.environment.gravity)
+    if fixes is not None:
+        position, velocity = _path(fixes, felt, t)
     else:
-        position, velocity = _dead_reckoning(recording, frame, grid, G, t)
+        position, velocity = _dead_reckoning(recording, felt, t)
     return _finite(Starts(t, position, velocity, attitude, rate, () if certain else _others(recording, attitude[0])))
 
 
@@ -167,7 +202,7 @@ def rig_starts(recording: Recording, t: FloatArray) -> tuple[FloatArray, FloatAr
     north, east, _ = recording.environment.magnetic_field
     # m_B = C3(psi) B: the complex field in B is that in N times exp(-i psi)
     psi = np.arctan2(east, north) - spin.phase_at(t)
-    return psi, -np.interp(t, spin.grid, spin.rate)
+    return psi, -np.interp(t, spin.grid, spin.turning)
 
 
 # ---------------------------------------------------------------------------------------------- readings
@@ -359,7 +394,19 @@ def _spin(
         phase = turned + delta
         rate = rate + np.gradient(delta, step)
     amplitude = np.abs(smooth) / np.maximum(weight, 1e-9)
-    return _Spin(grid, phase, rate, amplitude, t, plane)
+    return _Spin(grid, phase, rate, _without_steps(grid, rate, t, plane, step), amplitude, t, plane)
+
+
+def _without_steps(grid: FloatArray, rate: FloatArray, t: FloatArray, z: ComplexArray, step: float) -> FloatArray:
+    """Return the turning rate (n,) less the steps of phase where readings were lost and the clock did not show it."""
+    gap = np.diff(t)
+    middle = 0.5 * (t[1:] + t[:-1])
+    usual = median_filter(np.angle(z[1:] * np.conj(z[:-1])) / gap, size=41, mode="nearest")
+    odd = np.angle(z[1:] * np.conj(z[:-1]) * np.exp(-1j * usual * gap))
+    lost = np.abs(odd) > np.maximum(0.5 * np.abs(usual) * step, 8 * _median(odd) + 1e-9)
+    if np.count_nonzero(lost) < 0.005 * lost.size or _median(rate) * step < 0.15:
+        return rate
+    return _smoothed(middle[~lost], (usual + odd / gap)[~lost], grid, RATE_SIGMA)
 
 
 def _complex_smooth(grid: FloatArray, t: FloatArray, z: ComplexArray, sigma: float) -> ComplexArray:
@@ -442,7 +489,7 @@ def _frame(recording: Recording) -> _Attitude:
             r = _sign(recording) * centripetal(grid)
         psi = _integral(grid, r)
     else:
-        psi, r = -spin.phase_at(grid), -np.interp(grid, spin.grid, spin.rate)
+        psi, r = -spin.phase_at(grid), -np.interp(grid, spin.grid, spin.turning)
     if gyroscope is None:
         identity = np.tile([1.0, 0.0, 0.0, 0.0], (grid.size, 1))
         return _Attitude(grid, psi, _calm(grid, r), identity, None, field)
@@ -451,6 +498,13 @@ def _frame(recording: Recording) -> _Attitude:
         w = w - np.mean(w)  # over many turns p and q average to the sensor's bias
     if field is not None and spin is not None:
         psi, r = _without_precession(recording, spin, grid, psi, r, w)
+        if expected is not None:
+            # what the field adds to the gyroscope's own angle is slow: its gain and its clock
+            coarse = np.linspace(grid[0], grid[-1], max(2, int((grid[-1] - grid[0]) / 0.05)))
+            own = expected(grid)
+            added = _smoothed(grid, psi - _integral(grid, own), coarse, 0.3)
+            psi = _integral(grid, own) + np.interp(grid, coarse, added)
+            r = own + np.interp(grid, coarse, np.gradient(added, coarse))
     return _Attitude(grid, psi, _calm(grid, r), _despun(grid, psi, w), w, field)
 
 
@@ -538,37 +592,52 @@ def _without_precession(
 
 
 def _turned_to_ned(
-    recording: Recording, frame: _Attitude, grid: FloatArray, force: FloatArray | None
+    recording: Recording, frame: _Attitude, grid: FloatArray, pair: tuple[FloatArray, FloatArray | None] | None
 ) -> tuple[FloatArray, bool]:
     """Return C (n, 3, 3) from S at the start to N, found locally at the instants of ``grid``, and if it is unique.
 
-    With a perfect gyroscope all would be the same matrix. ``force`` (n, 3) is the specific force in N.
+    With a perfect gyroscope all would be the same matrix. ``pair`` holds the specific force in N and in S at the start.
     """
     field = recording.environment.magnetic_field
+    force, felt = (None, None) if pair is None else pair
     # a turn or so, except that at a slow spin nothing needs to average out
     fast = _median(frame.r)
-    sigma = float(np.clip(3.0 / max(fast, 0.1), VECTOR_SIGMA, 0.4)) if fast > 2.0 else VECTOR_SIGMA
+    sigma = float(np.clip(3.0 / max(fast, 0.1), VECTOR_SIGMA, 0.4)) if fast > SLOW else VECTOR_SIGMA
     axis = body_to_ned(frame.D_at(grid))[:, :, 2]
     magnetic = None if frame.field is None else _field_in_start(frame.field, frame, grid, sigma)
-    felt = _force_in_start(recording, frame, grid, sigma) if force is not None else None
     if magnetic is not None:
-        gyroscope = frame.transverse is not None
-        magnetic = _without_axial_iron(magnetic, axis, field, felt, force, wandering=not gyroscope)
+        wandering = frame.transverse is None
+        magnetic = _without_axial_iron(magnetic, axis, field, felt, force, wandering=wandering)
     sigma = ATTITUDE_SIGMA if frame.transverse is not None else GRID
-    if magnetic is None and felt is None:
+    if felt is not None and force is not None:
+        return _fitted_turns(magnetic, felt, field, force, sigma), magnetic is not None
+    if magnetic is None:
         return _level(recording, frame, grid), False
-    if magnetic is not None and felt is not None and force is not None:
-        return _rotations(_windowed(_pairs(magnetic, felt, field, force), sigma)), True
-    if magnetic is not None:
-        # one direction: in S at the start the field stands still, so all instants share it
-        turns = np.array([_level_about(mean, field, axis[0]) for mean in _windowed(magnetic, 1.0)])
-        return _stated_turn(recording, frame, _connected(turns, field), field), False
-    assert felt is not None
-    assert force is not None
-    # the force alone, but it moves: over the whole flight there is one best turn, from which each instant departs
-    K = _pairs(None, felt, field, force)
-    whole = _rotations(np.sum(K, axis=0, keepdims=True))
-    return _rotations(_windowed(K, sigma) + 0.05 * whole), False
+    # one direction: in S at the start the field stands still, so all instants share it
+    turns = np.array([_level_about(mean, field, axis[0]) for mean in _windowed(magnetic, 1.0)])
+    return _stated_turn(recording, frame, _connected(turns, field), field), False
+
+
+def _fitted_turns(
+    m: FloatArray | None, f: FloatArray, field: FloatArray, force: FloatArray, sigma: float
+) -> FloatArray:
+    """Return the rotations (n, 3, 3) that take m and f to field and force, each averaged over ``sigma`` s.
+
+    An instant whose force departs from its neighbours' rotation (a knock, an end of the path) loses its say.
+    """
+    say = np.ones(len(f))
+    turns = np.empty((0, 3, 3))
+    for width in (3 * sigma, 2 * sigma, sigma):
+        K = _pairs(m, f, field, force, say)
+        whole = _rotations(np.sum(K, axis=0, keepdims=True))
+        # the force alone leaves a turn about itself, which only its motion over the whole flight tells
+        turns = _rotations(_windowed(K, width) + (0.05 * whole if m is None else 1e-6 * whole))
+        turned = np.einsum("nij,nj->ni", turns, f)
+        apart = np.linalg.norm(np.cross(turned, force), axis=1) / np.maximum(
+            np.linalg.norm(f, axis=1) * np.linalg.norm(force, axis=1), 1e-9
+        )
+        say = 1 / (1 + (apart / max(0.05, 2 * float(np.median(apart)))) ** 2)
+    return turns
 
 
 def _field_in_start(field: _Readings, frame: _Attitude, grid: FloatArray, sigma: float) -> FloatArray:
@@ -619,6 +688,32 @@ def _force_in_start(recording: Recording, frame: _Attitude, grid: FloatArray, si
     vector = np.column_stack([solution[:, 2:], along])
     vector[sums[:, 21] < 2.0] = 0.0  # nothing read here: a vector without length has no weight
     return np.asarray(np.einsum("nij,nj->ni", body_to_ned(frame.D_at(grid)), vector))
+
+
+def _felt(recording: Recording, frame: _Attitude) -> _Felt | None:
+    """Return the specific force in S at the start and its integrals over the recording."""
+    # as local as a turn allows: the integrals average it anyway
+    sigma = float(np.clip(3.0 / max(_median(frame.r), 0.1), 0.03, VECTOR_SIGMA))
+    grid = np.arange(0.0, recording.end + sigma, sigma)
+    force = _force_in_start(recording, frame, grid, sigma)
+    return None if force is None else _integrated(grid, force)
+
+
+def _integrated(grid: FloatArray, force: FloatArray) -> _Felt:
+    step = np.diff(grid)[:, None]
+    gained = np.concatenate([np.zeros((1, 3)), np.cumsum(0.5 * (force[1:] + force[:-1]) * step, axis=0)])
+    # trapezoids of the first integral, with the parabola that a straight force makes
+    steps = gained[:-1] * step + (2 * force[:-1] + force[1:]) * step**2 / 6
+    return _Felt(grid, force, gained, np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]))
+
+
+def _in_ned(felt: _Felt, grid: FloatArray, G: FloatArray, gravity: float) -> _Felt:
+    """Return the acceleration in N, and its integrals, that attitudes G (n, 3, 3) on ``grid`` make of a force felt."""
+    nearest = np.clip(np.rint((felt.grid - grid[0]) / (grid[1] - grid[0])).astype(int), 0, grid.size - 1)
+    # a wrong reading must not carry the disc away: the specific force of a throw is below 4 g
+    size = np.linalg.norm(felt.force, axis=1, keepdims=True)
+    force = felt.force * np.minimum(1.0, 40.0 / np.maximum(size, 1e-9))
+    return _integrated(felt.grid, np.einsum("nij,nj->ni", G[nearest], force) + np.array([0.0, 0.0, gravity]))
 
 
 def _stuck(value: FloatArray, resolution: float) -> BoolArray:
@@ -681,10 +776,11 @@ def _without_axial_iron(
     return np.asarray(x[1] * (m - x[0] * axis))
 
 
-def _pairs(m: FloatArray | None, f: FloatArray, field: FloatArray, force: FloatArray) -> FloatArray:
+def _pairs(m: FloatArray | None, f: FloatArray, field: FloatArray, force: FloatArray, say: FloatArray) -> FloatArray:
     """Return the matrices (n, 3, 3) of Wahba's problem for m and f (n, 3) to be taken to field (3,) and force (n, 3).
 
-    The specific force counts where felt and path agree on its size, and is large enough to have a direction.
+    The specific force counts where felt and path agree on its size, and is large enough to have a direction, times
+    ``say`` (n,).
     """
 
     def unit(v: FloatArray) -> FloatArray:
@@ -692,7 +788,7 @@ def _pairs(m: FloatArray | None, f: FloatArray, field: FloatArray, force: FloatA
 
     size, other = np.linalg.norm(force, axis=1), np.linalg.norm(f, axis=1)
     agreement = 1 / (1 + ((size - other) / (1.0 + 0.1 * size)) ** 2)
-    strong = np.minimum(np.minimum(size, other) / 5.0, 1.0) ** 2 * agreement**2 + 1e-3 * (other > 0)
+    strong = say * np.minimum(np.minimum(size, other) / 5.0, 1.0) ** 2 * agreement**2 + 1e-3 * (other > 0)
     K = np.einsum("n,ni,nj->nij", strong, unit(force), unit(f))
     if m is not None:
         K += 0.3 * np.einsum("i,nj->nij", unit(field), unit(m))
@@ -803,68 +899,111 @@ def _others(recording: Recording, attitude: FloatArray) -> tuple[FloatArray, ...
 # ---------------------------------------------------------------------------------------------- path
 
 
-def _path(recording: Recording, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """Return position, velocity and acceleration (k, 3) in N at t from fixes, or None where there are none."""
+def _fixes(recording: Recording) -> _Fixes | None:
+    """Return the fixes of GPS, or else of a track, or None where there are fewer than four."""
     for sensor in ("gps", "track"):
         samples = recording.get(sensor)
-        if samples is None or np.count_nonzero(np.isfinite(samples.value[:, :3]).all(axis=1)) < 4:
+        if samples is None:
             continue
-        return _path_fit(recording, sensor, t)
+        good = np.asarray(np.all(np.isfinite(samples.value[:, :3]), axis=1))
+        if np.count_nonzero(good) < 4:
+            continue
+        sheet, value = recording.sheets[sensor], samples.value[good]
+        velocity = value[:, 3:6] if value.shape[1] >= 6 else np.full((len(value), 3), np.nan)
+        return _Fixes(samples.t[good], value[:, :3], velocity, sheet.noise_rms or 0.2, sheet.velocity_noise_rms or 0.1)
     return None
 
 
-def _path_at(recording: Recording, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    path = _path(recording, t)
-    assert path is not None
-    return path
+def _local_cubics(fixes: _Fixes, t: FloatArray, moved: FloatArray, gained: FloatArray) -> FloatArray:
+    """Fit a cubic to the fixes around each instant t (m,); return its value and three derivatives, (m, 4, 3 + k).
 
-
-def _path_fit(recording: Recording, sensor: str, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Fit a cubic to the fixes around each instant; outliers lose their weight step by step."""
-    samples, sheet = recording.samples[sensor], recording.sheets[sensor]
-    sd = sheet.noise_rms or 0.2
-    velocity_sd = sheet.velocity_noise_rms or 0.1
-    good = np.asarray(np.all(np.isfinite(samples.value[:, :3]), axis=1))
-    times, value = samples.t[good], samples.value[good]
-    fast = value[:, 3:6] if value.shape[1] >= 6 else np.full((times.size, 3), np.nan)
-    moving = np.asarray(np.all(np.isfinite(fast), axis=1))
-    position, velocity, acceleration = (np.empty((t.size, 3)) for _ in range(3))
+    ``moved`` and ``gained`` (n, k) are positions and velocities of something else at the times of the fixes, to which
+    the very same fit is made; the fixes alone decide the weights, and outliers lose theirs step by step.
+    """
+    moving = np.asarray(np.all(np.isfinite(fixes.velocity), axis=1))
+    x, v = np.concatenate([fixes.position, moved], axis=1), np.concatenate([fixes.velocity, gained], axis=1)
+    out = np.empty((t.size, 4, x.shape[1]))
+    # a throw's acceleration is below 3 g, its change a few g per second: keeps few fixes from inventing more
+    ridge = np.diag([1e-9, 1e-9, 1.0 / 30.0**2, 1.0 / 40.0**2])
     for i, instant in enumerate(t):
-        centre = float(np.clip(instant, times[0] + PATH_HALF, max(times[-1] - PATH_HALF, times[0] + PATH_HALF)))
+        centre = float(np.clip(instant, fixes.t[0] + PATH_HALF, max(fixes.t[-1] - PATH_HALF, fixes.t[0] + PATH_HALF)))
         half = PATH_HALF + 1e-9
-        while np.count_nonzero(np.abs(times - centre) <= half) < min(7, times.size):
+        while np.count_nonzero(np.abs(fixes.t - centre) <= half) < min(7, fixes.t.size):
             half *= 1.3
-        chosen = np.abs(times - centre) <= half
-        tau = times[chosen] - instant
+        chosen = np.abs(fixes.t - centre) <= half
+        quick = moving[chosen]
+        tau = fixes.t[chosen] - instant
         one, zero = np.ones(tau.size), np.zeros(tau.size)
-        with_rate = moving[chosen]
         A = np.concatenate(
             [
-                np.column_stack([one, tau, tau**2 / 2, tau**3 / 6]) / sd,
-                np.column_stack([zero, one, tau, tau**2 / 2])[with_rate] / velocity_sd,
+                np.column_stack([one, tau, tau**2 / 2, tau**3 / 6]) / fixes.position_sd,
+                np.column_stack([zero, one, tau, tau**2 / 2])[quick] / fixes.velocity_sd,
             ]
         )
-        y = np.concatenate([value[chosen, :3] / sd, fast[chosen][with_rate] / velocity_sd])
-        weight = np.ones(len(A))
-        solution = np.zeros((4, 3))
-        # a throw's acceleration is below 3 g, its change a few g per second: keeps few fixes from inventing more
-        ridge = np.diag([1e-9, 1e-9, 1.0 / 30.0**2, 1.0 / 40.0**2])
-        for scale in (None, 30.0, 10.0, 4.0, 3.0):
-            if scale is not None:
-                misfit = np.linalg.norm(y - A @ solution, axis=1)
-                # noise may be larger than stated: outliers are told by the others' median
-                usual = max(1.0, float(np.median(misfit)) / 1.5)
-                weight = 1 / (1 + (misfit / (scale * usual)) ** 2) ** 2
-            weighted = A * weight[:, None]
+        y = np.concatenate([x[chosen] / fixes.position_sd, v[chosen][quick] / fixes.velocity_sd])
+        weighted = A
+        solution = np.linalg.solve(A.T @ A + ridge, A.T @ y)
+        for scale in (30.0, 10.0, 4.0, 3.0):
+            misfit = np.linalg.norm(y[:, :3] - A @ solution[:, :3], axis=1)
+            # noise may be larger than stated: outliers are told by the others' median
+            usual = max(1.0, float(np.median(misfit)) / 1.5)
+            if float(np.max(misfit)) < usual * 4.0:
+                break
+            weighted = A * (1 / (1 + (misfit / (scale * usual)) ** 2) ** 2)[:, None]
             solution = np.linalg.solve(weighted.T @ A + ridge, weighted.T @ y)
-        position[i], velocity[i], acceleration[i] = solution[:3]
-    return position, velocity, acceleration
+        out[i] = solution
+    return out
 
 
-def _dead_reckoning(
-    recording: Recording, frame: _Attitude, grid: FloatArray, G: FloatArray, t: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return position and velocity (k, 3) at t from the stated release, or a guess, and the specific force."""
+def _compared(
+    fixes: _Fixes, felt: _Felt | None, grid: FloatArray, gravity: float
+) -> tuple[FloatArray, FloatArray | None]:
+    """Return the specific force (n, 3) in N from the path, and that felt in S at the start, over the same windows.
+
+    Both go through the same cubics: as path and velocity that the force felt would make. So a force that changes
+    within a window does not turn one against the other. A delay of the fixes is looked for where the sizes of both
+    disagree, for it would.
+    """
+    inside = np.clip(grid, fixes.t[0], fixes.t[-1])
+    down = np.array([0.0, 0.0, gravity])
+    if felt is None:
+        nothing = np.zeros((fixes.t.size, 0))
+        return _local_cubics(fixes, inside, nothing, nothing)[:, 2, :] - down, None
+    found = []
+    for delay in (0.0, 0.1, 0.2, 0.3):
+        both = _local_cubics(fixes, inside[::3] if delay else inside, *felt.integrals_at(fixes.t - delay))[:, 2, :]
+        force, other = both[:, :3] - down, both[:, 3:]
+        apart = np.linalg.norm(force, axis=1) - np.linalg.norm(other, axis=1)
+        # whatever both differ in all the time is a bias
+        misfit = float(np.median(np.abs(apart - np.median(apart))))
+        found.append((misfit, delay, force, other))
+        if delay == 0.0 and misfit < 0.5:
+            break
+    best = min(found, key=lambda entry: entry[0])
+    if best[1] == 0.0 or best[0] > 0.5 * found[0][0]:
+        return found[0][2], found[0][3]
+    both = _local_cubics(fixes, inside, *felt.integrals_at(fixes.t - best[1]))[:, 2, :]
+    return both[:, :3] - down, both[:, 3:]
+
+
+def _path(fixes: _Fixes, felt: _Felt | None, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return position and velocity (k, 3) at t: what the acceleration in N makes, and local cubics for the rest."""
+    nothing = np.zeros((fixes.t.size, 0))
+    inside = np.clip(t, fixes.t[0], fixes.t[-1])
+    outside = (t - inside)[:, None]
+    if felt is None:
+        cubic = _local_cubics(fixes, inside, nothing, nothing)
+        x, v, a = cubic[:, 0], cubic[:, 1], cubic[:, 2]
+        return x + v * outside + 0.5 * a * outside**2, v + a * outside
+    moved, gained = felt.integrals_at(fixes.t)
+    rest = fixes._replace(position=fixes.position - moved, velocity=fixes.velocity - gained)
+    cubic = _local_cubics(rest, inside, nothing, nothing)
+    moved, gained = felt.integrals_at(t)
+    return cubic[:, 0] + cubic[:, 1] * outside + moved, cubic[:, 1] + gained
+
+
+def _dead_reckoning(recording: Recording, felt: _Felt | None, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return position and velocity (k, 3) at t from the stated release, or a guess, and the acceleration in N."""
     release = recording.release
     position = np.array([0.0, 0.0, -GUESSED_HEIGHT])
     velocity = np.array([GUESSED_SPEED, 0.0, 0.0])
@@ -872,23 +1011,10 @@ def _dead_reckoning(
         position = np.array(release.position)
     if release is not None and release.velocity is not None:
         velocity = np.array(release.velocity)
-    felt = _force_in_start(recording, frame, grid, VECTOR_SIGMA)
-    acceleration = np.zeros((grid.size, 3))
-    if felt is not None:
-        # a wrong attitude must not carry the disc away: specific force of a glide is below 2 g
-        strength = np.linalg.norm(felt, axis=1, keepdims=True)
-        felt = felt * np.minimum(1.0, 20.0 / np.maximum(strength, 1e-9))
-        acceleration = np.einsum("nij,nj->ni", G, felt) + np.array([0.0, 0.0, recording.environment.gravity])
-    step = np.diff(grid)[:, None]
-    zero = int(np.argmin(np.abs(grid)))
-    gained = np.concatenate([np.zeros((1, 3)), np.cumsum(0.5 * (acceleration[1:] + acceleration[:-1]) * step, axis=0)])
-    v = velocity + gained - gained[zero]
-    moved = np.concatenate([np.zeros((1, 3)), np.cumsum(0.5 * (v[1:] + v[:-1]) * step, axis=0)])
-    x = position + moved - moved[zero]
-    return (
-        np.column_stack([np.interp(t, grid, x[:, i]) for i in range(3)]),
-        np.column_stack([np.interp(t, grid, v[:, i]) for i in range(3)]),
-    )
+    if felt is None:
+        return position + velocity * t[:, None], np.tile(velocity, (t.size, 1))
+    moved, gained = felt.integrals_at(t)
+    return position + velocity * t[:, None] + moved, velocity + gained
 
 
 def _finite(starts: Starts) -> Starts:
