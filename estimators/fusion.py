@@ -138,8 +138,8 @@ def centripetal(
     In each block of ``turns`` turns, at least ``shortest`` s, ``a_x + i a_y = c + c' t + (f + f' t) exp(-i psi)``
     is solved by least squares: c is the centripetal part, f gravity and translation, fixed in N and so turning in B.
     psi is the angle turned by ``rate`` (m,) rad/s given at times ``t``. Blocks with a clipped reading, or outside
-    the known rate, are left out, and so are those that leave more than `MISFIT` times the residual of most: there the
-    sensor does not show this (one that recovers from a throw's jerk drifts for some tenths of a second).
+    the known rate, are left out, and so are those that leave more than `MISFIT` times the residual of most and
+    their neighbours: there the sensor does not show this (one that recovers from a throw's jerk drifts for some tenths of a second).
     """
     known = np.isfinite(rate)
     empty = Centripetal(np.zeros(0), np.zeros((0, 2)), np.zeros(0))
@@ -189,7 +189,11 @@ def centripetal(
         return empty
     stated = float(np.hypot(sheet.noise_rms or 0.0, (sheet.resolution or 0.0) / np.sqrt(12)))
     left = np.sqrt(np.array(squares) / np.array(freedoms))
-    fits = left <= MISFIT * max(float(np.median(left)), stated, LEAST_RESIDUAL)
+    misfit = left > MISFIT * max(float(np.median(left)), stated, LEAST_RESIDUAL)
+    # the blocks beside may hold the tail of whatever it was
+    fits = ~(misfit | np.append(misfit[1:], False) | np.append(False, misfit[:-1]))
+    if not np.any(fits):
+        return empty
     noise = max(float(np.sqrt(np.array(squares)[fits].sum() / np.array(freedoms)[fits].sum())), stated)
     values = np.array(out_value)[fits]
     return Centripetal(
