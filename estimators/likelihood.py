@@ -36,8 +36,12 @@ __all__ = [
 LEAST = 16
 
 
-#: Residuals more correlated than this from sample to sample are no noise: the window is no answer.
-LARGEST_CORRELATION = 0.6
+#: Residuals more correlated than this from sample to sample are no noise but motion that no polynomial follows.
+LARGEST_CORRELATION = 0.3
+
+#: Such a window is no answer where the residual is above this share of the amplitude; below it, what the rate wobbles
+#: by within the window is in the standard deviation.
+LARGEST_MISFIT = 0.05
 
 #: Most steps of a fit. One that starts at its line converges within eight; the rest are no tones.
 MOST_STEPS = 15
@@ -93,7 +97,8 @@ class ToneFit:
 
     ``t`` window centre, s; ``phase`` of the field at it, rad; ``phase_rate`` rad/s, and the sd of both; ``chirp``
     rad/s^2; ``amplitude`` and its unit; ``offset`` hard iron x + i y; ``noise`` residual per axis; ``length`` s;
-    ``along`` mean of the transverse rate along the field, rad/s; ``correlation`` of neighbouring residuals.
+    ``along`` mean of the transverse rate along the field, rad/s; ``correlation`` of neighbouring residuals, and the
+    ``wobble`` of the phase rate that they show, rad/s rms.
     """
 
     t: FloatArray
@@ -109,6 +114,7 @@ class ToneFit:
     length: FloatArray
     along: FloatArray
     correlation: FloatArray
+    wobble: FloatArray
 
 
 def likelihood(recording: Recording, settings: LikelihoodSettings | None = None) -> YawRate:
@@ -164,8 +170,10 @@ def likelihood_from_samples(
         else:
             slack = np.hypot(fits.axial - axial.offset, axial.sd) / fits.amplitude * settings.precession_sd
         rate, sd = -fits.phase_rate, np.hypot(fits.phase_rate_sd, slack)
+    moving = np.nan_to_num(fits.correlation, nan=1.0) > LARGEST_CORRELATION
+    sd = np.where(moving, np.hypot(sd, fits.wobble), sd)
     known = np.isfinite(rate) & np.isfinite(sd) & (sd <= settings.largest_sd)
-    known &= np.nan_to_num(fits.correlation, nan=1.0) <= LARGEST_CORRELATION
+    known &= ~moving | (fits.noise <= LARGEST_MISFIT * fits.amplitude)
     return YawRate("likelihood", fits.t, np.where(known, rate, np.nan), np.where(known, sd, np.nan), signed=True)
 
 
@@ -257,7 +265,7 @@ def fit_windows(
                 continue
             if sd > settings.largest_sd or sd > 0.25 * abs(rate) or variance > 0.1 * parameters[powers] ** 2:
                 continue
-            correlation = _correlation(window, parameters, powers, u)
+            correlation, wobble = _correlation(window, parameters, powers, u)
             # n white samples are worth more than n correlated ones
             variance *= (1 + correlation) / max(1 - correlation, 0.05)
             sd = float(np.sqrt(covariance[1, 1] * variance)) / half
@@ -270,6 +278,7 @@ def fit_windows(
             out["axial"][index] = np.mean(m[lo:hi, 2])
             out["noise"][index] = np.sqrt(variance * max(1 - correlation, 0.05) / (1 + correlation))
             out["correlation"][index] = correlation
+            out["wobble"][index] = wobble
             out["length"][index] = length
             out["along"][index] = along
             offset[index] = complex(parameters[powers + 1], parameters[powers + 2])
@@ -400,10 +409,12 @@ def _with_turning(
     return _positive(parameters, powers), covariance, float(variance), float(along), u
 
 
-def _correlation(window: _Window, parameters: FloatArray, powers: int, u: ComplexArray) -> float:
+def _correlation(window: _Window, parameters: FloatArray, powers: int, u: ComplexArray) -> tuple[float, float]:
     """Return how much neighbouring residuals correlate beyond chance, the larger of as read and turned with the field.
 
-    A wandering axis, or a rate that no polynomial follows, leaves a residual that is smooth in one of both.
+    A wandering axis, or a rate that no polynomial follows, leaves a residual that is smooth in one of both. The second
+    value is the rms rate, rad/s, of the phase's part of it: a smooth signal's covariance falls by half its slope's
+    variance times the lag squared, so between one and two lags, which no white noise reaches, by 3/2 of it.
     """
     phase = np.polynomial.polynomial.polyval(window.x, parameters[:powers])
     E = u * np.exp(1j * phase)
@@ -411,12 +422,15 @@ def _correlation(window: _Window, parameters: FloatArray, powers: int, u: Comple
     residual = window.z - b - A * (E + c * np.conj(E))
     total = float(np.sum(np.abs(residual) ** 2))
     if total <= 0:
-        return 0.0
+        return 0.0, 0.0
     as_read = float(np.sum(residual[1:] * np.conj(residual[:-1])).real) / total
     turned = residual * np.exp(-1j * phase)
     with_field = float(np.sum(turned[1:] * np.conj(turned[:-1])).real) / total
     # of white noise the real part scatters by 1/sqrt(2 n)
-    return float(max(0.0, max(as_read, with_field) - 3 / np.sqrt(2 * len(residual))))
+    correlation = max(0.0, max(as_read, with_field) - 3 / np.sqrt(2 * len(residual)))
+    angle = turned.imag / A
+    fall = float(np.mean(angle[1:] * angle[:-1]) - np.mean(angle[2:] * angle[:-2]))
+    return float(correlation), float(np.sqrt(max(0.0, fall / 1.5)) / window.interval)
 
 
 def _peaks(tau: FloatArray, z: ComplexArray, interval: float, count: int = 3) -> list[tuple[float, float]]:

@@ -216,6 +216,7 @@ class _Problem:
         decaying: bool,
         rows: list[RateRows],
         top_rate: float,
+        typical_rate: float = 0.0,
     ) -> None:
         self.t, self.m, self.settings, self.rows = t, m, settings, rows
         self.strength, self.decaying = strength, decaying
@@ -244,6 +245,8 @@ class _Problem:
         self.parts = [slice(int(end - size), int(end)) for size, end in zip(sizes, ends, strict=True)]
         self.size = int(ends[-1])
         self.fixed_axis = fixed_axis
+        #: least roughness: what a spin-down's time constant changes by may not be laid to an unseen precession
+        self.least = 0.0 if self.slow is None else _CHANGE * typical_rate**2
         #: precision of each interval's roughness over the common one: small at the corner of a ramp or at a knock
         self.local = np.ones(self.spline.size - 2)
 
@@ -413,6 +416,9 @@ class _Linear:
 #: steady change of rate is likelier than a rough one.
 _GRID = np.logspace(-10, 7, 35)
 
+#: Least spectral density of r'', over r^2, where precession is unseen: r'/r changes by a third of 1/18 s in 5 s.
+_CHANGE = 5.0 * (0.33 / 18.0 / 5.0) ** 2
+
 
 def _linearise(
     problem: _Problem, x: FloatArray, noise: float, weights: FloatArray, precision: FloatArray, mean: FloatArray
@@ -523,6 +529,7 @@ def _evidence(problem: _Problem, linear: _Linear, x: FloatArray, target: FloatAr
 
     results = [solved(roughness) for roughness in _GRID]
     log = np.array([result[0] for result in results]) - 0.18 * np.log(_GRID)
+    log = np.where(_GRID >= problem.least, log, -np.inf)
     weight = np.exp(log - np.max(log))
     weight = np.where(weight < 1e-3, 0.0, weight)
     weight /= np.sum(weight)
@@ -618,7 +625,7 @@ def track_spin(
     rows = rows or []
     problem = _Problem(
         t, m, settings, gyroscope=gyroscope, strength=strength, fixed_axis=fixed_axis, decaying=decaying,
-        rows=rows, top_rate=float(np.max(np.abs(start_rate))),
+        rows=rows, top_rate=float(np.max(np.abs(start_rate))), typical_rate=float(np.median(np.abs(start_rate))),
     )  # fmt: skip
     x = _start(problem, start_rate, axial)
     precession = settings.precession

@@ -59,6 +59,20 @@ def test_missing_and_uneven_samples_count_by_their_time_stamps():
     assert np.sqrt(np.mean((np.array(errors) / np.array(sds)) ** 2)) == pytest.approx(1.0, abs=0.35)
 
 
+def test_a_rate_that_wobbles_within_the_window_is_answered_with_the_wobble_in_its_deviation():
+    """A clean signal of 340 deg/s whose rate swings by 15 deg/s rms at 6 Hz: the mean is known, the instant is not."""
+    rng = np.random.default_rng(12)
+    t = 0.01 * np.arange(460)
+    swing, pace = np.radians(15.0) * np.sqrt(2), 2 * np.pi * 6.0
+    phase = -np.radians(340.0) * t + swing / pace * np.cos(pace * t)
+    field = np.stack([29 * np.cos(phase), 29 * np.sin(phase), np.full(t.size, 25.0)], -1) + [-30.0, 1.0, 0.0]
+    samples = Samples(t, field + rng.normal(0, 0.05, field.shape))
+    answer = likelihood_from_samples(samples, fixed_axis=True)
+    error = answer.rate - np.radians(340.0) - swing * np.sin(pace * answer.t)
+    assert np.mean(np.isfinite(answer.rate)) > 0.9
+    assert np.sqrt(np.nanmean((error / answer.sd) ** 2)) == pytest.approx(1.0, abs=0.25)
+
+
 def test_a_fast_spin_up_is_found():
     """90 rad/s^2 turns the phase by 18 rad beyond a steady tone's within a window: the coarse search must chirp too."""
     samples, noise = tone(np.random.default_rng(7), rate=3000.0, window=1.28, decibels=34.0, chirp=90.0)
