@@ -139,7 +139,8 @@ def centripetal(
     is solved by least squares: c is the centripetal part, f gravity and translation, fixed in N and so turning in B.
     psi is the angle turned by ``rate`` (m,) rad/s given at times ``t``. Blocks with a clipped reading, or outside
     the known rate, are left out, and so are those that leave more than `MISFIT` times the residual of most and
-    their neighbours: there the sensor does not show this (one that recovers from a throw's jerk drifts for some tenths of a second).
+    their neighbours: there the sensor does not show this (one that recovers from a throw's jerk drifts for some tenths
+    of a second).
     """
     known = np.isfinite(rate)
     empty = Centripetal(np.zeros(0), np.zeros((0, 2)), np.zeros(0))

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from discsim.arrays import FloatArray
 from discsim.errors import InputError
 from discsim.recording import Recording
 from estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors, accelerometer
@@ -19,10 +20,13 @@ from estimators.likelihood import likelihood
 from estimators.rate import YawRate
 from estimators.tracking import tracking
 
-__all__ = ["METHODS", "Method", "Options", "best", "estimate", "missing_sensors", "sampling_notes"]
+__all__ = ["METHODS", "Method", "Options", "best", "estimate", "folding_notes", "missing_sensors", "sampling_notes"]
 
 #: `best` takes the first method that knows the rate for at least this share of its samples.
 ENOUGH = 0.5
+
+#: A rate above half the magnetometer's sampling rate is worth a note where this share of a sensor's readings shows it.
+FOLDED_SHARE = 0.01
 
 #: A sampling rate from time stamps further than this from the sheet's is worth a note.
 RATE_TOLERANCE = 0.01
@@ -133,3 +137,43 @@ def sampling_notes(recording: Recording) -> list[str]:
         if abs(found / stated - 1) > RATE_TOLERANCE:
             notes.append(f"{sensor}: time stamps say {found:.4g} Hz, its sheet {stated:.4g} Hz; the stamps are used")
     return notes
+
+
+def folding_notes(recording: Recording) -> list[str]:
+    """Say where another sensor shows a spin of more than half the magnetometer's sampling rate.
+
+    Whole turns from sample to sample leave no trace in the field: at 100 Hz a spin of 20000 deg/s (180 deg a sample is
+    18000) shows as one of 16000. `fft` and `likelihood` give that; `tracking` and `fusion` are told the missing turns
+    by the other sensor. A gyroscope that clips above the limit counts, and an accelerometer by two standard deviations.
+    """
+    if "magnetometer" not in recording:
+        return []
+    half = np.pi / recording.need("magnetometer").interval
+    notes = []
+    for name in ("rate_reference", "gyroscope", "accelerometer"):
+        if name not in recording:
+            continue
+        shown = np.abs(_shown(recording, name))
+        above = shown > half
+        share = float(np.mean(above)) if above.size else 0.0
+        if share < FOLDED_SHARE:
+            continue
+        rate = float(np.median(shown[above]))
+        folded = abs((rate + half) % (2 * half) - half)
+        notes.append(
+            f"{name}: {np.degrees(rate):.0f} deg/s for {100 * share:.0f} % of its readings, above half the "
+            f"magnetometer's sampling rate ({np.degrees(half):.0f} deg/s); fft and likelihood see it folded, as "
+            f"{np.degrees(folded):.0f} deg/s"
+        )
+    return notes
+
+
+def _shown(recording: Recording, sensor: str) -> FloatArray:
+    """Return the rate that a sensor surely shows, rad/s; a clipped one has its range, which is a lower bound."""
+    samples = recording.need(sensor)
+    if sensor == "rate_reference":
+        return samples.value
+    if sensor == "gyroscope":
+        return np.asarray(samples.value[:, 2])
+    found = _accelerometer(recording, Options())
+    return found.rate - 2 * found.sd

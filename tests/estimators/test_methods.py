@@ -9,7 +9,7 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples, SensorSheet
 from estimators import METHODS, best, estimate
-from estimators.methods import sampling_notes
+from estimators.methods import folding_notes, sampling_notes
 
 SHEETS = {
     "magnetometer": SensorSheet(100.0, 0.6, 0.15, 4912.0),
@@ -88,3 +88,28 @@ def test_time_stamps_that_contradict_the_sheet_are_noted():
     slow = Samples(recording.need("gyroscope").t * 1.04, recording.need("gyroscope").value)
     off = Recording("rate_table", "x", Environment(), sheets=recording.sheets, samples={"gyroscope": slow})
     assert sampling_notes(off) == ["gyroscope: time stamps say 192.3 Hz, its sheet 200 Hz; the stamps are used"]
+
+
+@pytest.mark.parametrize("sensor", ["rate_reference", "gyroscope", "accelerometer"])
+def test_a_spin_that_folds_is_named_with_what_the_field_shows(sensor):
+    """20000 deg/s at 100 Hz: 200 deg from sample to sample look like 160 deg the other way."""
+    recording = spinning(20000.0, ("magnetometer", sensor))
+    found = estimate(recording, "fft")
+    np.testing.assert_allclose(np.degrees(found.rate), 16000.0, atol=8.0)  # leakage of its mirror
+    wide = {name: SensorSheet(sheet.rate_hz, position=sheet.position) for name, sheet in SHEETS.items()}
+    samples = dict(recording.samples)
+    if sensor == "gyroscope":
+        t = np.arange(600) / 200
+        samples[sensor] = Samples(t, np.outer(np.ones(t.size), [0, 0, np.radians(20000.0)]))
+    recording = Recording("rate_table", "x", Environment(), sheets=wide, samples=samples)
+    (note,) = folding_notes(recording)
+    assert note.startswith(f"{sensor}: ")
+    assert "above half the magnetometer's sampling rate (18000 deg/s)" in note
+    if sensor != "accelerometer":  # whose mount is known to two standard deviations, 4 % of the rate
+        assert note.endswith("20000 deg/s for 100 % of its readings, above half the magnetometer's sampling rate "
+                             "(18000 deg/s); fft and likelihood see it folded, as 16000 deg/s")  # fmt: skip
+
+
+def test_a_spin_within_half_the_sampling_rate_is_no_matter_for_a_note():
+    assert folding_notes(spinning(7000.0, SHEETS)) == []
+    assert folding_notes(spinning(7000.0, ("gyroscope",))) == []

@@ -54,7 +54,7 @@ def command(
     from estimators.accelerometer import AccelerometerErrors
     from estimators.fft import FftSettings
     from estimators.fusion import contradictions
-    from estimators.methods import Options, sampling_notes
+    from estimators.methods import Options, folding_notes, sampling_notes
     from validation.comparison import disagreements
     from validation.run import start_run
 
@@ -65,7 +65,7 @@ def command(
     )
     data = read_recording(recording)
     rates, left_out = estimate_all(data, method, options)
-    notes = sampling_notes(data) + contradictions(data)
+    notes = sampling_notes(data) + folding_notes(data) + contradictions(data)
     found = disagreements(rates)
     with start_run(out, inputs=[recording]) as run:
         write_text(out / "rate.csv", rate_csv(rates))
