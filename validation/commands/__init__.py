@@ -11,6 +11,7 @@ __all__ = ["COMMANDS", "register"]
 #: name on the command line -> module in this package
 COMMANDS: dict[str, str] = {
     "import": "import_",
+    "diagnose": "diagnose",
     "estimate": "estimate",
     "fly": "fly",
     "rate-table": "rate_table",

@@ -123,7 +123,16 @@ def draw_sensor(sensor: str, residuals: Sequence[Residuals], located: Sequence[L
             axes.axhspan(-1.96, 1.96, color="#000000", alpha=0.07, lw=0)
             for item in items:
                 t, value = _thinned(item.t, item.before if which == "before" else item.after)
-                axes.plot(t, value, ".", ms=2.4, mew=0, color=shades[item.recording], alpha=0.7, rasterized=True)
+                axes.plot(
+                    t,
+                    value,
+                    ".",
+                    ms=2.4 if t.size > 400 else 4.0,
+                    mew=0,
+                    color=shades[item.recording],
+                    alpha=0.7,
+                    rasterized=True,
+                )
             if not any(np.isfinite(item.before).any() or np.isfinite(item.after).any() for item in items):
                 axes.text(0.5, 0.7, "no usable reading", transform=axes.transAxes, ha="center", color="#5b6773")
         _scale(row[0], items)
@@ -160,7 +169,7 @@ def _scale(axes: Axes, items: Sequence[Residuals]) -> None:
     if limit <= 4 * _LINEAR:
         axes.set_ylim(-limit, limit)
         return
-    axes.set_yscale("symlog", linthresh=_LINEAR)
+    axes.set_yscale("symlog", linthresh=_LINEAR, linscale=0.7)
     axes.set_ylim(-limit, limit)
     ticks = [tick for k in range(12) for tick in (10.0**k, 3.0 * 10.0**k) if _LINEAR <= tick <= 0.9 * limit]
     ticks = ticks[:: -(-len(ticks) // 3)]

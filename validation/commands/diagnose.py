@@ -1,0 +1,78 @@
+"""``discsim diagnose``: where recordings part from the baseline, which physics was left out, and its size."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from validation.options import OutOption, SeedOption
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from validation.diagnosis.answer import Outcome
+
+__all__ = ["command", "write_outcome"]
+
+
+def command(
+    datasets: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="DATASET...",
+            help="Data sets (folders of recordings) of one plant that share their hardware.",
+            show_default=False,
+        ),
+    ],
+    out: OutOption = Path("diagnosis"),
+    seed: SeedOption = 0,
+    user_effects: Annotated[
+        list[Path] | None,
+        typer.Option("--with", help="A Python file with effects of your own, to compete with the catalogue's."),
+    ] = None,
+) -> None:
+    """Tell whether the baseline explains recordings down to their noise, and if not, what was left out.
+
+    Writes diagnosis.json (verdict, places, effects with their sizes, evidence, held-out gain), report.html to read,
+    residuals*.png, and model.toml: the improved model, which other commands take with --model.
+
+    Example: discsim diagnose open-field --out open-field-diagnosis
+    """
+    from importlib import import_module
+
+    from validation.diagnosis.datasets import read_datasets
+    from validation.diagnosis.progress import shown
+    from validation.diagnosis.report import verdict_sentence
+    from validation.diagnosis.user_effects import load_user_effects
+    from validation.run import start_run
+
+    diagnose = import_module("validation.diagnosis").diagnose
+    files = user_effects or []
+    effects = load_user_effects(files)
+    recordings, names = read_datasets(datasets)
+    with start_run(out, seed, [*datasets, *files]) as run:
+        with shown() as progress:
+            outcome = diagnose(recordings, names, progress=progress, seed=seed, user_effects=effects)
+        settings = {
+            "command": f"discsim {' '.join(run.command)}",
+            "seed": str(seed),
+            "recordings": ", ".join(f"{name}: {len(set_)}" for name, set_ in zip(names, recordings, strict=True)),
+        }
+        write_outcome(outcome, out, settings)
+    typer.echo(f"{outcome.diagnosis.verdict}: {verdict_sentence(outcome.diagnosis)}")
+    typer.echo(f"read {out / 'report.html'}")
+
+
+def write_outcome(outcome: Outcome, out: Path, settings: Mapping[str, str]) -> None:
+    """Write all files of a diagnosis into ``out``, each whole or not at all, ``diagnosis.json`` last."""
+    from discsim.files import write_text
+    from discsim.model_file import write_model
+    from validation.diagnosis.report import draw_figures, write_diagnosis_report
+    from validation.run import json_text
+
+    figures = draw_figures(outcome, out)
+    write_diagnosis_report(out / "report.html", outcome, figures, settings)
+    write_model(outcome.model, out / "model.toml")
+    write_text(out / "diagnosis.json", json_text(outcome.diagnosis.to_json()))

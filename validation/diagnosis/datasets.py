@@ -1,0 +1,58 @@
+"""The data sets of a diagnosis: read, named, and checked to be of one kind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from discsim.errors import InputError
+from discsim.recording import Recording, read_dataset
+
+__all__ = ["dataset_names", "read_datasets", "recording_names"]
+
+
+def read_datasets(folders: Sequence[Path]) -> tuple[list[list[Recording]], list[str]]:
+    """Return the recordings of each data set, and the names of the sets.
+
+    Raises `InputError` where a folder cannot be read, is given twice, or holds another plant than the others.
+    """
+    names = dataset_names(folders)
+    datasets = [read_dataset(folder) for folder in folders]
+    first = datasets[0][0]
+    for recording in (recording for dataset in datasets for recording in dataset):
+        if recording.plant != first.plant:
+            raise InputError(
+                f"{recording.path}: is a {recording.plant} recording and {first.path} a {first.plant} one; "
+                "expected recordings of one plant (diagnose each plant by itself)"
+            )
+    return datasets, names
+
+
+def dataset_names(folders: Sequence[Path]) -> list[str]:
+    """Return a name for each folder: its own, with its parent's before it where two would be the same."""
+    places = [folder.resolve() for folder in folders]
+    for place in places:
+        if places.count(place) > 1:
+            raise InputError(f"{place.name}: given twice; expected each data set once")
+    names = [place.name for place in places]
+    depth = 1
+    while len(set(names)) < len(names):
+        depth += 1
+        names = ["-".join(place.parts[1:][-depth:]) for place in places]
+    return names
+
+
+def recording_names(datasets: Sequence[Sequence[Recording]], names: Sequence[str]) -> list[list[str]]:
+    """Return what the answer calls each recording: its folder's name, after its set's and a slash if there are several.
+
+    A recording that no folder holds goes by its own name.
+    """
+    several = len(names) > 1
+    return [
+        [f"{name}/{_folder(recording)}" if several else _folder(recording) for recording in dataset]
+        for name, dataset in zip(names, datasets, strict=True)
+    ]
+
+
+def _folder(recording: Recording) -> str:
+    return recording.path.resolve().name if recording.path is not None else recording.name
