@@ -40,8 +40,9 @@ PHASE_SIGMA = 0.05
 RATE_SIGMA = 0.15
 #: of the smoothing of field and specific force in S, s
 VECTOR_SIGMA = 0.15
-#: slower than this, rad/s, an unclipped gyroscope tells the spin better than the field's phase, which precession bends
-SLOW = 6.0
+#: slower than this, rad/s, an unclipped gyroscope tells the spin better than the field's phase, which precession
+#: bends; up to the second, where the disc wobbles half as fast as it spins
+SLOW, TUMBLING = 6.0, 20.0
 #: over which a local attitude is averaged after the gyroscope's turning is taken out, s
 ATTITUDE_SIGMA = 0.4
 #: prior standard deviation of hard iron along the spin axis, uT, and of the field's gain
@@ -124,7 +125,7 @@ class _Attitude(NamedTuple):
     """The frame that does not spin: ``psi`` and ``r`` on ``grid``; ``D`` (n, 4) turns S into S at the start.
 
     ``transverse`` (n,) is p + i q of the gyroscope, ``field`` the magnetometer's readings in B less the iron across
-    the axis; both None where they are missing.
+    the axis; both None where they are missing. ``tumbling`` tells that all three rates are the gyroscope's.
     """
 
     grid: FloatArray
@@ -133,6 +134,7 @@ class _Attitude(NamedTuple):
     D: FloatArray
     transverse: ComplexArray | None
     field: _Readings | None
+    tumbling: bool = False
 
     def psi_at(self, t: FloatArray) -> FloatArray:
         """Return psi (k,) at t (k,), which runs on at the last rate outside."""
@@ -161,7 +163,8 @@ def flight_starts(recording: Recording, t: FloatArray) -> Starts:
     fixes = _fixes(recording)
     felt = _felt(recording, frame)
     pair = None if fixes is None else _compared(fixes, felt, grid, recording.environment.gravity)
-    G, certain = _turned_to_ned(recording, frame, grid, pair)
+    normals = None if fixes is None or pair is None else _normals(recording, _path(fixes, None, grid)[1], pair[0])
+    G, certain = _turned_to_ned(recording, frame, grid, pair, normals)
     attitude, rate = _states(recording, frame, grid, G, t)
     if felt is not None:
         felt = _in_ned(felt, grid, G, recording.environment.gravity)
@@ -180,7 +183,7 @@ def spin_starts(recording: Recording, t: FloatArray) -> Starts:
     t = np.asarray(t, dtype=float)
     frame = _frame(recording)
     grid = _even(t, recording)
-    G, _ = _turned_to_ned(recording, frame, grid, None)
+    G, _ = _turned_to_ned(recording, frame, grid, None, None)
     attitude, rate = _states(recording, frame, grid, G, t)
     nothing = np.zeros((t.size, 3))
     return _finite(Starts(t, nothing, nothing.copy(), attitude, rate, _others(recording, attitude[0])))
@@ -378,10 +381,20 @@ def _spin(
         knots = t[-1] - t[0] if steady else max(0.5, 4 * np.pi / max(typical, 0.1))
         plane, _ = _conic(t, z, knots, field)
     else:
-        plane = z - _complex_smooth(grid, t, z, 0.3)
+        # a straight line for what stands still in B: it changes as the spin decays
+        coarse = np.arange(grid[0], grid[-1] + 0.05, 0.05)
+        still = _smoothed(t, z, coarse, 0.3)
+        plane = z - np.interp(t, coarse, still.real) - 1j * np.interp(t, coarse, still.imag)
     rate = rough if expected is not None else _rough_rate(grid, t, plane, step)
     if expected is None and (centripetal := _centripetal(recording)) is not None:
-        rate = _unfolded(rate, centripetal(grid), step)
+        own = centripetal(grid)
+        if sensor == "magnetometer":
+            rate = _unfolded(rate, own, step)
+        else:
+            # the specific force across the axis may vanish: the shape of the rate is the centripetal one's
+            ratio = rate / np.maximum(own, 1e-3)
+            sign = np.sign(np.median(ratio)) or 1.0
+            rate = own * sign * float(np.clip(np.median(np.abs(ratio)), 0.8, 1.25))
     smooth = np.zeros(grid.size, dtype=complex)
     phase = np.zeros(grid.size)
     weight = np.ones(grid.size)
@@ -407,12 +420,6 @@ def _without_steps(grid: FloatArray, rate: FloatArray, t: FloatArray, z: Complex
     if np.count_nonzero(lost) < 0.005 * lost.size or _median(rate) * step < 0.15:
         return rate
     return _smoothed(middle[~lost], (usual + odd / gap)[~lost], grid, RATE_SIGMA)
-
-
-def _complex_smooth(grid: FloatArray, t: FloatArray, z: ComplexArray, sigma: float) -> ComplexArray:
-    sums, weight = _spread(grid, t, z, sigma)
-    mean = sums / np.maximum(weight, 1e-9)
-    return np.asarray(np.interp(t, grid, mean.real) + 1j * np.interp(t, grid, mean.imag))
 
 
 def _rough_rate(grid: FloatArray, t: FloatArray, z: ComplexArray, step: float) -> FloatArray:
@@ -468,8 +475,11 @@ def _frame(recording: Recording) -> _Attitude:
     """Return psi, r and the relative attitude of the frame that does not spin over the whole recording."""
     expected = _expected_rate(recording)
     gyroscope = _readings(recording, "gyroscope", slice(0, 2))
-    if gyroscope is not None and expected is not None and _median(expected(gyroscope.t)) < SLOW:
-        return _slow_frame(recording, gyroscope, expected(gyroscope.t))
+    if gyroscope is not None and expected is not None:
+        own = expected(gyroscope.t)
+        wobble = _median(np.hypot(*gyroscope.value.T))
+        if _median(own) < SLOW or _median(own) < min(2 * wobble, TUMBLING):
+            return _slow_frame(recording, gyroscope, own)
     spin = _spin(recording, "magnetometer", expected, steady=False)
     field = None
     if spin is not None:
@@ -500,8 +510,7 @@ def _frame(recording: Recording) -> _Attitude:
         psi, r = _without_precession(recording, spin, grid, psi, r, w)
         if expected is not None:
             # what the field adds to the gyroscope's own angle is slow: its gain and its clock
-            coarse = np.linspace(grid[0], grid[-1], max(2, int((grid[-1] - grid[0]) / 0.05)))
-            own = expected(grid)
+            coarse, own = np.linspace(grid[0], grid[-1], max(2, int((grid[-1] - grid[0]) / 0.05))), expected(grid)
             added = _smoothed(grid, psi - _integral(grid, own), coarse, 0.3)
             psi = _integral(grid, own) + np.interp(grid, coarse, added)
             r = own + np.interp(grid, coarse, np.gradient(added, coarse))
@@ -512,7 +521,7 @@ def _slow_frame(recording: Recording, gyroscope: _Readings, r: FloatArray) -> _A
     """Return the frame of a disc that turns slowly, from the gyroscope alone; iron from a field that stands still."""
     grid, w = gyroscope.t, gyroscope.value[:, 0] + 1j * gyroscope.value[:, 1]
     psi = _integral(grid, r)
-    frame = _Attitude(grid, psi, r, _despun(grid, psi, w), w, None)
+    frame = _Attitude(grid, psi, r, _despun(grid, psi, w), w, None, tumbling=True)
     readings = _readings(recording, "magnetometer")
     if readings is None:
         return frame
@@ -592,11 +601,16 @@ def _without_precession(
 
 
 def _turned_to_ned(
-    recording: Recording, frame: _Attitude, grid: FloatArray, pair: tuple[FloatArray, FloatArray | None] | None
+    recording: Recording,
+    frame: _Attitude,
+    grid: FloatArray,
+    pair: tuple[FloatArray, FloatArray | None] | None,
+    normals: FloatArray | None,
 ) -> tuple[FloatArray, bool]:
     """Return C (n, 3, 3) from S at the start to N, found locally at the instants of ``grid``, and if it is unique.
 
-    With a perfect gyroscope all would be the same matrix. ``pair`` holds the specific force in N and in S at the start.
+    With a perfect gyroscope all would be the same matrix. ``pair`` holds the specific force in N and in S at the start,
+    ``normals`` (n, 3) what the path says of the spin axis, which stands in for a sensor that is missing.
     """
     field = recording.environment.magnetic_field
     force, felt = (None, None) if pair is None else pair
@@ -610,7 +624,13 @@ def _turned_to_ned(
         magnetic = _without_axial_iron(magnetic, axis, field, felt, force, wandering=wandering)
     sigma = ATTITUDE_SIGMA if frame.transverse is not None else GRID
     if felt is not None and force is not None:
+        if magnetic is None and normals is not None:
+            return _fitted_turns(axis, felt, normals, force, sigma), False
         return _fitted_turns(magnetic, felt, field, force, sigma), magnetic is not None
+    if normals is not None:
+        # the lift's size on both sides weighs its direction
+        lift = np.linalg.norm(normals, axis=1, keepdims=True)
+        return _fitted_turns(magnetic, axis * lift, field, normals, sigma), False
     if magnetic is None:
         return _level(recording, frame, grid), False
     # one direction: in S at the start the field stands still, so all instants share it
@@ -638,6 +658,30 @@ def _fitted_turns(
         )
         say = 1 / (1 + (apart / max(0.05, 2 * float(np.median(apart)))) ** 2)
     return turns
+
+
+def _normals(recording: Recording, velocity: FloatArray, force: FloatArray) -> FloatArray | None:
+    """Return the spin axis in N (n, 3), as long as the lift's share of the specific force (n, 3), from a path alone.
+
+    Lift is across the airspeed, in its plane with the axis, and its size tells the angle of attack, (20), (21). Lift
+    is taken to point away from z_B. None where the disc's aerodynamics are unknown.
+    """
+    disc, density = recording.disc, recording.environment.air_density
+    if disc is None or disc.aero is None or density is None:
+        return None
+    relative = velocity - recording.environment.wind
+    speed = np.maximum(np.linalg.norm(relative, axis=1, keepdims=True), 1.0)
+    along = relative / speed
+    across = force - np.sum(force * along, axis=1, keepdims=True) * along
+    lift = np.linalg.norm(across, axis=1, keepdims=True)
+    alpha = np.linspace(-0.3, 0.6, 181)
+    CL = disc.aero.CL0 + disc.aero.CLa * alpha
+    if disc.aero_table is not None:
+        CL = np.interp(alpha, disc.aero_table.alpha, disc.aero_table.CL)
+    needed = lift * disc.mass / (0.5 * density * speed**2 * disc.area)
+    found = alpha[np.argmin(np.abs(CL[None, :] - needed), axis=1)][:, None]
+    z = -np.cos(found) * across / np.maximum(lift, 1e-6) + np.sin(found) * along
+    return np.asarray(z * np.minimum(lift, 20.0))
 
 
 def _field_in_start(field: _Readings, frame: _Attitude, grid: FloatArray, sigma: float) -> FloatArray:
@@ -692,11 +736,29 @@ def _force_in_start(recording: Recording, frame: _Attitude, grid: FloatArray, si
 
 def _felt(recording: Recording, frame: _Attitude) -> _Felt | None:
     """Return the specific force in S at the start and its integrals over the recording."""
+    if frame.tumbling:
+        return _felt_tumbling(recording, frame)
     # as local as a turn allows: the integrals average it anyway
     sigma = float(np.clip(3.0 / max(_median(frame.r), 0.1), 0.03, VECTOR_SIGMA))
     grid = np.arange(0.0, recording.end + sigma, sigma)
     force = _force_in_start(recording, frame, grid, sigma)
     return None if force is None else _integrated(grid, force)
+
+
+def _felt_tumbling(recording: Recording, frame: _Attitude) -> _Felt | None:
+    """Return the force of a disc whose three rates are known: each reading less what the sensor's place makes."""
+    readings = _readings(recording, "accelerometer")
+    if readings is None or frame.transverse is None:
+        return None
+    place = recording.sheets["accelerometer"].position
+    d = np.zeros(3) if place is None else np.asarray(place)
+    w = np.column_stack([frame.transverse.real, frame.transverse.imag, frame.r])
+    w = np.column_stack([np.interp(readings.t, frame.grid, column) for column in w.T])
+    # (1): what is left of the reading at the centre
+    force = readings.value - np.cross(w, np.cross(w, d)) - np.cross(np.gradient(w, readings.t, axis=0), d)
+    about = frame.psi_at(readings.t)[:, None] * np.array([0.0, 0.0, 1.0])
+    C = body_to_ned(multiply(frame.D_at(readings.t), turn(about)))
+    return _integrated(readings.t, np.einsum("nij,nj->ni", C, force))
 
 
 def _integrated(grid: FloatArray, force: FloatArray) -> _Felt:
@@ -777,7 +839,7 @@ def _without_axial_iron(
 
 
 def _pairs(m: FloatArray | None, f: FloatArray, field: FloatArray, force: FloatArray, say: FloatArray) -> FloatArray:
-    """Return the matrices (n, 3, 3) of Wahba's problem for m and f (n, 3) to be taken to field (3,) and force (n, 3).
+    """Return the matrices (n, 3, 3) of Wahba's problem for m and f (n, 3) to be taken to field and force.
 
     The specific force counts where felt and path agree on its size, and is large enough to have a direction, times
     ``say`` (n,).
@@ -791,7 +853,7 @@ def _pairs(m: FloatArray | None, f: FloatArray, field: FloatArray, force: FloatA
     strong = say * np.minimum(np.minimum(size, other) / 5.0, 1.0) ** 2 * agreement**2 + 1e-3 * (other > 0)
     K = np.einsum("n,ni,nj->nij", strong, unit(force), unit(f))
     if m is not None:
-        K += 0.3 * np.einsum("i,nj->nij", unit(field), unit(m))
+        K += 0.3 * np.einsum("ni,nj->nij", unit(np.broadcast_to(field, m.shape)), unit(m))
         K += np.einsum("n,ni,nj->nij", 0.1 * strong, unit(np.cross(field, force)), unit(np.cross(m, f)))
     return np.asarray(K)
 
