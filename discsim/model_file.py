@@ -1,7 +1,8 @@
 """Model files (`model.toml`): a disc or a rig with its surroundings and the effects upon it, for every command.
 
 The tables ``[environment]``, ``[disc]`` and ``[rig]`` are those of a recording. Each ``[[effects]]`` names one effect
-of the catalogue with its parameters and their standard deviations, and the recordings that it belongs to.
+of the catalogue with its parameters and their standard deviations, and the recordings that it belongs to. ``[law]``
+is a term that the catalogue does not hold, as a formula with coefficients.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from discsim.effects.catalogue import Effect, effect, row
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import write_text
+from discsim.law import Law
 from discsim.recording import disc_toml, environment_toml, rig_toml, toml_lines
 from discsim.toml_table import TomlTable, read_toml
 
@@ -41,12 +43,13 @@ class ModelEffect:
 
 @dataclass(frozen=True)
 class Model:
-    """What a simulation needs beside the throw: surroundings, a disc or a rig, and effects."""
+    """What a simulation needs beside the throw: surroundings, a disc or a rig, effects, and a law if there is one."""
 
     environment: Environment
     disc: Disc | None = None
     rig: Rig | None = None
     effects: tuple[ModelEffect, ...] = ()
+    law: Law | None = None
 
     def effects_in(self, recording: str | None = None) -> list[Effect]:
         """Return the effects that all recordings share, and those of the named one."""
@@ -68,8 +71,10 @@ def read_model(path: Path | str) -> Model:
     disc = Disc.from_toml(disc_table, aero_required=False) if disc_table is not None else None
     rig = Rig.from_toml(rig_table) if rig_table is not None else None
     effects = tuple(_read_effect(table) for table in top.tables("effects"))
+    law_table = top.table("law")
+    law = None if law_table is None else _read_law(law_table)
     top.finish()
-    return Model(environment, disc, rig, effects)
+    return Model(environment, disc, rig, effects, law)
 
 
 def _read_effect(table: TomlTable) -> ModelEffect:
@@ -102,6 +107,24 @@ def _read_effect(table: TomlTable) -> ModelEffect:
     )
 
 
+def _read_law(table: TomlTable) -> Law:
+    text, target = table.text("text"), table.text("target")
+    assert text is not None
+    assert target is not None
+    coefficients = _numbers(table.table("coefficients", required=True))
+    sigma = _numbers(table.table("sigma"))
+    table.finish()
+    try:
+        return Law(text, target, coefficients, sigma)
+    except InputError as error:
+        raise table.error("target" if "target is" in str(error) else "text", str(error)) from None
+
+
+def _numbers(table: TomlTable | None) -> dict[str, float]:
+    """Return all of a table's numbers, whatever they are called."""
+    return {} if table is None else {name: table.need(name) for name in table}
+
+
 def write_model(model: Model, path: Path) -> None:
     """Write a model file, whole or not at all; what is read back is equal to the last bit."""
     lines = [f'format = "{MODEL_FORMAT}"', *environment_toml(model.environment)]
@@ -116,4 +139,9 @@ def write_model(model: Model, path: Path) -> None:
         lines += ["[effects.parameters]", *toml_lines(sizes)]
         if item.sigma:
             lines += ["[effects.sigma]", *toml_lines(dict(item.sigma))]
+    if (law := model.law) is not None:
+        lines += ["", "[law]", *toml_lines({"text": law.text, "target": law.target})]
+        lines += ["[law.coefficients]", *toml_lines(dict(law.coefficients))]
+        if law.sigma:
+            lines += ["[law.sigma]", *toml_lines(dict(law.sigma))]
     write_text(path, "\n".join([*lines, ""]))

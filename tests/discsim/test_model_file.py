@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from discsim.disc import Rig
 from discsim.effects import effect
 from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.law import Law
 from discsim.model_file import Model, ModelEffect, read_model, write_model
 from discsim.shipped import load_disc
 
@@ -43,6 +46,35 @@ def test_a_rig_is_a_model_too(tmp_path):
     again = read_model(tmp_path / "model.toml")
     assert again.disc is None
     assert again.rig == rig
+
+
+def test_a_law_is_carried_with_its_coefficients_and_their_deviations(model, tmp_path):
+    law = Law("-c * |r|^n * sign(r)", "moment_z_N_m", {"c": 3.1e-6, "n": 1.503}, {"c": 4e-8})
+    write_model(replace(model, law=law), tmp_path / "model.toml")
+    assert read_model(tmp_path / "model.toml").law == law
+    write_model(model, tmp_path / "model.toml")
+    assert read_model(tmp_path / "model.toml").law is None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("|r|^n", "|s|^n", r"model.toml:\d+: law .*found 's' where .* belongs"),
+        ("moment_z_N_m", "moment_z", "target is 'moment_z', expected one of force_x_N"),
+        ("\nn = ", "\nm = ", "unknown 'n' \\(known are c, m"),
+        ("[law.sigma]\nc", "[law.sigma]\nb", "sigma of 'b', which is no coefficient"),
+        ("text = ", "txt = ", "did you mean 'text'"),
+    ],
+)
+def test_a_law_that_cannot_be_read_is_refused_at_its_line(model, tmp_path, old, new, expected):
+    law = Law("-c * |r|^n * sign(r)", "moment_z_N_m", {"c": 3.1e-6, "n": 1.503}, {"c": 4e-8})
+    path = tmp_path / "model.toml"
+    write_model(replace(model, law=law), path)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match=expected):
+        read_model(path)
 
 
 def test_an_effect_of_one_recording_is_not_in_the_others(model):

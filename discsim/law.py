@@ -1,0 +1,233 @@
+"""A law: a missing force, moment or sensor term as an explicit formula of the state, read from its text.
+
+The text is a sum of products of powers. A factor is a number, a coefficient, a symbol of `SYMBOLS`, its magnitude
+``|r|`` or its direction ``sign(r)``; an exponent is a number or a coefficient. ``c * |r|^n * sign(r) + b * V^2`` with
+the coefficients c, n and b is a law, and so is ``-c r V``: a blank or a dot multiplies, too.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import isfinite, pow
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from discsim.arrays import FloatArray, readonly
+from discsim.compiled import compiled
+from discsim.errors import InputError
+from discsim.frames import heading_angles, norm3
+from discsim.recording import SENSORS
+
+__all__ = ["SYMBOLS", "WRENCH_TARGETS", "Law", "law_wrench"]
+
+#: symbols that a law may hold: time s, height m, airspeed m/s, angle of attack rad, rates in the H frame and spin
+#: rad/s; x, y, z are a sensor's own reading before noise, in its unit, and stand only in a law about that sensor
+SYMBOLS = ("t", "h", "V", "alpha", "p_H", "q_H", "r", "x", "y", "z")
+#: what a law about motion may give: force and moment of the H frame, whose z axis is that of the body
+WRENCH_TARGETS = ("force_x_N", "force_y_N", "force_z_N", "moment_x_N_m", "moment_y_N_m", "moment_z_N_m")
+_SENSOR_ONLY = ("x", "y", "z")
+_COUNT = len(SYMBOLS)
+#: a row of a law's numbers: place of its target, coefficient, and of each symbol the power of its magnitude and its
+#: sign to a power
+_WIDTH = 2 + 2 * _COUNT
+_TOKEN = re.compile(r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*·/^|()]))")
+
+
+@dataclass(frozen=True)
+class Law:
+    """A term that the catalogue does not hold: ``target = text``.
+
+    ``target`` is one of `WRENCH_TARGETS` (``moment_z_N_m`` also for a rig's axis) or ``SENSOR.COLUMN`` as in
+    ``magnetometer.x_uT``. ``sigma`` has one standard deviation per coefficient, absent where it is unknown. Raises
+    `InputError` for a text that is no law.
+    """
+
+    text: str
+    target: str
+    coefficients: Mapping[str, float]
+    sigma: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "coefficients", MappingProxyType(dict(self.coefficients)))
+        object.__setattr__(self, "sigma", MappingProxyType(dict(self.sigma)))
+        columns = [f"{sensor}.{column}" for sensor, kind in SENSORS.items() for column in kind.columns]
+        if self.target not in (*WRENCH_TARGETS, *columns):
+            raise InputError(
+                f"law: target is {self.target!r}, expected one of {', '.join(WRENCH_TARGETS)} or a sensor's column "
+                "such as magnetometer.x_uT"
+            )
+        for name, value in self.coefficients.items():
+            if not re.fullmatch(r"[A-Za-z_]\w*", name) or name in (*SYMBOLS, "sign"):
+                raise InputError(
+                    f"law: a coefficient is called '{name}'; expected a name that is no symbol of the state"
+                )
+            if not isfinite(value):
+                raise InputError(f"law: {name} is not finite ({value}); expected a finite number")
+        if strange := set(self.sigma) - set(self.coefficients):
+            raise InputError(f"law: sigma of '{min(strange)}', which is no coefficient")
+        rows = self.rows
+        if self.target in WRENCH_TARGETS and np.any(rows[:, 2 + SYMBOLS.index("x") : 2 + _COUNT]):
+            raise InputError("law: x, y and z are a sensor's reading; expected them only in a law about a sensor")
+
+    @cached_property
+    def rows(self) -> FloatArray:
+        """The law as numbers, a row per term, for `law_wrench`."""
+        parser = _Parser(self.text, self.coefficients)
+        place = WRENCH_TARGETS.index(self.target) if self.target in WRENCH_TARGETS else -1
+        return readonly([[place, *term] for term in parser.terms()])
+
+    def evaluate(self, state: Mapping[str, ArrayLike]) -> FloatArray:
+        """Return the law at states given by symbol, each a number or (n,); raises KeyError where one is missing."""
+        total: FloatArray = np.zeros(())
+        for row in self.rows:
+            term = np.asarray(row[1])
+            for k, symbol in enumerate(SYMBOLS):
+                power, odd = row[2 + k], row[2 + _COUNT + k]
+                if power or odd:
+                    x = np.asarray(state[symbol], dtype=np.float64)
+                    term = term * np.abs(x) ** power * (np.sign(x) if odd else 1.0)
+            total = total + term
+        return total
+
+
+class _Parser:
+    """Reads a sum of products into rows: coefficient, powers of the magnitudes, whether the sign is kept."""
+
+    def __init__(self, text: str, coefficients: Mapping[str, float]) -> None:
+        self._text, self._coefficients = text, coefficients
+        self._tokens: list[str] = []
+        place = 0
+        while text[place:].strip():
+            token = _TOKEN.match(text, place)
+            if token is None:
+                raise self._error(f"cannot read '{text[place:].strip()[:20]}'")
+            self._tokens.append(token[0].strip())
+            place = token.end()
+        self._next = 0
+
+    def _error(self, message: str) -> InputError:
+        return InputError(f"law '{self._text}': {message}; expected a sum of products of powers such as c * |r|^n * V")
+
+    def _peek(self) -> str:
+        return self._tokens[self._next] if self._next < len(self._tokens) else ""
+
+    def _take(self, *expected: str) -> str:
+        token = self._peek()
+        if not token or (expected and token not in expected):
+            found = f"'{token}'" if token else "the end"
+            raise self._error(f"found {found} where {' or '.join(expected) or 'a factor'} belongs")
+        self._next += 1
+        return token
+
+    def _skip(self, *tokens: str) -> bool:
+        """Tell whether one of the tokens is next, and step over it."""
+        there = self._peek() in tokens
+        self._next += there
+        return there
+
+    def terms(self) -> list[list[float]]:
+        """Return the rows of all terms."""
+        rows = []
+        sign = -1.0 if self._skip("-") else 1.0
+        while True:
+            rows.append(self._product(sign))
+            if not self._peek():
+                return rows
+            sign = {"+": 1.0, "-": -1.0}[self._take("+", "-")]
+
+    def _product(self, sign: float) -> list[float]:
+        coefficient, powers, odd = sign, [0.0] * _COUNT, [0.0] * _COUNT
+        inverse = 1.0
+        while True:
+            value, place, power, is_odd = self._factor()
+            if place < 0:
+                coefficient *= pow(value, inverse * power)
+            else:
+                powers[place] += inverse * power
+                odd[place] = (odd[place] + is_odd) % 2.0
+            if self._peek() in ("", "+", "-"):
+                return [coefficient, *powers, *odd]
+            inverse = -1.0 if self._skip("/") else 1.0
+            if inverse > 0.0:
+                self._skip("*", "·")
+
+    def _factor(self) -> tuple[float, int, float, float]:
+        """Return value of a number, place of a symbol (-1: a number), its power, and whether its sign is kept."""
+        token = self._take()
+        if token == "|":
+            place = self._symbol()
+            self._take("|")
+            return 1.0, place, self._exponent(), 0.0
+        if token == "sign":
+            self._take("(")
+            place = self._symbol()
+            self._take(")")
+            return 1.0, place, 0.0, 1.0
+        if token in SYMBOLS:
+            power = self._exponent()
+            if power != round(power):
+                raise self._error(f"{token} to a power that is no integer; write |{token}|^{power:g}")
+            return 1.0, SYMBOLS.index(token), power, abs(power) % 2.0
+        value = self._number(token)
+        power = self._exponent()
+        if (value == 0.0 and power < 0.0) or (value < 0.0 and power != round(power)):
+            raise self._error(f"{value:g} to the power {power:g}")
+        return value, -1, power, 0.0
+
+    def _symbol(self) -> int:
+        return SYMBOLS.index(self._take(*SYMBOLS))
+
+    def _exponent(self) -> float:
+        if not self._skip("^", "**"):
+            return 1.0
+        closing = self._skip("(")
+        sign = -1.0 if self._skip("-") else 1.0
+        value = sign * self._number(self._take())
+        if closing:
+            self._take(")")
+        return value
+
+    def _number(self, token: str) -> float:
+        if token in self._coefficients:
+            return float(self._coefficients[token])
+        try:
+            return float(token)
+        except ValueError:
+            known = ", ".join((*self._coefficients, *SYMBOLS))
+            raise self._error(f"unknown '{token}' (known are {known})") from None
+
+
+@compiled
+def law_wrench(
+    rows: FloatArray, t: float, h: float, u: float, v: float, w: float, P: float, Q: float, r: float
+) -> tuple[float, float, float, float, float, float]:
+    """Force (N) and moment (N m) of a law's rows, to be added to those of the air; arguments as for ``air_wrench``.
+
+    Like it, in any frame whose z axis is that of the body. For a rig's axis only r matters.
+    """
+    V = norm3(u, v, w)
+    cos_beta, sin_beta, alpha = heading_angles(u, v, w)
+    state = (t, h, V, alpha, cos_beta * P + sin_beta * Q, cos_beta * Q - sin_beta * P, r)
+    out = np.zeros(6)
+    for i in range(rows.shape[0]):
+        term = rows[i, 1]
+        for k in range(len(state)):
+            power, odd = rows[i, 2 + k], rows[i, 2 + _COUNT + k]
+            if power != 0.0:
+                term *= abs(state[k]) ** power
+            if odd != 0.0:
+                term *= np.sign(state[k])
+        out[int(rows[i, 0])] += term
+    return (
+        cos_beta * out[0] - sin_beta * out[1],
+        sin_beta * out[0] + cos_beta * out[1],
+        out[2],
+        cos_beta * out[3] - sin_beta * out[4],
+        sin_beta * out[3] + cos_beta * out[4],
+        out[5],
+    )

@@ -1,0 +1,102 @@
+"""Laws read from text: the same numbers in plain Python, over arrays and compiled, in whatever frame."""
+
+from __future__ import annotations
+
+from math import copysign, cos, hypot, sin, sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from discsim.errors import InputError
+from discsim.law import SYMBOLS, WRENCH_TARGETS, Law, law_wrench
+
+STATE = {"t": 1.5, "h": 2.0, "V": 17.0, "alpha": -0.1, "p_H": 2.0, "q_H": -3.0, "r": -60.0}
+COEFFICIENTS = {"c": 3e-6, "n": 1.5, "b": -2e-3}
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("c * |r|^n * sign(r)", -3e-6 * 60.0**1.5),
+        ("-c |r|^n sign(r) + b·V^2", 3e-6 * 60.0**1.5 - 2e-3 * 17.0**2),
+        ("b r V", 2e-3 * 60.0 * 17.0),
+        ("b * r**2", -2e-3 * 3600.0),
+        ("b r^3 / V^2", 2e-3 * 60.0**3 / 17.0**2),
+        ("b |r| |alpha|^0.5", -2e-3 * 60.0 * sqrt(0.1)),
+        ("b * alpha^2 q_H - 2.5e-1 p_H", -2e-3 * 0.01 * -3.0 - 0.5),
+        ("b h^(-1) + c t", -1e-3 + 4.5e-6),
+        ("c^2 * r", -9e-12 * 60.0),
+        ("b sign(r) sign(alpha)", -2e-3),
+        ("b", -2e-3),
+    ],
+)
+def test_a_law_is_what_its_text_says(text, expected):
+    law = Law(text, "moment_z_N_m", COEFFICIENTS)
+    assert float(law.evaluate(STATE)) == pytest.approx(expected, rel=1e-13)
+
+
+@given(V=st.floats(1.0, 40.0), beta=st.floats(-3.1, 3.1), alpha=st.floats(-1.0, 1.0), r=st.floats(-120.0, 120.0))
+def test_the_compiled_law_acts_in_the_heading_frame_whatever_the_frame_it_is_asked_in(V, beta, alpha, r):
+    u, v, w = V * cos(alpha) * cos(beta), V * cos(alpha) * sin(beta), V * sin(alpha)
+    p_H, q_H = 2.0, -3.0
+    P, Q = p_H * cos(beta) - q_H * sin(beta), p_H * sin(beta) + q_H * cos(beta)
+    state = {"t": 1.5, "h": 2.0, "V": V, "alpha": alpha, "p_H": p_H, "q_H": q_H, "r": r}
+    for place, target in enumerate(WRENCH_TARGETS):
+        law = Law("b |r|^0.7 V q_H + 0.1 alpha p_H", target, COEFFICIENTS)
+        out = np.array(law_wrench(law.rows, 1.5, 2.0, u, v, w, P, Q, r)).reshape(2, 3)
+        in_heading = np.stack(
+            [out[:, 0] * cos(beta) + out[:, 1] * sin(beta), -out[:, 0] * sin(beta) + out[:, 1] * cos(beta), out[:, 2]],
+            axis=1,
+        ).ravel()
+        expected = np.zeros(6)
+        expected[place] = law.evaluate(state)
+        # rounding of the angles; the law itself is of order one
+        np.testing.assert_allclose(in_heading, expected, rtol=1e-10, atol=1e-11)
+
+
+def test_a_rigs_axis_needs_its_spin_alone():
+    law = Law("-c |r|^n sign(r)", "moment_z_N_m", COEFFICIENTS)
+    for r in (-80.0, 0.0, 80.0):
+        wrench = law_wrench(law.rows, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, r)
+        assert wrench[:5] == (0.0, 0.0, 0.0, 0.0, 0.0)
+        assert wrench[5] == pytest.approx(copysign(3e-6 * abs(r) ** 1.5, -r) if r else 0.0, rel=1e-13)
+
+
+def test_a_law_about_a_sensor_may_hold_its_reading():
+    law = Law("b * x * |x|", "accelerometer.x_m_s2", COEFFICIENTS)
+    x = np.array([-10.0, 0.0, 5.0])
+    np.testing.assert_allclose(law.evaluate({"x": x}), -2e-3 * x * np.abs(x), rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("c *", "found the end where a factor belongs"),
+        ("", "found the end"),
+        ("c r^n", r"write \|r\|\^1.5"),
+        ("c |r", r"found the end where \| belongs"),
+        ("c * q", "unknown 'q'"),
+        ("c $ r", "cannot read"),
+        ("c + * r", r"unknown '\*'"),
+        ("c x", "only in a law about a sensor"),
+        ("b^n r", "to the power"),
+        ("c sign r", r"found 'r' where \( belongs"),
+        ("c (r + V)", r"unknown '\('"),
+    ],
+)
+def test_a_text_that_is_no_law_is_refused_with_the_place(text, expected):
+    with pytest.raises(InputError, match=expected):
+        Law(text, "moment_z_N_m", COEFFICIENTS)
+
+
+@pytest.mark.parametrize("name", ["r", "sign", "a b", "2"])
+def test_a_coefficient_may_not_be_called_as_something_else(name):
+    with pytest.raises(InputError, match=r"a name that is no symbol"):
+        Law("1.0 r", "moment_z_N_m", {name: 1.0})
+
+
+def test_symbols_are_told_from_coefficients_by_name():
+    assert len(set(SYMBOLS)) == len(SYMBOLS)
+    assert hypot(*Law("r + rr", "moment_z_N_m", {"rr": 2.0}).evaluate({"r": [3.0, -2.0]})) == 5.0
