@@ -146,9 +146,11 @@ def centripetal(
     empty = Centripetal(np.zeros(0), np.zeros((0, 2)), np.zeros(0))
     if np.count_nonzero(known) < 2 or len(accelerometer) < 8:
         return empty
-    value = accelerometer.value[:, :2]
-    good = np.all(np.isfinite(value), axis=1) & ~np.any(sheet.clipped(value), axis=1)
-    times = accelerometer.t
+    present = np.all(np.isfinite(accelerometer.value[:, :2]), axis=1)
+    times, value = accelerometer.t[present], accelerometer.value[present, :2]
+    if times.size < 8:
+        return empty
+    good = ~np.any(sheet.clipped(value), axis=1)
     r = np.interp(times, t[known], rate[known], left=np.nan, right=np.nan)
     # a hole in the known rate is no rate
     index = np.clip(np.searchsorted(t[known], times), 1, np.count_nonzero(known) - 1)
@@ -539,10 +541,11 @@ def accelerometer_calibrated(recording: Recording, settings: FusionSettings | No
 def _rough_rate(accelerometer: Samples, sheet: SensorSheet) -> FloatArray:
     """First guess from the force averaged over half a second."""
     assert sheet.position is not None
-    value = np.nan_to_num(accelerometer.value[:, :2])
+    present = np.all(np.isfinite(accelerometer.value[:, :2]), axis=1)
+    value = np.where(present[:, None], accelerometer.value[:, :2], 0.0)
     width = max(3, round(0.5 / accelerometer.interval))
     kernel = np.ones(width) / width
-    count = np.convolve(np.ones(len(value)), kernel, mode="same")
+    count = np.maximum(np.convolve(present.astype(float), kernel, mode="same"), 1e-9)
     mean = np.stack([np.convolve(value[:, i], kernel, mode="same") / count for i in range(2)], axis=1)
     d = sheet.position[:2]
     return np.asarray(np.sqrt(np.maximum(-(mean @ d), 0.0)) / float(np.hypot(*d)))

@@ -129,13 +129,22 @@ def missing_sensors(recording: Recording, name: str) -> tuple[str, ...]:
 
 
 def sampling_notes(recording: Recording) -> list[str]:
-    """Say where a sensor's time stamps contradict the sampling rate that its sheet states; the stamps are used."""
+    """Say where a sensor's time stamps contradict the sampling rate that its sheet states, and where rows are missing.
+
+    The stamps are used; `fft`, which needs an even grid, is silent where the magnetometer's is not.
+    """
     notes = []
     for sensor, samples in recording.samples.items():
         stated = recording.sheets[sensor].rate_hz
         found = 1 / samples.interval
         if abs(found / stated - 1) > RATE_TOLERANCE:
             notes.append(f"{sensor}: time stamps say {found:.4g} Hz, its sheet {stated:.4g} Hz; the stamps are used")
+        gaps = int(np.count_nonzero(np.diff(samples.t) > 1.5 * samples.interval))
+        if gaps:
+            silent = "; fft is silent across them" if sensor == "magnetometer" else ""
+            notes.append(
+                f"{sensor}: {gaps} steps longer than one and a half of the usual {samples.interval:.4g} s{silent}"
+            )
     return notes
 
 
