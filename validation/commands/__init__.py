@@ -12,6 +12,7 @@ __all__ = ["COMMANDS", "register"]
 COMMANDS: dict[str, str] = {
     "import": "import_",
     "diagnose": "diagnose",
+    "challenge": "challenge",
     "estimate": "estimate",
     "fly": "fly",
     "rate-table": "rate_table",

@@ -1,0 +1,72 @@
+"""``discsim challenge``: conceals effects in MuJoCo flights and rigs, has them diagnosed blind, opens the answers."""
+
+from __future__ import annotations
+
+import enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from validation.options import OutOption, SeedOption
+
+if TYPE_CHECKING:
+    from discsim.recording import Plant
+
+__all__ = ["command"]
+
+
+class PlantName(enum.StrEnum):
+    """What moves."""
+
+    flight = "flight"
+    rate_table = "rate_table"
+    spin_down = "spin_down"
+    free_spin = "free_spin"
+
+
+def command(
+    cases: Annotated[int, typer.Option(min=1, help="Number of cases; case k has seed --seed + k.")] = 20,
+    plant: Annotated[PlantName | None, typer.Option(help="Only this plant. Default: all four.")] = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(help="Conceal this in every case, an id of the catalogue; may repeat. Default: as drawn."),
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a running Dask scheduler. Default: local processes.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Local processes; 1 works in this one. Default: one per core.")
+    ] = None,
+    anew: Annotated[bool, typer.Option("--anew", help="Throw away what an earlier challenge left in --out.")] = False,
+    out: OutOption = Path("challenge"),
+    seed: SeedOption = 0,
+) -> None:
+    """Put discsim diagnose to a blind test and score it.
+
+    Effects are concealed in MuJoCo and written as plain recordings; another process that gets nothing but those
+    diagnoses them; then the sealed answers are opened. Writes challenge.json and report.html into --out. Stopped at
+    any moment, the same command goes on. Exit status 1 where a goal is missed.
+
+    Example: discsim challenge --cases 20 --out challenge
+    """
+    from discsim.errors import InputError
+    from validation.challenge.blind import Request
+    from validation.challenge.page import goals_met
+    from validation.challenge.run import challenge
+    from validation.run import start_run
+
+    if scheduler is not None and workers is not None:
+        raise InputError("--workers counts local processes, and --scheduler uses none; expected one of the two")
+    chosen: Plant | None = plant.value if plant is not None else None
+    requests = [Request(number, chosen, tuple(effect or ())) for number in range(seed, seed + cases)]
+    requests[0].draw()  # what does not go together is refused before anything is written
+    with start_run(out, seed) as run:
+        scored, rates = challenge(run, requests, scheduler=scheduler, workers=workers, anew=anew)
+    for name, found in rates.items():
+        share = f"{100 * found.value:.1f} % ({found.hits} of {found.of})" if found.of else "no such case"
+        typer.echo(f"{name.replace('_', ' ')}: {share}")
+    right = sum(item.score.right for item in scored)
+    typer.echo(f"{right} of {len(scored)} answered rightly; report: {out / 'report.html'}")
+    if not goals_met(rates, few=len(scored) < 300):
+        raise typer.Exit(1)
