@@ -12,6 +12,7 @@ from math import isfinite
 from types import MappingProxyType
 from typing import Any, Literal, TypeAlias, get_args
 
+import discsim.law
 from discsim.arrays import FloatArray, readonly
 from discsim.effects.catalogue import CATALOGUE
 from discsim.model_file import Model
@@ -248,7 +249,10 @@ class Recalibration:
 
 @dataclass(frozen=True)
 class Law:
-    """A missing force, torque or sensor term as an explicit formula of the state, ``target = text``."""
+    """A missing force, torque or sensor term as an explicit formula of the state, ``target = text``.
+
+    Text and target are those of `discsim.law.Law`, so that the law can be flown.
+    """
 
     text: str
     target: str
@@ -260,6 +264,13 @@ class Law:
         if not self.text or not self.target or not self.coefficients:
             raise ValueError("law: expected a text, a target and coefficients")
         object.__setattr__(self, "coefficients", MappingProxyType(dict(self.coefficients)))
+        self.for_model()
+
+    def for_model(self) -> discsim.law.Law:
+        """Return the law as a model file carries it; raises `InputError` where text or target are no law's."""
+        values = {name: float(item.value) for name, item in self.coefficients.items()}
+        sigma = {name: float(item.sd) for name, item in self.coefficients.items() if item.sd is not None}
+        return discsim.law.Law(self.text, self.target, values, sigma)
 
     def to_json(self) -> dict[str, Any]:
         """Return the JSON object."""

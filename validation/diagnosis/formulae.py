@@ -22,9 +22,11 @@ __all__ = [
     "everyday",
     "form",
     "found",
+    "law_text",
     "name_of",
     "plus_minus",
     "symbol",
+    "target_in_words",
     "unit",
     "wind_in_words",
     "with_unit",
@@ -251,6 +253,34 @@ def _filled(id: str, values: Mapping[str, str]) -> str:
         lambda place: values.get(place[1], f"<i>{symbol(place[1])}</i>"),
         FORMULAE[id].form,
     )
+
+
+_TARGETS = MappingProxyType(
+    {
+        "force_x_N": "force along the wind's direction in the disc's plane (x of H), N",
+        "force_y_N": "force across the wind in the disc's plane (y of H), N",
+        "force_z_N": "force along the disc's axis, N",
+        "moment_x_N_m": "rolling moment (x of H), N m",
+        "moment_y_N_m": "pitching moment (y of H), N m",
+        "moment_z_N_m": "moment about the spin axis, N m",
+    }
+)
+_SYMBOLS = MappingProxyType({"alpha": "α", "p_H": "p<sub>H</sub>", "q_H": "q<sub>H</sub>"})
+
+
+def target_in_words(target: str) -> str:
+    """Return what a law gives, with its unit."""
+    sensor, _, column = target.partition(".")
+    return _TARGETS.get(target) or f"reading of the {sensor.replace('_', ' ')}, {column}"
+
+
+def law_text(text: str) -> str:
+    """Return the formula of a law as HTML: exponents raised, products with a dot."""
+    raised = re.sub(
+        r"(?:\^|\*\*)\s*(?:\(([^)]*)\)|([-+]?[\w.]+))", lambda e: f"<sup>{e[1] or e[2]}</sup>", escape(text)
+    )
+    raised = re.sub(r"\b(alpha|p_H|q_H)\b", lambda word: _SYMBOLS[word[0]], raised)
+    return raised.replace(" * ", " · ").replace("*", " · ").replace("-", "−")
 
 
 def everyday(id: str, name: str, item: ParameterValue) -> str:

@@ -21,7 +21,17 @@ from validation.diagnosis.answer import (
     Outcome,
     Recalibration,
 )
-from validation.diagnosis.formulae import everyday, form, found, name_of, plus_minus, unit, wind_in_words
+from validation.diagnosis.formulae import (
+    everyday,
+    form,
+    found,
+    law_text,
+    name_of,
+    plus_minus,
+    target_in_words,
+    unit,
+    wind_in_words,
+)
 from validation.diagnosis.residual_figures import draw_overview, draw_sensor, readable_axis, sensors_of
 from validation.figures import save_figure
 from validation.report import write_page
@@ -206,8 +216,8 @@ def _where(item: NamedEffect) -> str:
 def _law(law: Law) -> dict[str, Any]:
     gain = law.heldout_delta_log_likelihood
     return {
-        "target": law.target,
-        "text": law.text,
+        "target": target_in_words(law.target),
+        "text": Markup(law_text(law.text)),
         "coefficients": [(name, plus_minus(value.value, value.sd)) for name, value in law.coefficients.items()],
         "evidence": "No recording could be set aside to test it."
         if gain is None

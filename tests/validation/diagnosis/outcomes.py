@@ -203,8 +203,8 @@ def explained() -> Outcome:
 def unexplained() -> Outcome:
     """Return an outcome with a law for a moment that the catalogue does not hold."""
     law = Law(
-        "c · |r|^n",
-        "moment about the spin axis, N m",
+        "c * |r|^n * sign(r)",
+        "moment_z_N_m",
         {"c": ParameterValue(-3.12e-6, 4e-8), "n": ParameterValue(1.503, 0.004)},
         210.0,
     )
@@ -229,7 +229,8 @@ def unexplained() -> Outcome:
         ),
         law=law,
     )
-    return replace(outcome, diagnosis=answer, residuals=residuals(True))
+    model = replace(outcome.model, law=law.for_model())
+    return replace(outcome, diagnosis=answer, model=model, residuals=residuals(True))
 
 
 OUTCOMES = {"consistent": consistent, "recalibrated": recalibrated, "explained": explained, "unexplained": unexplained}

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from discsim.errors import InputError
 from validation.diagnosis.answer import (
     Confusion,
     Diagnosis,
@@ -29,7 +30,7 @@ WIND = NamedEffect(
     STRONG,
     confused_with=(Confusion("gps.latency", 4801.0),),
 )
-LAW = Law("a |r|^b sign(r)", "torque about the spin axis, N m", {"a": ParameterValue(1e-6, 1e-8)}, 55.0)
+LAW = Law("a |r|^1.5 sign(r)", "moment_z_N_m", {"a": ParameterValue(1e-6, None)}, 55.0)
 
 
 @pytest.fixture
@@ -108,10 +109,18 @@ def test_an_unexplained_rest_names_no_effect_and_only_it_has_a_law(explained):
     with pytest.raises(ValueError, match="1 effects with the verdict unexplained"):
         replace(explained, verdict="unexplained")
     assert replace(explained, verdict="unexplained", effects=(), law=LAW).to_json()["law"]["coefficients"] == {
-        "a": {"value": 1e-6, "sd": 1e-8}
+        "a": {"value": 1e-6, "sd": None}
     }
     with pytest.raises(ValueError, match="a law with the verdict explained"):
         replace(explained, law=LAW)
+
+
+def test_a_law_is_one_that_a_model_file_can_carry():
+    carried = LAW.for_model()
+    assert float(carried.evaluate({"r": -4.0})) == pytest.approx(-8e-6, rel=1e-13)
+    assert dict(carried.sigma) == {}
+    with pytest.raises(InputError, match="unknown 'b'"):
+        Law("b r", "moment_z_N_m", {"a": ParameterValue(1e-6, 1e-8)})
 
 
 def test_explained_without_an_effect_is_refused(explained):

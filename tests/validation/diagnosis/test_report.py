@@ -13,7 +13,7 @@ from outcomes import OUTCOMES, explained, unexplained
 
 from discsim.effects import CATALOGUE
 from validation.diagnosis.answer import Confusion, Outcome, ParameterValue, Residuals
-from validation.diagnosis.formulae import FORMULAE, everyday, form, found, plus_minus, unit
+from validation.diagnosis.formulae import FORMULAE, everyday, form, found, law_text, plus_minus, unit
 from validation.diagnosis.report import draw_figures, verdict_sentence, write_diagnosis_report
 from validation.diagnosis.residual_figures import draw_sensor
 
@@ -91,6 +91,19 @@ def test_a_law_stands_with_its_coefficients(tmp_path):
     text = page(unexplained(), tmp_path).text
     assert "moment about the spin axis, N m" in text
     assert "(−3.120 ± 0.040) × 10⁻⁶" in text
+    assert "c · |r|n · sign(r)" in text
+    assert "c · |r|<sup>n</sup> · sign(r)" in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("text", "html"),
+    [
+        ("-c r V^2", "−c r V<sup>2</sup>"),
+        ("c |alpha|^(-n) + b*p_H**3", "c |α|<sup>−n</sup> + b · p<sub>H</sub><sup>3</sup>"),
+    ],
+)
+def test_a_law_reads_as_a_formula(text, html):
+    assert law_text(text) == html
 
 
 def test_names_from_files_cannot_become_markup(tmp_path):
