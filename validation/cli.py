@@ -69,6 +69,8 @@ def main() -> None:
             raise
         typer.echo(f"discsim: internal error, {type(error).__name__}: {error} (--debug shows where)", err=True)
         sys.exit(3)
+    if status == 130:  # typer turns an interrupt into this status and says nothing
+        typer.echo("discsim: interrupted", err=True)
     sys.exit(status if isinstance(status, int) else 0)
 
 

@@ -10,10 +10,13 @@ import io
 import json
 import logging
 import os
+import signal
 import threading
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import islice
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
@@ -146,13 +149,12 @@ def _results(
         def submit(task: Task) -> Any:
             return client.submit(_call, function, task, held, pure=False)
 
-        running = as_completed([submit(task) for task, _ in zip(waiting, range(AHEAD * threads), strict=False)])
+        running = as_completed([submit(task) for task in islice(waiting, AHEAD * threads)], loop=client.loop)
         for future in running:
             outcome = future.result()
             future.release()
-            for task in waiting:
+            for task in islice(waiting, 1):
                 running.add(submit(task))
-                break
             yield outcome
 
 
@@ -167,16 +169,15 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
     from distributed import Client, LocalCluster
 
     if scheduler is None:
-        with (
-            LocalCluster(
+        with _deaf_children():
+            cluster = LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
                 processes=True,
                 dashboard_address=None,
                 silence_logs=logging.CRITICAL,
-            ) as cluster,
-            Client(cluster) as client,
-        ):
+            )
+        with cluster, Client(cluster, set_as_default=False) as client:
             yield client
         return
     try:
@@ -197,6 +198,20 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
         yield client
 
 
+@contextmanager
+def _deaf_children() -> Iterator[None]:
+    """Let no process started in the block hear an interrupt: a terminal sends it to all, this process ends the others.
+
+    What a thread blocks its threads and processes inherit; here an interrupt waits until the block is over.
+    """
+    resource_tracker.ensure_running()  # else the first process started brings it up, which ends the blocking
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _write(folder: Path, name: str, result: Any) -> Any:
     """Write a result and return it as `_read` does."""
     if isinstance(result, Mapping) and result and all(isinstance(value, np.ndarray) for value in result.values()):
@@ -213,7 +228,8 @@ def _read(folder: Path, name: str) -> Any | None:
     """Return a result that is there; None where there is none, or a damaged one, which is then made again."""
     try:
         if (folder / f"{name}.npz").exists():
-            with np.load(folder / f"{name}.npz", allow_pickle=False) as arrays:
+            content = io.BytesIO((folder / f"{name}.npz").read_bytes())
+            with np.load(content, allow_pickle=False) as arrays:
                 return dict(arrays)
         if (folder / f"{name}.json").exists():
             return json.loads((folder / f"{name}.json").read_bytes())

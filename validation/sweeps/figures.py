@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
-from matplotlib.ticker import NullLocator
+from matplotlib.ticker import LogLocator, NullLocator
 
 from discsim.arrays import FloatArray
 from validation.figures import colour, new_figure, save_figure
@@ -42,7 +42,7 @@ def draw_installation(result: xr.Dataset, sweep: Sweep, path: Path) -> None:
     first = {axis.name: 0 for axis in sweep.plan.axes if axis.name not in ("radius_m", "parts")}
     chosen = result.isel(first)
     parts = [str(part) for part in chosen.parts.values] if "parts" in chosen.dims else [""]
-    figure, panels = new_figure(len(parts), 2, width=11.0, height=4.3 * len(parts), squeeze=False)
+    figure, panels = new_figure(len(parts), 2, width=12.5, height=4.3 * len(parts), squeeze=False)
     for row, part in zip(panels, parts, strict=True):
         shown = chosen.sel(parts=part) if part else chosen
         limit = _range(sweep, part)
@@ -123,15 +123,22 @@ def _size_over_radius(axes: Axes, shown: xr.Dataset, sweep: Sweep, limit: float 
             size = np.array([_rms(other[k]) for k in range(len(radii))])
             axes.plot(1000 * radii, size, "s-", ms=4, lw=1.0, color=colour(str(name)), label=f"{name}, all rates")
     if limit:
-        axes.plot([], [], color="0.4", lw=0.9, ls=":", label="the rate of that colour leaves the range")
+        axes.plot([], [], color="0.4", lw=0.9, ls=":", label="out of range beyond")
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xticks(1000 * radii, [f"{1000 * radius:g}" for radius in radii])
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.yaxis.set_major_formatter("{x:g}")
+    _plain_decades(axes)
     axes.set_xlabel("stated radius (mm)")
-    axes.set_ylabel("rms error over the mounts (%)")
-    axes.legend(fontsize=7.5, loc="best")
+    axes.set_ylabel("mean error, rms over the mounts (%)")
+    axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def _plain_decades(axes: Axes) -> None:
+    """Mark 1, 2 and 5 of each decade of a logarithmic y axis, in plain numbers."""
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_locator(NullLocator())
 
 
 def _rms(values: FloatArray) -> float:
@@ -167,8 +174,7 @@ def _along(axes: Axes, result: xr.Dataset, name: str) -> None:
         axes.fill_between(x, low, high, color=shade, alpha=0.2, lw=0)
         axes.plot(x, middle, "o-", ms=4, color=shade, label=estimator + ("" if known.any() else " (unknown)"))
     axes.set_yscale("log")
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_minor_locator(NullLocator())
+    _plain_decades(axes)
     if labels is not None:
         axes.set_xticks(x, labels, rotation=20, ha="right")
     axes.set_xlabel("mean true rate (deg/s)" if name == "segment" else name)

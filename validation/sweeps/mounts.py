@@ -163,4 +163,4 @@ def look_with_magnetometer(motion: Motion, sensor: Magnetometer, rng: np.random.
 
 def _times(rows: FloatArray, matrix: FloatArray) -> FloatArray:
     """Return rows @ matrix, (n, 3) @ (3, 3); numpy's own sum, whose bytes do not depend on a library's threads."""
-    return np.einsum("ni,ij->nj", rows, matrix)
+    return np.asarray(np.einsum("ni,ij->nj", rows, matrix))
