@@ -73,7 +73,7 @@ def write_page(out: Path, scored: Sequence[Scored], rates: Mapping[str, Rate]) -
             "What was named in place of what",
             (
                 "Rows are what was concealed, columns what was named; where nothing was named the verdict stands. Of "
-                "two concealed effects each is a row. Off the diagonal are the mistakes.",
+                "two concealed effects each is a row. Violet is right, orange a mistake.",
             ),
             figures=[("Concealed (rows) and named (columns), number of cases", figures / "confusion.png")],
         ),
@@ -225,16 +225,18 @@ def _failures(scored: Sequence[Scored]) -> Section:
 def draw_confusion(table: Mapping[str, Mapping[str, int]], path: Path) -> None:
     """Draw the confusion matrix with its numbers; only what occurs has a row or a column."""
     columns = [id for id in CATALOGUE if any(id in row for row in table.values())]
-    columns += [v for v in ("explained", "unexplained", "recalibrated", "consistent", "no answer")
-                if any(v in row for row in table.values())]  # fmt: skip
+    verdicts = ("explained", "unexplained", "recalibrated", "consistent", "no answer")
+    columns += [verdict for verdict in verdicts if any(verdict in row for row in table.values())]
     rows = list(table)
     counts = np.array([[table[row].get(column, 0) for column in columns] for row in rows], dtype=float)
+    right = np.array([[row == column or (row, column) in _RIGHT for column in columns] for row in rows])
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
+    shade = np.where(right, 1.0, -1.0) * np.where(counts > 0, 0.3 + 0.7 * shares, 0.0)
     figure, axes = new_figure(width=3.4 + 0.27 * len(columns), height=2.2 + 0.24 * len(rows))
-    axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.3, aspect="auto")
+    # orange and blue, which colour-blind readers can tell apart, light enough for black numbers
+    axes.imshow(shade, cmap="PuOr", vmin=-1.6, vmax=1.6, aspect="auto")
     for i, j in zip(*np.nonzero(counts), strict=True):
-        right = rows[i] == columns[j] or (rows[i], columns[j]) in _RIGHT
-        axes.text(j, i, f"{counts[i, j]:.0f}", ha="center", va="center", fontsize=8, color="k" if right else "#b3261e")
+        axes.text(j, i, f"{counts[i, j]:.0f}", ha="center", va="center", fontsize=8)
     axes.set_xticks(range(len(columns)), columns, rotation=90, fontsize=8)
     axes.set_yticks(range(len(rows)), rows, fontsize=8)
     axes.tick_params(length=0)
@@ -285,5 +287,6 @@ def draw_detection(sized: Sequence[tuple[float, bool]], path: Path) -> None:
     axes.set_xlim(0.18, 600.0)
     axes.set_ylim(-0.1, 1.1)
     axes.set_xlabel("size / detection limit (dashed: the limit, and twice the limit)")
+    axes.xaxis.set_major_formatter("{x:g}")
     axes.set_ylabel("share named rightly")
     save_figure(figure, path)

@@ -8,7 +8,7 @@ which this gain is `THRESHOLD`. Motions come from the standalone model and from 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from math import pi, sqrt
 from typing import TypeAlias
@@ -20,8 +20,8 @@ from scipy.interpolate import BSpline
 from discsim.arrays import BoolArray, FloatArray
 from discsim.disc import Disc, Release, Rig
 from discsim.effects.catalogue import Effect, effect
-from discsim.frames import body_to_ned, multiply, to_body, turn
-from discsim.motion import Motion
+from discsim.frames import body_to_ned
+from discsim.motion import Motion, State
 from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, Noise, record
 from discsim.trajectory import predict
@@ -58,8 +58,7 @@ def noncentrality(case: Case, item: Concealed) -> float:
             signature = sheet.column(readings(case, run, [small]), share)
         else:
             continue
-        unknowns = np.column_stack([sheet.column(made, step) for made, step in _unknowns(case, run)])
-        basis = _orthonormal(unknowns)
+        basis = _orthonormal(_unknowns(case, run, sheet))
         signature -= basis @ (basis.T @ signature)
         gain += float(signature @ signature)
         uncertain = _uncertain(case, run)
@@ -169,9 +168,13 @@ class _Sheet:
             _, mine, theirs = np.intersect1d(_ticks(t), _ticks(other_t), return_indices=True)
             change = np.zeros(value.shape)
             change[mine] = other[theirs] - value[mine]
-            change[~self.kept[name]] = 0.0
-            parts.append((self._averaged(name, change) / self._noise(name) / step).ravel())
-        return np.nan_to_num(np.concatenate(parts))
+            parts.append(self.weighed(name, change) / step)
+        return np.concatenate(parts)
+
+    def weighed(self, name: str, change: FloatArray) -> FloatArray:
+        """Return changes (n, k) of a sensor's readings in standard deviations, what does not count left out, (m,)."""
+        change = np.where(self.kept[name], change, 0.0)
+        return np.asarray((self._averaged(name, change) / self._noise(name)).ravel())
 
     def _noise(self, name: str) -> FloatArray:
         sensor = self.case.sheets_of.sensors[name]
@@ -210,21 +213,20 @@ def _ticks(t: FloatArray) -> FloatArray:
 # ---------------------------------------------------------------------------------------------- unknowns
 
 
-def _unknowns(case: Case, run: Run) -> list[tuple[Readings, float]]:
-    """Return readings with each unknown of one recording moved by a step, and the step."""
-    if isinstance(run, Turning):
-        return [(readings(case, replace(run, yaw=run.yaw + _ANGLE), []), _ANGLE)]
-    if isinstance(run, Coast):
-        return [
-            (readings(case, replace(run, yaw=run.yaw + _ANGLE), []), _ANGLE),
-            (readings(case, replace(run, rate=run.rate + _RATE), []), _RATE),
-        ]
+def _unknowns(case: Case, run: Run, sheet: _Sheet) -> FloatArray:
+    """Return how readings change with each unknown of one recording, (n, unknowns), in standard deviations."""
     if case.plant == "free_spin":
-        return _smooth_unknowns(case, run)
+        assert isinstance(run, Release)
+        return _smooth_unknowns(case, run, sheet)
+    moved: list[tuple[Run, float]] = []
+    if isinstance(run, Turning | Coast):
+        moved.append((replace(run, yaw=run.yaw + _ANGLE), _ANGLE))
+        if isinstance(run, Coast):
+            moved.append((replace(run, rate=run.rate + _RATE), _RATE))
+        return np.column_stack([sheet.column(readings(case, other, []), step) for other, step in moved])
     assert run.position is not None
     assert run.velocity is not None
     assert run.body_rate is not None
-    moved: list[tuple[Release, float]] = []
     for axis in np.eye(3):
         moved.append((replace(run, position=run.position + _POSITION * axis), _POSITION))
         moved.append((replace(run, velocity=run.velocity + _VELOCITY * axis), _VELOCITY))
@@ -232,57 +234,66 @@ def _unknowns(case: Case, run: Run) -> list[tuple[Readings, float]]:
     moved.append((replace(run, roll=(run.roll or 0.0) + _ANGLE), _ANGLE))
     moved.append((replace(run, pitch=(run.pitch or 0.0) + _ANGLE), _ANGLE))
     moved.append((replace(run, yaw=(run.yaw or 0.0) + _ANGLE), _ANGLE))
-    return [(readings(case, release, []), step) for release, step in moved]
+    return np.column_stack([sheet.column(readings(case, other, []), step) for other, step in moved])
 
 
-def _smooth_unknowns(case: Case, run: Release) -> list[tuple[Readings, float]]:
-    """Return readings with the attitude of a free spin turned by every smooth function of time, and by a wobble.
+def _smooth_unknowns(case: Case, run: Release, sheet: _Sheet) -> FloatArray:
+    """Return how readings of a free spin change if its attitude turns by every smooth function of time, or wobbles.
 
     This is more than unknown air moments and an unknown spin decay can do, so the limit errs on the large side.
     """
-    assert case.stated_disc is not None
     motion = _motion(case, run, [], case.stated_disc, None)
-    t = motion.t
+    return np.concatenate([_turned(case, motion, name, sheet) for name in sheet.base])
+
+
+def _turned(case: Case, motion: Motion, name: str, sheet: _Sheet) -> FloatArray:
+    """Return how one sensor's readings change, (n, functions), as the attitude turns by a small angle in N.
+
+    For a turn ``phi`` a vector b of N changes by -C_BN (phi x b) in B and the body rate by C_BN dphi/dt.
+    """
+    state = motion.at(sheet.base[name][0])
+    field_ned = motion.environment.magnetic_field
+    columns = []
+    for angle, speed, push in _turns(case, motion, state):
+        rate = state.in_body(speed)
+        if name == "magnetometer":
+            change = -state.in_body(np.cross(angle, field_ned))
+        elif name == "gyroscope":
+            change = rate
+        else:
+            d = case.sheets_of.sensors[name].position  # type: ignore[union-attr]
+            turning = state.in_body(push) - np.cross(state.rate, rate)
+            w = state.rate
+            change = np.cross(rate, np.cross(w, d)) + np.cross(w, np.cross(rate, d)) + np.cross(turning, d)
+        columns.append(sheet.weighed(name, change))
+    return np.column_stack(columns)
+
+
+def _turns(case: Case, motion: Motion, state: State) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Yield small turns in N (n, 3) with two derivatives: cubic splines along each axis, and a wobble that changes."""
+    assert case.stated_disc is not None
+    t = state.t
     count = max(round((motion.end - motion.start) / _KNOTS_S), 2)
     apart = (motion.end - motion.start) / count
     knots = motion.start + apart * np.arange(-3, count + 4)
-    made = []
     for k in range(len(knots) - 4):
         bump = BSpline.basis_element(knots[k : k + 5], extrapolate=False)
         shape = [np.nan_to_num(form(t)) for form in (bump, bump.derivative(1), bump.derivative(2))]
         for axis in np.eye(3):
-            made.append(_turned(case, motion, *(np.outer(part, axis) for part in shape)))
-    z = body_to_ned(motion.attitude)[..., 2]
+            angle, speed, push = (np.outer(part, axis) for part in shape)
+            yield angle, speed, push
+    z = body_to_ned(state.attitude)[..., 2]
     first = np.array([1.0, 0.0, 0.0]) - z[:, :1] * z
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    second = np.cross(z, first)
     pace = case.stated_disc.Izz / case.stated_disc.Ixx * motion.rate[:, 2]
-    phase = cumulative_trapezoid(pace, t, initial=0)
-    for growth in (np.ones_like(t), t / t[-1]):
+    phase = np.interp(t, motion.t, cumulative_trapezoid(pace, motion.t, initial=0))
+    now = np.interp(t, motion.t, pace)[:, None]
+    for growth in (np.ones_like(t), t / motion.end):
         for shift in (0.0, pi / 2):
-            way = np.cos(phase + shift)[:, None] * first + np.sin(phase + shift)[:, None] * second
-            on = np.cross(z, way)
-            by, squared = pace[:, None], (pace**2)[:, None]
-            grown = growth[:, None]
-            made.append(_turned(case, motion, grown * way, grown * by * on, -grown * squared * way))
-    return made
-
-
-def _turned(
-    case: Case, motion: Motion, angle: FloatArray, speed: FloatArray, push: FloatArray
-) -> tuple[Readings, float]:
-    """Return readings of a motion whose attitude is turned by a small rotation in N with these derivatives."""
-    step = _ANGLE
-    extra = to_body(motion.attitude, step * speed)
-    moved = replace(
-        motion,
-        attitude=multiply(turn(step * angle), motion.attitude),
-        rate=motion.rate + extra,
-        angular_acceleration=motion.angular_acceleration
-        + to_body(motion.attitude, step * push)
-        - np.cross(motion.rate, extra),
-    )
-    return _measured(case, moved, []), step
+            way = growth[:, None] * (
+                np.cos(phase + shift)[:, None] * first + np.sin(phase + shift)[:, None] * np.cross(z, first)
+            )
+            yield way, now * np.cross(z, way), -(now**2) * way
 
 
 def _rig_sigma(case: Case) -> Mapping[str, object]:
