@@ -398,15 +398,16 @@ def _spin(
     smooth = np.zeros(grid.size, dtype=complex)
     phase = np.zeros(grid.size)
     weight = np.ones(grid.size)
-    for sigma in (3 * PHASE_SIGMA, PHASE_SIGMA, PHASE_SIGMA):
-        sigma = max(sigma, 1.5 * step)
+    # a force across the axis passes through zero and points the other way after: its square has no sign
+    order, sigmas = (1, (3.0, 1.0, 1.0)) if sensor == "magnetometer" else (2, (2.0, 4.0, 6.0))
+    for sigma in sigmas:
         turned = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)])
         base = plane * np.exp(-1j * _curve(grid, turned, rate, t))
-        smooth, weight = _spread(grid, t, base, sigma)
-        delta = np.unwrap(np.angle(np.where(np.abs(smooth) > 0, smooth, 1.0)))
+        smooth, weight = _spread(grid, t, base**order, max(sigma * PHASE_SIGMA, 1.5 * step))
+        delta = np.unwrap(np.angle(np.where(np.abs(smooth) > 0, smooth, 1.0))) / order
         phase = turned + delta
         rate = rate + np.gradient(delta, step)
-    amplitude = np.abs(smooth) / np.maximum(weight, 1e-9)
+    amplitude = (np.abs(smooth) / np.maximum(weight, 1e-9)) ** (1 / order)
     return _Spin(grid, phase, rate, _without_steps(grid, rate, t, plane, step), amplitude, t, plane)
 
 
@@ -619,6 +620,8 @@ def _turned_to_ned(
     sigma = float(np.clip(3.0 / max(fast, 0.1), VECTOR_SIGMA, 0.4)) if fast > SLOW else VECTOR_SIGMA
     axis = body_to_ned(frame.D_at(grid))[:, :, 2]
     magnetic = None if frame.field is None else _field_in_start(frame.field, frame, grid, sigma)
+    if magnetic is not None and felt is not None and force is not None and normals is not None:
+        felt = _with_slip(magnetic, felt, axis, field, force, normals)
     if magnetic is not None:
         wandering = frame.transverse is None
         magnetic = _without_axial_iron(magnetic, axis, field, felt, force, wandering=wandering)
@@ -658,6 +661,35 @@ def _fitted_turns(
         )
         say = 1 / (1 + (apart / max(0.05, 2 * float(np.median(apart)))) ** 2)
     return turns
+
+
+def _with_slip(
+    m: FloatArray, f: FloatArray, axis: FloatArray, field: FloatArray, force: FloatArray, normals: FloatArray
+) -> FloatArray:
+    """Return the specific force felt (n, 3) turned about the axis to where the field's own clock would show it.
+
+    Where clocks differ, or readings were lost, the accelerometer's phase slips against the magnetometer's. The angle
+    from field to force in the disc's plane, which path and lift foretell, shows by how much; less than half a radian
+    is left alone, for wind and iron make as much.
+    """
+    if len(f) < 5:
+        return f
+    a, b = _from_to(m, f, axis), _from_to(np.broadcast_to(field, m.shape), force, normals)
+    slip = _windowed(a * np.conj(b), 0.5)
+    level = _windowed(np.abs(a * b), 0.5)
+    angle = np.unwrap(np.angle(np.where(np.abs(slip) > 0, slip, 1.0)))
+    coherent = np.median(np.abs(slip)) > 0.8 * np.median(level)
+    if not coherent or float(np.max(np.abs(angle))) < 0.5:
+        return f
+    return np.asarray(np.einsum("nij,nj->ni", body_to_ned(turn(-angle[:, None] * axis)), f))
+
+
+def _from_to(m: FloatArray, f: FloatArray, axis: FloatArray) -> ComplexArray:
+    """Return the components of f (n, 3) along and to the right of m across the axis, as one complex number (n,)."""
+    z = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9)
+    x = m - np.sum(m * z, axis=1, keepdims=True) * z
+    x = x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-9)
+    return np.asarray(np.sum(x * f, axis=1) + 1j * np.sum(np.cross(z, x) * f, axis=1))
 
 
 def _normals(recording: Recording, velocity: FloatArray, force: FloatArray) -> FloatArray | None:
@@ -870,7 +902,7 @@ def _weights(n: int, sigma: float) -> FloatArray:
     return np.asarray(W / W.sum(axis=1, keepdims=True))
 
 
-def _windowed(value: FloatArray, sigma: float) -> FloatArray:
+def _windowed(value: FloatArray | ComplexArray, sigma: float) -> FloatArray:
     return np.asarray(np.tensordot(_weights(len(value), sigma), value, axes=1))
 
 

@@ -1,0 +1,269 @@
+"""Starts for a fit, from data alone: near the truth of MuJoCo's flights, whatever sensor errs, clips or is missing."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from discsim.disc import Release, Rig
+from discsim.effects.catalogue import Effect, effect
+from discsim.engine import fly
+from discsim.frames import (
+    C3,
+    attitude_matrix,
+    body_to_ned,
+    euler_angles,
+    quaternion_from_matrix,
+    rotation_error,
+    to_body,
+)
+from discsim.motion import Motion
+from discsim.recording import Recording, Samples, read_dataset
+from discsim.rig import spin_down, turn_table
+from discsim.sensors import Instruments, record
+from discsim.shipped import load_disc
+from validation.diagnosis.starts import Starts, flight_starts, rig_starts, spin_starts
+
+DRIVER, FIELD = load_disc("driver")
+MODULE = Instruments.from_parts("mpu9250", "neo_m8n")
+
+# what a fit of pieces of 0.5 s converges from: well inside a third of a turn, and of the order of a throw's own change
+ATTITUDE_RAD, RATE, TRANSVERSE_RAD_S, VELOCITY_M_S, POSITION_M = np.radians(10.0), 0.01, 0.3, 1.5, 1.0
+
+
+@cache
+def flight(
+    spin_deg_s: float = 4200.0, heading_deg: float = 40.0, wobble: tuple[float, float] = (0.8, -0.5), knocks: int = 0
+) -> Motion:
+    """A throw towards a heading (deg from north), disc and all turned with it; with a knock at 1.4 s."""
+    heading = np.radians(heading_deg)
+    lean = -12.0 * np.sign(spin_deg_s)
+    C_NB = C3(heading).T @ attitude_matrix(np.radians(lean), np.radians(8.0), 1.0).T
+    roll, pitch, yaw = (float(angle) for angle in euler_angles(quaternion_from_matrix(C_NB)))
+    velocity = C3(heading).T @ np.array([23.6, 0.0, -4.2])
+    rate = np.array([*wobble, np.radians(spin_deg_s)])
+    knock = [effect("event.impulse", t_s=1.4, dv_north_m_s=1.0, dv_down_m_s=0.8)] * knocks
+    return fly(
+        DRIVER, FIELD, Release(np.array([0.0, 0.0, -1.3]), velocity, roll, pitch, yaw, rate), knock, duration=5.0
+    )
+
+
+def measured(motion: Motion, *errors: Effect, without: tuple[str, ...] = (), plant: str = "flight") -> Recording:
+    module = MODULE.without(*without).with_effects(errors)
+    return record(motion, module, np.random.default_rng(3), plant=plant, name="throw", disc=DRIVER)
+
+
+def instants(motion: Motion) -> np.ndarray:
+    return np.arange(0.0, motion.end - 0.2, 0.5)
+
+
+def errors_of(starts: Starts, motion: Motion) -> dict[str, float]:
+    truth = motion.at(starts.t)
+    return {
+        "attitude": float(np.max(rotation_error(starts.attitude, truth.attitude))),
+        "rate": float(np.max(np.abs(starts.rate[:, 2] / truth.rate[:, 2] - 1))),
+        "transverse": float(np.max(np.abs(starts.rate[:, :2] - truth.rate[:, :2]))),
+        "velocity": float(np.max(np.linalg.norm(starts.velocity - truth.velocity, axis=1))),
+        "position": float(np.max(np.linalg.norm(starts.position - truth.position, axis=1))),
+    }
+
+
+def assert_near(starts: Starts, motion: Motion) -> None:
+    found = errors_of(starts, motion)
+    allowed = dict(
+        zip(found, (ATTITUDE_RAD, RATE, TRANSVERSE_RAD_S, VELOCITY_M_S, POSITION_M), strict=True),
+    )
+    assert all(found[key] < allowed[key] for key in found), found
+
+
+@pytest.mark.parametrize("spin_deg_s", [4200.0, -3500.0, 7000.0, 1500.0])
+def test_a_throw_is_found_from_its_own_sensors_for_either_hand_and_any_spin(spin_deg_s):
+    """At 7000 deg/s the accelerometer's x is clipped throughout; z of the gyroscope is clipped above 2000 deg/s."""
+    motion = flight(spin_deg_s, heading_deg=-150.0 if spin_deg_s < 0 else 40.0)
+    starts = flight_starts(measured(motion), instants(motion))
+    assert_near(starts, motion)
+    assert starts.ambiguous == ()
+
+
+def test_a_tumbling_disc_is_followed_by_its_gyroscope():
+    motion = flight(spin_deg_s=-50.0)
+    assert_near(flight_starts(measured(motion), instants(motion)), motion)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        effect("mag.hard_iron", bx_uT=11.0, by_uT=-8.0, bz_uT=12.0),
+        effect("mag.soft_iron", sxx=0.2, sxy=0.1, sxz=-0.15, syy=-0.1, szz=-0.2),
+        effect("accel.position_offset", dx_m=0.003, dy_m=0.003, dz_m=0.003),
+        effect("accel.bias", bx_m_s2=1.0, by_m_s2=-1.0, bz_m_s2=1.0),
+        effect("accel.scale", sx=0.05, sy=-0.05, sz=0.05),
+        effect("accel.saturation", limit_m_s2=60.0),
+        effect("gyro.bias", bx_rad_s=0.3, by_rad_s=-0.3, bz_rad_s=0.3),
+        effect("gyro.scale", sx=0.05, sy=-0.05, sz=0.05),
+        effect("gps.clock_rate", ratio=1.01),
+    ],
+    ids=lambda error: error.id,
+)
+def test_a_sensor_that_errs_does_not_lead_the_start_astray(error):
+    motion = flight()
+    assert_near(flight_starts(measured(motion, error), instants(motion)), motion)
+
+
+def test_a_common_clock_turns_written_times_and_nothing_else():
+    """Where every sensor writes 2 % too much time, the state at written time t is the true one at t/1.02."""
+    motion = flight()
+    written = instants(motion)
+    starts = flight_starts(measured(motion, effect("clock.rate", ratio=1.02)), written)
+    found = errors_of(starts._replace(t=written / 1.02), motion)
+    assert found["attitude"] < ATTITUDE_RAD
+    # every rate is read in written time: 2 % less turn per second, and no more wrong than that
+    assert found["rate"] < 0.02 + RATE
+
+
+@pytest.mark.parametrize("clock", ["mag.clock_rate", "accel.clock_rate", "gyro.clock_rate"])
+def test_clocks_that_differ_leave_the_spin_axis_where_it_is(clock):
+    """Between sensors whose clocks differ by 2 % the phase slips by turns; the axis is told from slow quantities."""
+    motion = flight()
+    starts = flight_starts(measured(motion, effect(clock, ratio=1.02)), instants(motion))
+    truth = motion.at(starts.t)
+    cosine = np.sum(body_to_ned(starts.attitude)[:, :, 2] * body_to_ned(truth.attitude)[:, :, 2], axis=1)
+    # the drag's part of the specific force, a fifth of it, is turned to the wrong side
+    assert np.degrees(np.arccos(np.min(cosine))) < 20.0
+
+
+def test_lost_magnetometer_readings_make_no_spin():
+    """Each of 5 % lost readings looks like 0.7 rad of turn, and the rate like 5 % more."""
+    motion = flight()
+    starts = flight_starts(measured(motion, effect("mag.dropped_samples", fraction=0.05)), instants(motion))
+    assert errors_of(starts, motion)["rate"] < RATE
+
+
+def test_late_fixes_move_the_path_and_leave_the_attitude():
+    motion = flight()
+    starts = flight_starts(measured(motion, effect("gps.latency", delay_s=0.2)), instants(motion))
+    found = errors_of(starts, motion)
+    assert found["attitude"] < ATTITUDE_RAD
+    assert found["position"] < 0.2 * 24.0 + POSITION_M
+
+
+def test_a_knock_and_wild_fixes_are_no_velocity():
+    motion = flight(knocks=1)
+    recording = measured(motion)
+    fixes = recording.need("gps").value.copy()
+    fixes[10, :3] += 25.0
+    fixes[31, 3:] -= 12.0
+    fixes[20] = np.nan
+    samples = {**recording.samples, "gps": Samples(recording.need("gps").t, fixes)}
+    wild = Recording("flight", "wild", recording.environment, DRIVER, None, None, recording.sheets, samples)
+    assert_near(flight_starts(wild, instants(motion)), motion)
+
+
+@pytest.mark.parametrize("missing", ["magnetometer", "accelerometer", "gyroscope"])
+def test_the_path_and_the_lift_stand_in_for_a_missing_sensor(missing):
+    """Without the gyroscope nutation is not seen: of p and q only their size, 1 rad/s, bounds the error."""
+    motion = flight()
+    starts = flight_starts(measured(motion, without=(missing,)), instants(motion))
+    found = errors_of(starts, motion)
+    assert found["attitude"] < ATTITUDE_RAD
+    assert found["velocity"] < VELOCITY_M_S
+    assert found["transverse"] < (1.5 if missing == "gyroscope" else TRANSVERSE_RAD_S)
+
+
+SENSORS = ("magnetometer", "accelerometer", "gyroscope", "gps")
+
+
+@pytest.mark.parametrize("plant", ["flight", "free_spin"])
+def test_whatever_is_missing_the_answer_is_finite(plant):
+    motion = flight()
+    t = np.array([-0.1, 0.0, 1.0, motion.end + 0.3])
+    for count in range(1, 5):
+        for missing in combinations(SENSORS, count):
+            if len(missing) == 4:
+                continue
+            recording = measured(motion, without=missing, plant=plant)
+            starts = (flight_starts if plant == "flight" else spin_starts)(recording, t)
+            for part in (*starts[:5], *starts.ambiguous):
+                assert np.all(np.isfinite(part)), missing
+            np.testing.assert_allclose(np.linalg.norm(starts.attitude, axis=1), 1.0, atol=1e-9)
+
+
+def test_a_recording_of_a_few_readings_is_answered():
+    motion = flight()
+    whole = measured(motion)
+    samples = {name: part.between(0.0, 0.03) for name, part in whole.samples.items()}
+    short = Recording("flight", "short", whole.environment, DRIVER, None, None, whole.sheets, samples)
+    starts = flight_starts(short, np.zeros(1))
+    assert all(np.all(np.isfinite(part)) for part in starts[:5])
+
+
+@pytest.mark.parametrize("iron", [0.0, 9.0])
+def test_a_free_spin_is_found_but_for_a_turn_about_the_field(iron):
+    motion = flight()
+    hidden = effect("mag.hard_iron", bx_uT=iron, by_uT=-iron, bz_uT=-0.5 * iron)
+    starts = spin_starts(measured(motion, hidden, without=("gps",), plant="free_spin"), instants(motion))
+    truth = motion.at(starts.t)
+    apart = to_body(starts.attitude, FIELD.magnetic_field) - truth.in_body(FIELD.magnetic_field)
+    # a tenth of a radian of the field's 50 uT
+    assert np.max(np.linalg.norm(apart, axis=1)) < 5.0
+    assert np.max(np.abs(starts.rate[:, 2] / truth.rate[:, 2] - 1)) < RATE
+    # one turn about the field serves all instants: C_true C_found^T is the same throughout
+    turns = body_to_ned(truth.attitude) @ np.swapaxes(body_to_ned(starts.attitude), 1, 2)
+    between = [rotation_error(quaternion_from_matrix(C), quaternion_from_matrix(turns[0])) for C in turns]
+    assert np.max(between) < ATTITUDE_RAD
+    assert not np.any(starts.position)
+    assert not np.any(starts.velocity)
+
+
+@pytest.mark.parametrize("initial", [85.0, -60.0])
+@pytest.mark.parametrize("iron", [0.0, 10.0])
+def test_a_rig_that_runs_down_shows_its_angle(initial, iron):
+    rig = Rig(1.1e-3, 6e-5)
+    motion = spin_down(rig, FIELD, initial, 10.0, yaw=2.0)
+    module = MODULE.without("gps").with_effects([effect("mag.hard_iron", bx_uT=iron, by_uT=-iron)])
+    recording = record(motion, module, np.random.default_rng(4), plant="spin_down", name="rig", rig=rig)
+    t = np.arange(0.0, 9.9, 0.5)
+    psi, r = rig_starts(recording, t)
+    truth = motion.at(t)
+    ahead = to_body(truth.attitude, FIELD.magnetic_field)
+    turned = np.arctan2(FIELD.magnetic_field[1], FIELD.magnetic_field[0]) - np.arctan2(ahead[:, 1], ahead[:, 0])
+    assert np.max(np.abs(np.angle(np.exp(1j * (psi - turned))))) < 0.1
+    np.testing.assert_allclose(r, truth.rate[:, 2], rtol=RATE)
+    # unwrapped: it turns by what the rate says
+    np.testing.assert_allclose(np.diff(psi), 0.25 * (r[1:] + r[:-1]), rtol=0.02)
+
+
+def test_a_table_that_stands_still_and_turns_both_ways_shows_its_angle():
+    profile = Samples(np.array([0.0, 2.0, 3.0, 6.0, 7.0, 9.0]), np.array([0.0, 0.0, 70.0, 70.0, -20.0, -20.0]))
+    motion = turn_table(profile, FIELD, yaw=-1.0)
+    recording = record(
+        motion, MODULE.without("gps"), np.random.default_rng(5), plant="rate_table", name="table", command=profile
+    )
+    t = np.arange(0.0, 8.9, 0.25)
+    psi, r = rig_starts(recording, t)
+    truth = motion.at(t)
+    _, _, yaw = euler_angles(truth.attitude)
+    assert np.max(np.abs(np.angle(np.exp(1j * (psi - yaw))))) < 0.2
+    # the corners of a ramp of 90 rad/s^2 are rounded over a tenth of a second
+    np.testing.assert_allclose(r, truth.rate[:, 2], atol=5.0)
+
+
+PRACTICE = (
+    Path(os.environ.get("DISCSIM_RECORDINGS") or Path(__file__).parents[4] / "shared" / "recordings") / "practice"
+)
+
+
+@pytest.mark.skipif(not PRACTICE.is_dir(), reason="no practice recordings: set DISCSIM_RECORDINGS")
+@pytest.mark.parametrize("name", ["calm-evening", "no-path", "open-field"])
+def test_the_field_of_a_recorded_throw_is_where_the_starts_put_it(name):
+    for recording in read_dataset(PRACTICE / name):
+        magnetometer = recording.need("magnetometer")
+        starts = (flight_starts if recording.plant == "flight" else spin_starts)(recording, magnetometer.t)
+        apart = magnetometer.value - to_body(starts.attitude, recording.environment.magnetic_field)
+        # the readings' own noise is 0.6 uT per axis
+        assert np.sqrt(np.mean(apart**2)) < 1.2
