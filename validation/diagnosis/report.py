@@ -124,7 +124,7 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "recalibrated":
         moved = sorted(diagnosis.moved.items(), key=lambda pair: -abs(pair[1].sigmas))
         text = _joined([f"{name} moves from {item.stated:.4g} to {item.value:.4g}" for name, item in moved])
-        return f"The baseline's physics explains these recordings once {text}."
+        return f"The baseline's physics explains these recordings once {text}.".replace("-", "−")
     if diagnosis.verdict == "unexplained":
         text = "Something is missing that no effect of the catalogue accounts for"
         return f"{text}; a law for it is below." if diagnosis.law is not None else f"{text}."
@@ -150,7 +150,7 @@ def _named(item: NamedEffect) -> str:
 def _key_figures(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     def pair(read: Any) -> str:
         before, after = read(diagnosis.baseline), read(diagnosis.final)
-        return f"{before:.3g} → {after:.3g}" if abs(before - after) > 0.005 else f"{after:.3g}"
+        return _over_noise(after) if abs(before - after) < 0.005 else f"{_over_noise(before)} → {_over_noise(after)}"
 
     figures = [
         ("mismatch over noise (χ² per reading)", pair(lambda fit: fit.chi2_per_sample), "1 is noise alone"),
@@ -307,6 +307,10 @@ def _noise(item: NoiseNote) -> tuple[str, str, str, str, str, str]:
         f"{item.correlation_s:.2g}",
         ", ".join(remarks) or "as stated" if item.stated_rms is not None else ", ".join(remarks),
     )
+
+
+def _over_noise(value: float) -> str:
+    return f"{value:.2f}" if value < 9.995 else f"{value:.3g}" if value < 999.5 else f"{value:,.0f}"
 
 
 def _outlier_text(count: int) -> str:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.colors import BoundaryNorm
+from matplotlib.colors import BoundaryNorm, to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
@@ -17,13 +18,13 @@ from validation.figures import new_figure
 
 __all__ = ["draw_overview", "draw_sensor", "readable_axis", "sensors_of"]
 
-#: Okabe and Ito's colours and two more; recordings beyond these share them in turn
+#: Okabe and Ito's colours and two more, for as many recordings; more of them take a colour map in order
 _SHADES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#6a3d9a", "#7f7f7f")
 _MARK = "#e8b400"
 #: residuals are drawn linear to this many standard deviations and logarithmic beyond
 _LINEAR = 3.0
-#: most points drawn of one axis of one recording; of more the largest of each run is kept
-_MOST_POINTS = 3000
+#: most points drawn of one axis of one recording; of more each n-th, and what stands out further than this
+_MOST_POINTS, _OUTSTANDING = 3000, 4.5
 #: a span shorter than this share of the time shown is shaded over the whole height
 _SHORT = 0.25
 #: the overview's colours change at these multiples of the noise, and it has room for this many recordings
@@ -44,15 +45,18 @@ def sensors_of(residuals: Iterable[Residuals]) -> list[str]:
     return [sensor for sensor in SENSORS if sensor in present] + [s for s in present if s not in SENSORS]
 
 
-def _rms(values: FloatArray) -> float:
+def _rms(values: FloatArray) -> tuple[float, float]:
+    """Return the rms of the known values, and how large noise alone makes it once in some hundred times."""
     known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
+    if not known.size:
+        return float("nan"), float("nan")
+    return float(np.sqrt(np.mean(known**2))), 1.0 + 2.5 / float(np.sqrt(2.0 * known.size))
 
 
 def draw_overview(residuals: Sequence[Residuals]) -> Figure:
     """Draw the rms of each axis of each recording over its noise, before and after: where the mismatch is, at a glance.
 
-    A recording is a row; of more than fit the worst are shown.
+    A recording is a row; of more than fit the worst are shown. What so few readings of plain noise may give is pale.
     """
     columns = [
         (sensor, axis)
@@ -62,7 +66,7 @@ def draw_overview(residuals: Sequence[Residuals]) -> Figure:
     before = {(item.recording, item.sensor, item.axis): _rms(item.before) for item in residuals}
     after = {(item.recording, item.sensor, item.axis): _rms(item.after) for item in residuals}
     names = list(dict.fromkeys(item.recording for item in residuals))
-    worst = {name: max(v for (recording, *_), v in before.items() if recording == name) for name in names}
+    worst = {name: max(rms for (recording, *_), (rms, _) in before.items() if recording == name) for name in names}
     kept = sorted(names, key=lambda name: -np.nan_to_num(worst[name]))[:_MOST_ROWS]
     rows = [name for name in names if name in kept]
     height = 2.0 + 0.5 * len(rows)
@@ -70,9 +74,11 @@ def draw_overview(residuals: Sequence[Residuals]) -> Figure:
     _lay_out(figure, height, 2, left=min(2.5, 0.4 + 0.075 * max(map(len, rows))), bottom=1.1, gap=0.35)
     titles = ("Before: the baseline", "After: the final model")
     for axes, title, values in zip(panels, titles, (before, after), strict=True):
-        cells = np.array([[values.get((row, *column), np.nan) for column in columns] for row in rows])
+        nothing = (np.nan, np.nan)
+        table = np.array([[values.get((row, *column), nothing) for column in columns] for row in rows])
+        cells, plain = table[..., 0], table[..., 1]
         norm = BoundaryNorm(_STEPS, 256, extend="max")
-        axes.imshow(np.ma.masked_invalid(cells), cmap="YlOrRd", norm=norm, aspect="auto")
+        axes.imshow(np.ma.masked_invalid(np.where(cells <= plain, 1.0, cells)), cmap="YlOrRd", norm=norm, aspect="auto")
         axes.set_title(f"{title}. Residuals (rms) over the noise; 1 is noise alone")
         axes.set_yticks(range(len(rows)), rows)
         axes.set_facecolor("#eeeeee")
@@ -113,10 +119,10 @@ def draw_sensor(sensor: str, residuals: Sequence[Residuals], located: Sequence[L
     mine = [item for item in residuals if item.sensor == sensor]
     axes_names = list(dict.fromkeys(item.axis for item in mine))
     names = list(dict.fromkeys(item.recording for item in residuals))
-    shades = {name: _SHADES[k % len(_SHADES)] for k, name in enumerate(names)}
+    shades = _shades(names)
     height = 1.15 + 1.45 * len(axes_names)
     figure, panels = new_figure(len(axes_names), 2, width=10.0, height=height, sharex=True, sharey="row", squeeze=False)
-    _lay_out(figure, height, len(axes_names), left=0.75, bottom=0.8)
+    _lay_out(figure, height, len(axes_names), left=0.85, bottom=0.85)
     for row, axis in zip(panels, axes_names, strict=True):
         items = [item for item in mine if item.axis == axis]
         for axes, which in zip(row, ("before", "after"), strict=True):
@@ -142,15 +148,32 @@ def draw_sensor(sensor: str, residuals: Sequence[Residuals], located: Sequence[L
         axes.set_title(f"{sensor.replace('_', ' ')}, {title}")
     for axes in panels[-1]:
         axes.set_xlabel("time (s)")
-    shown = list(dict.fromkeys(item.recording for item in mine))[: 2 * len(_SHADES)]
-    handles = [panels[0][1].plot([], [], "o", ms=4, color=shades[name], label=name)[0] for name in shown]
-    if len(shown) > 1:
-        figure.legend(handles=handles, loc="lower center", ncols=min(len(shown), 8), fontsize=8)
+    _name_recordings(figure, panels[0][1], list(dict.fromkeys(item.recording for item in mine)), shades)
     return figure
 
 
+def _shades(names: Sequence[str]) -> dict[str, str]:
+    if len(names) <= len(_SHADES):
+        return dict(zip(names, _SHADES, strict=False))
+    return dict(
+        zip(names, (to_hex(shade) for shade in colormaps["turbo"](np.linspace(0.05, 0.95, len(names)))), strict=True)
+    )
+
+
+def _name_recordings(figure: Figure, axes: Axes, names: Sequence[str], shades: dict[str, str]) -> None:
+    """Name the recordings in two lines below the panels, as many as there is room for: in order, the last always."""
+    if len(names) < 2:
+        return
+    columns = max(2, min(10, int(115 / (max(map(len, names)) + 7))))
+    if len(names) > 2 * columns:
+        chosen = np.unique(np.linspace(0, len(names) - 1, 2 * columns).astype(int))
+        names = [names[k] for k in chosen]
+    handles = [axes.plot([], [], "o", ms=4, color=shades[name], label=name)[0] for name in names]
+    figure.legend(handles=handles, loc="lower center", ncols=min(columns, len(names)), fontsize=8)
+
+
 def _thinned(t: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the known points, of many the largest of each run, so that a short fault stays visible."""
+    """Return the known points; of many each n-th, and the largest of each n where noise would not reach it."""
     known = np.isfinite(value) & np.isfinite(t)
     t, value = t[known], value[known]
     run = -(-t.size // _MOST_POINTS)
@@ -158,7 +181,8 @@ def _thinned(t: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
         return t, value
     whole = t.size // run * run
     largest = np.argmax(np.abs(value[:whole]).reshape(-1, run), axis=1) + np.arange(0, whole, run)
-    return t[largest], value[largest]
+    kept = np.union1d(np.arange(0, t.size, run), largest[np.abs(value[largest]) > _OUTSTANDING])
+    return t[kept], value[kept]
 
 
 def _scale(axes: Axes, items: Sequence[Residuals]) -> None:

@@ -15,7 +15,7 @@ from discsim.effects import CATALOGUE
 from validation.diagnosis.answer import Confusion, Outcome, ParameterValue, Residuals
 from validation.diagnosis.formulae import FORMULAE, everyday, form, found, law_text, plus_minus, unit
 from validation.diagnosis.report import draw_figures, verdict_sentence, write_diagnosis_report
-from validation.diagnosis.residual_figures import draw_sensor
+from validation.diagnosis.residual_figures import draw_overview, draw_sensor
 
 
 class Page(HTMLParser):
@@ -190,3 +190,16 @@ def test_units_are_those_in_the_names():
 )
 def test_a_value_has_the_digits_that_its_standard_deviation_leaves(value, sd, text):
     assert plus_minus(value, sd) == text
+
+
+def test_plain_noise_is_pale_in_the_overview_however_few_its_readings_and_a_mismatch_is_not():
+    rng = np.random.default_rng(2)
+    residuals = []
+    for k, n in enumerate((20, 50, 200, 1000)):
+        t, noise = np.arange(float(n)), rng.standard_normal(n)
+        residuals.append(Residuals(f"{k:02d}", "gps", "north_m", t, noise, noise))
+    residuals.append(Residuals("99", "gps", "north_m", t, 3.0 * noise, noise))
+    (before, after) = (axes.images[0].get_array().ravel() for axes in draw_overview(residuals).axes)
+    assert before.tolist()[:4] == [1.0] * 4
+    assert before[4] == pytest.approx(3.0, rel=0.1)  # the rms of a thousand readings scatters by 2 %
+    assert after.tolist() == [1.0] * 5
