@@ -21,7 +21,7 @@ def command(
     datasets: Annotated[
         list[Path],
         typer.Argument(
-            metavar="DATASET...",
+            metavar="DATASET",
             help="Data sets (folders of recordings) of one plant that share their hardware.",
             show_default=False,
         ),
