@@ -14,6 +14,7 @@ COMMANDS: dict[str, str] = {
     "diagnose": "diagnose",
     "challenge": "challenge",
     "estimate": "estimate",
+    "fit": "fit",
     "fly": "fly",
     "rate-table": "rate_table",
     "sweep": "sweep",
