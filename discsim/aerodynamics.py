@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.compiled import compiled
+from discsim.compiled import compiled, inlined
 from discsim.effects.aero import (
     spin_drag,
     spin_lift,
@@ -118,7 +118,7 @@ def outside_table(tables: Tables, t: float, r: float, V: float) -> InputError:
     )
 
 
-@compiled
+@inlined
 def air_wrench(
     p: Any, tables: Tables, h: float, u: float, v: float, w: float, P: float, Q: float, r: float
 ) -> tuple[float, float, float, float, float, float]:
@@ -152,7 +152,7 @@ def air_wrench(
     R, M, N = QA * d * CR, QA * d * CM, QA * d * CN
 
     # F_H = C2(alpha) [-D, Y, -L], M_H = C2(alpha) [R, M, 0] + [0, 0, N]: (20), (23)
-    cos_alpha, sin_alpha = np.cos(alpha), np.sin(alpha)
+    cos_alpha, sin_alpha = (cos_beta * u + sin_beta * v) / V, w / V
     Fx, Fy, Fz = -D * cos_alpha + L * sin_alpha, Y, -D * sin_alpha - L * cos_alpha
     Mx, My, Mz = R * cos_alpha, M, R * sin_alpha + N
     return (

@@ -18,7 +18,7 @@ from typing import Any, TypeVar, cast
 import numba
 import numba.core.config
 
-__all__ = ["compiled", "compiled_nogil"]
+__all__ = ["compiled", "compiled_nogil", "inlined"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -38,7 +38,7 @@ def _cache_folder() -> Path:
 
 def compiled(function: F) -> F:
     """Compile ``function`` on first call (nopython, division by zero gives inf or nan, no fast-math)."""
-    return _compile(function, nogil=False)
+    return _compile(function)
 
 
 def compiled_nogil(function: F) -> F:
@@ -46,14 +46,19 @@ def compiled_nogil(function: F) -> F:
     return _compile(function, nogil=True)
 
 
-def _compile(function: F, nogil: bool) -> F:
+def inlined(function: F) -> F:
+    """Compile like `compiled`, into every caller: where passing the arguments costs as much as the work."""
+    return _compile(function, forceinline=True)
+
+
+def _compile(function: F, nogil: bool = False, forceinline: bool = False) -> F:
     config: Any = numba.core.config
     before = config.CACHE_DIR
     config.CACHE_DIR = str(_cache_folder())
     try:
         try:
-            return cast(F, numba.njit(cache=True, error_model="numpy", nogil=nogil)(function))
+            return cast(F, numba.njit(cache=True, error_model="numpy", nogil=nogil, forceinline=forceinline)(function))
         except RuntimeError:  # nowhere to write a cache: compile anew in each process
-            return cast(F, numba.njit(error_model="numpy", nogil=nogil)(function))
+            return cast(F, numba.njit(error_model="numpy", nogil=nogil, forceinline=forceinline)(function))
     finally:
         config.CACHE_DIR = before

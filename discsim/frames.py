@@ -9,7 +9,7 @@ A quaternion is (w, x, y, z) with w first and rotates body components into N: ``
 
 from __future__ import annotations
 
-from math import atan2, cos, hypot, sin, sqrt
+from math import atan2, cos, sin, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -178,7 +178,7 @@ def heading_angles(u: float, v: float, w: float) -> tuple[float, float, float]:
     ``beta = atan2(v, u)`` and ``alpha = atan2(w_H, u_H)`` with u_H = hypot(u, v) >= 0, so alpha runs from -pi/2 to
     pi/2. Where the wind is along z_B, beta is undefined and taken as zero: x_H is then x.
     """
-    across = hypot(u, v)
+    across = sqrt(u * u + v * v)
     if across < 1e-12 * (abs(w) + 1e-300):
         return 1.0, 0.0, atan2(w, 0.0)
     return u / across, v / across, atan2(w, across)

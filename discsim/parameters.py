@@ -39,6 +39,19 @@ PARAMETERS = np.dtype(
 )
 
 
+def _places() -> dict[str, slice]:
+    """Return where in the flat array each group stands."""
+    starts = {name: PARAMETERS.fields[name][1] // 8 for name in PARAMETERS.names or ()}  # type: ignore[index]
+    return {name: slice(start, start + PARAMETERS[name].itemsize // 8) for name, start in starts.items()}
+
+
+_PLACES = _places()
+#: no environment, disc or rig, and every effect at its baseline
+_BASELINE = np.zeros(PARAMETERS.itemsize // 8)
+for _row in _MOTION:
+    _BASELINE[_PLACES[_row.key]] = _row.baseline
+
+
 def parameter_index(group: str, name: str) -> int:
     """Return the place of ``group.name`` in the flat array; group is an effect's id or environment, disc, aero, rig."""
     key = group.replace(".", "_")
@@ -56,18 +69,21 @@ def parameters(
 
     Effects on sensors are passed over: they belong to the sensors. Raises `InputError` for an effect given twice.
     """
-    flat = np.zeros(PARAMETERS.itemsize // 8)
-    record = flat.view(PARAMETERS)[0]
+    flat = _BASELINE.copy()
     density = environment.air_density
-    record["environment"] = (environment.gravity, 0.0 if density is None else density, *environment.wind)
+    flat[_PLACES["environment"]] = (
+        environment.gravity,
+        0.0 if density is None else density,
+        *environment.wind.tolist(),
+    )
     if disc is not None:
-        record["disc"] = (disc.mass, disc.diameter, disc.Ixx, disc.Izz)
-        record["aero"] = tuple(disc.aero or Aero())
+        flat[_PLACES["disc"]] = (disc.mass, disc.diameter, disc.Ixx, disc.Izz)
+        flat[_PLACES["aero"]] = disc.aero or Aero()
     if rig is not None:
-        record["rig"] = (rig.Izz, rig.viscous)
-    given = by_id(effects)
-    for row in _MOTION:
-        record[row.key] = tuple(given.get(row.id, row.baseline))
+        flat[_PLACES["rig"]] = (rig.Izz, rig.viscous)
+    for id, value in by_id(effects).items():
+        if (place := _PLACES.get(CATALOGUE[id].key)) is not None:
+            flat[place] = value
     if not np.all(np.isfinite(flat)):
         raise InputError("a parameter of the physics is not finite; expected finite numbers only")
     return flat

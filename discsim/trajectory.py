@@ -27,14 +27,14 @@ from scipy.integrate import DOP853
 
 from discsim.aerodynamics import air_wrench, outside_table, wind
 from discsim.arrays import FloatArray, readonly
-from discsim.compiled import compiled, compiled_nogil
+from discsim.compiled import compiled, compiled_nogil, inlined
 from discsim.disc import Disc, Release
 from discsim.effects.body import centre_of_mass, transverse_inertia
 from discsim.effects.catalogue import Effect
 from discsim.effects.events import EVENT_WIDTH_S, impulse, spin_step
 from discsim.environment import Environment
 from discsim.errors import InputError
-from discsim.frames import euler_angles, norm3, quaternion_from_matrix, rotate_by_quaternion
+from discsim.frames import euler_angles, heading_angles, norm3, quaternion_from_matrix, rotate_by_quaternion
 from discsim.motion import Motion, State
 from discsim.parameters import PARAMETERS, Tables, flight_parameters, tables
 
@@ -43,16 +43,25 @@ __all__ = ["ATOL", "RTOL", "Flight", "Landings", "evaluate", "integrate", "predi
 #: places of the state: position and velocity in N, quaternion of S, rates P, Q (in S) and r, spin angle psi
 WIDTH = 14
 #: default tolerances; docs/trajectory.md says what they are worth
-RTOL, ATOL = 1e-10, 1e-10
+RTOL, ATOL = 1e-8, 1e-8
 
 # coefficients of the pair, as scipy publishes them
 _A, _B, _C = np.array(DOP853.A), np.array(DOP853.B), np.array(DOP853.C)
 _E3, _E5, _D = np.array(DOP853.E3), np.array(DOP853.E5), np.array(DOP853.D)
 _A_EXTRA, _C_EXTRA = np.array(DOP853.A_EXTRA), np.array(DOP853.C_EXTRA)
 _STAGES, _EXTENDED, _POWER = 12, 16, 7
+_NOTHING = np.zeros(WIDTH)
 
 #: a step this short (s) is taken whatever its error: what is left is a jump of the force, which no step resolves
 SHORTEST_STEP = 1e-7
+#: nothing in a flight is this fast (s) but a jump that is met again and again: wind along the axis, kept there by the
+#: air, has a direction that turns ever faster. Steps below may be short for a while only: the least that is taken
+#: whatever its error grows with the time spent, until a long one is taken again, so that a flight ends
+CHATTER_STEP, CHATTER_SHARE, CHATTER_END = 1e-4, 1.0 / 32.0, 2e-3
+#: a step ends on a kink of the coefficients within this angle of attack, rad: times any slope it is no force
+AT_NODE = 1e-7
+#: tries to end a step on a kink, and points within a step that tell where its angle of attack turns
+KINK_TRIES, KINK_SAMPLES = 8, 5
 FIRST_STEP = 5e-3
 #: pulses are entered this many widths before their peak: 2e-9 of their area lies outside
 PULSE_REACH = 6.0
@@ -60,7 +69,7 @@ PULSE_REACH = 6.0
 _LEFT, _TOUCHED, _LOST = 0, 1, 2
 
 
-@compiled
+@inlined
 def derivative(p: Any, tables: Tables, t: float, y: FloatArray, dy: FloatArray) -> None:
     """Write the time derivative of the state y (14,) into dy (14,): (18), (19), (22), (23).
 
@@ -69,7 +78,10 @@ def derivative(p: Any, tables: Tables, t: float, y: FloatArray, dy: FloatArray) 
     """
     qw, qx, qy, qz = y[6], y[7], y[8], y[9]
     P, Q, r = y[10], y[11], y[12]
-    c, s = cos(y[13]), sin(y[13])
+    c, s = 1.0, 0.0
+    imbalance, asymmetry = p.body_mass_imbalance, p.body_inertia_asymmetry
+    if imbalance.ex_m != 0.0 or imbalance.ey_m != 0.0 or asymmetry.dIyy_kg_m2 != 0.0:
+        c, s = cos(y[13]), sin(y[13])
 
     h = -y[2]
     wn, we, wd = wind(p, t, h)
@@ -110,31 +122,63 @@ def derivative(p: Any, tables: Tables, t: float, y: FloatArray, dy: FloatArray) 
     dy[13] = r
 
 
-@compiled
+@inlined
+def _combine(y: FloatArray, h: float, weights: FloatArray, K: FloatArray, stages: int, out: FloatArray) -> None:
+    """Write y + h (weights K) into out (14,), of the first stages; weights (16,) or less, K (16, 14).
+
+    One name for each sum, for a loop over the state would go through memory in every one of the 12 stages: that took
+    a fifth of a flight's time.
+    """
+    s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = s9 = s10 = s11 = s12 = s13 = 0.0
+    for j in range(stages):
+        a, k = weights[j], K[j]
+        if a == 0.0:
+            continue
+        s0 += a * k[0]
+        s1 += a * k[1]
+        s2 += a * k[2]
+        s3 += a * k[3]
+        s4 += a * k[4]
+        s5 += a * k[5]
+        s6 += a * k[6]
+        s7 += a * k[7]
+        s8 += a * k[8]
+        s9 += a * k[9]
+        s10 += a * k[10]
+        s11 += a * k[11]
+        s12 += a * k[12]
+        s13 += a * k[13]
+    out[0] = y[0] + h * s0
+    out[1] = y[1] + h * s1
+    out[2] = y[2] + h * s2
+    out[3] = y[3] + h * s3
+    out[4] = y[4] + h * s4
+    out[5] = y[5] + h * s5
+    out[6] = y[6] + h * s6
+    out[7] = y[7] + h * s7
+    out[8] = y[8] + h * s8
+    out[9] = y[9] + h * s9
+    out[10] = y[10] + h * s10
+    out[11] = y[11] + h * s11
+    out[12] = y[12] + h * s12
+    out[13] = y[13] + h * s13
+
+
+@inlined
 def step(p: Any, tables: Tables, t: float, y: FloatArray, h: float, K: FloatArray, new: FloatArray) -> None:
     """One step of order 8 from y (14,) to new (14,); K (16, 14) holds the first stage on entry and 12 on return."""
     for stage in range(1, _STAGES):
-        new[:] = y
-        for j in range(stage):
-            a = h * _A[stage, j]
-            if a != 0.0:
-                for i in range(WIDTH):
-                    new[i] += a * K[j, i]
+        _combine(y, h, _A[stage], K, stage, new)
         derivative(p, tables, t + _C[stage] * h, new, K[stage])
-    new[:] = y
-    for j in range(_STAGES):
-        b = h * _B[j]
-        if b != 0.0:
-            for i in range(WIDTH):
-                new[i] += b * K[j, i]
+    _combine(y, h, _B, K, _STAGES, new)
     # the attitude stays a rotation
     length = sqrt(new[6] ** 2 + new[7] ** 2 + new[8] ** 2 + new[9] ** 2)
     for i in range(6, 10):
         new[i] /= length
 
 
-@compiled
-def _error(h: float, K: FloatArray, y: FloatArray, rtol: float, atol: float) -> float:
+@inlined
+def _error(h: float, K: FloatArray, y: FloatArray, rtol: float, atol: float, work: FloatArray) -> float:
     """Estimated error of a step in units of the tolerance, root mean square over the state; K holds 13 stages.
 
     Velocity, attitude (one) and rates count by their size as vectors, so the steps do not depend on where north is;
@@ -142,40 +186,36 @@ def _error(h: float, K: FloatArray, y: FloatArray, rtol: float, atol: float) -> 
     """
     velocity = atol + rtol * norm3(y[3], y[4], y[5])
     rate = atol + rtol * norm3(y[10], y[11], y[12])
-    fifth, third = 0.0, 0.0
-    for i in range(WIDTH):
-        e3, e5 = 0.0, 0.0
-        for j in range(_STAGES + 1):
-            e3 += _E3[j] * K[j, i]
-            e5 += _E5[j] * K[j, i]
-        scale = atol
-        if 3 <= i < 6:
-            scale = velocity
-        elif 6 <= i < 10:
-            scale = atol + rtol
-        elif 10 <= i < 13:
-            scale = rate
-        fifth += (e5 / scale) ** 2
-        third += (e3 / scale) ** 2
-    if fifth == 0.0 and third == 0.0:
+    fifth, third = work[0], work[1]
+    _combine(_NOTHING, 1.0, _E5, K, _STAGES, fifth)
+    _combine(_NOTHING, 1.0, _E3, K, _STAGES, third)
+    e5 = _size(fifth, atol, velocity, atol + rtol, rate)
+    e3 = _size(third, atol, velocity, atol + rtol, rate)
+    if e5 == 0.0 and e3 == 0.0:
         return 0.0
-    return float(h * fifth / sqrt((fifth + 0.01 * third) * WIDTH))
+    return float(h * e5 / sqrt((e5 + 0.01 * e3) * WIDTH))
 
 
-@compiled
+@inlined
+def _size(e: FloatArray, position: float, velocity: float, attitude: float, rate: float) -> float:
+    """Sum of squares of a change of state (14,), each part in units of its own tolerance."""
+    return float(
+        (e[0] ** 2 + e[1] ** 2 + e[2] ** 2 + e[13] ** 2) / position**2
+        + (e[3] ** 2 + e[4] ** 2 + e[5] ** 2) / velocity**2
+        + (e[6] ** 2 + e[7] ** 2 + e[8] ** 2 + e[9] ** 2) / attitude**2
+        + (e[10] ** 2 + e[11] ** 2 + e[12] ** 2) / rate**2
+    )
+
+
+@inlined
 def interpolant(
     p: Any, tables: Tables, t: float, y: FloatArray, h: float, K: FloatArray, new: FloatArray, F: FloatArray
 ) -> None:
     """Write the dense output of a step into F (7, 14); K (16, 14) holds 13 stages."""
-    work = np.empty(WIDTH)
+    work = F[0]
     for extra in range(_EXTENDED - _STAGES - 1):
         stage = _STAGES + 1 + extra
-        work[:] = y
-        for j in range(stage):
-            a = h * _A_EXTRA[extra, j]
-            if a != 0.0:
-                for i in range(WIDTH):
-                    work[i] += a * K[j, i]
+        _combine(y, h, _A_EXTRA[extra], K, stage, work)
         derivative(p, tables, t + _C_EXTRA[extra] * h, work, K[stage])
     for i in range(WIDTH):
         change = new[i] - y[i]
@@ -183,12 +223,7 @@ def interpolant(
         F[1, i] = h * K[0, i] - change
         F[2, i] = 2.0 * change - h * (K[_STAGES, i] + K[0, i])
     for row in range(_POWER - 3):
-        F[3 + row] = 0.0
-        for j in range(_EXTENDED):
-            d = h * _D[row, j]
-            if d != 0.0:
-                for i in range(WIDTH):
-                    F[3 + row, i] += d * K[j, i]
+        _combine(_NOTHING, h, _D[row], K, _EXTENDED, F[3 + row])
 
 
 @compiled
@@ -249,6 +284,110 @@ def _land(
 
 
 @compiled
+def _incidence(p: Any, t: float, y: FloatArray) -> float:
+    """Angle of attack at a state (14,), rad."""
+    wn, we, wd = wind(p, t, -y[2])
+    u, v, w = rotate_by_quaternion(y[6], -y[7], -y[8], -y[9], y[3] - wn, y[4] - we, y[5] - wd)
+    return float(heading_angles(u, v, w)[2])
+
+
+@compiled
+def _between(node: float, start: float, end: float) -> bool:
+    """Whether a node lies between two angles of attack, and not at either of them."""
+    return min(start, end) + AT_NODE < node < max(start, end) - AT_NODE
+
+
+@compiled
+def _kink(p: Any, tables: Tables, start: float, end: float) -> float:
+    """Angle of attack, the first one after start, at which the coefficients have a kink before end; NaN: nowhere."""
+    nearest = np.nan
+    for node in tables.static[0]:
+        if _between(node, start, end) and not abs(node - start) >= abs(nearest - start):
+            nearest = node
+    node = p.aero_stall.alpha_stall_rad
+    if p.aero_stall.k != 0.0 and _between(node, start, end) and not abs(node - start) >= abs(nearest - start):
+        nearest = node
+    return float(nearest)
+
+
+@compiled
+def _incidence_within(
+    p: Any, t: float, y: FloatArray, h: float, F: FloatArray, share: float, work: FloatArray
+) -> float:
+    """Angle of attack at a share of a step by its dense output, rad."""
+    for i in range(2, 10):
+        work[i] = _within(F, y, share, i)
+    return _incidence(p, t + share * h, work)
+
+
+@compiled
+def _share_up_to(
+    p: Any,
+    t: float,
+    y: FloatArray,
+    h: float,
+    F: FloatArray,
+    node: float,
+    low: float,
+    start: float,
+    high: float,
+    end: float,
+    work: FloatArray,
+) -> float:
+    """Share of a step, between low and high, at which the angle of attack, from start to end, passes a node.
+
+    Regula falsi after Illinois: it keeps its bracket, and converges faster than linearly.
+    """
+    below, above = start - node, end - node
+    share, side = high, 0
+    for _ in range(30):
+        share = (low * above - high * below) / (above - below)
+        miss = _incidence_within(p, t, y, h, F, share, work) - node
+        if abs(miss) < 0.1 * AT_NODE:
+            break
+        if (miss > 0.0) == (above > 0.0):
+            high, above = share, miss
+            below *= 0.5 if side == 1 else 1.0
+            side = 1
+        else:
+            low, below = share, miss
+            above *= 0.5 if side == -1 else 1.0
+            side = -1
+    return share
+
+
+@compiled
+def _share_to_kink(
+    p: Any, tables: Tables, t: float, y: FloatArray, h: float, F: FloatArray, start: float, end: float, work: FloatArray
+) -> float:
+    """Share of a step, from angle of attack start to end, at which it first passes a kink; 1 where it passes none.
+
+    The nutation takes the angle up and down within a step, so its extremes are looked at too: a parabola through
+    three points of the dense output says where they are.
+    """
+    n = KINK_SAMPLES
+    low, lower, before = 0.0, start, start
+    here = _incidence_within(p, t, y, h, F, 1.0 / n, work)
+    for k in range(1, n + 1):
+        after = end
+        if k < n - 1:
+            after = _incidence_within(p, t, y, h, F, (k + 1.0) / n, work)
+        if k < n and (here - before) * (after - here) < 0.0:
+            top = (k + 0.5 * (before - after) / (before - 2.0 * here + after)) / n
+            extreme = _incidence_within(p, t, y, h, F, top, work)
+            node = _kink(p, tables, lower, extreme)
+            if np.isfinite(node):
+                return _share_up_to(p, t, y, h, F, node, low, lower, top, extreme, work)
+            low, lower = top, extreme
+        elif k == n:
+            node = _kink(p, tables, lower, end)
+            if np.isfinite(node):
+                return _share_up_to(p, t, y, h, F, node, low, lower, 1.0, end, work)
+        before, here = here, after
+    return 1.0
+
+
+@compiled
 def _lowest(F: FloatArray, y: FloatArray) -> float:
     """Share of a step, falling at its start and rising at its end, at which the disc is lowest."""
     low, high = 0.0, 1.0
@@ -285,24 +424,44 @@ def integrate(
     K, F = np.empty((_EXTENDED, WIDTH)), np.empty((_POWER, WIDTH))
     y, new, work = state.copy(), np.empty(WIDTH), np.empty(WIDTH)
     t, h, n, ended = t_start, FIRST_STEP, 0, _LEFT
+    kinked = tables.static.shape[1] > 0 or p.aero_stall.k != 0.0
+    alpha, alpha_new, tries = 0.0, 0.0, 0
+    shortest, chatter = SHORTEST_STEP, np.inf
     times[0], states[0] = t, y
     derivative(p, tables, t, y, K[0])
+    if kinked:
+        alpha = _incidence(p, t, y)
+    wished = h
     while t < t_end:
-        wished = h
         h = min(_up_to_events(p, t, h), t_end - t)
         whole = h >= t_end - t
         step(p, tables, t, y, h, K, new)
         derivative(p, tables, t + h, new, K[_STAGES])
-        error = _error(h, K, y, rtol, atol)
+        error = _error(h, K, y, rtol, atol, F)
         if not np.isfinite(error):
             if h <= SHORTEST_STEP:
                 ended = _LOST
                 break
-            h = max(0.2 * h, SHORTEST_STEP)
+            h = wished = max(0.2 * h, SHORTEST_STEP)
             continue
-        if error > 1.0 and h > SHORTEST_STEP:
-            h = max(h * max(0.2, 0.9 * error ** (-1.0 / 8.0)), SHORTEST_STEP)
+        if kinked:
+            alpha_new = _incidence(p, t + h, new)
+            if tries < KINK_TRIES and h > shortest:
+                interpolant(p, tables, t, y, h, K, new, F)
+                share = _share_to_kink(p, tables, t, y, h, F, alpha, alpha_new, work)
+                if share < 1.0:
+                    h = max(h * share, shortest)
+                    tries += 1
+                    continue
+        if error > 1.0 and h > shortest:
+            h = wished = max(h * max(0.2, 0.9 * error ** (-1.0 / 8.0)), shortest)
             continue
+        tries = 0
+        if h < CHATTER_STEP:
+            chatter = min(chatter, t)
+            shortest = min(max(CHATTER_SHARE * (t + h - chatter), SHORTEST_STEP), CHATTER_STEP)
+        elif h > CHATTER_END:
+            shortest, chatter = SHORTEST_STEP, np.inf
 
         if new[2] < 0.0 and y[5] > 0.0 > new[5]:
             # between its ends the step may touch the ground and leave it
@@ -334,9 +493,10 @@ def integrate(
             break
         y[:] = new
         K[0] = K[_STAGES]
-        grown = h * min(5.0, 0.9 * error ** (-1.0 / 8.0)) if error > 0.0 else 5.0 * h
-        # a step cut short for an event says little about the next one
-        h = max(grown, wished) if h < wished else grown
+        alpha = alpha_new
+        grown = max(h * min(5.0, 0.9 * error ** (-1.0 / 8.0)), shortest) if error > 0.0 else 5.0 * h
+        # a step cut short for an event or a kink says little about the next one
+        h = wished = max(grown, wished) if h < wished else grown
     return ended, times[: n + 1].copy(), states[: n + 1].copy(), dense[: n if keep else 0].copy()
 
 

@@ -100,6 +100,8 @@ class YawReynolds(NamedTuple):
 @compiled
 def yaw_reynolds(effect: YawReynolds, V: float) -> float:
     """Factor on CNr."""
+    if effect.exponent == 0.0:
+        return 1.0
     return float((V / 15.0) ** effect.exponent)
 
 

@@ -31,6 +31,8 @@ class WindShear(NamedTuple):
 @compiled
 def wind_shear(effect: WindShear, h: float) -> float:
     """Factor on the wind at 10 m; h is the height above ground in m."""
+    if effect.exponent == 0.0:
+        return 1.0
     return float((max(h, LOWEST_HEIGHT) / 10.0) ** effect.exponent)
 
 
@@ -46,6 +48,8 @@ class Gust(NamedTuple):
 @compiled
 def gust(effect: Gust, t: float) -> float:
     """Factor on the gust's peak at time t."""
+    if effect.w_north_m_s == 0.0 and effect.w_east_m_s == 0.0:
+        return 0.0
     s = (t - effect.t_s) / effect.width_s
     return exp(-0.5 * s * s)
 
@@ -65,4 +69,6 @@ class GroundEffect(NamedTuple):
 @compiled
 def ground_effect(effect: GroundEffect, h: float, d: float) -> float:
     """Factor on the lift coefficient at height h (m) of a disc of diameter d (m)."""
+    if effect.k == 0.0:
+        return 1.0
     return 1.0 + effect.k * exp(-max(h, LOWEST_HEIGHT) / (2.0 * d))

@@ -35,6 +35,8 @@ class Impulse(NamedTuple):
 @compiled
 def impulse(effect: Impulse, t: float) -> tuple[float, float, float]:
     """Acceleration in N, m/s^2."""
+    if effect.dv_north_m_s == 0.0 and effect.dv_east_m_s == 0.0 and effect.dv_down_m_s == 0.0:
+        return 0.0, 0.0, 0.0
     f = _pulse(t, effect.t_s)
     return f * effect.dv_north_m_s, f * effect.dv_east_m_s, f * effect.dv_down_m_s
 
@@ -49,5 +51,7 @@ class SpinStep(NamedTuple):
 @compiled
 def spin_step(effect: SpinStep, t: float, r: float) -> float:
     """Angular acceleration about z_B, rad/s^2."""
+    if effect.dr_rad_s == 0.0:
+        return 0.0
     direction = 1.0 if r >= 0.0 else -1.0
     return direction * effect.dr_rad_s * _pulse(t, effect.t_s)
