@@ -164,6 +164,11 @@ def flight_starts(recording: Recording, t: FloatArray) -> Starts:
     felt = _felt(recording, frame)
     pair = None if fixes is None else _compared(fixes, felt, grid, recording.environment.gravity)
     normals = None if fixes is None or pair is None else _normals(recording, _path(fixes, None, grid)[1], pair[0])
+    if fixes is not None and felt is not None and pair is not None and normals is not None:
+        slip = _slip(frame, recording.environment.magnetic_field, grid, pair, normals)
+        if slip is not None:
+            felt = _turned_about_axis(felt, frame, -np.interp(felt.grid, grid, slip))
+            pair = _compared(fixes, felt, grid, recording.environment.gravity)
     G, certain = _turned_to_ned(recording, frame, grid, pair, normals)
     attitude, rate = _states(recording, frame, grid, G, t)
     if felt is not None:
@@ -620,8 +625,6 @@ def _turned_to_ned(
     sigma = float(np.clip(3.0 / max(fast, 0.1), VECTOR_SIGMA, 0.4)) if fast > SLOW else VECTOR_SIGMA
     axis = body_to_ned(frame.D_at(grid))[:, :, 2]
     magnetic = None if frame.field is None else _field_in_start(frame.field, frame, grid, sigma)
-    if magnetic is not None and felt is not None and force is not None and normals is not None:
-        felt = _with_slip(magnetic, felt, axis, field, force, normals)
     if magnetic is not None:
         wandering = frame.transverse is None
         magnetic = _without_axial_iron(magnetic, axis, field, felt, force, wandering=wandering)
@@ -663,25 +666,43 @@ def _fitted_turns(
     return turns
 
 
-def _with_slip(
-    m: FloatArray, f: FloatArray, axis: FloatArray, field: FloatArray, force: FloatArray, normals: FloatArray
-) -> FloatArray:
-    """Return the specific force felt (n, 3) turned about the axis to where the field's own clock would show it.
+def _slip(
+    frame: _Attitude,
+    field: FloatArray,
+    grid: FloatArray,
+    pair: tuple[FloatArray, FloatArray | None],
+    normals: FloatArray,
+) -> FloatArray | None:
+    """Return by how much (n,) rad the accelerometer's phase runs ahead of the magnetometer's, or None where it is not.
 
-    Where clocks differ, or readings were lost, the accelerometer's phase slips against the magnetometer's. The angle
-    from field to force in the disc's plane, which path and lift foretell, shows by how much; less than half a radian
-    is left alone, for wind and iron make as much.
+    Where clocks differ, or readings were lost, one slips against the other. The angle from field to force in the
+    disc's plane, which path and lift foretell, shows it; what changes by less than half a radian is left alone, for
+    wind and iron make as much.
     """
-    if len(f) < 5:
-        return f
-    a, b = _from_to(m, f, axis), _from_to(np.broadcast_to(field, m.shape), force, normals)
-    slip = _windowed(a * np.conj(b), 0.5)
-    level = _windowed(np.abs(a * b), 0.5)
-    angle = np.unwrap(np.angle(np.where(np.abs(slip) > 0, slip, 1.0)))
-    coherent = np.median(np.abs(slip)) > 0.8 * np.median(level)
-    if not coherent or float(np.max(np.abs(angle))) < 0.5:
-        return f
-    return np.asarray(np.einsum("nij,nj->ni", body_to_ned(turn(-angle[:, None] * axis)), f))
+    force, felt = pair
+    if frame.field is None or felt is None or grid.size < 5:
+        return None
+    m = _field_in_start(frame.field, frame, grid, VECTOR_SIGMA)
+    axis = body_to_ned(frame.D_at(grid))[:, :, 2]
+    a, b = _from_to(m, felt, axis), _from_to(np.broadcast_to(field, m.shape), force, normals)
+    product, level = a * np.conj(b), np.abs(a * b)
+    # a steady slip first: 7 rad/s are 2 % of the fastest spin, or 10 % of readings lost at an ordinary one
+    trial = np.linspace(-7.0, 7.0, 281)
+    sums = np.abs(np.exp(-1j * trial[:, None] * grid) @ product)
+    steady = float(trial[np.argmax(sums)]) * grid
+    rest = _windowed(product * np.exp(-1j * steady), 0.5)
+    if np.median(np.abs(rest)) < 0.7 * np.median(_windowed(level, 0.5)):
+        return None
+    angle = np.asarray(steady + np.unwrap(np.angle(np.where(np.abs(rest) > 0, rest, 1.0))))
+    # by whole turns nearest to none at the start, where no time has passed to slip in
+    angle -= 2 * np.pi * np.rint(angle[0] / (2 * np.pi))
+    return angle if float(np.ptp(angle)) > 0.5 else None
+
+
+def _turned_about_axis(felt: _Felt, frame: _Attitude, angle: FloatArray) -> _Felt:
+    """Return a force felt turned about the spin axis by an angle (n,) rad on its grid."""
+    axis = body_to_ned(frame.D_at(felt.grid))[:, :, 2]
+    return _integrated(felt.grid, np.einsum("nij,nj->ni", body_to_ned(turn(angle[:, None] * axis)), felt.force))
 
 
 def _from_to(m: FloatArray, f: FloatArray, axis: FloatArray) -> ComplexArray:
