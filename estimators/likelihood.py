@@ -43,6 +43,10 @@ LARGEST_CORRELATION = 0.3
 #: by within the window is in the standard deviation.
 LARGEST_MISFIT = 0.05
 
+#: Relative standard deviation of the correction by p and q: the gyroscope's gain (2 %), and soft iron (3 % on the field
+#: along the axis, and the mean of two such across it).
+CORRECTION_SD = 0.042
+
 #: Most steps of a fit. One that starts at its line converges within eight; the rest are no tones.
 MOST_STEPS = 15
 
@@ -130,6 +134,7 @@ def likelihood(recording: Recording, settings: LikelihoodSettings | None = None)
         settings,
         sheet=recording.sheets.get("magnetometer"),
         gyroscope=recording.get("gyroscope"),
+        gyroscope_sheet=recording.sheets.get("gyroscope"),
         field=None if field is None else float(np.linalg.norm(field)),
         fixed_axis=recording.plant in ("rate_table", "spin_down"),
     )
@@ -141,6 +146,7 @@ def likelihood_from_samples(
     *,
     sheet: SensorSheet | None = None,
     gyroscope: Samples | None = None,
+    gyroscope_sheet: SensorSheet | None = None,
     field: float | None = None,
     fixed_axis: bool = False,
 ) -> YawRate:
@@ -150,8 +156,8 @@ def likelihood_from_samples(
     ----------
     magnetometer, gyroscope : Samples
         (n, 3) uT and (m, 3) rad/s in B; of the gyroscope only p and q are used.
-    sheet : SensorSheet or None
-        The magnetometer's, for its range.
+    sheet, gyroscope_sheet : SensorSheet or None
+        The magnetometer's, for its range, and the gyroscope's, for its noise.
     field : float or None
         Strength of the field, uT: it tells the hard iron along z, which the phase rate's correction needs.
     fixed_axis : bool
@@ -166,7 +172,13 @@ def likelihood_from_samples(
         axial = axial_field(fits.amplitude, fits.axial, field)
         if gyroscope is not None:
             fits = fit_windows(t, m, centres, settings, gyroscope=gyroscope, axial=axial, start=fits)
-            slack = fits.along / fits.amplitude * axial.sd
+            cotangent = (fits.axial - axial.offset) / fits.amplitude
+            slack = np.hypot(fits.along / fits.amplitude * axial.sd, fits.along * cotangent * CORRECTION_SD)
+            if gyroscope_sheet is not None and gyroscope_sheet.noise_rms is not None:
+                # white noise of p and q makes the phase a random walk, and a fitted slope sees 6/5 of its rate
+                density = gyroscope_sheet.noise_rms**2 * gyroscope.interval
+                walk = (1.2 if settings.degree < 2 else 2.5) * density * cotangent**2 / fits.length
+                slack = np.sqrt(slack**2 + walk)
         else:
             slack = np.hypot(fits.axial - axial.offset, axial.sd) / fits.amplitude * settings.precession_sd
         rate, sd = -fits.phase_rate, np.hypot(fits.phase_rate_sd, slack)
@@ -442,7 +454,7 @@ def _peaks(tau: FloatArray, z: ComplexArray, interval: float, count: int = 3) ->
     n = float(tau.size)
     span = tau[-1] - tau[0] + interval
     size = int(2 ** np.ceil(np.log2(4 * span / interval)))
-    frequency = 2 * np.pi * np.fft.fftfreq(size, interval)
+    frequency = np.asarray(2 * np.pi * np.fft.fftfreq(size, interval), dtype=np.float64)
     tone, value = _transforms(tau - tau[0], z, frequency, interval)
     left = n - np.abs(tone) ** 2 / n
     value -= tone * np.sum(z) / n

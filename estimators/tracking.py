@@ -133,9 +133,10 @@ def _integrate(
     times: FloatArray,
     substeps: int,
     r: FloatArray,
-    w_re: FloatArray,
-    w_im: FloatArray,
-    despun: bool,
+    body_re: FloatArray,
+    body_im: FloatArray,
+    despun_re: FloatArray,
+    despun_im: FloatArray,
     attitude: FloatArray,
     psi_at: FloatArray,
     axes: FloatArray,
@@ -145,7 +146,8 @@ def _integrate(
 
     Written: ``attitude`` (n, 3, 3) C_BN, the identity at the first time; ``psi_at`` (n,) the angle turned;
     ``axes`` (k, 3, 3), whose rows are the axes of the frame that does not spin, in N, at the middle of each sub-step,
-    and ``psi_middle`` (k,). ``despun`` tells that p and q are given in the frame that does not spin.
+    and ``psi_middle`` (k,). Transverse rates (k,) are the sum of those given in the body and in the frame that does
+    not spin.
     """
     D = np.eye(3)
     psi = 0.0
@@ -156,12 +158,10 @@ def _integrate(
         for j in range(substeps):
             s = k * substeps + j
             middle = psi + 0.5 * h * r[s]
-            p, q = w_re[s], w_im[s]
-            if despun:
-                a, b = p, q
-            else:  # C3(psi)^T takes body components to the frame that does not spin
-                a = cos(middle) * p - sin(middle) * q
-                b = sin(middle) * p + cos(middle) * q
+            p, q = body_re[s], body_im[s]
+            # C3(psi)^T takes body components to the frame that does not spin
+            a = cos(middle) * p - sin(middle) * q + despun_re[s]
+            b = sin(middle) * p + cos(middle) * q + despun_im[s]
             # exp(-[v x]) with v = (a, b, 0) h/2 twice, so that the axes are there at the middle too
             x, y = 0.5 * h * a, 0.5 * h * b
             angle = sqrt(x * x + y * y)
@@ -200,8 +200,8 @@ def _segments(t: FloatArray, settings: TrackingSettings) -> list[tuple[float, fl
 class _Problem:
     """The least-squares problem of one segment: parameters, residuals and derivatives.
 
-    Parameters in order: spin spline, transverse rates (bias and gain of p, q, or splines), field (3), hard iron (3),
-    soft iron (6), calibrations of other sensors' rows.
+    Parameters in order: spin spline, transverse rates (bias and gain of p, q, and splines of what they do not show),
+    field (3), hard iron (3), soft iron (6), calibrations of other sensors' rows.
     """
 
     def __init__(
@@ -217,6 +217,7 @@ class _Problem:
         rows: list[RateRows],
         top_rate: float,
         typical_rate: float = 0.0,
+        walk: float = 0.0,
     ) -> None:
         self.t, self.m, self.settings, self.rows = t, m, settings, rows
         self.strength, self.decaying = strength, decaying
@@ -235,18 +236,21 @@ class _Problem:
         self.middle = (t[:-1, None] + np.diff(t)[:, None] * fraction).ravel()
         self.interval = np.repeat(np.arange(t.size - 1), self.substeps)
         self.first, self.weights = self.spline.local(self.middle)
+        #: what the gyroscope's noise adds to the attitude, rad per root second; without one the whole rate is unknown
+        self.walk = walk
         self.slow: SpinSpline | None = None
-        if gyroscope is None and not fixed_axis:
+        if not fixed_axis and (gyroscope is None or walk > 0):
             self.slow = SpinSpline.over(float(t[0]), float(t[-1]), settings.precession_knots)
             self.slow_first, self.slow_weights = self.slow.local(self.middle)
-        transverse = 0 if fixed_axis else 4 if self.slow is None else 2 * self.slow.size
+        self.read = 0 if fixed_axis or gyroscope is None else 4
+        transverse = self.read + (0 if self.slow is None else 2 * self.slow.size)
         sizes = [self.spline.size, transverse, 3, 3, 6] + [row.calibration.size for row in rows]
         ends = np.cumsum(sizes)
         self.parts = [slice(int(end - size), int(end)) for size, end in zip(sizes, ends, strict=True)]
         self.size = int(ends[-1])
         self.fixed_axis = fixed_axis
         #: least roughness: what a spin-down's time constant changes by may not be laid to an unseen precession
-        self.least = 0.0 if self.slow is None else _CHANGE * typical_rate**2
+        self.least = 0.0 if self.slow is None or self.read else _CHANGE * typical_rate**2
         #: precision of each interval's roughness over the common one: small at the corner of a ramp or at a knock
         self.local = np.ones(self.spline.size - 2)
 
@@ -260,7 +264,15 @@ class _Problem:
         spin, transverse, _, iron, soft = self.parts[:5]
         # a spline needs some prior where there are no data at all; this one says nothing: 1e4 rad/s
         precision[spin, spin] = np.eye(self.spline.size) * 1e-8
-        if self.slow is not None:
+        if self.read:
+            sd = np.repeat([s.gyroscope_bias, s.gyroscope_gain], 2)
+            read = slice(transverse.start, transverse.start + self.read)
+            precision[read, read] = np.diag(1 / sd**2)
+        if self.slow is not None and self.read:
+            # white noise of density walk^2, averaged over a knot's spacing
+            noise = slice(transverse.start + self.read, transverse.stop)
+            precision[noise, noise] = np.eye(2 * self.slow.size) * self.slow.spacing / self.walk**2
+        elif self.slow is not None:
             distance = np.abs(np.subtract.outer(np.arange(self.slow.size), np.arange(self.slow.size)))
             # precession changes with the air's moment, over a second or two, about a level that stays
             correlation = 0.5 + 0.5 * np.exp(-distance * self.slow.spacing / 2.0)
@@ -268,9 +280,6 @@ class _Problem:
             middle = transverse.start + self.slow.size
             precision[transverse.start : middle, transverse.start : middle] = inverse
             precision[middle : transverse.stop, middle : transverse.stop] = inverse
-        elif not self.fixed_axis:
-            sd = np.repeat([s.gyroscope_bias, s.gyroscope_gain], 2)
-            precision[transverse, transverse] = np.diag(1 / sd**2)
         precision[iron, iron] = np.eye(3) / s.hard_iron**2
         precision[soft, soft] = np.eye(6) / s.soft_iron**2
         for part, row in zip(self.parts[5:], self.rows, strict=True):
@@ -298,21 +307,20 @@ class _Problem:
         spin, transverse, vector, iron, soft = self.parts[:5]
         c = x[spin]
         r = np.einsum("ki,ki->k", self.weights, c[self.first[:, None] + np.arange(4)])
-        w = self.w
-        if self.slow is not None:
-            half = self.slow.size
-            PQ = x[transverse][:half] + 1j * x[transverse][half:]
-            w = np.einsum("ki,ki->k", self.slow_weights, PQ[self.slow_first[:, None] + np.arange(4)])
-        elif not self.fixed_axis:
-            bias = complex(*x[transverse][:2])
-            gain = complex(*x[transverse][2:])
+        w, unread = self.w, np.zeros(self.middle.size, dtype=complex)
+        if self.read:
+            bias, gain = complex(*x[transverse][:2]), complex(*x[transverse][2:4])
             w = (1 + gain) * (self.w - bias)
+        if self.slow is not None:
+            real, imaginary = x[transverse][self.read :].reshape(2, -1)
+            PQ = real + 1j * imaginary
+            unread = np.einsum("ki,ki->k", self.slow_weights, PQ[self.slow_first[:, None] + np.arange(4)])
         n, k = self.t.size, self.middle.size
         C, psi = np.empty((n, 3, 3)), np.empty(n)
         axes, psi_middle = np.empty((k, 3, 3)), np.empty(k)
         _integrate(
             self.t, self.substeps, r, np.ascontiguousarray(w.real), np.ascontiguousarray(w.imag),
-            self.despun, C, psi, axes, psi_middle,
+            np.ascontiguousarray(unread.real), np.ascontiguousarray(unread.imag), C, psi, axes, psi_middle,
         )  # fmt: skip
         m0 = x[vector]
         M = np.eye(3) + _symmetric(x[soft])
@@ -334,9 +342,9 @@ class _Problem:
             for i in range(2):
                 moment = self.slow_weights[:, :, None] * (self.h[:, None] * axes[:, i, :])[:, None, :]
                 theta = _accumulate(self.slow_first, moment, self.interval, n, self.slow.size)
-                part = slice(transverse.start + i * self.slow.size, transverse.start + (i + 1) * self.slow.size)
-                J[:, :, part] = MC @ np.swapaxes(theta @ skew, 1, 2)
-        elif not self.fixed_axis:
+                first = transverse.start + self.read + i * self.slow.size
+                J[:, :, first : first + self.slow.size] = MC @ np.swapaxes(theta @ skew, 1, 2)
+        if self.read:
             cm, sm = np.cos(psi_middle)[:, None], np.sin(psi_middle)[:, None]
             ex = cm * axes[:, 0] + sm * axes[:, 1]
             ey = -sm * axes[:, 0] + cm * axes[:, 1]
@@ -345,7 +353,7 @@ class _Problem:
             moment = np.stack([-ex, -ey, p * ex + q * ey, p * ey - q * ex], 1) * self.h[:, None, None]
             total = np.zeros((n, 4, 3))
             total[1:] = np.cumsum(np.add.reduceat(moment, np.arange(0, k, self.substeps), axis=0), axis=0)
-            J[:, :, transverse] = MC @ np.swapaxes(total @ skew, 1, 2)
+            J[:, :, transverse.start : transverse.start + 4] = MC @ np.swapaxes(total @ skew, 1, 2)
         J[:, :, vector] = MC
         J[:, :, iron] = np.eye(3)
         for column, (i, j) in enumerate(_SOFT):
@@ -555,15 +563,17 @@ def track_bound(
     *,
     gyroscope: Samples | None,
     strength: float | None,
+    walk: float = 0.0,
 ) -> float:
     """Return the Bayesian Cramer-Rao bound of the rate at one instant, rad/s, of the whole model of `track_spin`.
 
     The inverse Fisher matrix for a rate that changes steadily (r'' = 0) with field, hard and soft iron, and the
-    gyroscope's bias and gain unknown within their priors. ``m`` (n, 3), ``rate`` (n,) and ``gyroscope`` are true ones.
+    gyroscope's bias and gain unknown within their priors. ``m`` (n, 3), ``rate`` (n,) and ``gyroscope`` are true ones;
+    ``walk`` is what the gyroscope's noise adds to the attitude, rad per root second.
     """
     problem = _Problem(
         t, m, settings, gyroscope=gyroscope, strength=strength, fixed_axis=False, decaying=False, rows=[],
-        top_rate=float(np.max(np.abs(rate))),
+        top_rate=float(np.max(np.abs(rate))), walk=walk,
     )  # fmt: skip
     x, linear, *_ = _solve(problem, _start(problem, rate, None), noise, np.ones(t.size), 1e-6, settings.precession, 20)
     information, _, _ = _with_roughness(problem, linear, x, np.zeros(problem.spline.size - 2), 1e-10)
@@ -616,16 +626,19 @@ def track_spin(
     axial: AxialField | None = None,
     rows: list[RateRows] | None = None,
     noise: float | None = None,
+    walk: float = 0.0,
 ) -> Track:
     """Smooth one segment: field m (n, 3) uT at times t (n,), from a first guess ``start_rate`` (n,) rad/s.
 
     ``strength`` is the field's, uT; ``axial`` a first guess of the hard iron along z; ``noise`` the data sheet's,
-    uT, taken as a floor. ``rows`` are other sensors' readings of the rate.
+    uT, taken as a floor; ``walk`` what the gyroscope's noise adds to the attitude, rad per root second. ``rows``
+    are other sensors' readings of the rate.
     """
     rows = rows or []
     problem = _Problem(
         t, m, settings, gyroscope=gyroscope, strength=strength, fixed_axis=fixed_axis, decaying=decaying,
         rows=rows, top_rate=float(np.max(np.abs(start_rate))), typical_rate=float(np.median(np.abs(start_rate))),
+        walk=walk,
     )  # fmt: skip
     x = _start(problem, start_rate, axial)
     precession = settings.precession
@@ -645,7 +658,7 @@ def track_spin(
         linear, residual, psi = _linearise(problem, x, sigma, weights, precision, mean)
         previous = roughness
         roughness = _adapt(problem, linear, x, target)
-        if problem.slow is not None:
+        if problem.slow is not None and problem.despun:
             # the part of the precession that the field shows tells the size of the part that it does not
             PQ = x[problem.parts[1]]
             shown = 1 - np.diag(np.linalg.inv(linear.information))[problem.parts[1]] / precession**2
@@ -684,7 +697,7 @@ def track_spin(
         calibration=[x[part] for part in parts],
         calibration_sd=[np.sqrt(np.diag(everything)[part]) for part in parts],
         chi2=[float(np.mean(error**2)) for error, _ in problem.evaluate_rows(x)],
-        gyroscope_gain=complex(*x[problem.parts[1]][2:]) if not problem.despun and not fixed_axis else 0j,
+        gyroscope_gain=complex(*x[problem.parts[1]][2:4]) if not problem.despun and not fixed_axis else 0j,
     )
 
 
@@ -813,10 +826,23 @@ def tracks_of(
                 axial=axial,
                 rows=_between(rows or [], float(t[chosen][0]), float(t[chosen][-1])),
                 noise=noise,
+                walk=_walk(recording, noise, strength, stop - start),
             )
             if track is not None:
                 tracks.append(track)
     return tracks
+
+
+def _walk(recording: Recording, noise: float | None, strength: float, length: float) -> float:
+    """Return what the gyroscope's noise adds to the attitude, rad per root second; 0 where it cannot matter.
+
+    It is left out where, summed over ``length`` s, it stays below a third of the magnetometer's own noise: the usual.
+    """
+    sheet = recording.sheets.get("gyroscope")
+    if sheet is None or sheet.noise_rms is None or noise is None:
+        return 0.0
+    walk = sheet.noise_rms / sqrt(sheet.rate_hz)
+    return walk if walk * strength * sqrt(length) > noise / 3 else 0.0
 
 
 def _tracked(t: FloatArray, *arguments: Any, **options: Any) -> Track | None:

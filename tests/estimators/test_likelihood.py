@@ -65,7 +65,7 @@ def test_a_rate_that_wobbles_within_the_window_is_answered_with_the_wobble_in_it
     t = 0.01 * np.arange(460)
     swing, pace = np.radians(15.0) * np.sqrt(2), 2 * np.pi * 6.0
     phase = -np.radians(340.0) * t + swing / pace * np.cos(pace * t)
-    field = np.stack([29 * np.cos(phase), 29 * np.sin(phase), np.full(t.size, 25.0)], -1) + [-30.0, 1.0, 0.0]
+    field = np.stack([29 * np.cos(phase), 29 * np.sin(phase), np.full(t.size, 25.0)], -1) + np.array([-30.0, 1.0, 0.0])
     samples = Samples(t, field + rng.normal(0, 0.05, field.shape))
     answer = likelihood_from_samples(samples, fixed_axis=True)
     error = answer.rate - np.radians(340.0) - swing * np.sin(pace * answer.t)
