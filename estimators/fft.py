@@ -9,6 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from discsim.arrays import BoolArray, FloatArray
+from discsim.compiled import compiled
 from discsim.errors import InputError
 from discsim.recording import Samples
 from estimators.fft_fast import dirichlet, highest, spectra, transform_at
@@ -18,8 +19,11 @@ from estimators.tone import ComplexArray
 
 __all__ = ["FftSettings", "fft"]
 
-#: Windows looked at together: their coarse spectra stay in a core's cache, whatever the length of the recording.
-CHUNK = 128
+#: Windows looked at together; memory does not grow with the recording.
+CHUNK = 512
+
+#: Windows transformed at once: their coarse spectra, 1 MB at n = 128, stay in a core's cache.
+BLOCK = 64
 
 #: Below this share of the window's variance the line is smeared by a change of rate of more than about four bins
 #: over the window; its spectrum then has several peaks of one height and the highest says little.
@@ -116,17 +120,20 @@ def fft(magnetometer: Samples, settings: FftSettings | None = None) -> YawRate:
         )
     starts = np.arange(0, t.size - n + 1, settings.step)
     rate, sd = np.full(starts.size, np.nan), np.full(starts.size, np.nan)
-    stamps = sliding_window_view(t, n)
-    values = sliding_window_view(magnetometer.value[:, :2], n, axis=0)  # (windows, 2, n)
+    stamps, field = sliding_window_view(t, n), np.ascontiguousarray(magnetometer.value[:, :2])
+    whole = np.concatenate([[0], np.cumsum(~np.isfinite(field).all(axis=1))])  # gaps before each sample
     for first in range(0, starts.size, CHUNK):
         chosen = starts[first : first + CHUNK]
         spacing = (t[chosen + n - 1] - t[chosen]) / (n - 1)
-        usable = _evenly_spaced(stamps[chosen], spacing) & np.all(np.isfinite(values[chosen]), axis=(1, 2))
+        usable = _evenly_spaced(stamps[chosen], spacing) & (whole[chosen + n] == whole[chosen])
         if not usable.any():
             continue
         spacing = spacing[usable]
-        still, mean = _wider_axis(values[chosen[usable]])
-        peak, line, known = _spectral_peak(still, mean, spacing, settings)
+        still, mean = np.empty((spacing.size, n)), np.empty(spacing.size)
+        _wider_axis(field, chosen[usable], still, mean)
+        blocks = [slice(start, start + BLOCK) for start in range(0, mean.size, BLOCK)]
+        found = [_spectral_peak(still[block], mean[block], spacing[block], settings) for block in blocks]
+        peak, line, known = (np.concatenate(parts) for parts in zip(*found, strict=True))
         if not known.any():
             continue
         omega = 2 * np.pi * peak[known] / total  # (PE2), rad per sample
@@ -146,13 +153,24 @@ def _evenly_spaced(t: FloatArray, interval: FloatArray) -> BoolArray:
     return np.asarray(np.ptp(stray, axis=1) <= interval / 2)
 
 
-def _wider_axis(block: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return windows (w, n) of the axis that varies more, less their means, and those means, from (w, 2, n)."""
-    mean = block.mean(axis=2)
-    still = block - mean[:, :, None]
-    axis = np.argmax(np.einsum("wan,wan->wa", still, still), axis=1)
-    window = np.arange(axis.size)
-    return still[window, axis], mean[window, axis]
+@compiled
+def _wider_axis(field: FloatArray, starts: IndexArray, still: FloatArray, mean: FloatArray) -> None:
+    """Fill ``still`` (w, n) with the windows of the axis that varies more, less their means (w,)."""
+    n = still.shape[1]
+    for i in range(starts.size):
+        window = field[starts[i] : starts[i] + n]
+        x_mean, y_mean = 0.0, 0.0
+        for k in range(n):
+            x_mean += window[k, 0] / n
+            y_mean += window[k, 1] / n
+        x_squares, y_squares = 0.0, 0.0
+        for k in range(n):
+            x_squares += (window[k, 0] - x_mean) ** 2
+            y_squares += (window[k, 1] - y_mean) ** 2
+        axis = 0 if x_squares >= y_squares else 1
+        mean[i] = x_mean if axis == 0 else y_mean
+        for k in range(n):
+            still[i, k] = window[k, axis] - mean[i]
 
 
 def _spectral_peak(

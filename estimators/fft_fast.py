@@ -29,8 +29,8 @@ from estimators.tone import ComplexArray
 
 __all__ = ["Spectra", "dirichlet", "highest", "padded_peak", "spectra", "transform_at"]
 
-#: Windows transformed at once by `padded_peak`: their coarse spectra take 1 MB at n = 128 and stay in a core's cache.
-CHUNK = 128
+#: Windows transformed at once by `padded_peak`: their coarse spectra, 1 MB at n = 128, stay in a core's cache.
+CHUNK = 64
 
 #: Coarse points on either side of an order through which the polynomial goes.
 SIDE = 4

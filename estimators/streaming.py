@@ -93,6 +93,11 @@ class StreamingRate:
         """Age of an answer, s: half the window."""
         return 0.5 * (self._t.size - 1) * self._interval
 
+    @property
+    def held_bytes(self) -> int:
+        """Memory of the window's arrays, which do not grow."""
+        return sum(int(value.nbytes) for value in vars(self).values() if isinstance(value, np.ndarray))
+
     def update_gyroscope(self, t: float, w: FloatArray) -> None:
         """Take a reading of the gyroscope, (3,) rad/s; before the magnetometer's of the same time or later."""
         self._has_gyroscope = True

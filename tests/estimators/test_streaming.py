@@ -60,8 +60,12 @@ def test_memory_and_latency_are_those_of_a_window(rig):
     live, answers = stream(samples, fixed_axis=True)
     assert live.latency == pytest.approx(0.635)
     assert answers[-1].newest - answers[-1].t == pytest.approx(live.latency, abs=0.006)
-    held = sum(sys.getsizeof(v) + getattr(v, "nbytes", 0) for v in vars(live).values())
+    held = live.held_bytes + sum(sys.getsizeof(v) for v in vars(live).values())
     assert held < 60_000
+    again, _ = stream(samples, fixed_axis=True)
+    for t in 6.0 + np.arange(200) / 100:
+        again.update(t, samples.value[0])
+    assert again.held_bytes == live.held_bytes
 
 
 def test_the_gyroscope_removes_precession_as_it_comes():
@@ -106,9 +110,9 @@ def test_gaps_and_time_that_runs_backwards(rig):
 
 
 def test_a_sample_takes_a_fraction_of_the_sampling_interval(rig):
-    """10 ms at 100 Hz; a tenth of it is allowed on a loaded machine (benchmarks/estimators.py gives the figure)."""
+    """10 ms at 100 Hz; a tenth of it, of the processor's time, is ten times the figure of benchmarks/cost.py."""
     samples, _ = rig
     stream(samples, fixed_axis=True)
-    start = time.perf_counter()
+    start = time.thread_time()
     stream(samples, fixed_axis=True)
-    assert (time.perf_counter() - start) / len(samples) < 1e-3
+    assert (time.thread_time() - start) / len(samples) < 1e-3
