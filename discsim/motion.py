@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -94,16 +95,20 @@ class Motion:
         return euler_angles(self.attitude)
 
     @cached_property
-    def _position(self) -> CubicHermiteSpline:
-        return CubicHermiteSpline(self.t, self.position, self.velocity)
+    def _position(self) -> Callable[[FloatArray], FloatArray]:
+        return self._hermite(self.position, self.velocity)
 
     @cached_property
-    def _velocity(self) -> CubicHermiteSpline:
-        return CubicHermiteSpline(self.t, self.velocity, self.acceleration)
+    def _velocity(self) -> Callable[[FloatArray], FloatArray]:
+        return self._hermite(self.velocity, self.acceleration)
 
     @cached_property
-    def _acceleration(self) -> CubicSpline:
-        return CubicSpline(self.t, self.acceleration)
+    def _acceleration(self) -> Callable[[FloatArray], FloatArray]:
+        return CubicSpline(self.t, self.acceleration) if self.acceleration.any() else _zero
+
+    def _hermite(self, value: FloatArray, slope: FloatArray) -> Callable[[FloatArray], FloatArray]:
+        # a rig stays where it is; splines of nothing would take more memory than all the rest of a long run
+        return CubicHermiteSpline(self.t, value, slope) if value.any() or slope.any() else _zero
 
     @cached_property
     def _rate(self) -> CubicHermiteSpline:
@@ -142,6 +147,10 @@ class Motion:
         slope0, slope1 = h * self.rate[k], h * _right_jacobian_inverse(whole, self.rate[k + 1])
         vector = s * (1 - s) ** 2 * slope0 + s**2 * (3 - 2 * s) * whole - s**2 * (1 - s) * slope1
         return multiply(first, turn(vector))
+
+
+def _zero(t: FloatArray) -> FloatArray:
+    return np.zeros((t.size, 3))
 
 
 def _right_jacobian_inverse(phi: FloatArray, w: FloatArray) -> FloatArray:

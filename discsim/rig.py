@@ -5,7 +5,8 @@ Both turn about one hinge, its axis straight down unless tilted; the yaw phase a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from array import array
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -103,13 +104,13 @@ class _Hinge:
         check_model(self.model)
         self.environment = environment
         self.data.qpos[0] = yaw
-        self.log: list[tuple[float, float, float, float]] = []
+        self.log = array("d")  # time, yaw, rate, acceleration of each state, one after the other
 
     def note(self) -> None:
         data = self.data
         mujoco.mj_forward(self.model, data)
         check_state(data)
-        self.log.append((data.time, float(data.qpos[0]), float(data.qvel[0]), float(data.qacc[0])))
+        self.log.extend((data.time, float(data.qpos[0]), float(data.qvel[0]), float(data.qacc[0])))
 
     def run(self, until: float, timestep: float) -> None:
         """Step to ``until`` in equal steps of at most ``timestep``, noting each state."""
@@ -123,7 +124,7 @@ class _Hinge:
             self.note()
 
     def motion(self) -> Motion:
-        t, yaw, rate, acceleration = np.array(self.log).T
+        t, yaw, rate, acceleration = np.frombuffer(self.log).reshape(-1, 4).T
         along_z = np.array([0.0, 0.0, 1.0])
         still = np.zeros((t.size, 3))
         attitude = multiply(np.broadcast_to(self.tilt, (t.size, 4)), turn(yaw[:, None] * along_z))
@@ -155,11 +156,13 @@ def turn_table(
     yaw: float = 0.0,
     inertia: float = 1.1e-3,
     timestep: float = 1e-3,
+    progress: Callable[[Sequence[float]], Iterable[float]] = iter,
 ) -> Motion:
     """Turn a rate table through a profile (t (n,) s, rate (n,) rad/s, piecewise linear) and return its true motion.
 
     ``yaw`` is the phase at t = 0 in rad, ``inertia`` the table's in kg m^2. Steps end on the profile's knots, so the
-    table follows ramps without error; `discsim.effects.rig` can add ripple and tilt.
+    table follows ramps without error; `discsim.effects.rig` can add ripple and tilt. ``progress`` is handed the slopes
+    of the profile's segments and yields them one by one, which shows how far it is.
     """
     if len(profile) < 2 or profile.value.ndim != 1 or np.any(np.isnan(profile.value)):
         raise InputError("profile: expected at least two knots (time, rate) without gaps")
@@ -180,7 +183,7 @@ def turn_table(
         data.qvel[0] += speed_ripple(SpeedRipple(*flat.view(PARAMETERS)[0]["rig_speed_ripple"]), 0.0, 0.0)[0]
     slopes = np.diff(profile.value) / np.diff(profile.t)
     with own_warnings(), passive_force(drive):
-        for k, slope in enumerate(slopes):
+        for k, slope in enumerate(progress(slopes.tolist())):
             segment[:] = profile.t[k], profile.value[k], slope, yaw, inertia
             if k == 0:
                 hinge.note()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -71,17 +71,19 @@ def run_rate_table(
     mount: FloatArray | None = None,
     effects: tuple[Effect, ...] = (),
     name: str = "rate-table",
+    progress: Callable[[Sequence[float]], Iterable[float]] = iter,
 ) -> RateTableRun:
     """Turn the table through ``profile`` and estimate its rate by each method of the paper.
 
     The module is one MPU-9250 drawn within its data sheet; its accelerometer sits ``mount`` (3,) m off its stated
     place. The yaw phase at the start is drawn too. An effect on a sensor takes the place of what was drawn of its
-    kind. Raises `InputError` where both ``mount`` and ``effects`` move the accelerometer.
+    kind. ``progress`` is `turn_table`'s. Raises `InputError` where both ``mount`` and ``effects`` move the
+    accelerometer.
     """
     if mount is not None and np.any(mount) and any(item.id == "accel.position_offset" for item in effects):
         raise InputError("a mount error and accel.position_offset both move the accelerometer; expected one of them")
     draw_module, draw_wide, draw_yaw, noise_module, noise_wide = rng.spawn(5)
-    motion = turn_table(profile, environment, effects, yaw=float(draw_yaw.uniform(0, 2 * np.pi)))
+    motion = turn_table(profile, environment, effects, yaw=float(draw_yaw.uniform(0, 2 * np.pi)), progress=progress)
     module = Instruments.from_parts("mpu9250", "ac1120s").drawn(draw_module)
     if mount is not None:
         module = module.fitted("accelerometer", offset=PositionOffset(*(float(x) for x in mount)))

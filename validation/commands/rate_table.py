@@ -65,6 +65,7 @@ def command(
             mount=offset,
             effects=effects,
             name=out.resolve().name or "rate-table",
+            progress=lambda segments: run.progress(segments, len(segments), "segment of the profile"),
         )
         write_recording(result.recording, out)
         write_recording(result.wide, out / "adxrs649")
