@@ -88,12 +88,17 @@ def discard(folder: Path) -> None:
     """Throw away what `claim` and `run_tasks` left in a folder, and nothing else."""
     if not (folder / IDENTITY).exists():
         return
-    for file in (*folder.glob("*.npz"), *folder.glob("*.json"), *folder.glob(".*")):
+    for file in (*folder.glob("*.npz"), *folder.glob("*.json"), *_unfinished(folder)):
         if file.name != IDENTITY:
             file.unlink()
     (folder / IDENTITY).unlink()  # last: a folder half emptied is still known
     if not any(folder.iterdir()):
         folder.rmdir()
+
+
+def _unfinished(folder: Path) -> list[Path]:
+    """Return what a process left that was killed while it wrote a result."""
+    return [*folder.glob(".*.npz.*"), *folder.glob(".*.json.*")]
 
 
 def run_tasks(
@@ -119,7 +124,7 @@ def run_tasks(
     names = [task.name for task in tasks]
     if len(set(names)) != len(names):
         raise ValueError("two tasks have one name; expected each its own")
-    for unfinished in folder.glob(".*"):  # of a process that was killed while it wrote
+    for unfinished in _unfinished(folder):
         unfinished.unlink(missing_ok=True)
     done = {name: result for name in names if (result := _read(folder, name)) is not None}
     left = [task for task in tasks if task.name not in done]

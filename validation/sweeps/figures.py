@@ -159,6 +159,7 @@ def draw_axes(result: xr.Dataset, path: Path) -> None:
         _along(axes, result, name)
     panels[0, 0].set_ylabel("rms error of the rate (deg/s)")
     panels[0, 0].legend(fontsize=8)
+    panels[0, 0].set_title(f"{result.attrs['title']}: median, 5 to 95 % over all else")
     save_figure(figure, path)
 
 
