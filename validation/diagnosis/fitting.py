@@ -1,0 +1,376 @@
+"""Weighted least squares over all recordings: states and jumps of each, parameters they share.
+
+Local unknowns are eliminated recording by recording (Schur complement), so the cost grows linearly with their number,
+and what is left, small matrices over the shared parameters, answers every question about subsets of them by algebra.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from discsim.arrays import BoolArray, FloatArray
+from discsim.frames import euler_angles
+from validation.diagnosis.noise import NoiseModel, whitened
+from validation.diagnosis.readings import Values
+from validation.diagnosis.trajectory_pieces import Chain, Column, Linear, linearise, moved, shifted
+
+__all__ = ["Fit", "Jumps", "Parameter", "Reduced", "linearised_columns", "reduce", "refit", "values_of"]
+
+THREADS = 2
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that the recordings share.
+
+    ``stated`` is where it stands without a fit, ``sigma`` the one-sigma uncertainty with which it is stated (inf:
+    free), ``step`` half the width of its differences. ``recordings`` are those it acts in; None means all.
+    """
+
+    group: str
+    name: str
+    stated: float
+    step: float
+    sigma: float = np.inf
+    recordings: frozenset[int] | None = None
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Group and name."""
+        return self.group, self.name
+
+    def acts_in(self, recording: int) -> bool:
+        """Tell whether it acts in a recording."""
+        return self.recordings is None or recording in self.recordings
+
+
+@dataclass(frozen=True)
+class Jumps:
+    """How far pieces may jump: one-sigma size (d,) in each direction of the state, zero where they may not."""
+
+    sd: FloatArray
+
+    @property
+    def allowed(self) -> BoolArray:
+        """Directions in which pieces may jump."""
+        return np.asarray(self.sd > 0)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Where a fit stands: the chains, the shared parameters and their values (p,), the last linearisations.
+
+    ``fixed`` are values that take part without being fitted.
+    """
+
+    chains: tuple[Chain, ...]
+    parameters: tuple[Parameter, ...]
+    at: FloatArray
+    jumps: Jumps
+    noise: NoiseModel
+    fixed: Values = field(default_factory=dict)
+    linears: tuple[Linear, ...] = ()
+    merit: float = np.inf
+    covariance: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    iterations: int = 0
+
+    def values(self, recording: int) -> dict[tuple[str, str], float]:
+        """Return the values that hold in a recording."""
+        return values_of(self.parameters, self.at, recording, self.fixed)
+
+    @property
+    def count(self) -> int:
+        """Number of scalar readings that take part."""
+        return sum(linear.residual.size for linear in self.linears)
+
+
+def values_of(
+    parameters: Sequence[Parameter], at: FloatArray, recording: int, fixed: Values
+) -> dict[tuple[str, str], float]:
+    """Return fixed values and those of the parameters that act in a recording."""
+    values = dict(fixed)
+    for parameter, number in zip(parameters, at, strict=True):
+        if parameter.acts_in(recording):
+            values[parameter.key] = float(number)
+    return values
+
+
+# ---------------------------------------------------------------------------------------- one recording
+
+
+def release_rows(current: Chain) -> tuple[FloatArray, FloatArray]:
+    """Return what a recording states of its release: residuals (m,) in sigmas and rows (m, d) upon the first state."""
+    release, d = current.recording.release, current.tangent
+    if release is None or current.recording.plant not in ("flight", "free_spin"):
+        return np.empty(0), np.empty((0, d))
+    residual: list[float] = []
+    rows: list[FloatArray] = []
+    state = current.states[0]
+
+    def add(difference: float, row: FloatArray, sigma: float) -> None:
+        residual.append(difference / sigma)
+        rows.append(row / sigma)
+
+    def sigma_of(key: str, exact: float) -> FloatArray:
+        given = release.sigma.get(key)
+        return np.broadcast_to(exact if given is None else np.maximum(np.asarray(given, dtype=float), exact), 3)
+
+    unit = np.eye(d)
+    if current.recording.plant == "flight":
+        for stated, first, key, exact in (
+            (release.position, 0, "position_ned_m", 1e-4),
+            (release.velocity, 3, "velocity_ned_m_s", 1e-4),
+        ):
+            if stated is not None:
+                for axis in range(3):
+                    add(stated[axis] - state[first + axis], unit[first + axis], sigma_of(key, exact)[axis])
+    if release.body_rate is not None:
+        for axis in range(3):
+            add(
+                release.body_rate[axis] - state[10 + axis],
+                unit[9 + axis],
+                sigma_of("body_rate_rad_s", 1e-4)[axis],
+            )
+    angles = np.array([float(a[0]) for a in euler_angles(state[None, 6:10])])
+    h = 1e-6
+    for place, (stated_angle, key) in enumerate(
+        ((release.roll, "roll_rad"), (release.pitch, "pitch_rad"), (release.yaw, "yaw_rad"))
+    ):
+        if stated_angle is None:
+            continue
+        row = np.zeros(d)
+        for axis in range(3):
+            tangent = np.zeros(d)
+            tangent[6 + axis] = h
+            turned = shifted("flight", state, tangent)
+            changed = float(euler_angles(turned[None, 6:10])[place][0]) - angles[place]
+            row[6 + axis] = (np.remainder(changed + np.pi, 2 * np.pi) - np.pi) / h
+        off = float(np.remainder(stated_angle - angles[place] + np.pi, 2 * np.pi) - np.pi)
+        add(off, row, float(sigma_of(key, 1e-5)[0]))
+    return np.array(residual), np.array(rows).reshape(-1, d)
+
+
+#: what is known of a state without any reading: m, m/s, rad, rad/s; nuisances of a free spin; rigs
+_ANYWHERE = {
+    "flight": np.repeat([1e4, 300.0, 30.0, 1e3], 3),
+    "free_spin": np.array([100.0, 100.0, 100.0, 100.0, 3.0, 3.0, 30.0, 30.0, 30.0, 1e3, 1e3, 1e3]),
+    "spin_down": np.array([1e6, 1e3]),
+    "rate_table": np.array([1e6]),
+}
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """What one recording says of the shared parameters once its own unknowns are eliminated.
+
+    ``gram`` (p + 1, p + 1) holds the reduced normal matrix over [parameters | residual]; its last entry is chi-squared
+    with the parameters where they stand. ``back`` gives the local unknowns from the shared ones.
+    """
+
+    gram: FloatArray
+    factor: Any
+    cross: FloatArray
+    rows: int
+
+
+def normal_matrix(linear: Linear, noise: NoiseModel) -> FloatArray:
+    """Return the normal matrix (l + p + 1, l + p + 1) over [local | shared | residual] of whitened rows."""
+    l, d = linear.unknowns, linear.moves.shape[1]
+    if l == d or linear.piece.size == 0:
+        A = whitened(linear, noise, np.hstack([linear.local, linear.shared, linear.residual[:, None]]))
+        return np.asarray(A.T @ A)
+    # with jumps the full rows are long and mostly empty: piece by piece, then chained
+    rows = whitened(linear, noise, np.hstack([linear.own, linear.residual[:, None]]), linear.piece)
+    width = linear.moves.shape[2] + 1
+    p = width - 1 - l
+    G = np.zeros((width, width))
+    T = np.zeros((d + p + 1, width))
+    T[d:, l:] = np.eye(p + 1)
+    for i in range(linear.moves.shape[0]):
+        mine = rows[linear.piece == i]
+        T[:d, :-1] = linear.moves[i]
+        G += T.T @ (mine.T @ mine) @ T
+    return G
+
+
+def reduce(linear: Linear, current: Chain, noise: NoiseModel, jumps: Jumps) -> Reduced:
+    """Eliminate the local unknowns of a recording."""
+    l = linear.unknowns
+    G = normal_matrix(linear, noise)
+    prior = np.zeros(l)
+    first = linear.jump_kind < 0
+    prior[first] = _ANYWHERE[current.recording.plant] ** -2.0
+    prior[~first] = jumps.sd[linear.jump_kind[~first]] ** -2.0
+    G[np.arange(l), np.arange(l)] += prior
+    # a jump is pulled to zero from where it stands
+    G[:l, -1] -= prior * linear.jump
+    G[-1, :l] -= prior * linear.jump
+    G[-1, -1] += float(prior @ linear.jump**2)
+    stated, rows = release_rows(current)
+    if stated.size:
+        d = rows.shape[1]
+        # the first state has followed the closing of nothing: its tangents are the first columns
+        G[:d, :d] += rows.T @ rows
+        G[:d, -1] += rows.T @ stated
+        G[-1, :d] += rows.T @ stated
+        G[-1, -1] += float(stated @ stated)
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(G)[:l], 1e-300))
+    H = G[:l, :l] * scale[:, None] * scale[None, :]
+    H[np.arange(l), np.arange(l)] += 1e-12
+    L = np.linalg.cholesky(H)
+    cross = G[:l, l:] * scale[:, None]
+    half = np.linalg.solve(L, cross)
+    gram = G[l:, l:] - half.T @ half
+    return Reduced(gram, (L, scale), cross, linear.residual.size)
+
+
+def local_step(reduced: Reduced, shared: FloatArray) -> FloatArray:
+    """Return the step of the local unknowns that goes with a step of the shared ones (p,)."""
+    L, scale = reduced.factor
+    right = reduced.cross[:, -1] - reduced.cross[:, :-1] @ shared
+    return np.asarray(scale * np.linalg.solve(L.T, np.linalg.solve(L, right)))
+
+
+def shared_step(
+    gram: FloatArray, parameters: Sequence[Parameter], at: FloatArray
+) -> tuple[FloatArray, FloatArray, float]:
+    """Solve for the shared parameters from a summed gram (p + 1, p + 1).
+
+    Returns the step (p,), its covariance (p, p) and what chi-squared is expected to become, priors included.
+    """
+    p = len(parameters)
+    prior = np.array([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for q in parameters])
+    off = np.array([q.stated for q in parameters]) - at
+    H = gram[:p, :p] + np.diag(prior)
+    right = gram[:p, -1] + prior * off
+    if p == 0:
+        return np.empty(0), np.empty((0, 0)), float(gram[-1, -1])
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
+    scaled = H * scale[:, None] * scale[None, :]
+    w, V = np.linalg.eigh(scaled)
+    kept = w > 1e-10 * max(float(w[-1]), 1e-300)
+    inverse = (V[:, kept] / w[kept]) @ V[:, kept].T
+    covariance = inverse * scale[:, None] * scale[None, :]
+    step = covariance @ right
+    expected = float(gram[-1, -1] + prior @ off**2 - step @ right)
+    return step, covariance, expected
+
+
+# ------------------------------------------------------------------------------------------ all recordings
+
+
+def mapped(function: Callable[..., Any], *arguments: Sequence[Any]) -> list[Any]:
+    """Map over recordings, on as many threads as there are cores."""
+    with ThreadPoolExecutor(THREADS) as pool:
+        return list(pool.map(function, *arguments))
+
+
+def linearised(fit: Fit, parameters: Sequence[Parameter] | None = None) -> tuple[Linear, ...]:
+    """Linearise all chains where they stand; the shared columns are those of ``parameters``."""
+    chosen = fit.parameters if parameters is None else parameters
+
+    def one(index: int) -> Linear:
+        columns = [Column(q.group, q.name, q.step if q.acts_in(index) else 0.0) for q in chosen]
+        active = [column for column in columns if column.step > 0]
+        linear = linearise(fit.chains[index], fit.values(index), active, fit.jumps.allowed)
+        if len(active) < len(columns):
+            linear = linear.spread([j for j, column in enumerate(columns) if column.step > 0], len(columns))
+        return linear
+
+    return tuple(mapped(one, range(len(fit.chains))))
+
+
+def linearised_columns(fit: Fit, columns: Sequence[Column]) -> tuple[Linear, ...]:
+    """Linearise all chains where they stand, with any columns."""
+    return tuple(
+        mapped(
+            lambda index: linearise(fit.chains[index], fit.values(index), columns, fit.jumps.allowed),
+            range(len(fit.chains)),
+        )
+    )
+
+
+def merit_of(fit: Fit, linears: Sequence[Linear]) -> float:
+    """Return chi-squared with priors where a fit stands: what jumps may not close is charged, too."""
+    total = 0.0
+    for current, linear in zip(fit.chains, linears, strict=True):
+        white = whitened(linear, fit.noise, linear.residual[:, None])
+        total += float(np.sum(white**2))
+        some = linear.jump_kind >= 0
+        total += float(np.sum((linear.jump[some] / fit.jumps.sd[linear.jump_kind[some]]) ** 2))
+        stated, _ = release_rows(current)
+        total += float(stated @ stated)
+    for q, number in zip(fit.parameters, fit.at, strict=True):
+        if np.isfinite(q.sigma):
+            total += ((number - q.stated) / q.sigma) ** 2
+    return total
+
+
+def refit(
+    fit: Fit,
+    *,
+    iterations: int = 8,
+    tolerance: float = 1e-3,
+    give_up: float = np.inf,
+    bounds: Mapping[tuple[str, str], tuple[float, float]] | None = None,
+) -> Fit:
+    """Go on from where a fit stands by Gauss-Newton steps, halved where they do not improve.
+
+    Stops when the expected gain is below ``tolerance`` of chi-squared per reading and of 0.05, or where chi-squared
+    is expected to stay above ``give_up``.
+    """
+    linears = linearised(fit)
+    fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
+    for _ in range(iterations):
+        reduced = mapped(lambda linear, chain: reduce(linear, chain, fit.noise, fit.jumps), fit.linears, fit.chains)
+        gram = np.sum([r.gram for r in reduced], axis=0)
+        step, covariance, expected = shared_step(gram, fit.parameters, fit.at)
+        fit = replace(fit, covariance=covariance)
+        gain = fit.merit - expected
+        if gain < max(0.05, 1e-6 * fit.merit) or expected > give_up:
+            break
+        share, better = 1.0, None
+        for _ in range(5):
+            at = fit.at + share * step
+            if bounds:
+                at = np.array(
+                    [np.clip(a, *bounds.get(q.key, (-np.inf, np.inf))) for a, q in zip(at, fit.parameters, strict=True)]
+                )
+            taken = at - fit.at
+            chains = tuple(
+                moved(chain, linear, share * local_step(r, taken / share), taken)
+                if share == 1.0
+                else _part(chain, linear, local_step(r, step), step, share)
+                for chain, linear, r in zip(fit.chains, fit.linears, reduced, strict=True)
+            )
+            trial = replace(fit, chains=chains, at=at)
+            if all(np.all(np.isfinite(chain.states)) for chain in chains):
+                new = linearised(trial)
+                merit = merit_of(trial, new)
+                if np.isfinite(merit) and merit < fit.merit + 1e-9 * abs(fit.merit):
+                    better = replace(trial, linears=new, merit=merit, iterations=fit.iterations + 1)
+                    break
+            share *= 0.4
+        if better is None:
+            break
+        improved = fit.merit - better.merit
+        fit = better
+        if improved < max(tolerance, 1e-7 * fit.merit):
+            break
+    return fit
+
+
+def _part(chain: Chain, linear: Linear, local: FloatArray, shared: FloatArray, share: float) -> Chain:
+    """Return the chain after a share of a step, the closing of gaps included."""
+    tangents = share * (linear.moves @ np.concatenate([local, shared]) + linear.closing)
+    return replace(chain, states=shifted(chain.recording.plant, chain.states, tangents))
+
+
+def residuals_after(fit: Fit, reduced: Sequence[Reduced], step: FloatArray) -> list[FloatArray]:
+    """Return the residuals (n,) of each recording that a step of the shared parameters is expected to leave."""
+    return [linear.after(local_step(r, step), step) for linear, r in zip(fit.linears, reduced, strict=True)]

@@ -1,0 +1,151 @@
+"""What the sensors of a recording would read of a motion, with any effect of the catalogue on them.
+
+The forms are those of docs/physics.md; motions come as rows (19,) of `validation.diagnosis.pieces_of_motion`, any
+number of neighbouring ones at once. Noise, rounding and clipping are the fit's business.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TypeAlias
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.effects.catalogue import CATALOGUE
+from discsim.effects.sensors import CrossAxis, Scale, sensitivity
+from discsim.recording import Recording
+
+__all__ = ["CLOCKS", "Values", "delay", "is_motion", "predicted", "value"]
+
+#: parameters that differ from their baseline, by (group, name); groups are effect ids, or aero, disc, environment, rig
+Values: TypeAlias = Mapping[tuple[str, str], float]
+
+#: sensor -> prefix of its effects
+PREFIX = {"magnetometer": "mag", "accelerometer": "accel", "gyroscope": "gyro", "gps": "gps"}
+#: the effects that only move the instants at which samples were taken
+CLOCKS = ("clock.rate", "mag.clock_rate", "accel.clock_rate", "gyro.clock_rate", "gps.clock_rate", "gps.latency")
+_FIELD = ("magnetic_north", "magnetic_east", "magnetic_down")
+_BASELINE = {(row.id, name): none for row in CATALOGUE.values() for name, none in row.baseline._asdict().items()}
+
+#: an effect of a user's own on a sensor: (readings (n, 3), t (n,), rows (n, 19)) -> readings
+Extra: TypeAlias = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+
+
+def value(values: Values, group: str, name: str) -> float:
+    """Return a parameter of an effect: as given, or its baseline."""
+    return values.get((group, name), _BASELINE.get((group, name), 0.0))
+
+
+def is_motion(group: str) -> bool:
+    """Tell whether a group of parameters acts on the motion (and not on a sensor)."""
+    if group in CATALOGUE:
+        return CATALOGUE[group].acts_on == "motion"
+    return group in ("aero", "disc", "environment", "rig")
+
+
+def delay(values: Values, sensor: str, written: FloatArray) -> FloatArray:
+    """Return by how much earlier (s) than written (n,) the samples of a sensor show the motion."""
+    ratio = value(values, "clock.rate", "ratio")
+    prefix = PREFIX.get(sensor)
+    if prefix is not None:
+        ratio *= value(values, f"{prefix}.clock_rate", "ratio")
+    late = written - written / ratio
+    if sensor == "gps":
+        late = late + value(values, "gps.latency", "delay_s")
+    return late
+
+
+def predicted(sensor: str, recording: Recording, values: Values, t: FloatArray, rows: FloatArray) -> FloatArray:
+    """Return the readings (..., m, k) of a sensor before lag and noise at true instants t (m,) for rows (..., m, 19)."""
+    if sensor == "gps":
+        return rows[..., :6]
+    if sensor == "track":
+        return rows[..., :3]
+    if sensor == "rate_reference":
+        return rows[..., 15:16]
+    if sensor == "magnetometer":
+        return _magnetometer(recording, values, rows)
+    if sensor == "gyroscope":
+        return _gyroscope(recording, values, rows)
+    return _accelerometer(recording, values, t, rows)
+
+
+def _to_body(rows: FloatArray, vector: FloatArray) -> FloatArray:
+    """Return N vectors (..., 3) in B by the attitudes in rows (..., 19)."""
+    w, x, y, z = rows[..., 9], rows[..., 10], rows[..., 11], rows[..., 12]
+    a, b, c = vector[..., 0], vector[..., 1], vector[..., 2]
+    # v' = v + 2 w (v x q) + 2 q x (q x v), the inverse turn
+    tx, ty, tz = 2 * (b * z - c * y), 2 * (c * x - a * z), 2 * (a * y - b * x)
+    return np.stack(
+        [a + w * tx + (ty * z - tz * y), b + w * ty + (tz * x - tx * z), c + w * tz + (tx * y - ty * x)], axis=-1
+    )
+
+
+def _field(recording: Recording, values: Values) -> FloatArray:
+    moved = [values.get(("environment", name)) for name in _FIELD]
+    stated = recording.environment.magnetic_field
+    return np.array([own if new is None else new for own, new in zip(stated, moved, strict=True)])
+
+
+def _magnetometer(recording: Recording, values: Values, rows: FloatArray) -> FloatArray:
+    m = _to_body(rows, np.broadcast_to(_field(recording, values), (*rows.shape[:-1], 3)))
+    xx, xy, xz, yy, yz, zz = (
+        value(values, "mag.soft_iron", f"s{name}") for name in ("xx", "xy", "xz", "yy", "yz", "zz")
+    )
+    m = m + m @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    m = m + np.array([value(values, "mag.hard_iron", f"b{axis}_uT") for axis in "xyz"])
+    stray = np.array([value(values, "mag.stray_field", f"b{axis}_uT") for axis in "ned"])
+    if np.any(stray):
+        h = np.maximum(-rows[..., 2], 0.02)
+        decay = np.exp(-h / value(values, "mag.stray_field", "height_m"))
+        m = m + _to_body(rows, decay[..., None] * stray)
+    return m
+
+
+def place(recording: Recording, values: Values) -> FloatArray:
+    """Return where the accelerometer sits from the geometric centre, (3,) m in B."""
+    stated = recording.sheets["accelerometer"].position if "accelerometer" in recording.sheets else None
+    offset = [value(values, "accel.position_offset", f"d{axis}_m") for axis in "xyz"]
+    return (np.zeros(3) if stated is None else np.array(stated)) + offset
+
+
+def specific_force(recording: Recording, values: Values, rows: FloatArray) -> FloatArray:
+    """Return f_B (..., 3) at the accelerometer, Eq. (1) with g's sign corrected, m/s^2."""
+    d = place(recording, values)
+    d = d - np.array([value(values, "body.mass_imbalance", "ex_m"), value(values, "body.mass_imbalance", "ey_m"), 0.0])
+    gravity = values.get(("environment", "gravity"), recording.environment.gravity)
+    f = _to_body(rows, rows[..., 6:9] - np.array([0.0, 0.0, gravity]))
+    w, dw = rows[..., 13:16], rows[..., 16:19]
+    along = w @ d
+    squared = np.sum(w * w, axis=-1)
+    f = f + w * along[..., None] - squared[..., None] * d
+    f[..., 0] += dw[..., 1] * d[2] - dw[..., 2] * d[1]
+    f[..., 1] += dw[..., 2] * d[0] - dw[..., 0] * d[2]
+    f[..., 2] += dw[..., 0] * d[1] - dw[..., 1] * d[0]
+    return np.asarray(f)
+
+
+def _accelerometer(recording: Recording, values: Values, t: FloatArray, rows: FloatArray) -> FloatArray:
+    f = specific_force(recording, values, rows)
+    scale = Scale(*(value(values, "accel.scale", f"s{axis}") for axis in "xyz"))
+    cross = CrossAxis(*(value(values, "accel.cross_axis", name) for name in CrossAxis._fields))
+    if any(scale) or any(cross):
+        f = f @ sensitivity(scale, cross).T
+    f = f + np.array([value(values, "accel.bias", f"b{axis}_m_s2") for axis in "xyz"])
+    drift = np.array([value(values, "accel.bias_drift", f"b{axis}_m_s3") for axis in "xyz"])
+    if np.any(drift):
+        f = f + t[:, None] * drift
+    limit = value(values, "accel.saturation", "limit_m_s2")
+    return np.clip(f, -limit, limit) if np.isfinite(limit) else f
+
+
+def _gyroscope(recording: Recording, values: Values, rows: FloatArray) -> FloatArray:
+    scale = np.array([value(values, "gyro.scale", f"s{axis}") for axis in "xyz"])
+    w = rows[..., 13:16] * (1.0 + scale) + np.array([value(values, "gyro.bias", f"b{axis}_rad_s") for axis in "xyz"])
+    faked = np.array([value(values, "gyro.g_sensitivity", f"k{axis}") for axis in "xyz"])
+    if np.any(faked):
+        # the stated place: both sit on one chip
+        here = {key: v for key, v in values.items() if key[0] != "accel.position_offset"}
+        w = w + faked * specific_force(recording, here, rows)
+    return np.asarray(w)

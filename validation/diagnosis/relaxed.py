@@ -1,0 +1,152 @@
+"""The relaxed fit: motion that follows the data whatever physics is missing.
+
+Pieces may jump and the sensors may be wrong by anything ordinary, each within a wide prior, so that the fit stays
+beside the truth under any hidden effect. What is learned there is not the effect but a point about which the questions
+that decide, asked by algebra, are nearly linear.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.effects.catalogue import CATALOGUE
+from discsim.recording import Recording
+from validation.diagnosis.fitting import Fit, Jumps, Parameter, linearised, merit_of, refit
+from validation.diagnosis.noise import channel_of, stated_noise
+from validation.diagnosis.starts import flight_starts, rig_starts, spin_starts
+from validation.diagnosis.trajectory_pieces import WOBBLE, Chain, Linear, chain
+
+__all__ = ["NO_JUMPS", "PIECE", "first_chain", "loose_jumps", "relaxed"]
+
+#: length of a piece, s
+PIECE = {"flight": 0.5, "free_spin": 0.2, "spin_down": 0.5, "rate_table": 1.0}
+
+#: one-sigma jumps between pieces of a relaxed fit: m, m/s, rad, rad/s; rad and rad/s on a rig
+_LOOSE = {
+    "flight": np.repeat([0.1, 0.5, 0.05, 0.3], 3),
+    "spin_down": np.array([0.5, 0.5]),
+    "rate_table": np.array([0.5]),
+}
+#: how the slopes of what a free spin does not model change from piece to piece: rad/s^3, 1/s^2; for good
+_WANDER = np.array([0, 0, 30.0, 30.0, 0, 0.02, 0, 0, 0, 0, 0, 0])
+NO_JUMPS = {
+    "flight": Jumps(np.zeros(12)),
+    "free_spin": Jumps(_WANDER),
+    "spin_down": Jumps(np.zeros(2)),
+    "rate_table": Jumps(np.zeros(1)),
+}
+
+#: ordinary errors that a relaxed fit allows for: (effect, parameter, one sigma)
+_ORDINARY = (
+    *(("mag.hard_iron", f"b{a}_uT", 10.0) for a in "xyz"),
+    *(("mag.soft_iron", name, 0.1) for name in ("sxx", "sxy", "sxz", "syy", "syz", "szz")),
+    *(("accel.bias", f"b{a}_m_s2", 1.0) for a in "xyz"),
+    *(("accel.position_offset", f"d{a}_m", 0.003) for a in "xy"),
+    *(("accel.scale", f"s{a}", 0.05) for a in "xyz"),
+    *(("gyro.bias", f"b{a}_rad_s", 0.1) for a in "xyz"),
+    *(("gyro.scale", f"s{a}", 0.05) for a in "xyz"),
+    ("air.wind", "w_north_m_s", 3.0),
+    ("air.wind", "w_east_m_s", 3.0),
+    ("air.density", "ratio", 0.1),
+    ("rig.coulomb_friction", "torque_N_m", 3e-4),
+    ("rig.quadratic_drag", "coefficient_N_m_s2", 3e-6),
+)
+
+
+def loose_jumps(plant: str) -> Jumps:
+    """Return the jumps of a relaxed fit."""
+    if plant == "free_spin":
+        sd = _WANDER.copy()
+        sd[6:9], sd[9:12] = 0.05, 0.3
+        return Jumps(sd)
+    return Jumps(_LOOSE[plant])
+
+
+def edges_of(recording: Recording) -> FloatArray:
+    """Return the boundaries of a recording's pieces, s."""
+    length = PIECE[recording.plant]
+    count = max(1, round(recording.end / length))
+    return np.linspace(0.0, max(recording.end, 1e-3) + 1e-6, count + 1)
+
+
+def first_chain(recording: Recording) -> Chain:
+    """Return a recording's chain of pieces with starts from the data."""
+    edges = edges_of(recording)
+    states = np.zeros((edges.size - 1, 13))
+    if recording.plant in ("flight", "free_spin"):
+        starts = (flight_starts if recording.plant == "flight" else spin_starts)(recording, edges[:-1])
+        states[:, 6:10], states[:, 10:13] = starts.attitude, starts.rate
+        if recording.plant == "flight":
+            states[:, :3], states[:, 3:6] = starts.position, starts.velocity
+        else:
+            r = starts.rate[:, 2]
+            states[:, 4] = np.gradient(r, edges[:-1]) / r if r.size > 1 else 0.0
+    else:
+        psi, r = rig_starts(recording, edges[:-1])
+        states[:, 0], states[:, 1] = psi, r
+        if recording.plant == "rate_table":
+            states[:, 1] = psi - psi[0]
+    return chain(recording, edges, states)
+
+
+def ordinary(sensors: set[str], plant: str) -> tuple[Parameter, ...]:
+    """Return the parameters that a relaxed fit sets free within a prior, of the sensors that are there."""
+    chosen = []
+    for id, name, sigma in _ORDINARY:
+        row = CATALOGUE[id]
+        if plant in row.plants and (row.acts_on == "motion" or row.acts_on in sensors):
+            size = row.scale[row.parameters.index(name)]
+            chosen.append(Parameter(id, name, float(getattr(row.baseline, name)), 0.1 * size, sigma))
+    return tuple(chosen)
+
+
+def unknowns(recordings: Sequence[Recording]) -> tuple[Parameter, ...]:
+    """Return what each recording leaves open beside its states: how the wobble of a free spin dies and turns."""
+    if recordings[0].plant != "free_spin":
+        return ()
+    sigmas = (5.0, 5.0, 10.0, 10.0, 2.0, 2.0, 2.0, 2.0)
+    return tuple(
+        Parameter(group, name, 0.0, 1e-3, sigma, frozenset([i]))
+        for i in range(len(recordings))
+        for (group, name), sigma in zip(WOBBLE, sigmas, strict=True)
+    )
+
+
+def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), iterations: int = 12) -> Fit:
+    """Fit recordings of one plant so loosely that any effect of ordinary size finds room."""
+    chains = tuple(first_chain(recording) for recording in recordings)
+    plant = recordings[0].plant
+    sensors = {readings.sensor for one in chains for readings in one.readings}
+    parameters = (*known, *unknowns(recordings), *ordinary(sensors, plant))
+    fit = Fit(chains, parameters, np.array([q.stated for q in parameters]), loose_jumps(plant), {})
+    bare = linearised(fit, ())
+    fit = replace(fit, noise=stated_noise(bare))
+    fit = refit(fit, iterations=iterations)
+    chains = tuple(within_range(chain, linear) for chain, linear in zip(fit.chains, fit.linears, strict=True))
+    fit = replace(fit, chains=chains)
+    linears = linearised(fit)
+    return replace(fit, linears=linears, merit=merit_of(fit, linears))
+
+
+def within_range(current: Chain, linear: Linear) -> Chain:
+    """Return the chain without readings whose noise a range may have cut off, by what the fit expects of them.
+
+    Leaving out readings by their own value would bias what remains.
+    """
+    kept = []
+    for readings in current.readings:
+        limit = current.recording.sheets[readings.sensor].range if readings.sensor != "gps" else None
+        good = readings.good.copy()
+        if limit is not None:
+            for axis, name in enumerate(readings.axes):
+                channel = channel_of(linear, readings.sensor, name)
+                if channel is not None:
+                    expected = readings.value[channel.index, axis] - linear.raw[channel.rows]
+                    near = np.abs(expected) > limit - 6.0 * np.nan_to_num(linear.sd[channel.rows])
+                    good[channel.index[near], axis] = False
+        kept.append(replace(readings, good=good))
+    return replace(current, readings=tuple(kept))

@@ -1,0 +1,194 @@
+"""From candidates to findings: propose by algebra, refit fairly, accept by likelihood with the noise that is there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from validation.diagnosis.board import Board, column_of, free_columns
+from validation.diagnosis.fitting import Fit, Parameter, merit_of, refit
+from validation.diagnosis.noise import NoiseModel, estimate_noise, log_likelihood
+from validation.diagnosis.relaxed import NO_JUMPS
+from validation.diagnosis.trials import Trial, parameters_of
+
+__all__ = ["Hypothesis", "Tied", "price", "tied_fit"]
+
+#: what evidence costs: twice the log likelihood that an effect must gain, and more for each of its parameters
+ENTRY, PER_PARAMETER, EVENT_ENTRY = 24.0, 4.0, 42.0
+#: what a parameter costs when hypotheses are compared with one another
+RIVAL = 8.0
+
+BOUNDS: Mapping[tuple[str, str], tuple[float, float]] = {
+    ("air.wind_shear", "exponent"): (-0.5, 3.0),
+    ("aero.stall", "alpha_stall_rad"): (-0.2, 0.8),
+    ("mag.stray_field", "height_m"): (0.05, 100.0),
+    ("air.gust", "width_s"): (0.03, 6.0),
+    ("air.density", "ratio"): (0.2, 5.0),
+    **{(f"{s}.lag", "tau_s"): (0.0, 0.2) for s in ("mag", "accel", "gyro")},
+    **{(f"{s}.clock_rate", "ratio"): (0.7, 1.4) for s in ("mag", "accel", "gyro", "gps")},
+    ("clock.rate", "ratio"): (0.7, 1.4),
+    ("gps.latency", "delay_s"): (0.0, 2.0),
+    ("rig.speed_ripple", "order"): (0.02, 200.0),
+    ("accel.saturation", "limit_m_s2"): (0.5, np.inf),
+}
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """Effects that may act, and stated numbers whose uncertainty is set aside (recalibrated)."""
+
+    trials: tuple[Trial, ...] = ()
+    freed: frozenset[tuple[str, str]] = frozenset()
+
+    def plus(self, trial: Trial) -> Hypothesis:
+        """Return it with one more effect."""
+        return replace(self, trials=(*self.trials, trial))
+
+    @property
+    def size(self) -> int:
+        """Number of parameters it adds."""
+        return sum(len(parameters_of(trial)) for trial in self.trials) + len(self.freed)
+
+
+@dataclass(frozen=True)
+class Tied:
+    """A fit whose pieces hang together, under a hypothesis.
+
+    ``score`` is -2 log likelihood with the noise estimated from its own residuals, priors included.
+    """
+
+    hypothesis: Hypothesis
+    fit: Fit
+    score: float
+    residuals: tuple[FloatArray, ...] = field(default_factory=tuple)
+
+    @property
+    def rival_score(self) -> float:
+        """Score that charges for parameters, to compare hypotheses of different size."""
+        return self.score + RIVAL * self.hypothesis.size
+
+
+def price(trial: Trial) -> float:
+    """Return what a trial must gain to be believed."""
+    count = len(parameters_of(trial))
+    if trial.id.startswith("event.") or trial.id == "air.gust":
+        return EVENT_ENTRY + PER_PARAMETER * count
+    return ENTRY + PER_PARAMETER * count
+
+
+def fitted_parameters(hypothesis: Hypothesis, own: Sequence[Parameter]) -> tuple[Parameter, ...]:
+    """Return a recording set's own parameters and those of the hypothesis."""
+    mine = [replace(q, sigma=np.inf) if q.key in hypothesis.freed else q for q in own]
+    taken = [q for trial in hypothesis.trials for q in parameters_of(trial)]
+    keys = {(q.key, q.recordings) for q in taken}
+    return (*(q for q in mine if (q.key, q.recordings) not in keys), *taken)
+
+
+def tied_fit(
+    loose: Fit,
+    hypothesis: Hypothesis,
+    own: Sequence[Parameter],
+    noise: NoiseModel,
+    start: Mapping[tuple[tuple[str, str], frozenset[int] | None], float],
+    *,
+    iterations: int = 8,
+    polish: int = 2,
+    give_up: float = np.inf,
+) -> Tied:
+    """Fit a hypothesis with pieces that hang together, from the chains of a loose fit.
+
+    ``start`` gives first values of parameters by (key, recordings). The noise is estimated anew from the residuals.
+    """
+    parameters = fitted_parameters(hypothesis, own)
+    at = np.array([start.get((q.key, q.recordings), q.stated) for q in parameters])
+    plant = loose.chains[0].recording.plant
+    fit = Fit(loose.chains, parameters, at, NO_JUMPS[plant], noise)
+    fit = refit(fit, iterations=iterations, give_up=give_up, bounds=BOUNDS)
+    for _ in range(polish):
+        fit = replace(fit, noise=noise_of(fit))
+        fit = refit(fit, iterations=2, bounds=BOUNDS)
+    return scored(hypothesis, fit)
+
+
+def noise_of(fit: Fit) -> NoiseModel:
+    """Return the noise that a fit's residuals show."""
+    spent = len(fit.parameters) + 12 * len(fit.chains)
+    return estimate_noise(fit.linears, [linear.residual for linear in fit.linears], spent=spent)
+
+
+def scored(hypothesis: Hypothesis, fit: Fit) -> Tied:
+    """Return a fit with its score."""
+    noise = noise_of(fit)
+    residuals = tuple(linear.residual for linear in fit.linears)
+    score = sum(log_likelihood(linear, noise, e) for linear, e in zip(fit.linears, residuals, strict=True))
+    score += merit_of(replace(fit, noise=noise), fit.linears) - sum(
+        _chi2(replace(fit, noise=noise), k) for k in range(len(fit.linears))
+    )
+    return Tied(hypothesis, replace(fit, noise=noise), score, residuals)
+
+
+def _chi2(fit: Fit, k: int) -> float:
+    from validation.diagnosis.noise import whitened
+
+    linear = fit.linears[k]
+    white = whitened(linear, fit.noise, linear.residual[:, None])
+    return float(np.sum(white**2))
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A trial and what algebra expects of it, with values of its columns to start from."""
+
+    trial: Trial
+    gain: float
+    start: Mapping[tuple[tuple[str, str], frozenset[int] | None], float]
+
+
+def proposals(
+    board: Board,
+    trials: Sequence[Trial],
+    hypothesis: Hypothesis,
+    own: Sequence[Parameter],
+) -> list[Proposal]:
+    """Return what each trial would gain upon a hypothesis, in all recordings and in each alone, best first."""
+    taken = [(column_of(q), q) for q in fitted_parameters(hypothesis, own)]
+    taken = [(column, q) for column, q in taken if column in board.place]
+    base = board.ask(taken).chi2
+    found = []
+    present = {(trial.id, trial.recordings) for trial in hypothesis.trials}
+    for trial in trials:
+        scopes: list[frozenset[int] | None] = [None]
+        if board.recordings > 1:
+            scopes += [frozenset([i]) for i in range(board.recordings)]
+        best: Proposal | None = None
+        for scope in scopes:
+            if (trial.id, scope) in present or (trial.id, None) in present:
+                continue
+            scoped = replace(trial, recordings=scope)
+            columns = free_columns(scoped)
+            rest = [(c, q) for c, q in taken if q.key not in {p.key for _, p in columns} or scope is not None]
+            answer = board.ask([*rest, *columns])
+            gain = base - answer.chi2
+            start = {
+                (q.key, q.recordings): q.stated + float(v)
+                for (_, q), v in zip([*rest, *columns], answer.value, strict=True)
+            }
+            start |= {((trial.id, name), scope): value for name, value in trial.shapes.items()}
+            proposal = Proposal(scoped, gain, start)
+            # one recording alone must do better than all by what choosing it costs
+            if best is None or gain > best.gain + (2.0 * np.log(board.recordings) + 6.0 if scope is not None else 0.0):
+                best = proposal
+        if best is not None:
+            found.append(best)
+    return sorted(found, key=lambda p: RIVAL * len(parameters_of(p.trial)) - p.gain)
+
+
+def one_per_effect(found: Sequence[Proposal]) -> list[Proposal]:
+    """Keep the best shape of each effect."""
+    seen: dict[str, Proposal] = {}
+    for proposal in found:
+        seen.setdefault(proposal.trial.id, proposal)
+    return list(seen.values())

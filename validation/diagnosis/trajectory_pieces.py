@@ -1,0 +1,717 @@
+"""A recording as a chain of short pieces of motion, and how its readings depend on every unknown: one linearisation.
+
+One long simulation from the release has many wrong minima: a spin phase that is off by a turn is one. Here each piece
+of half a second starts from a state of its own, so that it stays beside the data whatever physics is missing. The
+unknowns of a recording are the first state and the jumps between pieces; where jumps are not allowed, the step of a
+fit closes them (multiple shooting; Bock, "Recent advances in parameter identification", 1983).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from discsim.arrays import BoolArray, FloatArray
+from discsim.effects.catalogue import CATALOGUE
+from discsim.frames import conjugate, multiply, rotation_vector, turn
+from discsim.parameters import PARAMETERS, Tables, parameter_index, parameters, tables
+from discsim.recording import SENSORS, Recording
+from validation.diagnosis.pieces_of_motion import (
+    ROW,
+    STATE,
+    flight_pieces,
+    free_spin_pieces,
+    spin_down_pieces,
+    table_pieces,
+)
+from validation.diagnosis.readings import CLOCKS, Values, delay, is_motion, predicted, value
+
+__all__ = ["WOBBLE", "Chain", "Channel", "Column", "Linear", "Readings", "chain", "linearise", "readings_of"]
+
+IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
+
+#: longest step of a flight's integrator, s, and in radians of nutation
+STEP, NUTATION = 0.01, 1.2
+#: steps about an event of 10 ms
+EVENT_STEP = 0.0025
+#: half the differences of states: m, m/s, rad, rad/s
+_FLIGHT_STEPS = np.repeat([1e-3, 1e-3, 1e-5, 1e-4], 3)
+_SPIN_STEPS = np.array([1e-2, 1e-2, 1e-2, 1e-2, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4])
+_RIG_STEPS = np.array([1e-5, 1e-4])
+#: half the difference in time by which a reading's slope is taken, s
+_TIME_STEP = 2e-4
+#: neighbours simulated at a time, to bound memory
+_BATCH = 16
+#: nodes and weights of a first-order lag: an integral over the past with weight exp(-s)
+_LAG_NODES, _LAG_WEIGHTS = np.polynomial.laguerre.laggauss(8)
+#: a lagged sensor has forgotten its start after this many time constants
+_FORGOTTEN = 8.0
+
+
+class Column(NamedTuple):
+    """A direction in which predictions can move: a parameter, half its difference, shapes of its effect it is taken at."""
+
+    group: str
+    name: str
+    step: float
+    given: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Group and name."""
+        return self.group, self.name
+
+
+@dataclass(frozen=True)
+class Readings:
+    """The usable readings of one sensor of a recording.
+
+    t (n,) written times; value (n, k); good (n, k) tells which readings count; sd (k,) the stated noise with rounding
+    (NaN where nothing is stated); clipped (n, k) stand at the range.
+    """
+
+    sensor: str
+    t: FloatArray
+    value: FloatArray
+    good: BoolArray
+    clipped: BoolArray
+    sd: FloatArray
+    axes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One axis of one sensor in a linearisation: where its rows are, and their place among the sensor's samples."""
+
+    sensor: str
+    axis: str
+    group: str
+    rows: slice
+    index: IntArray
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The pieces of one recording: boundaries (k + 1,) s and the states (k, 13) they start from."""
+
+    recording: Recording
+    readings: tuple[Readings, ...]
+    edges: FloatArray
+    states: FloatArray
+    #: sensor -> samples lost before each of its samples (n,), where some were
+    lost: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    @property
+    def tangent(self) -> int:
+        """Number of directions in which a state can move."""
+        return {"flight": 12, "free_spin": 12, "spin_down": 2, "rate_table": 1}[self.recording.plant]
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Residuals of a recording and how they depend on its unknowns: ``residual - J du``.
+
+    The unknowns are the local ones, the first state and the allowed jumps (l,), and the shared ones (p,). Each row is
+    kept by the state of its own piece (compact); `local` and `shared` chain the pieces on demand.
+
+    Attributes
+    ----------
+    raw : (n,) array
+        Measured minus predicted where the chain stands, rows by channel.
+    own : (n, d + p) array
+        Derivatives of the prediction by the state of the row's piece and by the parameters within it; with a lag,
+        whose readings hang on several pieces, (n, l + p) by the unknowns themselves.
+    piece : (n,) int array
+        The piece of each row; empty with a lag.
+    t, sd : (n,) arrays
+        Written times, stated noise.
+    channels : tuple of Channel
+    jump, jump_kind, jump_piece : (l,) arrays
+        Current size of each allowed jump, its direction within the state (-1 for the first state) and its piece.
+    moves : (k, d, l + p) array
+        How the states of the pieces follow the unknowns.
+    closing : (k, d) array
+        How they move to close the jumps that are not allowed.
+    gaps : (k - 1, d) array
+        All jumps as they stand.
+    shifts : (n,) array
+        What the closing adds to the prediction.
+    """
+
+    raw: FloatArray
+    own: FloatArray
+    piece: IntArray
+    t: FloatArray
+    sd: FloatArray
+    channels: tuple[Channel, ...]
+    jump: FloatArray
+    jump_kind: IntArray
+    jump_piece: IntArray
+    moves: FloatArray
+    closing: FloatArray
+    gaps: FloatArray
+    shifts: FloatArray
+
+    @property
+    def unknowns(self) -> int:
+        """Number of local unknowns, l."""
+        return self.jump.size
+
+    @property
+    def residual(self) -> FloatArray:
+        """Measured minus predicted (n,) once the jumps that are not allowed are closed."""
+        return self.raw - self.shifts
+
+    @cached_property
+    def _full(self) -> FloatArray:
+        if self.piece.size == 0:
+            return self.own
+        d, width = self.moves.shape[1:]
+        full = np.empty((self.raw.size, width))
+        for i in range(self.moves.shape[0]):
+            rows = np.flatnonzero(self.piece == i)
+            full[rows] = self.own[rows, :d] @ self.moves[i]
+        full[:, self.unknowns :] += self.own[:, d:]
+        return full
+
+    def spread(self, places: Sequence[int], width: int) -> Linear:
+        """Return the linearisation with its shared columns at ``places`` of ``width``, the others zero."""
+        l, n = self.unknowns, self.raw.size
+        kept = self.own.shape[1] - len(places)
+        own = np.zeros((n, kept + width))
+        own[:, :kept] = self.own[:, :kept]
+        own[:, [kept + j for j in places]] = self.own[:, kept:]
+        moves = np.zeros((*self.moves.shape[:2], l + width))
+        moves[:, :, :l] = self.moves[:, :, :l]
+        moves[:, :, [l + j for j in places]] = self.moves[:, :, l:]
+        return replace(self, own=own, moves=moves)
+
+    def after(self, local: FloatArray, shared: FloatArray) -> FloatArray:
+        """Return the residuals (n,) that a step of the unknowns is expected to leave."""
+        if self.piece.size == 0:
+            return self.residual - self.own @ np.concatenate([local, shared])
+        d = self.moves.shape[1]
+        tangents = self.moves @ np.concatenate([local, shared])
+        moved = np.einsum("nd,nd->n", self.own[:, :d], tangents[self.piece])
+        return np.asarray(self.residual - moved - self.own[:, d:] @ shared)
+
+    @property
+    def local(self) -> FloatArray:
+        """Derivatives of the prediction (n, l) by the local unknowns."""
+        return self._full[:, : self.unknowns]
+
+    @property
+    def shared(self) -> FloatArray:
+        """Derivatives of the prediction (n, p) by the shared parameters."""
+        return self._full[:, self.unknowns :]
+
+
+# ------------------------------------------------------------------------------------------------- readings
+
+
+def readings_of(recording: Recording, *, plateau: bool = True) -> tuple[Readings, ...]:
+    """Return the usable readings of all sensors: gaps, and readings that stand at a range, take no part."""
+    found = []
+    for sensor in SENSORS:
+        samples = recording.get(sensor)
+        if samples is None or len(samples) == 0:
+            continue
+        sheet = recording.sheets[sensor]
+        measured = samples.value if samples.value.ndim == 2 else samples.value[:, None]
+        if sensor == "gps":
+            sd = np.repeat([_or_nan(sheet.noise_rms), _or_nan(sheet.velocity_noise_rms)], 3)
+            clipped = np.zeros(measured.shape, dtype=np.bool_)
+        else:
+            level = np.hypot(_or_nan(sheet.noise_rms), (sheet.resolution or 0.0) / np.sqrt(12.0))
+            sd = np.full(measured.shape[1], level)
+            clipped = sheet.clipped(measured)
+        good = np.isfinite(measured) & ~clipped
+        axes = tuple(SENSORS[sensor].columns)
+        t, m = samples.t, measured
+        if recording.plant == "free_spin" and sensor == "accelerometer":
+            continue
+        found.append(Readings(sensor, t, m, good, clipped, sd, axes))
+    return tuple(found)
+
+
+def _or_nan(number: float | None) -> float:
+    return np.nan if number is None else number
+
+
+# -------------------------------------------------------------------------------------------------- plants
+
+
+def base_flat(recording: Recording, values: Values) -> FloatArray:
+    """Return the flat parameter array of a recording's baseline with values in their places."""
+    flat = parameters(recording.environment, recording.disc, recording.rig)
+    for (group, name), number in values.items():
+        if (is_motion(group) and group != "environment") or (group, name) in _FLAT_ENVIRONMENT:
+            flat[parameter_index(group, name)] = number
+    return flat
+
+
+_FLAT_ENVIRONMENT = {("environment", name) for name in PARAMETERS["environment"].names or ()}
+
+
+def shifted(plant: str, states: FloatArray, tangents: FloatArray) -> FloatArray:
+    """Return states (..., 13) moved by tangents (..., d): rotations are small turns in B."""
+    moved = np.array(np.broadcast_to(states, (*np.broadcast_shapes(states.shape[:-1], tangents.shape[:-1]), STATE)))
+    if plant in ("flight", "free_spin"):
+        moved[..., :6] += tangents[..., :6]
+        moved[..., 6:10] = multiply(moved[..., 6:10], turn(tangents[..., 6:9]))
+        moved[..., 10:13] += tangents[..., 9:12]
+    else:
+        d = tangents.shape[-1]
+        moved[..., :d] += tangents
+    return moved
+
+
+def difference(plant: str, a: FloatArray, b: FloatArray, d: int) -> FloatArray:
+    """Return the tangents (..., d) that move states b (..., 13) to a."""
+    if plant in ("flight", "free_spin"):
+        return np.concatenate(
+            [
+                a[..., :6] - b[..., :6],
+                rotation_vector(multiply(conjugate(b[..., 6:10]), a[..., 6:10])),
+                a[..., 10:] - b[..., 10:],
+            ],
+            axis=-1,
+        )
+    return np.asarray(a[..., :d] - b[..., :d])
+
+
+@dataclass(frozen=True)
+class _Runner:
+    """Runs pieces of one recording."""
+
+    recording: Recording
+    lookup: Tables
+    knots: FloatArray
+    events: tuple[tuple[float, float], ...]
+
+    def times(self, start: float, stop: float, last: float, state: FloatArray) -> tuple[FloatArray, int]:
+        """Return the integrator's steps from start over at least [start, last], and the place of ``stop`` in them."""
+        plant = self.recording.plant
+        if plant == "flight":
+            disc = self.recording.disc
+            assert disc is not None
+            nutation = max(abs(state[12]) * disc.Izz / disc.Ixx, abs(state[12]), 1.0)
+            h = min(STEP, NUTATION / nutation)
+        elif plant == "free_spin":
+            h = min(0.00125, 0.15 / max(abs(state[12]) * 2.0, 1.0))
+        elif plant == "spin_down":
+            h = 0.01
+        else:
+            ripple = 1.0
+            h = min(0.01, 0.2 / max(ripple, 1.0))
+        marks = [start, stop]
+        if last > stop:
+            marks.append(last + 1e-9)
+        if plant == "rate_table":
+            marks += [float(t) for t in self.knots[0] if start < t < max(stop, last)]
+        for t, width in self.events:
+            for mark in (t - 6 * width, t + 6 * width):
+                if start < mark < max(stop, last):
+                    marks.append(mark)
+        marks = sorted(set(marks))
+        steps = [np.array([start])]
+        for a, b in zip(marks[:-1], marks[1:], strict=True):
+            fine = h
+            for t, width in self.events:
+                if abs(0.5 * (a + b) - t) < 6 * width:
+                    fine = min(fine, 0.25 * width)
+            n = max(1, int(np.ceil((b - a) / fine - 1e-9)))
+            steps.append(np.linspace(a, b, n + 1)[1:])
+        times = np.concatenate(steps)
+        return times, int(np.argmin(np.abs(times - stop)))
+
+    def run(
+        self, flats: FloatArray, wobbles: FloatArray, states: FloatArray, times: FloatArray, last: int, out: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return rows (c, m, 19) at instants out and the states (c, 13) at ``times[last]``."""
+        c = states.shape[0]
+        rows, ends = np.empty((c, out.size, ROW)), np.empty((c, STATE))
+        plant = self.recording.plant
+        if plant == "flight":
+            flight_pieces(flats, self.lookup, states, times, last, out, rows, ends)
+        elif plant == "free_spin":
+            free_spin_pieces(flats, wobbles, states, times, last, out, rows, ends)
+        elif plant == "spin_down":
+            spin_down_pieces(flats, states, times, last, out, rows, ends)
+        else:
+            table_pieces(flats, self.knots, states, times, last, out, rows, ends)
+        return rows, ends
+
+
+def _knots(recording: Recording) -> FloatArray:
+    """Return the knots (2, n) of a rate table's command; of other plants none."""
+    command = recording.command
+    return np.empty((2, 0)) if command is None else np.stack([command.t, command.value])
+
+
+def _events(values: Values) -> tuple[tuple[float, float], ...]:
+    """Return instants and widths of short events among values."""
+    found = []
+    for group in ("event.impulse", "event.spin_step"):
+        if (group, "t_s") in values:
+            found.append((values[group, "t_s"], 0.01))
+    return tuple(found)
+
+
+# ------------------------------------------------------------------------------------------ linearisation
+
+
+def chain(
+    recording: Recording, edges: FloatArray, states: FloatArray, lost: Mapping[str, FloatArray] | None = None
+) -> Chain:
+    """Return a recording cut at edges (k + 1,) s with states (k, 13) at the starts of its pieces."""
+    return Chain(recording, readings_of(recording), edges, states, dict(lost or {}))
+
+
+def linearise(
+    current: Chain,
+    values: Values,
+    columns: Sequence[Column],
+    jumps: BoolArray,
+) -> Linear:
+    """Linearise the readings of a chain about its states and values.
+
+    ``columns`` are parameters with the step of their differences; ``jumps`` (d,) tells in which directions pieces may
+    jump. Columns are central differences of the piece's own motion, chained over the pieces.
+    """
+    recording, d, k = current.recording, current.tangent, current.states.shape[0]
+    plant = recording.plant
+    runner = _Runner(recording, tables(recording.disc), _knots(recording), _events(values))
+    steps = _FLIGHT_STEPS if plant == "flight" else _SPIN_STEPS if plant == "free_spin" else _RIG_STEPS[:d]
+
+    samples = [_Sampled(current, readings, values) for readings in current.readings]
+    # the instants of all sensors, each with its neighbours in time for slopes and its past for a lag
+    motion_columns = [j for j, column in enumerate(columns) if is_motion(column.group) or column.key in WOBBLE]
+    sensor_columns = [j for j in range(len(columns)) if j not in motion_columns]
+    piece_of = [np.clip(np.searchsorted(current.edges, s.instants, side="right") - 1, 0, k - 1) for s in samples]
+
+    p = len(columns)
+    # states of the pieces as functions of [first state | jumps | parameters]
+    allowed = np.flatnonzero(jumps)
+    l = d + (k - 1) * allowed.size
+    S = np.zeros((k, d, l + p))
+    S[0, :, :d] = np.eye(d)
+    closing = np.zeros((k, d))
+    gaps = np.zeros((max(k - 1, 0), d))
+    flat = base_flat(recording, values)
+    wobble = np.array([values.get(key, 0.0) for key in WOBBLE])
+
+    out_rows = [np.empty((s.instants.size, ROW)) for s in samples]
+    # per sensor: derivative of each ideal reading by the state of its piece and by the parameters within it
+    J = [np.zeros((s.instants.size, s.width, d + p)) for s in samples]
+    ideal = [np.empty((s.instants.size, s.width)) for s in samples]
+
+    for i in range(k):
+        start, stop = float(current.edges[i]), float(current.edges[i + 1])
+        own = [np.flatnonzero(piece == i) for piece in piece_of]
+        instants = [s.instants[o] for s, o in zip(samples, own, strict=True)]
+        out = np.concatenate(instants) if instants else np.empty(0)
+        bounds = np.cumsum([0, *(o.size for o in own)])
+        state = current.states[i]
+        last_instant = float(out.max()) if out.size else stop
+        times, last = runner.times(start, stop, last_instant, state)
+        out = np.maximum(out, start)
+
+        # neighbours: two per direction of the state and per parameter of the motion
+        states = [state[None]]
+        flats, wobbles = [flat[None]], [wobble[None]]
+        for sign in (1.0, -1.0):
+            states.append(shifted(plant, state, sign * np.diag(steps)))
+            flats.append(np.broadcast_to(flat, (d, flat.size)))
+            wobbles.append(np.broadcast_to(wobble, (d, 8)))
+            if motion_columns:
+                moved = np.repeat(flat[None], len(motion_columns), axis=0)
+                moved_wobble = np.repeat(wobble[None], len(motion_columns), axis=0)
+                for row, j in enumerate(motion_columns):
+                    group, name, size, given = columns[j]
+                    if (group, name) in WOBBLE:
+                        moved_wobble[row, WOBBLE.index((group, name))] += sign * size
+                        continue
+                    for shape, number in given:
+                        moved[row, parameter_index(group, shape)] = number
+                    moved[row, parameter_index(group, name)] += sign * size
+                states.append(np.repeat(state[None], len(motion_columns), axis=0))
+                flats.append(moved)
+                wobbles.append(moved_wobble)
+        all_states, all_flats = np.concatenate(states), np.concatenate(flats)
+        rows, ends = runner.run(
+            np.ascontiguousarray(all_flats), np.concatenate(wobbles), np.ascontiguousarray(all_states), times, last, out
+        )
+        half = d + len(motion_columns)
+        widths = np.concatenate([steps, [columns[j].step for j in motion_columns]])
+        nominal_end = ends[0]
+        end_tangent = difference(plant, ends[1:], np.broadcast_to(nominal_end, ends[1:].shape), d)
+        Phi_Psi = ((end_tangent[:half] - end_tangent[half:]) / (2.0 * widths[:, None])).T  # (d, half)
+        Phi, Psi = Phi_Psi[:, :d], Phi_Psi[:, d:]
+
+        for s, o, a, b, w, y, M in zip(samples, own, bounds[:-1], bounds[1:], out_rows, ideal, J, strict=True):
+            if o.size == 0:
+                continue
+            mine = rows[:, a:b]
+            t = s.instants[o]
+            w[o] = mine[0]
+            read = np.empty((mine.shape[0], o.size, s.width))
+            for first in range(0, mine.shape[0], _BATCH):
+                part = slice(first, first + _BATCH)
+                read[part] = predicted(s.sensor, recording, values, t, mine[part])
+            for row, j in enumerate(motion_columns):
+                group, name, size, _ = columns[j]
+                if (group, name) in _ALSO_READ:  # it moves the readings of a given motion, too
+                    for place, sign in ((1 + d + row, 1.0), (1 + half + d + row, -1.0)):
+                        moved_values = {**values, (group, name): _current(values, recording, group, name) + sign * size}
+                        read[place] = predicted(s.sensor, recording, moved_values, t, mine[place])
+            y[o] = read[0]
+            slope = (read[1 : 1 + half] - read[1 + half :]) / (2.0 * widths[:, None, None])
+            slope = np.moveaxis(slope, 0, -1)  # (m, width, half)
+            M[o[:, None], :, np.array([*range(d), *(d + j for j in motion_columns)])] = np.moveaxis(slope, 1, -1)
+
+        if i + 1 < k:
+            S[i + 1] = Phi @ S[i]
+            for row, j in enumerate(motion_columns):
+                S[i + 1, :, l + j] += Psi[:, row]
+            closing[i + 1] = Phi @ closing[i]
+            gap = difference(plant, current.states[i + 1], nominal_end, d)
+            gaps[i] = gap
+            first = d + i * allowed.size
+            S[i + 1, allowed, first + np.arange(allowed.size)] += 1.0
+            forbidden = np.setdiff1d(np.arange(d), allowed)
+            closing[i + 1, forbidden] -= gap[forbidden]
+
+    # parameters of sensors and clocks, from the motion as it is
+    for s, w, y, M in zip(samples, out_rows, ideal, J, strict=True):
+        if not sensor_columns:
+            break
+        rate = None
+        for j in sensor_columns:
+            group, name, size, given = columns[j]
+            if not _concerns(group, s.sensor):
+                continue
+            here = {**values, **{(group, shape): number for shape, number in given}}
+            if group in CLOCKS:
+                if rate is None:
+                    rate = s.time_slope(runner, flat, wobble, values, current)
+                base = _current(values, recording, group, name)
+                plus, minus = {**here, (group, name): base + size}, {**here, (group, name): base - size}
+                moved = s.delays(plus) - s.delays(minus)
+                M[:, :, d + j] = -rate * (moved / (2.0 * size))[:, None]
+            elif name == "tau_s":
+                if rate is None:
+                    rate = s.time_slope(runner, flat, wobble, values, current)
+                M[:, :, d + j] = -rate * s.lag_slope[:, None]
+            else:
+                base = _current(values, recording, group, name)
+                up = predicted(s.sensor, recording, {**here, (group, name): base + size}, s.instants, w)
+                down = predicted(s.sensor, recording, {**here, (group, name): base - size}, s.instants, w)
+                M[:, :, d + j] = (up - down) / (2.0 * size)
+    return _stack(current, samples, ideal, J, piece_of, S, closing, gaps, allowed, l)
+
+
+#: how the wobble of a free spin dies (1/s) and turns (rad/s), how that differs along and across the wind, and their
+#: slopes in time: unknowns of each recording
+WOBBLE = tuple(
+    ("free_spin", f"{name}_{unit}") for name in ("decay", "turn", "along", "across") for unit in ("1_s", "1_s2")
+)
+#: parameters of the motion that also enter what a sensor reads of a given motion
+_ALSO_READ = {
+    ("body.mass_imbalance", "ex_m"),
+    ("body.mass_imbalance", "ey_m"),
+    ("environment", "gravity"),
+}
+
+
+def _current(values: Values, recording: Recording, group: str, name: str) -> float:
+    """Return the value a parameter has now: given, or as the recording states it, or the baseline."""
+    if (group, name) in values:
+        return values[group, name]
+    if group in CATALOGUE:
+        return value(values, group, name)
+    if group == "environment" and name.startswith("magnetic_"):
+        return float(recording.environment.magnetic_field[["north", "east", "down"].index(name.split("_")[1])])
+    if (group, name) in WOBBLE:
+        return 0.0
+    return float(parameters(recording.environment, recording.disc, recording.rig)[parameter_index(group, name)])
+
+
+def _concerns(group: str, sensor: str) -> bool:
+    """Tell whether an effect that is not of the motion can touch a sensor."""
+    if group == "clock.rate":
+        return True
+    if group == "environment":
+        return sensor == "magnetometer"
+    return group in CATALOGUE and CATALOGUE[group].acts_on == sensor
+
+
+class _Sampled:
+    """The instants at which one sensor's readings show the motion."""
+
+    def __init__(self, current: Chain, readings: Readings, values: Values) -> None:
+        self.readings, self.sensor = readings, readings.sensor
+        self.width = readings.value.shape[1]
+        self.rate_hz = current.recording.sheets[readings.sensor].rate_hz
+        self.lost = current.lost.get(readings.sensor)
+        written = readings.t
+        taken = written - self.delays(values)[: written.size]
+        prefix = {"magnetometer": "mag", "accelerometer": "accel", "gyroscope": "gyro"}.get(self.sensor, "")
+        self.tau = value(values, f"{prefix}.lag", "tau_s") if prefix else 0.0
+        if self.tau > 0:
+            # every reading is a weighted mean over its past
+            past = taken[None, :] - self.tau * _LAG_NODES[:, None]
+            self.instants = past.ravel()
+            self.lag_slope = np.repeat(_LAG_NODES, written.size)
+        else:
+            self.instants = taken
+            self.lag_slope = np.ones(written.size)
+        self.nodes = _LAG_NODES.size if self.tau > 0 else 1
+
+    def delays(self, values: Values) -> FloatArray:
+        """Return how much earlier than written the readings (nodes n,) show the motion."""
+        written = self.readings.t
+        late = delay(values, self.sensor, written)
+        if self.lost is not None:
+            late = late - self.lost / self.rate_hz
+        if getattr(self, "nodes", 1) > 1:
+            late = np.tile(late, self.nodes)
+        return late
+
+    def time_slope(
+        self, runner: _Runner, flat: FloatArray, wobble: FloatArray, values: Values, current: Chain
+    ) -> FloatArray:
+        """Return the slopes (m, width) of the ideal readings in time."""
+        slope = np.empty((self.instants.size, self.width))
+        edges = current.edges
+        piece = np.clip(np.searchsorted(edges, self.instants, side="right") - 1, 0, current.states.shape[0] - 1)
+        for i in range(current.states.shape[0]):
+            o = np.flatnonzero(piece == i)
+            if o.size == 0:
+                continue
+            t = np.maximum(self.instants[o], edges[i])
+            early = np.maximum(t - _TIME_STEP, edges[i])
+            late = early + 2.0 * _TIME_STEP
+            both = np.concatenate([late, early])
+            times, last = runner.times(float(edges[i]), float(edges[i + 1]), float(both.max()), current.states[i])
+            rows, _ = runner.run(flat[None], wobble[None], current.states[i : i + 1], times, last, both)
+            read = predicted(self.sensor, current.recording, values, both, rows[0])
+            slope[o] = (read[: o.size] - read[o.size :]) / (2.0 * _TIME_STEP)
+        return slope
+
+    def weighted(self, array: FloatArray) -> FloatArray:
+        """Return what the sensor shows of ideal readings (nodes n, ...): itself, or the weighted past."""
+        if self.nodes == 1:
+            return array
+        parts = array.reshape(self.nodes, -1, *array.shape[1:])
+        return np.asarray(np.tensordot(_LAG_WEIGHTS, parts, axes=1))
+
+
+def _group(sensor: str, axis: int) -> str:
+    if sensor == "gps":
+        return "gps.position" if axis < 3 else "gps.velocity"
+    return sensor
+
+
+def _stack(
+    current: Chain,
+    samples: Sequence[_Sampled],
+    ideal: Sequence[FloatArray],
+    J: Sequence[FloatArray],
+    piece_of: Sequence[IntArray],
+    S: FloatArray,
+    closing: FloatArray,
+    gaps: FloatArray,
+    allowed: IntArray,
+    l: int,
+) -> Linear:
+    """Put the rows of all sensors together, channel by channel, without those that take no part."""
+    raw, own, pieces, t, sd, shifts = [], [], [], [], [], []
+    channels: list[Channel] = []
+    at = 0
+    d = current.tangent
+    lagged = any(s.nodes > 1 for s in samples)
+    for s, y, M, piece in zip(samples, ideal, J, piece_of, strict=True):
+        readings = s.readings
+        # what the closing of forbidden jumps adds
+        closed = np.einsum("mwd,md->mw", M[:, :, :d], closing[piece])
+        if lagged:
+            full = np.matmul(M[:, :, :d], S[piece])
+            full[:, :, l:] += M[:, :, d:]
+            M = full
+        prediction, slopes, closed = s.weighted(y), s.weighted(M), s.weighted(closed)
+        limit = current.recording.sheets[s.sensor].range if s.sensor != "gps" else None
+        for axis in range(s.width):
+            good = readings.good[:, axis]
+            if s.tau > 0:
+                good = good & (readings.t > _FORGOTTEN * s.tau)
+            if limit is not None:
+                # a clipped reading says only that the motion was beyond the range
+                margin = 6.0 * np.nan_to_num(readings.sd[axis])
+                inside = readings.clipped[:, axis] & (np.abs(prediction[:, axis]) < limit - margin)
+                good = good | (inside & np.isfinite(readings.value[:, axis]))
+            index = np.flatnonzero(good)
+            if index.size == 0:
+                continue
+            raw.append(readings.value[index, axis] - prediction[index, axis])
+            own.append(slopes[index, axis])
+            pieces.append(piece[index] if not lagged else np.empty(0, dtype=np.int64))
+            shifts.append(closed[index, axis])
+            t.append(readings.t[index])
+            sd.append(np.full(index.size, readings.sd[axis]))
+            rows = slice(at, at + index.size)
+            channels.append(Channel(s.sensor, readings.axes[axis], _group(s.sensor, axis), rows, index))
+            at += index.size
+    kind, where, jump = np.full(l, -1), np.zeros(l, dtype=np.int64), np.zeros(l)
+    for i in range(gaps.shape[0]):
+        place = slice(d + i * allowed.size, d + (i + 1) * allowed.size)
+        kind[place], where[place], jump[place] = allowed, i + 1, gaps[i, allowed]
+
+    def joined(parts: list[Any]) -> Any:
+        return np.concatenate(parts) if parts else np.empty(0)
+
+    rows_of = joined(own) if own else np.empty((0, d + S.shape[2] - l))
+    return Linear(
+        joined(raw),
+        rows_of,
+        joined(pieces).astype(np.int64),
+        joined(t),
+        joined(sd),
+        tuple(channels),
+        jump,
+        kind,
+        where,
+        S,
+        closing,
+        gaps,
+        joined(shifts),
+    )
+
+
+def recut(current: Chain, values: Values, edges: FloatArray) -> Chain:
+    """Return the chain cut at other edges (k + 1,), its new pieces starting where the old motion was."""
+    recording = current.recording
+    runner = _Runner(recording, tables(recording.disc), _knots(recording), _events(values))
+    flat, wobble = base_flat(recording, values), np.array([values.get(key, 0.0) for key in WOBBLE])
+    states = np.empty((edges.size - 1, STATE))
+    piece = np.clip(np.searchsorted(current.edges, edges[:-1] + 1e-9, side="right") - 1, 0, len(current.states) - 1)
+    for j, i in enumerate(piece):
+        start, state = float(current.edges[i]), current.states[i]
+        stop = float(edges[j])
+        if stop - start < 1e-9:
+            states[j] = state
+            continue
+        times, last = runner.times(start, stop, stop, state)
+        _, ends = runner.run(flat[None], wobble[None], state[None], times, last, np.empty(0))
+        states[j] = ends[0]
+    return replace(current, edges=edges, states=states)
+
+
+def moved(current: Chain, linear: Linear, local: FloatArray, shared: FloatArray) -> Chain:
+    """Return the chain after a step of its unknowns: local (l,) and shared (p,)."""
+    tangents = linear.moves @ np.concatenate([local, shared]) + linear.closing
+    return replace(current, states=shifted(current.recording.plant, current.states, tangents))
