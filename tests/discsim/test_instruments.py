@@ -139,7 +139,9 @@ class TestParts:
         path.write_text('name = "mine"\n')
         with pytest.raises(InputError, match="no sensor in this part"):
             Instruments.from_parts(str(path))
-        with pytest.raises(InputError, match=r"no shipped file 'parts/mpu\.toml'; expected one of ac1120s, adxrs649"):
+        with pytest.raises(
+            InputError, match=r"no shipped file 'parts/mpu\.toml'; expected one of ac1120s, adxl375, adxrs649"
+        ):
             Instruments.from_parts("mpu")
         with pytest.raises(InputError, match=r"gone\.toml: no such file"):
             Instruments.from_parts(str(tmp_path / "gone.toml"))
