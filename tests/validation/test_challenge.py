@@ -366,5 +366,15 @@ def test_an_effect_twice_as_large_is_twice_as_far_above_its_limit():
     assert THRESHOLD > 0
 
 
+def test_a_limit_is_known_where_no_sensor_shows_an_unknown():
+    """Without a magnetometer the yaw of a rate table is in no reading, and takes in nothing."""
+    case = draw_case(5, "rate_table", ["rig.axis_tilt"])
+    for name in ("magnetometer", "gyroscope"):
+        case = replace(case, sheets_of=case.sheets_of.without(name), runs=case.runs[:1])
+    found = strength(case)
+    assert found is not None
+    assert found > 0
+
+
 def test_nothing_concealed_has_no_limit():
     assert strength(draw_case(1, "flight", kind="nothing")) is None
