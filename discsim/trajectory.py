@@ -731,6 +731,9 @@ def predict_many(
     # a few pieces for each thread, for flights differ in length
     edges = np.linspace(0, n, min(n, 4 * count) + 1).astype(int)
     pieces = [slice(a, b) for a, b in itertools.pairwise(edges) if b > a]
-    with ThreadPoolExecutor(count) as pool:
-        list(pool.map(fly, pieces))
+    if count == 1 or len(pieces) == 1:
+        fly(slice(0, n))
+    else:
+        with ThreadPoolExecutor(count) as pool:
+            list(pool.map(fly, pieces))
     return Landings(end, last, touched, track)
