@@ -235,7 +235,7 @@ def test_validate_scores_everything_and_leaves_its_report(monkeypatch, tmp_path,
     assert set(scores[0]) == {"name", "value", "unit", "expected", "tolerance", "ok"}
     assert all(score["ok"] for score in scores)
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 3
+    assert page.count("data:image/png;base64,") == 6
     suite = ElementTree.parse(junit).getroot()[0]
     assert int(suite.get("tests")) == len(scores)
     assert suite.get("failures") == "0"
