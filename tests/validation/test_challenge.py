@@ -319,7 +319,8 @@ def test_answers_are_sealed_before_and_opened_as_they_were(tmp_path):
         seal_answers([Request(seed, "flight") for seed in range(5)], tmp_path)
 
 
-def test_a_challenge_scores_reports_and_goes_on_where_it_was_stopped(tmp_path, spy):
+def test_a_challenge_scores_reports_and_goes_on_where_it_was_stopped(tmp_path, spy, monkeypatch):
+    monkeypatch.setattr("validation.challenge.run.code_digest", lambda: "as it is")
     requests = [Request(seed, "flight", (), kind) for seed, kind in ((40, "nothing"), (41, "off_catalogue"))]
     requests.append(Request(42, "flight", ("air.wind",)))
     with start_run(tmp_path / "out", 40) as run:
@@ -340,6 +341,10 @@ def test_a_challenge_scores_reports_and_goes_on_where_it_was_stopped(tmp_path, s
     with start_run(tmp_path / "out", 40) as run:
         again, _ = challenge(run, requests, workers=1, command=spy)
     assert [item.seconds for item in again] == [item.seconds for item in scored]
+    # of other code these would be no results
+    monkeypatch.setattr("validation.challenge.run.code_digest", lambda: "as it is now")
+    with start_run(tmp_path / "out", 40) as run, pytest.raises(InputError, match="versions differ"):
+        challenge(run, requests, workers=1, command=spy)
 
 
 # ------------------------------------------------------------------------------------------------ limits
