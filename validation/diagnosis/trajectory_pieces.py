@@ -21,7 +21,9 @@ from discsim.frames import conjugate, multiply, rotation_vector, turn
 from discsim.parameters import PARAMETERS, Tables, parameter_index, parameters, tables
 from discsim.recording import SENSORS, Recording
 from validation.diagnosis.pieces_of_motion import (
+    LAW_PLACES,
     ROW,
+    SIZE,
     STATE,
     flight_pieces,
     free_spin_pieces,
@@ -245,13 +247,29 @@ def _or_nan(number: float | None) -> float:
 # -------------------------------------------------------------------------------------------------- plants
 
 
-def base_flat(recording: Recording, values: Values) -> FloatArray:
-    """Return the flat parameter array of a recording's baseline with values in their places."""
+def base_flat(recording: Recording, values: Values, columns: Sequence[tuple[str, str]] = ()) -> FloatArray:
+    """Return the flat parameter array of a recording's baseline with values in their places.
+
+    ``columns`` are keys that need a place, too.
+    """
     flat = parameters(recording.environment, recording.disc, recording.rig)
+    terms = 1 + max((_term(name) for group, name in (*values, *columns) if group == "law"), default=-1)
+    flat = np.concatenate([flat, np.zeros(terms * len(LAW_PLACES))])
     for (group, name), number in values.items():
         if (is_motion(group) and group != "environment") or (group, name) in _FLAT_ENVIRONMENT:
-            flat[parameter_index(group, name)] = number
+            flat[_place(group, name)] = number
     return flat
+
+
+def _term(name: str) -> int:
+    return int(name.partition(".")[0])
+
+
+def _place(group: str, name: str) -> int:
+    """Return the place of a parameter in a flat array, a law's terms standing behind the physics."""
+    if group == "law":
+        return SIZE + _term(name) * len(LAW_PLACES) + LAW_PLACES.index(name.partition(".")[2])
+    return parameter_index(group, name)
 
 
 _FLAT_ENVIRONMENT = {("environment", name) for name in PARAMETERS["environment"].names or ()}
@@ -402,7 +420,7 @@ def linearise(
     S[0, :, :d] = np.eye(d)
     closing = np.zeros((k, d))
     gaps = np.zeros((max(k - 1, 0), d))
-    flat = base_flat(recording, values)
+    flat = base_flat(recording, values, [column.key for column in columns])
     wobble = np.array([values.get(key, 0.0) for key in WOBBLE])
 
     out_rows = [np.empty((s.instants.size, ROW)) for s in samples]
@@ -437,8 +455,8 @@ def linearise(
                         moved_wobble[row, WOBBLE.index((group, name))] += sign * size
                         continue
                     for shape, number in given:
-                        moved[row, parameter_index(group, shape)] = number
-                    moved[row, parameter_index(group, name)] += sign * size
+                        moved[row, _place(group, shape)] = number
+                    moved[row, _place(group, name)] += sign * size
                 states.append(np.repeat(state[None], len(motion_columns), axis=0))
                 flats.append(moved)
                 wobbles.append(moved_wobble)
