@@ -139,7 +139,7 @@ def within_range(current: Chain, linear: Linear) -> Chain:
     """
     kept = []
     for readings in current.readings:
-        limit = current.recording.sheets[readings.sensor].range if readings.sensor != "gps" else None
+        limit = readings.limit
         good = readings.good.copy()
         if limit is not None:
             for axis, name in enumerate(readings.axes):

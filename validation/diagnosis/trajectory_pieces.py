@@ -30,16 +30,30 @@ from validation.diagnosis.pieces_of_motion import (
     spin_down_pieces,
     table_pieces,
 )
+from validation.diagnosis.plateau import plateau
 from validation.diagnosis.readings import CLOCKS, Values, delay, is_motion, predicted, value
 
-__all__ = ["WOBBLE", "Chain", "Channel", "Column", "Linear", "Readings", "chain", "linearise", "readings_of"]
+__all__ = [
+    "WOBBLE",
+    "Chain",
+    "Channel",
+    "Column",
+    "Linear",
+    "Readings",
+    "chain",
+    "linearise",
+    "moved",
+    "readings_of",
+    "recut",
+    "shown",
+]
 
 IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
 #: longest step of a flight's integrator, s, and in radians of nutation
 STEP, NUTATION = 0.01, 1.2
-#: steps about an event of 10 ms
-EVENT_STEP = 0.0025
+#: longest step of a table's integrator in radians of its ripple
+RIPPLE = 0.3
 #: half the differences of states: m, m/s, rad, rad/s
 _FLIGHT_STEPS = np.repeat([1e-3, 1e-3, 1e-5, 1e-4], 3)
 _SPIN_STEPS = np.array([1e-2, 1e-2, 1e-2, 1e-2, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4])
@@ -73,7 +87,8 @@ class Readings:
     """The usable readings of one sensor of a recording.
 
     t (n,) written times; value (n, k); good (n, k) tells which readings count; sd (k,) the stated noise with rounding
-    (NaN where nothing is stated); clipped (n, k) stand at the range.
+    (NaN where nothing is stated); clipped (n, k) stand at the limit, which is the range unless readings stand still
+    below it.
     """
 
     sensor: str
@@ -83,6 +98,7 @@ class Readings:
     clipped: BoolArray
     sd: FloatArray
     axes: tuple[str, ...]
+    limit: float | None = None
 
 
 @dataclass(frozen=True)
@@ -215,8 +231,8 @@ class Linear:
 # ------------------------------------------------------------------------------------------------- readings
 
 
-def readings_of(recording: Recording, *, plateau: bool = True) -> tuple[Readings, ...]:
-    """Return the usable readings of all sensors: gaps, and readings that stand at a range, take no part."""
+def readings_of(recording: Recording) -> tuple[Readings, ...]:
+    """Return the usable readings of all sensors: gaps, and readings that stand at a limit, take no part."""
     found = []
     for sensor in SENSORS:
         samples = recording.get(sensor)
@@ -226,17 +242,20 @@ def readings_of(recording: Recording, *, plateau: bool = True) -> tuple[Readings
         measured = samples.value if samples.value.ndim == 2 else samples.value[:, None]
         if sensor == "gps":
             sd = np.repeat([_or_nan(sheet.noise_rms), _or_nan(sheet.velocity_noise_rms)], 3)
-            clipped = np.zeros(measured.shape, dtype=np.bool_)
+            clipped, limit = np.zeros(measured.shape, dtype=np.bool_), None
         else:
             level = np.hypot(_or_nan(sheet.noise_rms), (sheet.resolution or 0.0) / np.sqrt(12.0))
             sd = np.full(measured.shape[1], level)
-            clipped = sheet.clipped(measured)
+            clipped, limit = sheet.clipped(measured), sheet.range
+            lower = plateau(recording) if sensor == "accelerometer" else None
+            if lower is not None:
+                clipped, limit = np.abs(measured) >= lower - 1e-9 * lower, lower
         good = np.isfinite(measured) & ~clipped
         axes = tuple(SENSORS[sensor].columns)
         t, m = samples.t, measured
         if recording.plant == "free_spin" and sensor == "accelerometer":
             continue
-        found.append(Readings(sensor, t, m, good, clipped, sd, axes))
+        found.append(Readings(sensor, t, m, good, clipped, sd, axes, limit))
     return tuple(found)
 
 
@@ -310,6 +329,8 @@ class _Runner:
     lookup: Tables
     knots: FloatArray
     events: tuple[tuple[float, float], ...]
+    #: highest order of a speed ripple
+    order: float = 0.0
 
     def times(self, start: float, stop: float, last: float, state: FloatArray) -> tuple[FloatArray, int]:
         """Return the integrator's steps from start over at least [start, last], and the place of ``stop`` in them."""
@@ -324,8 +345,11 @@ class _Runner:
         elif plant == "spin_down":
             h = 0.01
         else:
-            ripple = 1.0
-            h = min(0.01, 0.2 / max(ripple, 1.0))
+            # the fastest the table turns in this piece
+            inside = np.interp([start, max(stop, last)], *self.knots)
+            within = self.knots[1, (self.knots[0] > start) & (self.knots[0] < max(stop, last))]
+            turning = float(np.max(np.abs(np.concatenate([inside, within]))))
+            h = min(0.01, RIPPLE / max(self.order * turning, 1.0))
         marks = [start, stop]
         if last > stop:
             marks.append(last + 1e-9)
@@ -371,13 +395,27 @@ def _knots(recording: Recording) -> FloatArray:
     return np.empty((2, 0)) if command is None else np.stack([command.t, command.value])
 
 
-def _events(values: Values) -> tuple[tuple[float, float], ...]:
-    """Return instants and widths of short events among values."""
-    found = []
-    for group in ("event.impulse", "event.spin_step"):
-        if (group, "t_s") in values:
-            found.append((values[group, "t_s"], 0.01))
-    return tuple(found)
+def _events(values: Values, columns: Sequence[Column] = ()) -> tuple[tuple[float, float], ...]:
+    """Return instants and widths of short events among values and among the shapes that columns are taken at."""
+    found = {values[group, "t_s"] for group in _EVENTS if (group, "t_s") in values}
+    found |= {number for column in columns if column.group in _EVENTS for name, number in column.given if name == "t_s"}
+    return tuple((t, 0.01) for t in sorted(found))
+
+
+def _order(values: Values, columns: Sequence[Column] = ()) -> float:
+    """Return the highest order of a speed ripple among values and among the shapes that columns are taken at."""
+    found = [values.get(("rig.speed_ripple", "order"), 0.0)]
+    found += [n for c in columns if c.group == "rig.speed_ripple" for name, n in c.given if name == "order"]
+    return max(abs(order) for order in found)
+
+
+_EVENTS = ("event.impulse", "event.spin_step")
+
+
+def _runner(recording: Recording, values: Values, columns: Sequence[Column] = ()) -> _Runner:
+    return _Runner(
+        recording, tables(recording.disc), _knots(recording), _events(values, columns), _order(values, columns)
+    )
 
 
 # ------------------------------------------------------------------------------------------ linearisation
@@ -403,7 +441,7 @@ def linearise(
     """
     recording, d, k = current.recording, current.tangent, current.states.shape[0]
     plant = recording.plant
-    runner = _Runner(recording, tables(recording.disc), _knots(recording), _events(values))
+    runner = _runner(recording, values, columns)
     steps = _FLIGHT_STEPS if plant == "flight" else _SPIN_STEPS if plant == "free_spin" else _RIG_STEPS[:d]
 
     samples = [_Sampled(current, readings, values) for readings in current.readings]
@@ -662,7 +700,7 @@ def _stack(
             full[:, :, l:] += M[:, :, d:]
             M = full
         prediction, slopes, closed = s.weighted(y), s.weighted(M), s.weighted(closed)
-        limit = current.recording.sheets[s.sensor].range if s.sensor != "gps" else None
+        limit = readings.limit
         for axis in range(s.width):
             good = readings.good[:, axis]
             if s.tau > 0:
@@ -710,10 +748,27 @@ def _stack(
     )
 
 
+def shown(current: Chain, values: Values, sensor: str, t: FloatArray) -> FloatArray:
+    """Return what a sensor would read (n, k) at true instants t (n,) of a chain's motion, before lag and noise."""
+    recording = current.recording
+    runner = _runner(recording, values)
+    flat, wobble = base_flat(recording, values), np.array([values.get(key, 0.0) for key in WOBBLE])
+    rows = np.empty((t.size, ROW))
+    piece = np.clip(np.searchsorted(current.edges, t, side="right") - 1, 0, len(current.states) - 1)
+    for i in range(len(current.states)):
+        mine = np.flatnonzero(piece == i)
+        if mine.size:
+            out = np.maximum(t[mine], current.edges[i])
+            start, stop = float(current.edges[i]), float(current.edges[i + 1])
+            times, last = runner.times(start, stop, float(out.max()), current.states[i])
+            rows[mine] = runner.run(flat[None], wobble[None], current.states[i : i + 1], times, last, out)[0][0]
+    return predicted(sensor, recording, values, t, rows)
+
+
 def recut(current: Chain, values: Values, edges: FloatArray) -> Chain:
     """Return the chain cut at other edges (k + 1,), its new pieces starting where the old motion was."""
     recording = current.recording
-    runner = _Runner(recording, tables(recording.disc), _knots(recording), _events(values))
+    runner = _runner(recording, values)
     flat, wobble = base_flat(recording, values), np.array([values.get(key, 0.0) for key in WOBBLE])
     states = np.empty((edges.size - 1, STATE))
     piece = np.clip(np.searchsorted(current.edges, edges[:-1] + 1e-9, side="right") - 1, 0, len(current.states) - 1)
