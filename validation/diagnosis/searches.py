@@ -369,10 +369,36 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], taken: Sequence[T
         for chain, c in zip(chains, counts, strict=True)
     ]
     anew = relaxed(fixed, known)
+    gain = fit.merit - anew.merit
     new = tuple(_own_times(one, chain, {sensor: c}) for one, chain, c in zip(anew.chains, chains, counts, strict=True))
-    trial, cost = _losses(id, new, sensor)
-    gain = fit.merit - anew.merit - cost
-    return [Shifted(Proposal(trial, gain, {}), new, cost)]
+    # what was lost while the phase stood still shows in what comes after, by a motion that hangs together
+    plant = chains[0].recording.plant
+    found = replace(anew, chains=new)
+    if plant == "rate_table":
+        whole = tuple(replace(c, edges=c.edges[[0, -1]], states=c.states[:1]) for c in new)
+        counted, _ = _counted(replace(found, chains=whole), sensor, _stated_sd(found, sensor, anew.noise))
+        found = _with_losses(found, counted, sensor)
+    for _ in range(2):
+        tied = refit(replace(found, jumps=NO_JUMPS[plant]), iterations=4)
+        counted, _ = _counted(tied, sensor, _stated_sd(found, sensor, anew.noise))
+        same = all(
+            np.array_equal(a.lost.get(sensor, 0.0), b.lost.get(sensor, 0.0))
+            for a, b in zip(found.chains, counted.chains, strict=True)
+        )
+        found = _with_losses(tied, counted, sensor)
+        if same:
+            break
+    trial, cost = _losses(id, found.chains, sensor)
+    return [Shifted(Proposal(trial, gain - cost, {}), found.chains, cost)]
+
+
+def _with_losses(fit: Fit, counted: Fit, sensor: str) -> Fit:
+    """Return a fit with the losses that the chains of another hold."""
+    chains = tuple(
+        replace(chain, lost={**chain.lost, sensor: other.lost[sensor]}) if sensor in other.lost else chain
+        for chain, other in zip(fit.chains, counted.chains, strict=True)
+    )
+    return replace(fit, chains=chains)
 
 
 def _own_times(anew: Chain, old: Chain, lost: Mapping[str, FloatArray]) -> Chain:
