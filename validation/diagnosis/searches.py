@@ -17,7 +17,7 @@ from validation.diagnosis.plateau import plateau
 from validation.diagnosis.readings import delay
 from validation.diagnosis.relaxed import NO_JUMPS, relaxed
 from validation.diagnosis.selection import Hypothesis, Proposal, Tied, fitted_parameters
-from validation.diagnosis.slips import lost_along, phase_counts, repaired
+from validation.diagnosis.slips import first_yaw, lost_along, phase_counts, repaired
 from validation.diagnosis.trajectory_pieces import WOBBLE, Chain, Column, IntArray, Linear, linearise, recut, shown
 from validation.diagnosis.trials import Trial, available
 
@@ -375,9 +375,14 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], taken: Sequence[T
     plant = chains[0].recording.plant
     found = replace(anew, chains=new)
     if plant == "rate_table":
-        whole = tuple(replace(c, edges=c.edges[[0, -1]], states=c.states[:1]) for c in new)
+        whole = tuple(
+            _begun(replace(c, edges=c.edges[[0, -1]], states=c.states[:1]), anew, i) for i, c in enumerate(new)
+        )
         counted, _ = _counted(replace(found, chains=whole), sensor, _stated_sd(found, sensor, anew.noise))
-        found = _with_losses(found, counted, sensor)
+        standing = tuple(
+            recut(one, found.values(i), chain.edges) for i, (one, chain) in enumerate(zip(whole, new, strict=True))
+        )
+        found = _with_losses(replace(found, chains=standing), counted, sensor)
     for _ in range(2):
         tied = refit(replace(found, jumps=NO_JUMPS[plant]), iterations=4)
         counted, _ = _counted(tied, sensor, _stated_sd(found, sensor, anew.noise))
@@ -390,6 +395,18 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], taken: Sequence[T
             break
     trial, cost = _losses(id, found.chains, sensor)
     return [Shifted(Proposal(trial, gain - cost, {}), found.chains, cost)]
+
+
+def _begun(whole: Chain, fit: Fit, i: int) -> Chain:
+    """Return a table's motion in one piece from the yaw that its first readings show."""
+    if whole.recording.get("magnetometer") is None:
+        return whole
+    states = whole.states.copy()
+    states[0, :2] = 0.0
+    whole = replace(whole, states=states)
+    turned = states.copy()
+    turned[0, 0] = first_yaw(whole, fit.values(i))
+    return replace(whole, states=turned)
 
 
 def _with_losses(fit: Fit, counted: Fit, sensor: str) -> Fit:
