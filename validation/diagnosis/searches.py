@@ -348,7 +348,9 @@ def _losses(id: str, chains: Sequence[Chain], sensor: str) -> tuple[Trial, float
     return Trial(id, (), None, (("fraction", share, sd),)), cost
 
 
-def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], taken: Sequence[Trial] = ()) -> list[Shifted]:
+def dropped_magnetometer(
+    fit: Fit, known: Sequence[Parameter], taken: Sequence[Trial] = (), least: float = 40.0
+) -> list[Shifted]:
     """Return lost samples of the magnetometer as a proposal where its phase shows steps.
 
     The motion of a loose fit follows the magnetometer; with steps found it is fitted anew with the samples at their
@@ -370,6 +372,8 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], taken: Sequence[T
     ]
     anew = relaxed(fixed, known)
     gain = fit.merit - anew.merit
+    if gain < least:
+        return []
     new = tuple(_own_times(one, chain, {sensor: c}) for one, chain, c in zip(anew.chains, chains, counts, strict=True))
     # what was lost while the phase stood still shows in what comes after, by a motion that hangs together
     plant = chains[0].recording.plant

@@ -31,7 +31,7 @@ _NEIGHBOURS = 12
 #: first samples, by which the phase at the start is told
 _FIRST = 12
 #: smallest step of phase, in its own noise, that is told from none
-_SEEN = 6.0
+_SEEN = 4.5
 
 
 def likeliest_counts(cost: FloatArray, gaps: IntArray, each: float = _COST) -> tuple[IntArray, float]:
