@@ -142,12 +142,17 @@ def lost_along(
     measured = np.where(readings.good[:, None, :], samples.value[:, None, :], np.nan)
     off = (measured - expected[place[:, None] + counts]) / sd
     cost = np.minimum(np.nansum(off**2, axis=2), _MOST)
-    # loggers mostly stop all their sensors together: then what is missing at the end was lost before
+    # loggers mostly stop all their sensors together: then as many as are missing at the end were lost before, and
+    # where the readings do not tell the place of one, there are so many places that it costs nothing
     missing = int((end - samples.t[-1]) * rate_hz + 1e-3)
+    believed = cost.copy()
     if missing <= most:
-        cost[-1] += _TOGETHER
-        cost[-1, missing] -= _TOGETHER
-    path, least = likeliest_counts(cost, np.diff(place, prepend=place[0]))
+        believed[-1] += _TOGETHER + _COST * missing
+        believed[-1, missing] = cost[-1, missing]
+    gaps = np.diff(place, prepend=place[0])
+    path, _ = likeliest_counts(believed, gaps)
+    # the gain is what the readings say alone
+    _, least = likeliest_counts(cost, gaps)
     was = np.zeros(len(samples), dtype=np.int64) if about is None else about.astype(np.int64)
     before = float(cost[np.arange(len(samples)), was].sum()) + _COST * float(was[-1])
     return path.astype(float), before - least
