@@ -17,7 +17,7 @@ from discsim.arrays import BoolArray, FloatArray
 from discsim.frames import euler_angles
 from validation.diagnosis.noise import NoiseModel, whitened
 from validation.diagnosis.readings import Values
-from validation.diagnosis.trajectory_pieces import Chain, Column, Linear, linearise, moved, shifted
+from validation.diagnosis.trajectory_pieces import STEPS, Chain, Column, Linear, linearise, moved, shifted
 
 __all__ = ["Fit", "Jumps", "Parameter", "Reduced", "linearised_columns", "reduce", "refit", "values_of"]
 
@@ -315,14 +315,14 @@ def refit(
     fit: Fit,
     *,
     iterations: int = 8,
-    tolerance: float = 1e-3,
+    tolerance: float = 0.05,
     give_up: float = np.inf,
     bounds: Mapping[tuple[str, str], tuple[float, float]] | None = None,
 ) -> Fit:
     """Go on from where a fit stands by Gauss-Newton steps, halved where they do not improve.
 
-    Stops when the expected gain is below ``tolerance`` of chi-squared per reading and of 0.05, or where chi-squared
-    is expected to stay above ``give_up``.
+    Stops when the gain, expected or found, is below ``tolerance`` of chi-squared, or where chi-squared is expected to
+    stay above ``give_up``.
     """
     linears = linearised(fit)
     fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
@@ -332,7 +332,7 @@ def refit(
         step, covariance, expected = shared_step(gram, fit.parameters, fit.at)
         fit = replace(fit, covariance=covariance)
         gain = fit.merit - expected
-        if gain < max(0.05, 1e-6 * fit.merit) or expected > give_up:
+        if (gain < max(tolerance, 1e-7 * fit.merit) and not open_gaps(fit)) or expected > give_up:
             break
         share, better = 1.0, None
         for _ in range(5):
@@ -352,17 +352,31 @@ def refit(
             if all(np.all(np.isfinite(chain.states)) for chain in chains):
                 new = linearised(trial)
                 merit = merit_of(trial, new)
-                if np.isfinite(merit) and merit < fit.merit + 1e-9 * abs(fit.merit):
+                # while gaps are open the merit is that of the closed chain to first order only: too good
+                bar = fit.merit * (1.0 + 1e-9) if not open_gaps(fit) else 1.5 * fit.merit + 10.0 * fit.count
+                if np.isfinite(merit) and merit < bar:
                     better = replace(trial, linears=new, merit=merit, iterations=fit.iterations + 1)
                     break
             share *= 0.4
         if better is None:
             break
         improved = fit.merit - better.merit
+        were_open = open_gaps(fit)
         fit = better
-        if improved < max(tolerance, 1e-7 * fit.merit):
+        if not were_open and improved < max(tolerance, 1e-7 * fit.merit):
             break
     return fit
+
+
+#: gaps of a chain below this share of the steps of its differences are closed
+_CLOSED = 20.0
+
+
+def open_gaps(fit: Fit) -> bool:
+    """Tell whether pieces that may not jump still do."""
+    forbidden = ~fit.jumps.allowed
+    steps = STEPS[fit.chains[0].recording.plant]
+    return any(bool(np.any(np.abs(linear.gaps[:, forbidden]) > _CLOSED * steps[forbidden])) for linear in fit.linears)
 
 
 def _part(chain: Chain, linear: Linear, local: FloatArray, shared: FloatArray, share: float) -> Chain:

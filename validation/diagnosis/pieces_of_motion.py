@@ -141,8 +141,9 @@ def free_spin_pieces(
         p = flats[c].view(PARAMETERS)[0]
         state = states[c]
         attitude[0], rate[0], psis[0] = state[6:10], state[10:13], 0.0
-        q = states[0]  # the same for all neighbours, or a turn would be taken for a change of the wind
-        heading = atan2(2.0 * (q[6] * q[9] + q[7] * q[8]), 1.0 - 2.0 * (q[8] * q[8] + q[9] * q[9]))
+        heading = atan2(
+            2.0 * (state[6] * state[9] + state[7] * state[8]), 1.0 - 2.0 * (state[8] * state[8] + state[9] * state[9])
+        )
         for k in range(n - 1):
             t, h, psi = times[k], times[k + 1] - times[k], psis[k]
             w0 = rate[k]

@@ -115,6 +115,8 @@ def specific_force(recording: Recording, values: Values, rows: FloatArray) -> Fl
     d = place(recording, values)
     d = d - np.array([value(values, "body.mass_imbalance", "ex_m"), value(values, "body.mass_imbalance", "ey_m"), 0.0])
     gravity = values.get(("environment", "gravity"), recording.environment.gravity)
+    if recording.plant == "free_spin":  # turns with the spin, like the translation that nobody knows: left to the means
+        gravity = 0.0
     f = _to_body(rows, rows[..., 6:9] - np.array([0.0, 0.0, gravity]))
     w, dw = rows[..., 13:16], rows[..., 16:19]
     along = w @ d

@@ -29,19 +29,25 @@ from validation.diagnosis.pieces_of_motion import (
     table_pieces,
 )
 from validation.diagnosis.readings import CLOCKS, Values, delay, is_motion, predicted, value
+from validation.diagnosis.starts import spin_starts
 
-__all__ = ["WOBBLE", "Chain", "Channel", "Column", "Linear", "Readings", "chain", "linearise", "readings_of"]
+__all__ = ["STEPS", "WOBBLE", "Chain", "Channel", "Column", "Linear", "Readings", "chain", "linearise", "readings_of"]
 
 IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
 #: longest step of a flight's integrator, s, and in radians of nutation
 STEP, NUTATION = 0.01, 1.2
+#: a fit that has gone astray to faster spins, rad/s, is not followed with ever shorter steps
+FASTEST = 400.0
 #: steps about an event of 10 ms
 EVENT_STEP = 0.0025
 #: half the differences of states: m, m/s, rad, rad/s
-_FLIGHT_STEPS = np.repeat([1e-3, 1e-3, 1e-5, 1e-4], 3)
-_SPIN_STEPS = np.array([1e-2, 1e-2, 1e-2, 1e-2, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4])
-_RIG_STEPS = np.array([1e-5, 1e-4])
+STEPS = {
+    "flight": np.repeat([1e-3, 1e-3, 1e-5, 1e-4], 3),
+    "free_spin": np.array([1e-2, 1e-2, 1e-2, 1e-2, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4]),
+    "spin_down": np.array([1e-5, 1e-4]),
+    "rate_table": np.array([1e-5]),
+}
 #: half the difference in time by which a reading's slope is taken, s
 _TIME_STEP = 2e-4
 #: neighbours simulated at a time, to bound memory
@@ -81,6 +87,9 @@ class Readings:
     clipped: BoolArray
     sd: FloatArray
     axes: tuple[str, ...]
+    #: written times and weights (w, n) of the samples that each reading is a mean of; None where it is one sample
+    taken: FloatArray | None = None
+    weights: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -232,10 +241,46 @@ def readings_of(recording: Recording, *, plateau: bool = True) -> tuple[Readings
         good = np.isfinite(measured) & ~clipped
         axes = tuple(SENSORS[sensor].columns)
         t, m = samples.t, measured
+        one = Readings(sensor, t, m, good, clipped, sd, axes)
         if recording.plant == "free_spin" and sensor == "accelerometer":
-            continue
-        found.append(Readings(sensor, t, m, good, clipped, sd, axes))
+            found += _over_turns(recording, one)
+        else:
+            found.append(one)
     return tuple(found)
+
+
+#: a reading of a turn's mean is a mean over this many turns, weighted by Hann: what turns once per turn is not seen
+_TURNS = 2.0
+
+
+def _over_turns(recording: Recording, one: Readings) -> list[Readings]:
+    """Return the means over turns of an accelerometer on a disc whose path is unknown.
+
+    Translation and gravity turn with the spin and average out; what remains of x and y is centripetal.
+    """
+    grid = np.linspace(0.0, recording.end, max(int(recording.end / 0.05), 2))
+    rate = spin_starts(recording, grid).rate[:, 2]
+    phase = np.interp(one.t, grid, np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(grid))]))
+    phase = np.abs(phase) / (2.0 * np.pi)
+    centres = np.arange(phase[0] + _TURNS / 2, phase[-1] - _TURNS / 2, _TURNS / 2)
+    first, last = np.searchsorted(phase, centres - _TURNS / 2), np.searchsorted(phase, centres + _TURNS / 2)
+    if centres.size < 4 or np.any(np.diff(phase) < 0) or np.min(last - first) < 8:
+        return []
+    width = int(np.max(last - first))
+    place = np.minimum(first[None, :] + np.arange(width)[:, None], one.t.size - 1)
+    inside = np.arange(width)[:, None] < (last - first)[None, :]
+    usable = np.all(one.good[:, :2], axis=1)
+    weights = np.where(inside & usable[place], 1.0 + np.cos(2.0 * np.pi * (phase[place] - centres) / _TURNS), 0.0)
+    # where samples are missing, what turns with the spin does not average out
+    whole = np.sum(inside & ~usable[place], axis=0) == 0
+    weights = weights / np.maximum(np.sum(weights, axis=0), 1e-12)
+    values = np.einsum("wn,wnk->nk", weights, np.nan_to_num(one.value)[place])
+    good = np.repeat(whole[:, None], 3, axis=1)
+    good[:, 2] = False
+    t = np.einsum("wn,wn->n", weights, one.t[place])
+    sd = one.sd * float(np.sqrt(np.median(np.sum(weights**2, axis=0))))
+    clipped = np.zeros(values.shape, dtype=np.bool_)
+    return [Readings(one.sensor, t, values, good, clipped, sd, one.axes, one.t[place], weights)]
 
 
 def _or_nan(number: float | None) -> float:
@@ -299,10 +344,11 @@ class _Runner:
         if plant == "flight":
             disc = self.recording.disc
             assert disc is not None
-            nutation = max(abs(state[12]) * disc.Izz / disc.Ixx, abs(state[12]), 1.0)
+            spin = min(abs(float(state[12])), FASTEST)
+            nutation = max(spin * disc.Izz / disc.Ixx, spin, 1.0)
             h = min(STEP, NUTATION / nutation)
         elif plant == "free_spin":
-            h = min(0.00125, 0.15 / max(abs(state[12]) * 2.0, 1.0))
+            h = min(0.00125, 0.15 / max(min(abs(float(state[12])), FASTEST) * 2.0, 1.0))
         elif plant == "spin_down":
             h = 0.01
         else:
@@ -386,7 +432,7 @@ def linearise(
     recording, d, k = current.recording, current.tangent, current.states.shape[0]
     plant = recording.plant
     runner = _Runner(recording, tables(recording.disc), _knots(recording), _events(values))
-    steps = _FLIGHT_STEPS if plant == "flight" else _SPIN_STEPS if plant == "free_spin" else _RIG_STEPS[:d]
+    steps = STEPS[plant]
 
     samples = [_Sampled(current, readings, values) for readings in current.readings]
     # the instants of all sensors, each with its neighbours in time for slopes and its past for a lag
@@ -558,11 +604,16 @@ class _Sampled:
         self.width = readings.value.shape[1]
         self.rate_hz = current.recording.sheets[readings.sensor].rate_hz
         self.lost = current.lost.get(readings.sensor)
-        written = readings.t
-        taken = written - self.delays(values)[: written.size]
+        self.tau = 0.0
+        self.written = readings.t if readings.taken is None else readings.taken.ravel()
+        self.weights = readings.weights
+        written = self.written
+        taken = written - self.delays(values)
         prefix = {"magnetometer": "mag", "accelerometer": "accel", "gyroscope": "gyro"}.get(self.sensor, "")
-        self.tau = value(values, f"{prefix}.lag", "tau_s") if prefix else 0.0
+        self.tau = value(values, f"{prefix}.lag", "tau_s") if prefix and self.weights is None else 0.0
+        self.nodes = 1
         if self.tau > 0:
+            self.weights = np.repeat(_LAG_WEIGHTS[:, None], written.size, axis=1)
             # every reading is a weighted mean over its past
             past = taken[None, :] - self.tau * _LAG_NODES[:, None]
             self.instants = past.ravel()
@@ -570,16 +621,15 @@ class _Sampled:
         else:
             self.instants = taken
             self.lag_slope = np.ones(written.size)
-        self.nodes = _LAG_NODES.size if self.tau > 0 else 1
+        self.nodes = 1 if self.weights is None else self.weights.shape[0]
 
     def delays(self, values: Values) -> FloatArray:
         """Return how much earlier than written the readings (nodes n,) show the motion."""
-        written = self.readings.t
-        late = delay(values, self.sensor, written)
-        if self.lost is not None:
+        late = delay(values, self.sensor, self.written)
+        if self.lost is not None and self.lost.size == late.size:
             late = late - self.lost / self.rate_hz
-        if getattr(self, "nodes", 1) > 1:
-            late = np.tile(late, self.nodes)
+        if self.tau > 0:
+            late = np.tile(late, _LAG_NODES.size)
         return late
 
     def time_slope(
@@ -605,10 +655,10 @@ class _Sampled:
 
     def weighted(self, array: FloatArray) -> FloatArray:
         """Return what the sensor shows of ideal readings (nodes n, ...): itself, or the weighted past."""
-        if self.nodes == 1:
+        if self.weights is None:
             return array
         parts = array.reshape(self.nodes, -1, *array.shape[1:])
-        return np.asarray(np.tensordot(_LAG_WEIGHTS, parts, axes=1))
+        return np.asarray(np.einsum("wn,wn...->n...", self.weights, parts))
 
 
 def _group(sensor: str, axis: int) -> str:
@@ -644,7 +694,7 @@ def _stack(
             full[:, :, l:] += M[:, :, d:]
             M = full
         prediction, slopes, closed = s.weighted(y), s.weighted(M), s.weighted(closed)
-        limit = current.recording.sheets[s.sensor].range if s.sensor != "gps" else None
+        limit = current.recording.sheets[s.sensor].range if s.sensor != "gps" and readings.taken is None else None
         for axis in range(s.width):
             good = readings.good[:, axis]
             if s.tau > 0:
