@@ -26,6 +26,7 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import model_file
 from discsim.frames import body_to_ned, flip_yz, norm3, quaternion_from_matrix, rotate_by_quaternion
+from discsim.law import Law, law_wrench
 from discsim.motion import Motion
 from discsim.parameters import PARAMETERS, Tables, flight_parameters, tables
 
@@ -144,6 +145,9 @@ def flight_force(
     p = flat.view(PARAMETERS)[0]
     h, u, v, w, P, Q, r = _flow(p, t, qpos, qvel)
     Fx, Fy, Fz, Mx, My, Mz = air_wrench(p, tables, h, u, v, w, P, Q, r)
+    if tables.law.shape[0] > 0:
+        Lx, Ly, Lz, Kx, Ky, Kz = law_wrench(tables.law, t, h, u, v, w, P, Q, r)
+        Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
 
     # a push through the centre of mass; about the geometric centre it has a moment
     qw, qx, qy, qz = qpos[3], qpos[4], -qpos[5], -qpos[6]
@@ -188,13 +192,14 @@ class FlyingDisc:
         *,
         timestep: float = 1e-3,
         contacts: bool = False,
+        law: Law | None = None,
     ) -> None:
         if mujoco.get_mjcb_passive() is not None:
             raise RuntimeError("a passive-force callback is installed; build every disc before entering its block")
         self.disc = disc
         self.environment = environment
         self.parameters = flight_parameters(disc, environment, effects)
-        self.tables = tables(disc)
+        self.tables = tables(disc, law)
         record = self.parameters.view(PARAMETERS)[0]
         self.centre_of_mass = readonly(centre_of_mass(record["body_mass_imbalance"]))
         try:
@@ -276,6 +281,7 @@ def fly(
     timestep: float = 1e-3,
     duration: float = 30.0,
     ground: Literal["stop", "skip"] = "stop",
+    law: Law | None = None,
 ) -> Motion:
     """Fly a disc in MuJoCo and return its true motion.
 
@@ -283,7 +289,7 @@ def fly(
     (s). With ``ground="skip"`` the rim has contact and friction with the ground, and the disc skips and slides on
     until it rests or ``duration`` ends.
     """
-    flying = FlyingDisc(disc, environment, effects, timestep=timestep, contacts=ground == "skip")
+    flying = FlyingDisc(disc, environment, effects, timestep=timestep, contacts=ground == "skip", law=law)
     return follow(flying, release, duration=duration, ground=ground)
 
 

@@ -2,7 +2,9 @@
 
 The text is a sum of products of powers. A factor is a number, a coefficient, a symbol of `SYMBOLS`, its magnitude
 ``|r|`` or its direction ``sign(r)``; an exponent is a number or a coefficient. ``c * |r|^n * sign(r) + b * V^2`` with
-the coefficients c, n and b is a law, and so is ``-c r V``: a blank or a dot multiplies, too.
+the coefficients c, n and b is a law, and so is ``-c r V``: a blank or a dot multiplies, too. What dies away in time has
+the factor ``exp(-t/tau)``; what repeats as a disc turns, ``cos(k psi + phase)`` or ``sin(k psi)``, psi being the angle
+turned since the recording began: it stands only in a law about a sensor.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import isfinite, pow
+from math import exp, isfinite, pi, pow
 from types import MappingProxyType
 
 import numpy as np
@@ -23,7 +25,7 @@ from discsim.errors import InputError
 from discsim.frames import heading_angles, norm3
 from discsim.recording import SENSORS
 
-__all__ = ["SYMBOLS", "WRENCH_TARGETS", "Law", "law_wrench"]
+__all__ = ["LAW_WIDTH", "SYMBOLS", "WRENCH_TARGETS", "Law", "law_wrench"]
 
 #: symbols that a law may hold: time s, height m, airspeed m/s, angle of attack rad, rates in the H frame and spin
 #: rad/s; x, y, z are a sensor's own reading before noise, in its unit, and stand only in a law about that sensor
@@ -31,10 +33,11 @@ SYMBOLS = ("t", "h", "V", "alpha", "p_H", "q_H", "r", "x", "y", "z")
 #: what a law about motion may give: force and moment of the H frame, whose z axis is that of the body
 WRENCH_TARGETS = ("force_x_N", "force_y_N", "force_z_N", "moment_x_N_m", "moment_y_N_m", "moment_z_N_m")
 _SENSOR_ONLY = ("x", "y", "z")
+_FUNCTIONS = ("sign", "exp", "cos", "sin")
 _COUNT = len(SYMBOLS)
-#: a row of a law's numbers: place of its target, coefficient, and of each symbol the power of its magnitude and its
-#: sign to a power
-_WIDTH = 2 + 2 * _COUNT
+#: a row of a law's numbers: place of its target, coefficient, of each symbol the power of its magnitude and its sign
+#: to a power, decay in 1/s, order and phase of the angle turned
+_DECAY, _ORDER, _PHASE, LAW_WIDTH = (2 + 2 * _COUNT + k for k in range(4))
 _TOKEN = re.compile(r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*·/^|()]))")
 
 
@@ -62,7 +65,7 @@ class Law:
                 "such as magnetometer.x_uT"
             )
         for name, value in self.coefficients.items():
-            if not re.fullmatch(r"[A-Za-z_]\w*", name) or name in (*SYMBOLS, "sign"):
+            if not re.fullmatch(r"[A-Za-z_]\w*", name) or name in (*SYMBOLS, *_FUNCTIONS, "psi"):
                 raise InputError(
                     f"law: a coefficient is called '{name}'; expected a name that is no symbol of the state"
                 )
@@ -71,8 +74,11 @@ class Law:
         if strange := set(self.sigma) - set(self.coefficients):
             raise InputError(f"law: sigma of '{min(strange)}', which is no coefficient")
         rows = self.rows
-        if self.target in WRENCH_TARGETS and np.any(rows[:, 2 + SYMBOLS.index("x") : 2 + _COUNT]):
-            raise InputError("law: x, y and z are a sensor's reading; expected them only in a law about a sensor")
+        if self.target in WRENCH_TARGETS:
+            if np.any(rows[:, 2 + SYMBOLS.index("x") : 2 + _COUNT]):
+                raise InputError("law: x, y and z are a sensor's reading; expected them only in a law about a sensor")
+            if np.any(rows[:, _ORDER]):
+                raise InputError("law: psi is the angle turned; expected it only in a law about a sensor")
 
     @cached_property
     def rows(self) -> FloatArray:
@@ -82,7 +88,10 @@ class Law:
         return readonly([[place, *term] for term in parser.terms()])
 
     def evaluate(self, state: Mapping[str, ArrayLike]) -> FloatArray:
-        """Return the law at states given by symbol, each a number or (n,); raises KeyError where one is missing."""
+        """Return the law at states given by symbol (psi, too), each a number or (n,).
+
+        Raises KeyError where one is missing.
+        """
         total: FloatArray = np.zeros(())
         for row in self.rows:
             term = np.asarray(row[1])
@@ -91,6 +100,10 @@ class Law:
                 if power or odd:
                     x = np.asarray(state[symbol], dtype=np.float64)
                     term = term * np.abs(x) ** power * (np.sign(x) if odd else 1.0)
+            if row[_DECAY]:
+                term = term * np.exp(-row[_DECAY] * np.asarray(state["t"], dtype=np.float64))
+            if row[_ORDER]:
+                term = term * np.cos(row[_ORDER] * np.asarray(state["psi"], dtype=np.float64) + row[_PHASE])
             total = total + term
         return total
 
@@ -142,19 +155,54 @@ class _Parser:
 
     def _product(self, sign: float) -> list[float]:
         coefficient, powers, odd = sign, [0.0] * _COUNT, [0.0] * _COUNT
+        decay, order, phase = 0.0, 0.0, 0.0
         inverse = 1.0
         while True:
-            value, place, power, is_odd = self._factor()
-            if place < 0:
-                coefficient *= pow(value, inverse * power)
+            if self._peek() == "exp":
+                decay += inverse * self._decay()
+            elif self._peek() in ("cos", "sin"):
+                if order or inverse < 0.0:
+                    raise self._error("a second cos or sin in one product, or one below a stroke")
+                order, phase = self._turn()
+                if not order:
+                    coefficient *= np.cos(phase)
             else:
-                powers[place] += inverse * power
-                odd[place] = (odd[place] + is_odd) % 2.0
+                value, place, power, is_odd = self._factor()
+                if place < 0:
+                    coefficient *= pow(value, inverse * power)
+                else:
+                    powers[place] += inverse * power
+                    odd[place] = (odd[place] + is_odd) % 2.0
             if self._peek() in ("", "+", "-"):
-                return [coefficient, *powers, *odd]
+                return [float(coefficient), *powers, *odd, decay, order, phase]
             inverse = -1.0 if self._skip("/") else 1.0
             if inverse > 0.0:
                 self._skip("*", "·")
+
+    def _decay(self) -> float:
+        """Read ``exp(-t/tau)``; return 1/tau."""
+        for token in ("exp", "(", "-", "t", "/"):
+            self._take(token)
+        tau = self._number(self._take())
+        self._take(")")
+        if not tau:
+            raise self._error("a time constant of zero")
+        return 1.0 / tau
+
+    def _turn(self) -> tuple[float, float]:
+        """Read ``cos(k psi + phase)`` or the sine; return k and the phase of the cosine."""
+        phase = -0.5 * pi if self._take("cos", "sin") == "sin" else 0.0
+        self._take("(")
+        order = 1.0
+        if self._peek() != "psi":
+            order = self._number(self._take())
+            self._skip("*", "·")
+        self._take("psi")
+        if self._peek() != ")":
+            sign = -1.0 if self._take("+", "-") == "-" else 1.0
+            phase += sign * self._number(self._take())
+        self._take(")")
+        return order, phase
 
     def _factor(self) -> tuple[float, int, float, float]:
         """Return value of a number, place of a symbol (-1: a number), its power, and whether its sign is kept."""
@@ -222,6 +270,8 @@ def law_wrench(
                 term *= abs(state[k]) ** power
             if odd != 0.0:
                 term *= np.sign(state[k])
+        if rows[i, _DECAY] != 0.0:
+            term *= exp(-rows[i, _DECAY] * t)
         out[int(rows[i, 0])] += term
     return (
         cos_beta * out[0] - sin_beta * out[1],

@@ -18,6 +18,7 @@ from discsim.disc import Aero, Disc, Rig
 from discsim.effects.catalogue import CATALOGUE, Effect, by_id
 from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.law import LAW_WIDTH, WRENCH_TARGETS, Law
 
 __all__ = ["PARAMETERS", "Tables", "flight_parameters", "parameter_index", "parameters", "tables"]
 
@@ -102,17 +103,19 @@ class Tables(NamedTuple):
     """Tabulated coefficients as arrays for compiled code; empty where the linear forms hold.
 
     static is (4, n): alpha, C_L, C_D, C_M. rate (nr,) rad/s and speed (nv,) m/s are the knots of C_Nr, and spline
-    (nr - 1, nv - 1, 4, 4) its bicubic coefficients, highest powers first.
+    (nr - 1, nv - 1, 4, 4) its bicubic coefficients, highest powers first. law (terms, LAW_WIDTH) are the rows of a
+    `discsim.law.Law`.
     """
 
     static: FloatArray
     rate: FloatArray
     speed: FloatArray
     spline: FloatArray
+    law: FloatArray
 
 
-def tables(disc: Disc | None) -> Tables:
-    """Return the tables of a disc."""
+def tables(disc: Disc | None, law: Law | None = None) -> Tables:
+    """Return the tables of a disc, and of a law about motion; one about a sensor has none."""
     static = np.empty((4, 0))
     rate, speed, spline = np.empty(0), np.empty(0), np.empty((0, 0, 4, 4))
     if disc is not None and (lookup := disc.aero_table) is not None:
@@ -122,4 +125,6 @@ def tables(disc: Disc | None) -> Tables:
         along_rate = CubicSpline(rate, damping.CNr, axis=0).c  # (4, nr - 1, nv)
         along_both = CubicSpline(speed, along_rate, axis=2).c  # (4, nv - 1, 4, nr - 1)
         spline = np.ascontiguousarray(np.transpose(along_both, (3, 1, 2, 0)))
-    return Tables(static, rate, speed, spline)
+    acts = law is not None and law.target in WRENCH_TARGETS
+    rows = np.array(law.rows) if law is not None and acts else np.empty((0, LAW_WIDTH))
+    return Tables(static, rate, speed, spline, rows)

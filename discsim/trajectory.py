@@ -35,6 +35,7 @@ from discsim.effects.events import EVENT_WIDTH_S, impulse, spin_step
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.frames import euler_angles, heading_angles, norm3, quaternion_from_matrix, rotate_by_quaternion
+from discsim.law import Law, law_wrench
 from discsim.motion import Motion, State
 from discsim.parameters import PARAMETERS, Tables, flight_parameters, tables
 
@@ -87,6 +88,9 @@ def derivative(p: Any, tables: Tables, t: float, y: FloatArray, dy: FloatArray) 
     wn, we, wd = wind(p, t, h)
     u, v, w = rotate_by_quaternion(qw, -qx, -qy, -qz, y[3] - wn, y[4] - we, y[5] - wd)
     Fx, Fy, Fz, Mx, My, Mz = air_wrench(p, tables, h, u, v, w, P, Q, r)
+    if tables.law.shape[0] > 0:
+        Lx, Ly, Lz, Kx, Ky, Kz = law_wrench(tables.law, t, h, u, v, w, P, Q, r)
+        Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
 
     # from the geometric centre to the centre of mass, whose place e turns with psi: M - e x F
     ex_B, ey_B, _ = centre_of_mass(p.body_mass_imbalance)
@@ -631,13 +635,14 @@ def predict(
     rtol: float = RTOL,
     atol: float = ATOL,
     duration: float = 30.0,
+    law: Law | None = None,
 ) -> Flight:
     """Fly a disc by the standalone model, until its centre of mass reaches the ground or for ``duration`` s.
 
     rtol is of the size of velocity, attitude and rates, atol in SI units: estimated errors of one step. Raises
     `InputError` for a release that lacks something, and where a C_Nr table does not reach.
     """
-    flat, lookup = flight_parameters(disc, environment, effects), tables(disc)
+    flat, lookup = flight_parameters(disc, environment, effects), tables(disc, law)
     state = release_state(release)
     ended, t, states, dense = integrate(flat, lookup, state, 0.0, float(duration), rtol, atol, True)
     if ended == _LOST:
@@ -731,6 +736,9 @@ def predict_many(
     # a few pieces for each thread, for flights differ in length
     edges = np.linspace(0, n, min(n, 4 * count) + 1).astype(int)
     pieces = [slice(a, b) for a, b in itertools.pairwise(edges) if b > a]
-    with ThreadPoolExecutor(count) as pool:
-        list(pool.map(fly, pieces))
+    if count == 1 or len(pieces) == 1:
+        fly(slice(0, n))
+    else:
+        with ThreadPoolExecutor(count) as pool:
+            list(pool.map(fly, pieces))
     return Landings(end, last, touched, track)

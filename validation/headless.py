@@ -1,4 +1,4 @@
-"""The validation run: closed forms, rate table, throws; figures with tolerances, pictures and a page."""
+"""The validation run: closed forms, rate table, throws, C_Nr fed back; figures with tolerances, pictures and a page."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ import numpy as np
 from discsim.rig import PLATEAUS_DEG_S, default_profile
 from discsim.shipped import load_disc
 from validation.closed_forms import closed_form_checks
+from validation.feedback.figures import draw_fig_13
+from validation.feedback.loop import Loop, close_loop
+from validation.feedback.scoring import OUTPUT_ERROR
 from validation.figures import COLOURS, new_figure, save_figure, symmetric_log
+from validation.fitting.figures import draw_fit, draw_sources
 from validation.rate_table import plateau_table, rate_table_checks, run_rate_table, write_plateaus
 from validation.rate_table_figures import draw_methods, draw_waveform
 from validation.report import Section, write_report
@@ -47,11 +51,18 @@ def validate(run: Run, *, quick: bool, junit: Path | None = None) -> list[Score]
     scores += throw_checks(results)
     draw_throws(results, run.out / "throws.png")
 
+    run.step("C_Nr and the flights that it predicts")
+    loop = close_loop(results, disc, environment)
+    scores += loop.scores
+    draw_fit(loop.throws, loop.fit, loop.paper, run.out / "cnr.png")
+    draw_sources(loop.found, run.out / "cnr-sources.png")
+    draw_fig_13(loop.flown[0], run.out / "feedback.png")
+
     run.step("report")
     run.write_json("scores.json", [item.as_dict() for item in scores])
     if junit is not None:
         write_junit(junit, scores, time.monotonic() - started)
-    _write_report(run, scores, results)
+    _write_report(run, scores, results, loop)
     return scores
 
 
@@ -86,7 +97,7 @@ def draw_throws(results: Sequence[ThrowResult], path: Path) -> None:
     save_figure(figure, path)
 
 
-def _write_report(run: Run, scores: Sequence[Score], results: Sequence[ThrowResult]) -> None:
+def _write_report(run: Run, scores: Sequence[Score], results: Sequence[ThrowResult], loop: Loop) -> None:
     failed = sum(not item.ok for item in scores)
     verdict = (
         "every score is within its tolerance" if all_ok(scores) else f"{failed} scores are outside their tolerance"
@@ -130,6 +141,21 @@ def _write_report(run: Run, scores: Sequence[Score], results: Sequence[ThrowResu
             throw_rows,
             figures=[("Flights and errors", run.out / "throws.png")],
         ),
+        Section(
+            "C_Nr, and the flights that it predicts",
+            (
+                "One C_Nr for all throws, by output error and by straight lines and (26), from each method's spin. "
+                "Errors are those of the first throw flown with the source's C_Nr (output error) and spin at release; "
+                "the last column has the true spin, so that only C_Nr is the source's.",
+            ),
+            ("spin by", "CNr", "sd", "by (26)", "landing, m", "track, m", "landing by CNr alone, m"),
+            _loop_rows(loop),
+            figures=[
+                ("Spin, its models and what they leave", run.out / "cnr.png"),
+                ("C_Nr by source", run.out / "cnr-sources.png"),
+                ("Predicted flights against the truth", run.out / "feedback.png"),
+            ],
+        ),
     ]
     write_report(
         run.out / "report.html",
@@ -137,6 +163,17 @@ def _write_report(run: Run, scores: Sequence[Score], results: Sequence[ThrowResu
         f"{len(scores)} scores, seed {run.seed}: {verdict}.",
         sections,
     )
+
+
+def _loop_rows(loop: Loop) -> list[tuple[str, ...]]:
+    predicted = {item.damping.source: item for item in loop.flown[0].predicted if item.damping.way == OUTPUT_ERROR}
+    rows = []
+    for item in loop.found:
+        assert item.fit is not None
+        flight = predicted[item.source.label]
+        errors = (f"{value:.3f}" for value in (flight.landing, flight.track, flight.damping_only))
+        rows.append((item.source.label, f"{item.fit.CNr:.6f}", f"{item.fit.sd:.6f}", f"{item.fit.by_26:.6f}", *errors))
+    return rows
 
 
 def _cell(value: float) -> str:

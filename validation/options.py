@@ -10,13 +10,26 @@ from typing import Annotated, TypeAlias
 import typer
 
 from discsim.arrays import FloatArray, readonly
-from discsim.effects.catalogue import Effect, effect, row
+from discsim.disc import Disc
+from discsim.effects.catalogue import Effect, by_id, effect, row
 from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.model_file import Model, read_model
 from discsim.recording import Plant
-from discsim.shipped import load_site
+from discsim.shipped import load_disc, load_site
 
-__all__ = ["EffectOption", "OutOption", "SeedOption", "SiteOption", "at_site", "parse_effects", "parse_vector"]
+__all__ = [
+    "EffectOption",
+    "ModelOption",
+    "OutOption",
+    "SeedOption",
+    "SiteOption",
+    "all_effects",
+    "at_site",
+    "disc_to_fly",
+    "parse_effects",
+    "parse_vector",
+]
 
 OutOption: TypeAlias = Annotated[Path, typer.Option("--out", help="Folder to write into; created where absent.")]
 SeedOption: TypeAlias = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
@@ -31,6 +44,55 @@ EffectOption: TypeAlias = Annotated[
 SiteOption: TypeAlias = Annotated[
     str | None, typer.Option("--site", help="A shipped place's name or a TOML file: its magnetic field is taken.")
 ]
+
+ModelOption: TypeAlias = Annotated[
+    Path | None,
+    typer.Option(
+        "--model",
+        help="A model file: surroundings, disc, and effects; those of named recordings act where --out has that name.",
+    ),
+]
+
+
+def disc_to_fly(disc: str | None, model: Path | None) -> tuple[Disc, Environment, Model | None]:
+    """Return the disc of ``--disc`` (by default the driver) or of ``--model``, where it flies, and the model if any."""
+    if model is None:
+        return *load_disc(disc or "driver"), None
+    if disc is not None:
+        raise InputError(f"--disc {disc} and --model {model} both name a disc; expected one of them")
+    given = read_model(model)
+    if given.disc is None:
+        raise InputError(f"{model}: has no [disc]; expected the model of a disc")
+    return given.disc, given.environment, given
+
+
+def all_effects(
+    model: Model | None, texts: Sequence[str] | None, plant: Plant, sensors: Sequence[str], recording: str | None
+) -> tuple[list[Effect], list[str]]:
+    """Return the effects of a model and of ``--effect`` upon a recording, and one line for each that is passed over.
+
+    A model holds for more than one plant and more sensors, so what cannot act here is passed over; of ``--effect`` it
+    is refused. Raises `InputError` for an effect given twice.
+    """
+    effects, notes = [], []
+    for given in model.effects_in(recording) if model is not None else ():
+        if problem := _cannot_act(given, plant, sensors):
+            notes.append(f"the model's {given.id} is passed over: {problem}")
+        else:
+            effects.append(given)
+    effects += parse_effects(texts, plant, sensors)
+    by_id(effects)
+    return effects, notes
+
+
+def _cannot_act(given: Effect, plant: Plant, sensors: Sequence[str]) -> str:
+    """Return why an effect cannot act on a plant with these sensors; empty where it can."""
+    kind = row(given.id)
+    if plant not in kind.plants:
+        return f"acts on {', '.join(kind.plants)}; this is a {plant}"
+    if kind.acts_on not in ("motion", "clock", *sensors):
+        return f"there is no {kind.acts_on} on board, only {', '.join(sensors)}"
+    return ""
 
 
 def at_site(environment: Environment, site: str | None) -> Environment:
@@ -56,11 +118,8 @@ def parse_effects(texts: Sequence[str] | None, plant: Plant, sensors: Sequence[s
             except ValueError:
                 raise InputError(f"--effect {text}: '{item}' is no name=number; expected ID:name=number,...") from None
         given = effect(id.strip(), **sizes)
-        kind = row(given.id)
-        if plant not in kind.plants:
-            raise InputError(f"--effect {given.id}: acts on {', '.join(kind.plants)}; this is a {plant}")
-        if kind.acts_on not in ("motion", "clock", *sensors):
-            raise InputError(f"--effect {given.id}: there is no {kind.acts_on} on board, only {', '.join(sensors)}")
+        if problem := _cannot_act(given, plant, sensors):
+            raise InputError(f"--effect {given.id}: {problem}")
         effects.append(given)
     return effects
 

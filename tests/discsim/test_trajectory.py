@@ -230,6 +230,38 @@ class TestSensitivity:
                 scale = np.abs(expected[:, rows]).max()
                 assert np.abs(mine[:, rows] - expected[:, rows]).max() < 2e-6 * scale, column
 
+    @pytest.mark.parametrize(
+        ("id", "name", "size"),
+        [
+            ("air.wind", "w_north_m_s", 1e-2),
+            ("air.wind", "w_east_m_s", 1e-2),
+            ("air.gust", "w_east_m_s", 1e-2),
+            ("aero.spin_lift", "CLr", 1e-4),
+            ("aero.yaw_quadratic", "CNrr", 1e-5),
+            ("body.mass_imbalance", "ex_m", 1e-5),
+            ("body.inertia_asymmetry", "dIyy_kg_m2", 1e-7),
+            ("event.impulse", "dv_east_m_s", 1e-2),
+        ],
+    )
+    def test_an_effect_is_a_column_too(self, id, name, size):
+        """Central differences over two widths, extrapolated, of adaptive flights; 1e-5 of the largest derivative."""
+        timing = {"air.gust": {"t_s": 0.5, "width_s": 0.2}, "event.impulse": {"t_s": 0.5}}.get(id, {})
+
+        def effects(value):
+            return [effect(id, **timing, **{name: value})]
+
+        def path(value):
+            flight = predict(DRIVER, FIELD, WOBBLING, effects(value), duration=1.5, rtol=1e-13, atol=1e-13)
+            return flight.at(t).position
+
+        t, start = np.linspace(0.1, 1.4, 6), 2.0 * size
+        flight = predict(DRIVER, FIELD, WOBBLING, effects(start), duration=1.5, rtol=1e-10, atol=1e-10)
+        mine = sensitivities(flight, [(id, name)], t).derivative[:, :3, -1]
+        half, whole = ((path(start + k * size) - path(start - k * size)) / (2 * k * size) for k in (1, 2))
+        expected = (4 * half - whole) / 3
+        assert np.abs(expected).max() > 0.0
+        np.testing.assert_allclose(mine, expected, atol=1e-5 * np.abs(expected).max())
+
     def test_in_vacuum_it_is_the_identity_and_time(self):
         flight = predict(BARE, FIELD, throw())
         found = sensitivities(flight, [("environment", "gravity")])

@@ -122,6 +122,24 @@ def test_the_phase_turns_at_the_rate_of_the_derivation(thrown):
     assert 5 < abs(np.mean(departure)) < 15
 
 
+def test_nutation_leaves_only_a_term_of_second_order():
+    """It swings the phase's rate by about its own size, but on average by 0.013 deg/s for 15, and four times for 30."""
+    means = []
+    for nutation in (15.0, 30.0):
+        spin = Spin(
+            duration=1.0, decay=1e9, decay_change=0.0, precession=(0.0, 0.0), precession_change=(0.0, 0.0),
+            nutation=nutation, nutation_decay=1e9,
+        )  # fmt: skip
+        truth = move(spin, step=5e-4)
+        false = np.degrees(phase_rate(truth.attitude @ np.asarray(spin.magnetic_field), truth.w) + truth.w[:, 2])
+        assert np.std(false) > 0.9 * nutation
+        # a Hann window: the ends of the stretch, cut anywhere in a swing, would count for more
+        weight = np.hanning(false.size)
+        means.append(np.sum(weight * false) / np.sum(weight))
+    assert abs(means[0]) < 0.02
+    assert means[1] / means[0] == pytest.approx(4.0, rel=0.1)
+
+
 def test_a_gyroscope_removes_what_precession_does_to_the_phase(thrown):
     spin, truth = thrown
     faults = Faults(hard_iron=(11.0, 4.0, -15.0))

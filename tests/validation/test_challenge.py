@@ -319,7 +319,8 @@ def test_answers_are_sealed_before_and_opened_as_they_were(tmp_path):
         seal_answers([Request(seed, "flight") for seed in range(5)], tmp_path)
 
 
-def test_a_challenge_scores_reports_and_goes_on_where_it_was_stopped(tmp_path, spy):
+def test_a_challenge_scores_reports_and_goes_on_where_it_was_stopped(tmp_path, spy, monkeypatch):
+    monkeypatch.setattr("validation.challenge.run.code_digest", lambda: "as it is")
     requests = [Request(seed, "flight", (), kind) for seed, kind in ((40, "nothing"), (41, "off_catalogue"))]
     requests.append(Request(42, "flight", ("air.wind",)))
     with start_run(tmp_path / "out", 40) as run:
@@ -340,6 +341,10 @@ def test_a_challenge_scores_reports_and_goes_on_where_it_was_stopped(tmp_path, s
     with start_run(tmp_path / "out", 40) as run:
         again, _ = challenge(run, requests, workers=1, command=spy)
     assert [item.seconds for item in again] == [item.seconds for item in scored]
+    # of other code these would be no results
+    monkeypatch.setattr("validation.challenge.run.code_digest", lambda: "as it is now")
+    with start_run(tmp_path / "out", 40) as run, pytest.raises(InputError, match="versions differ"):
+        challenge(run, requests, workers=1, command=spy)
 
 
 # ------------------------------------------------------------------------------------------------ limits
@@ -364,6 +369,16 @@ def test_an_effect_twice_as_large_is_twice_as_far_above_its_limit():
         sizes.append(strength(replace(case, concealed=(Concealed(friction),))))
     assert sizes[1] == pytest.approx(2 * sizes[0], rel=1e-3)  # differences of 1e-3 of the size
     assert THRESHOLD > 0
+
+
+def test_a_limit_is_known_where_no_sensor_shows_an_unknown():
+    """Without a magnetometer the yaw of a rate table is in no reading, and takes in nothing."""
+    case = draw_case(5, "rate_table", ["rig.axis_tilt"])
+    for name in ("magnetometer", "gyroscope"):
+        case = replace(case, sheets_of=case.sheets_of.without(name), runs=case.runs[:1])
+    found = strength(case)
+    assert found is not None
+    assert found > 0
 
 
 def test_nothing_concealed_has_no_limit():

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
+from discsim.effects import effect
+from discsim.model_file import Model, ModelEffect, write_model
 from discsim.recording import read_recording
+from discsim.shipped import load_disc
 from validation import headless
 from validation.cli import main
 from validation.scores import at_most
@@ -91,6 +95,86 @@ def test_a_site_replaces_the_field(monkeypatch, tmp_path):
     assert 45.0 < down < 47.0
 
 
+def test_both_engines_fly_the_same_throw_from_the_command_line(monkeypatch, tmp_path):
+    """RK4 of 1 ms is 1e-5 m and 1e-3 deg from the standalone model on the driver's throw."""
+    truths = []
+    for engine in ("mujoco", "trajectory"):
+        assert run(monkeypatch, "fly", "--engine", engine, "--out", str(tmp_path / engine), "--seed", "1") == 0
+        truth = np.genfromtxt(tmp_path / engine / "truth.csv", delimiter=",", names=True)
+        truths.append(np.column_stack([truth[name] for name in truth.dtype.names]))
+    n = min(len(truth) for truth in truths) - 1
+    difference = np.abs(truths[0][:n] - truths[1][:n])
+    assert difference[:, 1:4].max() < 1e-4
+    assert np.degrees(difference[:, 7:10].max()) < 0.01
+    ends = [truth[-1] for truth in truths]
+    np.testing.assert_allclose(ends[0][:4], ends[1][:4], atol=1e-4)
+
+
+class TestModel:
+    @pytest.fixture
+    def model(self, tmp_path: Path) -> Path:
+        disc, environment = load_disc("dd2")
+        path = tmp_path / "model.toml"
+        shared = ModelEffect(effect("air.wind", w_north_m_s=3.0), {"w_north_m_s": 0.1})
+        here = ModelEffect(effect("mag.hard_iron", bz_uT=25.0), {}, ("named",))
+        rig = ModelEffect(effect("rig.axis_tilt", tilt_north_rad=0.01))
+        write_model(Model(environment, replace(disc, sigma={"CNr": 1e-4}), effects=(shared, here, rig)), path)
+        return path
+
+    @pytest.mark.parametrize("engine", ["mujoco", "trajectory"])
+    def test_a_model_is_flown_with_its_tables_and_effects(self, monkeypatch, tmp_path, capsys, model, engine):
+        """The same as its disc and its effects named one by one, to the byte; what acts on a rig is passed over."""
+        common = ["fly", "--engine", engine, "--duration", "1"]
+        assert run(monkeypatch, *common, "--model", str(model), "--out", str(tmp_path / "a" / "flight")) == 0
+        assert "rig.axis_tilt is passed over: acts on rate_table" in capsys.readouterr().out
+        given = ["--disc", "dd2", "--effect", "air.wind:w_north_m_s=3"]
+        assert run(monkeypatch, *common, *given, "--out", str(tmp_path / "b" / "flight")) == 0
+        for name in ("truth.csv", "magnetometer.csv", "accelerometer.csv"):
+            assert (tmp_path / "a" / "flight" / name).read_bytes() == (tmp_path / "b" / "flight" / name).read_bytes()
+        stated = read_recording(tmp_path / "a" / "flight").disc
+        assert stated is not None
+        assert stated.sigma["CNr"] == 1e-4
+
+    def test_an_effect_of_named_recordings_acts_on_those(self, monkeypatch, tmp_path, model):
+        for name in ("named", "other"):
+            arguments = ["fly", "--engine", "trajectory", "--duration", "1", "--model", str(model)]
+            assert run(monkeypatch, *arguments, "--out", str(tmp_path / name)) == 0
+        named, other = (read_recording(tmp_path / n).need("magnetometer").value[:, 2] for n in ("named", "other"))
+        assert np.mean(named - other) == pytest.approx(25.0, abs=0.5)
+
+    def test_a_rate_table_takes_its_surroundings_and_what_acts_on_it(self, monkeypatch, tmp_path, model, short_profile):
+        out = tmp_path / "run"
+        assert (
+            run(monkeypatch, "rate-table", "--profile", str(short_profile), "--model", str(model), "--out", str(out))
+            == 0
+        )
+        field = read_recording(out).environment.magnetic_field
+        np.testing.assert_array_equal(field, load_disc("dd2")[1].magnetic_field)
+
+    @pytest.mark.parametrize(
+        ("old", "new", "expected"),
+        [
+            ("CNr =", "CNrr =", "CNrr"),
+            ("mass_kg =", "weight_kg = 1.0\nmass_kg =", "weight_kg"),
+            ("w_north_m_s = 3.0", "w_up_m_s = 3.0", "w_up_m_s"),
+            ("[disc]", "[disk]\n[disc]", "disk"),
+        ],
+    )
+    @pytest.mark.parametrize("command", ["fly", "view"])
+    def test_an_unknown_key_is_refused_by_name(self, monkeypatch, tmp_path, capsys, model, command, old, new, expected):
+        model.write_text(model.read_text().replace(old, new, 1))
+        assert run(monkeypatch, command, "--model", str(model), "--out", str(tmp_path / "flight")) == 2
+        assert expected in capsys.readouterr().err
+
+    def test_a_disc_twice_and_an_effect_twice_are_refused(self, monkeypatch, tmp_path, capsys, model):
+        for more, expected in (
+            (["--disc", "dd2"], "both name a disc"),
+            (["--effect", "air.wind:w_east_m_s=1"], "'air.wind' is given twice"),
+        ):
+            assert run(monkeypatch, "fly", "--model", str(model), "--out", str(tmp_path / "flight"), *more) == 2
+            assert expected in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
@@ -151,7 +235,7 @@ def test_validate_scores_everything_and_leaves_its_report(monkeypatch, tmp_path,
     assert set(scores[0]) == {"name", "value", "unit", "expected", "tolerance", "ok"}
     assert all(score["ok"] for score in scores)
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 3
+    assert page.count("data:image/png;base64,") == 6
     suite = ElementTree.parse(junit).getroot()[0]
     assert int(suite.get("tests")) == len(scores)
     assert suite.get("failures") == "0"

@@ -15,7 +15,7 @@ from discsim.files import digest
 from discsim.recording import PLANTS, SENSORS, Samples, read_dataset
 from discsim.rig import spin_down
 from discsim.sensors import Noise
-from validation.challenge.cases import Case, Coast, Turning, draw_case
+from validation.challenge.cases import MASKS, Case, Coast, Turning, draw_case
 from validation.challenge.conceal import Answer, conceal, read_answer, recordings
 from validation.challenge.physics import OFF_CATALOGUE, coast, play
 from validation.challenge.sizes import HIDING, conceivable, draw_effect
@@ -197,6 +197,44 @@ def test_what_cannot_be_concealed_there_is_refused():
         draw_case(0, "rate_table", ["air.wind"])
     with pytest.raises(InputError, match="turbulence: cannot act on a spin_down"):
         draw_case(0, "spin_down", ["turbulence"])
+
+
+@pytest.mark.parametrize("mask", MASKS)
+def test_a_mask_makes_the_same_case_harder(mask):
+    for seed in range(25):
+        bare, masked = draw_case(seed), draw_case(seed, mask=mask)
+        assert masked.plant == bare.plant
+        assert masked.verdict == bare.verdict
+        sensors = masked.instruments.sensors
+        if mask == "few_recordings":
+            assert len(masked.runs) == 2
+        elif mask == "short":
+            assert masked.longest == 1.5
+            assert all(run.duration == 6.0 for run in masked.runs if isinstance(run, Coast))
+            instants = [item.effect.value.t_s for item in masked.concealed if item.recording is not None]
+            assert all(0.2 < t_s < 5.0 for t_s in instants)
+        elif mask == "clipped":
+            assert all(sensors[name].range < 80.0 for name in ("accelerometer", "gyroscope") if name in sensors)
+        elif mask == "magnetometer_only":
+            assert list(sensors) == ["magnetometer"]
+        elif mask == "coloured_noise":
+            still = [sensor.noise for name, sensor in sensors.items() if name != "gps"]
+            assert all(noise.correlated > 0 for noise in still)
+        elif mask == "stated_loosely" and masked.plant in ("flight", "spin_down"):
+            assert masked.moved
+        elif mask == "second_effect" and bare.kind == "one":
+            assert masked.kind == "two"
+            assert masked.concealed[0].effect == bare.concealed[0].effect
+
+
+def test_a_flight_that_is_cut_short_is_recorded_no_longer():
+    case = draw_case(2, "flight", mask="short")
+    assert recordings(replace(case, runs=case.runs[:1], stated_releases=()))[0].end <= 1.5
+
+
+def test_a_mask_that_leaves_no_sensor_to_conceal_in_is_refused():
+    with pytest.raises(InputError, match="leaves no accelerometer"):
+        draw_case(0, "flight", ["accel.bias"], mask="magnetometer_only")
 
 
 RIG, BENCH = Rig(1.1e-3, 3e-5), Environment(air_density=None)

@@ -126,7 +126,8 @@ def cluster(folder: Path) -> Iterator[str]:
     try:
         options = ["--port", "0", "--scheduler-file", str(file)]
         processes.append(subprocess.Popen([*dask, "scheduler", *local, *options], **quiet))
-        wait_until(file.exists, "the scheduler")
+        # the file appears before its content does
+        wait_until(lambda: file.exists() and file.read_text().rstrip().endswith("}"), "the scheduler")
         address = json.loads(file.read_text())["address"]
         for name in ("one", "two"):
             options = ["--nthreads", "2", "--no-nanny", "--name", name, "--local-directory", str(folder / name)]

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from discsim.errors import InputError
 from discsim.files import digest, write_text
 from discsim.recording import Plant
-from validation.challenge.cases import Kind, draw_case
+from validation.challenge.cases import Kind, Mask, draw_case
 from validation.challenge.conceal import Answer, read_answer, write_recordings
 
 __all__ = ["DIAGNOSE", "Request", "diagnose_blind", "open_answers", "seal_answers"]
@@ -36,6 +36,7 @@ class Request(NamedTuple):
     plant: Plant | None = None
     effects: tuple[str, ...] = ()
     kind: Kind | None = None
+    mask: Mask | None = None
 
     @property
     def name(self) -> str:
@@ -44,7 +45,7 @@ class Request(NamedTuple):
 
     def draw(self) -> Any:
         """Return the case."""
-        return draw_case(self.seed, self.plant, self.effects, self.kind)
+        return draw_case(self.seed, self.plant, self.effects, self.kind, self.mask)
 
 
 def seal_answers(requests: Sequence[Request], out: Path) -> dict[str, str]:

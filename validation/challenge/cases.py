@@ -31,7 +31,27 @@ from validation.challenge.physics import OFF_CATALOGUE, OffCatalogue
 from validation.challenge.sizes import conceivable, draw_effect
 from validation.throws import Throw
 
-__all__ = ["KINDS", "Case", "Coast", "Concealed", "Kind", "Run", "draw_case"]
+__all__ = ["KINDS", "MASKS", "Case", "Coast", "Concealed", "Kind", "Mask", "Run", "Turning", "draw_case"]
+
+Mask = Literal[
+    "stated_loosely", "coloured_noise", "second_effect", "few_recordings", "short", "clipped", "magnetometer_only"
+]
+#: under what an effect may hide, in words
+MASKS: Mapping[Mask, str] = {
+    "stated_loosely": "every coefficient is off by its stated sigma",
+    "coloured_noise": "the noise of every sensor is louder than stated and correlated",
+    "second_effect": "a second effect, as large as they come, hides the first",
+    "few_recordings": "two recordings only",
+    "short": "flights end after 1.5 s, runs of a rig after 6 s",
+    "clipped": "accelerometer of 8 g and gyroscope of 500 deg/s, clipped most of the time",
+    "magnetometer_only": "no other sensor",
+}
+#: lengths of what a ``short`` case records, s
+SHORT_FLIGHT_S, SHORT_RUN_S = 1.5, 6.0
+#: nearly all flights of the challenge last longer, s
+ORDINARY_FLIGHT_S = 3.5
+#: no throw of the challenge stays up this long, s
+LONGEST_FLIGHT_S = 20.0
 
 Kind = Literal["nothing", "noise", "within_sigma", "beyond_sigma", "one", "two", "off_catalogue"]
 
@@ -87,7 +107,8 @@ class Concealed:
 class Case:
     """Everything about one case; only what is ``stated`` and what the instruments read reaches a recording.
 
-    ``disc`` and ``rig`` are the true ones, ``sheets_of`` the instruments as their data sheets describe them.
+    ``disc`` and ``rig`` are the true ones, ``sheets_of`` the instruments as their data sheets describe them. A flight
+    is recorded until it ends or for ``longest`` (s).
     """
 
     seed: int
@@ -105,6 +126,13 @@ class Case:
     stated_rig: Rig | None = None
     stated_releases: tuple[Release | None, ...] = ()
     moved: Mapping[str, float] = field(default_factory=dict)
+    longest: float = LONGEST_FLIGHT_S
+
+    @property
+    def recorded(self) -> float:
+        """Shortest time that a recording lasts, s; of a flight about."""
+        rig_runs = [run.duration for run in self.runs if isinstance(run, Coast)]
+        return min(rig_runs, default=min(self.longest, ORDINARY_FLIGHT_S))
 
     @property
     def verdict(self) -> str:
@@ -116,10 +144,16 @@ class Case:
         return "recalibrated" if self.kind == "beyond_sigma" else "consistent"
 
 
-def draw_case(seed: int, plant: Plant | None = None, effects: Sequence[str] = (), kind: Kind | None = None) -> Case:
+def draw_case(
+    seed: int,
+    plant: Plant | None = None,
+    effects: Sequence[str] = (),
+    kind: Kind | None = None,
+    mask: Mask | None = None,
+) -> Case:
     """Draw the case of a seed; a plant, a kind, or effects (ids, or names of off-catalogue physics) may be asked for.
 
-    Raises `InputError` where what is asked for does not go together.
+    A ``mask`` is put over it (`MASKS`). Raises `InputError` where what is asked for does not go together.
     """
     rng = np.random.default_rng(seed)
     drawn_plant: Plant = rng.choice(list(PLANT_SHARES), p=list(PLANT_SHARES.values()))
@@ -127,11 +161,24 @@ def draw_case(seed: int, plant: Plant | None = None, effects: Sequence[str] = ()
     plant, kind = plant or _plant_of(effects, str(drawn_plant)), kind or _kind_of(effects, str(drawn_kind))
     if kind in ("within_sigma", "beyond_sigma") and plant in ("rate_table", "free_spin"):
         kind = "nothing"  # nothing stated there has a sigma
-    case = _bench(seed, plant, kind, rng) if plant in ("rate_table", "spin_down") else _throws(seed, plant, kind, rng)
-    wanted = _sensors_wanted(effects)
-    case = _with_sensors(case, wanted, rng)
-    case = _hide(case, effects, rng)
-    return _stated(_noisy(case, rng), rng)
+    loosely = mask == "stated_loosely" or kind in ("within_sigma", "beyond_sigma")
+    if plant in ("rate_table", "spin_down"):
+        case = _bench(seed, plant, kind, rng)
+    else:
+        case = _throws(seed, plant, kind, rng, linear=loosely)
+    case = _with_sensors(case, _sensors_wanted(effects), rng, mask)
+    case = _shortened(case, mask)
+    case = _hide(case, effects, rng, doubled=mask == "second_effect")
+    return _stated(_noisy(case, rng, everywhere=mask == "coloured_noise"), rng, loosely=loosely)
+
+
+def _shortened(case: Case, mask: Mask | None) -> Case:
+    if mask == "few_recordings":
+        return replace(case, runs=case.runs[:2])
+    if mask != "short":
+        return case
+    runs = [replace(run, duration=SHORT_RUN_S) if isinstance(run, Coast) else run for run in case.runs]
+    return replace(case, runs=tuple(runs), longest=SHORT_FLIGHT_S)
 
 
 def _plant_of(effects: Sequence[str], drawn: str) -> Plant:
@@ -208,11 +255,11 @@ def _throw(number: int, count: int, disc: Disc, start: float, rng: np.random.Gen
     return replace(release, body_rate=release.body_rate + np.array([*wobble, 0.0]))
 
 
-def _throws(seed: int, plant: Plant, kind: Kind, rng: np.random.Generator) -> Case:
+def _throws(seed: int, plant: Plant, kind: Kind, rng: np.random.Generator, *, linear: bool) -> Case:
     environment = _place(rng)
     if plant == "flight" and rng.random() < 0.15:
         environment = replace(environment, wind=np.append(rng.normal(0.0, 1.5, 2).round(1), 0.0))
-    disc = _disc(rng, linear=kind in ("within_sigma", "beyond_sigma"))
+    disc = _disc(rng, linear=linear)
     count = int(rng.integers(3, 9))
     start = rng.uniform(0.0, 360.0)
     runs = tuple(_throw(number, count, disc, start, rng) for number in range(count))
@@ -257,14 +304,22 @@ def _profile(number: int, rng: np.random.Generator) -> Samples:
 # ---------------------------------------------------------------------------------------------- sensors
 
 
-def _with_sensors(case: Case, wanted: set[str], rng: np.random.Generator) -> Case:
+def _with_sensors(case: Case, wanted: set[str], rng: np.random.Generator, mask: Mask | None) -> Case:
     """Put sensors on board; all of ``wanted`` are there."""
     sensors = _module(case.plant, rng)
     for name in sorted(_missing(case.plant, rng) - wanted):
         sensors.pop(name, None)
     if "track" not in wanted and case.plant == "flight" and "gps" in sensors and rng.random() < 0.8:
         sensors.pop("track")
+    if mask == "magnetometer_only":
+        if others := wanted - {"magnetometer"}:
+            raise InputError(f"mask {mask}: leaves no {', '.join(sorted(others))} to conceal anything in")
+        sensors = {"magnetometer": _module(case.plant, rng)["magnetometer"]}
     instruments = Instruments(sensors)
+    if mask == "clipped":
+        for name, limit in (("accelerometer", 78.4532), ("gyroscope", 8.7266)):
+            if name in sensors:
+                instruments = instruments.fitted(name, range=limit)
     return replace(case, instruments=instruments, sheets_of=instruments)
 
 
@@ -321,15 +376,16 @@ def _module(plant: Plant, rng: np.random.Generator) -> dict[str, Sensor]:
     return module
 
 
-def _noisy(case: Case, rng: np.random.Generator) -> Case:
-    """Let some sensors of a ``noise`` case be louder, quieter or slower than their sheets state."""
-    if case.kind != "noise":
+def _noisy(case: Case, rng: np.random.Generator, *, everywhere: bool) -> Case:
+    """Let some sensors of a ``noise`` case be louder, quieter or slower than stated; ``everywhere`` all are slower."""
+    if case.kind != "noise" and not everywhere:
         return case
     instruments = case.instruments
     names = list(instruments.sensors)
-    for name in rng.choice(names, size=int(rng.integers(1, min(3, len(names)) + 1)), replace=False).tolist():
+    some = len(names) if everywhere else int(rng.integers(1, min(3, len(names)) + 1))
+    for name in rng.choice(names, size=some, replace=False).tolist():
         fields = ("position_noise", "velocity_noise") if name == "gps" else ("noise",)
-        coloured, louder = rng.random() < 0.5, rng.random() < 0.6
+        coloured, louder = everywhere or rng.random() < 0.5, rng.random() < 0.6
         factor = float(rng.uniform(1.3, 3.0) if louder else rng.uniform(0.4, 0.75))
         correlation = float(np.exp(rng.uniform(np.log(0.03), np.log(1.5))))
         for item in fields:
@@ -342,8 +398,8 @@ def _noisy(case: Case, rng: np.random.Generator) -> Case:
 # ---------------------------------------------------------------------------------------------- concealing
 
 
-def _hide(case: Case, effects: Sequence[str], rng: np.random.Generator) -> Case:
-    """Choose and size what is concealed: ``effects`` where given."""
+def _hide(case: Case, effects: Sequence[str], rng: np.random.Generator, *, doubled: bool) -> Case:
+    """Choose and size what is concealed: ``effects`` where given; ``doubled``: and another of its largest size."""
     sensors = tuple(case.instruments.sensors)
     if case.kind == "off_catalogue":
         possible = [
@@ -358,17 +414,23 @@ def _hide(case: Case, effects: Sequence[str], rng: np.random.Generator) -> Case:
         return replace(case, secret=secret)
     if case.kind not in ("one", "two"):
         return case
-    ids = list(effects)
-    for id in ids:
+    for id in effects:
         if case.plant not in row(id).plants:
             raise InputError(f"{id}: acts on {', '.join(row(id).plants)}; this is a {case.plant}")
     possible = conceivable(case.plant, sensors)
-    while len(ids) < (2 if case.kind == "two" else 1):
-        ids.append(str(rng.choice([id for id in possible if all(_goes_with(id, other) for other in ids)])))
-    concealed = []
-    for id in ids:
+    if "accelerometer" in sensors and case.instruments.sensors["accelerometer"].range < 100.0:  # type: ignore[union-attr]
+        possible.remove("accel.saturation")  # it clips by its sheet before it could by a fault
+    if doubled:
+        case = replace(case, kind="two")
+    count = max(len(effects), 2 if case.kind == "two" else 1)
+    concealed: list[Concealed] = []
+    for number in range(count):
+        others = [item.effect.id for item in concealed]
+        free = [id for id in possible if all(_goes_with(id, other) for other in others)]
+        id = effects[number] if number < len(effects) else str(rng.choice(free))
         only = int(rng.integers(len(case.runs))) if row(id).event else None
-        concealed.append(Concealed(draw_effect(id, case.plant, rng), only))
+        largest = doubled and number == count - 1
+        concealed.append(Concealed(draw_effect(id, case.plant, rng, case.recorded, largest=largest), only))
     return replace(case, concealed=tuple(concealed))
 
 
@@ -391,12 +453,12 @@ def _goes_with(id: str, other: str) -> bool:
 # ---------------------------------------------------------------------------------------------- what is stated
 
 
-def _stated(case: Case, rng: np.random.Generator) -> Case:
+def _stated(case: Case, rng: np.random.Generator, *, loosely: bool) -> Case:
     """Turn what is drawn so far (the stated numbers) into stated ones with a sigma, and true ones that differ."""
     if case.plant == "spin_down":
-        case = _stated_rig(case, rng)
+        case = _stated_rig(case, rng, loosely)
     elif case.plant == "flight":
-        case = _stated_coefficients(case, rng)
+        case = _stated_coefficients(case, rng, loosely)
         if rng.random() < 0.25:
             case = replace(case, stated_releases=tuple(_stated_release(run, rng) for run in case.runs))
     return case
@@ -414,9 +476,9 @@ def _beyond(rng: np.random.Generator) -> float:
     return float(rng.uniform(4.5, 8.0) * (1.0 if rng.random() < 0.5 else -1.0))
 
 
-def _stated_rig(case: Case, rng: np.random.Generator) -> Case:
+def _stated_rig(case: Case, rng: np.random.Generator, loosely: bool) -> Case:
     uncertain = rng.random() < 0.5
-    if not (uncertain or case.kind in ("within_sigma", "beyond_sigma")):
+    if not (uncertain or loosely):
         return case
     assert case.stated_rig is not None
     viscous = case.stated_rig.viscous
@@ -427,13 +489,13 @@ def _stated_rig(case: Case, rng: np.random.Generator) -> Case:
     return replace(case, stated_rig=stated, rig=Rig(stated.Izz, true), moved={"viscous_N_m_s": true})
 
 
-def _stated_coefficients(case: Case, rng: np.random.Generator) -> Case:
+def _stated_coefficients(case: Case, rng: np.random.Generator, loosely: bool) -> Case:
     beside = all(item.effect.id.startswith(_BESIDE_COEFFICIENTS) for item in case.concealed)
     competing = case.kind == "one" and beside and rng.random() < 0.15
     disc = case.stated_disc
     assert disc is not None
     assert disc.aero is not None
-    if not (competing or case.kind in ("within_sigma", "beyond_sigma")) or disc.aero_table is not None:
+    if not (competing or loosely) or disc.aero_table is not None:
         return case
     share = float(rng.choice([0.02, 0.03, 0.04]))
     names = [name for name in disc.aero._fields if name != "alpha0"]

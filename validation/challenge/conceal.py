@@ -25,13 +25,10 @@ from discsim.recording import PLANTS, Plant, Recording, toml_lines, write_record
 from discsim.rig import turn_table
 from discsim.sensors import record
 from discsim.toml_table import read_toml
-from validation.challenge.cases import Case, Coast, Kind, Run, Turning, draw_case
+from validation.challenge.cases import Case, Coast, Kind, Mask, Run, Turning, draw_case
 from validation.challenge.physics import HiddenDisc, coast, haunted
 
 __all__ = ["Answer", "conceal", "read_answer", "recordings", "seal", "write_recordings"]
-
-#: no throw of the challenge stays up this long, s
-LONGEST_FLIGHT = 20.0
 
 
 @dataclass(frozen=True)
@@ -180,7 +177,7 @@ def _flight(case: Case, release: Release, effects: Sequence[Effect], number: int
     assert case.disc is not None
     assert release.velocity is not None
     flying = HiddenDisc(case.disc, environment, rest, case.secret, number)
-    motion = follow(flying, replace(release, velocity=release.velocity - drift), duration=LONGEST_FLIGHT)
+    motion = follow(flying, replace(release, velocity=release.velocity - drift), duration=case.longest)
     if not np.any(drift):
         return motion
     return replace(
@@ -211,11 +208,12 @@ def seal(
     plant: Plant | None = None,
     effects: Sequence[str] = (),
     kind: Kind | None = None,
+    mask: Mask | None = None,
 ) -> dict[str, dict[str, str]]:
     """Conceal the cases of ``cases`` seeds from ``seed`` on in ``out``; return (and write) the digests by case."""
     digests = {}
     for number in range(seed, seed + cases):
-        case = draw_case(number, plant, effects, kind)
+        case = draw_case(number, plant, effects, kind, mask)
         name = f"case-{number:05d}"
         digests[name] = conceal(case, out / name, out / "answers" / f"{name}.toml")
         print(f"{name}: {case.plant}, {len(case.runs)} recordings", flush=True)
@@ -231,10 +229,11 @@ def main() -> None:
     parser.add_argument("--plant", choices=PLANTS)
     parser.add_argument("--effects", nargs="*", default=[], help="ids of the catalogue, or one off-catalogue name")
     parser.add_argument("--kind", choices=get_args(Kind))
+    parser.add_argument("--mask", choices=get_args(Mask))
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
     try:
-        seal(given.out, given.seed, given.cases, given.plant, given.effects, given.kind)
+        seal(given.out, given.seed, given.cases, given.plant, given.effects, given.kind, given.mask)
     except InputError as error:
         parser.error(str(error))
 

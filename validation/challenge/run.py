@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+import discsim
 from validation.challenge.blind import DIAGNOSE, Request, diagnose_blind, open_answers, seal_answers
 from validation.challenge.conceal import Answer
 from validation.challenge.page import write_page
@@ -81,7 +84,7 @@ def challenge(
     if anew:
         discard(folder)
         (run.out / "sealed.json").unlink(missing_ok=True)
-    versions = {"discsim": package_version(), "numpy": np.__version__}
+    versions = {"discsim": package_version(), "numpy": np.__version__, "code": code_digest()}
     claim(folder, {"cases": [list(request) for request in requests], "command": command, "versions": versions})
     seal_answers(requests, run.out)
     run.step(f"{len(requests)} answers are sealed; their digests stand in {run.out / 'sealed.json'}")
@@ -130,6 +133,16 @@ def challenge(
     )
     write_page(run.out, scored, rates)
     return scored, rates
+
+
+def code_digest() -> str:
+    """Return the SHA-256 of the simulation, the diagnosis and this test: a result of other code is no result of it."""
+    total = hashlib.sha256()
+    here = Path(__file__).parents[1]
+    for folder in (Path(discsim.__file__).parent, here / "diagnosis", here / "challenge"):
+        for file in sorted(folder.rglob("*.py")):
+            total.update(str(file.relative_to(folder)).encode() + b"\0" + file.read_bytes() + b"\0")
+    return total.hexdigest()
 
 
 def limit_of(request: tuple[Any, ...], shared: Any) -> dict[str, float | None]:

@@ -88,6 +88,8 @@ class _Shared:
 def _orthonormal(columns: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the columns' span; directions that nothing shows are left out."""
     norms = np.linalg.norm(columns, axis=0)
+    if not np.any(norms > 0):  # without a magnetometer no yaw shows
+        return np.empty((len(columns), 0))
     u, s, _ = np.linalg.svd(columns[:, norms > 0] / norms[norms > 0], full_matrices=False)
     return np.asarray(u[:, s > 1e-7 * s[0]])
 
@@ -124,7 +126,7 @@ def _motion(case: Case, run: Run, effects: Sequence[Effect], disc: Disc | None, 
         assert rig is not None
         return spin_down(rig, case.environment, run.rate, run.duration, effects, yaw=run.yaw, timestep=4e-3)
     assert disc is not None
-    return predict(disc, case.environment, run, effects).motion()
+    return predict(disc, case.environment, run, effects, duration=case.longest).motion()
 
 
 def _measured(case: Case, motion: Motion, effects: Sequence[Effect]) -> Readings:

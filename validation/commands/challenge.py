@@ -12,6 +12,7 @@ from validation.options import OutOption, SeedOption
 
 if TYPE_CHECKING:
     from discsim.recording import Plant
+    from validation.challenge.cases import Mask
 
 __all__ = ["command"]
 
@@ -25,12 +26,27 @@ class PlantName(enum.StrEnum):
     free_spin = "free_spin"
 
 
+class MaskName(enum.StrEnum):
+    """Under what an effect hides."""
+
+    stated_loosely = "stated_loosely"
+    coloured_noise = "coloured_noise"
+    second_effect = "second_effect"
+    few_recordings = "few_recordings"
+    short = "short"
+    clipped = "clipped"
+    magnetometer_only = "magnetometer_only"
+
+
 def command(
     cases: Annotated[int, typer.Option(min=1, help="Number of cases; case k has seed --seed + k.")] = 20,
     plant: Annotated[PlantName | None, typer.Option(help="Only this plant. Default: all four.")] = None,
     effect: Annotated[
         list[str] | None,
         typer.Option(help="Conceal this in every case, an id of the catalogue; may repeat. Default: as drawn."),
+    ] = None,
+    mask: Annotated[
+        MaskName | None, typer.Option(help="Put this over every case, to see how the score degrades.")
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a running Dask scheduler. Default: local processes.")
@@ -59,7 +75,8 @@ def command(
     if scheduler is not None and workers is not None:
         raise InputError("--workers counts local processes, and --scheduler uses none; expected one of the two")
     chosen: Plant | None = plant.value if plant is not None else None
-    requests = [Request(number, chosen, tuple(effect or ())) for number in range(seed, seed + cases)]
+    over: Mask | None = mask.value if mask is not None else None
+    requests = [Request(number, chosen, tuple(effect or ()), None, over) for number in range(seed, seed + cases)]
     requests[0].draw()  # what does not go together is refused before anything is written
     with start_run(out, seed) as run:
         scored, rates = challenge(run, requests, scheduler=scheduler, workers=workers, anew=anew)

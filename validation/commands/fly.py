@@ -8,7 +8,16 @@ from typing import Annotated
 
 import typer
 
-from validation.options import EffectOption, OutOption, SeedOption, SiteOption, at_site, parse_effects
+from validation.options import (
+    EffectOption,
+    ModelOption,
+    OutOption,
+    SeedOption,
+    SiteOption,
+    all_effects,
+    at_site,
+    disc_to_fly,
+)
 
 __all__ = ["command"]
 
@@ -28,9 +37,11 @@ class Engine(enum.StrEnum):
 
 
 def command(
-    disc: Annotated[str, typer.Option(help="A shipped disc's name, or a TOML file with [disc] and [environment].")] = (
-        "driver"
-    ),
+    disc: Annotated[
+        str | None,
+        typer.Option(help="A shipped disc's name, or a TOML file with [disc] and [environment]. Default: driver."),
+    ] = None,
+    model: ModelOption = None,
     throw: Annotated[
         str, typer.Option(help="A shipped throw's name, or a TOML file with the keys of [release].")
     ] = "driver",
@@ -52,25 +63,27 @@ def command(
     Writes a recording folder (recording.toml and one CSV file per sensor) and truth.csv into --out.
 
     Example: discsim fly --disc driver --effect air.wind:w_north_m_s=2 --out flight
+    or, with what a diagnosis or a fit has written: discsim fly --model model.toml --engine trajectory --out flight
     """
     from discsim.engine import fly
     from discsim.errors import InputError
     from discsim.recording import write_recording
     from discsim.sensors import Instruments, record
-    from discsim.shipped import load_disc, load_throw
+    from discsim.shipped import load_throw
     from discsim.trajectory import predict
     from validation.run import start_run
     from validation.truth import write_flight_truth
 
     if engine is Engine.trajectory and ground is Ground.skip:
         raise InputError("--engine trajectory knows no contact with the ground; expected --ground stop with it")
-    body, surroundings = load_disc(disc)
+    body, surroundings, stated = disc_to_fly(disc, model)
     environment = at_site(surroundings, site)
     release = load_throw(throw)
     instruments = Instruments.from_parts(*parts.split(","))
-    effects = parse_effects(effect, "flight", list(instruments.sensors))
+    effects, notes = all_effects(stated, effect, "flight", list(instruments.sensors), out.resolve().name)
     instruments = instruments.with_effects(effects)
-    inputs = [Path(name) for name in (disc, throw, site or "", *parts.split(",")) if name.endswith(".toml")]
+    names = (disc or "", throw, site or "", *parts.split(","))
+    inputs = [*([model] if model else []), *(Path(name) for name in names if name.endswith(".toml"))]
     with start_run(out, seed, inputs) as run:
         if engine is Engine.trajectory:
             motion = predict(body, environment, release, effects, duration=duration).motion()
@@ -81,4 +94,6 @@ def command(
         write_flight_truth(out / "truth.csv", motion)
         north, east = motion.position[-1, :2]
         what = "touches down" if motion.touched_down else "is left"
+        for note in notes:
+            typer.echo(note)
         typer.echo(f"{out}: {what} after {motion.end:.2f} s, {north:.1f} m north and {east:.1f} m east")

@@ -9,11 +9,12 @@ import typer
 
 from validation.options import (
     EffectOption,
+    ModelOption,
     OutOption,
     SeedOption,
     SiteOption,
+    all_effects,
     at_site,
-    parse_effects,
     parse_vector,
 )
 
@@ -31,6 +32,7 @@ def command(
     mount: Annotated[
         str, typer.Option(help="Installation error dx,dy,dz of the accelerometer in m, added to its stated place.")
     ] = "0,0,0",
+    model: ModelOption = None,
     site: SiteOption = None,
     effect: EffectOption = None,
     out: OutOption = Path("rate-table"),
@@ -44,6 +46,7 @@ def command(
     Example: discsim rate-table --mount 0.001,0.001,0 --out rate-table
     """
     from discsim.environment import Environment
+    from discsim.model_file import read_model
     from discsim.recording import write_recording
     from discsim.rig import default_profile, read_profile
     from validation.rate_table import plateau_table, plateaus, rate_table_checks, run_rate_table, write_plateaus
@@ -54,16 +57,20 @@ def command(
     knots = default_profile() if profile is None else read_profile(profile)
     offset = parse_vector(mount, "--mount", "m", 0.05)
     sensors = ("magnetometer", "accelerometer", "gyroscope", "rate_reference")
-    effects = tuple(parse_effects(effect, "rate_table", sensors))
-    inputs = [path for path in (profile, Path(site) if site and site.endswith(".toml") else None) if path]
+    stated = read_model(model) if model is not None else None
+    effects, notes = all_effects(stated, effect, "rate_table", sensors, out.resolve().name)
+    for note in notes:
+        typer.echo(note)
+    surroundings = Environment() if stated is None else stated.environment
+    inputs = [path for path in (profile, model, Path(site) if site and site.endswith(".toml") else None) if path]
     with start_run(out, seed, inputs) as run:
         run.step("turning the table and measuring")
         result = run_rate_table(
             knots,
-            at_site(Environment(), site),
+            at_site(surroundings, site),
             run.rng,
             mount=offset,
-            effects=effects,
+            effects=tuple(effects),
             name=out.resolve().name or "rate-table",
             progress=lambda segments: run.progress(segments, len(segments), "segment of the profile"),
         )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from discsim.errors import InputError
+from validation.options import ModelOption, all_effects, disc_to_fly
 
 if TYPE_CHECKING:
     from validation.replay import Replay
@@ -24,6 +25,7 @@ def command(
     disc: Annotated[
         str | None, typer.Option(help="Fly a disc: a shipped name, or a TOML file with [disc] and [environment].")
     ] = None,
+    model: ModelOption = None,
     throw: Annotated[
         str | None, typer.Option(help="Its throw: a shipped name, or a TOML file. Default: driver.")
     ] = None,
@@ -51,9 +53,9 @@ def command(
 
     Example: discsim view --disc driver --video throw.gif --speed 0.1 --span 0:1
     """
-    if (recording is None) == (disc is None):
-        raise InputError("expected either the folder of a recording or --disc NAME")
-    if throw is not None and disc is None:
+    if sum(source is not None for source in (recording, disc, model)) != 1:
+        raise InputError("expected either the folder of a recording or --disc NAME or --model FILE")
+    if throw is not None and recording is not None:
         raise InputError(f"--throw {throw}: a recording has its own motion; expected --disc NAME with it")
     if video is not None and video.suffix not in ENDINGS:
         raise InputError(f"--video {video}: expected a name that ends in {', '.join(ENDINGS)}")
@@ -71,7 +73,7 @@ def command(
     from validation.run import start_run
     from validation.viewing import Look, draw_stills, draw_whole, show, write_picture
 
-    replay = _replay(recording, disc, throw or "driver")
+    replay = _replay(recording, disc, model, throw or "driver")
     if cut is not None:
         if len(cut) != 2:
             raise InputError(f"--span {span}: expected A:B, two numbers of seconds")
@@ -84,7 +86,8 @@ def command(
         show(replay, look, speed)
         return
     file = out / video
-    inputs = [recording] if recording is not None else [Path(x) for x in (disc, throw) if x and x.endswith(".toml")]
+    names = [Path(name) for name in (disc, throw) if name and name.endswith(".toml")]
+    inputs = [path for path in (recording, model) if path is not None] + names
     with start_run(file.parent, None, inputs):
         if whole:
             write_picture(file, draw_whole(replay, look))
@@ -95,17 +98,17 @@ def command(
     typer.echo(f"{file}")
 
 
-def _replay(recording: Path | None, disc: str | None, throw: str) -> Replay:
+def _replay(recording: Path | None, disc: str | None, model: Path | None, throw: str) -> Replay:
     from discsim.engine import fly
-    from discsim.shipped import load_disc, load_throw
+    from discsim.shipped import load_throw
     from validation.replay import replay_motion, replay_recording
 
     if recording is not None:
         return replay_recording(recording)
-    assert disc is not None
-    body, environment = load_disc(disc)
-    motion = fly(body, environment, load_throw(throw))
-    return replay_motion(motion, body.diameter, f"flown in MuJoCo: disc {disc}, throw {throw}")
+    body, environment, stated = disc_to_fly(disc, model)
+    effects, _ = all_effects(stated, None, "flight", (), None)
+    motion = fly(body, environment, load_throw(throw), effects)
+    return replay_motion(motion, body.diameter, f"flown in MuJoCo: disc {disc or model}, throw {throw}")
 
 
 def _draw_video(file: Path, replay: Replay, look: Look, fps: float, speed: float) -> None:

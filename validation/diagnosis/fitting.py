@@ -19,7 +19,17 @@ from validation.diagnosis.noise import NoiseModel, whitened
 from validation.diagnosis.readings import Values
 from validation.diagnosis.trajectory_pieces import STEPS, Chain, Column, Linear, linearise, moved, shifted
 
-__all__ = ["Fit", "Jumps", "Parameter", "Reduced", "linearised_columns", "reduce", "refit", "values_of"]
+__all__ = [
+    "Fit",
+    "Jumps",
+    "Parameter",
+    "Reduced",
+    "linearised_columns",
+    "reduce",
+    "refit",
+    "unknown_prior",
+    "values_of",
+]
 
 THREADS = 2
 
@@ -198,27 +208,34 @@ def normal_matrix(linear: Linear, noise: NoiseModel) -> FloatArray:
     return G
 
 
-def reduce(linear: Linear, current: Chain, noise: NoiseModel, jumps: Jumps) -> Reduced:
-    """Eliminate the local unknowns of a recording."""
+def unknown_prior(linear: Linear, current: Chain, jumps: Jumps) -> tuple[FloatArray, FloatArray, float]:
+    """Return what is known of a recording's own unknowns beside its readings: normal matrix (l, l), pull (l,), chi2."""
     l = linear.unknowns
-    G = normal_matrix(linear, noise)
     prior = np.zeros(l)
     first = linear.jump_kind < 0
     prior[first] = _ANYWHERE[current.recording.plant] ** -2.0
     prior[~first] = jumps.sd[linear.jump_kind[~first]] ** -2.0
-    G[np.arange(l), np.arange(l)] += prior
     # a jump is pulled to zero from where it stands
-    G[:l, -1] -= prior * linear.jump
-    G[-1, :l] -= prior * linear.jump
-    G[-1, -1] += float(prior @ linear.jump**2)
+    H, right, chi2 = np.diag(prior), -prior * linear.jump, float(prior @ linear.jump**2)
     stated, rows = release_rows(current)
     if stated.size:
         d = rows.shape[1]
         # the first state has followed the closing of nothing: its tangents are the first columns
-        G[:d, :d] += rows.T @ rows
-        G[:d, -1] += rows.T @ stated
-        G[-1, :d] += rows.T @ stated
-        G[-1, -1] += float(stated @ stated)
+        H[:d, :d] += rows.T @ rows
+        right[:d] += rows.T @ stated
+        chi2 += float(stated @ stated)
+    return H, right, chi2
+
+
+def reduce(linear: Linear, current: Chain, noise: NoiseModel, jumps: Jumps) -> Reduced:
+    """Eliminate the local unknowns of a recording."""
+    l = linear.unknowns
+    G = normal_matrix(linear, noise)
+    H, right, chi2 = unknown_prior(linear, current, jumps)
+    G[:l, :l] += H
+    G[:l, -1] += right
+    G[-1, :l] += right
+    G[-1, -1] += chi2
     scale = 1.0 / np.sqrt(np.maximum(np.diag(G)[:l], 1e-300))
     H = G[:l, :l] * scale[:, None] * scale[None, :]
     H[np.arange(l), np.arange(l)] += 1e-12

@@ -25,13 +25,51 @@ from discsim.compiled import compiled, compiled_nogil
 from discsim.effects.body import transverse_inertia
 from discsim.effects.events import spin_step
 from discsim.effects.rig import axis, coulomb_friction, quadratic_drag, speed_ripple
+from discsim.law import LAW_WIDTH, SYMBOLS, law_wrench
 from discsim.parameters import PARAMETERS, Tables
 from discsim.trajectory import derivative, evaluate, in_body, interpolant, step
 
-__all__ = ["ROW", "STATE", "flight_pieces", "free_spin_pieces", "spin_down_pieces", "table_pieces"]
+__all__ = [
+    "LAW_PLACES",
+    "ROW",
+    "SIZE",
+    "STATE",
+    "flight_pieces",
+    "free_spin_pieces",
+    "spin_down_pieces",
+    "table_pieces",
+]
 
 #: numbers of a state and of a row of motion
 STATE, ROW = 13, 19
+#: numbers of the physics; what a row of flats holds beyond are the terms of a law
+SIZE = PARAMETERS.itemsize // 8
+#: names of the numbers of a law's term: those of a row of `discsim.law`, and per symbol where its power is one
+LAW_PLACES = (
+    "target",
+    "coefficient",
+    *(f"power_{symbol}" for symbol in SYMBOLS),
+    *(f"odd_{symbol}" for symbol in SYMBOLS),
+    "decay",
+    "order",
+    "phase",
+    *(f"at_{symbol}" for symbol in SYMBOLS),
+)
+_PLACES, _COUNT = len(LAW_PLACES), len(SYMBOLS)
+
+
+@compiled
+def _law(flat: FloatArray) -> FloatArray:
+    """Return the rows (terms, LAW_WIDTH) of the law at the end of a row of flats."""
+    terms = (flat.size - SIZE) // _PLACES
+    rows = np.zeros((terms, LAW_WIDTH))
+    for i in range(terms):
+        given = flat[SIZE + i * _PLACES : SIZE + (i + 1) * _PLACES]
+        rows[i] = given[:LAW_WIDTH]
+        for k in range(_COUNT):
+            if given[LAW_WIDTH + k] > 0.0:
+                rows[i, 1] /= given[LAW_WIDTH + k] ** given[2 + k]
+    return rows
 
 
 @compiled_nogil
@@ -51,8 +89,11 @@ def flight_pieces(
     """
     n = times.size
     path, dense, K = np.empty((n, 14)), np.empty((n - 1, 7, 14)), np.empty((16, 14))
+    given = tables
     for c in range(states.shape[0]):
-        p = flats[c].view(PARAMETERS)[0]
+        flat = flats[c, :SIZE].copy()
+        p = flat.view(PARAMETERS)[0]
+        tables = Tables(given.static, given.rate, given.speed, given.spline, _law(flats[c]))
         path[0, :10] = states[c, :10]
         path[0, 10:13] = states[c, 10:13]
         path[0, 13] = 0.0
@@ -63,8 +104,8 @@ def flight_pieces(
             derivative(p, tables, times[k + 1], path[k + 1], K[12])
             interpolant(p, tables, times[k], path[k], h, K, path[k + 1], dense[k])
             K[0] = K[12]
-        rows[c] = in_body(flats[c], tables, out, evaluate(times, path, dense, out))
-        end = in_body(flats[c], tables, times[last : last + 1], path[last : last + 1])[0]
+        rows[c] = in_body(flat, tables, out, evaluate(times, path, dense, out))
+        end = in_body(flat, tables, times[last : last + 1], path[last : last + 1])[0]
         ends[c, :6] = end[:6]
         ends[c, 6:10] = end[9:13]
         ends[c, 10:13] = end[13:16]
@@ -138,7 +179,8 @@ def free_spin_pieces(
     rate, slope, attitude, psis = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 4)), np.empty(n)
     k1, k2, k3, k4, w = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for c in range(states.shape[0]):
-        p = flats[c].view(PARAMETERS)[0]
+        flat = flats[c, :SIZE].copy()
+        p = flat.view(PARAMETERS)[0]
         state = states[c]
         attitude[0], rate[0], psis[0] = state[6:10], state[10:13], 0.0
         heading = atan2(
@@ -219,10 +261,12 @@ def _rig_row(p: Any, psi: float, r: float, dr: float, row: FloatArray) -> None:
 
 
 @compiled
-def _friction(p: Any, t: float, r: float) -> float:
+def _friction(p: Any, law: FloatArray, t: float, r: float) -> float:
     """Angular acceleration of a rig that runs down, rad/s^2."""
     torque = -p.rig.viscous * r + coulomb_friction(p.rig_coulomb_friction, r)
     torque += quadratic_drag(p.rig_quadratic_drag, r)
+    if law.shape[0] > 0:
+        torque += law_wrench(law, t, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, r)[5]
     return float(torque / p.rig.Izz + spin_step(p.event_spin_step, t, r))
 
 
@@ -240,18 +284,19 @@ def spin_down_pieces(
     n = times.size
     psi, r, slope = np.empty(n), np.empty(n), np.empty(n)
     for c in range(states.shape[0]):
-        p = flats[c].view(PARAMETERS)[0]
+        flat = flats[c, :SIZE].copy()
+        p, law = flat.view(PARAMETERS)[0], _law(flats[c])
         psi[0], r[0] = states[c, 0], states[c, 1]
-        slope[0] = _friction(p, times[0], r[0])
+        slope[0] = _friction(p, law, times[0], r[0])
         for k in range(n - 1):
             t, h = times[k], times[k + 1] - times[k]
             k1 = slope[k]
-            k2 = _friction(p, t + 0.5 * h, r[k] + 0.5 * h * k1)
-            k3 = _friction(p, t + 0.5 * h, r[k] + 0.5 * h * k2)
-            k4 = _friction(p, t + h, r[k] + h * k3)
+            k2 = _friction(p, law, t + 0.5 * h, r[k] + 0.5 * h * k1)
+            k3 = _friction(p, law, t + 0.5 * h, r[k] + 0.5 * h * k2)
+            k4 = _friction(p, law, t + h, r[k] + h * k3)
             r[k + 1] = r[k] + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
             psi[k + 1] = psi[k] + h * r[k] + h * h / 6.0 * (k1 + k2 + k3)
-            slope[k + 1] = _friction(p, times[k + 1], r[k + 1])
+            slope[k + 1] = _friction(p, law, times[k + 1], r[k + 1])
         _between(p, times, psi, r, slope, out, rows[c])
         ends[c] = 0.0
         ends[c, 0], ends[c, 1] = psi[last], r[last]
@@ -307,7 +352,8 @@ def table_pieces(
     n = times.size
     turned, r, slope = np.empty(n), np.empty(n), np.empty(n)
     for c in range(states.shape[0]):
-        p = flats[c].view(PARAMETERS)[0]
+        flat = flats[c, :SIZE].copy()
+        p = flat.view(PARAMETERS)[0]
         turned[0] = states[c, 1]
         yaw = states[c, 0] - states[c, 1]
         for k in range(n - 1):

@@ -16,9 +16,10 @@ from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.sensors import CrossAxis, Scale, sensitivity
 from discsim.recording import Recording
 
-__all__ = ["CLOCKS", "Values", "delay", "is_motion", "predicted", "value"]
+__all__ = ["CLOCKS", "Values", "delay", "is_motion", "predicted", "to_body", "value"]
 
-#: parameters that differ from their baseline, by (group, name); groups are effect ids, or aero, disc, environment, rig
+#: parameters that differ from their baseline, by (group, name); groups are effect ids, or aero, disc, environment, rig;
+#: a law's are called TERM.PLACE, as in 0.power_r
 Values: TypeAlias = Mapping[tuple[str, str], float]
 
 #: sensor -> prefix of its effects
@@ -41,7 +42,7 @@ def is_motion(group: str) -> bool:
     """Tell whether a group of parameters acts on the motion (and not on a sensor)."""
     if group in CATALOGUE:
         return CATALOGUE[group].acts_on == "motion"
-    return group in ("aero", "disc", "environment", "rig")
+    return group in ("aero", "disc", "environment", "rig", "law")
 
 
 def delay(values: Values, sensor: str, written: FloatArray) -> FloatArray:
@@ -71,7 +72,7 @@ def predicted(sensor: str, recording: Recording, values: Values, t: FloatArray, 
     return _accelerometer(recording, values, t, rows)
 
 
-def _to_body(rows: FloatArray, vector: FloatArray) -> FloatArray:
+def to_body(rows: FloatArray, vector: FloatArray) -> FloatArray:
     """Return N vectors (..., 3) in B by the attitudes in rows (..., 19)."""
     w, x, y, z = rows[..., 9], rows[..., 10], rows[..., 11], rows[..., 12]
     a, b, c = vector[..., 0], vector[..., 1], vector[..., 2]
@@ -89,7 +90,7 @@ def _field(recording: Recording, values: Values) -> FloatArray:
 
 
 def _magnetometer(recording: Recording, values: Values, rows: FloatArray) -> FloatArray:
-    m = _to_body(rows, np.broadcast_to(_field(recording, values), (*rows.shape[:-1], 3)))
+    m = to_body(rows, np.broadcast_to(_field(recording, values), (*rows.shape[:-1], 3)))
     xx, xy, xz, yy, yz, zz = (
         value(values, "mag.soft_iron", f"s{name}") for name in ("xx", "xy", "xz", "yy", "yz", "zz")
     )
@@ -99,7 +100,7 @@ def _magnetometer(recording: Recording, values: Values, rows: FloatArray) -> Flo
     if np.any(stray):
         h = np.maximum(-rows[..., 2], 0.02)
         decay = np.exp(-h / value(values, "mag.stray_field", "height_m"))
-        m = m + _to_body(rows, decay[..., None] * stray)
+        m = m + to_body(rows, decay[..., None] * stray)
     return m
 
 
@@ -117,7 +118,7 @@ def specific_force(recording: Recording, values: Values, rows: FloatArray) -> Fl
     gravity = values.get(("environment", "gravity"), recording.environment.gravity)
     if recording.plant == "free_spin":  # turns with the spin, like the translation that nobody knows: left to the means
         gravity = 0.0
-    f = _to_body(rows, rows[..., 6:9] - np.array([0.0, 0.0, gravity]))
+    f = to_body(rows, rows[..., 6:9] - np.array([0.0, 0.0, gravity]))
     w, dw = rows[..., 13:16], rows[..., 16:19]
     along = w @ d
     squared = np.sum(w * w, axis=-1)

@@ -142,9 +142,7 @@ def within_range(current: Chain, linear: Linear) -> Chain:
     """
     kept = []
     for readings in current.readings:
-        limit = None
-        if readings.sensor != "gps" and readings.taken is None:
-            limit = current.recording.sheets[readings.sensor].range
+        limit = readings.limit
         good = readings.good.copy()
         if limit is not None:
             for axis, name in enumerate(readings.axes):

@@ -21,17 +21,34 @@ from discsim.frames import conjugate, multiply, rotation_vector, turn
 from discsim.parameters import PARAMETERS, Tables, parameter_index, parameters, tables
 from discsim.recording import SENSORS, Recording
 from validation.diagnosis.pieces_of_motion import (
+    LAW_PLACES,
     ROW,
+    SIZE,
     STATE,
     flight_pieces,
     free_spin_pieces,
     spin_down_pieces,
     table_pieces,
 )
+from validation.diagnosis.plateau import plateau
 from validation.diagnosis.readings import CLOCKS, Values, delay, is_motion, predicted, value
 from validation.diagnosis.starts import spin_starts
 
-__all__ = ["STEPS", "WOBBLE", "Chain", "Channel", "Column", "Linear", "Readings", "chain", "linearise", "readings_of"]
+__all__ = [
+    "STEPS",
+    "WOBBLE",
+    "Chain",
+    "Channel",
+    "Column",
+    "Linear",
+    "Readings",
+    "chain",
+    "linearise",
+    "moved",
+    "readings_of",
+    "recut",
+    "shown",
+]
 
 IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
@@ -39,8 +56,8 @@ IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 STEP, NUTATION = 0.01, 1.2
 #: a fit that has gone astray to faster spins, rad/s, is not followed with ever shorter steps
 FASTEST = 400.0
-#: steps about an event of 10 ms
-EVENT_STEP = 0.0025
+#: longest step of a table's integrator in radians of its ripple
+RIPPLE = 0.3
 #: half the differences of states: m, m/s, rad, rad/s
 STEPS = {
     "flight": np.repeat([1e-3, 1e-3, 1e-5, 1e-4], 3),
@@ -77,7 +94,8 @@ class Readings:
     """The usable readings of one sensor of a recording.
 
     t (n,) written times; value (n, k); good (n, k) tells which readings count; sd (k,) the stated noise with rounding
-    (NaN where nothing is stated); clipped (n, k) stand at the range.
+    (NaN where nothing is stated); clipped (n, k) stand at the limit, which is the range unless readings stand still
+    below it.
     """
 
     sensor: str
@@ -87,6 +105,8 @@ class Readings:
     clipped: BoolArray
     sd: FloatArray
     axes: tuple[str, ...]
+    #: the range that clips them, as stated or lower; None where there is none
+    limit: float | None = None
     #: written times and weights (w, n) of the samples that each reading is a mean of; None where it is one sample
     taken: FloatArray | None = None
     weights: FloatArray | None = None
@@ -222,8 +242,8 @@ class Linear:
 # ------------------------------------------------------------------------------------------------- readings
 
 
-def readings_of(recording: Recording, *, plateau: bool = True) -> tuple[Readings, ...]:
-    """Return the usable readings of all sensors: gaps, and readings that stand at a range, take no part."""
+def readings_of(recording: Recording) -> tuple[Readings, ...]:
+    """Return the usable readings of all sensors: gaps, and readings that stand at a limit, take no part."""
     found = []
     for sensor in SENSORS:
         samples = recording.get(sensor)
@@ -233,15 +253,18 @@ def readings_of(recording: Recording, *, plateau: bool = True) -> tuple[Readings
         measured = samples.value if samples.value.ndim == 2 else samples.value[:, None]
         if sensor == "gps":
             sd = np.repeat([_or_nan(sheet.noise_rms), _or_nan(sheet.velocity_noise_rms)], 3)
-            clipped = np.zeros(measured.shape, dtype=np.bool_)
+            clipped, limit = np.zeros(measured.shape, dtype=np.bool_), None
         else:
             level = np.hypot(_or_nan(sheet.noise_rms), (sheet.resolution or 0.0) / np.sqrt(12.0))
             sd = np.full(measured.shape[1], level)
-            clipped = sheet.clipped(measured)
+            clipped, limit = sheet.clipped(measured), sheet.range
+            lower = plateau(recording) if sensor == "accelerometer" else None
+            if lower is not None:
+                clipped, limit = np.abs(measured) >= lower - 1e-9 * lower, lower
         good = np.isfinite(measured) & ~clipped
         axes = tuple(SENSORS[sensor].columns)
         t, m = samples.t, measured
-        one = Readings(sensor, t, m, good, clipped, sd, axes)
+        one = Readings(sensor, t, m, good, clipped, sd, axes, limit)
         if recording.plant == "free_spin" and sensor == "accelerometer":
             found += _over_turns(recording, one)
         else:
@@ -280,7 +303,7 @@ def _over_turns(recording: Recording, one: Readings) -> list[Readings]:
     t = np.einsum("wn,wn->n", weights, one.t[place])
     sd = one.sd * float(np.sqrt(np.median(np.sum(weights**2, axis=0))))
     clipped = np.zeros(values.shape, dtype=np.bool_)
-    return [Readings(one.sensor, t, values, good, clipped, sd, one.axes, one.t[place], weights)]
+    return [Readings(one.sensor, t, values, good, clipped, sd, one.axes, None, one.t[place], weights)]
 
 
 def _or_nan(number: float | None) -> float:
@@ -290,13 +313,29 @@ def _or_nan(number: float | None) -> float:
 # -------------------------------------------------------------------------------------------------- plants
 
 
-def base_flat(recording: Recording, values: Values) -> FloatArray:
-    """Return the flat parameter array of a recording's baseline with values in their places."""
+def base_flat(recording: Recording, values: Values, columns: Sequence[tuple[str, str]] = ()) -> FloatArray:
+    """Return the flat parameter array of a recording's baseline with values in their places.
+
+    ``columns`` are keys that need a place, too.
+    """
     flat = parameters(recording.environment, recording.disc, recording.rig)
+    terms = 1 + max((_term(name) for group, name in (*values, *columns) if group == "law"), default=-1)
+    flat = np.concatenate([flat, np.zeros(terms * len(LAW_PLACES))])
     for (group, name), number in values.items():
         if (is_motion(group) and group != "environment") or (group, name) in _FLAT_ENVIRONMENT:
-            flat[parameter_index(group, name)] = number
+            flat[_place(group, name)] = number
     return flat
+
+
+def _term(name: str) -> int:
+    return int(name.partition(".")[0])
+
+
+def _place(group: str, name: str) -> int:
+    """Return the place of a parameter in a flat array, a law's terms standing behind the physics."""
+    if group == "law":
+        return SIZE + _term(name) * len(LAW_PLACES) + LAW_PLACES.index(name.partition(".")[2])
+    return parameter_index(group, name)
 
 
 _FLAT_ENVIRONMENT = {("environment", name) for name in PARAMETERS["environment"].names or ()}
@@ -337,6 +376,8 @@ class _Runner:
     lookup: Tables
     knots: FloatArray
     events: tuple[tuple[float, float], ...]
+    #: highest order of a speed ripple
+    order: float = 0.0
 
     def times(self, start: float, stop: float, last: float, state: FloatArray) -> tuple[FloatArray, int]:
         """Return the integrator's steps from start over at least [start, last], and the place of ``stop`` in them."""
@@ -352,8 +393,11 @@ class _Runner:
         elif plant == "spin_down":
             h = 0.01
         else:
-            ripple = 1.0
-            h = min(0.01, 0.2 / max(ripple, 1.0))
+            # the fastest the table turns in this piece
+            inside = np.interp([start, max(stop, last)], *self.knots)
+            within = self.knots[1, (self.knots[0] > start) & (self.knots[0] < max(stop, last))]
+            turning = float(np.max(np.abs(np.concatenate([inside, within]))))
+            h = min(0.01, RIPPLE / max(self.order * turning, 1.0))
         marks = [start, stop]
         if last > stop:
             marks.append(last + 1e-9)
@@ -399,13 +443,27 @@ def _knots(recording: Recording) -> FloatArray:
     return np.empty((2, 0)) if command is None else np.stack([command.t, command.value])
 
 
-def _events(values: Values) -> tuple[tuple[float, float], ...]:
-    """Return instants and widths of short events among values."""
-    found = []
-    for group in ("event.impulse", "event.spin_step"):
-        if (group, "t_s") in values:
-            found.append((values[group, "t_s"], 0.01))
-    return tuple(found)
+def _events(values: Values, columns: Sequence[Column] = ()) -> tuple[tuple[float, float], ...]:
+    """Return instants and widths of short events among values and among the shapes that columns are taken at."""
+    found = {values[group, "t_s"] for group in _EVENTS if (group, "t_s") in values}
+    found |= {number for column in columns if column.group in _EVENTS for name, number in column.given if name == "t_s"}
+    return tuple((t, 0.01) for t in sorted(found))
+
+
+def _order(values: Values, columns: Sequence[Column] = ()) -> float:
+    """Return the highest order of a speed ripple among values and among the shapes that columns are taken at."""
+    found = [values.get(("rig.speed_ripple", "order"), 0.0)]
+    found += [n for c in columns if c.group == "rig.speed_ripple" for name, n in c.given if name == "order"]
+    return max(abs(order) for order in found)
+
+
+_EVENTS = ("event.impulse", "event.spin_step")
+
+
+def _runner(recording: Recording, values: Values, columns: Sequence[Column] = ()) -> _Runner:
+    return _Runner(
+        recording, tables(recording.disc), _knots(recording), _events(values, columns), _order(values, columns)
+    )
 
 
 # ------------------------------------------------------------------------------------------ linearisation
@@ -431,7 +489,7 @@ def linearise(
     """
     recording, d, k = current.recording, current.tangent, current.states.shape[0]
     plant = recording.plant
-    runner = _Runner(recording, tables(recording.disc), _knots(recording), _events(values))
+    runner = _runner(recording, values, columns)
     steps = STEPS[plant]
 
     samples = [_Sampled(current, readings, values) for readings in current.readings]
@@ -448,7 +506,7 @@ def linearise(
     S[0, :, :d] = np.eye(d)
     closing = np.zeros((k, d))
     gaps = np.zeros((max(k - 1, 0), d))
-    flat = base_flat(recording, values)
+    flat = base_flat(recording, values, [column.key for column in columns])
     wobble = np.array([values.get(key, 0.0) for key in WOBBLE])
 
     out_rows = [np.empty((s.instants.size, ROW)) for s in samples]
@@ -483,8 +541,8 @@ def linearise(
                         moved_wobble[row, WOBBLE.index((group, name))] += sign * size
                         continue
                     for shape, number in given:
-                        moved[row, parameter_index(group, shape)] = number
-                    moved[row, parameter_index(group, name)] += sign * size
+                        moved[row, _place(group, shape)] = number
+                    moved[row, _place(group, name)] += sign * size
                 states.append(np.repeat(state[None], len(motion_columns), axis=0))
                 flats.append(moved)
                 wobbles.append(moved_wobble)
@@ -694,7 +752,7 @@ def _stack(
             full[:, :, l:] += M[:, :, d:]
             M = full
         prediction, slopes, closed = s.weighted(y), s.weighted(M), s.weighted(closed)
-        limit = current.recording.sheets[s.sensor].range if s.sensor != "gps" and readings.taken is None else None
+        limit = readings.limit
         for axis in range(s.width):
             good = readings.good[:, axis]
             if s.tau > 0:
@@ -742,10 +800,27 @@ def _stack(
     )
 
 
+def shown(current: Chain, values: Values, sensor: str, t: FloatArray) -> FloatArray:
+    """Return what a sensor would read (n, k) at true instants t (n,) of a chain's motion, before lag and noise."""
+    recording = current.recording
+    runner = _runner(recording, values)
+    flat, wobble = base_flat(recording, values), np.array([values.get(key, 0.0) for key in WOBBLE])
+    rows = np.empty((t.size, ROW))
+    piece = np.clip(np.searchsorted(current.edges, t, side="right") - 1, 0, len(current.states) - 1)
+    for i in range(len(current.states)):
+        mine = np.flatnonzero(piece == i)
+        if mine.size:
+            out = np.maximum(t[mine], current.edges[i])
+            start, stop = float(current.edges[i]), float(current.edges[i + 1])
+            times, last = runner.times(start, stop, float(out.max()), current.states[i])
+            rows[mine] = runner.run(flat[None], wobble[None], current.states[i : i + 1], times, last, out)[0][0]
+    return predicted(sensor, recording, values, t, rows)
+
+
 def recut(current: Chain, values: Values, edges: FloatArray) -> Chain:
     """Return the chain cut at other edges (k + 1,), its new pieces starting where the old motion was."""
     recording = current.recording
-    runner = _Runner(recording, tables(recording.disc), _knots(recording), _events(values))
+    runner = _runner(recording, values)
     flat, wobble = base_flat(recording, values), np.array([values.get(key, 0.0) for key in WOBBLE])
     states = np.empty((edges.size - 1, STATE))
     piece = np.clip(np.searchsorted(current.edges, edges[:-1] + 1e-9, side="right") - 1, 0, len(current.states) - 1)

@@ -19,11 +19,15 @@ __all__ = ["Trial", "parameters_of", "trials_for"]
 
 @dataclass(frozen=True)
 class Trial:
-    """An effect as a hypothesis: free columns, and the recordings it acts in (None: all)."""
+    """An effect as a hypothesis: free columns, and the recordings it acts in (None: all).
+
+    ``told`` are parameters (name, value, sd) that a search has found and that no fit moves.
+    """
 
     id: str
     columns: tuple[Column, ...]
     recordings: frozenset[int] | None = None
+    told: tuple[tuple[str, float, float], ...] = ()
 
     @property
     def shapes(self) -> dict[str, float]:

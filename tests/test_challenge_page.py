@@ -1,0 +1,41 @@
+"""The page on the blind test lists the sizes that are drawn."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from validation.challenge.cases import MASKS
+from validation.challenge.sizes import HIDING
+
+PAGE = Path(__file__).parents[1] / "docs" / "challenge.md"
+
+
+def sizes_table() -> str:
+    """The table of sizes as the test draws them; `python tests/test_challenge_page.py` writes it into the page."""
+    rows = ["| effect | size of | from | to | elsewhere |", "|---|---|---|---|---|"]
+    for id, hiding in HIDING.items():
+        size = ", ".join(hiding.sized) + (" less 1" if hiding.about else "")
+        elsewhere = "; ".join(f"{plant}: {low:g} to {high:g}" for plant, (low, high) in hiding.by_plant.items())
+        rows.append(f"| {id} | {size} | {hiding.smallest:g} | {hiding.largest:g} | {elsewhere.replace('_', ' ')} |")
+    return "\n".join(rows)
+
+
+def with_table(page: str) -> str:
+    start, end = "<!-- sizes -->\n", "<!-- /sizes -->"
+    before, _, rest = page.partition(start)
+    _, _, after = rest.partition(end)
+    return f"{before}{start}{sizes_table()}\n{end}{after}"
+
+
+def test_the_page_on_the_blind_test_lists_every_size():
+    page = PAGE.read_text(encoding="utf-8")
+    assert page == with_table(page), "run `python tests/test_challenge_page.py` to renew the table"
+
+
+def test_the_page_on_the_blind_test_lists_every_mask():
+    page = PAGE.read_text(encoding="utf-8")
+    assert all(f"| `{mask}` |" in page for mask in MASKS)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(with_table(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
