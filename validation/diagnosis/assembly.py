@@ -30,6 +30,7 @@ from validation.diagnosis.answer import (
     Verdict,
 )
 from validation.diagnosis.board import column_of
+from validation.diagnosis.law import FoundLaw
 from validation.diagnosis.places import located_effect, located_rest
 from validation.diagnosis.rest import remainders
 from validation.diagnosis.search import Search, chi2_in, tried_without
@@ -101,7 +102,7 @@ def _named(found: Search, trial: Trial, names: Sequence[str]) -> NamedEffect:
         room = width.get(q.key, np.inf)
         known = np.isfinite(error) and not (np.isfinite(room) and error > _UNDETERMINED * room)
         values[q.name] = ParameterValue(float(value), float(error) if known else None)
-    values.update(found.extra.get(id_of(trial), {}))
+    values.update({name: ParameterValue(value, sd) for name, value, sd in trial.known})
     for name, value in trial.shapes.items():
         values.setdefault(name, ParameterValue(float(value), None))
     less = tried_without(found, trial)
@@ -287,10 +288,11 @@ def _model(found: Search, effects: Sequence[NamedEffect], trials: Sequence[Trial
 
 
 def assemble(
-    found: Search, datasets: Sequence[str], names: Sequence[str], seed: int, law: Law | None = None
+    found: Search, datasets: Sequence[str], names: Sequence[str], seed: int, law: FoundLaw | None = None
 ) -> Outcome:
     """Return the outcome of a search."""
     verdict, unexplained = verdict_of(found)
+    written = law.law if law is not None and unexplained else None
     trials = found.final.hypothesis.trials if verdict == "explained" else ()
     effects = tuple(_named(found, trial, names) for trial in trials)
     located = [place for trial in trials for place in located_effect(found, trial, names)]
@@ -326,12 +328,12 @@ def assemble(
         tuple(located),
         effects,
         moved,
-        law if unexplained else None,
+        written,
         tuple(_noise_notes(found)),
         held,
         tuple(Outlier(names[i], s, a, t, d) for i, s, a, t, d in found.outliers),
         tuple(dict.fromkeys(c.next_recording for e in effects for c in e.confused_with if c.next_recording)),
         tuple(found.warnings),
     )
-    model = _model(found if not unexplained else found.at_base(), effects, trials, law if unexplained else None)
+    model = _model(found if not unexplained else found.at_base(), effects, trials, written)
     return Outcome(diagnosis, model, tuple(_residuals(found, names, unexplained)), candidates)

@@ -6,8 +6,9 @@ from collections.abc import Callable, Sequence
 
 from discsim.recording import Recording
 from validation.diagnosis.answer import Outcome
-from validation.diagnosis.assembly import assemble
+from validation.diagnosis.assembly import assemble, verdict_of
 from validation.diagnosis.datasets import recording_names
+from validation.diagnosis.law import find_law
 from validation.diagnosis.search import search
 from validation.diagnosis.user_effects import UserEffect
 
@@ -34,4 +35,8 @@ def diagnose(
     recordings = [recording for dataset in datasets for recording in dataset]
     called = [name for group in recording_names(datasets, names) for name in group]
     found = search(recordings, progress)
-    return assemble(found, names, called, seed)
+    law = None
+    if verdict_of(found)[1]:
+        progress("looking for a law", 4, 5)
+        law = find_law(found.loose, found.final, found.own, found.loose_noise, recordings)
+    return assemble(found, names, called, seed, law)

@@ -18,8 +18,10 @@ from validation.diagnosis.board import Board, board_of, column_of, free_columns
 from validation.diagnosis.fitting import Fit, Parameter
 from validation.diagnosis.noise import NoiseModel, estimate_noise, whitened
 from validation.diagnosis.relaxed import NO_JUMPS, relaxed, unknowns
+from validation.diagnosis.searches import Shifted, searched
 from validation.diagnosis.selection import (
     ONE_SIDED,
+    RIVAL,
     Hypothesis,
     Proposal,
     Tied,
@@ -76,6 +78,8 @@ class Search:
     #: readings that were left out: (recording, sensor, axis, time, deviations)
     outliers: list[tuple[int, str, str, float, float]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    #: what choosing the samples that were lost has cost, in twice the log likelihood
+    cost: float = 0.0
 
     def at_base(self) -> Search:
         """Return the search as if nothing had been found."""
@@ -140,21 +144,26 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     plant = found.recordings[0].plant
     noise = found.loose_noise
     far = chi2_in(current, noise) > FAR * current.fit.count
-    offered: list[tuple[Proposal, Fit]] = []
+    offered: list[tuple[Proposal, Fit, float]] = []
     if far or step == 0:
         ranked = one_per_effect(proposals(board, found.trials, current.hypothesis, found.own))
-        offered += [(p, found.loose) for p in ranked]
+        offered += [(p, found.loose, 0.0) for p in ranked]
     if not far or step > 0:
         near = board_of(current.fit, found.trials, current.fit.noise, NO_JUMPS[plant])
         offered += [
-            (_from_here(p, current), current.fit)
+            (_from_here(p, current), current.fit, 0.0)
             for p in one_per_effect(proposals(near, found.trials, current.hypothesis, found.own))
         ]
-    worth = [(p, fit) for p, fit in offered if p.gain > 0.5 * price(p.trial)]
-    worth.sort(key=lambda item: 8.0 * len(parameters_of(item[0].trial)) - item[0].gain)
-    fits: list[tuple[float, Tied, Proposal]] = []
+    for item in searched(found.loose, current, found.own, noise):
+        if isinstance(item, Shifted):
+            offered.append((item.proposal, replace(found.loose, chains=item.chains), item.cost))
+        else:
+            offered.append((item, current.fit if not far and current.hypothesis.trials else found.loose, 0.0))
+    worth = [item for item in offered if item[0].gain > 0.5 * price(item[0].trial)]
+    worth.sort(key=lambda item: RIVAL * len(parameters_of(item[0].trial)) - item[0].gain)
+    fits: list[tuple[float, Tied, Fit, float]] = []
     seen: set[tuple[str, frozenset[int] | None]] = set()
-    for proposal, fit in worth:
+    for proposal, fit, cost in worth:
         key = (proposal.trial.id, proposal.trial.recordings)
         if key in seen:
             continue
@@ -162,22 +171,32 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
         if len(seen) > REFITTED:
             break
         hypothesis = current.hypothesis.plus(proposal.trial)
-        chains = replace(fit, chains=fit.chains)
-        trial_noise = noise if far else current.fit.noise
-        refitted = tied_fit(chains, hypothesis, found.own, trial_noise, {**values_of_fit(current), **proposal.start})
+        refitted = tied_fit(
+            fit,
+            hypothesis,
+            found.own,
+            noise if far else current.fit.noise,
+            {**values_of_fit(current), **proposal.start},
+        )
+        refitted = replace(refitted, score=refitted.score + found.cost + cost)
         gain = current.score - refitted.score
         chi2_gain = chi2_in(current, noise) - chi2_in(refitted, noise)
-        count = len(parameters_of(proposal.trial))
-        names = refitted.fit.parameters[-count:]
-        values = {q.name: float(v) for q, v in zip(names, refitted.fit.at[-count:], strict=True)}
+        values = {
+            q.name: float(v)
+            for q, v in zip(refitted.fit.parameters, refitted.fit.at, strict=True)
+            if q.group == proposal.trial.id and q.recordings == proposal.trial.recordings
+        }
         found.considered.append(Considered(proposal.trial, gain, chi2_gain, values, False))
         if gain > price(proposal.trial) and _possible(refitted):
             # far from the data chi-squared says more than a likelihood that has swallowed the mismatch as noise
-            merit = (chi2_in(refitted, noise) if far else refitted.score) + 8.0 * hypothesis.size
-            fits.append((merit, refitted, proposal))
+            merit = (chi2_in(refitted, noise) + cost if far else refitted.score) + RIVAL * hypothesis.size
+            fits.append((merit, refitted, fit, cost))
     if not fits:
         return None
-    return min(fits, key=lambda item: item[0])[1]
+    _, best, fit, cost = min(fits, key=lambda item: item[0])
+    if cost:
+        found.loose, found.cost = replace(found.loose, chains=fit.chains), found.cost + cost
+    return best
 
 
 def tried_without(found: Search, trial: Trial) -> Tied:
@@ -220,6 +239,7 @@ def _pruned(found: Search, current: Tied) -> Tied:
                 current.fit.noise,
                 values_of_fit(current),
             )
+            less = replace(less, score=less.score + found.cost)
             if less.score - current.score < price(trial) and (weakest is None or less.score < weakest.score):
                 weakest = less
         if weakest is None:
