@@ -102,7 +102,7 @@ def _named(found: Search, trial: Trial, names: Sequence[str]) -> NamedEffect:
         room = width.get(q.key, np.inf)
         known = np.isfinite(error) and not (np.isfinite(room) and error > _UNDETERMINED * room)
         values[q.name] = ParameterValue(float(value), float(error) if known else None)
-    values.update({name: ParameterValue(value, sd) for name, value, sd in trial.known})
+    values.update({name: ParameterValue(value, sd) for name, value, sd in trial.told})
     for name, value in trial.shapes.items():
         values.setdefault(name, ParameterValue(float(value), None))
     less = tried_without(found, trial)

@@ -106,8 +106,8 @@ def search(recordings: Sequence[Recording], report: Report = lambda stage, done,
         better = _next(found, board, current, step)
         if better is None:
             break
-        if step >= 2 and chi2_in(better, noise) > FAR * better.fit.count:
-            # three effects and still far from the data: none of these
+        if step >= 1 and chi2_in(better, noise) > FAR * better.fit.count:
+            # two effects and still far from the data: none of these
             current = better
             break
         current = _pruned(found, better)

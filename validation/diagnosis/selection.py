@@ -116,6 +116,8 @@ def tied_fit(
     plant = loose.chains[0].recording.plant
     fit = Fit(loose.chains, parameters, at, NO_JUMPS[plant], noise)
     fit = refit(fit, iterations=iterations, give_up=give_up, bounds=BOUNDS)
+    if fit.merit > give_up:
+        polish = 0
     for _ in range(polish):
         fit = replace(fit, noise=noise_of(fit))
         fit = refit(fit, iterations=2, bounds=BOUNDS)
