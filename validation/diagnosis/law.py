@@ -13,6 +13,7 @@ from itertools import product
 from math import exp, log
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from discsim.arrays import FloatArray
 from discsim.law import WRENCH_TARGETS
@@ -30,11 +31,11 @@ from validation.diagnosis.fitting import (
     refit,
     shared_step,
 )
-from validation.diagnosis.noise import GroupNoise, NoiseModel, log_likelihood
+from validation.diagnosis.noise import GroupNoise, NoiseModel, log_likelihood, whitened
 from validation.diagnosis.readings import to_body
 from validation.diagnosis.relaxed import NO_JUMPS
 from validation.diagnosis.selection import ENTRY, PER_PARAMETER, Hypothesis, Tied, noise_of, scored, tied_fit
-from validation.diagnosis.trajectory_pieces import Chain, Column, Linear, recut
+from validation.diagnosis.trajectory_pieces import Chain, Column, IntArray, Linear, moved, recut
 
 __all__ = ["FoundLaw", "Term", "find_law"]
 
@@ -45,10 +46,14 @@ _AIR_POWERS = {"V": (0.0, 1.0, 2.0, 3.0), "r": (0.0, 1.0, 2.0), "alpha": (0.0, 1
 _FORCE_STEP, _MOMENT_STEP, _RIG_STEP, _POWER_STEP = 2e-2, 2e-4, 2e-5, 1e-3
 #: an exponent is sought within this of where it starts, and one less certain than the second stays where it starts
 _POWER_SIGMA, _UNCERTAIN = 3.0, 0.5
-#: candidates that are fitted, terms of a law at most, sums of exponents beyond which no physics goes
-_FITTED, _TERMS, _HIGHEST = 3, 2, 5.0
+#: candidates that are fitted, sums of exponents beyond which no physics goes
+_FITTED, _HIGHEST = 2, 5.0
+#: share of the best candidate's gain below which another is not fitted
+_WORTH = 0.7
 #: share of the excess that a law must explain, and twice the log likelihood it must gain on held-out recordings
 _SHARE, _HELD_OUT = 0.5, 12.0
+#: share of the excess beyond which no other candidate is fitted
+_ALL = 0.98
 
 
 @dataclass(frozen=True)
@@ -185,32 +190,34 @@ def _weighed(linear: Linear, first: int, targets: Sequence[int], weights: FloatA
 def board_of_terms(
     fit: Fit, terms: Sequence[Term], states: Sequence[Mapping[str, FloatArray]], at: Mapping[str, float]
 ) -> Board:
-    """Return the board of a fit's own parameters and terms, pieces hanging together."""
-    plant = fit.chains[0].recording.plant
+    """Return the board of a fit's own parameters and terms, its pieces jumping as they may."""
+    plant, jumps = fit.chains[0].recording.plant, fit.jumps
     targets = list(dict.fromkeys(term.target for term in terms))
     place_of = [targets.index(term.target) for term in terms]
     taken = len({int(q.name.partition(".")[0]) for q in fit.parameters if q.group == "law"})
     own = [column_of(q) for q in fit.parameters]
-    jumps = NO_JUMPS[plant]
-    bare = linearised_columns(
-        replace(fit, jumps=jumps), [*own, *(_constant(target, plant, taken) for target in targets)]
-    )
+    bare = linearised_columns(fit, [*own, *(_constant(target, plant, taken) for target in targets)])
     linears = [
         _weighed(linear, len(own), place_of, np.array([term.weight(state, at) for term in terms]))
         for linear, state in zip(bare, states, strict=True)
     ]
     reduced = mapped(lambda linear, chain: reduce(linear, chain, fit.noise, jumps), linears, fit.chains)
     columns = (*own, *(Column("law", f"{j}.candidate", 1.0) for j in range(len(terms))))
-    grams = np.stack([r.gram for r in reduced])
+    grams = _to_baseline(np.stack([r.gram for r in reduced]), fit)
+    return Board(columns, grams, {column: j for j, column in enumerate(columns)}, tuple(linears), tuple(reduced))
+
+
+def _to_baseline(grams: FloatArray, fit: Fit) -> FloatArray:
+    """Return reduced matrices (recordings, p + 1, p + 1) with a fit's parameters, the first columns, as stated."""
     for i, G in enumerate(grams):
-        away = np.zeros(len(columns))
+        away = np.zeros(G.shape[0] - 1)
         for j, (q, number) in enumerate(zip(fit.parameters, fit.at, strict=True)):
             if q.acts_in(i):
                 away[j] = number - q.stated
         e, chi2 = G[:-1, -1].copy(), float(G[-1, -1])
         G[-1, -1] = chi2 + float(2.0 * away @ e + away @ G[:-1, :-1] @ away)
         G[:-1, -1] = G[-1, :-1] = e + G[:-1, :-1] @ away
-    return Board(columns, grams, {column: j for j, column in enumerate(columns)}, tuple(linears), tuple(reduced))
+    return grams
 
 
 def _asked(board: Board, own: Sequence[Parameter], terms: int) -> Iterator[tuple[float, float]]:
@@ -221,6 +228,344 @@ def _asked(board: Board, own: Sequence[Parameter], terms: int) -> Iterator[tuple
         column = Column("law", f"{j}.candidate", 1.0)
         answer: Answer = board.ask([*taken, (column, Parameter("law", column.name, 0.0, 1.0))])
         yield base - answer.chi2, float(answer.value[-1])
+
+
+# ----------------------------------------------------------------------------------------------- about a sensor
+
+
+@dataclass(frozen=True)
+class SensorTerm:
+    """What a sensor's axes read beside the motion, each with coefficients of its own and one ``shape`` in common.
+
+    ==========  ============================================  ======================
+    kind        form                                          shape
+    ==========  ============================================  ======================
+    warming     c - c exp(-t/tau)                             tau in s
+    drift       c t^n                                         n
+    rate        c |r|^n sign(r)                               n
+    reading     c |x|^n sign(x), x the axis's own reading     n
+    turning     a cos(k psi) + b sin(k psi)                   k
+    ==========  ============================================  ======================
+    """
+
+    sensor: str
+    kind: str
+    shape: float
+    #: what powers are taken in units of
+    unit: float = 1.0
+
+    @property
+    def size(self) -> int:
+        """Number of coefficients of an axis."""
+        return 2 if self.kind == "turning" else 1
+
+    def basis(self, t: FloatArray, r: FloatArray, psi: FloatArray, x: FloatArray, shape: float) -> FloatArray:
+        """Return what coefficients of one add to readings, (n, size), at t, spin r, angle psi, reading x."""
+        if self.kind == "warming":
+            return np.asarray(-np.expm1(-t / shape))[:, None]
+        if self.kind == "turning":
+            return np.stack([np.cos(shape * psi), np.sin(shape * psi)], axis=1)
+        y = {"drift": t, "rate": r, "reading": x}[self.kind]
+        return np.asarray(np.sign(y) * np.abs(y / self.unit) ** shape)[:, None]
+
+
+#: half the difference by which the slope in a shape is taken, as a share of it
+_SHAPE_STEP = 1e-4
+#: shapes that are tried first; those of what turns with the disc come from the spectrum of the residuals
+_SHAPES = {
+    "warming": tuple(0.5 * 2.0**k for k in range(6)),
+    "drift": (1.0, 2.0),
+    "rate": (1.0, 2.0, 3.0),
+    "reading": (2.0, 3.0),
+}
+#: kinds of law that a sensor can have
+_SENSORS = {
+    "magnetometer": ("warming", "drift", "rate", "turning"),
+    "accelerometer": ("warming", "drift", "rate", "reading", "turning"),
+    "gyroscope": ("warming", "drift", "rate", "reading", "turning"),
+}
+#: orders of the spin that are looked at, peaks of the spectrum that are tried
+_ORDERS, _PEAKS = (0.05, 4.0), 3
+
+
+@dataclass(frozen=True)
+class Turned:
+    """Spin and the angle turned since the recording began, as functions of time."""
+
+    rate: CubicSpline | CubicHermiteSpline
+    angle: CubicSpline | CubicHermiteSpline
+
+
+def turned(chain: Chain) -> Turned:
+    """Return how a chain turns, from the states at the starts of its pieces."""
+    plant, t, states = chain.recording.plant, chain.edges[:-1], chain.states
+    if plant == "rate_table":
+        command = chain.recording.command
+        assert command is not None
+        # piecewise linear, so its integral is exact on its knots and parabolas between
+        grid = np.union1d(np.linspace(0.0, chain.edges[-1], 20 * t.size), np.clip(command.t, 0.0, chain.edges[-1]))
+        r = np.interp(grid, command.t, command.value)
+        psi = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(grid) * (r[1:] + r[:-1]))])
+        rate = CubicHermiteSpline(grid, r, np.gradient(r, grid))
+        return Turned(rate, CubicHermiteSpline(grid, psi, r))
+    r = states[:, 1] if plant == "spin_down" else states[:, 12]
+    if t.size < 3:
+        t, r = np.append(t, chain.edges[-1]), np.append(r, r[-1])
+    rate = CubicSpline(t, r)
+    return Turned(rate, rate.antiderivative())
+
+
+def _seen(linear: Linear, chain: Chain, term: SensorTerm, shape: float) -> list[tuple[slice, int, FloatArray]]:
+    """Return rows, axis and basis (n, size) of a term on each of its sensor's axes."""
+    spin = turned(chain)
+    found = []
+    axes = next((readings.axes for readings in chain.readings if readings.sensor == term.sensor), ())
+    for channel in linear.channels:
+        if channel.sensor == term.sensor:
+            t = linear.t[channel.rows]
+            x = _reading(linear, chain, channel.rows, channel.index, term.sensor, axes.index(channel.axis))
+            basis = term.basis(t, spin.rate(t), spin.angle(t), x, shape)
+            found.append((channel.rows, axes.index(channel.axis), basis))
+    return found
+
+
+def _reading(linear: Linear, chain: Chain, rows: slice, index: IntArray, sensor: str, axis: int) -> FloatArray:
+    """Return what the model expects an axis to read, (n,), the closing of gaps included."""
+    readings = next(r for r in chain.readings if r.sensor == sensor)
+    return np.asarray(readings.value[index, axis] - linear.residual[rows])
+
+
+def _columns_of(linear: Linear, chain: Chain, term: SensorTerm, shape: float) -> FloatArray:
+    """Return the columns (n, axes size) of a sensor term's coefficients."""
+    axes = len(_axes(chain, term.sensor))
+    columns = np.zeros((linear.raw.size, axes * term.size))
+    for rows, axis, basis in _seen(linear, chain, term, shape):
+        columns[rows, axis * term.size : (axis + 1) * term.size] = basis
+    return columns
+
+
+def _axes(chain: Chain, sensor: str) -> tuple[str, ...]:
+    return next((readings.axes for readings in chain.readings if readings.sensor == sensor), ())
+
+
+def _widened(linear: Linear, columns: FloatArray) -> Linear:
+    """Return a linearisation with more shared columns (n, c), of the readings alone."""
+    k, d = linear.moves.shape[:2]
+    return replace(
+        linear,
+        own=np.hstack([linear.own, columns]),
+        moves=np.concatenate([linear.moves, np.zeros((k, d, columns.shape[1]))], axis=2),
+    )
+
+
+def orders(fit: Fit, sensor: str) -> list[float]:
+    """Return the orders of the spin at which a sensor's residuals of a loose fit have their highest lines."""
+    length = 0.0
+    parts = []
+    for linear, chain in zip(fit.linears, fit.chains, strict=True):
+        spin = turned(chain)
+        for channel in linear.channels:
+            if channel.sensor == sensor:
+                psi = spin.angle(linear.t[channel.rows])
+                e = linear.residual[channel.rows]
+                parts.append((psi, e - e.mean()))
+                length = max(length, float(np.ptp(psi)))
+    if length < 20.0:
+        return []
+    step = 1.0 / length
+    tried = np.arange(_ORDERS[0], _ORDERS[1], step)
+    power = np.zeros(tried.size)
+    for psi, e in parts:
+        turning, by = np.exp(-1j * tried[0] * psi), np.exp(-1j * step * psi)
+        for j in range(tried.size):
+            power[j] += abs(np.sum(e * turning)) ** 2 / e.size
+            turning = turning * by
+    found: list[float] = []
+    for j in np.argsort(power)[::-1]:
+        if all(abs(tried[j] - other) > 12.0 * step for other in found):
+            found.append(float(tried[j]))
+        if len(found) == _PEAKS:
+            break
+    return found
+
+
+def sensor_library(fit: Fit) -> list[SensorTerm]:
+    """Return the terms about sensors that are asked for first."""
+    terms = []
+    length = 0.5 * max(float(chain.edges[-1]) for chain in fit.chains)
+    spin = max(float(np.max(np.abs(turned(chain).rate(chain.edges[:-1])))) for chain in fit.chains)
+    for sensor in _SENSORS:
+        values = [r.value[r.good] for chain in fit.chains for r in chain.readings if r.sensor == sensor]
+        if not values or not any(v.size for v in values):
+            continue
+        units = {"drift": length, "rate": spin, "reading": float(np.std(np.concatenate(values)))}
+        for kind in _SENSORS[sensor]:
+            shapes = orders(fit, sensor) if kind == "turning" else _SHAPES[kind]
+            unit = float(f"{max(units.get(kind, 1.0), 1e-6):.1g}")
+            terms += [SensorTerm(sensor, kind, shape, unit) for shape in shapes]
+    return terms
+
+
+def _asked_of_sensors(fit: Fit, own: Sequence[Parameter], terms: Sequence[SensorTerm]) -> list[float]:
+    """Return what each sensor term would gain in chi2, pieces jumping as they may."""
+    if not terms:
+        return []
+    bare, jumps = linearised(fit), fit.jumps
+    wide, places, at = [], [], len(fit.parameters)
+    for term in terms:
+        width = max(len(_axes(chain, term.sensor)) for chain in fit.chains) * term.size
+        places.append(range(at, at + width))
+        at += width
+    for linear, chain in zip(bare, fit.chains, strict=True):
+        parts = [
+            _columns_of(linear, chain, term, term.shape)
+            if _axes(chain, term.sensor)
+            else np.zeros((linear.raw.size, len(place)))
+            for term, place in zip(terms, places, strict=True)
+        ]
+        wide.append(_widened(linear, np.hstack(parts)))
+    reduced = mapped(lambda linear, chain: reduce(linear, chain, fit.noise, jumps), wide, fit.chains)
+    columns = (*map(column_of, fit.parameters), *(Column("term", str(j), 1.0) for j in range(at - len(fit.parameters))))
+    board = Board(
+        columns,
+        _to_baseline(np.stack([r.gram for r in reduced]), fit),
+        {column: j for j, column in enumerate(columns)},
+        tuple(wide),
+        tuple(reduced),
+    )
+    taken = [(column_of(q), q) for q in own]
+    base = board.ask(taken).chi2
+    gains = []
+    for place in places:
+        chosen = [(columns[j], Parameter("term", columns[j].name, 0.0, 1.0)) for j in place]
+        gains.append(base - board.ask([*taken, *chosen]).chi2)
+    return gains
+
+
+def _without(chain: Chain, linear: Linear, term: SensorTerm, shape: float, coefficients: FloatArray) -> Chain:
+    """Return a chain whose readings are freed of a term; coefficients (axes, size)."""
+    changed = []
+    for readings in chain.readings:
+        if readings.sensor == term.sensor:
+            value = readings.value.copy()
+            for channel in linear.channels:
+                if channel.sensor == term.sensor:
+                    axis = readings.axes.index(channel.axis)
+                    basis = next(b for rows, _, b in _seen(linear, chain, term, shape) if rows == channel.rows)
+                    value[channel.index, axis] -= basis @ coefficients[axis]
+            readings = replace(readings, value=value)
+        changed.append(readings)
+    return replace(chain, readings=tuple(changed))
+
+
+def _fitted_sensor(start: Fit, own: Sequence[Parameter], own_at: FloatArray, term: SensorTerm) -> Tied | None:
+    """Fit a sensor term and own parameters by output error, pieces hanging together.
+
+    The chains keep their readings; what the term takes off them is part of the residual.
+    """
+    plant = start.chains[0].recording.plant
+    axes = max((_axes(chain, term.sensor) for chain in start.chains), key=len)
+    names = [(axis, j) for axis in axes for j in range(term.size)]
+    noise, chains, shape = start.noise, start.chains, term.shape
+    at = np.concatenate([own_at, np.zeros(len(names)), [shape]])
+    parameters = (
+        *own,
+        *(Parameter("term", f"{axis}.{j}", 0.0, 1.0) for axis, j in names),
+        Parameter("term", "shape", shape, _SHAPE_STEP * shape, 0.3 * shape if term.kind != "turning" else 0.01),
+    )
+    p = len(own)
+    fit = Fit(chains, parameters, at, NO_JUMPS[plant], noise)
+    for round in range(12):
+        bare = linearised(replace(fit, parameters=tuple(own), at=fit.at[:p]))
+        linears = []
+        shape, c = float(fit.at[-1]), fit.at[p:-1]
+        for linear, chain in zip(bare, fit.chains, strict=True):
+            if not _axes(chain, term.sensor):
+                linears.append(_widened(linear, np.zeros((linear.raw.size, len(names) + 1))))
+                continue
+            here = _columns_of(linear, chain, term, shape)
+            h = _SHAPE_STEP * shape
+            slope = (_columns_of(linear, chain, term, shape + h) - _columns_of(linear, chain, term, shape - h)) @ c
+            less = replace(linear, raw=linear.raw - here @ c)
+            linears.append(_widened(less, np.hstack([here, slope[:, None] / (2.0 * h)])))
+        fit = replace(fit, linears=tuple(linears))
+        merit = sum(_squares(fit, i) for i in range(len(linears)))
+        reduced = mapped(lambda linear, chain, f=fit: reduce(linear, chain, f.noise, f.jumps), linears, fit.chains)
+        gram = np.sum([r.gram for r in reduced], axis=0)
+        free = [*range(p + len(names))] if not np.any(c) else [*range(len(parameters))]
+        some = [*free, len(parameters)]
+        step, covariance, expected = shared_step(gram[np.ix_(some, some)], [parameters[j] for j in free], fit.at[free])
+        full = np.zeros(len(parameters))
+        full[free] = step
+        if len(free) == len(parameters):
+            # a shape moves by a third of itself at most, an order of the spin by less than its line is wide
+            full[-1] = float(np.clip(full[-1], -0.3 * shape, 0.3 * shape))
+            fit = replace(fit, covariance=covariance)
+        if round > 2 and fit.merit - merit < 1e-3 * abs(fit.merit - expected) + 0.05 and merit - expected < 0.5:
+            break
+        if round == 11 or not np.all(np.isfinite(full)):
+            break
+        fit = replace(
+            fit,
+            merit=merit,
+            noise=noise_of(fit) if round > 3 else fit.noise,
+            chains=tuple(
+                moved(chain, linear, local_step(r, full), full)
+                for chain, linear, r in zip(fit.chains, linears, reduced, strict=True)
+            ),
+            at=fit.at + full,
+        )
+    return scored(Hypothesis(), fit) if np.all(np.isfinite(fit.at)) and fit.covariance.size else None
+
+
+def _squares(fit: Fit, i: int) -> float:
+    linear = fit.linears[i]
+    white = whitened(linear, fit.noise, linear.residual[:, None])
+    return float(np.sum(white**2))
+
+
+def _as_sensor_laws(term: SensorTerm, fit: Fit, heldout: float | None) -> tuple[tuple[Law, ...], str]:
+    """Return a sensor term as laws, that of the strongest axis first, and its shape in words."""
+    C, place = fit.covariance, {q.name: j for j, q in enumerate(fit.parameters) if q.group == "term"}
+    s = place["shape"]
+    shape, shape_sd = float(fit.at[s]), float(np.sqrt(C[s, s]))
+    axes = list(dict.fromkeys(name.partition(".")[0] for name in place if name != "shape"))
+    ranked = []
+    for axis in axes:
+        js = [place[f"{axis}.{j}"] for j in range(term.size)]
+        values, block = fit.at[js], C[np.ix_(js, js)]
+        if not np.any(np.diag(block) > 0):
+            continue
+        z2 = float(values @ np.linalg.pinv(block) @ values)
+        sds = np.sqrt(np.diag(block))
+        if term.kind == "turning":
+            text = "a * cos(k * psi) + b * sin(k * psi)"
+            coefficients = {
+                "a": ParameterValue(float(values[0]), float(sds[0])),
+                "b": ParameterValue(float(values[1]), float(sds[1])),
+                "k": ParameterValue(shape, shape_sd),
+            }
+        elif term.kind == "warming":
+            text = "c - c * exp(-t/tau)"
+            coefficients = {
+                "c": ParameterValue(float(values[0]), float(sds[0])),
+                "tau": ParameterValue(shape, shape_sd),
+            }
+        else:
+            symbol = {"drift": "t", "rate": "r", "reading": axis.partition("_")[0]}[term.kind]
+            scale = term.unit**-shape
+            c = float(values[0])
+            row = np.array([scale, -c * scale * log(term.unit)])
+            pair = C[np.ix_([js[0], s], [js[0], s])]
+            text = f"c * |{symbol}|^n" + (f" * sign({symbol})" if symbol != "t" else "")
+            coefficients = {
+                "c": ParameterValue(c * scale, float(np.sqrt(row @ pair @ row))),
+                "n": ParameterValue(shape, shape_sd),
+            }
+        ranked.append((z2, Law(text, f"{term.sensor}.{axis}", coefficients, heldout)))
+    ranked.sort(key=lambda item: -item[0])
+    laws = tuple(law for z2, law in ranked if z2 > PER_PARAMETER * 4.0 or law is ranked[0][1])
+    return laws, f"{term.kind} of the {term.sensor}, {shape:.4g} ± {shape_sd:.2g}"
 
 
 # --------------------------------------------------------------------------------------------------- fitting
@@ -262,7 +607,7 @@ def _fitted(
     coefficients: Sequence[float],
     at: Mapping[str, float],
     *,
-    iterations: int = 10,
+    iterations: int = 8,
 ) -> Tied:
     """Fit terms and own parameters by output error, pieces hanging together."""
     plant = start.chains[0].recording.plant
@@ -294,7 +639,7 @@ def _held_out(before: Fit, after: Fit) -> dict[int, float]:
         return {}
     sides = []
     for fit in (before, after):
-        linears = fit.linears or linearised(fit)
+        linears = fit.linears
         reduced = mapped(lambda linear, chain, f=fit: reduce(linear, chain, f.noise, f.jumps), linears, fit.chains)
         levels = []
         for i in range(count):
@@ -312,7 +657,7 @@ def _held_out(before: Fit, after: Fit) -> dict[int, float]:
 
 
 def _factor(symbol: str, power: str) -> str:
-    return f"|{symbol}|^{power}" if symbol != "V" else f"V^{power}"
+    return f"|{symbol}|^{power}"
 
 
 def _as_law(terms: Sequence[Term], fit: Fit, at: Mapping[str, float], heldout: float | None) -> tuple[Law, str]:
@@ -375,6 +720,32 @@ def _white(noise: NoiseModel) -> dict[str, GroupNoise]:
     return {group: GroupNoise(item.sd, min(item.correlation, 0.9)) for group, item in noise.items()}
 
 
+def _beside(loose: Fit, own: Sequence[Parameter], own_at: FloatArray, noise: NoiseModel) -> Fit:
+    """Return a fit without errors of the sensors whose motion stays beside the data, to ask from.
+
+    In the air its pieces jump as those of the loose fit do, for what hides turns a whole flight too far from a line; a
+    rig's hang together.
+    """
+    plant = loose.chains[0].recording.plant
+    fit = refit(Fit(loose.chains, tuple(own), own_at, loose.jumps, _white(noise)), iterations=5)
+    levels: dict[str, list[float]] = {}
+    for linear in fit.linears:
+        for channel in linear.channels:
+            levels.setdefault(channel.group, []).append(_quick(linear.residual[channel.rows]))
+    quick = {group: float(np.sqrt(np.mean(np.square(found)))) for group, found in levels.items()}
+    sure = {
+        g: GroupNoise(min(item.sd, max(quick[g], 0.1 * item.sd)), item.correlation)
+        for g, item in fit.noise.items()
+        if g in quick
+    }
+    return replace(fit, noise=sure, jumps=fit.jumps if plant == "flight" else NO_JUMPS[plant])
+
+
+def _quick(e: FloatArray) -> float:
+    """Return the noise that differences of neighbours show, whatever drifts below it."""
+    return float(np.sqrt(0.5 * np.mean(np.diff(e) ** 2))) if e.size > 1 else 0.0
+
+
 def _candidates(
     fit: Fit, own: Sequence[Parameter], terms: Sequence[Term], at: Mapping[str, float]
 ) -> list[tuple[float, float, Term]]:
@@ -395,50 +766,74 @@ def find_law(
     """
     plant = recordings[0].plant
     base = best if not best.hypothesis.trials else tied_fit(loose, Hypothesis(), own, noise, {}, iterations=6, polish=1)
-    terms = library(plant)
-    if not terms:
-        return None
-    start = replace(loose, noise=_white(noise))
+    own_at = _own_at(loose, own)
+    start = _beside(loose, own, own_at, noise)
     states = [state_of(chain, start.values(i)) for i, chain in enumerate(start.chains)]
     at = reference_of(states)
-    found: tuple[Tied, tuple[Term, ...]] | None = None
-    for gain, coefficient, term in _spread(_candidates(start, own, terms, at)):
-        if gain < ENTRY:
+    motion = library(plant)
+    about = sensor_library(start)
+    ranked: list[tuple[float, float, Term | SensorTerm]] = []
+    if motion:
+        ranked += _candidates(start, own, motion, at)
+    ranked += [(gain, 0.0, term) for gain, term in zip(_asked_of_sensors(start, own, about), about, strict=True)]
+    ranked.sort(key=lambda item: -item[0])
+    found: tuple[Tied, Term | SensorTerm] | None = None
+    for _, coefficient, term in _spread(ranked):
+        tied: Tied | None
+        if isinstance(term, SensorTerm):
+            tied = _fitted_sensor(start, own, own_at, term)
+        else:
+            tied = _fitted(start, own, own_at, [term], [coefficient], at)
+        if tied is None:
             continue
-        tied = _fitted(start, own, _own_at(loose, own), [term], [coefficient], at)
         if found is None or tied.score < found[0].score:
-            found = tied, (term,)
-    if found is None:
-        return None
-    return _believed(found[0], found[1], base, best, at)
-
-
-def _spread(ranked: Sequence[tuple[float, float, Term]]) -> list[tuple[float, float, Term]]:
-    """Return the best of a ranking, no two of which differ by exponents next to one another alone."""
-    chosen: list[tuple[float, float, Term]] = []
-    for item in ranked:
-        near = [
-            other
-            for _, _, other in chosen
-            if other.target == item[2].target
-            and {s for s, _ in other.powers} == {s for s, _ in item[2].powers}
-            and all(abs(a - b) <= 1.0 for (_, a), (_, b) in zip(other.powers, item[2].powers, strict=True))
-            and bool(other.decay) == bool(item[2].decay)
-        ]
-        if not near:
-            chosen.append(item)
-        if len(chosen) == _FITTED:
+            found = tied, term
+        if _share(base.fit, tied.fit, start.noise) > _ALL:
             break
-    return chosen
+    return None if found is None else _believed(found[0], found[1], base, best, at, start.noise)
 
 
-def _believed(tied: Tied, terms: tuple[Term, ...], base: Tied, best: Tied, at: Mapping[str, float]) -> FoundLaw | None:
-    """Return the law if it gains what it costs, and on recordings that took no part."""
-    size = sum(q.group == "law" for q in tied.fit.parameters)
+def _key(term: Term | SensorTerm) -> tuple[object, ...]:
+    if isinstance(term, SensorTerm):
+        return term.sensor, term.kind
+    return term.target, frozenset(symbol for symbol, _ in term.powers), bool(term.decay)
+
+
+def _spread(ranked: Sequence[tuple[float, float, Term | SensorTerm]]) -> list[tuple[float, float, Term | SensorTerm]]:
+    """Return the best few of a ranking, one of each set of symbols: the exponents are the fit's business."""
+    chosen: dict[tuple[object, ...], tuple[float, float, Term | SensorTerm]] = {}
+    for item in ranked:
+        if item[0] > max(ENTRY, _WORTH * ranked[0][0]):
+            chosen.setdefault(_key(item[2]), item)
+    return list(chosen.values())[:_FITTED]
+
+
+def _share(base: Fit, fit: Fit, noise: NoiseModel) -> float:
+    """Return the part of the excess of chi2 over the number of readings that a fit takes away."""
+    before, after = (
+        sum(float(np.sum(whitened(linear, noise, linear.residual[:, None]) ** 2)) for linear in one.linears)
+        for one in (base, fit)
+    )
+    return (before - after) / max(before - base.count, 1.0)
+
+
+def _believed(
+    tied: Tied, term: Term | SensorTerm, base: Tied, best: Tied, at: Mapping[str, float], noise: NoiseModel
+) -> FoundLaw | None:
+    """Return the law if it gains what it costs, explains most of the excess, and recordings that took no part."""
+    size = sum(q.group in ("law", "term") for q in tied.fit.parameters)
     if tied.score + ENTRY + PER_PARAMETER * size > min(base.score, best.score):
         return None
+    share = _share(base.fit, tied.fit, noise)
     heldout = _held_out(base.fit, tied.fit)
     if heldout and (2.0 * sum(heldout.values()) < _HELD_OUT or np.mean(np.array([*heldout.values()]) > 0.0) < 0.5):
         return None
-    law, reference = _as_law(terms, tied.fit, at, sum(heldout.values()) if heldout else None)
-    return FoundLaw(law, base.score - tied.score, heldout, 1.0, reference, tied)
+    if share < _SHARE:
+        return None
+    total = sum(heldout.values()) if heldout else None
+    if isinstance(term, SensorTerm):
+        laws, reference = _as_sensor_laws(term, tied.fit, total)
+    else:
+        law, reference = _as_law([term], tied.fit, at, total)
+        laws = (law,)
+    return FoundLaw(laws[0], base.score - tied.score, heldout, share, reference, tied, laws[1:])

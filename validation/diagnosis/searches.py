@@ -17,7 +17,7 @@ from validation.diagnosis.plateau import plateau
 from validation.diagnosis.readings import delay
 from validation.diagnosis.relaxed import NO_JUMPS, relaxed
 from validation.diagnosis.selection import Hypothesis, Proposal, Tied, fitted_parameters
-from validation.diagnosis.slips import lost_along, phase_counts, repaired
+from validation.diagnosis.slips import first_yaw, lost_along, phase_counts, repaired
 from validation.diagnosis.trajectory_pieces import WOBBLE, Chain, Column, IntArray, Linear, linearise, recut, shown
 from validation.diagnosis.trials import Trial, available
 
@@ -348,7 +348,9 @@ def _losses(id: str, chains: Sequence[Chain], sensor: str) -> tuple[Trial, float
     return Trial(id, (), None, (("fraction", share, sd),)), cost
 
 
-def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], taken: Sequence[Trial] = ()) -> list[Shifted]:
+def dropped_magnetometer(
+    fit: Fit, known: Sequence[Parameter], taken: Sequence[Trial] = (), least: float = 40.0
+) -> list[Shifted]:
     """Return lost samples of the magnetometer as a proposal where its phase shows steps.
 
     The motion of a loose fit follows the magnetometer; with steps found it is fitted anew with the samples at their
@@ -369,10 +371,55 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], taken: Sequence[T
         for chain, c in zip(chains, counts, strict=True)
     ]
     anew = relaxed(fixed, known)
+    gain = fit.merit - anew.merit
+    if gain < least:
+        return []
     new = tuple(_own_times(one, chain, {sensor: c}) for one, chain, c in zip(anew.chains, chains, counts, strict=True))
-    trial, cost = _losses(id, new, sensor)
-    gain = fit.merit - anew.merit - cost
-    return [Shifted(Proposal(trial, gain, {}), new, cost)]
+    # what was lost while the phase stood still shows in what comes after, by a motion that hangs together
+    plant = chains[0].recording.plant
+    found = replace(anew, chains=new)
+    if plant == "rate_table":
+        whole = tuple(
+            _begun(replace(c, edges=c.edges[[0, -1]], states=c.states[:1]), anew, i) for i, c in enumerate(new)
+        )
+        counted, _ = _counted(replace(found, chains=whole), sensor, _stated_sd(found, sensor, anew.noise))
+        standing = tuple(
+            recut(one, found.values(i), chain.edges) for i, (one, chain) in enumerate(zip(whole, new, strict=True))
+        )
+        found = _with_losses(replace(found, chains=standing), counted, sensor)
+    for _ in range(2):
+        tied = refit(replace(found, jumps=NO_JUMPS[plant]), iterations=4)
+        counted, _ = _counted(tied, sensor, _stated_sd(found, sensor, anew.noise))
+        same = all(
+            np.array_equal(a.lost.get(sensor, 0.0), b.lost.get(sensor, 0.0))
+            for a, b in zip(found.chains, counted.chains, strict=True)
+        )
+        found = _with_losses(tied, counted, sensor)
+        if same:
+            break
+    trial, cost = _losses(id, found.chains, sensor)
+    return [Shifted(Proposal(trial, gain - cost, {}), found.chains, cost)]
+
+
+def _begun(whole: Chain, fit: Fit, i: int) -> Chain:
+    """Return a table's motion in one piece from the yaw that its first readings show."""
+    if whole.recording.get("magnetometer") is None:
+        return whole
+    states = whole.states.copy()
+    states[0, :2] = 0.0
+    whole = replace(whole, states=states)
+    turned = states.copy()
+    turned[0, 0] = first_yaw(whole, fit.values(i))
+    return replace(whole, states=turned)
+
+
+def _with_losses(fit: Fit, counted: Fit, sensor: str) -> Fit:
+    """Return a fit with the losses that the chains of another hold."""
+    chains = tuple(
+        replace(chain, lost={**chain.lost, sensor: other.lost[sensor]}) if sensor in other.lost else chain
+        for chain, other in zip(fit.chains, counted.chains, strict=True)
+    )
+    return replace(fit, chains=chains)
 
 
 def _own_times(anew: Chain, old: Chain, lost: Mapping[str, FloatArray]) -> Chain:

@@ -16,7 +16,7 @@ from discsim.recording import Recording, Samples
 from validation.diagnosis.readings import Values, delay
 from validation.diagnosis.trajectory_pieces import Chain, IntArray, shown
 
-__all__ = ["likeliest_counts", "lost_along", "phase_counts", "repaired"]
+__all__ = ["first_yaw", "likeliest_counts", "lost_along", "phase_counts", "repaired"]
 
 #: most samples lost in a row that are looked for
 _IN_A_ROW = 4
@@ -24,10 +24,14 @@ _IN_A_ROW = 4
 _COST = 2.0 * np.log(100.0)
 #: a reading cannot speak against a count by more than this
 _MOST = 50.0
+#: what speaks, in chi-squared, for a sensor that ends when the others do
+_TOGETHER = 20.0
 #: neighbours by which the ordinary turn from sample to sample is judged, on either side
 _NEIGHBOURS = 12
+#: first samples, by which the phase at the start is told
+_FIRST = 12
 #: smallest step of phase, in its own noise, that is told from none
-_SEEN = 6.0
+_SEEN = 4.5
 
 
 def likeliest_counts(cost: FloatArray, gaps: IntArray, each: float = _COST) -> tuple[IntArray, float]:
@@ -138,10 +142,29 @@ def lost_along(
     measured = np.where(readings.good[:, None, :], samples.value[:, None, :], np.nan)
     off = (measured - expected[place[:, None] + counts]) / sd
     cost = np.minimum(np.nansum(off**2, axis=2), _MOST)
+    # loggers mostly stop all their sensors together: then what is missing at the end was lost before
+    missing = int((end - samples.t[-1]) * rate_hz + 1e-3)
+    if missing <= most:
+        cost[-1] += _TOGETHER
+        cost[-1, missing] -= _TOGETHER
     path, least = likeliest_counts(cost, np.diff(place, prepend=place[0]))
     was = np.zeros(len(samples), dtype=np.int64) if about is None else about.astype(np.int64)
     before = float(cost[np.arange(len(samples)), was].sum()) + _COST * float(was[-1])
     return path.astype(float), before - least
+
+
+def first_yaw(current: Chain, values: Values) -> float:
+    """Return by how much the first piece's yaw must grow for the first magnetometer samples to agree with it, rad."""
+    samples = current.recording.samples["magnetometer"]
+    lost = current.lost.get("magnetometer", np.zeros(len(samples)))
+    some = np.flatnonzero(np.all(np.isfinite(samples.value), axis=1))[:_FIRST]
+    if some.size == 0:
+        return 0.0
+    t = samples.t[some] + lost[some] / current.recording.sheets["magnetometer"].rate_hz
+    expected = shown(current, values, "magnetometer", t - delay(values, "magnetometer", t))
+    measured = samples.value[some]
+    ahead = (expected[:, 0] + 1j * expected[:, 1]) * np.conj(measured[:, 0] + 1j * measured[:, 1])
+    return float(np.angle(np.sum(ahead / np.maximum(np.abs(ahead), 1e-12))))
 
 
 def repaired(recording: Recording, sensor: str, lost: FloatArray) -> Recording:
