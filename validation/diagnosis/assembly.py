@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2 as chi2_law
 
+from discsim.arrays import FloatArray
 from discsim.disc import Aero, Disc, Rig, aero_key
 from discsim.effects.catalogue import CATALOGUE, Effect
 from discsim.model_file import Model, ModelEffect
@@ -31,9 +32,10 @@ from validation.diagnosis.answer import (
 )
 from validation.diagnosis.board import column_of
 from validation.diagnosis.law import FoundLaw
+from validation.diagnosis.noise import NoiseModel
 from validation.diagnosis.places import located_effect, located_rest
 from validation.diagnosis.rest import remainders
-from validation.diagnosis.search import Search, chi2_in, tried_without
+from validation.diagnosis.search import FAR, Search, chi2_in, tried_without
 from validation.diagnosis.selection import Hypothesis, Tied, fitted_parameters
 from validation.diagnosis.trials import Trial, parameters_of
 
@@ -55,8 +57,6 @@ _RECALIBRATED_NAMES = {
 
 def verdict_of(found: Search) -> tuple[Verdict, bool]:
     """Return the verdict, and whether something is left that is not noise."""
-    from validation.diagnosis.search import FAR
-
     final = found.final
     left = remainders(final.fit.linears, final.residuals, final.fit.noise)
     far = chi2_in(final, found.loose_noise) > FAR * final.fit.count and found.loose.merit < 2.0 * found.loose.count
@@ -84,7 +84,7 @@ def recalibrations(found: Search) -> dict[str, Recalibration]:
     return result
 
 
-def _errors(tied: Tied) -> np.ndarray:  # type: ignore[type-arg]
+def _errors(tied: Tied) -> FloatArray:
     covariance = tied.fit.covariance
     if covariance.shape[0] != len(tied.fit.parameters):
         return np.full(len(tied.fit.parameters), np.nan)
@@ -135,9 +135,9 @@ def _separating(one: str, other: str, found: Search) -> str:
     prefix = {one.split(".")[0], other.split(".")[0]}
     if plant == "flight":
         if prefix & {"accel", "mag", "gyro"}:
-            return "a run of the module on a rate table from rest to full spin: there the motion is known and the sensors show alone"
+            return "a run of the module on a rate table, from rest to full spin: there the motion is known"
         if prefix & {"air"}:
-            return "two throws into opposite directions at the same speed, and one much slower: air that moves and coefficients part there"
+            return "two throws into opposite directions at one speed, and one much slower"
         return "throws of both spin directions at half and at full speed"
     if plant == "rate_table":
         return "a profile with several plateaus and both directions, and a minute at rest before and after"
@@ -226,7 +226,7 @@ def _figures(found: Search, unexplained: bool) -> tuple[FitFigures, FitFigures, 
     return FitFigures(base, before / n), FitFigures(last, after / n), tuple(held)
 
 
-def _one_chi2(tied: Tied, i: int, noise: dict) -> float:  # type: ignore[type-arg]
+def _one_chi2(tied: Tied, i: int, noise: NoiseModel) -> float:
     linear, residual = tied.fit.linears[i], tied.residuals[i]
     return sum(float(np.sum((residual[c.rows] / noise[c.group].sd) ** 2)) for c in linear.channels)
 

@@ -132,7 +132,7 @@ def located_effect(found: Search, trial: Trial, names: Sequence[str]) -> list[Lo
         by_axis[sensor, axis] = by_axis.get((sensor, axis), 0.0) + max(float(np.sum(value)), 0.0)
     owner = CATALOGUE[trial.id].acts_on if trial.id in CATALOGUE else "motion"
     order = sorted(by_axis, key=lambda key: (key[0] != owner, -by_axis[key]))
-    places = []
+    places: list[Located] = []
     event = trial.id in CATALOGUE and CATALOGUE[trial.id].event
     for sensor, axis in order[:4]:
         share = by_axis[sensor, axis] / total
@@ -190,7 +190,7 @@ def _span(
 
 
 def located_rest(found: Search, names: Sequence[str]) -> list[Located]:
-    """Return where the baseline fails when nothing explains it: the sensors and axes, and what the excess grows with."""
+    """Return where the baseline fails when nothing explains it: sensors and axes, and what the excess grows with."""
     noise = {group: found.loose_noise[group].sd for group in found.loose_noise}
     linears = found.base.fit.linears
     zero = [np.zeros_like(residual) for residual in found.base.residuals]
@@ -201,7 +201,7 @@ def located_rest(found: Search, names: Sequence[str]) -> list[Located]:
     by_axis: dict[tuple[str, str], dict[int, float]] = {}
     for (index, sensor, axis), value in excess.items():
         by_axis.setdefault((sensor, axis), {})[index] = max(float(np.sum(value)), 0.0)
-    places = []
+    places: list[Located] = []
     for (sensor, axis), shares in sorted(by_axis.items(), key=lambda item: -sum(item[1].values()))[:4]:
         amount = sum(shares.values())
         if places and amount < _WORTH * total:

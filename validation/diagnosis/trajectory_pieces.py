@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -76,7 +77,7 @@ _FORGOTTEN = 8.0
 
 
 class Column(NamedTuple):
-    """A direction in which predictions can move: a parameter, half its difference, shapes of its effect it is taken at."""
+    """A direction in which predictions move: a parameter, half its difference, shapes that its effect is taken at."""
 
     group: str
     name: str
@@ -209,20 +210,20 @@ class Linear:
 
     def spread(self, places: Sequence[int], width: int) -> Linear:
         """Return the linearisation with its shared columns at ``places`` of ``width``, the others zero."""
-        l, n = self.unknowns, self.raw.size
+        u, n = self.unknowns, self.raw.size
         kept = self.own.shape[1] - len(places)
         own = np.zeros((n, kept + width))
         own[:, :kept] = self.own[:, :kept]
         own[:, [kept + j for j in places]] = self.own[:, kept:]
-        moves = np.zeros((*self.moves.shape[:2], l + width))
-        moves[:, :, :l] = self.moves[:, :, :l]
-        moves[:, :, [l + j for j in places]] = self.moves[:, :, l:]
+        moves = np.zeros((*self.moves.shape[:2], u + width))
+        moves[:, :, :u] = self.moves[:, :, :u]
+        moves[:, :, [u + j for j in places]] = self.moves[:, :, u:]
         return replace(self, own=own, moves=moves)
 
     def after(self, local: FloatArray, shared: FloatArray) -> FloatArray:
         """Return the residuals (n,) that a step of the unknowns is expected to leave."""
         if self.piece.size == 0:
-            return self.residual - self.own @ np.concatenate([local, shared])
+            return np.asarray(self.residual - self.own @ np.concatenate([local, shared]))
         d = self.moves.shape[1]
         tangents = self.moves @ np.concatenate([local, shared])
         moved = np.einsum("nd,nd->n", self.own[:, :d], tangents[self.piece])
@@ -409,7 +410,7 @@ class _Runner:
                     marks.append(mark)
         marks = sorted(set(marks))
         steps = [np.array([start])]
-        for a, b in zip(marks[:-1], marks[1:], strict=True):
+        for a, b in pairwise(marks):
             fine = h
             for t, width in self.events:
                 if abs(0.5 * (a + b) - t) < 6 * width:
@@ -501,8 +502,8 @@ def linearise(
     p = len(columns)
     # states of the pieces as functions of [first state | jumps | parameters]
     allowed = np.flatnonzero(jumps)
-    l = d + (k - 1) * allowed.size
-    S = np.zeros((k, d, l + p))
+    u = d + (k - 1) * allowed.size
+    S = np.zeros((k, d, u + p))
     S[0, :, :d] = np.eye(d)
     closing = np.zeros((k, d))
     gaps = np.zeros((max(k - 1, 0), d))
@@ -581,7 +582,7 @@ def linearise(
         if i + 1 < k:
             S[i + 1] = Phi @ S[i]
             for row, j in enumerate(motion_columns):
-                S[i + 1, :, l + j] += Psi[:, row]
+                S[i + 1, :, u + j] += Psi[:, row]
             closing[i + 1] = Phi @ closing[i]
             gap = difference(plant, current.states[i + 1], nominal_end, d)
             gaps[i] = gap
@@ -591,7 +592,7 @@ def linearise(
             closing[i + 1, forbidden] -= gap[forbidden]
 
     # parameters of sensors and clocks, from the motion as it is
-    for s, w, y, M in zip(samples, out_rows, ideal, J, strict=True):
+    for s, w, M in zip(samples, out_rows, J, strict=True):
         if not sensor_columns:
             break
         rate = None
@@ -616,7 +617,7 @@ def linearise(
                 up = predicted(s.sensor, recording, {**here, (group, name): base + size}, s.instants, w)
                 down = predicted(s.sensor, recording, {**here, (group, name): base - size}, s.instants, w)
                 M[:, :, d + j] = (up - down) / (2.0 * size)
-    return _stack(current, samples, ideal, J, piece_of, S, closing, gaps, allowed, l)
+    return _stack(current, samples, ideal, J, piece_of, S, closing, gaps, allowed, u)
 
 
 #: how the wobble of a free spin dies (1/s) and turns (rad/s), how that differs along and across the wind, and their
@@ -735,7 +736,7 @@ def _stack(
     closing: FloatArray,
     gaps: FloatArray,
     allowed: IntArray,
-    l: int,
+    u: int,
 ) -> Linear:
     """Put the rows of all sensors together, channel by channel, without those that take no part."""
     raw, own, pieces, t, sd, shifts = [], [], [], [], [], []
@@ -749,7 +750,7 @@ def _stack(
         closed = np.einsum("mwd,md->mw", M[:, :, :d], closing[piece])
         if lagged:
             full = np.matmul(M[:, :, :d], S[piece])
-            full[:, :, l:] += M[:, :, d:]
+            full[:, :, u:] += M[:, :, d:]
             M = full
         prediction, slopes, closed = s.weighted(y), s.weighted(M), s.weighted(closed)
         limit = readings.limit
@@ -774,7 +775,7 @@ def _stack(
             rows = slice(at, at + index.size)
             channels.append(Channel(s.sensor, readings.axes[axis], _group(s.sensor, axis), rows, index))
             at += index.size
-    kind, where, jump = np.full(l, -1), np.zeros(l, dtype=np.int64), np.zeros(l)
+    kind, where, jump = np.full(u, -1), np.zeros(u, dtype=np.int64), np.zeros(u)
     for i in range(gaps.shape[0]):
         place = slice(d + i * allowed.size, d + (i + 1) * allowed.size)
         kind[place], where[place], jump[place] = allowed, i + 1, gaps[i, allowed]
@@ -782,7 +783,7 @@ def _stack(
     def joined(parts: list[Any]) -> Any:
         return np.concatenate(parts) if parts else np.empty(0)
 
-    rows_of = joined(own) if own else np.empty((0, d + S.shape[2] - l))
+    rows_of = joined(own) if own else np.empty((0, d + S.shape[2] - u))
     return Linear(
         joined(raw),
         rows_of,
