@@ -140,7 +140,7 @@ def _accelerometer(recording: Recording, values: Values, t: FloatArray, rows: Fl
     if np.any(drift):
         f = f + t[:, None] * drift
     limit = value(values, "accel.saturation", "limit_m_s2")
-    return np.asarray(np.clip(f, -limit, limit) if np.isfinite(limit) else f
+    return np.asarray(np.clip(f, -limit, limit) if np.isfinite(limit) else f)
 
 
 def _gyroscope(recording: Recording, values: Values, rows: FloatArray) -> FloatArray:
