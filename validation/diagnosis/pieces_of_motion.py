@@ -324,9 +324,9 @@ def _commanded(p: Any, knots: FloatArray, t: float, psi: float) -> tuple[float, 
     n = knots.shape[1]
     k = min(max(np.searchsorted(knots[0], t, side="right") - 1, 0), n - 2)
     slope = (knots[1, k + 1] - knots[1, k]) / (knots[0, k + 1] - knots[0, k])
+    command = knots[1, k] + (min(max(t, knots[0, 0]), knots[0, n - 1]) - knots[0, k]) * slope
     if t < knots[0, 0] or t > knots[0, n - 1]:
         slope = 0.0
-    command = knots[1, k] + (min(max(t, knots[0, 0]), knots[0, n - 1]) - knots[0, k]) * slope
     if command == 0.0 and slope == 0.0:
         return 0.0, 0.0
     ripple, _ = speed_ripple(p.rig_speed_ripple, psi, 0.0)
