@@ -17,7 +17,7 @@ from discsim.arrays import BoolArray, FloatArray
 from discsim.frames import euler_angles
 from validation.diagnosis.noise import NoiseModel, whitened
 from validation.diagnosis.readings import Values
-from validation.diagnosis.trajectory_pieces import Chain, Column, Linear, linearise, moved, shifted
+from validation.diagnosis.trajectory_pieces import STEPS, Chain, Column, Linear, linearise, moved, shifted
 
 __all__ = [
     "Fit",
@@ -190,17 +190,17 @@ class Reduced:
 
 def normal_matrix(linear: Linear, noise: NoiseModel) -> FloatArray:
     """Return the normal matrix (l + p + 1, l + p + 1) over [local | shared | residual] of whitened rows."""
-    l, d = linear.unknowns, linear.moves.shape[1]
-    if l == d or linear.piece.size == 0:
+    u, d = linear.unknowns, linear.moves.shape[1]
+    if u == d or linear.piece.size == 0:
         A = whitened(linear, noise, np.hstack([linear.local, linear.shared, linear.residual[:, None]]))
         return np.asarray(A.T @ A)
     # with jumps the full rows are long and mostly empty: piece by piece, then chained
     rows = whitened(linear, noise, np.hstack([linear.own, linear.residual[:, None]]), linear.piece)
     width = linear.moves.shape[2] + 1
-    p = width - 1 - l
+    p = width - 1 - u
     G = np.zeros((width, width))
     T = np.zeros((d + p + 1, width))
-    T[d:, l:] = np.eye(p + 1)
+    T[d:, u:] = np.eye(p + 1)
     for i in range(linear.moves.shape[0]):
         mine = rows[linear.piece == i]
         T[:d, :-1] = linear.moves[i]
@@ -210,8 +210,8 @@ def normal_matrix(linear: Linear, noise: NoiseModel) -> FloatArray:
 
 def unknown_prior(linear: Linear, current: Chain, jumps: Jumps) -> tuple[FloatArray, FloatArray, float]:
     """Return what is known of a recording's own unknowns beside its readings: normal matrix (l, l), pull (l,), chi2."""
-    l = linear.unknowns
-    prior = np.zeros(l)
+    u = linear.unknowns
+    prior = np.zeros(u)
     first = linear.jump_kind < 0
     prior[first] = _ANYWHERE[current.recording.plant] ** -2.0
     prior[~first] = jumps.sd[linear.jump_kind[~first]] ** -2.0
@@ -229,20 +229,20 @@ def unknown_prior(linear: Linear, current: Chain, jumps: Jumps) -> tuple[FloatAr
 
 def reduce(linear: Linear, current: Chain, noise: NoiseModel, jumps: Jumps) -> Reduced:
     """Eliminate the local unknowns of a recording."""
-    l = linear.unknowns
+    u = linear.unknowns
     G = normal_matrix(linear, noise)
     H, right, chi2 = unknown_prior(linear, current, jumps)
-    G[:l, :l] += H
-    G[:l, -1] += right
-    G[-1, :l] += right
+    G[:u, :u] += H
+    G[:u, -1] += right
+    G[-1, :u] += right
     G[-1, -1] += chi2
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(G)[:l], 1e-300))
-    H = G[:l, :l] * scale[:, None] * scale[None, :]
-    H[np.arange(l), np.arange(l)] += 1e-12
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(G)[:u], 1e-300))
+    H = G[:u, :u] * scale[:, None] * scale[None, :]
+    H[np.arange(u), np.arange(u)] += 1e-12
     L = np.linalg.cholesky(H)
-    cross = G[:l, l:] * scale[:, None]
+    cross = G[:u, u:] * scale[:, None]
     half = np.linalg.solve(L, cross)
-    gram = G[l:, l:] - half.T @ half
+    gram = G[u:, u:] - half.T @ half
     return Reduced(gram, (L, scale), cross, linear.residual.size)
 
 
@@ -332,24 +332,24 @@ def refit(
     fit: Fit,
     *,
     iterations: int = 8,
-    tolerance: float = 1e-3,
+    tolerance: float = 0.05,
     give_up: float = np.inf,
     bounds: Mapping[tuple[str, str], tuple[float, float]] | None = None,
 ) -> Fit:
     """Go on from where a fit stands by Gauss-Newton steps, halved where they do not improve.
 
-    Stops when the expected gain is below ``tolerance`` of chi-squared per reading and of 0.05, or where chi-squared
-    is expected to stay above ``give_up``.
+    Stops when the gain, expected or found, is below ``tolerance`` of chi-squared, or where chi-squared is expected to
+    stay above ``give_up``.
     """
     linears = linearised(fit)
     fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
     for _ in range(iterations):
-        reduced = mapped(lambda linear, chain: reduce(linear, chain, fit.noise, fit.jumps), fit.linears, fit.chains)
+        reduced = mapped(_reduced(fit), fit.linears, fit.chains)
         gram = np.sum([r.gram for r in reduced], axis=0)
         step, covariance, expected = shared_step(gram, fit.parameters, fit.at)
         fit = replace(fit, covariance=covariance)
         gain = fit.merit - expected
-        if gain < max(0.05, 1e-6 * fit.merit) or expected > give_up:
+        if (gain < max(tolerance, 1e-7 * fit.merit) and not open_gaps(fit)) or expected > give_up:
             break
         share, better = 1.0, None
         for _ in range(5):
@@ -369,17 +369,36 @@ def refit(
             if all(np.all(np.isfinite(chain.states)) for chain in chains):
                 new = linearised(trial)
                 merit = merit_of(trial, new)
-                if np.isfinite(merit) and merit < fit.merit + 1e-9 * abs(fit.merit):
+                # while gaps are open the merit is that of the closed chain to first order only: too good
+                bar = fit.merit * (1.0 + 1e-9) if not open_gaps(fit) else 1.5 * fit.merit + 10.0 * fit.count
+                if np.isfinite(merit) and merit < bar:
                     better = replace(trial, linears=new, merit=merit, iterations=fit.iterations + 1)
                     break
             share *= 0.4
         if better is None:
             break
         improved = fit.merit - better.merit
+        were_open = open_gaps(fit)
         fit = better
-        if improved < max(tolerance, 1e-7 * fit.merit):
+        if not were_open and improved < max(tolerance, 1e-7 * fit.merit):
             break
     return fit
+
+
+#: gaps of a chain below this share of the steps of its differences are closed
+_CLOSED = 20.0
+
+
+def open_gaps(fit: Fit) -> bool:
+    """Tell whether pieces that may not jump still do."""
+    forbidden = ~fit.jumps.allowed
+    steps = STEPS[fit.chains[0].recording.plant]
+    return any(bool(np.any(np.abs(linear.gaps[:, forbidden]) > _CLOSED * steps[forbidden])) for linear in fit.linears)
+
+
+def _reduced(fit: Fit) -> Callable[[Linear, Chain], Reduced]:
+    """Return `reduce` with the noise and the jumps of a fit."""
+    return lambda linear, chain: reduce(linear, chain, fit.noise, fit.jumps)
 
 
 def _part(chain: Chain, linear: Linear, local: FloatArray, shared: FloatArray, share: float) -> Chain:

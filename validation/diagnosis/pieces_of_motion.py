@@ -183,8 +183,9 @@ def free_spin_pieces(
         p = flat.view(PARAMETERS)[0]
         state = states[c]
         attitude[0], rate[0], psis[0] = state[6:10], state[10:13], 0.0
-        q = states[0]  # the same for all neighbours, or a turn would be taken for a change of the wind
-        heading = atan2(2.0 * (q[6] * q[9] + q[7] * q[8]), 1.0 - 2.0 * (q[8] * q[8] + q[9] * q[9]))
+        heading = atan2(
+            2.0 * (state[6] * state[9] + state[7] * state[8]), 1.0 - 2.0 * (state[8] * state[8] + state[9] * state[9])
+        )
         for k in range(n - 1):
             t, h, psi = times[k], times[k + 1] - times[k], psis[k]
             w0 = rate[k]
@@ -323,9 +324,9 @@ def _commanded(p: Any, knots: FloatArray, t: float, psi: float) -> tuple[float, 
     n = knots.shape[1]
     k = min(max(np.searchsorted(knots[0], t, side="right") - 1, 0), n - 2)
     slope = (knots[1, k + 1] - knots[1, k]) / (knots[0, k + 1] - knots[0, k])
+    command = knots[1, k] + (min(max(t, knots[0, 0]), knots[0, n - 1]) - knots[0, k]) * slope
     if t < knots[0, 0] or t > knots[0, n - 1]:
         slope = 0.0
-    command = knots[1, k] + (min(max(t, knots[0, 0]), knots[0, n - 1]) - knots[0, k]) * slope
     if command == 0.0 and slope == 0.0:
         return 0.0, 0.0
     ripple, _ = speed_ripple(p.rig_speed_ripple, psi, 0.0)

@@ -58,7 +58,7 @@ def delay(values: Values, sensor: str, written: FloatArray) -> FloatArray:
 
 
 def predicted(sensor: str, recording: Recording, values: Values, t: FloatArray, rows: FloatArray) -> FloatArray:
-    """Return the readings (..., m, k) of a sensor before lag and noise at true instants t (m,) for rows (..., m, 19)."""
+    """Return the readings (..., m, k) of a sensor before lag and noise at true times t (m,) for rows (..., m, 19)."""
     if sensor == "gps":
         return rows[..., :6]
     if sensor == "track":
@@ -101,7 +101,7 @@ def _magnetometer(recording: Recording, values: Values, rows: FloatArray) -> Flo
         h = np.maximum(-rows[..., 2], 0.02)
         decay = np.exp(-h / value(values, "mag.stray_field", "height_m"))
         m = m + to_body(rows, decay[..., None] * stray)
-    return m
+    return np.asarray(m)
 
 
 def place(recording: Recording, values: Values) -> FloatArray:
@@ -116,6 +116,8 @@ def specific_force(recording: Recording, values: Values, rows: FloatArray) -> Fl
     d = place(recording, values)
     d = d - np.array([value(values, "body.mass_imbalance", "ex_m"), value(values, "body.mass_imbalance", "ey_m"), 0.0])
     gravity = values.get(("environment", "gravity"), recording.environment.gravity)
+    if recording.plant == "free_spin":  # turns with the spin, like the translation that nobody knows: left to the means
+        gravity = 0.0
     f = to_body(rows, rows[..., 6:9] - np.array([0.0, 0.0, gravity]))
     w, dw = rows[..., 13:16], rows[..., 16:19]
     along = w @ d
@@ -138,7 +140,7 @@ def _accelerometer(recording: Recording, values: Values, t: FloatArray, rows: Fl
     if np.any(drift):
         f = f + t[:, None] * drift
     limit = value(values, "accel.saturation", "limit_m_s2")
-    return np.clip(f, -limit, limit) if np.isfinite(limit) else f
+    return np.asarray(np.clip(f, -limit, limit) if np.isfinite(limit) else f)
 
 
 def _gyroscope(recording: Recording, values: Values, rows: FloatArray) -> FloatArray:

@@ -52,6 +52,9 @@ _ORDINARY = (
     ("air.wind", "w_north_m_s", 3.0),
     ("air.wind", "w_east_m_s", 3.0),
     ("air.density", "ratio", 0.1),
+    ("body.inertia_asymmetry", "dIyy_kg_m2", 2e-5),
+    ("body.mass_imbalance", "ex_m", 1e-3),
+    ("body.mass_imbalance", "ey_m", 1e-3),
     ("rig.coulomb_friction", "torque_N_m", 3e-4),
     ("rig.quadratic_drag", "coefficient_N_m_s2", 3e-6),
 )
@@ -125,7 +128,7 @@ def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), it
     fit = Fit(chains, parameters, np.array([q.stated for q in parameters]), loose_jumps(plant), {})
     bare = linearised(fit, ())
     fit = replace(fit, noise=stated_noise(bare))
-    fit = refit(fit, iterations=iterations)
+    fit = refit(fit, iterations=iterations, tolerance=1e-4 * sum(linear.raw.size for linear in bare))
     chains = tuple(within_range(chain, linear) for chain, linear in zip(fit.chains, fit.linears, strict=True))
     fit = replace(fit, chains=chains)
     linears = linearised(fit)

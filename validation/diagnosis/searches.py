@@ -665,8 +665,9 @@ def searched(
         found += events(asked, least)
         found += gusts(asked, least)
     found += ripple(tied.fit, tied.fit.noise, taken, least)
-    found += saturation(tied.fit, tied.fit.noise, taken)
     known = [q for q in own if q.key not in WOBBLE]
     found += dropped_magnetometer(loose, known, taken)
-    found += dropped_accelerometer(loose, noise, taken)
+    if loose.chains[0].recording.plant != "free_spin":  # there an accelerometer counts by its means over turns
+        found += saturation(tied.fit, tied.fit.noise, taken)
+        found += dropped_accelerometer(loose, noise, taken)
     return sorted(found, key=lambda p: p.proposal.gain if isinstance(p, Shifted) else p.gain, reverse=True)

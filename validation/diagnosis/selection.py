@@ -36,6 +36,15 @@ BOUNDS: Mapping[tuple[str, str], tuple[float, float]] = {
 }
 
 
+#: parameters whose sign physics fixes: friction brakes, a lag is late
+ONE_SIDED: Mapping[tuple[str, str], float] = {
+    ("rig.coulomb_friction", "torque_N_m"): 1.0,
+    ("rig.quadratic_drag", "coefficient_N_m_s2"): 1.0,
+    ("gps.latency", "delay_s"): 1.0,
+    **{(f"{s}.lag", "tau_s"): 1.0 for s in ("mag", "accel", "gyro")},
+}
+
+
 @dataclass(frozen=True)
 class Hypothesis:
     """Effects that may act, and stated numbers whose uncertainty is set aside (recalibrated)."""
@@ -107,6 +116,8 @@ def tied_fit(
     plant = loose.chains[0].recording.plant
     fit = Fit(loose.chains, parameters, at, NO_JUMPS[plant], noise)
     fit = refit(fit, iterations=iterations, give_up=give_up, bounds=BOUNDS)
+    if fit.merit > give_up:
+        polish = 0
     for _ in range(polish):
         fit = replace(fit, noise=noise_of(fit))
         fit = refit(fit, iterations=2, bounds=BOUNDS)
@@ -172,6 +183,11 @@ def proposals(
             rest = [(c, q) for c, q in taken if q.key not in {p.key for _, p in columns} or scope is not None]
             answer = board.ask([*rest, *columns])
             gain = base - answer.chi2
+            if any(
+                q.key in ONE_SIDED and ONE_SIDED[q.key] * float(v) < 0
+                for (_, q), v in zip(columns, answer.value[len(rest) :], strict=True)
+            ):
+                continue
             start = {
                 (q.key, q.recordings): q.stated + float(v)
                 for (_, q), v in zip([*rest, *columns], answer.value, strict=True)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from discsim.arrays import FloatArray
 from discsim.disc import Aero, aero_key
 from discsim.recording import Recording
 from validation.diagnosis.fitting import Parameter
@@ -75,5 +77,5 @@ def _of(recording: Recording) -> Iterator[tuple[str, str, float, float]]:
             yield "accel.position_offset", f"d{axis}_m", 0.0, float(size)
 
 
-def _three(sigma: object) -> np.ndarray:  # type: ignore[type-arg]
+def _three(sigma: ArrayLike) -> FloatArray:
     return np.broadcast_to(np.asarray(sigma, dtype=float), 3)

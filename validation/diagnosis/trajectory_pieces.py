@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -32,8 +33,10 @@ from validation.diagnosis.pieces_of_motion import (
 )
 from validation.diagnosis.plateau import plateau
 from validation.diagnosis.readings import CLOCKS, Values, delay, is_motion, predicted, value
+from validation.diagnosis.starts import spin_starts
 
 __all__ = [
+    "STEPS",
     "WOBBLE",
     "Chain",
     "Channel",
@@ -52,12 +55,17 @@ IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
 #: longest step of a flight's integrator, s, and in radians of nutation
 STEP, NUTATION = 0.01, 1.2
+#: a fit that has gone astray to faster spins, rad/s, is not followed with ever shorter steps
+FASTEST = 400.0
 #: longest step of a table's integrator in radians of its ripple
 RIPPLE = 0.3
 #: half the differences of states: m, m/s, rad, rad/s
-_FLIGHT_STEPS = np.repeat([1e-3, 1e-3, 1e-5, 1e-4], 3)
-_SPIN_STEPS = np.array([1e-2, 1e-2, 1e-2, 1e-2, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4])
-_RIG_STEPS = np.array([1e-5, 1e-4])
+STEPS = {
+    "flight": np.repeat([1e-3, 1e-3, 1e-5, 1e-4], 3),
+    "free_spin": np.array([1e-2, 1e-2, 1e-2, 1e-2, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4]),
+    "spin_down": np.array([1e-5, 1e-4]),
+    "rate_table": np.array([1e-5]),
+}
 #: half the difference in time by which a reading's slope is taken, s
 _TIME_STEP = 2e-4
 #: neighbours simulated at a time, to bound memory
@@ -69,7 +77,7 @@ _FORGOTTEN = 8.0
 
 
 class Column(NamedTuple):
-    """A direction in which predictions can move: a parameter, half its difference, shapes of its effect it is taken at."""
+    """A direction in which predictions move: a parameter, half its difference, shapes that its effect is taken at."""
 
     group: str
     name: str
@@ -98,7 +106,11 @@ class Readings:
     clipped: BoolArray
     sd: FloatArray
     axes: tuple[str, ...]
+    #: the range that clips them, as stated or lower; None where there is none
     limit: float | None = None
+    #: written times and weights (w, n) of the samples that each reading is a mean of; None where it is one sample
+    taken: FloatArray | None = None
+    weights: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -198,20 +210,20 @@ class Linear:
 
     def spread(self, places: Sequence[int], width: int) -> Linear:
         """Return the linearisation with its shared columns at ``places`` of ``width``, the others zero."""
-        l, n = self.unknowns, self.raw.size
+        u, n = self.unknowns, self.raw.size
         kept = self.own.shape[1] - len(places)
         own = np.zeros((n, kept + width))
         own[:, :kept] = self.own[:, :kept]
         own[:, [kept + j for j in places]] = self.own[:, kept:]
-        moves = np.zeros((*self.moves.shape[:2], l + width))
-        moves[:, :, :l] = self.moves[:, :, :l]
-        moves[:, :, [l + j for j in places]] = self.moves[:, :, l:]
+        moves = np.zeros((*self.moves.shape[:2], u + width))
+        moves[:, :, :u] = self.moves[:, :, :u]
+        moves[:, :, [u + j for j in places]] = self.moves[:, :, u:]
         return replace(self, own=own, moves=moves)
 
     def after(self, local: FloatArray, shared: FloatArray) -> FloatArray:
         """Return the residuals (n,) that a step of the unknowns is expected to leave."""
         if self.piece.size == 0:
-            return self.residual - self.own @ np.concatenate([local, shared])
+            return np.asarray(self.residual - self.own @ np.concatenate([local, shared]))
         d = self.moves.shape[1]
         tangents = self.moves @ np.concatenate([local, shared])
         moved = np.einsum("nd,nd->n", self.own[:, :d], tangents[self.piece])
@@ -253,10 +265,46 @@ def readings_of(recording: Recording) -> tuple[Readings, ...]:
         good = np.isfinite(measured) & ~clipped
         axes = tuple(SENSORS[sensor].columns)
         t, m = samples.t, measured
+        one = Readings(sensor, t, m, good, clipped, sd, axes, limit)
         if recording.plant == "free_spin" and sensor == "accelerometer":
-            continue
-        found.append(Readings(sensor, t, m, good, clipped, sd, axes, limit))
+            found += _over_turns(recording, one)
+        else:
+            found.append(one)
     return tuple(found)
+
+
+#: a reading of a turn's mean is a mean over this many turns, weighted by Hann: what turns once per turn is not seen
+_TURNS = 2.0
+
+
+def _over_turns(recording: Recording, one: Readings) -> list[Readings]:
+    """Return the means over turns of an accelerometer on a disc whose path is unknown.
+
+    Translation and gravity turn with the spin and average out; what remains of x and y is centripetal.
+    """
+    grid = np.linspace(0.0, recording.end, max(int(recording.end / 0.05), 2))
+    rate = spin_starts(recording, grid).rate[:, 2]
+    phase = np.interp(one.t, grid, np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(grid))]))
+    phase = np.abs(phase) / (2.0 * np.pi)
+    centres = np.arange(phase[0] + _TURNS / 2, phase[-1] - _TURNS / 2, _TURNS / 2)
+    first, last = np.searchsorted(phase, centres - _TURNS / 2), np.searchsorted(phase, centres + _TURNS / 2)
+    if centres.size < 4 or np.any(np.diff(phase) < 0) or np.min(last - first) < 8:
+        return []
+    width = int(np.max(last - first))
+    place = np.minimum(first[None, :] + np.arange(width)[:, None], one.t.size - 1)
+    inside = np.arange(width)[:, None] < (last - first)[None, :]
+    usable = np.all(one.good[:, :2], axis=1)
+    weights = np.where(inside & usable[place], 1.0 + np.cos(2.0 * np.pi * (phase[place] - centres) / _TURNS), 0.0)
+    # where samples are missing, what turns with the spin does not average out
+    whole = np.sum(inside & ~usable[place], axis=0) == 0
+    weights = weights / np.maximum(np.sum(weights, axis=0), 1e-12)
+    values = np.einsum("wn,wnk->nk", weights, np.nan_to_num(one.value)[place])
+    good = np.repeat(whole[:, None], 3, axis=1)
+    good[:, 2] = False
+    t = np.einsum("wn,wn->n", weights, one.t[place])
+    sd = one.sd * float(np.sqrt(np.median(np.sum(weights**2, axis=0))))
+    clipped = np.zeros(values.shape, dtype=np.bool_)
+    return [Readings(one.sensor, t, values, good, clipped, sd, one.axes, None, one.t[place], weights)]
 
 
 def _or_nan(number: float | None) -> float:
@@ -338,10 +386,11 @@ class _Runner:
         if plant == "flight":
             disc = self.recording.disc
             assert disc is not None
-            nutation = max(abs(state[12]) * disc.Izz / disc.Ixx, abs(state[12]), 1.0)
+            spin = min(abs(float(state[12])), FASTEST)
+            nutation = max(spin * disc.Izz / disc.Ixx, spin, 1.0)
             h = min(STEP, NUTATION / nutation)
         elif plant == "free_spin":
-            h = min(0.00125, 0.15 / max(abs(state[12]) * 2.0, 1.0))
+            h = min(0.00125, 0.15 / max(min(abs(float(state[12])), FASTEST) * 2.0, 1.0))
         elif plant == "spin_down":
             h = 0.01
         else:
@@ -361,7 +410,7 @@ class _Runner:
                     marks.append(mark)
         marks = sorted(set(marks))
         steps = [np.array([start])]
-        for a, b in zip(marks[:-1], marks[1:], strict=True):
+        for a, b in pairwise(marks):
             fine = h
             for t, width in self.events:
                 if abs(0.5 * (a + b) - t) < 6 * width:
@@ -442,7 +491,7 @@ def linearise(
     recording, d, k = current.recording, current.tangent, current.states.shape[0]
     plant = recording.plant
     runner = _runner(recording, values, columns)
-    steps = _FLIGHT_STEPS if plant == "flight" else _SPIN_STEPS if plant == "free_spin" else _RIG_STEPS[:d]
+    steps = STEPS[plant]
 
     samples = [_Sampled(current, readings, values) for readings in current.readings]
     # the instants of all sensors, each with its neighbours in time for slopes and its past for a lag
@@ -453,8 +502,8 @@ def linearise(
     p = len(columns)
     # states of the pieces as functions of [first state | jumps | parameters]
     allowed = np.flatnonzero(jumps)
-    l = d + (k - 1) * allowed.size
-    S = np.zeros((k, d, l + p))
+    u = d + (k - 1) * allowed.size
+    S = np.zeros((k, d, u + p))
     S[0, :, :d] = np.eye(d)
     closing = np.zeros((k, d))
     gaps = np.zeros((max(k - 1, 0), d))
@@ -533,7 +582,7 @@ def linearise(
         if i + 1 < k:
             S[i + 1] = Phi @ S[i]
             for row, j in enumerate(motion_columns):
-                S[i + 1, :, l + j] += Psi[:, row]
+                S[i + 1, :, u + j] += Psi[:, row]
             closing[i + 1] = Phi @ closing[i]
             gap = difference(plant, current.states[i + 1], nominal_end, d)
             gaps[i] = gap
@@ -543,7 +592,7 @@ def linearise(
             closing[i + 1, forbidden] -= gap[forbidden]
 
     # parameters of sensors and clocks, from the motion as it is
-    for s, w, y, M in zip(samples, out_rows, ideal, J, strict=True):
+    for s, w, M in zip(samples, out_rows, J, strict=True):
         if not sensor_columns:
             break
         rate = None
@@ -568,7 +617,7 @@ def linearise(
                 up = predicted(s.sensor, recording, {**here, (group, name): base + size}, s.instants, w)
                 down = predicted(s.sensor, recording, {**here, (group, name): base - size}, s.instants, w)
                 M[:, :, d + j] = (up - down) / (2.0 * size)
-    return _stack(current, samples, ideal, J, piece_of, S, closing, gaps, allowed, l)
+    return _stack(current, samples, ideal, J, piece_of, S, closing, gaps, allowed, u)
 
 
 #: how the wobble of a free spin dies (1/s) and turns (rad/s), how that differs along and across the wind, and their
@@ -614,11 +663,16 @@ class _Sampled:
         self.width = readings.value.shape[1]
         self.rate_hz = current.recording.sheets[readings.sensor].rate_hz
         self.lost = current.lost.get(readings.sensor)
-        written = readings.t
-        taken = written - self.delays(values)[: written.size]
+        self.tau = 0.0
+        self.written = readings.t if readings.taken is None else readings.taken.ravel()
+        self.weights = readings.weights
+        written = self.written
+        taken = written - self.delays(values)
         prefix = {"magnetometer": "mag", "accelerometer": "accel", "gyroscope": "gyro"}.get(self.sensor, "")
-        self.tau = value(values, f"{prefix}.lag", "tau_s") if prefix else 0.0
+        self.tau = value(values, f"{prefix}.lag", "tau_s") if prefix and self.weights is None else 0.0
+        self.nodes = 1
         if self.tau > 0:
+            self.weights = np.repeat(_LAG_WEIGHTS[:, None], written.size, axis=1)
             # every reading is a weighted mean over its past
             past = taken[None, :] - self.tau * _LAG_NODES[:, None]
             self.instants = past.ravel()
@@ -626,16 +680,15 @@ class _Sampled:
         else:
             self.instants = taken
             self.lag_slope = np.ones(written.size)
-        self.nodes = _LAG_NODES.size if self.tau > 0 else 1
+        self.nodes = 1 if self.weights is None else self.weights.shape[0]
 
     def delays(self, values: Values) -> FloatArray:
         """Return how much earlier than written the readings (nodes n,) show the motion."""
-        written = self.readings.t
-        late = delay(values, self.sensor, written)
-        if self.lost is not None:
+        late = delay(values, self.sensor, self.written)
+        if self.lost is not None and self.lost.size == late.size:
             late = late - self.lost / self.rate_hz
-        if getattr(self, "nodes", 1) > 1:
-            late = np.tile(late, self.nodes)
+        if self.tau > 0:
+            late = np.tile(late, _LAG_NODES.size)
         return late
 
     def time_slope(
@@ -661,10 +714,10 @@ class _Sampled:
 
     def weighted(self, array: FloatArray) -> FloatArray:
         """Return what the sensor shows of ideal readings (nodes n, ...): itself, or the weighted past."""
-        if self.nodes == 1:
+        if self.weights is None:
             return array
         parts = array.reshape(self.nodes, -1, *array.shape[1:])
-        return np.asarray(np.tensordot(_LAG_WEIGHTS, parts, axes=1))
+        return np.asarray(np.einsum("wn,wn...->n...", self.weights, parts))
 
 
 def _group(sensor: str, axis: int) -> str:
@@ -683,7 +736,7 @@ def _stack(
     closing: FloatArray,
     gaps: FloatArray,
     allowed: IntArray,
-    l: int,
+    u: int,
 ) -> Linear:
     """Put the rows of all sensors together, channel by channel, without those that take no part."""
     raw, own, pieces, t, sd, shifts = [], [], [], [], [], []
@@ -697,7 +750,7 @@ def _stack(
         closed = np.einsum("mwd,md->mw", M[:, :, :d], closing[piece])
         if lagged:
             full = np.matmul(M[:, :, :d], S[piece])
-            full[:, :, l:] += M[:, :, d:]
+            full[:, :, u:] += M[:, :, d:]
             M = full
         prediction, slopes, closed = s.weighted(y), s.weighted(M), s.weighted(closed)
         limit = readings.limit
@@ -722,7 +775,7 @@ def _stack(
             rows = slice(at, at + index.size)
             channels.append(Channel(s.sensor, readings.axes[axis], _group(s.sensor, axis), rows, index))
             at += index.size
-    kind, where, jump = np.full(l, -1), np.zeros(l, dtype=np.int64), np.zeros(l)
+    kind, where, jump = np.full(u, -1), np.zeros(u, dtype=np.int64), np.zeros(u)
     for i in range(gaps.shape[0]):
         place = slice(d + i * allowed.size, d + (i + 1) * allowed.size)
         kind[place], where[place], jump[place] = allowed, i + 1, gaps[i, allowed]
@@ -730,7 +783,7 @@ def _stack(
     def joined(parts: list[Any]) -> Any:
         return np.concatenate(parts) if parts else np.empty(0)
 
-    rows_of = joined(own) if own else np.empty((0, d + S.shape[2] - l))
+    rows_of = joined(own) if own else np.empty((0, d + S.shape[2] - u))
     return Linear(
         joined(raw),
         rows_of,

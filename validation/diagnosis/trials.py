@@ -53,6 +53,8 @@ SEARCHED = (
 )
 #: a parameter is held this many steps wide, so that one without a trace in the readings stays where it is
 _LOOSE = 1e5
+#: a free spin's accelerometer counts by its means over turns alone, which these do not move
+_UNSEEN_IN_FREE_SPIN = ("accel.lag", "accel.clock_rate", "accel.dropped_samples", "gyro.g_sensitivity")
 #: share of an effect's scale that a difference is taken over
 _STEP = 0.1
 
@@ -69,6 +71,8 @@ def available(recordings: Sequence[Recording]) -> list[str]:
     found = []
     for row in CATALOGUE.values():
         if plant not in row.plants:
+            continue
+        if plant == "free_spin" and row.id in _UNSEEN_IN_FREE_SPIN:
             continue
         if row.acts_on in ("motion", "clock") or row.acts_on in sensors:
             found.append(row.id)

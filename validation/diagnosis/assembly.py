@@ -1,0 +1,339 @@
+"""From what a search found to the answer: verdict, effects with evidence, places, noise, held-out figures, model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import chi2 as chi2_law
+
+from discsim.arrays import FloatArray
+from discsim.disc import Aero, Disc, Rig, aero_key
+from discsim.effects.catalogue import CATALOGUE, Effect
+from discsim.model_file import Model, ModelEffect
+from validation.diagnosis.answer import (
+    SMALLEST_P_VALUE,
+    Candidate,
+    Confusion,
+    Diagnosis,
+    Evidence,
+    FitFigures,
+    HeldOut,
+    Law,
+    NamedEffect,
+    NoiseNote,
+    Outcome,
+    Outlier,
+    ParameterValue,
+    Recalibration,
+    Residuals,
+    Verdict,
+)
+from validation.diagnosis.board import column_of
+from validation.diagnosis.law import FoundLaw
+from validation.diagnosis.noise import NoiseModel
+from validation.diagnosis.places import located_effect, located_rest
+from validation.diagnosis.rest import remainders
+from validation.diagnosis.search import FAR, Search, chi2_in, tried_without
+from validation.diagnosis.selection import Hypothesis, Tied, fitted_parameters
+from validation.diagnosis.trials import Trial, parameters_of
+
+__all__ = ["assemble"]
+
+#: a parameter whose error is this share of the room it was given is not determined by the data
+_UNDETERMINED = 0.2
+_RECALIBRATED_NAMES = {
+    ("disc", "mass"): "mass_kg",
+    ("disc", "d"): "diameter_m",
+    ("disc", "Ixx"): "Ixx_kg_m2",
+    ("disc", "Izz"): "Izz_kg_m2",
+    ("rig", "Izz"): "Izz_kg_m2",
+    ("rig", "viscous"): "viscous_N_m_s",
+    ("environment", "air_density"): "air_density_kg_m3",
+    ("environment", "gravity"): "gravity_m_s2",
+}
+
+
+def verdict_of(found: Search) -> tuple[Verdict, bool]:
+    """Return the verdict, and whether something is left that is not noise."""
+    final = found.final
+    left = remainders(final.fit.linears, final.residuals, final.fit.noise)
+    far = chi2_in(final, found.loose_noise) > FAR * final.fit.count and found.loose.merit < 2.0 * found.loose.count
+    if left or far:
+        return "unexplained", True
+    if final.hypothesis.trials:
+        return "explained", False
+    moved = any(item.beyond for item in recalibrations(found).values())
+    return ("recalibrated" if moved else "consistent"), False
+
+
+def recalibrations(found: Search) -> dict[str, Recalibration]:
+    """Return the stated numbers that may move, and where the recordings move them."""
+    fit = found.final.fit
+    sd = _errors(found.final)
+    result = {}
+    for q, value, error in zip(fit.parameters, fit.at, sd, strict=True):
+        if q.group == "free_spin" or not any(q.key == p.key and q.recordings == p.recordings for p in found.own):
+            continue
+        sigma = next(p.sigma for p in found.own if q.key == p.key and q.recordings == p.recordings)
+        name = aero_key(q.name) if q.group == "aero" else _RECALIBRATED_NAMES.get(q.key, f"{q.group}.{q.name}")
+        if q.recordings is not None:
+            name = f"{name} ({','.join(str(i + 1) for i in sorted(q.recordings))})"
+        result[name] = Recalibration(q.stated, sigma, float(value), float(error))
+    return result
+
+
+def _errors(tied: Tied) -> FloatArray:
+    covariance = tied.fit.covariance
+    if covariance.shape[0] != len(tied.fit.parameters):
+        return np.full(len(tied.fit.parameters), np.nan)
+    return np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+
+def _named(found: Search, trial: Trial, names: Sequence[str]) -> NamedEffect:
+    final = found.final
+    errors = _errors(final)
+    values = {}
+    width = {q.key: q.sigma for q in parameters_of(trial)}
+    for q, value, error in zip(final.fit.parameters, final.fit.at, errors, strict=True):
+        if q.group != trial.id or q.recordings != trial.recordings:
+            continue
+        room = width.get(q.key, np.inf)
+        known = np.isfinite(error) and not (np.isfinite(room) and error > _UNDETERMINED * room)
+        values[q.name] = ParameterValue(float(value), float(error) if known else None)
+    values.update({name: ParameterValue(value, sd) for name, value, sd in trial.told})
+    for name, value in trial.shapes.items():
+        values.setdefault(name, ParameterValue(float(value), None))
+    less = tried_without(found, trial)
+    gain = max(less.score - final.score, 0.0)
+    k = len(parameters_of(trial))
+    bic = gain - k * float(np.log(max(final.fit.count, 2)))
+    p = float(max(chi2_law.sf(gain, k), SMALLEST_P_VALUE))
+    held = _heldout_gain(found, trial)
+    confused = []
+    for other, worse in found.rivals.get(id_of(trial), []):
+        rival_bic = gain - worse - len(parameters_of(other)) * float(np.log(max(final.fit.count, 2)))
+        if worse < CONFUSED + 4.0 * max(0, len(parameters_of(other)) - k):
+            confused.append(Confusion(other.id, float(rival_bic), _separating(trial.id, other.id, found)))
+    where = None if trial.recordings is None else tuple(names[i] for i in sorted(trial.recordings))
+    return NamedEffect(trial.id, values, Evidence(bic, held, p), where, tuple(confused))
+
+
+#: hypotheses whose scores differ by less than this cannot be told apart
+CONFUSED = 12.0
+
+
+def id_of(trial: Trial) -> str:
+    """Return a name of a trial that tells its recordings, too."""
+    return trial.id if trial.recordings is None else f"{trial.id}@{','.join(map(str, sorted(trial.recordings)))}"
+
+
+def _separating(one: str, other: str, found: Search) -> str:
+    """Return what recording would tell two effects apart, in words."""
+    plant = found.recordings[0].plant
+    prefix = {one.split(".")[0], other.split(".")[0]}
+    if plant == "flight":
+        if prefix & {"accel", "mag", "gyro"}:
+            return "a run of the module on a rate table, from rest to full spin: there the motion is known"
+        if prefix & {"air"}:
+            return "two throws into opposite directions at one speed, and one much slower"
+        return "throws of both spin directions at half and at full speed"
+    if plant == "rate_table":
+        return "a profile with several plateaus and both directions, and a minute at rest before and after"
+    if plant == "spin_down":
+        return "a run-down from twice the rate and one from half of it, to rest"
+    return "a throw with GPS, or the same module on a rate table"
+
+
+def _heldout_gain(found: Search, trial: Trial) -> float | None:
+    """Return the log likelihood that an effect gains on recordings that took no part in its fit."""
+    board, final = found.board, found.final
+    assert board is not None
+    count = board.recordings
+    if count < 2 or (trial.recordings is not None and len(trial.recordings) < 2):
+        return None
+    rest = Hypothesis(tuple(t for t in final.hypothesis.trials if t is not trial), final.hypothesis.freed)
+    total = 0.0
+    for i in range(count):
+        total += _heldout_chi2(found, rest, i) - _heldout_chi2(found, final.hypothesis, i)
+    return 0.5 * total
+
+
+def _heldout_chi2(found: Search, hypothesis: Hypothesis, i: int) -> float:
+    """Return chi-squared of a recording with the shared parameters as the other recordings have them."""
+    board = found.board
+    assert board is not None
+    own = [(column_of(q), q) for q in fitted_parameters(hypothesis, found.own) if column_of(q) in board.place]
+    others = [j for j in range(board.recordings) if j != i]
+    answer = board.ask(own, only=others)
+    G = board.grams[i]
+    fixed = [
+        (board.place[column], float(v))
+        for (column, q), v in zip(own, answer.value, strict=True)
+        if q.acts_in(i) and any(q.acts_in(j) for j in others)
+    ]
+    alone = [(column, q) for column, q in own if q.acts_in(i) and not any(q.acts_in(j) for j in others)]
+    at = np.array([place for place, _ in fixed], dtype=int)
+    v = np.array([value for _, value in fixed])
+    e = G[:, -1].copy()
+    chi2 = float(G[-1, -1])
+    if at.size:
+        chi2 += float(-2.0 * v @ e[at] + v @ G[np.ix_(at, at)] @ v)
+        e[:-1] -= G[:-1][:, at] @ v
+    if alone:
+        free = np.array([board.place[column] for column, _ in alone])
+        H = G[np.ix_(free, free)] + np.diag([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for _, q in alone])
+        chi2 -= float(e[free] @ np.linalg.solve(H + 1e-12 * np.diag(np.diag(H)), e[free]))
+    return chi2
+
+
+def _noise_notes(found: Search) -> list[NoiseNote]:
+    notes = []
+    linears = found.final.fit.linears
+    for group, noise in found.final.fit.noise.items():
+        channel = next((linear, c) for linear in linears for c in linear.channels if c.group == group)
+        stated = float(channel[0].sd[channel[1].rows][0])
+        interval = float(np.median(np.diff(channel[0].t[channel[1].rows]))) if channel[1].index.size > 1 else 0.0
+        n = sum(c.index.size for linear in linears for c in linear.channels if c.group == group)
+        surprising = abs(noise.sd / stated - 1.0) > max(0.1, 5.0 / np.sqrt(2.0 * n)) if np.isfinite(stated) else True
+        if surprising or noise.correlation > 0.15:
+            slow = -interval / float(np.log(noise.correlation)) if noise.correlation > 0 else 0.0
+            notes.append(NoiseNote(group, stated if np.isfinite(stated) else None, float(noise.sd), slow))
+    return notes
+
+
+def _figures(found: Search, unexplained: bool) -> tuple[FitFigures, FitFigures, tuple[HeldOut, ...]]:
+    final, board = found.final, found.board
+    assert board is not None
+    white = {group: noise._replace(correlation=0.0) for group, noise in final.fit.noise.items()}
+    reference = white if not unexplained else {g: n._replace(correlation=0.0) for g, n in found.loose_noise.items()}
+    n = final.fit.count
+    base = chi2_in(found.base, reference) / found.base.fit.count
+    last = chi2_in(found.base if unexplained else final, reference) / n
+    if board.recordings < 2 or unexplained:
+        return FitFigures(base, None), FitFigures(last, None), ()
+    held = []
+    before = after = 0.0
+    for i in range(board.recordings):
+        rows = board.linears[i].raw.size
+        new = max(_heldout_chi2(found, final.hypothesis, i), 0.0)
+        residual = found.base.residuals[i]
+        old = _one_chi2(found.base, i, reference)
+        del residual
+        before, after = before + old, after + new
+        held.append(HeldOut(str(i), old / rows, new / rows, 0.5 * (old - new)))
+    return FitFigures(base, before / n), FitFigures(last, after / n), tuple(held)
+
+
+def _one_chi2(tied: Tied, i: int, noise: NoiseModel) -> float:
+    linear, residual = tied.fit.linears[i], tied.residuals[i]
+    return sum(float(np.sum((residual[c.rows] / noise[c.group].sd) ** 2)) for c in linear.channels)
+
+
+def _residuals(found: Search, names: Sequence[str], unexplained: bool) -> list[Residuals]:
+    shown = []
+    after_fit = found.final
+    noise = found.loose_noise if unexplained else after_fit.fit.noise
+    for i, name in enumerate(names):
+        before_linear, after_linear = found.base.fit.linears[i], after_fit.fit.linears[i]
+        for channel in after_linear.channels:
+            other = next(
+                (c for c in before_linear.channels if (c.sensor, c.axis) == (channel.sensor, channel.axis)), None
+            )
+            if other is None:
+                continue
+            sd = noise[channel.group].sd if channel.group in noise else 1.0
+            count = int(max(channel.index[-1], other.index[-1])) + 1
+            before, after, t = np.full(count, np.nan), np.full(count, np.nan), np.full(count, np.nan)
+            before[other.index] = found.base.residuals[i][other.rows] / sd
+            after[channel.index] = after_fit.residuals[i][channel.rows] / sd
+            t[other.index], t[channel.index] = before_linear.t[other.rows], after_linear.t[channel.rows]
+            some = np.isfinite(t)
+            shown.append(Residuals(name, channel.sensor, channel.axis, t[some], before[some], after[some]))
+    return shown
+
+
+def _model(found: Search, effects: Sequence[NamedEffect], trials: Sequence[Trial], law: Law | None) -> Model:
+    first = found.recordings[0]
+    environment, disc, rig = first.environment, first.disc, first.rig
+    values = {
+        q.key: (float(v), float(e))
+        for q, v, e in zip(found.final.fit.parameters, found.final.fit.at, _errors(found.final), strict=True)
+        if q.recordings is None
+    }
+    if disc is not None and disc.aero is not None:
+        aero = {name: values["aero", name][0] for name in Aero._fields if ("aero", name) in values}
+        sigma = dict(disc.sigma)
+        sigma.update({aero_key(name): values["aero", name][1] for name in aero})
+        places = {"mass": "mass", "Ixx": "Ixx", "Izz": "Izz", "d": "diameter"}
+        fields = {places[name]: values["disc", name][0] for name in places if ("disc", name) in values}
+        disc = replace(disc, aero=disc.aero._replace(**aero), sigma=sigma, **fields)  # type: ignore[arg-type]
+    if rig is not None:
+        fields = {name: values["rig", name][0] for name in ("Izz", "viscous") if ("rig", name) in values}
+        rig = replace(rig, **fields)  # type: ignore[arg-type]
+    if ("environment", "air_density") in values:
+        environment = replace(environment, air_density=values["environment", "air_density"][0])
+    carried = []
+    for effect in effects:
+        if effect.id not in CATALOGUE:
+            continue
+        kind = CATALOGUE[effect.id].type
+        sizes = {name: item.value for name, item in effect.parameters.items()}
+        sds = {name: item.sd for name, item in effect.parameters.items() if item.sd is not None}
+        carried.append(ModelEffect(Effect(effect.id, kind(**sizes)), sds, effect.recordings))
+    model_disc: Disc | None = disc
+    model_rig: Rig | None = rig
+    return Model(environment, model_disc, model_rig, tuple(carried), law.for_model() if law is not None else None)
+
+
+def assemble(
+    found: Search, datasets: Sequence[str], names: Sequence[str], seed: int, law: FoundLaw | None = None
+) -> Outcome:
+    """Return the outcome of a search."""
+    verdict, unexplained = verdict_of(found)
+    written = law.law if law is not None and unexplained else None
+    trials = found.final.hypothesis.trials if verdict == "explained" else ()
+    effects = tuple(_named(found, trial, names) for trial in trials)
+    located = [place for trial in trials for place in located_effect(found, trial, names)]
+    moved = recalibrations(found if not unexplained else found.at_base())
+    if verdict == "recalibrated":
+        located += [
+            replace(place, text=f"{place.text}; a stated number is off") for place in located_rest(found, names)[:1]
+        ]
+    if unexplained:
+        located = located_rest(found, names)
+    base, final, held = _figures(found, unexplained)
+    held = tuple(replace(item, recording=names[int(item.recording)]) for item in held)
+    candidates = tuple(
+        Candidate(
+            c.trial.id,
+            float(c.gain),
+            c.values,
+            None if c.trial.recordings is None else tuple(names[i] for i in sorted(c.trial.recordings)),
+            "named"
+            if any(c.trial.id == t.id for t in trials)
+            else ("worth less than its price" if c.gain < 25 else "another explains more"),
+        )
+        for c in sorted(found.considered, key=lambda c: -c.gain)
+        if np.isfinite(c.gain) and all(np.isfinite(v) for v in c.values.values())
+    )
+    diagnosis = Diagnosis(
+        tuple(datasets),
+        found.recordings[0].plant,
+        seed,
+        verdict,
+        base,
+        final,
+        tuple(located),
+        effects,
+        moved,
+        written,
+        tuple(_noise_notes(found)),
+        held,
+        tuple(Outlier(names[i], s, a, t, d) for i, s, a, t, d in found.outliers),
+        tuple(dict.fromkeys(c.next_recording for e in effects for c in e.confused_with if c.next_recording)),
+        tuple(found.warnings),
+    )
+    model = _model(found if not unexplained else found.at_base(), effects, trials, written)
+    return Outcome(diagnosis, model, tuple(_residuals(found, names, unexplained)), candidates)

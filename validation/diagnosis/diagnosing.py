@@ -1,0 +1,42 @@
+"""One call from data sets to an outcome."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from discsim.recording import Recording
+from validation.diagnosis.answer import Outcome
+from validation.diagnosis.assembly import assemble, verdict_of
+from validation.diagnosis.datasets import recording_names
+from validation.diagnosis.law import find_law
+from validation.diagnosis.search import search
+from validation.diagnosis.user_effects import UserEffect
+
+__all__ = ["diagnose"]
+
+
+def _silent(stage: str, done: int, total: int) -> None:
+    del stage, done, total
+
+
+def diagnose(
+    datasets: Sequence[Sequence[Recording]],
+    names: Sequence[str],
+    *,
+    progress: Callable[[str, int, int], None] = _silent,
+    seed: int = 0,
+    user_effects: Sequence[UserEffect] = (),
+) -> Outcome:
+    """Tell whether the baseline explains recordings of one plant, and if not what was left out.
+
+    ``datasets`` are sets of recordings that share their hardware, ``names`` what to call the sets; ``progress`` is
+    called with a stage, steps done and steps in all.
+    """
+    recordings = [recording for dataset in datasets for recording in dataset]
+    called = [name for group in recording_names(datasets, names) for name in group]
+    found = search(recordings, progress)
+    law = None
+    if verdict_of(found)[1]:
+        progress("looking for a law", 4, 5)
+        law = find_law(found.loose, found.final, found.own, found.loose_noise, recordings)
+    return assemble(found, names, called, seed, law)

@@ -1,0 +1,104 @@
+"""Is what is left noise? Tests of residuals that no first-order noise could have made.
+
+A sensor whose noise is larger or slower than stated is no physics. What tells the two apart: noise with one level and
+one correlation, once whitened, is flat over frequency and the same at all times; missing physics is neither.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from validation.diagnosis.noise import NoiseModel, whitened
+from validation.diagnosis.trajectory_pieces import Linear
+
+__all__ = ["Remainder", "remainders"]
+
+#: bands of frequency in which the whitened residuals of a group are compared
+BANDS = 24
+#: excess of a band in its own standard errors, and in share of the level, that no noise shows
+BAND_Z, BAND_SHARE = 8.0, 0.2
+#: readings in a window of time, and its excess in standard errors
+WINDOW, WINDOW_Z = 24, 9.0
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """Something left that is not noise: in which group, which recording (None: all), when, how strong."""
+
+    group: str
+    recording: int | None
+    kind: str
+    z: float
+    from_s: float
+    to_s: float
+    axis: str = "all"
+
+
+def remainders(linears: Sequence[Linear], residuals: Sequence[FloatArray], noise: NoiseModel) -> list[Remainder]:
+    """Return what the residuals (n,) of each recording hold beside noise, strongest first."""
+    white = [
+        whitened(linear, noise, residual[:, None])[:, 0] for linear, residual in zip(linears, residuals, strict=True)
+    ]
+    return sorted([*_bands(linears, white), *_windows(linears, white)], key=lambda item: -item.z)
+
+
+def _bands(linears: Sequence[Linear], white: Sequence[FloatArray]) -> list[Remainder]:
+    """Test the flatness of each group's spectrum, pooled over axes and recordings."""
+    sums: dict[str, FloatArray] = {}
+    counts: dict[str, FloatArray] = {}
+    ends: dict[str, float] = {}
+    for linear, x in zip(linears, white, strict=True):
+        for channel in linear.channels:
+            y = x[channel.rows]
+            if y.size < 4 * BANDS or channel.index.size < 0.8 * (channel.index[-1] - channel.index[0] + 1):
+                continue
+            y = y - y.mean()
+            power = np.abs(np.fft.rfft(y)) ** 2 / y.size
+            place = np.minimum((np.arange(1, power.size) * BANDS) // power.size, BANDS - 1)
+            group = channel.group
+            sums.setdefault(group, np.zeros(BANDS))
+            counts.setdefault(group, np.zeros(BANDS))
+            np.add.at(sums[group], place, power[1:])
+            np.add.at(counts[group], place, 1.0)
+            ends[group] = max(ends.get(group, 0.0), float(linear.t[channel.rows][-1]))
+    found = []
+    for group, total in sums.items():
+        n = np.maximum(counts[group], 1.0)
+        mean = total / n
+        level = float(np.median(mean))
+        z = (mean / level - 1.0) * np.sqrt(n)
+        worst = int(np.argmax(z))
+        if z[worst] > BAND_Z and mean[worst] > (1.0 + BAND_SHARE) * level:
+            found.append(Remainder(group, None, f"band {worst}", float(z[worst]), 0.0, ends[group]))
+    return found
+
+
+def _windows(linears: Sequence[Linear], white: Sequence[FloatArray]) -> list[Remainder]:
+    """Test that the level is the same at all times."""
+    found = []
+    for index, (linear, x) in enumerate(zip(linears, white, strict=True)):
+        for channel in linear.channels:
+            y = np.minimum(x[channel.rows] ** 2, 100.0)
+            if y.size < 2 * WINDOW:
+                continue
+            total = np.convolve(y, np.ones(WINDOW), mode="valid")
+            z = (total - WINDOW) / np.sqrt(2.0 * WINDOW)
+            worst = int(np.argmax(z))
+            if z[worst] > WINDOW_Z:
+                t = linear.t[channel.rows]
+                found.append(
+                    Remainder(
+                        channel.group,
+                        index,
+                        "window",
+                        float(z[worst]),
+                        float(t[worst]),
+                        float(t[worst + WINDOW - 1]),
+                        channel.axis,
+                    )
+                )
+    return found

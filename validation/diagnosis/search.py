@@ -1,0 +1,293 @@
+"""The search: from the relaxed fit to the smallest set of effects that leaves nothing but noise.
+
+Proposals come from algebra about a fit that follows the data; each that matters is refitted with pieces that hang
+together, and believed only if it gains more than its price by the likelihood, with the noise estimated anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+
+import numpy as np
+
+from discsim.recording import Recording
+from validation.diagnosis.answer import ParameterValue
+from validation.diagnosis.board import Board, board_of, column_of, free_columns
+from validation.diagnosis.fitting import Fit, Parameter
+from validation.diagnosis.noise import NoiseModel, estimate_noise, whitened
+from validation.diagnosis.relaxed import NO_JUMPS, relaxed, unknowns
+from validation.diagnosis.searches import Shifted, searched
+from validation.diagnosis.selection import (
+    ONE_SIDED,
+    RIVAL,
+    Hypothesis,
+    Proposal,
+    Tied,
+    fitted_parameters,
+    one_per_effect,
+    price,
+    proposals,
+    tied_fit,
+)
+from validation.diagnosis.stated import stated_parameters
+from validation.diagnosis.trials import Trial, parameters_of, trials_for
+
+__all__ = ["Considered", "Search", "search"]
+
+Report: TypeAlias = Callable[[str, int, int], None]
+Start: TypeAlias = dict[tuple[tuple[str, str], frozenset[int] | None], float]
+
+#: how many effects are ever added
+MOST_EFFECTS = 4
+#: how many proposals are refitted at each step
+REFITTED = 4
+#: a fit whose chi-squared per reading, in the noise of the relaxed fit, is above this is far from the data
+FAR = 1.6
+
+
+@dataclass(frozen=True)
+class Considered:
+    """A trial that was refitted: what it gained when it was, by the likelihood and in chi-squared."""
+
+    trial: Trial
+    gain: float
+    chi2_gain: float
+    values: Mapping[str, float]
+    kept: bool
+
+
+@dataclass
+class Search:
+    """What the search found: fits of the baseline and of the final hypothesis, and what was considered."""
+
+    recordings: tuple[Recording, ...]
+    own: tuple[Parameter, ...]
+    loose: Fit
+    loose_noise: NoiseModel
+    trials: tuple[Trial, ...]
+    base: Tied
+    final: Tied
+    steps: list[Tied] = field(default_factory=list)
+    considered: list[Considered] = field(default_factory=list)
+    rivals: dict[str, list[tuple[Trial, float]]] = field(default_factory=dict)
+    board: Board | None = None
+    #: values of an effect's parameters that no fit gives, by the trial's name
+    extra: dict[str, dict[str, ParameterValue]] = field(default_factory=dict)
+    #: readings that were left out: (recording, sensor, axis, time, deviations)
+    outliers: list[tuple[int, str, str, float, float]] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    #: what choosing the samples that were lost has cost, in twice the log likelihood
+    cost: float = 0.0
+
+    def at_base(self) -> Search:
+        """Return the search as if nothing had been found."""
+        return replace(self, final=self.base)
+
+
+def search(recordings: Sequence[Recording], report: Report = lambda stage, done, total: None) -> Search:
+    """Find the effects that explain recordings of one plant."""
+    known = stated_parameters(recordings)
+    own = (*known, *unknowns(recordings))
+    report("following the data", 0, 4)
+    loose = relaxed(recordings, known)
+    noise = estimate_noise(loose.linears, [linear.residual for linear in loose.linears])
+    plant = recordings[0].plant
+    trials = trials_for(recordings)
+    report("asking every effect", 1, 4)
+    board = board_of(loose, trials, noise, NO_JUMPS[plant])
+    report("fitting the baseline", 2, 4)
+    base = tied_fit(loose, Hypothesis(), own, noise, _start(board, Hypothesis(), own))
+    found = Search(tuple(recordings), own, loose, noise, trials, base, base)
+    current = base
+    for step in range(MOST_EFFECTS):
+        report("refitting candidates", 3, 4)
+        better = _next(found, board, current, step)
+        if better is None:
+            break
+        if step >= 1 and chi2_in(better, noise) > FAR * better.fit.count:
+            # two effects and still far from the data: none of these
+            current = better
+            break
+        current = _pruned(found, better)
+        found.steps.append(current)
+    found.final = current
+    found.board = board_of(found.final.fit, trials, found.final.fit.noise, NO_JUMPS[plant])
+    _rivals(found)
+    report("done", 4, 4)
+    return found
+
+
+def _start(board: Board, hypothesis: Hypothesis, own: Sequence[Parameter]) -> Start:
+    """Return what algebra expects of a hypothesis's parameters."""
+    parameters = [q for q in fitted_parameters(hypothesis, own) if column_of(q) in board.place]
+    answer = board.ask([(column_of(q), q) for q in parameters])
+    return {(q.key, q.recordings): q.stated + float(v) for q, v in zip(parameters, answer.value, strict=True)}
+
+
+def values_of_fit(tied: Tied) -> Start:
+    """Return the values of a fit's parameters as a start for another."""
+    return {(q.key, q.recordings): float(v) for q, v in zip(tied.fit.parameters, tied.fit.at, strict=True)}
+
+
+def chi2_in(tied: Tied, noise: NoiseModel) -> float:
+    """Return the chi-squared of a fit's residuals in a given noise."""
+    return sum(
+        float(np.sum(whitened(linear, noise, residual[:, None]) ** 2))
+        for linear, residual in zip(tied.fit.linears, tied.residuals, strict=True)
+    )
+
+
+def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
+    """Return the fit with the best further effect, or None where none is worth its price."""
+    plant = found.recordings[0].plant
+    noise = found.loose_noise
+    far = chi2_in(current, noise) > FAR * current.fit.count
+    offered: list[tuple[Proposal, Fit, float]] = []
+    if far or step == 0:
+        ranked = one_per_effect(proposals(board, found.trials, current.hypothesis, found.own))
+        offered += [(p, found.loose, 0.0) for p in ranked]
+    if not far or step > 0:
+        near = board_of(current.fit, found.trials, current.fit.noise, NO_JUMPS[plant])
+        offered += [
+            (_from_here(p, current), current.fit, 0.0)
+            for p in one_per_effect(proposals(near, found.trials, current.hypothesis, found.own))
+        ]
+    for item in searched(found.loose, current, found.own, noise):
+        if isinstance(item, Shifted):
+            offered.append((item.proposal, replace(found.loose, chains=item.chains), item.cost))
+        else:
+            offered.append((item, current.fit if not far and current.hypothesis.trials else found.loose, 0.0))
+    worth = [item for item in offered if item[0].gain > 0.5 * price(item[0].trial)]
+    worth.sort(key=lambda item: RIVAL * len(parameters_of(item[0].trial)) - item[0].gain)
+    fits: list[tuple[float, Tied, Fit, float]] = []
+    seen: set[tuple[str, frozenset[int] | None]] = set()
+    for proposal, fit, cost in worth:
+        key = (proposal.trial.id, proposal.trial.recordings)
+        if key in seen:
+            continue
+        seen.add(key)
+        if len(seen) > REFITTED:
+            break
+        hypothesis = current.hypothesis.plus(proposal.trial)
+        refitted = tied_fit(
+            fit,
+            hypothesis,
+            found.own,
+            noise if far else current.fit.noise,
+            {**values_of_fit(current), **proposal.start},
+        )
+        refitted = replace(refitted, score=refitted.score + found.cost + cost)
+        gain = current.score - refitted.score
+        chi2_gain = chi2_in(current, noise) - chi2_in(refitted, noise)
+        values = {
+            q.name: float(v)
+            for q, v in zip(refitted.fit.parameters, refitted.fit.at, strict=True)
+            if q.group == proposal.trial.id and q.recordings == proposal.trial.recordings
+        }
+        found.considered.append(Considered(proposal.trial, gain, chi2_gain, values, False))
+        if gain > price(proposal.trial) and _possible(refitted):
+            # far from the data chi-squared says more than a likelihood that has swallowed the mismatch as noise
+            merit = (chi2_in(refitted, noise) + cost if far else refitted.score) + RIVAL * hypothesis.size
+            fits.append((merit, refitted, fit, cost))
+    if not fits:
+        return None
+    _, best, fit, cost = min(fits, key=lambda item: item[0])
+    if cost:
+        found.loose, found.cost = replace(found.loose, chains=fit.chains), found.cost + cost
+    return best
+
+
+def tried_without(found: Search, trial: Trial) -> Tied:
+    """Return the fit of the final hypothesis without one of its effects."""
+    final = found.final
+    rest = replace(final.hypothesis, trials=tuple(t for t in final.hypothesis.trials if t is not trial))
+    if not rest.trials:
+        return found.base
+    for step in found.steps:
+        if set(step.hypothesis.trials) == set(rest.trials):
+            return step
+    return tied_fit(found.loose, rest, found.own, found.loose_noise, values_of_fit(final), iterations=5, polish=1)
+
+
+def _from_here(proposal: Proposal, current: Tied) -> Proposal:
+    """Return a proposal whose start keeps what the fit has found for everything else."""
+    own = {key: value for key, value in proposal.start.items() if key[0][0] == proposal.trial.id}
+    return replace(proposal, start={**values_of_fit(current), **own})
+
+
+def _possible(tied: Tied) -> bool:
+    """Tell whether a fit's parameters make physical sense: friction that drives by more than its error does not."""
+    sd = np.sqrt(np.maximum(np.diag(tied.fit.covariance), 0.0))
+    for q, value, error in zip(tied.fit.parameters, tied.fit.at, sd, strict=True):
+        if q.key in ONE_SIDED and ONE_SIDED[q.key] * value < -3.0 * error:
+            return False
+    return True
+
+
+def _pruned(found: Search, current: Tied) -> Tied:
+    """Leave out effects that the later ones have made superfluous."""
+    while len(current.hypothesis.trials) > 1:
+        weakest: Tied | None = None
+        for k, trial in enumerate(current.hypothesis.trials[:-1]):
+            rest = tuple(t for j, t in enumerate(current.hypothesis.trials) if j != k)
+            less = tied_fit(
+                current.fit,
+                replace(current.hypothesis, trials=rest),
+                found.own,
+                current.fit.noise,
+                values_of_fit(current),
+            )
+            less = replace(less, score=less.score + found.cost)
+            if less.score - current.score < price(trial) and (weakest is None or less.score < weakest.score):
+                weakest = less
+        if weakest is None:
+            return current
+        current = weakest
+    return current
+
+
+def _rivals(found: Search) -> None:
+    """Find effects that could stand in for a named one."""
+    final = found.final
+    board = found.board
+    assert board is not None
+    for trial in final.hypothesis.trials:
+        rest = Hypothesis(tuple(t for t in final.hypothesis.trials if t is not trial), final.hypothesis.freed)
+        taken = [(column_of(q), q) for q in fitted_parameters(rest, found.own) if column_of(q) in board.place]
+        full = [
+            (column_of(q), q) for q in fitted_parameters(final.hypothesis, found.own) if column_of(q) in board.place
+        ]
+        best = board.ask(full).chi2
+        near = []
+        for other in found.trials:
+            if other.id == trial.id or any(other.id == t.id for t in rest.trials):
+                continue
+            scoped = replace(other, recordings=trial.recordings)
+            worse = board.ask([*taken, *free_columns(scoped)]).chi2 - best
+            near.append((worse, scoped))
+        near.sort(key=lambda item: item[0])
+        found.rivals[_key(trial)] = []
+        seen: set[str] = set()
+        for worse, scoped in near:
+            if scoped.id in seen or worse > 60.0 or len(seen) >= 3:
+                continue
+            seen.add(scoped.id)
+            other_fit = tied_fit(
+                final.fit,
+                rest.plus(scoped),
+                found.own,
+                final.fit.noise,
+                {**values_of_fit(final), **_shape_start(scoped)},
+            )
+            found.rivals[_key(trial)].append((scoped, other_fit.score - final.score))
+
+
+def _shape_start(trial: Trial) -> Start:
+    return {((trial.id, name), trial.recordings): value for name, value in trial.shapes.items()}
+
+
+def _key(trial: Trial) -> str:
+    """Return a name of a trial that tells its recordings, too."""
+    return trial.id if trial.recordings is None else f"{trial.id}@{','.join(map(str, sorted(trial.recordings)))}"
