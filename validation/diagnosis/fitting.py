@@ -294,7 +294,7 @@ def linearised(fit: Fit, parameters: Sequence[Parameter] | None = None) -> tuple
     def one(index: int) -> Linear:
         columns = [Column(q.group, q.name, q.step if q.acts_in(index) else 0.0) for q in chosen]
         active = [column for column in columns if column.step > 0]
-        linear = linearise(fit.chains[index], fit.values(index), active, fit.jumps.allowed)
+        linear = linearise(fit.chains[index], fit.values(index), active, fit.jumps.allowed, central=False)
         if len(active) < len(columns):
             linear = linear.spread([j for j, column in enumerate(columns) if column.step > 0], len(columns))
         return linear

@@ -27,6 +27,7 @@ from validation.diagnosis.selection import (
     Tied,
     fitted_parameters,
     one_per_effect,
+    polished,
     price,
     proposals,
     tied_fit,
@@ -196,7 +197,8 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     _, best, fit, cost = min(fits, key=lambda item: item[0])
     if cost:
         found.loose, found.cost = replace(found.loose, chains=fit.chains), found.cost + cost
-    return best
+    best = polished(best)
+    return replace(best, score=best.score + found.cost)
 
 
 def tried_without(found: Search, trial: Trial) -> Tied:

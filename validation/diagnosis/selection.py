@@ -14,7 +14,7 @@ from validation.diagnosis.noise import NoiseModel, estimate_noise, log_likelihoo
 from validation.diagnosis.relaxed import NO_JUMPS
 from validation.diagnosis.trials import Trial, parameters_of
 
-__all__ = ["Hypothesis", "Tied", "price", "tied_fit"]
+__all__ = ["Hypothesis", "Tied", "polished", "price", "tied_fit"]
 
 #: what evidence costs: twice the log likelihood that an effect must gain, and more for each of its parameters
 ENTRY, PER_PARAMETER, EVENT_ENTRY = 24.0, 4.0, 42.0
@@ -122,6 +122,14 @@ def tied_fit(
         fit = replace(fit, noise=noise_of(fit))
         fit = refit(fit, iterations=2, bounds=BOUNDS)
     return scored(hypothesis, fit)
+
+
+def polished(tied: Tied) -> Tied:
+    """Return a fit gone on with in the noise that its own residuals show, until both agree."""
+    fit = tied.fit
+    for _ in range(2):
+        fit = refit(replace(fit, noise=noise_of(fit)), iterations=2, bounds=BOUNDS)
+    return scored(tied.hypothesis, fit)
 
 
 def noise_of(fit: Fit) -> NoiseModel:

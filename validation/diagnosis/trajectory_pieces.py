@@ -482,11 +482,14 @@ def linearise(
     values: Values,
     columns: Sequence[Column],
     jumps: BoolArray,
+    *,
+    central: bool = True,
 ) -> Linear:
     """Linearise the readings of a chain about its states and values.
 
     ``columns`` are parameters with the step of their differences; ``jumps`` (d,) tells in which directions pieces may
-    jump. Columns are central differences of the piece's own motion, chained over the pieces.
+    jump. Columns are differences of the piece's own motion, chained over the pieces; one-sided ones, where ``central``
+    is false, cost half.
     """
     recording, d, k = current.recording, current.tangent, current.states.shape[0]
     plant = recording.plant
@@ -529,7 +532,7 @@ def linearise(
         # neighbours: two per direction of the state and per parameter of the motion
         states = [state[None]]
         flats, wobbles = [flat[None]], [wobble[None]]
-        for sign in (1.0, -1.0):
+        for sign in (1.0, -1.0) if central else (1.0,):
             states.append(shifted(plant, state, sign * np.diag(steps)))
             flats.append(np.broadcast_to(flat, (d, flat.size)))
             wobbles.append(np.broadcast_to(wobble, (d, 8)))
@@ -555,7 +558,10 @@ def linearise(
         widths = np.concatenate([steps, [columns[j].step for j in motion_columns]])
         nominal_end = ends[0]
         end_tangent = difference(plant, ends[1:], np.broadcast_to(nominal_end, ends[1:].shape), d)
-        Phi_Psi = ((end_tangent[:half] - end_tangent[half:]) / (2.0 * widths[:, None])).T  # (d, half)
+        if central:
+            Phi_Psi = ((end_tangent[:half] - end_tangent[half:]) / (2.0 * widths[:, None])).T  # (d, half)
+        else:
+            Phi_Psi = (end_tangent / widths[:, None]).T
         Phi, Psi = Phi_Psi[:, :d], Phi_Psi[:, d:]
 
         for s, o, a, b, w, y, M in zip(samples, own, bounds[:-1], bounds[1:], out_rows, ideal, J, strict=True):
@@ -571,11 +577,12 @@ def linearise(
             for row, j in enumerate(motion_columns):
                 group, name, size, _ = columns[j]
                 if (group, name) in _ALSO_READ:  # it moves the readings of a given motion, too
-                    for place, sign in ((1 + d + row, 1.0), (1 + half + d + row, -1.0)):
+                    for place, sign in ((1 + d + row, 1.0), (1 + half + d + row, -1.0))[: 2 if central else 1]:
                         moved_values = {**values, (group, name): _current(values, recording, group, name) + sign * size}
                         read[place] = predicted(s.sensor, recording, moved_values, t, mine[place])
             y[o] = read[0]
-            slope = (read[1 : 1 + half] - read[1 + half :]) / (2.0 * widths[:, None, None])
+            other, span = (read[1 + half :], 2.0 * widths) if central else (read[:1], widths)
+            slope = (read[1 : 1 + half] - other) / span[:, None, None]
             slope = np.moveaxis(slope, 0, -1)  # (m, width, half)
             M[o[:, None], :, np.array([*range(d), *(d + j for j in motion_columns)])] = np.moveaxis(slope, 1, -1)
 
