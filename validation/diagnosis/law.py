@@ -285,7 +285,7 @@ _SENSORS = {
     "gyroscope": ("warming", "drift", "rate", "reading", "turning"),
 }
 #: orders of the spin that are looked at, peaks of the spectrum that are tried
-_ORDERS, _PEAKS = (0.05, 4.0), 3
+_ORDERS, _PEAKS = (0.15, 4.0), 3
 
 
 @dataclass(frozen=True)
@@ -786,7 +786,7 @@ def find_law(
             tied = _fitted(start, own, own_at, [term], [coefficient], at)
         if tied is None:
             continue
-        if found is None or tied.score < found[0].score:
+        if found is None or _priced(tied) < _priced(found[0]):
             found = tied, term
         if _share(base.fit, tied.fit, start.noise) > _ALL:
             break
@@ -817,12 +817,16 @@ def _share(base: Fit, fit: Fit, noise: NoiseModel) -> float:
     return (before - after) / max(before - base.count, 1.0)
 
 
+def _priced(tied: Tied) -> float:
+    """Return a fit's score with what the numbers of its law cost: of laws that do as well the simpler one is taken."""
+    return tied.score + PER_PARAMETER * sum(q.group in ("law", "term") for q in tied.fit.parameters)
+
+
 def _believed(
     tied: Tied, term: Term | SensorTerm, base: Tied, best: Tied, at: Mapping[str, float], noise: NoiseModel
 ) -> FoundLaw | None:
     """Return the law if it gains what it costs, explains most of the excess, and recordings that took no part."""
-    size = sum(q.group in ("law", "term") for q in tied.fit.parameters)
-    if tied.score + ENTRY + PER_PARAMETER * size > min(base.score, best.score):
+    if _priced(tied) + ENTRY > min(base.score, best.score):
         return None
     share = _share(base.fit, tied.fit, noise)
     heldout = _held_out(base.fit, tied.fit)

@@ -521,7 +521,7 @@ def saturation(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = ()) -> list
     above = [i for i, chain in enumerate(fit.chains) if i not in limits and _largest(chain) > limit + max(steps)]
     recordings = None if not above else frozenset(limits)
     # the readings are the limit, to within a step of the converter
-    trial = Trial("accel.saturation", (), recordings, (("limit_m_s2", limit, max(max(steps), 1e-6) / np.sqrt(12.0)),))
+    trial = Trial("accel.saturation", (), recordings, (("limit_m_s2", limit, max(max(steps), 1e-6) / 12.0**0.5),))
     return [Proposal(trial, gain, {})]
 
 

@@ -1,0 +1,132 @@
+"""Laws of what no catalogue holds: hidden in MuJoCo's rigs and flights, found again by the other model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from discsim.disc import Release, Rig
+from discsim.engine import fly
+from discsim.environment import Environment
+from discsim.law import Law
+from discsim.recording import Recording, Samples
+from discsim.rig import turn_table
+from discsim.sensors import Instruments, record
+from discsim.shipped import load_disc
+from validation.challenge.physics import OffCatalogue, PowerLawTorque, RotatingMagnet, Warming, coast, haunted
+from validation.diagnosis.law import FoundLaw, find_law
+from validation.diagnosis.noise import estimate_noise
+from validation.diagnosis.relaxed import relaxed
+from validation.diagnosis.selection import Hypothesis, tied_fit
+from validation.diagnosis.stated import stated_parameters
+
+MODULE = Instruments.from_parts("mpu9250")
+FIELD = Environment(magnetic_field=np.array([30.1, -4.3, 39.2]), gravity=9.8)
+RIG = Rig(Izz=1.1e-3, viscous=3e-5, sigma={"viscous_N_m_s": 3e-6})
+
+
+def coasting(secrets: Sequence[OffCatalogue | None], seconds: float = 5.0) -> list[Recording]:
+    """One run of the rig for each secret, from 75, 55, 40 rad/s on."""
+    made = []
+    for number, secret in enumerate(secrets):
+        motion = coast(RIG, FIELD, (75.0, 55.0, 40.0)[number], seconds, secret=secret, yaw=0.3 + number)
+        module = haunted(MODULE, secret)
+        rng = np.random.default_rng(number)
+        made.append(record(motion, module, rng, plant="spin_down", name=f"run-{number}", rig=RIG))
+    return made
+
+
+def law_of(recordings: Sequence[Recording]) -> FoundLaw | None:
+    own = stated_parameters(recordings)
+    loose = relaxed(recordings, own)
+    noise = estimate_noise(loose.linears, [linear.residual for linear in loose.linears])
+    base = tied_fit(loose, Hypothesis(), own, noise, {}, iterations=6, polish=1)
+    return find_law(loose, base, own, noise, recordings)
+
+
+def within(found: FoundLaw, name: str, truth: float, sigmas: float = 3.0) -> bool:
+    item = found.law.coefficients[name]
+    assert item.sd is not None
+    return abs(item.value - truth) < sigmas * item.sd
+
+
+def test_the_torque_of_an_odd_bearing_is_found_with_its_exponent():
+    secret = PowerLawTorque(5e-9, 2.6)
+    found = law_of(coasting([secret] * 3, 6.0))
+    assert found is not None
+    assert found.law.target == "moment_z_N_m"
+    assert within(found, "n", 2.6)
+    assert within(found, "c", -5e-9)
+    # friction that is known to a tenth hides most of the torque, and yet the exponent is held to a few per cent
+    assert found.law.coefficients["n"].sd < 0.05
+    assert all(gain > 0.0 for gain in found.heldout.values())
+    # the law as a model file carries it is the torque
+    r = np.array([-60.0, 45.0, 60.0])
+    torque = found.law.for_model().evaluate({"r": r, "t": np.zeros(3)})
+    np.testing.assert_allclose(torque, [secret.torque(x) for x in r], rtol=0.03)
+
+
+def test_a_torque_that_differs_from_run_to_run_is_no_law():
+    secrets = [PowerLawTorque(5e-9, 2.6), PowerLawTorque(-5e-9, 2.6)]
+    assert law_of(coasting(secrets)) is None
+
+
+def test_a_magnet_that_turns_beside_the_sensor_is_a_law_of_the_angle_turned():
+    found = law_of(coasting([RotatingMagnet(6.0, 1.37)] * 2))
+    assert found is not None
+    assert within(found, "k", 1.37)
+    assert {law.target for law in (found.law, *found.also)} == {"magnetometer.x_uT", "magnetometer.y_uT"}
+    amplitude = np.hypot(found.law.coefficients["a"].value, found.law.coefficients["b"].value)
+    # 0.6 uT of noise on 1200 samples
+    assert amplitude == pytest.approx(6.0, abs=0.15)
+
+
+def test_a_gyroscope_that_warms_up_on_a_table_is_a_law_of_time():
+    t = np.array([0.0, 5.0, 9.0, 12.0])
+    secret = Warming("gyroscope", (0.0, 0.06, -0.03), 4.0)
+    recordings = []
+    for number, rates in enumerate(([3.0, 20.0, 20.0, 5.0], [15.0, 15.0, 2.0, 25.0])):
+        profile = Samples(t, np.array(rates))
+        motion = turn_table(profile, FIELD, yaw=1.0)
+        recordings.append(
+            record(
+                motion,
+                haunted(MODULE, secret),
+                np.random.default_rng(number),
+                plant="rate_table",
+                name=f"table-{number}",
+                command=profile,
+            )
+        )
+    found = law_of(recordings)
+    assert found is not None
+    assert found.law.target == "gyroscope.y_rad_s"
+    assert within(found, "c", 0.06)
+    assert within(found, "tau", 4.0)
+
+
+def test_a_side_force_in_flight_is_found_with_its_target_and_powers():
+    driver, field = load_disc("driver")
+    module = Instruments.from_parts("mpu9250", "neo_m8n")
+    hidden = Law("c * |V|^2.5", "force_y_N", {"c": 3e-4})
+    recordings = []
+    for number, (speed, spin) in enumerate(((24.0, 60.0), (18.0, 45.0))):
+        release = Release(
+            position=np.array([0.0, 0.0, -1.5]),
+            velocity=np.array([speed, 1.0, -3.0]),
+            roll=-0.2,
+            pitch=0.15,
+            yaw=0.4,
+            body_rate=np.array([0.5, -0.4, spin]),
+        )
+        motion = fly(driver, field, release, duration=2.5, law=hidden)
+        rng = np.random.default_rng(number)
+        recordings.append(record(motion, module, rng, plant="flight", name=f"throw-{number}", disc=driver))
+    found = law_of(recordings)
+    assert found is not None
+    assert found.law.target == "force_y_N"
+    V = np.array([15.0, 18.0, 21.0])
+    state = {"V": V, "t": 1.0 + 0.0 * V, "h": 2.0 + 0.0 * V, "alpha": 0.1 + 0.0 * V, "r": 55.0 + 0.0 * V}
+    np.testing.assert_allclose(found.law.for_model().evaluate(state), 3e-4 * V**2.5, rtol=0.1)
