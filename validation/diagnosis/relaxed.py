@@ -32,7 +32,7 @@ _LOOSE = {
     "rate_table": np.array([0.5]),
 }
 #: how the slopes of what a free spin does not model change from piece to piece: rad/s^3, 1/s^2; for good
-_WANDER = np.array([0, 0, 30.0, 30.0, 0, 0.02, 0, 0, 0, 0, 0, 0])
+_WANDER = np.array([0, 0, 100.0, 100.0, 0, 0.02, 0, 0, 0, 0, 0, 0])
 NO_JUMPS = {
     "flight": Jumps(np.zeros(12)),
     "free_spin": Jumps(_WANDER),
@@ -72,8 +72,13 @@ def loose_jumps(plant: str) -> Jumps:
 def edges_of(recording: Recording) -> FloatArray:
     """Return the boundaries of a recording's pieces, s."""
     length = PIECE[recording.plant]
+    end = max(recording.end, 1e-3) + 1e-6
+    if recording.plant == "free_spin" and end > 1.5:
+        # just after release the moments of the air change fast
+        first = np.concatenate([np.arange(0.0, 0.3, 0.05), np.arange(0.3, 0.8, 0.1)])
+        return np.concatenate([first, np.linspace(0.8, end, max(1, round((end - 0.8) / length)) + 1)])
     count = max(1, round(recording.end / length))
-    return np.linspace(0.0, max(recording.end, 1e-3) + 1e-6, count + 1)
+    return np.linspace(0.0, end, count + 1)
 
 
 def first_chain(recording: Recording) -> Chain:
@@ -111,7 +116,7 @@ def unknowns(recordings: Sequence[Recording]) -> tuple[Parameter, ...]:
     """Return what each recording leaves open beside its states: how the wobble of a free spin dies and turns."""
     if recordings[0].plant != "free_spin":
         return ()
-    sigmas = (5.0, 5.0, 10.0, 10.0, 2.0, 2.0, 2.0, 2.0)
+    sigmas = (5.0, 5.0, 10.0, 10.0, 2.0, 2.0, 2.0, 2.0, 5.0, 10.0)
     return tuple(
         Parameter(group, name, 0.0, 1e-3, sigma, frozenset([i]))
         for i in range(len(recordings))

@@ -535,7 +535,7 @@ def linearise(
         for sign in (1.0, -1.0) if central else (1.0,):
             states.append(shifted(plant, state, sign * np.diag(steps)))
             flats.append(np.broadcast_to(flat, (d, flat.size)))
-            wobbles.append(np.broadcast_to(wobble, (d, 8)))
+            wobbles.append(np.broadcast_to(wobble, (d, len(WOBBLE))))
             if motion_columns:
                 moved = np.repeat(flat[None], len(motion_columns), axis=0)
                 moved_wobble = np.repeat(wobble[None], len(motion_columns), axis=0)
@@ -629,8 +629,10 @@ def linearise(
 
 #: how the wobble of a free spin dies (1/s) and turns (rad/s), how that differs along and across the wind, and their
 #: slopes in time: unknowns of each recording
-WOBBLE = tuple(
-    ("free_spin", f"{name}_{unit}") for name in ("decay", "turn", "along", "across") for unit in ("1_s", "1_s2")
+WOBBLE = (
+    *(("free_spin", f"{name}_{unit}") for name in ("decay", "turn", "along", "across") for unit in ("1_s", "1_s2")),
+    ("free_spin", "decay_1_s3"),
+    ("free_spin", "turn_1_s3"),
 )
 #: parameters of the motion that also enter what a sensor reads of a given motion
 _ALSO_READ = {
