@@ -191,7 +191,7 @@ class Reduced:
 def normal_matrix(linear: Linear, noise: NoiseModel) -> FloatArray:
     """Return the normal matrix (l + p + 1, l + p + 1) over [local | shared | residual] of whitened rows."""
     u, d = linear.unknowns, linear.moves.shape[1]
-    if u == d or linear.piece.size == 0:
+    if u == d:
         A = whitened(linear, noise, np.hstack([linear.local, linear.shared, linear.residual[:, None]]))
         return np.asarray(A.T @ A)
     # with jumps the full rows are long and mostly empty: piece by piece, then chained
@@ -205,6 +205,13 @@ def normal_matrix(linear: Linear, noise: NoiseModel) -> FloatArray:
         mine = rows[linear.piece == i]
         T[:d, :-1] = linear.moves[i]
         G += T.T @ (mine.T @ mine) @ T
+    if linear.whole.size:
+        # readings that hang on several pieces come in whole channels
+        spread = linear.piece < 0
+        columns = np.zeros((linear.raw.size, width))
+        columns[spread, :-1], columns[spread, -1] = linear.whole, linear.residual[spread]
+        A = whitened(linear, noise, columns)[spread]
+        G += A.T @ A
     return G
 
 

@@ -153,10 +153,11 @@ class Linear:
     raw : (n,) array
         Measured minus predicted where the chain stands, rows by channel.
     own : (n, d + p) array
-        Derivatives of the prediction by the state of the row's piece and by the parameters within it; with a lag,
-        whose readings hang on several pieces, (n, l + p) by the unknowns themselves.
+        Derivatives of the prediction by the state of the row's piece and by the parameters within it.
     piece : (n,) int array
-        The piece of each row; empty with a lag.
+        The piece of each row; -1 for a reading that hangs on several, as with a lag or where it is a mean.
+    whole : (m, l + p) array
+        Derivatives of those by the unknowns themselves, in their order.
     t, sd : (n,) arrays
         Written times, stated noise.
     channels : tuple of Channel
@@ -175,6 +176,7 @@ class Linear:
     raw: FloatArray
     own: FloatArray
     piece: IntArray
+    whole: FloatArray
     t: FloatArray
     sd: FloatArray
     channels: tuple[Channel, ...]
@@ -198,14 +200,14 @@ class Linear:
 
     @cached_property
     def _full(self) -> FloatArray:
-        if self.piece.size == 0:
-            return self.own
         d, width = self.moves.shape[1:]
         full = np.empty((self.raw.size, width))
         for i in range(self.moves.shape[0]):
             rows = np.flatnonzero(self.piece == i)
             full[rows] = self.own[rows, :d] @ self.moves[i]
         full[:, self.unknowns :] += self.own[:, d:]
+        if self.whole.size:
+            full[self.piece < 0] = self.whole
         return full
 
     def spread(self, places: Sequence[int], width: int) -> Linear:
@@ -218,16 +220,20 @@ class Linear:
         moves = np.zeros((*self.moves.shape[:2], u + width))
         moves[:, :, :u] = self.moves[:, :, :u]
         moves[:, :, [u + j for j in places]] = self.moves[:, :, u:]
-        return replace(self, own=own, moves=moves)
+        whole = np.zeros((self.whole.shape[0], u + width))
+        whole[:, :u] = self.whole[:, :u]
+        whole[:, [u + j for j in places]] = self.whole[:, u:]
+        return replace(self, own=own, moves=moves, whole=whole)
 
     def after(self, local: FloatArray, shared: FloatArray) -> FloatArray:
         """Return the residuals (n,) that a step of the unknowns is expected to leave."""
-        if self.piece.size == 0:
-            return np.asarray(self.residual - self.own @ np.concatenate([local, shared]))
         d = self.moves.shape[1]
-        tangents = self.moves @ np.concatenate([local, shared])
-        moved = np.einsum("nd,nd->n", self.own[:, :d], tangents[self.piece])
-        return np.asarray(self.residual - moved - self.own[:, d:] @ shared)
+        step = np.concatenate([local, shared])
+        tangents = self.moves @ step
+        moved = np.einsum("nd,nd->n", self.own[:, :d], tangents[self.piece]) + self.own[:, d:] @ shared
+        if self.whole.size:
+            moved[self.piece < 0] = self.whole @ step
+        return np.asarray(self.residual - moved)
 
     @property
     def local(self) -> FloatArray:
@@ -390,7 +396,7 @@ class _Runner:
             nutation = max(spin * disc.Izz / disc.Ixx, spin, 1.0)
             h = min(STEP, NUTATION / nutation)
         elif plant == "free_spin":
-            h = min(0.00125, 0.15 / max(min(abs(float(state[12])), FASTEST) * 2.0, 1.0))
+            h = min(0.0025, 0.3 / max(min(abs(float(state[12])), FASTEST) * 2.0, 1.0))
         elif plant == "spin_down":
             h = 0.01
         else:
@@ -748,17 +754,20 @@ def _stack(
     u: int,
 ) -> Linear:
     """Put the rows of all sensors together, channel by channel, without those that take no part."""
-    raw, own, pieces, t, sd, shifts = [], [], [], [], [], []
+    raw, own, pieces, whole, t, sd, shifts = [], [], [], [], [], [], []
     channels: list[Channel] = []
     at = 0
     d = current.tangent
-    lagged = any(s.nodes > 1 for s in samples)
+    p = S.shape[2] - u
     for s, y, M, piece in zip(samples, ideal, J, piece_of, strict=True):
         readings = s.readings
         # what the closing of forbidden jumps adds
         closed = np.einsum("mwd,md->mw", M[:, :, :d], closing[piece])
-        if lagged:
-            full = np.matmul(M[:, :, :d], S[piece])
+        spread = s.nodes > 1
+        if spread:
+            full = np.empty((*M.shape[:2], u + p))
+            for i in np.unique(piece):
+                full[piece == i] = M[piece == i, :, :d] @ S[i]
             full[:, :, u:] += M[:, :, d:]
             M = full
         prediction, slopes, closed = s.weighted(y), s.weighted(M), s.weighted(closed)
@@ -776,8 +785,13 @@ def _stack(
             if index.size == 0:
                 continue
             raw.append(readings.value[index, axis] - prediction[index, axis])
-            own.append(slopes[index, axis])
-            pieces.append(piece[index] if not lagged else np.empty(0, dtype=np.int64))
+            if spread:
+                whole.append(slopes[index, axis])
+                own.append(np.zeros((index.size, d + p)))
+                pieces.append(np.full(index.size, -1))
+            else:
+                own.append(slopes[index, axis])
+                pieces.append(piece[index])
             shifts.append(closed[index, axis])
             t.append(readings.t[index])
             sd.append(np.full(index.size, readings.sd[axis]))
@@ -792,11 +806,12 @@ def _stack(
     def joined(parts: list[Any]) -> Any:
         return np.concatenate(parts) if parts else np.empty(0)
 
-    rows_of = joined(own) if own else np.empty((0, d + S.shape[2] - u))
+    rows_of = joined(own) if own else np.empty((0, d + p))
     return Linear(
         joined(raw),
         rows_of,
         joined(pieces).astype(np.int64),
+        joined(whole) if whole else np.empty((0, u + p)),
         joined(t),
         joined(sd),
         tuple(channels),
