@@ -14,13 +14,14 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE
+from discsim.frames import conjugate, multiply
 from discsim.recording import Recording
 from validation.diagnosis.fitting import Fit, Jumps, Parameter, linearised, merit_of, refit
-from validation.diagnosis.noise import channel_of, stated_noise
+from validation.diagnosis.noise import channel_of, stated_noise, whitened
 from validation.diagnosis.starts import flight_starts, rig_starts, spin_starts
 from validation.diagnosis.trajectory_pieces import WOBBLE, Chain, Linear, chain
 
-__all__ = ["NO_JUMPS", "PIECE", "first_chain", "loose_jumps", "relaxed"]
+__all__ = ["NO_JUMPS", "PIECE", "first_chain", "loose_jumps", "relaxed", "without_outliers"]
 
 #: length of a piece, s
 PIECE = {"flight": 0.5, "free_spin": 0.2, "spin_down": 0.5, "rate_table": 1.0}
@@ -134,10 +135,82 @@ def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), it
     bare = linearised(fit, ())
     fit = replace(fit, noise=stated_noise(bare))
     fit = refit(fit, iterations=iterations, tolerance=1e-4 * sum(linear.raw.size for linear in bare))
+    fit = _from_other_starts(fit)
     chains = tuple(within_range(chain, linear) for chain, linear in zip(fit.chains, fit.linears, strict=True))
     fit = replace(fit, chains=chains)
     linears = linearised(fit)
     return replace(fit, linears=linears, merit=merit_of(fit, linears))
+
+
+#: a relaxed fit of a recording whose chi-squared per reading is above this started wrong
+_ASTRAY = 8.0
+
+
+def _astray(fit: Fit) -> list[int]:
+    """Return the recordings whose fit is far from their data while others' is not, worst first."""
+    chi2 = [
+        float(np.sum(np.minimum(whitened(linear, fit.noise, linear.residual[:, None])[:, 0] ** 2, 1e4)))
+        / max(linear.raw.size, 1)
+        for linear in fit.linears
+    ]
+    return [i for i in np.argsort(chi2)[::-1].tolist() if chi2[i] > _ASTRAY]
+
+
+def _from_other_starts(fit: Fit) -> Fit:
+    """Try other attitudes at release for recordings whose fit went astray."""
+    plant = fit.chains[0].recording.plant
+    if plant not in ("flight", "free_spin"):
+        return fit
+    for i in _astray(fit)[:3]:
+        recording = fit.chains[i].recording
+        first = first_chain(recording)
+        starts = (flight_starts if plant == "flight" else spin_starts)(recording, first.edges[:1])
+        for other in starts.ambiguous[:3]:
+            turned = multiply(other, conjugate(first.states[0, 6:10]))
+            states = first.states.copy()
+            states[:, 6:10] = multiply(np.broadcast_to(turned, (len(states), 4)), states[:, 6:10])
+            chain_of_i = replace(fit.chains[i], states=states)
+            trial = replace(fit, chains=(*fit.chains[:i], chain_of_i, *fit.chains[i + 1 :]))
+            trial = refit(trial, iterations=6, tolerance=1e-3 * fit.count)
+            if trial.merit < 0.8 * fit.merit:
+                fit = trial
+    return fit
+
+
+#: a reading this many standard deviations off, alone among its neighbours, is left out and listed
+_OUTLIER, _NEIGHBOUR = 9.0, 4.5
+#: larger shares of a sensor's readings than this are not outliers
+_MOST = 0.03
+
+
+def without_outliers(fit: Fit) -> tuple[Fit, list[tuple[int, str, str, float, float]]]:
+    """Leave out single readings far from everything else, as bad GPS fixes are, and fit again.
+
+    Returns the fit and what was left out: (recording, sensor, axis, time s, standard deviations).
+    """
+    found: list[tuple[int, str, str, float, float]] = []
+    chains = []
+    for index, (current, linear) in enumerate(zip(fit.chains, fit.linears, strict=True)):
+        kept = {readings.sensor: readings.good.copy() for readings in current.readings}
+        for channel in linear.channels:
+            x = linear.residual[channel.rows]
+            if x.size < 8:
+                continue
+            sd = max(1.4826 * float(np.median(np.abs(x))), 1e-12)
+            z = np.abs(x) / sd
+            padded = np.concatenate([[0.0], z, [0.0]])
+            alone = (z > _OUTLIER) & (np.maximum(padded[:-2], padded[2:]) < np.maximum(_NEIGHBOUR, 0.2 * z))
+            if not 0 < np.count_nonzero(alone) <= max(2, _MOST * x.size):
+                continue
+            readings = next(r for r in current.readings if r.sensor == channel.sensor)
+            axis = readings.axes.index(channel.axis)
+            for k in np.flatnonzero(alone):
+                kept[channel.sensor][channel.index[k], axis] = False
+                found.append((index, channel.sensor, channel.axis, float(linear.t[channel.rows][k]), float(z[k])))
+        chains.append(replace(current, readings=tuple(replace(r, good=kept[r.sensor]) for r in current.readings)))
+    if not found:
+        return fit, found
+    return refit(replace(fit, chains=tuple(chains)), iterations=4, tolerance=1e-4 * fit.count), found
 
 
 def within_range(current: Chain, linear: Linear) -> Chain:

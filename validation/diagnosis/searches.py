@@ -174,9 +174,7 @@ def _grounds(fit: Fit, f: int) -> dict[int, _Ground]:
         kept = w > 1e-11 * w[-1]
         inverse = ((V[:, kept] / w[kept]) @ V[:, kept].T) * np.outer(scale, scale)
         piece = np.clip(np.searchsorted(chain.edges, linear.t, side="right") - 1, 0, len(chain.states) - 1)
-        found[i] = _Ground(
-            chain, linear, noise, np.where(linear.piece < 0, piece, linear.piece), A, e, inverse, right
-        )
+        found[i] = _Ground(chain, linear, noise, np.where(linear.piece < 0, piece, linear.piece), A, e, inverse, right)
     return found
 
 
