@@ -17,7 +17,7 @@ from discsim.arrays import BoolArray, FloatArray
 from discsim.frames import euler_angles
 from validation.diagnosis.noise import NoiseModel, whitened
 from validation.diagnosis.readings import Values
-from validation.diagnosis.trajectory_pieces import STEPS, Chain, Column, Linear, linearise, moved, shifted
+from validation.diagnosis.trajectory_pieces import STEPS, Chain, Column, Linear, linearise, moved, shifted, stepped
 
 __all__ = [
     "Fit",
@@ -411,7 +411,7 @@ def _reduced(fit: Fit) -> Callable[[Linear, Chain], Reduced]:
 def _part(chain: Chain, linear: Linear, local: FloatArray, shared: FloatArray, share: float) -> Chain:
     """Return the chain after a share of a step, the closing of gaps included."""
     tangents = share * (linear.moves @ np.concatenate([local, shared]) + linear.closing)
-    return replace(chain, states=shifted(chain.recording.plant, chain.states, tangents))
+    return stepped(chain, tangents)
 
 
 def residuals_after(fit: Fit, reduced: Sequence[Reduced], step: FloatArray) -> list[FloatArray]:

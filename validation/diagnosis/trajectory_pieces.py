@@ -49,6 +49,7 @@ __all__ = [
     "readings_of",
     "recut",
     "shown",
+    "stepped",
 ]
 
 IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
@@ -863,5 +864,13 @@ def recut(current: Chain, values: Values, edges: FloatArray) -> Chain:
 
 def moved(current: Chain, linear: Linear, local: FloatArray, shared: FloatArray) -> Chain:
     """Return the chain after a step of its unknowns: local (l,) and shared (p,)."""
-    tangents = linear.moves @ np.concatenate([local, shared]) + linear.closing
-    return replace(current, states=shifted(current.recording.plant, current.states, tangents))
+    return stepped(current, linear.moves @ np.concatenate([local, shared]) + linear.closing)
+
+
+def stepped(current: Chain, tangents: FloatArray) -> Chain:
+    """Return the chain with its states moved by tangents (k, d)."""
+    states = shifted(current.recording.plant, current.states, tangents)
+    if current.recording.plant == "rate_table":
+        # the angle turned so far goes along with the yaw
+        states[:, 1] = states[:, 0] - states[0, 0]
+    return replace(current, states=states)
