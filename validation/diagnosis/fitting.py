@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -282,9 +283,10 @@ def shared_step(
 
 
 def mapped(function: Callable[..., Any], *arguments: Sequence[Any]) -> list[Any]:
-    """Map over recordings, on as many threads as there are cores."""
+    """Map over recordings, on as many threads as there are cores, each in the context of the call."""
     with ThreadPoolExecutor(THREADS) as pool:
-        return list(pool.map(function, *arguments))
+        tasks = [pool.submit(copy_context().run, function, *each) for each in zip(*arguments, strict=True)]
+        return [task.result() for task in tasks]
 
 
 def linearised(fit: Fit, parameters: Sequence[Parameter] | None = None) -> tuple[Linear, ...]:
