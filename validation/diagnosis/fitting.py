@@ -259,7 +259,8 @@ def shared_step(
 ) -> tuple[FloatArray, FloatArray, float]:
     """Solve for the shared parameters from a summed gram (p + 1, p + 1).
 
-    Returns the step (p,), its covariance (p, p) and what chi-squared is expected to become, priors included.
+    Returns the step (p,), its covariance (p, p) and what chi-squared is expected to become, priors included; all NaN
+    where the fit has gone where its predictions are not finite.
     """
     p = len(parameters)
     prior = np.array([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for q in parameters])
@@ -268,6 +269,8 @@ def shared_step(
     right = gram[:p, -1] + prior * off
     if p == 0:
         return np.empty(0), np.empty((0, 0)), float(gram[-1, -1])
+    if not np.all(np.isfinite(gram)):
+        return np.full(p, np.nan), np.full((p, p), np.nan), np.nan
     scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
     scaled = H * scale[:, None] * scale[None, :]
     w, V = np.linalg.eigh(scaled)
