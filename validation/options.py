@@ -14,6 +14,7 @@ from discsim.disc import Disc
 from discsim.effects.catalogue import Effect, by_id, effect, row
 from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.law import WRENCH_TARGETS, Law
 from discsim.model_file import Model, read_model
 from discsim.recording import Plant
 from discsim.shipped import load_disc, load_site
@@ -27,6 +28,7 @@ __all__ = [
     "all_effects",
     "at_site",
     "disc_to_fly",
+    "law_upon",
     "parse_effects",
     "parse_vector",
 ]
@@ -49,7 +51,8 @@ ModelOption: TypeAlias = Annotated[
     Path | None,
     typer.Option(
         "--model",
-        help="A model file: surroundings, disc, and effects; those of named recordings act where --out has that name.",
+        help="A model file: surroundings, disc, law, and effects; those of named recordings act where --out has that "
+        "name.",
     ),
 ]
 
@@ -83,6 +86,19 @@ def all_effects(
     effects += parse_effects(texts, plant, sensors)
     by_id(effects)
     return effects, notes
+
+
+def law_upon(model: Model | None, plant: Plant) -> tuple[Law | None, list[str]]:
+    """Return a model's law where it acts on the motion of a plant, and else one line that says why it does not."""
+    if model is None or model.law is None:
+        return None, []
+    law = model.law
+    passed = f"the model's law about {law.target} is passed over"
+    if law.target not in WRENCH_TARGETS:
+        return None, [f"{passed}: simulated readings carry no law, only motion does"]
+    if plant == "rate_table":
+        return None, [f"{passed}: a rate table turns as commanded, whatever acts on it"]
+    return law, []
 
 
 def _cannot_act(given: Effect, plant: Plant, sensors: Sequence[str]) -> str:

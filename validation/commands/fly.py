@@ -17,6 +17,7 @@ from validation.options import (
     all_effects,
     at_site,
     disc_to_fly,
+    law_upon,
 )
 
 __all__ = ["command"]
@@ -82,18 +83,19 @@ def command(
     instruments = Instruments.from_parts(*parts.split(","))
     effects, notes = all_effects(stated, effect, "flight", list(instruments.sensors), out.resolve().name)
     instruments = instruments.with_effects(effects)
+    law, passed = law_upon(stated, "flight")
     names = (disc or "", throw, site or "", *parts.split(","))
     inputs = [*([model] if model else []), *(Path(name) for name in names if name.endswith(".toml"))]
     with start_run(out, seed, inputs) as run:
         if engine is Engine.trajectory:
-            motion = predict(body, environment, release, effects, duration=duration).motion()
+            motion = predict(body, environment, release, effects, duration=duration, law=law).motion()
         else:
-            motion = fly(body, environment, release, effects, duration=duration, ground=ground.value)
+            motion = fly(body, environment, release, effects, duration=duration, ground=ground.value, law=law)
         recording = record(motion, instruments, run.rng, plant="flight", name=out.resolve().name, disc=body)
         write_recording(recording, out)
         write_flight_truth(out / "truth.csv", motion)
         north, east = motion.position[-1, :2]
         what = "touches down" if motion.touched_down else "is left"
-        for note in notes:
+        for note in (*notes, *passed):
             typer.echo(note)
         typer.echo(f"{out}: {what} after {motion.end:.2f} s, {north:.1f} m north and {east:.1f} m east")

@@ -15,6 +15,7 @@ from validation.options import (
     SiteOption,
     all_effects,
     at_site,
+    law_upon,
     parse_vector,
 )
 
@@ -59,7 +60,8 @@ def command(
     sensors = ("magnetometer", "accelerometer", "gyroscope", "rate_reference")
     stated = read_model(model) if model is not None else None
     effects, notes = all_effects(stated, effect, "rate_table", sensors, out.resolve().name)
-    for note in notes:
+    _, passed = law_upon(stated, "rate_table")
+    for note in (*notes, *passed):
         typer.echo(note)
     surroundings = Environment() if stated is None else stated.environment
     inputs = [path for path in (profile, model, Path(site) if site and site.endswith(".toml") else None) if path]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from discsim.errors import InputError
-from validation.options import ModelOption, all_effects, disc_to_fly
+from validation.options import ModelOption, all_effects, disc_to_fly, law_upon
 
 if TYPE_CHECKING:
     from validation.replay import Replay
@@ -107,7 +107,8 @@ def _replay(recording: Path | None, disc: str | None, model: Path | None, throw:
         return replay_recording(recording)
     body, environment, stated = disc_to_fly(disc, model)
     effects, _ = all_effects(stated, None, "flight", (), None)
-    motion = fly(body, environment, load_throw(throw), effects)
+    law, _ = law_upon(stated, "flight")
+    motion = fly(body, environment, load_throw(throw), effects, law=law)
     return replay_motion(motion, body.diameter, f"flown in MuJoCo: disc {disc or model}, throw {throw}")
 
 

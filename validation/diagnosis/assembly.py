@@ -35,6 +35,7 @@ from validation.diagnosis.law import FoundLaw
 from validation.diagnosis.noise import NoiseModel
 from validation.diagnosis.places import located_effect, located_rest
 from validation.diagnosis.rest import remainders
+from validation.diagnosis.rows import user_effect
 from validation.diagnosis.search import FAR, Search, chi2_in, tried_without
 from validation.diagnosis.selection import Hypothesis, Tied, fitted_parameters
 from validation.diagnosis.trials import Trial, parameters_of
@@ -134,7 +135,7 @@ def _separating(one: str, other: str, found: Search) -> str:
     plant = found.recordings[0].plant
     prefix = {one.split(".")[0], other.split(".")[0]}
     if plant == "flight":
-        if prefix & {"accel", "mag", "gyro"}:
+        if prefix & {"accel", "mag", "gyro"} or user_effect(one) or user_effect(other):
             return "a run of the module on a rate table, from rest to full spin: there the motion is known"
         if prefix & {"air"}:
             return "two throws into opposite directions at one speed, and one much slower"
@@ -287,6 +288,15 @@ def _model(found: Search, effects: Sequence[NamedEffect], trials: Sequence[Trial
     return Model(environment, model_disc, model_rig, tuple(carried), law.for_model() if law is not None else None)
 
 
+def _not_carried(effects: Sequence[NamedEffect]) -> list[str]:
+    """Return a warning for each effect that model.toml has no place for."""
+    return [
+        f"model.toml does not carry {effect.id}: an effect of the user's own competes here and is not flown"
+        for effect in effects
+        if effect.id not in CATALOGUE
+    ]
+
+
 def assemble(
     found: Search, datasets: Sequence[str], names: Sequence[str], seed: int, law: FoundLaw | None = None
 ) -> Outcome:
@@ -333,7 +343,7 @@ def assemble(
         held,
         tuple(Outlier(names[i], s, a, t, d) for i, s, a, t, d in found.outliers),
         tuple(dict.fromkeys(c.next_recording for e in effects for c in e.confused_with if c.next_recording)),
-        tuple(found.warnings),
+        (*found.warnings, *_not_carried(effects)),
     )
     model = _model(found if not unexplained else found.at_base(), effects, trials, written)
     return Outcome(diagnosis, model, tuple(_residuals(found, names, unexplained)), candidates)

@@ -9,6 +9,7 @@ from validation.diagnosis.answer import Outcome
 from validation.diagnosis.assembly import assemble, verdict_of
 from validation.diagnosis.datasets import recording_names
 from validation.diagnosis.law import find_law
+from validation.diagnosis.rows import competing
 from validation.diagnosis.search import search
 from validation.diagnosis.user_effects import UserEffect
 
@@ -30,13 +31,15 @@ def diagnose(
     """Tell whether the baseline explains recordings of one plant, and if not what was left out.
 
     ``datasets`` are sets of recordings that share their hardware, ``names`` what to call the sets; ``progress`` is
-    called with a stage, steps done and steps in all.
+    called with a stage, steps done and steps in all. ``user_effects`` compete with the catalogue's; raises `InputError`
+    for one that acts on motion.
     """
     recordings = [recording for dataset in datasets for recording in dataset]
     called = [name for group in recording_names(datasets, names) for name in group]
-    found = search(recordings, progress)
-    law = None
-    if verdict_of(found)[1]:
-        progress("looking for a law", 4, 5)
-        law = find_law(found.loose, found.final, found.own, found.loose_noise, recordings)
-    return assemble(found, names, called, seed, law)
+    with competing(user_effects):
+        found = search(recordings, progress)
+        law = None
+        if verdict_of(found)[1]:
+            progress("looking for a law", 4, 5)
+            law = find_law(found.loose, found.final, found.own, found.loose_noise, recordings)
+        return assemble(found, names, called, seed, law)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -265,7 +266,8 @@ def shared_step(
 ) -> tuple[FloatArray, FloatArray, float]:
     """Solve for the shared parameters from a summed gram (p + 1, p + 1).
 
-    Returns the step (p,), its covariance (p, p) and what chi-squared is expected to become, priors included.
+    Returns the step (p,), its covariance (p, p) and what chi-squared is expected to become, priors included; all NaN
+    where the fit has gone where its predictions are not finite.
     """
     p = len(parameters)
     prior = np.array([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for q in parameters])
@@ -274,6 +276,8 @@ def shared_step(
     right = gram[:p, -1] + prior * off
     if p == 0:
         return np.empty(0), np.empty((0, 0)), float(gram[-1, -1])
+    if not np.all(np.isfinite(gram)):
+        return np.full(p, np.nan), np.full((p, p), np.nan), np.nan
     scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
     scaled = H * scale[:, None] * scale[None, :]
     w, V = np.linalg.eigh(scaled)
@@ -289,9 +293,10 @@ def shared_step(
 
 
 def mapped(function: Callable[..., Any], *arguments: Sequence[Any]) -> list[Any]:
-    """Map over recordings, on as many threads as there are cores."""
+    """Map over recordings, on as many threads as there are cores, each in the context of the call."""
     with ThreadPoolExecutor(THREADS) as pool:
-        return list(pool.map(function, *arguments))
+        tasks = [pool.submit(copy_context().run, function, *each) for each in zip(*arguments, strict=True)]
+        return [task.result() for task in tasks]
 
 
 def linearised(fit: Fit, parameters: Sequence[Parameter] | None = None) -> tuple[Linear, ...]:

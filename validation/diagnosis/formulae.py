@@ -178,6 +178,9 @@ def unit(id: str, name: str) -> str:
     """Return the unit of an effect's parameter; empty where it has none."""
     if (id, name) in _OTHER_UNITS:
         return _OTHER_UNITS[id, name]
+    before, per, after = name.rpartition("_per_")
+    if per:
+        return f"{unit(id, before)} per {unit(id, f'_{after}')}".strip()
     return next((text for ending, text in _UNITS if name.endswith(ending)), "")
 
 

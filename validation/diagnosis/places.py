@@ -8,10 +8,10 @@ from types import MappingProxyType
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import CATALOGUE
 from validation.diagnosis.answer import Located
 from validation.diagnosis.board import column_of
 from validation.diagnosis.fitting import local_step
+from validation.diagnosis.rows import row_of, user_effect
 from validation.diagnosis.search import Search
 from validation.diagnosis.selection import Hypothesis, fitted_parameters
 from validation.diagnosis.trajectory_pieces import Linear
@@ -122,7 +122,9 @@ def located_effect(found: Search, trial: Trial, names: Sequence[str]) -> list[Lo
     sd = {group: noise.sd for group, noise in found.final.fit.noise.items()}
     assert found.board is not None
     excess = excess_of(without(found, trial), found.final.residuals, found.board.linears, sd)
-    grows, text = _TRACES.get(trial.id, ("the state of the effect", "as this effect of the user's own says"))
+    row, own = row_of(trial.id), user_effect(trial.id)
+    assert row is not None
+    grows, text = _TRACES[trial.id] if own is None else (None, own.text)
     mine = {key: value for key, value in excess.items() if trial.recordings is None or key[0] in trial.recordings}
     total = sum(max(float(np.sum(value)), 0.0) for value in mine.values())
     if total <= 0:
@@ -130,10 +132,9 @@ def located_effect(found: Search, trial: Trial, names: Sequence[str]) -> list[Lo
     by_axis: dict[tuple[str, str], float] = {}
     for (_, sensor, axis), value in mine.items():
         by_axis[sensor, axis] = by_axis.get((sensor, axis), 0.0) + max(float(np.sum(value)), 0.0)
-    owner = CATALOGUE[trial.id].acts_on if trial.id in CATALOGUE else "motion"
-    order = sorted(by_axis, key=lambda key: (key[0] != owner, -by_axis[key]))
+    order = sorted(by_axis, key=lambda key: (key[0] != row.acts_on, -by_axis[key]))
     places: list[Located] = []
-    event = trial.id in CATALOGUE and CATALOGUE[trial.id].event
+    event = row.event
     for sensor, axis in order[:4]:
         share = by_axis[sensor, axis] / total
         if places and share < _WORTH:

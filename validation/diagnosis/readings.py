@@ -1,12 +1,13 @@
-"""What the sensors of a recording would read of a motion, with any effect of the catalogue on them.
+"""What the sensors of a recording would read of a motion, with any effect on them.
 
-The forms are those of docs/physics.md; motions come as rows (19,) of `validation.diagnosis.pieces_of_motion`, any
-number of neighbouring ones at once. Noise, rounding and clipping are the fit's business.
+The catalogue's forms are those of docs/physics.md; motions come as rows (19,) of
+`validation.diagnosis.pieces_of_motion`, any number of neighbouring ones at once. Noise, rounding and clipping are the
+fit's business.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TypeAlias
 
 import numpy as np
@@ -14,7 +15,9 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.sensors import CrossAxis, Scale, sensitivity
+from discsim.motion import State
 from discsim.recording import Recording
+from validation.diagnosis.rows import row_of, user_effects_on
 
 __all__ = ["CLOCKS", "Values", "delay", "is_motion", "predicted", "to_body", "value"]
 
@@ -29,19 +32,20 @@ CLOCKS = ("clock.rate", "mag.clock_rate", "accel.clock_rate", "gyro.clock_rate",
 _FIELD = ("magnetic_north", "magnetic_east", "magnetic_down")
 _BASELINE = {(row.id, name): none for row in CATALOGUE.values() for name, none in row.baseline._asdict().items()}
 
-#: an effect of a user's own on a sensor: (readings (n, 3), t (n,), rows (n, 19)) -> readings
-Extra: TypeAlias = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
-
 
 def value(values: Values, group: str, name: str) -> float:
     """Return a parameter of an effect: as given, or its baseline."""
-    return values.get((group, name), _BASELINE.get((group, name), 0.0))
+    if (group, name) in values:
+        return values[group, name]
+    if (group, name) not in _BASELINE and (row := row_of(group)) is not None:
+        return float(getattr(row.baseline, name))
+    return float(_BASELINE.get((group, name), 0.0))
 
 
 def is_motion(group: str) -> bool:
     """Tell whether a group of parameters acts on the motion (and not on a sensor)."""
-    if group in CATALOGUE:
-        return CATALOGUE[group].acts_on == "motion"
+    if (row := row_of(group)) is not None:
+        return row.acts_on == "motion"
     return group in ("aero", "disc", "environment", "rig", "law")
 
 
@@ -59,6 +63,23 @@ def delay(values: Values, sensor: str, written: FloatArray) -> FloatArray:
 
 def predicted(sensor: str, recording: Recording, values: Values, t: FloatArray, rows: FloatArray) -> FloatArray:
     """Return the readings (..., m, k) of a sensor before lag and noise at true times t (m,) for rows (..., m, 19)."""
+    readings = _by_catalogue(sensor, recording, values, t, rows)
+    for effect in user_effects_on(sensor):
+        sizes = [value(values, effect.id, name) for name in effect.row.parameters]
+        if sizes != list(effect.row.baseline):
+            flat = rows.reshape(-1, rows.shape[-1])
+            times = np.broadcast_to(t, rows.shape[:-1]).ravel()
+            changed = effect.on_readings(sizes, readings.reshape(-1, readings.shape[-1]), times, _state(times, flat))
+            readings = changed.reshape(readings.shape)
+    return readings
+
+
+def _state(t: FloatArray, rows: FloatArray) -> State:
+    """Return rows (n, 19) at times t (n,) as a state."""
+    return State(t, rows[:, :3], rows[:, 3:6], rows[:, 6:9], rows[:, 9:13], rows[:, 13:16], rows[:, 16:19])
+
+
+def _by_catalogue(sensor: str, recording: Recording, values: Values, t: FloatArray, rows: FloatArray) -> FloatArray:
     if sensor == "gps":
         return rows[..., :6]
     if sensor == "track":

@@ -23,6 +23,8 @@ BANDS = 24
 BAND_Z, BAND_SHARE = 8.0, 0.2
 #: readings in a window of time, and its excess in standard errors
 WINDOW, WINDOW_Z = 24, 9.0
+#: most that one reading's square counts in a window: two wild readings are outliers, three in a row are not
+WILD = 30.0
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ def _windows(linears: Sequence[Linear], white: Sequence[FloatArray]) -> list[Rem
     found = []
     for index, (linear, x) in enumerate(zip(linears, white, strict=True)):
         for channel in linear.channels:
-            y = np.minimum(x[channel.rows] ** 2, 100.0)
+            y = np.minimum(x[channel.rows] ** 2, WILD)
             if y.size < 2 * WINDOW:
                 continue
             total = np.convolve(y, np.ones(WINDOW), mode="valid")

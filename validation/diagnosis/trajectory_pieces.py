@@ -33,6 +33,7 @@ from validation.diagnosis.pieces_of_motion import (
 )
 from validation.diagnosis.plateau import plateau
 from validation.diagnosis.readings import CLOCKS, Values, delay, is_motion, predicted, value
+from validation.diagnosis.rows import row_of
 from validation.diagnosis.starts import spin_starts
 
 __all__ = [
@@ -505,7 +506,7 @@ def linearise(
 
     samples = [_Sampled(current, readings, values) for readings in current.readings]
     # the instants of all sensors, each with its neighbours in time for slopes and its past for a lag
-    motion_columns = [j for j, column in enumerate(columns) if is_motion(column.group) or column.key in WOBBLE]
+    motion_columns = [j for j, column in enumerate(columns) if _moves(column)]
     sensor_columns = [j for j in range(len(columns)) if j not in motion_columns]
     piece_of = [np.clip(np.searchsorted(current.edges, s.instants, side="right") - 1, 0, k - 1) for s in samples]
 
@@ -622,7 +623,7 @@ def linearise(
                 plus, minus = {**here, (group, name): base + size}, {**here, (group, name): base - size}
                 moved = s.delays(plus) - s.delays(minus)
                 M[:, :, d + j] = -rate * (moved / (2.0 * size))[:, None]
-            elif name == "tau_s":
+            elif name == "tau_s" and group in CATALOGUE:
                 if rate is None:
                     rate = s.time_slope(runner, flat, wobble, values, current)
                 M[:, :, d + j] = -rate * s.lag_slope[:, None]
@@ -653,7 +654,7 @@ def _current(values: Values, recording: Recording, group: str, name: str) -> flo
     """Return the value a parameter has now: given, or as the recording states it, or the baseline."""
     if (group, name) in values:
         return values[group, name]
-    if group in CATALOGUE:
+    if row_of(group) is not None:
         return value(values, group, name)
     if group == "environment" and name.startswith("magnetic_"):
         return float(recording.environment.magnetic_field[["north", "east", "down"].index(name.split("_")[1])])
@@ -662,13 +663,21 @@ def _current(values: Values, recording: Recording, group: str, name: str) -> flo
     return float(parameters(recording.environment, recording.disc, recording.rig)[parameter_index(group, name)])
 
 
+def _moves(column: Column) -> bool:
+    """Tell whether a column is of the motion; the field of the earth is only read."""
+    if column.group == "environment":
+        return column.key in _FLAT_ENVIRONMENT
+    return is_motion(column.group) or column.key in WOBBLE
+
+
 def _concerns(group: str, sensor: str) -> bool:
     """Tell whether an effect that is not of the motion can touch a sensor."""
     if group == "clock.rate":
         return True
     if group == "environment":
         return sensor == "magnetometer"
-    return group in CATALOGUE and CATALOGUE[group].acts_on == sensor
+    row = row_of(group)
+    return row is not None and row.acts_on == sensor
 
 
 class _Sampled:

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from discsim.effects.catalogue import CATALOGUE
 from discsim.recording import Recording
 from validation.diagnosis.fitting import Parameter
+from validation.diagnosis.rows import row_of, rows
 from validation.diagnosis.trajectory_pieces import Column
 
 __all__ = ["Trial", "parameters_of", "trials_for"]
@@ -62,7 +62,8 @@ _STEP = 0.1
 def _step(id: str, name: str) -> float:
     if (id, name) == ("rig.speed_ripple", "order"):
         return 1e-6  # times the angle turned, hundreds of turns, this is what moves the phase
-    row = CATALOGUE[id]
+    row = row_of(id)
+    assert row is not None
     return _STEP * row.scale[row.parameters.index(name)]
 
 
@@ -71,7 +72,7 @@ def available(recordings: Sequence[Recording]) -> list[str]:
     plant = recordings[0].plant
     sensors = {sensor for recording in recordings for sensor in recording.samples}
     found = []
-    for row in CATALOGUE.values():
+    for row in rows():
         if plant not in row.plants:
             continue
         if plant == "free_spin" and row.id in _UNSEEN_IN_FREE_SPIN:
@@ -87,7 +88,8 @@ def trials_for(recordings: Sequence[Recording]) -> tuple[Trial, ...]:
     for id in available(recordings):
         if id in SEARCHED:
             continue
-        row = CATALOGUE[id]
+        row = row_of(id)
+        assert row is not None
         if id == "gyro.g_sensitivity" and "accelerometer" not in recordings[0].sheets:
             continue
         shapes: list[tuple[tuple[str, float], ...]] = [()]
@@ -112,7 +114,8 @@ _SHAPE_SIGMA = {
 
 def parameters_of(trial: Trial, *, shaped: bool = True) -> tuple[Parameter, ...]:
     """Return the parameters of a trial for a fit, its shapes among them where ``shaped``."""
-    row = CATALOGUE[trial.id]
+    row = row_of(trial.id)
+    assert row is not None
     baseline = row.baseline._asdict()
     found = [
         Parameter(c.group, c.name, float(baseline[c.name]), c.step, _LOOSE * c.step, trial.recordings)

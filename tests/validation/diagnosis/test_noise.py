@@ -1,0 +1,134 @@
+"""Noise as it is: whitening, likelihood and estimates, against simulated noise and dense covariances."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.stats import multivariate_normal
+
+from discsim.arrays import FloatArray
+from validation.diagnosis.noise import GroupNoise, estimate_noise, log_likelihood, stated_noise, whitened
+from validation.diagnosis.trajectory_pieces import Channel, Linear
+
+
+def rows(*sizes: tuple[str, int], sd: float = 1.0, missing: tuple[int, ...] = ()) -> Linear:
+    """A linearisation of no unknowns: channels (group, readings), of each the samples ``missing``."""
+    channels, at, times = [], 0, []
+    for k, (group, size) in enumerate(sizes):
+        index = np.setdiff1d(np.arange(size), missing)
+        channels.append(Channel(group, f"{k}", group, slice(at, at + index.size), index))
+        times.append(index / 100.0)
+        at += index.size
+    none = np.empty((at, 0))
+    return Linear(
+        np.zeros(at),
+        none,
+        np.zeros(at, dtype=np.int64),
+        np.concatenate(times),
+        np.full(at, sd),
+        tuple(channels),
+        np.empty(0),
+        np.empty(0, dtype=np.int64),
+        np.empty(0, dtype=np.int64),
+        np.zeros((1, 0, 0)),
+        np.zeros((1, 0)),
+        np.zeros((0, 0)),
+        np.zeros(at),
+    )
+
+
+def coloured(rng: np.random.Generator, n: int, sd: float, phi: float) -> FloatArray:
+    drive = sd * np.sqrt(1.0 - phi**2) * rng.standard_normal(n)
+    drive[0] /= np.sqrt(1.0 - phi**2)
+    return np.asarray(lfilter([1.0], [1.0, -phi], drive))
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.4, 0.9])
+def test_whitened_noise_is_white_with_unit_level(phi: float):
+    rng, n = np.random.default_rng(1), 20000
+    linear = rows(("gyroscope", n))
+    white = whitened(linear, {"gyroscope": GroupNoise(0.3, phi)}, coloured(rng, n, 0.3, phi)[:, None])[:, 0]
+    # four standard errors each
+    assert np.var(white) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / n))
+    for lag in (1, 2, 5):
+        assert abs(np.mean(white[lag:] * white[:-lag])) < 4.0 / np.sqrt(n)
+
+
+def test_whitening_reaches_over_missing_samples():
+    """Neighbours that lie three samples apart have the cube of the correlation in common."""
+    linear = rows(("gps", 6), missing=(2, 3))
+    noise = {"gps": GroupNoise(0.5, 0.8)}
+    index = linear.channels[0].index
+    covariance = 0.25 * 0.8 ** np.abs(index[:, None] - index[None, :])
+    W = whitened(linear, noise, np.eye(4))
+    assert pytest.approx(np.eye(4), abs=1e-12) == W @ covariance @ W.T
+
+
+def test_channels_do_not_leak_into_one_another():
+    linear = rows(("gyroscope", 5), ("gyroscope", 5))
+    W = whitened(linear, {"gyroscope": GroupNoise(1.0, 0.7)}, np.eye(10))
+    assert not W[5:, :5].any()
+    assert not W[:5, 5:].any()
+
+
+def test_pieces_are_whitened_apart_where_they_are_asked_to_be():
+    linear = rows(("gyroscope", 6))
+    piece = np.array([0, 0, 0, 1, 1, 1])
+    W = whitened(linear, {"gyroscope": GroupNoise(1.0, 0.7)}, np.eye(6), piece)
+    assert not W[3:, :3].any()
+    assert pytest.approx(W[:3, :3]) == W[3:, 3:]
+
+
+def test_the_likelihood_is_that_of_the_dense_covariance():
+    rng = np.random.default_rng(2)
+    linear = rows(("gyroscope", 12), ("gps", 7), missing=(3,))
+    noise = {"gyroscope": GroupNoise(0.3, 0.6), "gps": GroupNoise(2.0, 0.0)}
+    e = rng.standard_normal(linear.raw.size)
+    expected = 0.0
+    for channel in linear.channels:
+        sd, phi = noise[channel.group]
+        apart = np.abs(channel.index[:, None] - channel.index[None, :])
+        covariance = sd**2 * (phi**apart if phi else np.eye(channel.index.size))
+        dense = multivariate_normal(np.zeros(channel.index.size), covariance)
+        expected += -2.0 * float(dense.logpdf(e[channel.rows])) - channel.index.size * np.log(2.0 * np.pi)
+    assert log_likelihood(linear, noise, e) == pytest.approx(expected, rel=1e-10)
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.3, 0.85])
+def test_level_and_correlation_are_estimated_from_residuals(phi: float):
+    rng, n = np.random.default_rng(3), 4000
+    linears = [rows(("accelerometer", n), ("accelerometer", n)) for _ in range(2)]
+    residuals = [np.concatenate([coloured(rng, n, 0.08, phi) for _ in range(2)]) for _ in linears]
+    found = estimate_noise(linears, residuals)["accelerometer"]
+    count = 4 * n
+    # a sample correlation has variance (1 - phi^2)/n; a level's count shrinks by (1 - phi^2)/(1 + phi^2)
+    assert found.correlation == pytest.approx(phi, abs=4.0 * np.sqrt((1.0 - phi**2) / count))
+    assert found.sd == pytest.approx(0.08, rel=4.0 * np.sqrt((1.0 + phi**2) / (1.0 - phi**2) / (2.0 * count)))
+
+
+def test_white_noise_is_never_given_a_correlation():
+    linear = rows(("magnetometer", 300), ("magnetometer", 300), ("magnetometer", 300))
+    for seed in range(200):
+        e = np.random.default_rng(seed).standard_normal(900)
+        # 3 standard errors of 0.033: one in 740 sequences, one-sided
+        assert estimate_noise([linear], [e])["magnetometer"].correlation < 0.12
+    found = [
+        estimate_noise([linear], [np.random.default_rng(s).standard_normal(900)])["magnetometer"] for s in range(200)
+    ]
+    assert sum(noise.correlation > 0 for noise in found) <= 2
+
+
+def test_fitted_parameters_take_their_share_of_the_level():
+    linear = rows(("track", 100))
+    plain = estimate_noise([linear], [np.ones(100)], coloured=False)["track"]
+    spent = estimate_noise([linear], [np.ones(100)], coloured=False, spent=19.0)["track"]
+    assert plain.sd == pytest.approx(1.0)
+    assert spent.sd == pytest.approx(1.0 / np.sqrt(0.81))
+
+
+def test_what_a_sheet_states_is_the_first_guess_and_something_stands_in_where_it_is_silent():
+    assert stated_noise([rows(("gyroscope", 5), sd=0.7)])["gyroscope"] == GroupNoise(0.7)
+    silent = stated_noise([rows(("gyroscope", 5), sd=np.nan)])["gyroscope"]
+    assert np.isfinite(silent.sd)
+    assert silent.sd > 0

@@ -1,0 +1,74 @@
+"""Is what is left noise: silent on noise of any level and first-order correlation, loud on physics."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_noise import coloured, rows
+
+from discsim.arrays import FloatArray
+from validation.diagnosis.noise import estimate_noise
+from validation.diagnosis.rest import Remainder, remainders
+
+N, AXES, RECORDINGS = 600, 3, 4
+
+
+def left(residuals: list[FloatArray]) -> list[Remainder]:
+    """What remains of the residuals of recordings of a three-axis sensor, the noise estimated from them."""
+    linears = [rows(*[("gyroscope", N)] * AXES) for _ in residuals]
+    return remainders(linears, residuals, estimate_noise(linears, residuals))
+
+
+def noise(seed: int, sd: float = 1.0, phi: float = 0.0) -> list[FloatArray]:
+    rng = np.random.default_rng(seed)
+    return [np.concatenate([coloured(rng, N, sd, phi) for _ in range(AXES)]) for _ in range(RECORDINGS)]
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.5, 0.95])
+def test_noise_of_any_level_and_memory_is_noise(phi: float):
+    """A false alarm in one of a hundred data sets is allowed, and this test would see one in fifty."""
+    for seed in range(100):
+        assert left(noise(seed, 0.37, phi)) == []
+
+
+def test_rounding_is_noise():
+    assert left([np.round(e / 1.5) * 1.5 for e in noise(1)]) == []
+
+
+@pytest.mark.parametrize("frequency", [0.07, 0.2, 0.43])
+def test_a_sine_of_the_size_of_the_noise_is_not_noise(frequency: float):
+    """Half of its power would do: what turns with the spin stands in one band."""
+    wave = np.tile(np.sin(2.0 * np.pi * frequency * np.arange(N)), AXES)
+    found = left([e + wave for e in noise(2)])
+    assert found
+    assert found[0].kind.startswith("band")
+    assert found[0].group == "gyroscope"
+
+
+def test_a_burst_is_located_in_its_recording_axis_and_time():
+    residuals = noise(3)
+    start = N + 250  # the second axis
+    residuals[2][start : start + 24] += 5.0 * np.sign(np.sin(np.arange(24)))
+    found = left(residuals)
+    (window,) = [item for item in found if item.kind == "window"]
+    assert (window.recording, window.group, window.axis) == (2, "gyroscope", "1")
+    assert window.from_s == pytest.approx(2.5, abs=0.1)
+    assert window.to_s == pytest.approx(2.74, abs=0.1)
+
+
+def test_one_or_two_wild_readings_are_outliers_and_three_are_not():
+    residuals = noise(4)
+    residuals[0][100] = 12.0
+    assert left(residuals) == []
+    residuals[0][110] = -12.0
+    assert left(residuals) == []
+    residuals[0][115] = 12.0
+    assert [item.kind for item in left(residuals)] == ["window"]
+
+
+def test_the_strongest_remainder_comes_first():
+    wave = np.tile(np.sin(0.5 * np.arange(N)), AXES)
+    residuals = [e + 3.0 * wave for e in noise(5)]
+    residuals[1][300:324] += 20.0
+    strengths = [item.z for item in left(residuals)]
+    assert strengths == sorted(strengths, reverse=True)

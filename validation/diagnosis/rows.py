@@ -1,0 +1,58 @@
+"""The effects that compete in a diagnosis: the catalogue's, and the user's own for as long as one call lasts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from types import MappingProxyType
+
+from discsim.effects.catalogue import CATALOGUE, Row
+from discsim.errors import InputError
+from validation.diagnosis.user_effects import UserEffect
+
+__all__ = ["competing", "row_of", "rows", "user_effect", "user_effects_on"]
+
+_NONE: Mapping[str, UserEffect] = MappingProxyType({})
+#: a context's own, so that diagnoses side by side do not see one another's; threads take it over in `fitting.mapped`
+_OWN: ContextVar[Mapping[str, UserEffect]] = ContextVar("user_effects", default=_NONE)
+
+
+@contextmanager
+def competing(effects: Sequence[UserEffect]) -> Iterator[None]:
+    """Let effects of the user's own compete within the block; raises `InputError` for one that acts on motion."""
+    for effect in effects:
+        if effect.row.acts_on == "motion":
+            raise InputError.at(
+                effect.path,
+                None,
+                f"{effect.id} acts on motion; expected an effect on a sensor, for only these compete so far",
+            )
+    token = _OWN.set(MappingProxyType({effect.id: effect for effect in effects}))
+    try:
+        yield
+    finally:
+        _OWN.reset(token)
+
+
+def row_of(id: str) -> Row | None:
+    """Return the row of an effect that competes, None for any other name."""
+    if id in CATALOGUE:
+        return CATALOGUE[id]
+    own = _OWN.get().get(id)
+    return None if own is None else own.row
+
+
+def rows() -> tuple[Row, ...]:
+    """Return the rows of all effects that compete, the catalogue's first."""
+    return (*CATALOGUE.values(), *(effect.row for effect in _OWN.get().values()))
+
+
+def user_effect(id: str) -> UserEffect | None:
+    """Return an effect of the user's own by its id, None for any other name."""
+    return _OWN.get().get(id)
+
+
+def user_effects_on(sensor: str) -> tuple[UserEffect, ...]:
+    """Return the user's own effects on a sensor, in the order in which they act."""
+    return tuple(effect for effect in _OWN.get().values() if effect.row.acts_on == sensor)
