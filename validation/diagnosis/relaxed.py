@@ -82,13 +82,18 @@ def edges_of(recording: Recording) -> FloatArray:
     return np.linspace(0.0, end, count + 1)
 
 
-def first_chain(recording: Recording) -> Chain:
-    """Return a recording's chain of pieces with starts from the data."""
+def first_chain(recording: Recording, ratio: float = 1.0) -> Chain:
+    """Return a recording's chain of pieces with starts from the data; ``ratio`` is that of the magnetometer's clock.
+
+    Starts stand in the time that the magnetometer writes.
+    """
     edges = edges_of(recording)
     states = np.zeros((edges.size - 1, 13))
     if recording.plant in ("flight", "free_spin"):
-        starts = (flight_starts if recording.plant == "flight" else spin_starts)(recording, edges[:-1])
+        written = np.minimum(edges[:-1] * ratio, recording.end)
+        starts = (flight_starts if recording.plant == "flight" else spin_starts)(recording, written)
         states[:, 6:10], states[:, 10:13] = starts.attitude, starts.rate
+        states[:, 12] *= ratio
         if recording.plant == "flight":
             states[:, :3], states[:, 3:6] = starts.position, starts.velocity
         else:
@@ -135,7 +140,7 @@ def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), it
     bare = linearised(fit, ())
     fit = replace(fit, noise=stated_noise(bare))
     fit = refit(fit, iterations=iterations, tolerance=1e-4 * sum(linear.raw.size for linear in bare))
-    fit = _from_other_starts(fit)
+    fit = _with_clocks(_from_other_starts(fit))
     chains = tuple(within_range(chain, linear) for chain, linear in zip(fit.chains, fit.linears, strict=True))
     fit = replace(fit, chains=chains)
     linears = linearised(fit)
@@ -175,6 +180,45 @@ def _from_other_starts(fit: Fit) -> Fit:
             if trial.merit < 0.8 * fit.merit:
                 fit = trial
     return fit
+
+
+#: how far clocks may be wrong where a fit went astray, and how long its first look is, s
+_CLOCK_SIGMA, _FIRST_LOOK = 0.02, 1.3
+
+
+def _with_clocks(fit: Fit) -> Fit:
+    """Fit again with free clocks where recordings went astray: their phases may have run away from one another.
+
+    A first look at the beginning, where no phase is off by a turn, gives the clocks; then all of it.
+    """
+    plant = fit.chains[0].recording.plant
+    if plant not in ("flight", "free_spin") or not _astray(fit):
+        return fit
+    sensors = {readings.sensor for one in fit.chains for readings in one.readings}
+    clocks = tuple(
+        Parameter(f"{prefix}.clock_rate", "ratio", 1.0, 1e-6, _CLOCK_SIGMA)
+        for sensor, prefix in (("magnetometer", "mag"), ("accelerometer", "accel"), ("gyroscope", "gyro"))
+        if sensor in sensors
+    )
+    parameters = (*fit.parameters, *clocks)
+    at = np.array([q.stated for q in parameters])
+    short = tuple(_beginning(first_chain(one.recording)) for one in fit.chains)
+    look = refit(replace(fit, chains=short, parameters=parameters, at=at), iterations=10)
+    ratio = look.values(0).get(("mag.clock_rate", "ratio"), 1.0)
+    chains = tuple(first_chain(one.recording, ratio) for one in fit.chains)
+    # what the first look says of the rest is little: only the clocks are taken over
+    known = {q.key for q in clocks}
+    at = np.array([v if q.key in known else q.stated for q, v in zip(parameters, look.at, strict=True)])
+    whole = refit(replace(fit, chains=chains, parameters=parameters, at=at), iterations=12, tolerance=1e-4 * fit.count)
+    return whole if whole.merit < 0.8 * fit.merit else fit
+
+
+def _beginning(current: Chain) -> Chain:
+    """Return the first pieces of a chain and the readings within them."""
+    count = max(1, int(np.searchsorted(current.edges, _FIRST_LOOK)))
+    end = float(current.edges[count])
+    readings = tuple(replace(r, good=r.good & (r.t < end - 0.03)[:, None]) for r in current.readings)
+    return replace(current, edges=current.edges[: count + 1], states=current.states[:count], readings=readings)
 
 
 #: a reading this many standard deviations off, alone among its neighbours, is left out and listed

@@ -18,6 +18,8 @@ __all__ = ["Hypothesis", "Tied", "polished", "price", "tied_fit"]
 
 #: what evidence costs: twice the log likelihood that an effect must gain, and more for each of its parameters
 ENTRY, PER_PARAMETER, EVENT_ENTRY = 24.0, 4.0, 42.0
+#: a gust may pass at any time, in any recording, at any width: more places to look at
+GUST_ENTRY = 60.0
 #: what a parameter costs when hypotheses are compared with one another
 RIVAL = 8.0
 
@@ -83,7 +85,9 @@ class Tied:
 def price(trial: Trial) -> float:
     """Return what a trial must gain to be believed."""
     count = len(parameters_of(trial))
-    if trial.id.startswith("event.") or trial.id == "air.gust":
+    if trial.id == "air.gust":
+        return GUST_ENTRY + PER_PARAMETER * count
+    if trial.id.startswith("event."):
         return EVENT_ENTRY + PER_PARAMETER * count
     return ENTRY + PER_PARAMETER * count
 

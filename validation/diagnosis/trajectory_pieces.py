@@ -57,6 +57,8 @@ IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
 #: longest step of a flight's integrator, s, and in radians of nutation
 STEP, NUTATION = 0.01, 1.2
+#: and where an uneven body makes the motion follow the spin
+UNEVEN = 0.6
 #: a fit that has gone astray to faster spins, rad/s, is not followed with ever shorter steps
 FASTEST = 400.0
 #: longest step of a table's integrator in radians of its ripple
@@ -387,6 +389,8 @@ class _Runner:
     events: tuple[tuple[float, float], ...]
     #: highest order of a speed ripple
     order: float = 0.0
+    #: whether the body is uneven, so that its motion follows the spin
+    uneven: bool = False
 
     def times(self, start: float, stop: float, last: float, state: FloatArray) -> tuple[FloatArray, int]:
         """Return the integrator's steps from start over at least [start, last], and the place of ``stop`` in them."""
@@ -396,7 +400,7 @@ class _Runner:
             assert disc is not None
             spin = min(abs(float(state[12])), FASTEST)
             nutation = max(spin * disc.Izz / disc.Ixx, spin, 1.0)
-            h = min(STEP, NUTATION / nutation)
+            h = min(STEP, (UNEVEN if self.uneven else NUTATION) / nutation)
         elif plant == "free_spin":
             h = min(0.0025, 0.3 / max(min(abs(float(state[12])), FASTEST) * 2.0, 1.0))
         elif plant == "spin_down":
@@ -469,9 +473,21 @@ def _order(values: Values, columns: Sequence[Column] = ()) -> float:
 _EVENTS = ("event.impulse", "event.spin_step")
 
 
+_UNEVEN_BODY = (
+    ("body.inertia_asymmetry", "dIyy_kg_m2"),
+    ("body.mass_imbalance", "ex_m"),
+    ("body.mass_imbalance", "ey_m"),
+)
+
+
 def _runner(recording: Recording, values: Values, columns: Sequence[Column] = ()) -> _Runner:
     return _Runner(
-        recording, tables(recording.disc), _knots(recording), _events(values, columns), _order(values, columns)
+        recording,
+        tables(recording.disc),
+        _knots(recording),
+        _events(values, columns),
+        _order(values, columns),
+        any(value(values, *key) != 0.0 for key in _UNEVEN_BODY),
     )
 
 
