@@ -184,6 +184,9 @@ def turn_table(
     slopes = np.diff(profile.value) / np.diff(profile.t)
     with own_warnings(), passive_force(drive):
         for k, slope in enumerate(progress(slopes.tolist())):
+            if k and profile.value[k] == 0.0 and slope != 0.0:  # it starts to turn, ripple and all
+                turned = float(data.qpos[0]) - yaw
+                data.qvel[0] += speed_ripple(SpeedRipple(*flat.view(PARAMETERS)[0]["rig_speed_ripple"]), turned, 0.0)[0]
             segment[:] = profile.t[k], profile.value[k], slope, yaw, inertia
             if k == 0:
                 hinge.note()

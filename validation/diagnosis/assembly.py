@@ -110,7 +110,7 @@ def _named(found: Search, trial: Trial, names: Sequence[str]) -> NamedEffect:
     gain = max(less.score - final.score, 0.0)
     k = len(parameters_of(trial))
     bic = gain - k * float(np.log(max(final.fit.count, 2)))
-    p = float(max(chi2_law.sf(gain, k), SMALLEST_P_VALUE))
+    p = float(max(chi2_law.sf(gain, max(k, 1)), SMALLEST_P_VALUE))
     held = _heldout_gain(found, trial)
     confused = []
     for other, worse in found.rivals.get(id_of(trial), []):

@@ -18,7 +18,7 @@ from discsim.arrays import BoolArray, FloatArray
 from discsim.frames import euler_angles
 from validation.diagnosis.noise import NoiseModel, whitened
 from validation.diagnosis.readings import Values
-from validation.diagnosis.trajectory_pieces import STEPS, Chain, Column, Linear, linearise, moved, shifted
+from validation.diagnosis.trajectory_pieces import STEPS, Chain, Column, Linear, linearise, moved, shifted, stepped
 
 __all__ = [
     "Fit",
@@ -192,7 +192,7 @@ class Reduced:
 def normal_matrix(linear: Linear, noise: NoiseModel) -> FloatArray:
     """Return the normal matrix (l + p + 1, l + p + 1) over [local | shared | residual] of whitened rows."""
     u, d = linear.unknowns, linear.moves.shape[1]
-    if u == d or linear.piece.size == 0:
+    if u == d:
         A = whitened(linear, noise, np.hstack([linear.local, linear.shared, linear.residual[:, None]]))
         return np.asarray(A.T @ A)
     # with jumps the full rows are long and mostly empty: piece by piece, then chained
@@ -206,6 +206,13 @@ def normal_matrix(linear: Linear, noise: NoiseModel) -> FloatArray:
         mine = rows[linear.piece == i]
         T[:d, :-1] = linear.moves[i]
         G += T.T @ (mine.T @ mine) @ T
+    if linear.whole.size:
+        # readings that hang on several pieces come in whole channels
+        spread = linear.piece < 0
+        columns = np.zeros((linear.raw.size, width))
+        columns[spread, :-1], columns[spread, -1] = linear.whole, linear.residual[spread]
+        A = whitened(linear, noise, columns)[spread]
+        G += A.T @ A
     return G
 
 
@@ -299,7 +306,7 @@ def linearised(fit: Fit, parameters: Sequence[Parameter] | None = None) -> tuple
     def one(index: int) -> Linear:
         columns = [Column(q.group, q.name, q.step if q.acts_in(index) else 0.0) for q in chosen]
         active = [column for column in columns if column.step > 0]
-        linear = linearise(fit.chains[index], fit.values(index), active, fit.jumps.allowed)
+        linear = linearise(fit.chains[index], fit.values(index), active, fit.jumps.allowed, central=False)
         if len(active) < len(columns):
             linear = linear.spread([j for j, column in enumerate(columns) if column.step > 0], len(columns))
         return linear
@@ -409,7 +416,7 @@ def _reduced(fit: Fit) -> Callable[[Linear, Chain], Reduced]:
 def _part(chain: Chain, linear: Linear, local: FloatArray, shared: FloatArray, share: float) -> Chain:
     """Return the chain after a share of a step, the closing of gaps included."""
     tangents = share * (linear.moves @ np.concatenate([local, shared]) + linear.closing)
-    return replace(chain, states=shifted(chain.recording.plant, chain.states, tangents))
+    return stepped(chain, tangents)
 
 
 def residuals_after(fit: Fit, reduced: Sequence[Reduced], step: FloatArray) -> list[FloatArray]:

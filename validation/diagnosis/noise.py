@@ -7,26 +7,45 @@ axes and recordings. What a sheet states is a first guess and a thing to compare
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.signal import lfilter
 
 from discsim.arrays import FloatArray
 from validation.diagnosis.trajectory_pieces import Channel, IntArray, Linear
 
 __all__ = ["GroupNoise", "NoiseModel", "estimate_noise", "log_likelihood", "whitened"]
 
-#: slowest noise that is taken for noise: correlation from one sample to the next
-MOST_CORRELATED = 0.97
+#: correlations from one sample to the next that are tried; slower noise than the last is not taken for noise
+CORRELATIONS = np.concatenate([np.linspace(0.05, 0.9, 18), 1.0 - np.geomspace(0.08, 0.005, 9)])
+#: lags (samples) at which noise is looked at
+LAGS = np.unique(np.geomspace(1, 100, 16).astype(int))
 #: correlation this weak is taken for none
 LEAST_CORRELATED = 0.04
 
 
 class GroupNoise(NamedTuple):
-    """Level (in the sensor's unit) and correlation from one sample to the next."""
+    """Level (in the sensor's unit), correlation from one sample to the next, share of the variance that has it.
+
+    The rest of the variance is white, as where a slow wander lies under the noise of single readings.
+    """
 
     sd: float
     correlation: float = 0.0
+    share: float = 1.0
+
+    @property
+    def innovation(self) -> tuple[float, float]:
+        """Return the moving-average coefficient of the noise as ARMA(1, 1), and its innovation over the level."""
+        phi, white = self.correlation, 1.0 - self.share
+        if phi == 0.0:
+            return 0.0, 1.0
+        total = white * (1.0 + phi**2) + self.share * (1.0 - phi**2)
+        q = phi * white / total
+        theta = (1.0 - float(np.sqrt(max(1.0 - 4.0 * q * q, 0.0)))) / (2.0 * q) if q > 1e-9 else 0.0
+        return theta, float(np.sqrt(total / (1.0 + theta**2)))
 
 
 NoiseModel = Mapping[str, GroupNoise]
@@ -39,15 +58,28 @@ def whitened(linear: Linear, noise: NoiseModel, columns: FloatArray, piece: IntA
     """
     result = np.empty_like(columns)
     for channel in linear.channels:
-        sd, phi = noise[channel.group]
-        x = columns[channel.rows] / sd
-        if phi:
-            gap = phi ** np.diff(channel.index)[:, None].astype(float)
-            if piece is not None:
-                gap[np.diff(piece[channel.rows]) != 0] = 0.0
-            x[1:] = (x[1:] - gap * x[:-1]) / np.sqrt(1.0 - gap**2)
+        own = noise[channel.group]
+        x = columns[channel.rows] / own.sd
+        if own.correlation and x.shape[0] > 1:
+            pieces = None if piece is None else piece[channel.rows]
+            cuts = [] if pieces is None else [*(np.flatnonzero(np.diff(pieces) != 0) + 1)]
+            for start, stop in pairwise([0, *cuts, x.shape[0]]):
+                x[start:stop] = _freed(x[start:stop], own, channel.index[start:stop])
         result[channel.rows] = x
     return result
+
+
+def _freed(x: FloatArray, noise: GroupNoise, index: IntArray) -> FloatArray:
+    """Return rows (n, c) of unit level freed of their correlation; ``index`` tells where samples are missing."""
+    phi = noise.correlation
+    if noise.share >= 1.0:
+        gap = phi ** np.diff(index)[:, None].astype(float)
+        x[1:] = (x[1:] - gap * x[:-1]) / np.sqrt(1.0 - gap**2)
+        return x
+    theta, innovation = noise.innovation
+    # the first reading has the level of all, not that of an innovation
+    state = x[:1] * (innovation - 1.0)
+    return np.asarray(lfilter([1.0, -phi], [1.0, -theta], x, axis=0, zi=state)[0] / innovation)
 
 
 def log_likelihood(linear: Linear, noise: NoiseModel, residual: FloatArray) -> float:
@@ -55,10 +87,12 @@ def log_likelihood(linear: Linear, noise: NoiseModel, residual: FloatArray) -> f
     white = whitened(linear, noise, residual[:, None])[:, 0]
     total = float(white @ white)
     for channel in linear.channels:
-        sd, phi = noise[channel.group]
-        total += 2.0 * channel.index.size * float(np.log(sd))
-        if phi:
-            total += float(np.sum(np.log1p(-(phi ** (2 * np.diff(channel.index))))))
+        own = noise[channel.group]
+        total += 2.0 * channel.index.size * float(np.log(own.sd))
+        if own.correlation and own.share >= 1.0:
+            total += float(np.sum(np.log1p(-(own.correlation ** (2.0 * np.diff(channel.index))))))
+        elif own.correlation:
+            total += 2.0 * (channel.index.size - 1) * float(np.log(own.innovation[1]))
     return total
 
 
@@ -71,29 +105,57 @@ def estimate_noise(
     """
     squares: dict[str, float] = {}
     counts: dict[str, int] = {}
-    products: dict[str, float] = {}
-    pairs: dict[str, float] = {}
+    products: dict[str, FloatArray] = {}
+    pairs: dict[str, FloatArray] = {}
     for linear, residual in zip(linears, residuals, strict=True):
         for channel in linear.channels:
             x = residual[channel.rows]
             group = channel.group
             squares[group] = squares.get(group, 0.0) + float(x @ x)
             counts[group] = counts.get(group, 0) + x.size
-            if x.size > 1:
-                next_to = np.diff(channel.index) == 1
-                a, b = x[:-1][next_to], x[1:][next_to]
-                products[group] = products.get(group, 0.0) + float(a @ b)
-                pairs[group] = pairs.get(group, 0.0) + 0.5 * float(a @ a + b @ b)
+            at_lags = products.setdefault(group, np.zeros(LAGS.size))
+            numbers = pairs.setdefault(group, np.zeros(LAGS.size))
+            for k, lag in enumerate(LAGS):
+                if x.size > 2 * lag:
+                    apart = channel.index[lag:] - channel.index[:-lag] == lag
+                    at_lags[k] += float(x[:-lag][apart] @ x[lag:][apart])
+                    numbers[k] += np.count_nonzero(apart)
     total = sum(counts.values())
     share = max(1.0 - spent / total, 0.1) if total else 1.0
     model = {}
     for group, n in counts.items():
-        phi = products.get(group, 0.0) / pairs[group] if coloured and pairs.get(group, 0.0) > 0 else 0.0
-        # less than three standard errors of a white sequence is white
-        if phi < max(LEAST_CORRELATED, 3.0 / np.sqrt(max(n, 1))):
-            phi = 0.0
-        model[group] = GroupNoise(max(float(np.sqrt(squares[group] / (n * share))), 1e-12), min(phi, MOST_CORRELATED))
+        sd = max(float(np.sqrt(squares[group] / (n * share))), 1e-12)
+        phi, part = 0.0, 1.0
+        if coloured and squares[group] > 0:
+            rho = products[group] / np.maximum(pairs[group], 1.0) / (squares[group] / n)
+            phi, part = _correlation(rho, pairs[group])
+        model[group] = GroupNoise(sd, phi, part)
     return model
+
+
+def _correlation(rho: FloatArray, pairs: FloatArray) -> tuple[float, float]:
+    """Return correlation and share of noise from its autocorrelations (k,) at the lags; (0, 1) where it is white."""
+    some = pairs > 20
+    lags, rho, weight = LAGS[some], rho[some], pairs[some]
+    if lags.size == 0 or lags[0] != 1:
+        return 0.0, 1.0
+    error = 1.0 / np.sqrt(weight)
+    best, fit = (0.0, 1.0), float(np.sum((rho / error) ** 2))
+    white = fit
+    for phi in CORRELATIONS:
+        shape = phi ** lags.astype(float)
+        part = float(np.clip(np.sum(rho * shape / error**2) / np.sum((shape / error) ** 2), 0.0, 1.0))
+        left = float(np.sum(((rho - part * shape) / error) ** 2))
+        if left < fit:
+            best, fit = (float(phi), part), left
+    # two numbers for colour must pay, and be large enough to matter
+    phi, part = best
+    if white - fit < 20.0 or phi * part < LEAST_CORRELATED * max(1.0, 1.0 - phi) * 0.25:
+        return 0.0, 1.0
+    # first lag alone when all of the noise has it: exact where the grid is coarse
+    if part > 0.9 and 0.0 < rho[0] < CORRELATIONS[-1]:
+        return float(rho[0]), 1.0
+    return phi, part
 
 
 def stated_noise(linears: Sequence[Linear], floor: Mapping[str, float] | None = None) -> dict[str, GroupNoise]:

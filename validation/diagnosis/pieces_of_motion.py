@@ -138,7 +138,7 @@ def _spinning(
 ) -> None:
     """Write the derivative of body rates w (3,) in a free spin into dw (3,): Euler's equations and the nuisances.
 
-    wobble (8,) is how fast the wobble dies, 1/s, how much faster it turns for the stiffness of the air, rad/s, and how
+    wobble (10,) is how fast the wobble dies, 1/s, how much faster it turns for the stiffness of the air, rad/s, and how
     both differ along the wind and across it (cosine and sine of twice the wind's direction), each with its change
     over the first seconds. heading is that of x_B in N where psi is zero.
     """
@@ -148,8 +148,10 @@ def _spinning(
     mx, my = state[0] + since * state[2], state[1] + since * state[3]
     c, s = cos(psi), sin(psi)
     later = t / (1.0 + t)  # bounded, or a wobble that is long gone would grow again
-    decay, faster = wobble[0] + later * wobble[1], wobble[2] + later * wobble[3]
-    along, across = wobble[4] + later * wobble[5], wobble[6] + later * wobble[7]
+    decay = wobble[0] + later * (wobble[1] + later * wobble[8])
+    faster = wobble[2] + later * (wobble[3] + later * wobble[9])
+    along = wobble[4] + later * wobble[5]
+    across = wobble[6] + later * wobble[7]
     c2, s2 = cos(2.0 * (psi + heading)), sin(2.0 * (psi + heading))
     a, b = along * c2 + across * s2, across * c2 - along * s2
     dw[0] = (Iyy - Izz) / Ixx * w[1] * w[2] + c * mx + s * my - decay * w[0] - faster * w[1]
@@ -171,7 +173,7 @@ def free_spin_pieces(
     rows: FloatArray,
     ends: FloatArray,
 ) -> None:
-    """Spin freely from states (c, 13); wobbles (c, 8) as for `_spinning`. Else as `flight_pieces`.
+    """Spin freely from states (c, 13); wobbles (c, 10) as for `_spinning`. Else as `flight_pieces`.
 
     Rates by the classical fourth-order steps, attitude by the fourth-order Magnus step through them.
     """

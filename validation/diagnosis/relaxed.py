@@ -14,13 +14,14 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE
+from discsim.frames import conjugate, multiply
 from discsim.recording import Recording
 from validation.diagnosis.fitting import Fit, Jumps, Parameter, linearised, merit_of, refit
-from validation.diagnosis.noise import channel_of, stated_noise
+from validation.diagnosis.noise import channel_of, stated_noise, whitened
 from validation.diagnosis.starts import flight_starts, rig_starts, spin_starts
 from validation.diagnosis.trajectory_pieces import WOBBLE, Chain, Linear, chain
 
-__all__ = ["NO_JUMPS", "PIECE", "first_chain", "loose_jumps", "relaxed"]
+__all__ = ["NO_JUMPS", "PIECE", "first_chain", "loose_jumps", "relaxed", "without_outliers"]
 
 #: length of a piece, s
 PIECE = {"flight": 0.5, "free_spin": 0.2, "spin_down": 0.5, "rate_table": 1.0}
@@ -32,7 +33,7 @@ _LOOSE = {
     "rate_table": np.array([0.5]),
 }
 #: how the slopes of what a free spin does not model change from piece to piece: rad/s^3, 1/s^2; for good
-_WANDER = np.array([0, 0, 30.0, 30.0, 0, 0.02, 0, 0, 0, 0, 0, 0])
+_WANDER = np.array([0, 0, 100.0, 100.0, 0, 0.02, 0, 0, 0, 0, 0, 0])
 NO_JUMPS = {
     "flight": Jumps(np.zeros(12)),
     "free_spin": Jumps(_WANDER),
@@ -72,17 +73,27 @@ def loose_jumps(plant: str) -> Jumps:
 def edges_of(recording: Recording) -> FloatArray:
     """Return the boundaries of a recording's pieces, s."""
     length = PIECE[recording.plant]
+    end = max(recording.end, 1e-3) + 1e-6
+    if recording.plant == "free_spin" and end > 1.5:
+        # just after release the moments of the air change fast
+        first = np.concatenate([np.arange(0.0, 0.3, 0.05), np.arange(0.3, 0.8, 0.1)])
+        return np.concatenate([first, np.linspace(0.8, end, max(1, round((end - 0.8) / length)) + 1)])
     count = max(1, round(recording.end / length))
-    return np.linspace(0.0, max(recording.end, 1e-3) + 1e-6, count + 1)
+    return np.linspace(0.0, end, count + 1)
 
 
-def first_chain(recording: Recording) -> Chain:
-    """Return a recording's chain of pieces with starts from the data."""
+def first_chain(recording: Recording, ratio: float = 1.0) -> Chain:
+    """Return a recording's chain of pieces with starts from the data; ``ratio`` is that of the magnetometer's clock.
+
+    Starts stand in the time that the magnetometer writes.
+    """
     edges = edges_of(recording)
     states = np.zeros((edges.size - 1, 13))
     if recording.plant in ("flight", "free_spin"):
-        starts = (flight_starts if recording.plant == "flight" else spin_starts)(recording, edges[:-1])
+        written = np.minimum(edges[:-1] * ratio, recording.end)
+        starts = (flight_starts if recording.plant == "flight" else spin_starts)(recording, written)
         states[:, 6:10], states[:, 10:13] = starts.attitude, starts.rate
+        states[:, 12] *= ratio
         if recording.plant == "flight":
             states[:, :3], states[:, 3:6] = starts.position, starts.velocity
         else:
@@ -111,7 +122,7 @@ def unknowns(recordings: Sequence[Recording]) -> tuple[Parameter, ...]:
     """Return what each recording leaves open beside its states: how the wobble of a free spin dies and turns."""
     if recordings[0].plant != "free_spin":
         return ()
-    sigmas = (5.0, 5.0, 10.0, 10.0, 2.0, 2.0, 2.0, 2.0)
+    sigmas = (5.0, 5.0, 10.0, 10.0, 2.0, 2.0, 2.0, 2.0, 5.0, 10.0)
     return tuple(
         Parameter(group, name, 0.0, 1e-3, sigma, frozenset([i]))
         for i in range(len(recordings))
@@ -129,10 +140,121 @@ def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), it
     bare = linearised(fit, ())
     fit = replace(fit, noise=stated_noise(bare))
     fit = refit(fit, iterations=iterations, tolerance=1e-4 * sum(linear.raw.size for linear in bare))
+    fit = _with_clocks(_from_other_starts(fit))
     chains = tuple(within_range(chain, linear) for chain, linear in zip(fit.chains, fit.linears, strict=True))
     fit = replace(fit, chains=chains)
     linears = linearised(fit)
     return replace(fit, linears=linears, merit=merit_of(fit, linears))
+
+
+#: a relaxed fit of a recording whose chi-squared per reading is above this started wrong
+_ASTRAY = 8.0
+
+
+def _astray(fit: Fit) -> list[int]:
+    """Return the recordings whose fit is far from their data while others' is not, worst first."""
+    chi2 = [
+        float(np.sum(np.minimum(whitened(linear, fit.noise, linear.residual[:, None])[:, 0] ** 2, 1e4)))
+        / max(linear.raw.size, 1)
+        for linear in fit.linears
+    ]
+    return [i for i in np.argsort(chi2)[::-1].tolist() if chi2[i] > _ASTRAY]
+
+
+def _from_other_starts(fit: Fit) -> Fit:
+    """Try other attitudes at release for recordings whose fit went astray."""
+    plant = fit.chains[0].recording.plant
+    if plant not in ("flight", "free_spin"):
+        return fit
+    for i in _astray(fit)[:3]:
+        recording = fit.chains[i].recording
+        first = first_chain(recording)
+        starts = (flight_starts if plant == "flight" else spin_starts)(recording, first.edges[:1])
+        for other in starts.ambiguous[:3]:
+            turned = multiply(other, conjugate(first.states[0, 6:10]))
+            states = first.states.copy()
+            states[:, 6:10] = multiply(np.broadcast_to(turned, (len(states), 4)), states[:, 6:10])
+            chain_of_i = replace(fit.chains[i], states=states)
+            trial = replace(fit, chains=(*fit.chains[:i], chain_of_i, *fit.chains[i + 1 :]))
+            trial = refit(trial, iterations=6, tolerance=1e-3 * fit.count)
+            if trial.merit < 0.8 * fit.merit:
+                fit = trial
+    return fit
+
+
+#: how far clocks may be wrong where a fit went astray, and how long its first look is, s
+_CLOCK_SIGMA, _FIRST_LOOK = 0.02, 1.3
+
+
+def _with_clocks(fit: Fit) -> Fit:
+    """Fit again with free clocks where recordings went astray: their phases may have run away from one another.
+
+    A first look at the beginning, where no phase is off by a turn, gives the clocks; then all of it.
+    """
+    plant = fit.chains[0].recording.plant
+    if plant not in ("flight", "free_spin") or not _astray(fit):
+        return fit
+    sensors = {readings.sensor for one in fit.chains for readings in one.readings}
+    clocks = tuple(
+        Parameter(f"{prefix}.clock_rate", "ratio", 1.0, 1e-6, _CLOCK_SIGMA)
+        for sensor, prefix in (("magnetometer", "mag"), ("accelerometer", "accel"), ("gyroscope", "gyro"))
+        if sensor in sensors
+    )
+    parameters = (*fit.parameters, *clocks)
+    at = np.array([q.stated for q in parameters])
+    short = tuple(_beginning(first_chain(one.recording)) for one in fit.chains)
+    look = refit(replace(fit, chains=short, parameters=parameters, at=at), iterations=10)
+    ratio = look.values(0).get(("mag.clock_rate", "ratio"), 1.0)
+    chains = tuple(first_chain(one.recording, ratio) for one in fit.chains)
+    # what the first look says of the rest is little: only the clocks are taken over
+    known = {q.key for q in clocks}
+    at = np.array([v if q.key in known else q.stated for q, v in zip(parameters, look.at, strict=True)])
+    whole = refit(replace(fit, chains=chains, parameters=parameters, at=at), iterations=12, tolerance=1e-4 * fit.count)
+    return whole if whole.merit < 0.8 * fit.merit else fit
+
+
+def _beginning(current: Chain) -> Chain:
+    """Return the first pieces of a chain and the readings within them."""
+    count = max(1, int(np.searchsorted(current.edges, _FIRST_LOOK)))
+    end = float(current.edges[count])
+    readings = tuple(replace(r, good=r.good & (r.t < end - 0.03)[:, None]) for r in current.readings)
+    return replace(current, edges=current.edges[: count + 1], states=current.states[:count], readings=readings)
+
+
+#: a reading this many standard deviations off, alone among its neighbours, is left out and listed
+_OUTLIER, _NEIGHBOUR = 9.0, 4.5
+#: larger shares of a sensor's readings than this are not outliers
+_MOST = 0.03
+
+
+def without_outliers(fit: Fit) -> tuple[Fit, list[tuple[int, str, str, float, float]]]:
+    """Leave out single readings far from everything else, as bad GPS fixes are, and fit again.
+
+    Returns the fit and what was left out: (recording, sensor, axis, time s, standard deviations).
+    """
+    found: list[tuple[int, str, str, float, float]] = []
+    chains = []
+    for index, (current, linear) in enumerate(zip(fit.chains, fit.linears, strict=True)):
+        kept = {readings.sensor: readings.good.copy() for readings in current.readings}
+        for channel in linear.channels:
+            x = linear.residual[channel.rows]
+            if x.size < 8:
+                continue
+            sd = max(1.4826 * float(np.median(np.abs(x))), 1e-12)
+            z = np.abs(x) / sd
+            padded = np.concatenate([[0.0], z, [0.0]])
+            alone = (z > _OUTLIER) & (np.maximum(padded[:-2], padded[2:]) < np.maximum(_NEIGHBOUR, 0.2 * z))
+            if not 0 < np.count_nonzero(alone) <= max(2, _MOST * x.size):
+                continue
+            readings = next(r for r in current.readings if r.sensor == channel.sensor)
+            axis = readings.axes.index(channel.axis)
+            for k in np.flatnonzero(alone):
+                kept[channel.sensor][channel.index[k], axis] = False
+                found.append((index, channel.sensor, channel.axis, float(linear.t[channel.rows][k]), float(z[k])))
+        chains.append(replace(current, readings=tuple(replace(r, good=kept[r.sensor]) for r in current.readings)))
+    if not found:
+        return fit, found
+    return refit(replace(fit, chains=tuple(chains)), iterations=4, tolerance=1e-4 * fit.count), found
 
 
 def within_range(current: Chain, linear: Linear) -> Chain:

@@ -17,7 +17,7 @@ from validation.diagnosis.answer import ParameterValue
 from validation.diagnosis.board import Board, board_of, column_of, free_columns
 from validation.diagnosis.fitting import Fit, Parameter
 from validation.diagnosis.noise import NoiseModel, estimate_noise, whitened
-from validation.diagnosis.relaxed import NO_JUMPS, relaxed, unknowns
+from validation.diagnosis.relaxed import NO_JUMPS, relaxed, unknowns, without_outliers
 from validation.diagnosis.searches import Shifted, searched
 from validation.diagnosis.selection import (
     ONE_SIDED,
@@ -27,6 +27,7 @@ from validation.diagnosis.selection import (
     Tied,
     fitted_parameters,
     one_per_effect,
+    polished,
     price,
     proposals,
     tied_fit,
@@ -91,7 +92,7 @@ def search(recordings: Sequence[Recording], report: Report = lambda stage, done,
     known = stated_parameters(recordings)
     own = (*known, *unknowns(recordings))
     report("following the data", 0, 4)
-    loose = relaxed(recordings, known)
+    loose, left_out = without_outliers(relaxed(recordings, known))
     noise = estimate_noise(loose.linears, [linear.residual for linear in loose.linears])
     plant = recordings[0].plant
     trials = trials_for(recordings)
@@ -100,6 +101,7 @@ def search(recordings: Sequence[Recording], report: Report = lambda stage, done,
     report("fitting the baseline", 2, 4)
     base = tied_fit(loose, Hypothesis(), own, noise, _start(board, Hypothesis(), own))
     found = Search(tuple(recordings), own, loose, noise, trials, base, base)
+    found.outliers = left_out
     current = base
     for step in range(MOST_EFFECTS):
         report("refitting candidates", 3, 4)
@@ -171,6 +173,9 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
         if len(seen) > REFITTED:
             break
         hypothesis = current.hypothesis.plus(proposal.trial)
+        if proposal.trial.id == "accel.saturation":
+            # readings at the limit take no part in a fit: what the motion asks for beyond it is the evidence
+            cost = -proposal.gain
         refitted = tied_fit(
             fit,
             hypothesis,
@@ -194,9 +199,11 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     if not fits:
         return None
     _, best, fit, cost = min(fits, key=lambda item: item[0])
-    if cost:
-        found.loose, found.cost = replace(found.loose, chains=fit.chains), found.cost + cost
-    return best
+    found.cost += cost
+    if cost > 0:
+        found.loose = replace(found.loose, chains=fit.chains)
+    best = polished(best)
+    return replace(best, score=best.score + found.cost)
 
 
 def tried_without(found: Search, trial: Trial) -> Tied:

@@ -41,6 +41,8 @@ _IMPULSE = (3, 4, 5)
 _SPIN = {"flight": (11,), "free_spin": (11,), "spin_down": (1,)}
 #: how far about the best boundary the instant of an event is looked for, s
 _NEAR = {"flight": 0.09, "free_spin": 0.2, "spin_down": 0.12}
+#: how many recordings and kinds of event are followed up at a time: the strongest, the others come after them
+_FOLLOWED = 3
 #: widths of gusts tried, s, and the spacing of their instants
 _WIDTHS, _EVERY = (0.1, 0.2, 0.4, 0.8), 0.1
 _WIND = (("air.wind", "w_north_m_s"), ("air.wind", "w_east_m_s"))
@@ -172,9 +174,7 @@ def _grounds(fit: Fit, f: int) -> dict[int, _Ground]:
         kept = w > 1e-11 * w[-1]
         inverse = ((V[:, kept] / w[kept]) @ V[:, kept].T) * np.outer(scale, scale)
         piece = np.clip(np.searchsorted(chain.edges, linear.t, side="right") - 1, 0, len(chain.states) - 1)
-        found[i] = _Ground(
-            chain, linear, noise, piece if linear.piece.size == 0 else linear.piece, A, e, inverse, right
-        )
+        found[i] = _Ground(chain, linear, noise, np.where(linear.piece < 0, piece, linear.piece), A, e, inverse, right)
     return found
 
 
@@ -242,12 +242,13 @@ def events(asked: Asked, least: float = 25.0) -> list[Proposal]:
     if "event.spin_step" in there:
         kinds.append(("event.spin_step", _SPIN[plant], ("dr_rad_s",)))
 
-    def one(task: tuple[int, tuple[str, Sequence[int], tuple[str, ...]]]) -> Proposal | None:
-        i, (id, directions, names) = task
+    def scanned(task: tuple[int, tuple[str, Sequence[int], tuple[str, ...]]]) -> FloatArray:
+        i, (id, directions, _) = task
+        return np.zeros(0) if asked.has(id, i) else _jumps(asked.grounds[i], directions)
+
+    def one(task: tuple[int, tuple[str, Sequence[int], tuple[str, ...]]], gain: FloatArray) -> Proposal | None:
+        i, (id, _, names) = task
         ground = asked.grounds[i]
-        gain = _jumps(ground, directions)
-        if asked.has(id, i) or gain.size == 0 or gain.max() < least - 10.0:
-            return None
         trial = Trial(id, tuple(Column(id, name, 0.02) for name in names))
         inner, end = ground.chain.edges[1:-1], float(ground.chain.edges[-1])
         near = np.concatenate([inner[j] + _NEAR[plant] * np.linspace(-1.0, 1.0, 13) for j in _peaks(gain, 2)])
@@ -258,7 +259,11 @@ def events(asked: Asked, least: float = 25.0) -> list[Proposal]:
         return best if best.gain > least else None
 
     tasks = [(i, kind) for i in asked.grounds for kind in kinds]
-    return sorted((p for p in mapped(one, tasks) if p is not None), key=_gain, reverse=True)
+    gains = mapped(scanned, tasks)
+    promising = [(t, g) for t, g in zip(tasks, gains, strict=True) if g.size and g.max() >= least - 10.0]
+    promising = sorted(promising, key=lambda item: -float(item[1].max()))[:_FOLLOWED]
+    found = mapped(one, [t for t, _ in promising], [g for _, g in promising])
+    return sorted((p for p in found if p is not None), key=_gain, reverse=True)
 
 
 def _gain(proposal: Proposal) -> float:

@@ -50,12 +50,15 @@ __all__ = [
     "readings_of",
     "recut",
     "shown",
+    "stepped",
 ]
 
 IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
 #: longest step of a flight's integrator, s, and in radians of nutation
 STEP, NUTATION = 0.01, 1.2
+#: and where an uneven body makes the motion follow the spin
+UNEVEN = 0.6
 #: a fit that has gone astray to faster spins, rad/s, is not followed with ever shorter steps
 FASTEST = 400.0
 #: longest step of a table's integrator in radians of its ripple
@@ -156,10 +159,11 @@ class Linear:
     raw : (n,) array
         Measured minus predicted where the chain stands, rows by channel.
     own : (n, d + p) array
-        Derivatives of the prediction by the state of the row's piece and by the parameters within it; with a lag,
-        whose readings hang on several pieces, (n, l + p) by the unknowns themselves.
+        Derivatives of the prediction by the state of the row's piece and by the parameters within it.
     piece : (n,) int array
-        The piece of each row; empty with a lag.
+        The piece of each row; -1 for a reading that hangs on several, as with a lag or where it is a mean.
+    whole : (m, l + p) array
+        Derivatives of those by the unknowns themselves, in their order.
     t, sd : (n,) arrays
         Written times, stated noise.
     channels : tuple of Channel
@@ -178,6 +182,7 @@ class Linear:
     raw: FloatArray
     own: FloatArray
     piece: IntArray
+    whole: FloatArray
     t: FloatArray
     sd: FloatArray
     channels: tuple[Channel, ...]
@@ -201,14 +206,14 @@ class Linear:
 
     @cached_property
     def _full(self) -> FloatArray:
-        if self.piece.size == 0:
-            return self.own
         d, width = self.moves.shape[1:]
         full = np.empty((self.raw.size, width))
         for i in range(self.moves.shape[0]):
             rows = np.flatnonzero(self.piece == i)
             full[rows] = self.own[rows, :d] @ self.moves[i]
         full[:, self.unknowns :] += self.own[:, d:]
+        if self.whole.size:
+            full[self.piece < 0] = self.whole
         return full
 
     def spread(self, places: Sequence[int], width: int) -> Linear:
@@ -221,16 +226,20 @@ class Linear:
         moves = np.zeros((*self.moves.shape[:2], u + width))
         moves[:, :, :u] = self.moves[:, :, :u]
         moves[:, :, [u + j for j in places]] = self.moves[:, :, u:]
-        return replace(self, own=own, moves=moves)
+        whole = np.zeros((self.whole.shape[0], u + width))
+        whole[:, :u] = self.whole[:, :u]
+        whole[:, [u + j for j in places]] = self.whole[:, u:]
+        return replace(self, own=own, moves=moves, whole=whole)
 
     def after(self, local: FloatArray, shared: FloatArray) -> FloatArray:
         """Return the residuals (n,) that a step of the unknowns is expected to leave."""
-        if self.piece.size == 0:
-            return np.asarray(self.residual - self.own @ np.concatenate([local, shared]))
         d = self.moves.shape[1]
-        tangents = self.moves @ np.concatenate([local, shared])
-        moved = np.einsum("nd,nd->n", self.own[:, :d], tangents[self.piece])
-        return np.asarray(self.residual - moved - self.own[:, d:] @ shared)
+        step = np.concatenate([local, shared])
+        tangents = self.moves @ step
+        moved = np.einsum("nd,nd->n", self.own[:, :d], tangents[self.piece]) + self.own[:, d:] @ shared
+        if self.whole.size:
+            moved[self.piece < 0] = self.whole @ step
+        return np.asarray(self.residual - moved)
 
     @property
     def local(self) -> FloatArray:
@@ -386,6 +395,8 @@ class _Runner:
     events: tuple[tuple[float, float], ...]
     #: highest order of a speed ripple
     order: float = 0.0
+    #: whether the body is uneven, so that its motion follows the spin
+    uneven: bool = False
 
     def times(self, start: float, stop: float, last: float, state: FloatArray) -> tuple[FloatArray, int]:
         """Return the integrator's steps from start over at least [start, last], and the place of ``stop`` in them."""
@@ -395,9 +406,9 @@ class _Runner:
             assert disc is not None
             spin = min(abs(float(state[12])), FASTEST)
             nutation = max(spin * disc.Izz / disc.Ixx, spin, 1.0)
-            h = min(STEP, NUTATION / nutation)
+            h = min(STEP, (UNEVEN if self.uneven else NUTATION) / nutation)
         elif plant == "free_spin":
-            h = min(0.00125, 0.15 / max(min(abs(float(state[12])), FASTEST) * 2.0, 1.0))
+            h = min(0.0025, 0.3 / max(min(abs(float(state[12])), FASTEST) * 2.0, 1.0))
         elif plant == "spin_down":
             h = 0.01
         else:
@@ -468,9 +479,21 @@ def _order(values: Values, columns: Sequence[Column] = ()) -> float:
 _EVENTS = ("event.impulse", "event.spin_step")
 
 
+_UNEVEN_BODY = (
+    ("body.inertia_asymmetry", "dIyy_kg_m2"),
+    ("body.mass_imbalance", "ex_m"),
+    ("body.mass_imbalance", "ey_m"),
+)
+
+
 def _runner(recording: Recording, values: Values, columns: Sequence[Column] = ()) -> _Runner:
     return _Runner(
-        recording, tables(recording.disc), _knots(recording), _events(values, columns), _order(values, columns)
+        recording,
+        tables(recording.disc),
+        _knots(recording),
+        _events(values, columns),
+        _order(values, columns),
+        any(value(values, *key) != 0.0 for key in _UNEVEN_BODY),
     )
 
 
@@ -489,11 +512,14 @@ def linearise(
     values: Values,
     columns: Sequence[Column],
     jumps: BoolArray,
+    *,
+    central: bool = True,
 ) -> Linear:
     """Linearise the readings of a chain about its states and values.
 
     ``columns`` are parameters with the step of their differences; ``jumps`` (d,) tells in which directions pieces may
-    jump. Columns are central differences of the piece's own motion, chained over the pieces.
+    jump. Columns are differences of the piece's own motion, chained over the pieces; one-sided ones, where ``central``
+    is false, cost half.
     """
     recording, d, k = current.recording, current.tangent, current.states.shape[0]
     plant = recording.plant
@@ -536,10 +562,10 @@ def linearise(
         # neighbours: two per direction of the state and per parameter of the motion
         states = [state[None]]
         flats, wobbles = [flat[None]], [wobble[None]]
-        for sign in (1.0, -1.0):
+        for sign in (1.0, -1.0) if central else (1.0,):
             states.append(shifted(plant, state, sign * np.diag(steps)))
             flats.append(np.broadcast_to(flat, (d, flat.size)))
-            wobbles.append(np.broadcast_to(wobble, (d, 8)))
+            wobbles.append(np.broadcast_to(wobble, (d, len(WOBBLE))))
             if motion_columns:
                 moved = np.repeat(flat[None], len(motion_columns), axis=0)
                 moved_wobble = np.repeat(wobble[None], len(motion_columns), axis=0)
@@ -562,7 +588,10 @@ def linearise(
         widths = np.concatenate([steps, [columns[j].step for j in motion_columns]])
         nominal_end = ends[0]
         end_tangent = difference(plant, ends[1:], np.broadcast_to(nominal_end, ends[1:].shape), d)
-        Phi_Psi = ((end_tangent[:half] - end_tangent[half:]) / (2.0 * widths[:, None])).T  # (d, half)
+        if central:
+            Phi_Psi = ((end_tangent[:half] - end_tangent[half:]) / (2.0 * widths[:, None])).T  # (d, half)
+        else:
+            Phi_Psi = (end_tangent / widths[:, None]).T
         Phi, Psi = Phi_Psi[:, :d], Phi_Psi[:, d:]
 
         for s, o, a, b, w, y, M in zip(samples, own, bounds[:-1], bounds[1:], out_rows, ideal, J, strict=True):
@@ -578,11 +607,12 @@ def linearise(
             for row, j in enumerate(motion_columns):
                 group, name, size, _ = columns[j]
                 if (group, name) in _ALSO_READ:  # it moves the readings of a given motion, too
-                    for place, sign in ((1 + d + row, 1.0), (1 + half + d + row, -1.0)):
+                    for place, sign in ((1 + d + row, 1.0), (1 + half + d + row, -1.0))[: 2 if central else 1]:
                         moved_values = {**values, (group, name): _current(values, recording, group, name) + sign * size}
                         read[place] = predicted(s.sensor, recording, moved_values, t, mine[place])
             y[o] = read[0]
-            slope = (read[1 : 1 + half] - read[1 + half :]) / (2.0 * widths[:, None, None])
+            other, span = (read[1 + half :], 2.0 * widths) if central else (read[:1], widths)
+            slope = (read[1 : 1 + half] - other) / span[:, None, None]
             slope = np.moveaxis(slope, 0, -1)  # (m, width, half)
             M[o[:, None], :, np.array([*range(d), *(d + j for j in motion_columns)])] = np.moveaxis(slope, 1, -1)
 
@@ -629,8 +659,10 @@ def linearise(
 
 #: how the wobble of a free spin dies (1/s) and turns (rad/s), how that differs along and across the wind, and their
 #: slopes in time: unknowns of each recording
-WOBBLE = tuple(
-    ("free_spin", f"{name}_{unit}") for name in ("decay", "turn", "along", "across") for unit in ("1_s", "1_s2")
+WOBBLE = (
+    *(("free_spin", f"{name}_{unit}") for name in ("decay", "turn", "along", "across") for unit in ("1_s", "1_s2")),
+    ("free_spin", "decay_1_s3"),
+    ("free_spin", "turn_1_s3"),
 )
 #: parameters of the motion that also enter what a sensor reads of a given motion
 _ALSO_READ = {
@@ -754,17 +786,20 @@ def _stack(
     u: int,
 ) -> Linear:
     """Put the rows of all sensors together, channel by channel, without those that take no part."""
-    raw, own, pieces, t, sd, shifts = [], [], [], [], [], []
+    raw, own, pieces, whole, t, sd, shifts = [], [], [], [], [], [], []
     channels: list[Channel] = []
     at = 0
     d = current.tangent
-    lagged = any(s.nodes > 1 for s in samples)
+    p = S.shape[2] - u
     for s, y, M, piece in zip(samples, ideal, J, piece_of, strict=True):
         readings = s.readings
         # what the closing of forbidden jumps adds
         closed = np.einsum("mwd,md->mw", M[:, :, :d], closing[piece])
-        if lagged:
-            full = np.matmul(M[:, :, :d], S[piece])
+        spread = s.nodes > 1
+        if spread:
+            full = np.empty((*M.shape[:2], u + p))
+            for i in np.unique(piece):
+                full[piece == i] = M[piece == i, :, :d] @ S[i]
             full[:, :, u:] += M[:, :, d:]
             M = full
         prediction, slopes, closed = s.weighted(y), s.weighted(M), s.weighted(closed)
@@ -782,8 +817,13 @@ def _stack(
             if index.size == 0:
                 continue
             raw.append(readings.value[index, axis] - prediction[index, axis])
-            own.append(slopes[index, axis])
-            pieces.append(piece[index] if not lagged else np.empty(0, dtype=np.int64))
+            if spread:
+                whole.append(slopes[index, axis])
+                own.append(np.zeros((index.size, d + p)))
+                pieces.append(np.full(index.size, -1))
+            else:
+                own.append(slopes[index, axis])
+                pieces.append(piece[index])
             shifts.append(closed[index, axis])
             t.append(readings.t[index])
             sd.append(np.full(index.size, readings.sd[axis]))
@@ -798,11 +838,12 @@ def _stack(
     def joined(parts: list[Any]) -> Any:
         return np.concatenate(parts) if parts else np.empty(0)
 
-    rows_of = joined(own) if own else np.empty((0, d + S.shape[2] - u))
+    rows_of = joined(own) if own else np.empty((0, d + p))
     return Linear(
         joined(raw),
         rows_of,
         joined(pieces).astype(np.int64),
+        joined(whole) if whole else np.empty((0, u + p)),
         joined(t),
         joined(sd),
         tuple(channels),
@@ -854,5 +895,13 @@ def recut(current: Chain, values: Values, edges: FloatArray) -> Chain:
 
 def moved(current: Chain, linear: Linear, local: FloatArray, shared: FloatArray) -> Chain:
     """Return the chain after a step of its unknowns: local (l,) and shared (p,)."""
-    tangents = linear.moves @ np.concatenate([local, shared]) + linear.closing
-    return replace(current, states=shifted(current.recording.plant, current.states, tangents))
+    return stepped(current, linear.moves @ np.concatenate([local, shared]) + linear.closing)
+
+
+def stepped(current: Chain, tangents: FloatArray) -> Chain:
+    """Return the chain with its states moved by tangents (k, d)."""
+    states = shifted(current.recording.plant, current.states, tangents)
+    if current.recording.plant == "rate_table":
+        # the angle turned so far goes along with the yaw
+        states[:, 1] = states[:, 0] - states[0, 0]
+    return replace(current, states=states)

@@ -60,6 +60,8 @@ _STEP = 0.1
 
 
 def _step(id: str, name: str) -> float:
+    if (id, name) == ("rig.speed_ripple", "order"):
+        return 1e-6  # times the angle turned, hundreds of turns, this is what moves the phase
     row = row_of(id)
     assert row is not None
     return _STEP * row.scale[row.parameters.index(name)]
