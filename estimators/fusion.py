@@ -157,6 +157,8 @@ def centripetal(
     r[np.diff(t[known])[index - 1] > 0.5] = np.nan
     steps = np.diff(times)
     psi = np.concatenate([[0.0], np.cumsum(steps * 0.5 * np.nan_to_num(r[1:] + r[:-1]))])
+    # by the angle turned, not by the rate at a block's start: one that starts at rest would last for minutes
+    turned = np.concatenate([[0.0], np.cumsum(steps * 0.5 * np.nan_to_num(np.abs(r[1:]) + np.abs(r[:-1])))])
     a = value[:, 0] + 1j * value[:, 1]
     out_t, out_value, out_share, squares, freedoms = [], [], [], [], []
     start = 0
@@ -164,13 +166,14 @@ def centripetal(
         if not np.isfinite(r[start]) or abs(r[start]) < 1e-3:
             start += 1
             continue
-        length = max(shortest, turns * 2 * np.pi / abs(r[start]))
-        stop = int(np.searchsorted(times, times[start] + length - 1e-9))
-        if stop >= times.size and times[-1] - times[start] < 0.9 * length:
+        goal = turned[start] + turns * 2 * np.pi
+        stop = max(int(np.searchsorted(turned, goal)), int(np.searchsorted(times, times[start] + shortest - 1e-9)))
+        if stop >= times.size and turned[-1] < goal - 0.1 * turns * 2 * np.pi:
             break
         chosen = np.arange(start, min(stop, times.size))
         start = max(stop, start + 1)
-        whole = chosen.size >= 0.8 * length / accelerometer.interval
+        length = float(times[chosen[-1]] - times[chosen[0]]) + accelerometer.interval
+        whole = length >= 0.9 * shortest and chosen.size >= 0.8 * length / accelerometer.interval
         if chosen.size < 8 or not whole or not np.all(good[chosen]) or not np.all(np.isfinite(r[chosen])):
             continue
         centre = float(np.mean(times[chosen]))

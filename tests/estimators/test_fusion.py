@@ -72,6 +72,19 @@ def test_gravity_and_translation_average_out_over_a_turn(thrown):
     assert np.median(block.sd) < 0.03  # 0.08 m/s^2 over some 30 readings
 
 
+def test_a_table_that_stands_still_first_is_averaged_over_turns_once_it_turns():
+    """Two turns at the 1 deg/s that an estimate wavers by at rest would last 12 minutes: longer than the recording."""
+    t = np.arange(0.0, 12.0, 0.005)
+    rate = np.radians(np.interp(t, [4.0, 5.0], [0.0, 1000.0]))
+    wavering = rate + np.radians(1.0) * np.cos(2 * np.pi * t / 0.9)
+    force = Samples(t, np.column_stack([0.0161 * rate**2, np.zeros_like(t), np.full_like(t, -9.8)]))
+    block = centripetal(force, MPU9250["accelerometer"], t, wavering)
+    fast = block.t > 5.8
+    # two turns at 1000 deg/s are 0.72 s
+    assert np.count_nonzero(fast) >= 8
+    np.testing.assert_allclose(block.value[fast, 0], 0.0161 * np.radians(1000.0) ** 2, rtol=1e-9)
+
+
 def test_the_mount_is_calibrated_by_the_magnetometer(thrown):
     """Eq. (9): 1.1 mm of 16.1 mm is 3.5 % of rate, 140 deg/s; calibrated, the accelerometer is within its noise."""
     spin, truth = thrown

@@ -90,6 +90,10 @@ def draw(rates: Sequence[YawRate], name: str, path: Path) -> None:
         axes.set_xlabel("")
         draw_differences(lower, knowing, max(knowing, key=lambda rate: bool(np.mean(np.isfinite(rate.rate)) >= 0.5)))
     axes.set_title(f"Spin rate of {name}, with bands of one standard deviation")
+    # below the axes: with all methods there is no free corner
+    handles, labels = axes.get_legend_handles_labels()
+    axes.get_legend().remove()
+    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 5), fontsize=8)
     save_figure(figure, path)
 
 
@@ -172,9 +176,11 @@ def _print(
 ) -> None:
     import numpy as np
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Column, Table
 
-    table = Table("method", "values", "unknown", "median, deg/s", "median sd, deg/s")
+    # names are what --method takes: whole on a narrow terminal, too
+    first = Column("method", no_wrap=True, min_width=max((len(rate.method) for rate in rates), default=0))
+    table = Table(first, "values", "unknown", "median, deg/s", "median sd, deg/s")
     for rate in rates:
         figures = _figures(rate)
         cells = [np.degrees(figures["median_rate_rad_s"]), np.degrees(figures["median_sd_rad_s"])]

@@ -63,6 +63,8 @@ UNEVEN = 0.6
 FASTEST = 400.0
 #: longest step of a table's integrator in radians of its ripple
 RIPPLE = 0.3
+#: a table turns a corner of its command within some of the time constants of its speed loop, s
+CORNER = 4e-3
 #: half the differences of states: m, m/s, rad, rad/s
 STEPS = {
     "flight": np.repeat([1e-3, 1e-3, 1e-5, 1e-4], 3),
@@ -273,6 +275,10 @@ def readings_of(recording: Recording) -> tuple[Readings, ...]:
             if lower is not None:
                 clipped, limit = np.abs(measured) >= lower - 1e-9 * lower, lower
         good = np.isfinite(measured) & ~clipped
+        if sensor == "accelerometer" and recording.plant == "rate_table" and recording.command is not None:
+            # there a real table's angular acceleration is neither that before the knot nor that after it
+            apart = np.abs(samples.t[:, None] - recording.command.t[None, :])
+            good &= np.min(apart, axis=1, initial=np.inf)[:, None] > CORNER
         axes = tuple(SENSORS[sensor].columns)
         t, m = samples.t, measured
         one = Readings(sensor, t, m, good, clipped, sd, axes, limit)

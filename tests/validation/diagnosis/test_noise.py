@@ -22,19 +22,20 @@ def rows(*sizes: tuple[str, int], sd: float = 1.0, missing: tuple[int, ...] = ()
         at += index.size
     none = np.empty((at, 0))
     return Linear(
-        np.zeros(at),
-        none,
-        np.zeros(at, dtype=np.int64),
-        np.concatenate(times),
-        np.full(at, sd),
-        tuple(channels),
-        np.empty(0),
-        np.empty(0, dtype=np.int64),
-        np.empty(0, dtype=np.int64),
-        np.zeros((1, 0, 0)),
-        np.zeros((1, 0)),
-        np.zeros((0, 0)),
-        np.zeros(at),
+        raw=np.zeros(at),
+        own=none,
+        piece=np.zeros(at, dtype=np.int64),
+        whole=none,
+        t=np.concatenate(times),
+        sd=np.full(at, sd),
+        channels=tuple(channels),
+        jump=np.empty(0),
+        jump_kind=np.empty(0, dtype=np.int64),
+        jump_piece=np.empty(0, dtype=np.int64),
+        moves=np.zeros((1, 0, 0)),
+        closing=np.zeros((1, 0)),
+        gaps=np.zeros((0, 0)),
+        shifts=np.zeros(at),
     )
 
 
@@ -87,7 +88,7 @@ def test_the_likelihood_is_that_of_the_dense_covariance():
     e = rng.standard_normal(linear.raw.size)
     expected = 0.0
     for channel in linear.channels:
-        sd, phi = noise[channel.group]
+        sd, phi, _ = noise[channel.group]
         apart = np.abs(channel.index[:, None] - channel.index[None, :])
         covariance = sd**2 * (phi**apart if phi else np.eye(channel.index.size))
         dense = multivariate_normal(np.zeros(channel.index.size), covariance)
