@@ -158,6 +158,18 @@ def _correlation(rho: FloatArray, pairs: FloatArray) -> tuple[float, float]:
     return phi, part
 
 
+def robust_noise(linears: Sequence[Linear], residuals: Sequence[FloatArray]) -> dict[str, GroupNoise]:
+    """Return white noise by the median of the residuals' sizes: what a short event does not raise."""
+    sizes: dict[str, list[FloatArray]] = {}
+    for linear, residual in zip(linears, residuals, strict=True):
+        for channel in linear.channels:
+            sizes.setdefault(channel.group, []).append(np.abs(residual[channel.rows]))
+    return {
+        group: GroupNoise(max(1.4826 * float(np.median(np.concatenate(found))), 1e-12))
+        for group, found in sizes.items()
+    }
+
+
 def stated_noise(linears: Sequence[Linear], floor: Mapping[str, float] | None = None) -> dict[str, GroupNoise]:
     """Return what the sheets state, white; a group without a statement takes ``floor``."""
     model: dict[str, GroupNoise] = {}

@@ -21,7 +21,7 @@ from validation.diagnosis.noise import channel_of, stated_noise, whitened
 from validation.diagnosis.starts import flight_starts, rig_starts, spin_starts
 from validation.diagnosis.trajectory_pieces import WOBBLE, Chain, Linear, chain
 
-__all__ = ["NO_JUMPS", "PIECE", "first_chain", "loose_jumps", "relaxed", "without_outliers"]
+__all__ = ["NO_JUMPS", "PIECE", "beginning", "first_chain", "loose_jumps", "relaxed", "without_outliers"]
 
 #: length of a piece, s
 PIECE = {"flight": 0.5, "free_spin": 0.2, "spin_down": 0.5, "rate_table": 1.0}
@@ -202,7 +202,7 @@ def _with_clocks(fit: Fit) -> Fit:
     )
     parameters = (*fit.parameters, *clocks)
     at = np.array([q.stated for q in parameters])
-    short = tuple(_beginning(first_chain(one.recording)) for one in fit.chains)
+    short = tuple(beginning(first_chain(one.recording), _FIRST_LOOK) for one in fit.chains)
     look = refit(replace(fit, chains=short, parameters=parameters, at=at), iterations=10)
     ratio = look.values(0).get(("mag.clock_rate", "ratio"), 1.0)
     chains = tuple(first_chain(one.recording, ratio) for one in fit.chains)
@@ -213,9 +213,9 @@ def _with_clocks(fit: Fit) -> Fit:
     return whole if whole.merit < 0.8 * fit.merit else fit
 
 
-def _beginning(current: Chain) -> Chain:
-    """Return the first pieces of a chain and the readings within them."""
-    count = max(1, int(np.searchsorted(current.edges, _FIRST_LOOK)))
+def beginning(current: Chain, length: float) -> Chain:
+    """Return the pieces of a chain's first ``length`` s and the readings within them."""
+    count = min(max(1, int(np.searchsorted(current.edges, length))), len(current.states))
     end = float(current.edges[count])
     readings = tuple(replace(r, good=r.good & (r.t < end - 0.03)[:, None]) for r in current.readings)
     return replace(current, edges=current.edges[: count + 1], states=current.states[:count], readings=readings)

@@ -16,7 +16,7 @@ from discsim.recording import Recording
 from validation.diagnosis.answer import ParameterValue
 from validation.diagnosis.board import Board, board_of, column_of, free_columns
 from validation.diagnosis.fitting import Fit, Parameter
-from validation.diagnosis.noise import NoiseModel, estimate_noise, whitened
+from validation.diagnosis.noise import NoiseModel, estimate_noise, robust_noise, whitened
 from validation.diagnosis.relaxed import NO_JUMPS, relaxed, unknowns, without_outliers
 from validation.diagnosis.searches import Shifted, searched
 from validation.diagnosis.selection import (
@@ -156,7 +156,8 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
             (_from_here(p, current), current.fit, 0.0)
             for p in one_per_effect(proposals(near, found.trials, current.hypothesis, found.own))
         ]
-    for item in searched(found.loose, current, found.own, noise):
+    steady = robust_noise(found.loose.linears, [linear.residual for linear in found.loose.linears])
+    for item in searched(found.loose, current, found.own, steady):
         if isinstance(item, Shifted):
             offered.append((item.proposal, replace(found.loose, chains=item.chains), item.cost))
         else:

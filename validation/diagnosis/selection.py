@@ -11,7 +11,8 @@ from discsim.arrays import FloatArray
 from validation.diagnosis.board import Board, column_of, free_columns
 from validation.diagnosis.fitting import Fit, Parameter, merit_of, refit
 from validation.diagnosis.noise import NoiseModel, estimate_noise, log_likelihood
-from validation.diagnosis.relaxed import NO_JUMPS
+from validation.diagnosis.readings import CLOCKS
+from validation.diagnosis.relaxed import NO_JUMPS, beginning
 from validation.diagnosis.trials import Trial, parameters_of
 
 __all__ = ["Hypothesis", "Tied", "polished", "price", "tied_fit"]
@@ -119,6 +120,8 @@ def tied_fit(
     at = np.array([start.get((q.key, q.recordings), q.stated) for q in parameters])
     plant = loose.chains[0].recording.plant
     fit = Fit(loose.chains, parameters, at, NO_JUMPS[plant], noise)
+    if plant in ("rate_table", "spin_down") and any(q.group in CLOCKS for q in parameters):
+        fit = replace(fit, at=_longer_and_longer(fit))
     fit = refit(fit, iterations=iterations, give_up=give_up, bounds=BOUNDS)
     if fit.merit > give_up:
         polish = 0
@@ -126,6 +129,20 @@ def tied_fit(
         fit = replace(fit, noise=noise_of(fit))
         fit = refit(fit, iterations=2, bounds=BOUNDS)
     return scored(hypothesis, fit)
+
+
+#: lengths of the looks by which a clock is found on a rig, each fixing the phase of the next, s
+_LOOKS = (5.0, 10.0, 20.0)
+
+
+def _longer_and_longer(fit: Fit) -> FloatArray:
+    """Return parameters (p,) fitted to longer and longer beginnings: a wrong clock's phase never slips by a turn."""
+    at = fit.at
+    for look in _LOOKS:
+        if look < 0.8 * max(float(chain.edges[-1]) for chain in fit.chains):
+            short = tuple(beginning(chain, look) for chain in fit.chains)
+            at = refit(replace(fit, chains=short, at=at), iterations=5, bounds=BOUNDS).at
+    return at
 
 
 def polished(tied: Tied) -> Tied:
