@@ -9,10 +9,11 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from validation.diagnosis.board import Board, column_of, free_columns
-from validation.diagnosis.fitting import Fit, Parameter, merit_of, refit
+from validation.diagnosis.fitting import Fit, Parameter, merit_of, refit, values_of
 from validation.diagnosis.noise import NoiseModel, estimate_noise, log_likelihood
 from validation.diagnosis.readings import CLOCKS
 from validation.diagnosis.relaxed import NO_JUMPS, beginning
+from validation.diagnosis.trajectory_pieces import Chain
 from validation.diagnosis.trials import Trial, parameters_of
 
 __all__ = ["Hypothesis", "Tied", "polished", "price", "tied_fit"]
@@ -119,7 +120,7 @@ def tied_fit(
     parameters = fitted_parameters(hypothesis, own)
     at = np.array([start.get((q.key, q.recordings), q.stated) for q in parameters])
     plant = loose.chains[0].recording.plant
-    fit = Fit(loose.chains, parameters, at, NO_JUMPS[plant], noise)
+    fit = Fit(_retimed(loose, parameters, at), parameters, at, NO_JUMPS[plant], noise)
     if plant in ("rate_table", "spin_down") and any(q.group in CLOCKS for q in parameters):
         fit = replace(fit, at=_longer_and_longer(fit))
     fit = refit(fit, iterations=iterations, give_up=give_up, bounds=BOUNDS)
@@ -129,6 +130,24 @@ def tied_fit(
         fit = replace(fit, noise=noise_of(fit))
         fit = refit(fit, iterations=2, bounds=BOUNDS)
     return scored(hypothesis, fit)
+
+
+#: clocks by which the motion of a relaxed fit goes: it follows the magnetometer's phase
+_LEADING = (("clock.rate", "ratio"), ("mag.clock_rate", "ratio"))
+
+
+def _retimed(loose: Fit, parameters: Sequence[Parameter], at: FloatArray) -> tuple[Chain, ...]:
+    """Return the chains of a fit with their motion moved to the times that other clocks mean."""
+    chains = []
+    for i, chain in enumerate(loose.chains):
+        before, after = loose.values(i), values_of(parameters, at, i, {})
+        ratio = 1.0
+        for key in _LEADING:
+            ratio *= after.get(key, 1.0) / before.get(key, 1.0)
+        if abs(ratio - 1.0) > 1e-5 and 0.5 < ratio < 2.0:
+            chain = replace(chain, edges=chain.edges / ratio)
+        chains.append(chain)
+    return tuple(chains)
 
 
 #: lengths of the looks by which a clock is found on a rig, each fixing the phase of the next, s
