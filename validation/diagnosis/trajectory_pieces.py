@@ -408,7 +408,7 @@ class _Runner:
             nutation = max(spin * disc.Izz / disc.Ixx, spin, 1.0)
             h = min(STEP, (UNEVEN if self.uneven else NUTATION) / nutation)
         elif plant == "free_spin":
-            h = min(0.0025, 0.3 / max(min(abs(float(state[12])), FASTEST) * 2.0, 1.0))
+            h = min(0.00125, 0.15 / max(min(abs(float(state[12])), FASTEST) * 2.0, 1.0))
         elif plant == "spin_down":
             h = 0.01
         else:
