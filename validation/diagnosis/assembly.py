@@ -157,7 +157,7 @@ def _heldout_gain(found: Search, trial: Trial) -> float | None:
     board, final = found.board, found.final
     assert board is not None
     count = board.recordings
-    if count < 2 or (trial.recordings is not None and len(trial.recordings) < 2):
+    if count < 2 or not trial.columns or (trial.recordings is not None and len(trial.recordings) < 2):
         return None
     rest = Hypothesis(tuple(t for t in final.hypothesis.trials if t is not trial), final.hypothesis.freed)
     total = 0.0

@@ -156,14 +156,14 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
             (_from_here(p, current), current.fit, 0.0)
             for p in one_per_effect(proposals(near, found.trials, current.hypothesis, found.own))
         ]
-    steady = robust_noise(found.loose.linears, [linear.residual for linear in found.loose.linears])
-    for item in searched(found.loose, current, found.own, steady):
+    for item in searched(found.loose, current, found.own, _steady_noise(found)):
         if isinstance(item, Shifted):
             offered.append((item.proposal, replace(found.loose, chains=item.chains), item.cost))
         else:
             offered.append((item, current.fit if not far and current.hypothesis.trials else found.loose, 0.0))
     worth = [item for item in offered if item[0].gain > 0.5 * price(item[0].trial)]
-    worth.sort(key=lambda item: RIVAL * len(parameters_of(item[0].trial)) - item[0].gain)
+    # lost samples first: they bend what algebra says of everything else
+    worth.sort(key=lambda item: (item[2] <= 0.0, RIVAL * len(parameters_of(item[0].trial)) - item[0].gain))
     fits: list[tuple[float, Tied, Fit, float]] = []
     seen: set[tuple[str, frozenset[int] | None]] = set()
     for proposal, fit, cost in worth:
@@ -205,6 +205,19 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
         found.loose = replace(found.loose, chains=fit.chains)
     best = polished(best)
     return replace(best, score=best.score + found.cost)
+
+
+#: where most readings lie within this many times the stated noise, what raises its level is short
+_SHORT = 2.0
+
+
+def _steady_noise(found: Search) -> NoiseModel:
+    """Return the noise in which events are looked for: without what a short one adds, where most readings are well."""
+    linears = found.loose.linears
+    steady = robust_noise(linears, [linear.residual for linear in linears])
+    stated = {c.group: float(linear.sd[c.rows][0]) for linear in linears for c in linear.channels}
+    well = all(not np.isfinite(stated[group]) or noise.sd < _SHORT * stated[group] for group, noise in steady.items())
+    return steady if well else found.loose_noise
 
 
 def tried_without(found: Search, trial: Trial) -> Tied:
@@ -262,6 +275,8 @@ def _rivals(found: Search) -> None:
     board = found.board
     assert board is not None
     for trial in final.hypothesis.trials:
+        if trial.told:  # found in the readings themselves, and kept in the chains: nothing else could do it from there
+            continue
         rest = Hypothesis(tuple(t for t in final.hypothesis.trials if t is not trial), final.hypothesis.freed)
         taken = [(column_of(q), q) for q in fitted_parameters(rest, found.own) if column_of(q) in board.place]
         full = [
