@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from page_table import with_table
+
 from validation.challenge.cases import MASKS
 from validation.challenge.sizes import HIDING
 
@@ -20,16 +22,11 @@ def sizes_table() -> str:
     return "\n".join(rows)
 
 
-def with_table(page: str) -> str:
-    start, end = "<!-- sizes -->\n", "<!-- /sizes -->"
-    before, _, rest = page.partition(start)
-    _, _, after = rest.partition(end)
-    return f"{before}{start}{sizes_table()}\n{end}{after}"
-
-
 def test_the_page_on_the_blind_test_lists_every_size():
     page = PAGE.read_text(encoding="utf-8")
-    assert page == with_table(page), "run `python tests/test_challenge_page.py` to renew the table"
+    assert page == with_table(page, "sizes", sizes_table()), (
+        "run `python tests/test_challenge_page.py` to renew the table"
+    )
 
 
 def test_the_page_on_the_blind_test_lists_every_mask():
@@ -38,4 +35,5 @@ def test_the_page_on_the_blind_test_lists_every_mask():
 
 
 if __name__ == "__main__":
-    PAGE.write_text(with_table(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    page = with_table(PAGE.read_text(encoding="utf-8"), "sizes", sizes_table())
+    PAGE.write_text(page, encoding="utf-8")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from page_table import with_table
+
 from discsim.effects import CATALOGUE
 
 PAGE = Path(__file__).parents[1] / "docs" / "physics.md"
@@ -20,17 +22,13 @@ def catalogue_table() -> str:
     return "\n".join(rows)
 
 
-def with_table(page: str) -> str:
-    start, end = "<!-- catalogue -->\n", "<!-- /catalogue -->"
-    before, _, rest = page.partition(start)
-    _, _, after = rest.partition(end)
-    return f"{before}{start}{catalogue_table()}\n{end}{after}"
-
-
 def test_the_page_on_physics_lists_every_effect_of_the_catalogue():
     page = PAGE.read_text(encoding="utf-8")
-    assert page == with_table(page), "run `python tests/test_physics_page.py` to renew the table"
+    assert page == with_table(page, "catalogue", catalogue_table()), (
+        "run `python tests/test_physics_page.py` to renew the table"
+    )
 
 
 if __name__ == "__main__":
-    PAGE.write_text(with_table(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    page = with_table(PAGE.read_text(encoding="utf-8"), "catalogue", catalogue_table())
+    PAGE.write_text(page, encoding="utf-8")
