@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import chi2 as chi2_law
 
 from discsim.arrays import FloatArray
-from discsim.disc import Aero, Disc, Rig, aero_key
+from discsim.disc import Aero, aero_key
 from discsim.effects.catalogue import CATALOGUE, Effect
 from discsim.model_file import Model, ModelEffect
 from validation.diagnosis.answer import (
@@ -30,9 +30,8 @@ from validation.diagnosis.answer import (
     Residuals,
     Verdict,
 )
-from validation.diagnosis.board import column_of
 from validation.diagnosis.law import FoundLaw
-from validation.diagnosis.noise import NoiseModel
+from validation.diagnosis.noise import chi_squared
 from validation.diagnosis.places import located_effect, located_rest
 from validation.diagnosis.rest import remainders
 from validation.diagnosis.rows import user_effect
@@ -118,7 +117,7 @@ def _named(found: Search, trial: Trial, names: Sequence[str]) -> NamedEffect:
     p = float(max(chi2_law.sf(gain, max(k, 1)), SMALLEST_P_VALUE))
     held = _heldout_gain(found, trial)
     confused = []
-    for other, worse in found.rivals.get(id_of(trial), []):
+    for other, worse in found.rivals.get(trial.name, []):
         rival_bic = gain - worse - len(parameters_of(other)) * float(np.log(max(final.fit.count, 2)))
         if worse < CONFUSED + 4.0 * max(0, len(parameters_of(other)) - k):
             confused.append(Confusion(other.id, float(rival_bic), _separating(trial.id, other.id, found)))
@@ -128,11 +127,6 @@ def _named(found: Search, trial: Trial, names: Sequence[str]) -> NamedEffect:
 
 #: hypotheses whose scores differ by less than this cannot be told apart
 CONFUSED = 12.0
-
-
-def id_of(trial: Trial) -> str:
-    """Return a name of a trial that tells its recordings, too."""
-    return trial.id if trial.recordings is None else f"{trial.id}@{','.join(map(str, sorted(trial.recordings)))}"
 
 
 def _separating(one: str, other: str, found: Search) -> str:
@@ -159,7 +153,7 @@ def _heldout_gain(found: Search, trial: Trial) -> float | None:
     count = board.recordings
     if count < 2 or not trial.columns or (trial.recordings is not None and len(trial.recordings) < 2):
         return None
-    rest = Hypothesis(tuple(t for t in final.hypothesis.trials if t is not trial), final.hypothesis.freed)
+    rest = final.hypothesis.without(trial)
     total = 0.0
     for i in range(count):
         total += _heldout_chi2(found, rest, i) - _heldout_chi2(found, final.hypothesis, i)
@@ -170,7 +164,7 @@ def _heldout_chi2(found: Search, hypothesis: Hypothesis, i: int) -> float:
     """Return chi-squared of a recording with the shared parameters as the other recordings have them."""
     board = found.board
     assert board is not None
-    own = [(column_of(q), q) for q in fitted_parameters(hypothesis, found.own) if column_of(q) in board.place]
+    own = board.columns_of(fitted_parameters(hypothesis, found.own))
     others = [j for j in range(board.recordings) if j != i]
     answer = board.ask(own, only=others)
     G = board.grams[i]
@@ -224,17 +218,10 @@ def _figures(found: Search, unexplained: bool) -> tuple[FitFigures, FitFigures, 
     for i in range(board.recordings):
         rows = board.linears[i].raw.size
         new = max(_heldout_chi2(found, final.hypothesis, i), 0.0)
-        residual = found.base.residuals[i]
-        old = _one_chi2(found.base, i, reference)
-        del residual
+        old = chi_squared(found.base.fit.linears[i], reference, found.base.residuals[i])
         before, after = before + old, after + new
         held.append(HeldOut(str(i), old / rows, new / rows, 0.5 * (old - new)))
     return FitFigures(base, before / n), FitFigures(last, after / n), tuple(held)
-
-
-def _one_chi2(tied: Tied, i: int, noise: NoiseModel) -> float:
-    linear, residual = tied.fit.linears[i], tied.residuals[i]
-    return sum(float(np.sum((residual[c.rows] / noise[c.group].sd) ** 2)) for c in linear.channels)
 
 
 def _residuals(found: Search, names: Sequence[str], unexplained: bool) -> list[Residuals]:
@@ -260,7 +247,7 @@ def _residuals(found: Search, names: Sequence[str], unexplained: bool) -> list[R
     return shown
 
 
-def _model(found: Search, effects: Sequence[NamedEffect], trials: Sequence[Trial], law: Law | None) -> Model:
+def _model(found: Search, effects: Sequence[NamedEffect], law: Law | None) -> Model:
     first = found.recordings[0]
     environment, disc, rig = first.environment, first.disc, first.rig
     values = {
@@ -288,9 +275,7 @@ def _model(found: Search, effects: Sequence[NamedEffect], trials: Sequence[Trial
         sizes = {name: item.value for name, item in effect.parameters.items()}
         sds = {name: item.sd for name, item in effect.parameters.items() if item.sd is not None}
         carried.append(ModelEffect(Effect(effect.id, kind(**sizes)), sds, effect.recordings))
-    model_disc: Disc | None = disc
-    model_rig: Rig | None = rig
-    return Model(environment, model_disc, model_rig, tuple(carried), law.for_model() if law is not None else None)
+    return Model(environment, disc, rig, tuple(carried), law.for_model() if law is not None else None)
 
 
 def _not_carried(effects: Sequence[NamedEffect]) -> list[str]:
@@ -350,5 +335,5 @@ def assemble(
         tuple(dict.fromkeys(c.next_recording for e in effects for c in e.confused_with if c.next_recording)),
         (*found.warnings, *_not_carried(effects)),
     )
-    model = _model(found if not unexplained else found.at_base(), effects, trials, written)
+    model = _model(found if not unexplained else found.at_base(), effects, written)
     return Outcome(diagnosis, model, tuple(_residuals(found, names, unexplained)), candidates)

@@ -44,6 +44,11 @@ class Board:
         """Number of recordings."""
         return int(self.grams.shape[0])
 
+    def columns_of(self, parameters: Sequence[Parameter]) -> list[tuple[Column, Parameter]]:
+        """Return the columns of parameters, those that have one here, to `ask` with."""
+        found = [(column_of(q), q) for q in parameters]
+        return [(column, q) for column, q in found if column in self.place]
+
     def ask(self, parameters: Sequence[tuple[Column, Parameter]], only: Sequence[int] | None = None) -> Answer:
         """Free some columns, each in its recordings and with its prior; all others stay at their baseline.
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
 from discsim.frames import euler_angles
-from validation.diagnosis.noise import NoiseModel, whitened
+from validation.diagnosis.noise import NoiseModel, chi_squared, whitened
 from validation.diagnosis.readings import Values
 from validation.diagnosis.trajectory_pieces import STEPS, Chain, Column, Linear, linearise, moved, shifted, stepped
 
@@ -326,10 +326,14 @@ def linearised_columns(fit: Fit, columns: Sequence[Column]) -> tuple[Linear, ...
 
 def merit_of(fit: Fit, linears: Sequence[Linear]) -> float:
     """Return chi-squared with priors where a fit stands: what jumps may not close is charged, too."""
+    chi2 = sum(chi_squared(linear, fit.noise, linear.residual) for linear in linears)
+    return chi2 + penalty_of(fit, linears)
+
+
+def penalty_of(fit: Fit, linears: Sequence[Linear]) -> float:
+    """Return what a fit is charged beside its readings: its jumps, its distance from what is stated."""
     total = 0.0
     for current, linear in zip(fit.chains, linears, strict=True):
-        white = whitened(linear, fit.noise, linear.residual[:, None])
-        total += float(np.sum(white**2))
         some = linear.jump_kind >= 0
         total += float(np.sum((linear.jump[some] / fit.jumps.sd[linear.jump_kind[some]]) ** 2))
         stated, _ = release_rows(current)
@@ -345,13 +349,11 @@ def refit(
     *,
     iterations: int = 8,
     tolerance: float = 0.05,
-    give_up: float = np.inf,
     bounds: Mapping[tuple[str, str], tuple[float, float]] | None = None,
 ) -> Fit:
     """Go on from where a fit stands by Gauss-Newton steps, halved where they do not improve.
 
-    Stops when the gain, expected or found, is below ``tolerance`` of chi-squared, or where chi-squared is expected to
-    stay above ``give_up``.
+    Stops when the gain, expected or found, is below ``tolerance`` of chi-squared.
     """
     linears = linearised(fit)
     fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
@@ -361,7 +363,7 @@ def refit(
         step, covariance, expected = shared_step(gram, fit.parameters, fit.at)
         fit = replace(fit, covariance=covariance)
         gain = fit.merit - expected
-        if (gain < max(tolerance, 1e-7 * fit.merit) and not open_gaps(fit)) or expected > give_up:
+        if gain < max(tolerance, 1e-7 * fit.merit) and not open_gaps(fit):
             break
         share, better = 1.0, None
         for _ in range(5):

@@ -16,7 +16,7 @@ from scipy.signal import lfilter
 from discsim.arrays import FloatArray
 from validation.diagnosis.trajectory_pieces import Channel, IntArray, Linear
 
-__all__ = ["GroupNoise", "NoiseModel", "estimate_noise", "log_likelihood", "whitened"]
+__all__ = ["GroupNoise", "NoiseModel", "chi_squared", "estimate_noise", "log_likelihood", "whitened"]
 
 #: correlations from one sample to the next that are tried; slower noise than the last is not taken for noise
 CORRELATIONS = np.concatenate([np.linspace(0.05, 0.9, 18), 1.0 - np.geomspace(0.08, 0.005, 9)])
@@ -82,10 +82,15 @@ def _freed(x: FloatArray, noise: GroupNoise, index: IntArray) -> FloatArray:
     return np.asarray(lfilter([1.0, -phi], [1.0, -theta], x, axis=0, zi=state)[0] / innovation)
 
 
+def chi_squared(linear: Linear, noise: NoiseModel, residual: FloatArray) -> float:
+    """Return the chi-squared of residuals (n,) in a noise, its correlation included."""
+    white = whitened(linear, noise, residual[:, None])[:, 0]
+    return float(white @ white)
+
+
 def log_likelihood(linear: Linear, noise: NoiseModel, residual: FloatArray) -> float:
     """Return -2 log likelihood of residuals (n,), less a constant."""
-    white = whitened(linear, noise, residual[:, None])[:, 0]
-    total = float(white @ white)
+    total = chi_squared(linear, noise, residual)
     for channel in linear.channels:
         own = noise[channel.group]
         total += 2.0 * channel.index.size * float(np.log(own.sd))

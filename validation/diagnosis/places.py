@@ -9,11 +9,10 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from validation.diagnosis.answer import Located
-from validation.diagnosis.board import column_of
 from validation.diagnosis.fitting import local_step
 from validation.diagnosis.rows import row_of, user_effect
 from validation.diagnosis.search import Search
-from validation.diagnosis.selection import Hypothesis, fitted_parameters
+from validation.diagnosis.selection import fitted_parameters
 from validation.diagnosis.trajectory_pieces import Linear
 from validation.diagnosis.trials import Trial
 
@@ -99,21 +98,20 @@ def without(found: Search, trial: Trial) -> list[FloatArray]:
     board = found.board
     assert board is not None
     final = found.final
-    full = [q for q in fitted_parameters(final.hypothesis, found.own)]
-    rest = Hypothesis(tuple(t for t in final.hypothesis.trials if t is not trial), final.hypothesis.freed)
-    kept = [(column_of(q), q) for q in fitted_parameters(rest, found.own) if column_of(q) in board.place]
+    kept = board.columns_of(fitted_parameters(final.hypothesis.without(trial), found.own))
+    whole = board.columns_of(final.fit.parameters)
+    stood = {(q.key, q.recordings): at - q.stated for q, at in zip(final.fit.parameters, final.fit.at, strict=True)}
     value = board.ask(kept).value
     residuals = []
     for i, linear in enumerate(board.linears):
         step = np.zeros(len(board.columns))
-        for q, at in zip(final.fit.parameters, final.fit.at, strict=True):
-            if q.acts_in(i) and column_of(q) in board.place:
-                step[board.place[column_of(q)]] -= at - q.stated
+        for column, q in whole:
+            if q.acts_in(i):
+                step[board.place[column]] -= stood[q.key, q.recordings]
         for (column, q), v in zip(kept, value, strict=True):
             if q.acts_in(i):
                 step[board.place[column]] += v
         residuals.append(linear.after(local_step(board.reduced[i], step), step))
-    del full
     return residuals
 
 
@@ -127,7 +125,8 @@ def located_effect(found: Search, trial: Trial, names: Sequence[str]) -> list[Lo
     grows, text = _TRACES[trial.id] if own is None else (None, own.text)
     mine = {key: value for key, value in excess.items() if trial.recordings is None or key[0] in trial.recordings}
     total = sum(max(float(np.sum(value)), 0.0) for value in mine.values())
-    if total <= 0:
+    traced = total > 0
+    if not traced:
         mine, total = {key: np.ones(1) for key in mine}, float(len(mine))
     by_axis: dict[tuple[str, str], float] = {}
     for (_, sensor, axis), value in mine.items():
@@ -139,7 +138,9 @@ def located_effect(found: Search, trial: Trial, names: Sequence[str]) -> list[Lo
         share = by_axis[sensor, axis] / total
         if places and share < _WORTH:
             continue
-        start, stop = _span(found, mine, sensor, axis)
+        start, stop = 0.0, max(recording.end for recording in found.recordings)
+        if traced:
+            start, stop = _span({k: v for k, v in mine.items() if k[1:] == (sensor, axis)}, found.board.linears)
         if event:
             instant = _instant(found, trial)
             width = 0.03 if trial.id.startswith("event.") else 2.0 * _width(found, trial)
@@ -165,31 +166,6 @@ def _width(found: Search, trial: Trial) -> float:
     return abs(_value(found, trial, "width_s"))
 
 
-def _span(
-    found: Search, excess: Mapping[tuple[int, str, str], FloatArray], sensor: str, axis: str
-) -> tuple[float, float]:
-    """Return when the excess of an axis is gathered: from 2 % of it to 98 %."""
-    assert found.board is not None
-    times, values = [], []
-    for (index, s, a), value in excess.items():
-        if (s, a) != (sensor, axis):
-            continue
-        linear = found.board.linears[index]
-        channel = next(c for c in linear.channels if (c.sensor, c.axis) == (s, a))
-        if value.size == channel.index.size:
-            times.append(linear.t[channel.rows])
-            values.append(value)
-    if not times:
-        return 0.0, max(recording.end for recording in found.recordings)
-    t, v = np.concatenate(times), np.maximum(np.concatenate(values), 0.0)
-    order = np.argsort(t)
-    gathered = np.cumsum(v[order])
-    if gathered[-1] <= 0:
-        return float(t.min()), float(t.max())
-    start, stop = np.searchsorted(gathered, [0.02 * gathered[-1], 0.98 * gathered[-1]])
-    return float(t[order][start]), float(t[order][min(stop, t.size - 1)])
-
-
 def located_rest(found: Search, names: Sequence[str]) -> list[Located]:
     """Return where the baseline fails when nothing explains it: sensors and axes, and what the excess grows with."""
     noise = {group: found.loose_noise[group].sd for group in found.loose_noise}
@@ -213,22 +189,20 @@ def located_rest(found: Search, names: Sequence[str]) -> list[Located]:
         chosen = {
             key: value for key, value in excess.items() if key[1:] == (sensor, axis) and (not alone or key[0] == worst)
         }
-        start, stop = _span_of(found, chosen, linears)
+        start, stop = _span(chosen, linears)
         grows = _grows_with(found, chosen, linears)
         text = f"the baseline leaves more than noise on {sensor} {axis}" + (f", growing with {grows}" if grows else "")
         places.append(Located(where, sensor, axis, start, stop, min(amount / total, 1.0), text, grows))
     return places
 
 
-def _span_of(
-    found: Search, excess: Mapping[tuple[int, str, str], FloatArray], linears: Sequence[Linear]
-) -> tuple[float, float]:
-    times, values = [], []
-    for (index, sensor, axis), value in excess.items():
+def _span(excess: Mapping[tuple[int, str, str], FloatArray], linears: Sequence[Linear]) -> tuple[float, float]:
+    """Return when the excess is gathered: from 2 % of it to 98 %."""
+    times = []
+    for index, sensor, axis in excess:
         channel = next(c for c in linears[index].channels if (c.sensor, c.axis) == (sensor, axis))
         times.append(linears[index].t[channel.rows])
-        values.append(np.maximum(value, 0.0))
-    t, v = np.concatenate(times), np.concatenate(values)
+    t, v = np.concatenate(times), np.maximum(np.concatenate([*excess.values()]), 0.0)
     order = np.argsort(t)
     gathered = np.cumsum(v[order])
     if gathered[-1] <= 0:

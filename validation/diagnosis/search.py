@@ -13,10 +13,9 @@ from typing import TypeAlias
 import numpy as np
 
 from discsim.recording import Recording
-from validation.diagnosis.answer import ParameterValue
-from validation.diagnosis.board import Board, board_of, column_of, free_columns
+from validation.diagnosis.board import Board, board_of, free_columns
 from validation.diagnosis.fitting import Fit, Parameter
-from validation.diagnosis.noise import NoiseModel, estimate_noise, robust_noise, whitened
+from validation.diagnosis.noise import NoiseModel, chi_squared, estimate_noise, robust_noise
 from validation.diagnosis.relaxed import NO_JUMPS, relaxed, unknowns, without_outliers
 from validation.diagnosis.searches import Shifted, searched
 from validation.diagnosis.selection import (
@@ -27,7 +26,6 @@ from validation.diagnosis.selection import (
     Tied,
     fitted_parameters,
     one_per_effect,
-    polished,
     price,
     proposals,
     tied_fit,
@@ -56,7 +54,6 @@ class Considered:
     gain: float
     chi2_gain: float
     values: Mapping[str, float]
-    kept: bool
 
 
 @dataclass
@@ -74,8 +71,6 @@ class Search:
     considered: list[Considered] = field(default_factory=list)
     rivals: dict[str, list[tuple[Trial, float]]] = field(default_factory=dict)
     board: Board | None = None
-    #: values of an effect's parameters that no fit gives, by the trial's name
-    extra: dict[str, dict[str, ParameterValue]] = field(default_factory=dict)
     #: readings that were left out: (recording, sensor, axis, time, deviations)
     outliers: list[tuple[int, str, str, float, float]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -123,9 +118,8 @@ def search(recordings: Sequence[Recording], report: Report = lambda stage, done,
 
 def _start(board: Board, hypothesis: Hypothesis, own: Sequence[Parameter]) -> Start:
     """Return what algebra expects of a hypothesis's parameters."""
-    parameters = [q for q in fitted_parameters(hypothesis, own) if column_of(q) in board.place]
-    answer = board.ask([(column_of(q), q) for q in parameters])
-    return {(q.key, q.recordings): q.stated + float(v) for q, v in zip(parameters, answer.value, strict=True)}
+    taken = board.columns_of(fitted_parameters(hypothesis, own))
+    return {(q.key, q.recordings): q.stated + float(v) for (_, q), v in zip(taken, board.ask(taken).value, strict=True)}
 
 
 def values_of_fit(tied: Tied) -> Start:
@@ -136,8 +130,7 @@ def values_of_fit(tied: Tied) -> Start:
 def chi2_in(tied: Tied, noise: NoiseModel) -> float:
     """Return the chi-squared of a fit's residuals in a given noise."""
     return sum(
-        float(np.sum(whitened(linear, noise, residual[:, None]) ** 2))
-        for linear, residual in zip(tied.fit.linears, tied.residuals, strict=True)
+        chi_squared(linear, noise, residual) for linear, residual in zip(tied.fit.linears, tied.residuals, strict=True)
     )
 
 
@@ -192,7 +185,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
             for q, v in zip(refitted.fit.parameters, refitted.fit.at, strict=True)
             if q.group == proposal.trial.id and q.recordings == proposal.trial.recordings
         }
-        found.considered.append(Considered(proposal.trial, gain, chi2_gain, values, False))
+        found.considered.append(Considered(proposal.trial, gain, chi2_gain, values))
         if gain > price(proposal.trial) and _possible(refitted):
             # far from the data chi-squared says more than a likelihood that has swallowed the mismatch as noise
             merit = (chi2_in(refitted, noise) + cost if far else refitted.score) + RIVAL * hypothesis.size
@@ -203,8 +196,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     found.cost += cost
     if cost > 0:
         found.loose = replace(found.loose, chains=fit.chains)
-    best = polished(best)
-    return replace(best, score=best.score + found.cost)
+    return best
 
 
 #: where most readings lie within this many times the stated noise, what raises its level is short
@@ -223,7 +215,7 @@ def _steady_noise(found: Search) -> NoiseModel:
 def tried_without(found: Search, trial: Trial) -> Tied:
     """Return the fit of the final hypothesis without one of its effects."""
     final = found.final
-    rest = replace(final.hypothesis, trials=tuple(t for t in final.hypothesis.trials if t is not trial))
+    rest = final.hypothesis.without(trial)
     if not rest.trials:
         return found.base
     for step in found.steps:
@@ -251,11 +243,10 @@ def _pruned(found: Search, current: Tied) -> Tied:
     """Leave out effects that the later ones have made superfluous."""
     while len(current.hypothesis.trials) > 1:
         weakest: Tied | None = None
-        for k, trial in enumerate(current.hypothesis.trials[:-1]):
-            rest = tuple(t for j, t in enumerate(current.hypothesis.trials) if j != k)
+        for trial in current.hypothesis.trials[:-1]:
             less = tied_fit(
                 current.fit,
-                replace(current.hypothesis, trials=rest),
+                current.hypothesis.without(trial),
                 found.own,
                 current.fit.noise,
                 values_of_fit(current),
@@ -277,12 +268,9 @@ def _rivals(found: Search) -> None:
     for trial in final.hypothesis.trials:
         if trial.told:  # found in the readings themselves, and kept in the chains: nothing else could do it from there
             continue
-        rest = Hypothesis(tuple(t for t in final.hypothesis.trials if t is not trial), final.hypothesis.freed)
-        taken = [(column_of(q), q) for q in fitted_parameters(rest, found.own) if column_of(q) in board.place]
-        full = [
-            (column_of(q), q) for q in fitted_parameters(final.hypothesis, found.own) if column_of(q) in board.place
-        ]
-        best = board.ask(full).chi2
+        rest = final.hypothesis.without(trial)
+        taken = board.columns_of(fitted_parameters(rest, found.own))
+        best = board.ask(board.columns_of(fitted_parameters(final.hypothesis, found.own))).chi2
         near = []
         for other in found.trials:
             if other.id == trial.id or any(other.id == t.id for t in rest.trials):
@@ -291,7 +279,7 @@ def _rivals(found: Search) -> None:
             worse = board.ask([*taken, *free_columns(scoped)]).chi2 - best
             near.append((worse, scoped))
         near.sort(key=lambda item: item[0])
-        found.rivals[_key(trial)] = []
+        found.rivals[trial.name] = []
         seen: set[str] = set()
         for worse, scoped in near:
             if scoped.id in seen or worse > 60.0 or len(seen) >= 3:
@@ -304,13 +292,8 @@ def _rivals(found: Search) -> None:
                 final.fit.noise,
                 {**values_of_fit(final), **_shape_start(scoped)},
             )
-            found.rivals[_key(trial)].append((scoped, other_fit.score - final.score))
+            found.rivals[trial.name].append((scoped, other_fit.score - final.score))
 
 
 def _shape_start(trial: Trial) -> Start:
     return {((trial.id, name), trial.recordings): value for name, value in trial.shapes.items()}
-
-
-def _key(trial: Trial) -> str:
-    """Return a name of a trial that tells its recordings, too."""
-    return trial.id if trial.recordings is None else f"{trial.id}@{','.join(map(str, sorted(trial.recordings)))}"

@@ -8,15 +8,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from discsim.arrays import FloatArray
-from validation.diagnosis.board import Board, column_of, free_columns
-from validation.diagnosis.fitting import Fit, Parameter, merit_of, refit, values_of
+from validation.diagnosis.board import Board, free_columns
+from validation.diagnosis.fitting import Fit, Parameter, penalty_of, refit, values_of
 from validation.diagnosis.noise import NoiseModel, estimate_noise, log_likelihood
 from validation.diagnosis.readings import CLOCKS
 from validation.diagnosis.relaxed import NO_JUMPS, beginning
 from validation.diagnosis.trajectory_pieces import Chain
 from validation.diagnosis.trials import Trial, parameters_of
 
-__all__ = ["Hypothesis", "Tied", "polished", "price", "tied_fit"]
+__all__ = ["Hypothesis", "Tied", "price", "tied_fit"]
 
 #: what evidence costs: twice the log likelihood that an effect must gain, and more for each of its parameters
 ENTRY, PER_PARAMETER, EVENT_ENTRY = 24.0, 4.0, 42.0
@@ -51,19 +51,22 @@ ONE_SIDED: Mapping[tuple[str, str], float] = {
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Effects that may act, and stated numbers whose uncertainty is set aside (recalibrated)."""
+    """Effects that may act."""
 
     trials: tuple[Trial, ...] = ()
-    freed: frozenset[tuple[str, str]] = frozenset()
 
     def plus(self, trial: Trial) -> Hypothesis:
         """Return it with one more effect."""
         return replace(self, trials=(*self.trials, trial))
 
+    def without(self, trial: Trial) -> Hypothesis:
+        """Return it less one of its effects."""
+        return replace(self, trials=tuple(t for t in self.trials if t is not trial))
+
     @property
     def size(self) -> int:
         """Number of parameters it adds."""
-        return sum(len(parameters_of(trial)) for trial in self.trials) + len(self.freed)
+        return sum(len(parameters_of(trial)) for trial in self.trials)
 
 
 @dataclass(frozen=True)
@@ -96,10 +99,9 @@ def price(trial: Trial) -> float:
 
 def fitted_parameters(hypothesis: Hypothesis, own: Sequence[Parameter]) -> tuple[Parameter, ...]:
     """Return a recording set's own parameters and those of the hypothesis."""
-    mine = [replace(q, sigma=np.inf) if q.key in hypothesis.freed else q for q in own]
     taken = [q for trial in hypothesis.trials for q in parameters_of(trial)]
     keys = {(q.key, q.recordings) for q in taken}
-    return (*(q for q in mine if (q.key, q.recordings) not in keys), *taken)
+    return (*(q for q in own if (q.key, q.recordings) not in keys), *taken)
 
 
 def tied_fit(
@@ -111,7 +113,6 @@ def tied_fit(
     *,
     iterations: int = 8,
     polish: int = 2,
-    give_up: float = np.inf,
 ) -> Tied:
     """Fit a hypothesis with pieces that hang together, from the chains of a loose fit.
 
@@ -123,9 +124,7 @@ def tied_fit(
     fit = Fit(_retimed(loose, parameters, at), parameters, at, NO_JUMPS[plant], noise)
     if plant in ("rate_table", "spin_down") and any(q.group in CLOCKS for q in parameters):
         fit = replace(fit, at=_longer_and_longer(fit))
-    fit = refit(fit, iterations=iterations, give_up=give_up, bounds=BOUNDS)
-    if fit.merit > give_up:
-        polish = 0
+    fit = refit(fit, iterations=iterations, bounds=BOUNDS)
     for _ in range(polish):
         fit = replace(fit, noise=noise_of(fit))
         fit = refit(fit, iterations=2, bounds=BOUNDS)
@@ -164,14 +163,6 @@ def _longer_and_longer(fit: Fit) -> FloatArray:
     return at
 
 
-def polished(tied: Tied) -> Tied:
-    """Return a fit gone on with in the noise that its own residuals show, until both agree."""
-    fit = tied.fit
-    for _ in range(2):
-        fit = refit(replace(fit, noise=noise_of(fit)), iterations=2, bounds=BOUNDS)
-    return scored(tied.hypothesis, fit)
-
-
 def noise_of(fit: Fit) -> NoiseModel:
     """Return the noise that a fit's residuals show."""
     spent = len(fit.parameters) + 12 * len(fit.chains)
@@ -180,21 +171,10 @@ def noise_of(fit: Fit) -> NoiseModel:
 
 def scored(hypothesis: Hypothesis, fit: Fit) -> Tied:
     """Return a fit with its score."""
-    noise = noise_of(fit)
+    fit = replace(fit, noise=noise_of(fit))
     residuals = tuple(linear.residual for linear in fit.linears)
-    score = sum(log_likelihood(linear, noise, e) for linear, e in zip(fit.linears, residuals, strict=True))
-    score += merit_of(replace(fit, noise=noise), fit.linears) - sum(
-        _chi2(replace(fit, noise=noise), k) for k in range(len(fit.linears))
-    )
-    return Tied(hypothesis, replace(fit, noise=noise), score, residuals)
-
-
-def _chi2(fit: Fit, k: int) -> float:
-    from validation.diagnosis.noise import whitened
-
-    linear = fit.linears[k]
-    white = whitened(linear, fit.noise, linear.residual[:, None])
-    return float(np.sum(white**2))
+    score = sum(log_likelihood(linear, fit.noise, e) for linear, e in zip(fit.linears, residuals, strict=True))
+    return Tied(hypothesis, fit, score + penalty_of(fit, fit.linears), residuals)
 
 
 @dataclass(frozen=True)
@@ -213,8 +193,7 @@ def proposals(
     own: Sequence[Parameter],
 ) -> list[Proposal]:
     """Return what each trial would gain upon a hypothesis, in all recordings and in each alone, best first."""
-    taken = [(column_of(q), q) for q in fitted_parameters(hypothesis, own)]
-    taken = [(column, q) for column, q in taken if column in board.place]
+    taken = board.columns_of(fitted_parameters(hypothesis, own))
     base = board.ask(taken).chi2
     found = []
     present = {(trial.id, trial.recordings) for trial in hypothesis.trials}

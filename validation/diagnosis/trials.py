@@ -30,6 +30,11 @@ class Trial:
     told: tuple[tuple[str, float, float], ...] = ()
 
     @property
+    def name(self) -> str:
+        """A name that tells its recordings, too."""
+        return self.id if self.recordings is None else f"{self.id}@{','.join(map(str, sorted(self.recordings)))}"
+
+    @property
     def shapes(self) -> dict[str, float]:
         """Values of the parameters that shape the effect."""
         return dict(self.columns[0].given) if self.columns else {}
