@@ -290,9 +290,11 @@ def _not_carried(effects: Sequence[NamedEffect]) -> list[str]:
 def assemble(
     found: Search, datasets: Sequence[str], names: Sequence[str], seed: int, law: FoundLaw | None = None
 ) -> Outcome:
-    """Return the outcome of a search."""
+    """Return the outcome of a search; a law stands for all that was left out."""
     verdict, unexplained = verdict_of(found)
-    written = law.law if law is not None and unexplained else None
+    if law is not None:
+        verdict, unexplained = "unexplained", True
+    written = law.law if law is not None else None
     trials = found.final.hypothesis.trials if verdict == "explained" else ()
     effects = tuple(_named(found, trial, names) for trial in trials)
     located = [place for trial in trials for place in located_effect(found, trial, names)]

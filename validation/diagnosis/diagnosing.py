@@ -9,8 +9,8 @@ from validation.diagnosis.answer import Outcome
 from validation.diagnosis.assembly import assemble, verdict_of
 from validation.diagnosis.datasets import recording_names
 from validation.diagnosis.law import find_law
-from validation.diagnosis.rows import competing
-from validation.diagnosis.search import search
+from validation.diagnosis.rows import competing, row_of
+from validation.diagnosis.search import Search, search
 from validation.diagnosis.user_effects import UserEffect
 
 __all__ = ["diagnose"]
@@ -18,6 +18,16 @@ __all__ = ["diagnose"]
 
 def _silent(stage: str, done: int, total: int) -> None:
     del stage, done, total
+
+
+#: so many effects on the motion may be a bad copy of something that is none of them
+_STACK = 2
+
+
+def _stacked(found: Search) -> bool:
+    """Tell whether several effects on the motion were found, so that one law is worth comparing with them."""
+    rows = [row_of(trial.id) for trial in found.final.hypothesis.trials if not trial.id.startswith("event.")]
+    return sum(row is not None and row.acts_on == "motion" for row in rows) >= _STACK
 
 
 def diagnose(
@@ -39,7 +49,7 @@ def diagnose(
     with competing(user_effects):
         found = search(recordings, progress)
         law = None
-        if verdict_of(found)[1]:
+        if verdict_of(found)[1] or _stacked(found):
             progress("looking for a law", 4, 5)
             law = find_law(found.loose, found.final, found.own, found.loose_noise, recordings)
         return assemble(found, names, called, seed, law)

@@ -35,7 +35,7 @@ from validation.diagnosis.noise import GroupNoise, NoiseModel, log_likelihood, w
 from validation.diagnosis.readings import to_body
 from validation.diagnosis.relaxed import NO_JUMPS
 from validation.diagnosis.selection import ENTRY, PER_PARAMETER, Hypothesis, Tied, noise_of, scored, tied_fit
-from validation.diagnosis.trajectory_pieces import Chain, Column, IntArray, Linear, moved, recut
+from validation.diagnosis.trajectory_pieces import Chain, Column, IntArray, Linear, moved, recut, undone
 
 __all__ = ["FoundLaw", "Term", "find_law"]
 
@@ -177,7 +177,7 @@ def _weighed(linear: Linear, first: int, targets: Sequence[int], weights: FloatA
     moves = np.zeros((k, d, len(targets)))
     for i in range(k - 1):
         before, after = linear.moves[i], linear.moves[i + 1]
-        Phi = np.linalg.solve(before[:, :d].T, after[:, :d].T).T
+        Phi = undone(before[:, :d].T, after[:, :d].T).T
         constants = after[:, local + first :] - Phi @ before[:, local + first :]
         moves[i + 1] = Phi @ moves[i] + constants[:, targets] * weights[:, i]
     return replace(

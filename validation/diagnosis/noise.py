@@ -55,8 +55,9 @@ def whitened(linear: Linear, noise: NoiseModel, columns: FloatArray, piece: IntA
     """Return columns (n, c) with rows divided by the noise and freed of its correlation.
 
     With ``piece`` (n,) rows of different pieces stay apart: the first of a piece keeps its correlated part.
+    Rows of no channel become zero.
     """
-    result = np.empty_like(columns)
+    result = np.zeros_like(columns)
     for channel in linear.channels:
         own = noise[channel.group]
         x = columns[channel.rows] / own.sd

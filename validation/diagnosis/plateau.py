@@ -35,6 +35,25 @@ def plateau_of(value: FloatArray, resolution: float, noise: float | None) -> flo
     The largest readings must be equal, and several times as many as noise would leave there: that is judged by how
     many stand within one noise (or ten steps of resolution) below them.
     """
+    counted = _counted(value, resolution, noise)
+    if counted is None:
+        return None
+    top, equal, expected = counted
+    return top if equal >= FEWEST and equal > DENSER * expected else None
+
+
+def equal_beyond_chance(recording: Recording) -> float:
+    """Return twice the log likelihood ratio of as many equal largest readings as there are, against chance."""
+    samples, sheet = recording.samples["accelerometer"], recording.sheets["accelerometer"]
+    counted = _counted(samples.value, sheet.resolution or 0.0, sheet.noise_rms)
+    if counted is None:
+        return 0.0
+    _, equal, expected = counted
+    return float(2.0 * (equal * np.log(equal / expected) - (equal - expected))) if equal > expected else 0.0
+
+
+def _counted(value: FloatArray, resolution: float, noise: float | None) -> tuple[float, int, float] | None:
+    """Return the largest size of readings (n, k), how many have it, and how many would by chance."""
     size = np.abs(value[np.isfinite(value)])
     if size.size < FEWEST:
         return None
@@ -46,5 +65,4 @@ def plateau_of(value: FloatArray, resolution: float, noise: float | None) -> flo
     equal = int(np.count_nonzero(size > top - 0.25 * step))
     # the clipped value need not be a multiple of the resolution: the step below it is left alone
     below = int(np.count_nonzero((size > top - 1.25 * step - width) & (size <= top - 1.25 * step)))
-    expected = max(below * step / width, 0.5)
-    return top if equal >= FEWEST and equal > DENSER * expected else None
+    return top, equal, max(below * step / width, 0.5)

@@ -7,12 +7,13 @@ one correlation, once whitened, is flat over frequency and the same at all times
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 
 from discsim.arrays import FloatArray
-from validation.diagnosis.noise import NoiseModel, whitened
+from validation.diagnosis.noise import NoiseModel, estimate_noise, log_likelihood, whitened
 from validation.diagnosis.trajectory_pieces import Linear
 
 __all__ = ["Remainder", "remainders"]
@@ -25,6 +26,8 @@ BAND_Z, BAND_SHARE = 8.0, 0.2
 WINDOW, WINDOW_Z = 24, 9.0
 #: most that one reading's square counts in a window: two wild readings are outliers, three in a row are not
 WILD = 30.0
+#: terms of a course over time that recordings may have in common, and what it must gain in twice the log likelihood
+COURSE_TERMS, COURSE_GAIN = 5, 90.0
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,10 @@ def remainders(linears: Sequence[Linear], residuals: Sequence[FloatArray], noise
     white = [
         whitened(linear, noise, residual[:, None])[:, 0] for linear, residual in zip(linears, residuals, strict=True)
     ]
-    return sorted([*_bands(linears, white), *_windows(linears, white)], key=lambda item: -item.z)
+    return sorted(
+        [*_bands(linears, white), *_windows(linears, white), *_courses(linears, residuals, noise)],
+        key=lambda item: -item.z,
+    )
 
 
 def _bands(linears: Sequence[Linear], white: Sequence[FloatArray]) -> list[Remainder]:
@@ -104,3 +110,51 @@ def _windows(linears: Sequence[Linear], white: Sequence[FloatArray]) -> list[Rem
                     )
                 )
     return found
+
+
+def _courses(linears: Sequence[Linear], residuals: Sequence[FloatArray], noise: NoiseModel) -> list[Remainder]:
+    """Test that slow noise goes its own way in each recording.
+
+    A sensor that drifts the same way in all of them leaves residuals that one recording alone cannot tell from slow
+    noise. A polynomial of the time since the start, common to all recordings for each axis, must not gain more by the
+    likelihood, noise estimated anew, than its terms do by chance.
+    """
+    found = []
+    for group, slow in noise.items():
+        channels = [[c for c in linear.channels if c.group == group] for linear in linears]
+        if slow.correlation == 0.0 or sum(bool(some) for some in channels) < 2:
+            continue
+        ends = [float(linear.t[c.rows][-1]) for linear, some in zip(linears, channels, strict=True) for c in some]
+        alone = [replace(linear, channels=tuple(some)) for linear, some in zip(linears, channels, strict=True)]
+        left, own = list(residuals), {group: slow}
+        before = sum(log_likelihood(linear, own, e) for linear, e in zip(alone, left, strict=True))
+        after, now = before, own
+        for _ in range(3):
+            left = _without_course(alone, residuals, now, max(ends))
+            now = estimate_noise(alone, left)
+            after = min(after, sum(log_likelihood(linear, now, e) for linear, e in zip(alone, left, strict=True)))
+        if before - after > COURSE_GAIN:
+            found.append(Remainder(group, None, "course", float(np.sqrt(before - after)), 0.0, max(ends)))
+    return found
+
+
+def _without_course(
+    linears: Sequence[Linear], residuals: Sequence[FloatArray], noise: NoiseModel, end: float
+) -> list[FloatArray]:
+    """Return residuals less the course that each axis has in common in all recordings, estimated in a noise."""
+    axes = list(dict.fromkeys(c.axis for linear in linears for c in linear.channels))
+    columns = []
+    for linear in linears:
+        A = np.zeros((linear.t.size, COURSE_TERMS * len(axes)))
+        for c in linear.channels:
+            k = COURSE_TERMS * axes.index(c.axis)
+            A[c.rows, k : k + COURSE_TERMS] = legvander(2.0 * linear.t[c.rows] / end - 1.0, COURSE_TERMS - 1)
+        columns.append(A)
+    width = COURSE_TERMS * len(axes)
+    H, right = np.zeros((width, width)), np.zeros(width)
+    for linear, A, e in zip(linears, columns, residuals, strict=True):
+        white = np.hstack([whitened(linear, noise, A), whitened(linear, noise, e[:, None])])
+        H += white[:, :-1].T @ white[:, :-1]
+        right += white[:, :-1].T @ white[:, -1]
+    common = np.linalg.lstsq(H, right, rcond=1e-10)[0]
+    return [e - A @ common for A, e in zip(columns, residuals, strict=True)]

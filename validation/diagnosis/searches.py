@@ -13,12 +13,22 @@ import numpy as np
 from discsim.arrays import FloatArray
 from validation.diagnosis.fitting import Fit, Parameter, linearised, mapped, reduce, refit, unknown_prior
 from validation.diagnosis.noise import NoiseModel, whitened
-from validation.diagnosis.plateau import plateau
+from validation.diagnosis.plateau import equal_beyond_chance, plateau
 from validation.diagnosis.readings import delay
 from validation.diagnosis.relaxed import NO_JUMPS, relaxed
 from validation.diagnosis.selection import Hypothesis, Proposal, Tied, fitted_parameters
 from validation.diagnosis.slips import first_yaw, lost_along, phase_counts, repaired
-from validation.diagnosis.trajectory_pieces import WOBBLE, Chain, Column, IntArray, Linear, linearise, recut, shown
+from validation.diagnosis.trajectory_pieces import (
+    WOBBLE,
+    Chain,
+    Column,
+    IntArray,
+    Linear,
+    linearise,
+    recut,
+    shown,
+    undone,
+)
 from validation.diagnosis.trials import Trial, available
 
 __all__ = [
@@ -195,7 +205,7 @@ def _jumps(ground: _Ground, directions: Sequence[int]) -> FloatArray:
     after = np.cumsum(products[::-1], axis=0)[::-1]
     gain = np.zeros(max(k - 1, 0))
     for j in range(1, k):
-        back = np.linalg.solve(moves[j], np.eye(d)[:, list(directions)])
+        back = undone(moves[j], np.eye(d)[:, list(directions)])
         own = back.T @ after[j][:, :d] @ back
         cross = (back.T @ after[j]).T
         gain[j - 1], _ = ground.explained(own, cross[:-1], cross[-1])
@@ -294,7 +304,7 @@ def _gust(ground: _Ground, recording: int, wide: Sequence[int]) -> Proposal | No
     d, own, k = ground.chain.tangent, linear.unknowns, len(ground.chain.states)
     first = linear.local[:, :d]
     # u: the change of the first state that a wind up to each boundary amounts to
-    u = np.stack([np.linalg.solve(m[:, :d], m[:, [own + w for w in wide]]) for m in linear.moves])
+    u = np.stack([undone(m[:, :d], m[:, [own + w for w in wide]]) for m in linear.moves])
     within = linear.shared[:, list(wide)] - np.einsum("nd,ndw->nw", first, u[piece])
     push = np.diff(u, axis=0)
     middle = 0.5 * (edges[:-1] + edges[1:])
@@ -493,7 +503,8 @@ def saturation(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = ()) -> list
     """Return an accelerometer's limit below its range as a proposal where readings stand still at it.
 
     Such readings take no part in any fit. Gained is what the fit's motion asks for beyond the limit: readings that
-    should have been larger, and that noise alone would have had to hold at one size.
+    should have been larger, and that noise alone would have had to hold at one size. On a disc whose path is unknown
+    the motion asks for nothing, and what counts is how many readings are equal.
     """
     if any(trial.id == "accel.saturation" for trial in taken):
         return []
@@ -506,6 +517,9 @@ def saturation(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = ()) -> list
             continue
         limits[i] = limit
         steps.append(chain.recording.sheets["accelerometer"].resolution or 0.0)
+        if chain.recording.plant == "free_spin":
+            gain += equal_beyond_chance(chain.recording)
+            continue
         at, axis = np.nonzero(readings.clipped)
         values = {key: v for key, v in fit.values(i).items() if key[0] != "accel.saturation"}
         moved = readings.t - _lateness(chain, values, readings.t)
@@ -672,7 +686,7 @@ def searched(
     found += ripple(tied.fit, tied.fit.noise, taken, least)
     known = [q for q in own if q.key not in WOBBLE]
     found += dropped_magnetometer(loose, known, taken)
+    found += saturation(tied.fit, tied.fit.noise, taken)
     if loose.chains[0].recording.plant != "free_spin":  # there an accelerometer counts by its means over turns
-        found += saturation(tied.fit, tied.fit.noise, taken)
         found += dropped_accelerometer(loose, noise, taken)
     return sorted(found, key=lambda p: p.proposal.gain if isinstance(p, Shifted) else p.gain, reverse=True)

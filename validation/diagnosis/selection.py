@@ -22,6 +22,8 @@ __all__ = ["Hypothesis", "Tied", "price", "tied_fit"]
 ENTRY, PER_PARAMETER, EVENT_ENTRY = 24.0, 4.0, 42.0
 #: a gust may pass at any time, in any recording, at any width: more places to look at
 GUST_ENTRY = 60.0
+#: what it costs more that a disc's aerodynamics or build should differ in some recordings only
+OTHER_DISC = 40.0
 #: what a parameter costs when hypotheses are compared with one another
 RIVAL = 8.0
 
@@ -94,7 +96,8 @@ def price(trial: Trial) -> float:
         return GUST_ENTRY + PER_PARAMETER * count
     if trial.id.startswith("event."):
         return EVENT_ENTRY + PER_PARAMETER * count
-    return ENTRY + PER_PARAMETER * count
+    odd = trial.recordings is not None and trial.id.startswith(("aero.", "body."))
+    return ENTRY + PER_PARAMETER * count + (OTHER_DISC if odd else 0.0)
 
 
 def fitted_parameters(hypothesis: Hypothesis, own: Sequence[Parameter]) -> tuple[Parameter, ...]:

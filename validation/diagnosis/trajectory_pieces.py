@@ -51,6 +51,7 @@ __all__ = [
     "recut",
     "shown",
     "stepped",
+    "undone",
 ]
 
 IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
@@ -905,3 +906,11 @@ def stepped(current: Chain, tangents: FloatArray) -> Chain:
         # the angle turned so far goes along with the yaw
         states[:, 1] = states[:, 0] - states[0, 0]
     return replace(current, states=states)
+
+
+def undone(moves: FloatArray, change: FloatArray) -> FloatArray:
+    """Return the change (d, c) of a first state that amounts to a change (d, c) of a later one, moved there by (d, d).
+
+    What motion has damped beyond double precision cannot be undone; of that the least is taken.
+    """
+    return np.asarray(np.linalg.lstsq(moves, change, rcond=1e-13)[0])
