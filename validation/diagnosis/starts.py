@@ -11,6 +11,7 @@ whose clocks differ by some per cent still agree within each comparison.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import cos, sin, sqrt
 from typing import NamedTuple
 
@@ -21,8 +22,10 @@ from scipy.ndimage import median_filter
 from discsim.arrays import BoolArray, FloatArray
 from discsim.compiled import compiled
 from discsim.disc import Release
+from discsim.errors import InputError
 from discsim.frames import attitude_matrix, body_to_ned, multiply, quaternion_from_matrix, rotation_vector, turn
 from discsim.recording import Recording
+from discsim.trajectory import predict
 
 __all__ = ["Starts", "flight_starts", "rig_starts", "spin_starts"]
 
@@ -49,6 +52,10 @@ ATTITUDE_SIGMA = 0.4
 IRON_SD, GAIN_SD = 8.0, 0.06
 #: a throw of which nothing is known: height and speed to the north, m and m/s
 GUESSED_HEIGHT, GUESSED_SPEED = 1.3, 20.0
+#: sensors that fly with the disc
+ON_BOARD = ("magnetometer", "gyroscope", "accelerometer")
+#: how much higher a predicted start is flown than it was thrown, m
+HIGH = 1e4
 
 
 class Starts(NamedTuple):
@@ -155,9 +162,14 @@ def flight_starts(recording: Recording, t: FloatArray) -> Starts:
 
     Without GPS and track the path is dead reckoning from the stated release, or from a guess. Without path or
     accelerometer the attitude's turn about the field is the one that keeps the disc most level, unless the release
-    states it; the others are in ``ambiguous``.
+    states it; the others are in ``ambiguous``. With no sensor on board at all, the flight that the baseline predicts
+    from a stated release is the start.
     """
     t = np.asarray(t, dtype=float)
+    if not any(sensor in recording for sensor in ON_BOARD):
+        predicted = _predicted(recording, t)
+        if predicted is not None:
+            return predicted
     frame = _frame(recording)
     grid = _even(t, recording)
     fixes = _fixes(recording)
@@ -178,6 +190,22 @@ def flight_starts(recording: Recording, t: FloatArray) -> Starts:
     else:
         position, velocity = _dead_reckoning(recording, felt, t)
     return _finite(Starts(t, position, velocity, attitude, rate, () if certain else _others(recording, attitude[0])))
+
+
+def _predicted(recording: Recording, t: FloatArray) -> Starts | None:
+    """Return the states (k,) of the flight from a stated release, or None where that does not say enough to fly."""
+    release, disc = recording.release, recording.disc
+    if release is None or release.position is None or disc is None:
+        return None
+    # the ground is no end to a start: flown high above it, where the baseline's air is the same
+    high = np.array([0.0, 0.0, -HIGH])
+    try:
+        aloft = replace(release, position=release.position + high)
+        flight = predict(disc, recording.environment, aloft, duration=float(np.max(t, initial=0.0)) + GRID)
+    except InputError:
+        return None
+    at = flight.at(np.maximum(t, 0.0))
+    return Starts(t, at.position - high, at.velocity, at.attitude, at.rate, ())
 
 
 def spin_starts(recording: Recording, t: FloatArray) -> Starts:

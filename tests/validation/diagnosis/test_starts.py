@@ -23,7 +23,7 @@ from discsim.frames import (
     to_body,
 )
 from discsim.motion import Motion
-from discsim.recording import Recording, Samples, read_dataset
+from discsim.recording import Recording, Samples, SensorSheet, read_dataset
 from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
@@ -93,6 +93,21 @@ def test_a_throw_is_found_from_its_own_sensors_for_either_hand_and_any_spin(spin
 def test_a_tumbling_disc_is_followed_by_its_gyroscope():
     motion = flight(spin_deg_s=-50.0)
     assert_near(flight_starts(measured(motion), instants(motion)), motion)
+
+
+def test_a_throw_that_only_a_camera_saw_from_above_starts_as_its_release_says():
+    """Also past the ground, where the recorded disc did not end but the predicted one does."""
+    motion = flight()
+    release = Release(
+        motion.position[0], motion.velocity[0], *(float(a[0]) for a in motion.euler_angles), motion.rate[0]
+    )
+    seen = Samples(motion.t[::33], motion.position[::33] * [1.0, 1.0, np.nan])
+    sheet = SensorSheet(30.0, 0.03)
+    recording = Recording("flight", "throw", FIELD, DRIVER, None, release, {"track": sheet}, {"track": seen})
+    assert_near(flight_starts(recording, instants(motion)), motion)
+    past = flight_starts(recording, np.array([30.0]))
+    assert past.position[0, 2] > 1.0
+    assert np.all(np.isfinite(np.concatenate([past.velocity[0], past.attitude[0], past.rate[0]])))
 
 
 @pytest.mark.parametrize(
