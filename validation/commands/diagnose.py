@@ -32,6 +32,12 @@ def command(
         list[Path] | None,
         typer.Option("--with", help="A Python file with effects of your own, to compete with the catalogue's."),
     ] = None,
+    candidates: Annotated[
+        Path | None,
+        typer.Option(
+            "--candidates", help="A TOML file of recordings that you could make, to choose the next one from."
+        ),
+    ] = None,
 ) -> None:
     """Tell whether the baseline explains recordings down to their noise, and if not, what was left out.
 
@@ -43,6 +49,7 @@ def command(
     from importlib import import_module
 
     from validation.diagnosis.datasets import read_datasets
+    from validation.diagnosis.plans import read_plans
     from validation.diagnosis.progress import shown
     from validation.diagnosis.report import verdict_sentence
     from validation.diagnosis.user_effects import load_user_effects
@@ -52,9 +59,13 @@ def command(
     files = user_effects or []
     effects = load_user_effects(files)
     recordings, names = read_datasets(datasets)
+    plans = None
+    if candidates is not None:
+        plans = read_plans(candidates, recordings[0][0].plant)
+        files = [*files, candidates]
     with start_run(out, seed, [*datasets, *files]) as run:
         with shown() as progress:
-            outcome = diagnose(recordings, names, progress=progress, seed=seed, user_effects=effects)
+            outcome = diagnose(recordings, names, progress=progress, seed=seed, user_effects=effects, plans=plans)
         settings = {
             "command": f"discsim {' '.join(run.command)}",
             "seed": str(seed),

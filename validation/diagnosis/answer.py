@@ -22,6 +22,7 @@ __all__ = [
     "DIAGNOSIS_FORMAT",
     "MOVE_LIMIT",
     "SMALLEST_P_VALUE",
+    "Advice",
     "Candidate",
     "Confusion",
     "Diagnosis",
@@ -37,6 +38,7 @@ __all__ = [
     "ParameterValue",
     "Recalibration",
     "Residuals",
+    "Separation",
     "Verdict",
 ]
 
@@ -164,19 +166,56 @@ class Evidence:
 
 
 @dataclass(frozen=True)
+class Separation:
+    """A recording that could be made, and how much chi-squared it is expected to say for one of two effects."""
+
+    recording: str
+    expected_chi2: float
+
+    def __post_init__(self) -> None:
+        _not_negative(f"separated by {self.recording}", expected_chi2=self.expected_chi2)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return {"recording": self.recording, "expected_chi2": _plain(self.expected_chi2)}
+
+
+@dataclass(frozen=True)
+class Advice:
+    """The recording that says most about which of two effects it is, the next best, and one as those in hand again."""
+
+    best: Separation
+    runner_up: Separation | None = None
+    again: Separation | None = None
+
+
+@dataclass(frozen=True)
 class Confusion:
-    """An effect that these recordings cannot tell from a named one, and the recording that would."""
+    """An effect that these recordings cannot tell from a named one, and the recording that would.
+
+    ``next_recording`` says in a sentence what to record; ``advice`` is what was computed for that, None where no
+    recording can be advised.
+    """
 
     id: str
     delta_bic: float
     next_recording: str | None = None
+    advice: Advice | None = None
 
     def __post_init__(self) -> None:
         _finite(f"confused with {self.id}", delta_bic=self.delta_bic)
 
     def to_json(self) -> dict[str, Any]:
         """Return the JSON object."""
-        return {"id": self.id, "delta_bic": _plain(self.delta_bic), "next_recording": self.next_recording}
+        told = self.advice
+        return {
+            "id": self.id,
+            "delta_bic": _plain(self.delta_bic),
+            "next_recording": self.next_recording,
+            "separated_by": None if told is None else told.best.to_json(),
+            "runner_up": None if told is None or told.runner_up is None else told.runner_up.to_json(),
+            "same_again": None if told is None or told.again is None else told.again.to_json(),
+        }
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 from scipy.stats import chi2 as chi2_law
@@ -12,8 +13,10 @@ from discsim.arrays import FloatArray
 from discsim.disc import Aero, aero_key
 from discsim.effects.catalogue import CATALOGUE, Effect
 from discsim.model_file import Model, ModelEffect
+from validation.diagnosis.advice import confusions, in_words
 from validation.diagnosis.answer import (
     SMALLEST_P_VALUE,
+    Advice,
     Candidate,
     Confusion,
     Diagnosis,
@@ -30,11 +33,11 @@ from validation.diagnosis.answer import (
     Residuals,
     Verdict,
 )
+from validation.diagnosis.formulae import telling_apart
 from validation.diagnosis.law import FoundLaw
 from validation.diagnosis.noise import chi_squared
 from validation.diagnosis.places import located_effect, located_rest
 from validation.diagnosis.rest import remainders
-from validation.diagnosis.rows import user_effect
 from validation.diagnosis.search import FAR, Search, chi2_in, tried_without
 from validation.diagnosis.selection import Hypothesis, Tied, fitted_parameters
 from validation.diagnosis.trials import Trial, parameters_of
@@ -45,6 +48,7 @@ __all__ = ["assemble"]
 _SETTLED = 0.4
 #: a parameter whose error is this share of the room it was given is not determined by the data
 _UNDETERMINED = 0.2
+_NO_ADVICE: Mapping[tuple[str, str], Advice] = MappingProxyType({})
 _RECALIBRATED_NAMES = {
     ("disc", "mass"): "mass_kg",
     ("disc", "d"): "diameter_m",
@@ -96,7 +100,7 @@ def _errors(tied: Tied) -> FloatArray:
     return np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
 
-def _named(found: Search, trial: Trial, names: Sequence[str]) -> NamedEffect:
+def _named(found: Search, trial: Trial, names: Sequence[str], advice: Mapping[tuple[str, str], Advice]) -> NamedEffect:
     final = found.final
     errors = _errors(final)
     values = {}
@@ -117,33 +121,12 @@ def _named(found: Search, trial: Trial, names: Sequence[str]) -> NamedEffect:
     p = float(max(chi2_law.sf(gain, max(k, 1)), SMALLEST_P_VALUE))
     held = _heldout_gain(found, trial)
     confused = []
-    for other, worse in found.rivals.get(trial.name, []):
-        rival_bic = gain - worse - len(parameters_of(other)) * float(np.log(max(final.fit.count, 2)))
-        if worse < CONFUSED + 4.0 * max(0, len(parameters_of(other)) - k):
-            confused.append(Confusion(other.id, float(rival_bic), _separating(trial.id, other.id, found)))
+    for rival in confusions(found, trial):
+        rival_bic = gain - rival.worse - len(parameters_of(rival.trial)) * float(np.log(max(final.fit.count, 2)))
+        told = advice.get((trial.name, rival.trial.name))
+        confused.append(Confusion(rival.trial.id, float(rival_bic), in_words(trial.id, told), told))
     where = None if trial.recordings is None else tuple(names[i] for i in sorted(trial.recordings))
     return NamedEffect(trial.id, values, Evidence(bic, held, p), where, tuple(confused))
-
-
-#: hypotheses whose scores differ by less than this cannot be told apart
-CONFUSED = 12.0
-
-
-def _separating(one: str, other: str, found: Search) -> str:
-    """Return what recording would tell two effects apart, in words."""
-    plant = found.recordings[0].plant
-    prefix = {one.split(".")[0], other.split(".")[0]}
-    if plant == "flight":
-        if prefix & {"accel", "mag", "gyro"} or user_effect(one) or user_effect(other):
-            return "a run of the module on a rate table, from rest to full spin: there the motion is known"
-        if prefix & {"air"}:
-            return "two throws into opposite directions at one speed, and one much slower"
-        return "throws of both spin directions at half and at full speed"
-    if plant == "rate_table":
-        return "a profile with several plateaus and both directions, and a minute at rest before and after"
-    if plant == "spin_down":
-        return "a run-down from twice the rate and one from half of it, to rest"
-    return "a throw with GPS, or the same module on a rate table"
 
 
 def _heldout_gain(found: Search, trial: Trial) -> float | None:
@@ -278,6 +261,20 @@ def _model(found: Search, effects: Sequence[NamedEffect], law: Law | None) -> Mo
     return Model(environment, disc, rig, tuple(carried), law.for_model() if law is not None else None)
 
 
+def _next_recordings(found: Search, verdict: Verdict, effects: Sequence[NamedEffect]) -> tuple[str, ...]:
+    """Return what to record next, as sentences; what needs no further recording is said, too."""
+    told = [telling_apart(effect.id, other) for effect in effects for other in effect.confused_with]
+    if verdict == "explained" and not told:
+        told.append("Nothing more is needed to tell what is named from the other effects that were tried.")
+    elif verdict == "unexplained":
+        told.append("Recordings that reach further in what the mismatch grows with: they settle the form of a law.")
+    elif not told:
+        told.append("Nothing more is needed: no effect is in doubt.")
+    if len(found.recordings) == 1:
+        told.append("A second recording, unlike the first: with one alone nothing can be set aside to test the answer.")
+    return tuple(dict.fromkeys(told))
+
+
 def _not_carried(effects: Sequence[NamedEffect]) -> list[str]:
     """Return a warning for each effect that model.toml has no place for."""
     return [
@@ -288,15 +285,23 @@ def _not_carried(effects: Sequence[NamedEffect]) -> list[str]:
 
 
 def assemble(
-    found: Search, datasets: Sequence[str], names: Sequence[str], seed: int, law: FoundLaw | None = None
+    found: Search,
+    datasets: Sequence[str],
+    names: Sequence[str],
+    seed: int,
+    law: FoundLaw | None = None,
+    advice: Mapping[tuple[str, str], Advice] = _NO_ADVICE,
 ) -> Outcome:
-    """Return the outcome of a search; a law stands for all that was left out."""
+    """Return the outcome of a search; a law stands for all that was left out.
+
+    ``advice`` is that of `validation.diagnosis.advice.advise`.
+    """
     verdict, unexplained = verdict_of(found)
     if law is not None:
         verdict, unexplained = "unexplained", True
     written = law.law if law is not None else None
     trials = found.final.hypothesis.trials if verdict == "explained" else ()
-    effects = tuple(_named(found, trial, names) for trial in trials)
+    effects = tuple(_named(found, trial, names, advice) for trial in trials)
     located = [place for trial in trials for place in located_effect(found, trial, names)]
     moved = recalibrations(found if not unexplained else found.at_base())
     if verdict == "recalibrated":
@@ -334,7 +339,7 @@ def assemble(
         tuple(_noise_notes(found)),
         held,
         tuple(Outlier(names[i], s, a, t, d) for i, s, a, t, d in found.outliers),
-        tuple(dict.fromkeys(c.next_recording for e in effects for c in e.confused_with if c.next_recording)),
+        _next_recordings(found, verdict, effects),
         (*found.warnings, *_not_carried(effects)),
     )
     model = _model(found if not unexplained else found.at_base(), effects, written)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from discsim.recording import Recording
+from validation.diagnosis.advice import advise
 from validation.diagnosis.answer import Outcome
 from validation.diagnosis.assembly import assemble, verdict_of
 from validation.diagnosis.datasets import recording_names
 from validation.diagnosis.law import find_law
+from validation.diagnosis.plans import Plan
 from validation.diagnosis.rows import competing, row_of
 from validation.diagnosis.search import Search, search
 from validation.diagnosis.user_effects import UserEffect
@@ -37,19 +39,26 @@ def diagnose(
     progress: Callable[[str, int, int], None] = _silent,
     seed: int = 0,
     user_effects: Sequence[UserEffect] = (),
+    plans: Sequence[Plan] | None = None,
 ) -> Outcome:
     """Tell whether the baseline explains recordings of one plant, and if not what was left out.
 
     ``datasets`` are sets of recordings that share their hardware, ``names`` what to call the sets; ``progress`` is
     called with a stage, steps done and steps in all. ``user_effects`` compete with the catalogue's; raises `InputError`
-    for one that acts on motion.
+    for one that acts on motion. ``plans`` are the recordings that could be made where effects cannot be told apart, by
+    default such as are made easily.
     """
     recordings = [recording for dataset in datasets for recording in dataset]
     called = [name for group in recording_names(datasets, names) for name in group]
     with competing(user_effects):
         found = search(recordings, progress)
         law = None
-        if verdict_of(found)[1] or _stacked(found):
+        verdict, unexplained = verdict_of(found)
+        if unexplained or _stacked(found):
             progress("looking for a law", 4, 5)
             law = find_law(found.loose, found.final, found.own, found.loose_noise, recordings)
-        return assemble(found, names, called, seed, law)
+        advice = {}
+        if verdict == "explained" and law is None:
+            progress("asking what to record next", 4, 5)
+            advice = advise(found, called, plans)
+        return assemble(found, names, called, seed, law, advice)

@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from discsim.effects.catalogue import CATALOGUE
-from validation.diagnosis.answer import ParameterValue
+from validation.diagnosis.answer import Confusion, ParameterValue
 
 __all__ = [
     "FORMULAE",
@@ -27,6 +27,7 @@ __all__ = [
     "plus_minus",
     "symbol",
     "target_in_words",
+    "telling_apart",
     "unit",
     "wind_in_words",
     "with_unit",
@@ -172,6 +173,13 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 def name_of(id: str) -> str:
     """Return what an effect is called; an effect of the user's own goes by its id."""
     return FORMULAE[id].name if id in FORMULAE else id
+
+
+def telling_apart(id: str, other: Confusion) -> str:
+    """Return a sentence on what would tell an effect from one that it is confused with; empty where nothing is said."""
+    if not other.next_recording:
+        return ""
+    return f"To tell {name_of(id)} from {name_of(other.id)}: {other.next_recording}"
 
 
 def unit(id: str, name: str) -> str:

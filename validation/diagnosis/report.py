@@ -29,6 +29,7 @@ from validation.diagnosis.formulae import (
     name_of,
     plus_minus,
     target_in_words,
+    telling_apart,
     unit,
     wind_in_words,
 )
@@ -267,13 +268,8 @@ def _further(outcome: Outcome) -> str:
 
 def _next_recordings(diagnosis: Diagnosis) -> list[str]:
     """Return what to record next: what separates confused effects, then the answer's own proposals, each once."""
-    separating = [
-        f"{other.next_recording} (tells {name_of(item.id)} from {name_of(other.id)})"
-        for item in diagnosis.effects
-        for other in item.confused_with
-        if other.next_recording
-    ]
-    return list(dict.fromkeys([*separating, *diagnosis.next_recordings]))
+    separating = [telling_apart(item.id, other) for item in diagnosis.effects for other in item.confused_with]
+    return list(dict.fromkeys(text for text in (*separating, *diagnosis.next_recordings) if text))
 
 
 def _moved(name: str, item: Recalibration) -> tuple[str, str, str, str, str]:

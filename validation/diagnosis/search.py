@@ -33,7 +33,7 @@ from validation.diagnosis.selection import (
 from validation.diagnosis.stated import stated_parameters
 from validation.diagnosis.trials import Trial, parameters_of, trials_for
 
-__all__ = ["Considered", "Search", "search"]
+__all__ = ["Considered", "Rival", "Search", "search"]
 
 Report: TypeAlias = Callable[[str, int, int], None]
 Start: TypeAlias = dict[tuple[tuple[str, str], frozenset[int] | None], float]
@@ -56,6 +56,15 @@ class Considered:
     values: Mapping[str, float]
 
 
+@dataclass(frozen=True)
+class Rival:
+    """An effect in the place of a named one: how much worse the likelihood is (twice its logarithm), and the fit."""
+
+    trial: Trial
+    worse: float
+    tied: Tied
+
+
 @dataclass
 class Search:
     """What the search found: fits of the baseline and of the final hypothesis, and what was considered."""
@@ -69,7 +78,7 @@ class Search:
     final: Tied
     steps: list[Tied] = field(default_factory=list)
     considered: list[Considered] = field(default_factory=list)
-    rivals: dict[str, list[tuple[Trial, float]]] = field(default_factory=dict)
+    rivals: dict[str, list[Rival]] = field(default_factory=dict)
     board: Board | None = None
     #: readings that were left out: (recording, sensor, axis, time, deviations)
     outliers: list[tuple[int, str, str, float, float]] = field(default_factory=list)
@@ -292,7 +301,7 @@ def _rivals(found: Search) -> None:
                 final.fit.noise,
                 {**values_of_fit(final), **_shape_start(scoped)},
             )
-            found.rivals[trial.name].append((scoped, other_fit.score - final.score))
+            found.rivals[trial.name].append(Rival(scoped, other_fit.score - final.score, other_fit))
 
 
 def _shape_start(trial: Trial) -> Start:

@@ -45,8 +45,10 @@ __all__ = [
     "Linear",
     "Readings",
     "chain",
+    "group_of",
     "linearise",
     "moved",
+    "read",
     "readings_of",
     "recut",
     "shown",
@@ -768,7 +770,8 @@ class _Sampled:
         return np.asarray(np.einsum("wn,wn...->n...", self.weights, parts))
 
 
-def _group(sensor: str, axis: int) -> str:
+def group_of(sensor: str, axis: int) -> str:
+    """Return the name under which an axis shares its noise with others."""
     if sensor == "gps":
         return "gps.position" if axis < 3 else "gps.velocity"
     return sensor
@@ -829,7 +832,7 @@ def _stack(
             t.append(readings.t[index])
             sd.append(np.full(index.size, readings.sd[axis]))
             rows = slice(at, at + index.size)
-            channels.append(Channel(s.sensor, readings.axes[axis], _group(s.sensor, axis), rows, index))
+            channels.append(Channel(s.sensor, readings.axes[axis], group_of(s.sensor, axis), rows, index))
             at += index.size
     kind, where, jump = np.full(u, -1), np.zeros(u, dtype=np.int64), np.zeros(u)
     for i in range(gaps.shape[0]):
@@ -873,6 +876,15 @@ def shown(current: Chain, values: Values, sensor: str, t: FloatArray) -> FloatAr
             times, last = runner.times(start, stop, float(out.max()), current.states[i])
             rows[mine] = runner.run(flat[None], wobble[None], current.states[i : i + 1], times, last, out)[0][0]
     return predicted(sensor, recording, values, t, rows)
+
+
+def read(current: Chain, values: Values, readings: Readings) -> FloatArray:
+    """Return what a sensor would read (n, width) of a chain's motion when `readings` are written, clocks and lag too.
+
+    Noise, rounding and range are left to whoever asks.
+    """
+    sampled = _Sampled(current, readings, values)
+    return sampled.weighted(shown(current, values, readings.sensor, sampled.instants))
 
 
 def recut(current: Chain, values: Values, edges: FloatArray) -> Chain:

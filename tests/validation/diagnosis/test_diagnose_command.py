@@ -94,6 +94,16 @@ def test_an_effect_of_ones_own_is_handed_on_and_its_file_kept_in_the_run(monkeyp
     assert str(tmp_path / "mine.py") in json.loads((tmp_path / "out" / "run.json").read_text())["inputs"]
 
 
+def test_a_list_of_recordings_that_could_be_made_is_handed_on_and_kept_in_the_run(monkeypatch, tmp_path, asked):
+    (tmp_path / "mine.toml").write_text("[[recording]]\nrate_rad_s = 30.0\nduration_s = 60.0\n")
+    folder = dataset(tmp_path / "set", "01")
+    arguments = (str(folder), "--candidates", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "out"))
+    assert run(monkeypatch, *arguments) == 0
+    ((_, _, options),) = asked
+    assert [plan.duration for plan in options["plans"]] == [60.0]
+    assert str(tmp_path / "mine.toml") in json.loads((tmp_path / "out" / "run.json").read_text())["inputs"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
