@@ -419,6 +419,8 @@ def _spin(
         still = _smoothed(t, z, coarse, 0.3)
         plane = z - np.interp(t, coarse, still.real) - 1j * np.interp(t, coarse, still.imag)
     rate = rough if expected is not None else _rough_rate(grid, t, plane, step)
+    # the rate's course where another reading shows it better than the phase of a force that may vanish
+    shape = rough if expected is not None and sensor == "accelerometer" else None
     if expected is None and (centripetal := _centripetal(recording)) is not None:
         own = centripetal(grid)
         if sensor == "magnetometer":
@@ -428,6 +430,7 @@ def _spin(
             ratio = rate / np.maximum(own, 1e-3)
             sign = np.sign(np.median(ratio)) or 1.0
             rate = own * sign * float(np.clip(np.median(np.abs(ratio)), 0.8, 1.25))
+            shape = rate
     smooth = np.zeros(grid.size, dtype=complex)
     phase = np.zeros(grid.size)
     weight = np.ones(grid.size)
@@ -441,7 +444,18 @@ def _spin(
         phase = turned + delta
         rate = rate + np.gradient(delta, step)
     amplitude = (np.abs(smooth) / np.maximum(weight, 1e-9)) ** (1 / order)
+    if shape is not None and np.all(np.abs(shape) > SLOW):
+        rate = shape * _weighted_median(rate / shape, amplitude)
+        turned = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)])
+        phase = turned + _weighted_median(phase - turned, amplitude)
+        return _Spin(grid, phase, rate, rate, amplitude, t, plane)
     return _Spin(grid, phase, rate, _without_steps(grid, rate, t, plane, step), amplitude, t, plane)
+
+
+def _weighted_median(value: FloatArray, weight: FloatArray) -> float:
+    order = np.argsort(value)
+    heavy = np.cumsum(weight[order])
+    return float(value[order[min(int(np.searchsorted(heavy, 0.5 * heavy[-1])), value.size - 1)]])
 
 
 def _without_steps(grid: FloatArray, rate: FloatArray, t: FloatArray, z: ComplexArray, step: float) -> FloatArray:
