@@ -18,6 +18,7 @@ from validation.challenge.blind import Request, diagnose_blind, open_answers, se
 from validation.challenge.cases import Concealed, draw_case
 from validation.challenge.conceal import Answer
 from validation.challenge.page import GOALS, goals_met
+from validation.challenge.result import rates_of, read_result
 from validation.challenge.run import challenge
 from validation.challenge.scoring import CaseScore, confusion, rate, score_case, summary
 from validation.challenge.strength import THRESHOLD, noncentrality, strength
@@ -215,6 +216,9 @@ def test_the_summary_counts_what_a_person_would_count():
         "coverage_2sd": (1, 2),
         "off_catalogue_misnamed_rate": (1, 2),
         "off_catalogue_noticed_rate": (1, 2),
+        "law_given_rate": (0, 1),
+        "exponent_given_rate": (0, 0),
+        "exponent_within_2sd_rate": (0, 0),
         "heldout_improved_rate": (1, 1),
         "crash_rate": (1, 7),
     }
@@ -324,22 +328,24 @@ def test_a_challenge_scores_reports_and_goes_on_where_it_was_stopped(tmp_path, s
     requests = [Request(seed, "flight", (), kind) for seed, kind in ((40, "nothing"), (41, "off_catalogue"))]
     requests.append(Request(42, "flight", ("air.wind",)))
     with start_run(tmp_path / "out", 40) as run:
-        scored, rates = challenge(run, requests, workers=1, command=spy)
+        scored = challenge(run, requests, workers=1, command=spy)
     written = json.loads((tmp_path / "out" / "challenge.json").read_text())
     assert [case["right"] for case in written["cases"]] == [True, False, False]
     assert [case["seed"] for case in written["cases"]] == [40, 41, 42]
     assert written["cases"][2]["answer"]["effects"] == ["air.wind"]
     assert written["summary"]["false_alarm_rate"]["count"] == 0
     assert written["summary"]["right_set_rate"]["interval_95"] == [0.0, pytest.approx(0.975)]
-    assert rates["off_catalogue_misnamed_rate"].value == 0.0
+    assert rates_of(scored)["off_catalogue_misnamed_rate"].value == 0.0
     assert scored[2].strength is not None
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "discsim challenge --seed SEED --cases 1" in page
-    assert ">42<" in page
+    assert "discsim challenge --seed 42 --cases 1 --plant flight --effect air.wind" in page
+    assert "discsim challenge --seed 41 --cases 1 --plant flight --kind off_catalogue" in page
+    # what is kept is all that pages are written from
+    assert read_result(tmp_path / "out").scored == scored
     # a second run with a diagnosis that would fail does nothing anew
     Path(spy[1]).write_text("import sys; sys.exit(1)")
     with start_run(tmp_path / "out", 40) as run:
-        again, _ = challenge(run, requests, workers=1, command=spy)
+        again = challenge(run, requests, workers=1, command=spy)
     assert [item.seconds for item in again] == [item.seconds for item in scored]
     # of other code these would be no results
     monkeypatch.setattr("validation.challenge.run.code_digest", lambda: "as it is now")

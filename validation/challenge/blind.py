@@ -43,6 +43,16 @@ class Request(NamedTuple):
         """The case's name in files."""
         return f"case-{self.seed:05d}"
 
+    @property
+    def command(self) -> str:
+        """The command line that does this case alone."""
+        words = ["discsim challenge", f"--seed {self.seed} --cases 1"]
+        words += [f"--plant {self.plant}"] if self.plant else []
+        words += [f"--effect {id}" for id in self.effects]
+        words += [f"--kind {self.kind}"] if self.kind else []
+        words += [f"--mask {self.mask}"] if self.mask else []
+        return " ".join(words)
+
     def draw(self) -> Any:
         """Return the case."""
         return draw_case(self.seed, self.plant, self.effects, self.kind, self.mask)

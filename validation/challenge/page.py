@@ -4,21 +4,31 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE
-from validation.challenge.scoring import Rate, confusion, median, rate
-from validation.figures import new_figure, save_figure
+from validation.challenge.detection import HALF_GOAL, Curve, Sized, detections, fit_curve, has_curve
+from validation.challenge.figures import draw_confusion, draw_detection, draw_deviates, draw_effects, draw_exponents
+from validation.challenge.result import Scored, rates_of, times
+from validation.challenge.scoring import NOTHING, Rate, confusion, has_power_law, median, rate
 from validation.report import Section, write_report
 
-if TYPE_CHECKING:
-    from validation.challenge.run import Scored
-
-__all__ = ["GOALS", "Goal", "goals_met", "write_page"]
+__all__ = [
+    "GOALS",
+    "NAMES",
+    "Goal",
+    "draw_all",
+    "fault_of",
+    "found_of",
+    "goals_met",
+    "hidden_of",
+    "percent",
+    "write_page",
+]
 
 
 class Goal(NamedTuple):
@@ -46,8 +56,8 @@ GOALS: Mapping[str, Goal] = {
 }
 
 
-def goals_met(rates: Mapping[str, Rate], *, few: bool) -> bool:
-    """Tell whether every goal is met that cases bear on.
+def goals_met(rates: Mapping[str, Rate], curve: Curve | None = None, *, few: bool) -> bool:
+    """Tell whether every goal is met that cases bear on, the half-detection size of ``curve`` among them.
 
     ``few`` cases cannot show a rate of one per cent: then a goal counts as missed only where its interval excludes it.
     """
@@ -57,75 +67,85 @@ def goals_met(rates: Mapping[str, Rate], *, few: bool) -> bool:
             return False
         if not few and goal.met(found) is False:
             return False
-    return True
+    return curve is None or (curve.low if few else curve.half) <= HALF_GOAL
 
 
-def write_page(out: Path, scored: Sequence[Scored], rates: Mapping[str, Rate]) -> None:
+def write_page(out: Path, scored: Sequence[Scored]) -> None:
     """Draw the figures and write ``report.html`` into ``out``."""
-    figures = out / "figures"
-    triples = [(item.answer, item.diagnosis, item.score) for item in scored]
-    table = confusion(triples)
-    draw_confusion(table, figures / "confusion.png")
-    sections = [
-        _goals(rates),
-        _kinds(scored),
-        Section(
-            "What was named in place of what",
-            (
-                "Rows are what was concealed, columns what was named; where nothing was named the verdict stands. Of "
-                "two concealed effects each is a row. Violet is right, orange a mistake.",
-            ),
-            figures=[("Concealed (rows) and named (columns), number of cases", figures / "confusion.png")],
-        ),
-        _by_effect(scored),
-    ]
-    deviates = np.array([z for item in scored for each in item.score.deviations if (z := each.in_sd) is not None])
-    if deviates.size:
-        draw_deviates(deviates, figures / "deviates.png")
-        sections.append(
-            Section(
-                "Are the standard errors honest?",
-                (
-                    f"{deviates.size} parameters of effects that were concealed and named, and of coefficients that "
-                    "were stated with a sigma: how many of its own standard deviations each lies off its true value.",
-                ),
-                figures=[("Errors of parameters in their own standard deviations", figures / "deviates.png")],
-            )
+    rates, items = rates_of(scored), detections(scored)
+    figures = draw_all(scored, out / "figures")
+    curve = fit_curve(items)
+    sections = [_goals(rates, curve), _kinds(scored)]
+    if "confusion" in figures:
+        text = (
+            "Rows are what was concealed, columns what was named; where nothing was named the verdict stands. Of two "
+            "concealed effects each is a row. Violet is right, orange a mistake."
         )
-    sized = [(item.strength, item.score.right_set, item) for item in scored if item.strength is not None]
-    if sized:
-        draw_detection([(size, right) for size, right, _ in sized], figures / "detection.png")
-        sections.append(
-            Section(
-                "How small an effect is found",
-                (
-                    "Size of the smaller concealed effect of a case in units of its detection limit: the size at which "
-                    "the recordings of that very case, with everything fitted that is unknown in them, hold just "
-                    "enough information for a gain in chi2 that chance does not give. It is computed without the "
-                    "diagnosis.",
-                ),
-                figures=[("Share of cases named rightly, by size", figures / "detection.png")],
-            )
+        caption = "Concealed (rows) and named (columns), number of cases"
+        sections.append(Section("What was named in place of what", (text,), figures=[(caption, figures["confusion"])]))
+    sections.append(_by_effect(scored))
+    if "deviates" in figures:
+        z = deviates_of(scored)
+        most = np.sqrt(np.mean(z[np.abs(z) <= 4] ** 2))
+        text = (
+            f"{z.size} parameters of effects that were concealed and named, and of coefficients that were stated with "
+            "a sigma: how many of its own standard deviations each lies off its true value. Their root mean square is "
+            f"{np.sqrt(np.mean(z**2)):.2f}, without those beyond 4 it is {most:.2f}; "
+            "honest errors have 1."
         )
+        caption = "Errors of parameters in their own standard deviations"
+        sections.append(Section("Are the standard errors honest?", (text,), figures=[(caption, figures["deviates"])]))
+    if items:
+        sections.append(_detection(items, curve, figures))
+    if any(has_power_law(item.answer) for item in scored):
+        sections.append(_exponents(scored, figures))
     sections.append(_failures(scored))
     right = sum(item.score.right for item in scored)
-    seconds = median([item.seconds for item in scored if item.diagnosis is not None])
     write_report(
         out / "report.html",
         "Blind test of the diagnosis",
-        f"{len(scored)} concealed cases, {right} answered rightly in verdict, effects and place; "
-        f"{seconds:.0f} s a case (median).",
+        f"{len(scored)} concealed cases, {right} answered rightly in verdict, effects and place. "
+        f"A diagnosis takes {times(scored).text}.",
         sections,
     )
 
 
-def _percent(found: Rate) -> tuple[str, str]:
+def deviates_of(scored: Sequence[Scored]) -> FloatArray:
+    """Return the errors of all parameters in their own standard deviations."""
+    return np.array([z for item in scored for each in item.score.deviations if (z := each.in_sd) is not None])
+
+
+def draw_all(scored: Sequence[Scored], folder: Path, prefix: str = "") -> dict[str, Path]:
+    """Draw what the cases can show into ``folder``; return the files by name."""
+    drawn = {}
+    table = confusion([(item.answer, item.diagnosis, item.score) for item in scored])
+    drawn["confusion"] = folder / f"{prefix}confusion.png"
+    draw_confusion(table, drawn["confusion"])
+    z = deviates_of(scored)
+    if z.size:
+        drawn["deviates"] = folder / f"{prefix}deviates.png"
+        draw_deviates(z, drawn["deviates"])
+    items = detections(scored)
+    if items:
+        drawn["detection"], drawn["effects"] = folder / f"{prefix}detection.png", folder / f"{prefix}effects.png"
+        draw_detection(items, fit_curve(items), drawn["detection"])
+        draw_effects(items, drawn["effects"])
+    exponents = [item.score.exponent for item in scored if item.score.exponent is not None]
+    if exponents:
+        drawn["exponents"] = folder / f"{prefix}exponents.png"
+        draw_exponents(exponents, drawn["exponents"])
+    return drawn
+
+
+def percent(found: Rate) -> tuple[str, str]:
+    """Return a share and its interval as text."""
     if not found.of:
         return "–", "no such case"
     return f"{100 * found.value:.1f} %", f"{100 * found.low:.1f} to {100 * found.high:.1f} %"
 
 
-_NAMES = {
+#: rate of the summary -> what it is, in words
+NAMES: Mapping[str, str] = {
     "false_alarm_rate": "false alarms: something named, or unexplained, where nothing is hidden",
     "right_set_rate": "effects named rightly, all sizes",
     "right_set_rate_above_twice_the_limit": "effects named rightly, above twice the detection limit",
@@ -136,19 +156,29 @@ _NAMES = {
     "coverage_2sd": "parameters within 2 standard deviations",
     "off_catalogue_misnamed_rate": "physics of no catalogue named as an effect of the catalogue",
     "off_catalogue_noticed_rate": "physics of no catalogue found unexplained",
+    "law_given_rate": "a law given for what is found unexplained",
+    "exponent_given_rate": "power laws: an exponent given",
+    "exponent_within_2sd_rate": "power laws: exponent within 2 standard deviations",
     "heldout_improved_rate": "held-out recordings fit better (effects named rightly)",
     "crash_rate": "no answer at all",
 }
 
 
-def _goals(rates: Mapping[str, Rate]) -> Section:
+def _goals(rates: Mapping[str, Rate], curve: Curve | None) -> Section:
     rows = []
     for name, found in rates.items():
         goal = GOALS.get(name)
         met = goal.met(found) if goal else None
-        share, interval = _percent(found)
+        share, interval = percent(found)
         state = {True: "ok", False: "FAIL", None: ""}[met]
-        rows.append((_NAMES[name], share, f"{found.hits} of {found.of}", interval, goal.text if goal else "", state))
+        rows.append((NAMES[name], share, f"{found.hits} of {found.of}", interval, goal.text if goal else "", state))
+    if curve is not None:
+        state = "ok" if curve.half <= HALF_GOAL else "FAIL"
+        size, _, interval = curve.text.partition(" (")
+        cases = f"{curve.named} of {curve.cases}"
+        goal_text = f"at most {HALF_GOAL:g} limits"
+        what = "size at which half are named, in detection limits"
+        rows.append((what, size, cases, interval.rstrip(")"), goal_text, state))
     text = "Intervals are Clopper and Pearson's, of 95 %. Goals are meant for 300 cases or more."
     return Section("Result", (text,), ("", "share", "cases", "95 % interval", "goal", ""), rows)
 
@@ -184,18 +214,120 @@ def _by_effect(scored: Sequence[Scored]) -> Section:
             for each in item.score.deviations
             if each.effect == id and (z := each.in_sd) is not None
         ]
+        own = [item for item in detections(mine) if item.effect == id]
+        missed = [item.size for item in own if not item.named]
+        curve = fit_curve(own) if has_curve(own) else None
         confused = Counter(other for item in mine for other in item.score.named if other not in item.answer.effects)
         rows.append(
             (
                 id,
                 str(len(mine)),
                 str(len(found)),
-                f"{sum(z <= 2 for z in deviates)} of {len(deviates)}" if deviates else "–",
+                f"{max(missed):.2g}" if missed else "–",
+                curve.text if curve is not None else "",
+                *(f"{sum(z <= most for z in deviates)} of {len(deviates)}" if deviates else "–" for most in (1, 2)),
                 ", ".join(f"{other} ({n})" for other, n in confused.most_common(3)),
             )
         )
-    header = ("effect", "cases", "named", "parameters within 2 sd", "named beside or instead")
-    return Section("By effect", (), header, rows)
+    text = (
+        "Sizes are in units of the detection limit of each case; the half-detection size stands where enough cases "
+        "were named and enough were not."
+    )
+    header = (
+        "effect",
+        "cases",
+        "named",
+        "largest that was not",
+        "half are named at",
+        "parameters within 1 sd",
+        "within 2 sd",
+        "named beside or instead",
+    )
+    return Section("By effect", (text,), header, rows)
+
+
+def _detection(items: Sequence[Sized], curve: Curve | None, figures: Mapping[str, Path]) -> Section:
+    text = [
+        "Size of each concealed effect in units of its detection limit: the size at which the recordings of that very "
+        "case, with everything fitted that is unknown in them, hold just enough information for a gain in chi2 that "
+        "chance does not give. It is computed without the diagnosis. The green curve is what an ideal test would do."
+    ]
+    if curve is not None:
+        text.append(
+            f"Half-detection size in detection limits: {curve.text} (a logistic in the logarithm of the size, "
+            f"with {100 * curve.missed:.0f} % missed however large); the goal is {HALF_GOAL:g}."
+        )
+    drawn = [
+        ("Share of effects named, by size", figures["detection"]),
+        ("Each effect by size, named or not", figures["effects"]),
+    ]
+    return Section("How small an effect is found", text, figures=drawn)
+
+
+def _exponents(scored: Sequence[Scored], figures: Mapping[str, Path]) -> Section:
+    rows = []
+    for item in scored:
+        if not has_power_law(item.answer):
+            continue
+        found = item.score.exponent
+        told = ("–", "–", "–")
+        if found is not None:
+            sd, off = found.sd, found.in_sd
+            told = (
+                f"{found.value:.4g}",
+                f"{sd:.2g}" if sd is not None else "–",
+                f"{off:+.2f}" if off is not None else "–",
+            )
+        answer = item.answer
+        rows.append(
+            (
+                str(answer.seed),
+                answer.plant.replace("_", " "),
+                f"{answer.parameters['exponent']:g}",
+                *told,
+                found_of(item),
+            )
+        )
+    header = ("seed", "plant", "concealed", "found", "sd", "error in sd", "verdict")
+    drawn = [("Exponents found against concealed", figures["exponents"])] if "exponents" in figures else []
+    text = "A torque about the spin axis with a power of the spin rate that no catalogue has: the exponent of the law."
+    return Section("Exponents of power laws", (text,), header, rows, drawn)
+
+
+def hidden_of(item: Scored) -> str:
+    """Return what was concealed, in words."""
+    return ", ".join(item.answer.effects) or item.answer.law or item.answer.verdict
+
+
+def found_of(item: Scored) -> str:
+    """Return what the diagnosis said, in words."""
+    verdict = "no answer" if item.diagnosis is None else str(item.diagnosis["verdict"])
+    said = ", ".join(item.score.named) or verdict
+    return said + (" (in another place)" if item.score.right_set and item.score.right_place is False else "")
+
+
+def fault_of(item: Scored) -> str:
+    """Return in which way a case was answered wrongly; empty where it was answered rightly."""
+    answer, score = item.answer, item.score
+    if score.right:
+        return ""
+    if score.crashed or item.diagnosis is None:
+        return "no answer"
+    alarm = item.diagnosis["verdict"] in ("explained", "unexplained")
+    if answer.kind in NOTHING:
+        return "false alarm" if alarm else "consistent and recalibrated confused"
+    if answer.kind == "off_catalogue":
+        return "physics of no catalogue named as an effect" if score.named else "physics of no catalogue not noticed"
+    hidden, named = set(answer.effects), set(score.named)
+    if named == hidden:
+        return "right effects in another place"
+    if not alarm:
+        return "not noticed"
+    if not named:
+        return "noticed, called unexplained"
+    if named < hidden:
+        return "one of two effects not named"
+    return "effects named beside the right ones" if hidden < named else "another effect named"
 
 
 def _failures(scored: Sequence[Scored]) -> Section:
@@ -203,90 +335,13 @@ def _failures(scored: Sequence[Scored]) -> Section:
     for item in scored:
         if item.score.right:
             continue
-        answer = item.answer
-        hidden = ", ".join(answer.effects) or answer.law or answer.verdict
-        verdict = "no answer" if item.diagnosis is None else str(item.diagnosis["verdict"])
-        said = ", ".join(item.score.named) or verdict
-        if item.score.right_set and item.score.right_place is False:
-            said += " (in another place)"
         size = "" if item.strength is None else f"{item.strength:.2g}"
-        rows.append((str(answer.seed), answer.plant.replace("_", " "), hidden, size, said, (item.error or "")[:200]))
+        what = (fault_of(item), hidden_of(item), size, found_of(item), (item.error or "")[-200:], item.reproduce)
+        rows.append((str(item.answer.seed), *what))
     text = (
-        "Each is reproduced alone by its seed: discsim challenge --seed SEED --cases 1 (its recordings: python -m "
-        "validation.challenge.conceal --seed SEED --out DIR). Size is in units of the detection limit."
+        "Each is reproduced alone by its command; its recordings and its answer are written by python -m "
+        "validation.challenge.conceal --seed SEED --out DIR with the same options. Size is that of the least concealed "
+        "effect in units of its detection limit."
     )
-    header = ("seed", "plant", "concealed", "size", "found", "error")
+    header = ("seed", "fault", "concealed", "size", "found", "error", "command")
     return Section("Failures" if rows else "No failures", (text,) if rows else (), header if rows else (), rows)
-
-
-# ---------------------------------------------------------------------------------------------- figures
-
-
-def draw_confusion(table: Mapping[str, Mapping[str, int]], path: Path) -> None:
-    """Draw the confusion matrix with its numbers; only what occurs has a row or a column."""
-    columns = [id for id in CATALOGUE if any(id in row for row in table.values())]
-    verdicts = ("explained", "unexplained", "recalibrated", "consistent", "no answer")
-    columns += [verdict for verdict in verdicts if any(verdict in row for row in table.values())]
-    rows = list(table)
-    counts = np.array([[table[row].get(column, 0) for column in columns] for row in rows], dtype=float)
-    right = np.array([[row == column or (row, column) in _RIGHT for column in columns] for row in rows])
-    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
-    shade = np.where(right, 1.0, -1.0) * np.where(counts > 0, 0.3 + 0.7 * shares, 0.0)
-    figure, axes = new_figure(width=3.4 + 0.27 * len(columns), height=2.2 + 0.24 * len(rows))
-    # orange and blue, which colour-blind readers can tell apart, light enough for black numbers
-    axes.imshow(shade, cmap="PuOr", vmin=-1.6, vmax=1.6, aspect="auto")
-    for i, j in zip(*np.nonzero(counts), strict=True):
-        axes.text(j, i, f"{counts[i, j]:.0f}", ha="center", va="center", fontsize=8)
-    axes.set_xticks(range(len(columns)), columns, rotation=90, fontsize=8)
-    axes.set_yticks(range(len(rows)), rows, fontsize=8)
-    axes.tick_params(length=0)
-    axes.grid(False)
-    axes.xaxis.tick_top()
-    axes.set_ylabel("concealed")
-    save_figure(figure, path)
-
-
-_RIGHT = {("nothing", "consistent"), ("nothing", "recalibrated"), ("off-catalogue", "unexplained")}
-
-
-def draw_deviates(deviates: np.ndarray, path: Path) -> None:
-    """Draw the errors of parameters in their own standard deviations against a standard normal distribution."""
-    figure, axes = new_figure(width=7.0, height=3.4)
-    edges = np.arange(-6.0, 6.5, 0.5)
-    shown = np.clip(deviates, -5.99, 5.99)
-    axes.hist(shown, bins=edges, color="#56b4e9", edgecolor="white", label="parameters")
-    z = np.linspace(-6, 6, 241)
-    axes.plot(z, deviates.size * 0.5 * np.exp(-(z**2) / 2) / np.sqrt(2 * np.pi), color="k", label="standard normal")
-    beyond = int(np.count_nonzero(np.abs(deviates) > 6))
-    axes.set_xlabel("(found - concealed) / sd" + (f"; {beyond} beyond 6 stand at the ends" if beyond else ""))
-    axes.set_ylabel("number")
-    axes.legend()
-    save_figure(figure, path)
-
-
-def draw_detection(sized: Sequence[tuple[float, bool]], path: Path) -> None:
-    """Draw the share of cases named rightly by size over detection limit, with exact intervals, in bins of a factor."""
-    edges = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 4.0, 10.0, 30.0, 100.0, np.inf])
-    sizes = np.array([size for size, _ in sized])
-    right = np.array([ok for _, ok in sized])
-    figure, axes = new_figure(width=7.0, height=3.6)
-    rng = np.random.default_rng(0)
-    shown = np.clip(sizes, 0.2, 500.0)
-    axes.plot(shown, np.where(right, 1.04, -0.04) + rng.uniform(-0.02, 0.02, sizes.size), ".", color="#7f7f7f", ms=4)
-    for low, high in pairwise(edges):
-        mine = (sizes >= low) & (sizes < high)
-        if mine.any():
-            found = rate(bool(ok) for ok in right[mine])
-            middle = float(np.exp(np.mean(np.log(shown[mine]))))
-            error = [[found.value - found.low], [found.high - found.value]]
-            axes.errorbar([middle], [found.value], yerr=error, fmt="o", color="#0072b2", capsize=2)
-    axes.axvline(1.0, color="k", lw=0.8, ls="--")
-    axes.axvline(2.0, color="#d55e00", lw=0.8, ls="--")
-    axes.axhline(0.5, color="#999999", lw=0.6)
-    axes.set_xscale("log")
-    axes.set_xlim(0.18, 600.0)
-    axes.set_ylim(-0.1, 1.1)
-    axes.set_xlabel("size / detection limit (dashed: the limit, and twice the limit)")
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.set_ylabel("share named rightly")
-    save_figure(figure, path)

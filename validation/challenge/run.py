@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,58 +11,20 @@ import numpy as np
 
 import discsim
 from validation.challenge.blind import DIAGNOSE, Request, diagnose_blind, open_answers, seal_answers
-from validation.challenge.conceal import Answer
+from validation.challenge.detection import detections, fit_curve
 from validation.challenge.page import write_page
-from validation.challenge.scoring import CaseScore, Rate, score_case, summary
-from validation.challenge.strength import strength
+from validation.challenge.result import RESULT, Scored, rates_of, times
+from validation.challenge.scoring import score_case
+from validation.challenge.strength import sizes
 from validation.run import Run, package_version
 from validation.sweeps.execution import Task, claim, discard, run_tasks
 
-__all__ = ["Scored", "challenge", "limit_of"]
+__all__ = ["challenge", "limit_of"]
 
 #: folder of what is done, in --out
 CHECKPOINTS = "checkpoints"
-
-
-@dataclass(frozen=True)
-class Scored:
-    """One case, opened: its answer, the diagnosis (None where there is none), its score, time and detection limit.
-
-    ``strength`` is the concealed size in units of the smallest that can be seen (the least of several); None where
-    nothing, or nothing of the catalogue, is concealed.
-    """
-
-    answer: Answer
-    diagnosis: dict[str, Any] | None
-    score: CaseScore
-    error: str | None
-    seconds: float
-    recordings_sha256: str
-    strength: float | None
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the entry of ``challenge.json``."""
-        answer = self.answer
-        return {
-            "seed": answer.seed,
-            "answer": {
-                "verdict": answer.verdict,
-                "effects": list(answer.effects),
-                "recordings": "all" if answer.recordings is None else list(answer.recordings),
-                "parameters": answer.parameters,
-                "moved": answer.moved,
-                "law": answer.law,
-                "plant": answer.plant,
-                "kind": answer.kind,
-            },
-            "diagnosis": self.diagnosis,
-            "right": self.score.right,
-            "score": self.score.to_json(),
-            "size_over_limit": self.strength,
-            "error": self.error,
-            "seconds": self.seconds,
-            "recordings_sha256": self.recordings_sha256,
-        }
+#: what is done with finished cases: a change of it is no reason to do them again
+_AFTERWARDS = ("detection.py", "document.py", "figures.py", "masks.py", "page.py", "result.py", "run.py", "scoring.py")
 
 
 def challenge(
@@ -74,7 +35,7 @@ def challenge(
     workers: int | None = None,
     anew: bool = False,
     command: Sequence[str] | None = None,
-) -> tuple[list[Scored], dict[str, Rate]]:
+) -> list[Scored]:
     """Put the diagnosis to the test; write ``challenge.json`` and ``report.html`` into the run's folder.
 
     ``command`` is another command that diagnoses (its folder of recordings and ``--out DIR`` are appended). What is
@@ -117,34 +78,44 @@ def challenge(
             result["error"],
             result["seconds"],
             result["recordings_sha256"],
-            limit["strength"],
+            limit["sizes"],
+            request.command,
         )
-        for answer, result, limit in zip(open_answers(requests, run.out), results, limits, strict=True)
+        for request, answer, result, limit in zip(
+            requests, open_answers(requests, run.out), results, limits, strict=True
+        )
     ]
-    rates = summary([(item.answer, item.diagnosis, item.score) for item in scored], [item.strength for item in scored])
+    curve = fit_curve(detections(scored))
     run.write_json(
-        "challenge.json",
+        RESULT,
         {
             "command": list(command or DIAGNOSE[1:]),
+            "made_by": " ".join(["discsim", *run.command]),
             "version": package_version(),
+            "code_sha256": versions["code"],
+            "mask": requests[0].mask,
             "cases": [item.to_json() for item in scored],
-            "summary": {name: value.to_json() for name, value in rates.items()},
+            "summary": {name: value.to_json() for name, value in rates_of(scored).items()},
+            "half_detection": curve.to_json() if curve is not None else None,
+            "seconds": times(scored).to_json(),
         },
     )
-    write_page(run.out, scored, rates)
-    return scored, rates
+    write_page(run.out, scored)
+    return scored
 
 
 def code_digest() -> str:
-    """Return the SHA-256 of the simulation, the diagnosis and this test: a result of other code is no result of it."""
+    """Return the SHA-256 of simulation, diagnosis and concealment: a result of other code is no result of it."""
     total = hashlib.sha256()
     here = Path(__file__).parents[1]
     for folder in (Path(discsim.__file__).parent, here / "diagnosis", here / "challenge"):
         for file in sorted(folder.rglob("*.py")):
+            if folder.name == "challenge" and file.name in _AFTERWARDS:
+                continue
             total.update(str(file.relative_to(folder)).encode() + b"\0" + file.read_bytes() + b"\0")
     return total.hexdigest()
 
 
-def limit_of(request: tuple[Any, ...], shared: Any) -> dict[str, float | None]:
-    """Return how far above its detection limit a case's smallest concealed effect is."""
-    return {"strength": strength(Request(*request).draw())}
+def limit_of(request: tuple[Any, ...], shared: Any) -> dict[str, dict[str, float]]:
+    """Return how far above their detection limits a case's concealed effects are."""
+    return {"sizes": sizes(Request(*request).draw())}

@@ -5,6 +5,7 @@ Everything here is told by two documents, an `Answer` and the content of a ``dia
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -18,7 +19,7 @@ from discsim.effects.catalogue import CATALOGUE, row
 from discsim.errors import InputError
 from validation.challenge.conceal import Answer
 
-__all__ = ["NOTHING", "CaseScore", "Deviation", "Rate", "confusion", "rate", "score_case", "summary"]
+__all__ = ["NOTHING", "CaseScore", "Deviation", "Rate", "confusion", "has_power_law", "rate", "score_case", "summary"]
 
 #: an event is in the right place within this, s (docs/diagnosis contract)
 INSTANT_S = 0.1
@@ -28,6 +29,8 @@ NOTHING = ("nothing", "noise", "within_sigma", "beyond_sigma")
 _ALARMS = ("explained", "unexplained")
 #: keys under which a rig's friction may stand in ``recalibrated``
 _RIG_KEYS = {"viscous_N_m_s": ("viscous_N_m_s", "viscous")}
+#: the power of the spin rate in a law's text: a number, or the name of a coefficient
+_POWER_OF_RATE = re.compile(r"\|r\|\^([\w.]+)")
 
 
 class Deviation(NamedTuple):
@@ -46,6 +49,10 @@ class Deviation(NamedTuple):
             return None
         return (self.value - self.true) / self.sd
 
+    def to_json(self) -> dict[str, Any]:
+        """Return what ``challenge.json`` keeps of it."""
+        return {**self._asdict(), "in_sd": self.in_sd}
+
 
 @dataclass(frozen=True)
 class CaseScore:
@@ -53,7 +60,8 @@ class CaseScore:
 
     ``right_place`` is None where nothing was concealed that has a place (an event, a sensor). ``named`` are the ids
     that the diagnosis names; ``within_confusion`` tells that each concealed effect is named or listed as
-    indistinguishable from one that is, and nothing else is named.
+    indistinguishable from one that is, and nothing else is named. ``law_given`` tells that the diagnosis has a law,
+    ``exponent`` how its power of the spin rate compares with the concealed one, where there is one.
     """
 
     named: tuple[str, ...]
@@ -65,6 +73,8 @@ class CaseScore:
     heldout_before: float | None
     heldout_after: float | None
     crashed: bool = False
+    law_given: bool = False
+    exponent: Deviation | None = None
 
     @property
     def right(self) -> bool:
@@ -74,7 +84,8 @@ class CaseScore:
     def to_json(self) -> dict[str, Any]:
         """Return what ``challenge.json`` keeps of it."""
         kept = asdict(self)
-        kept["deviations"] = [{**item._asdict(), "in_sd": item.in_sd} for item in self.deviations]
+        kept["deviations"] = [item.to_json() for item in self.deviations]
+        kept["exponent"] = self.exponent.to_json() if self.exponent is not None else None
         return kept
 
 
@@ -101,6 +112,8 @@ def score_case(answer: Answer, diagnosis: Mapping[str, Any] | None) -> CaseScore
             deviations=tuple(_deviations(answer, effects, diagnosis["recalibrated"])),
             heldout_before=before,
             heldout_after=after,
+            law_given=diagnosis["law"] is not None,
+            exponent=_exponent(answer, diagnosis["law"]),
         )
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(
@@ -164,6 +177,26 @@ def _deviations(
         for key in _RIG_KEYS.get(name, (name,)):
             if key in recalibrated:
                 yield Deviation("recalibrated", name, true, recalibrated[key]["value"], recalibrated[key]["sd"])
+
+
+def has_power_law(answer: Answer) -> bool:
+    """Tell whether what is concealed is a torque with a power law."""
+    return answer.kind == "off_catalogue" and "exponent" in answer.parameters
+
+
+def _exponent(answer: Answer, law: Mapping[str, Any] | None) -> Deviation | None:
+    """Return the power of the spin rate in a law against the concealed one; None where either has none.
+
+    The law must be one steady term about the spin axis; a power that the law states and did not fit has no sd.
+    """
+    if law is None or not has_power_law(answer) or law["target"] != "moment_z_N_m" or "exp(" in law["text"]:
+        return None
+    powers = _POWER_OF_RATE.findall(law["text"])
+    if len(powers) != 1:
+        return None
+    found = law["coefficients"].get(powers[0])
+    value, sd = (found["value"], found["sd"]) if found is not None else (float(powers[0]), None)
+    return Deviation("law", "exponent", answer.parameters["exponent"], value, sd)
 
 
 def _one_way_to_say_it(id: str, found: dict[str, tuple[float, float | None]]) -> dict[str, tuple[float, float | None]]:
@@ -231,6 +264,7 @@ def summary(
     ]
     unknown = [(d, s) for a, d, s in scored if a.kind == "off_catalogue"]
     deviates = [z for _, _, s in scored for item in s.deviations if (z := item.in_sd) is not None]
+    exponents = [z for _, _, s in scored if s.exponent is not None and (z := s.exponent.in_sd) is not None]
     placed = [s.right_place for _, _, s in scored if s.right_place is not None]
     gained = [
         s.heldout_after < s.heldout_before
@@ -248,6 +282,9 @@ def summary(
         "coverage_2sd": rate(abs(z) <= 2.0 for z in deviates),
         "off_catalogue_misnamed_rate": rate(d is not None and d["verdict"] == "explained" for d, _ in unknown),
         "off_catalogue_noticed_rate": rate(d is not None and d["verdict"] == "unexplained" for d, _ in unknown),
+        "law_given_rate": rate(s.law_given for d, s in unknown if d is not None and d["verdict"] == "unexplained"),
+        "exponent_given_rate": rate(s.exponent is not None for a, _, s in scored if has_power_law(a)),
+        "exponent_within_2sd_rate": rate(abs(z) <= 2.0 for z in exponents),
         "heldout_improved_rate": rate(gained),
         "crash_rate": rate(s.crashed for _, _, s in scored),
     }

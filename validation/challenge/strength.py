@@ -28,7 +28,7 @@ from discsim.trajectory import predict
 from validation.challenge.cases import Case, Coast, Concealed, Run, Turning
 from validation.challenge.sizes import HIDING
 
-__all__ = ["THRESHOLD", "strength"]
+__all__ = ["THRESHOLD", "sizes", "strength"]
 
 #: gain in chi2 that chance does not bring among fifty hypotheses of one to three parameters: 25 + 2 ln(n) and more
 THRESHOLD = 40.0
@@ -42,9 +42,12 @@ Readings: TypeAlias = Mapping[str, tuple[FloatArray, FloatArray]]
 
 def strength(case: Case) -> float | None:
     """Return the least concealed effect's size in units of its detection limit; None where none is concealed."""
-    if not case.concealed:
-        return None
-    return min(sqrt(max(noncentrality(case, item), 0.0) / THRESHOLD) for item in case.concealed)
+    return min(sizes(case).values(), default=None)
+
+
+def sizes(case: Case) -> dict[str, float]:
+    """Return each concealed effect's size in units of its detection limit, by id."""
+    return {item.effect.id: sqrt(max(noncentrality(case, item), 0.0) / THRESHOLD) for item in case.concealed}
 
 
 def noncentrality(case: Case, item: Concealed) -> float:
@@ -97,16 +100,16 @@ def _orthonormal(columns: FloatArray) -> FloatArray:
 def _small(item: Effect, case: Case) -> tuple[Effect, float]:
     """Return the effect at a size where readings are linear in it, and the share of its size that this is."""
     hiding = HIDING[item.id]
-    sizes = item.value._asdict()
+    values = item.value._asdict()
     if item.id.endswith("dropped_samples"):
         # what the losses do on average: a clock that runs slow by the share that is lost
-        return effect(item.id.replace("dropped_samples", "clock_rate"), ratio=1.0 - 1e-5), 1e-5 / sizes["fraction"]
+        return effect(item.id.replace("dropped_samples", "clock_rate"), ratio=1.0 - 1e-5), 1e-5 / values["fraction"]
     if item.id == "accel.saturation":
         return item, 1.0  # a clipped reading is not linear in the limit
-    size = float(np.linalg.norm([sizes[name] - hiding.about for name in hiding.sized]))
+    size = float(np.linalg.norm([values[name] - hiding.about for name in hiding.sized]))
     share = min(1.0, 0.1 * hiding.limits(case.plant)[0] / size)
-    small = {name: hiding.about + share * (sizes[name] - hiding.about) for name in hiding.sized}
-    return effect(item.id, **{**sizes, **small}), share
+    small = {name: hiding.about + share * (values[name] - hiding.about) for name in hiding.sized}
+    return effect(item.id, **{**values, **small}), share
 
 
 # ---------------------------------------------------------------------------------------------- readings

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -12,7 +12,8 @@ from validation.options import OutOption, SeedOption
 
 if TYPE_CHECKING:
     from discsim.recording import Plant
-    from validation.challenge.cases import Mask
+    from validation.challenge.cases import Kind, Mask
+    from validation.challenge.result import Scored
 
 __all__ = ["command"]
 
@@ -26,9 +27,22 @@ class PlantName(enum.StrEnum):
     free_spin = "free_spin"
 
 
+class KindName(enum.StrEnum):
+    """What is concealed."""
+
+    nothing = "nothing"
+    noise = "noise"
+    within_sigma = "within_sigma"
+    beyond_sigma = "beyond_sigma"
+    one = "one"
+    two = "two"
+    off_catalogue = "off_catalogue"
+
+
 class MaskName(enum.StrEnum):
     """Under what an effect hides."""
 
+    all = "all"
     stated_loosely = "stated_loosely"
     coloured_noise = "coloured_noise"
     second_effect = "second_effect"
@@ -45,8 +59,13 @@ def command(
         list[str] | None,
         typer.Option(help="Conceal this in every case, an id of the catalogue; may repeat. Default: as drawn."),
     ] = None,
+    kind: Annotated[KindName | None, typer.Option(help="Only this kind of case. Default: as drawn.")] = None,
     mask: Annotated[
-        MaskName | None, typer.Option(help="Put this over every case, to see how the score degrades.")
+        MaskName | None,
+        typer.Option(
+            help="Put this over every case, to see how the score degrades; all: one mask after another, each in a "
+            "folder of its own."
+        ),
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a running Dask scheduler. Default: local processes.")
@@ -68,22 +87,40 @@ def command(
     """
     from discsim.errors import InputError
     from validation.challenge.blind import Request
+    from validation.challenge.detection import detections, fit_curve
+    from validation.challenge.masks import challenge_masks
     from validation.challenge.page import goals_met
+    from validation.challenge.result import rates_of
     from validation.challenge.run import challenge
     from validation.run import start_run
 
     if scheduler is not None and workers is not None:
         raise InputError("--workers counts local processes, and --scheduler uses none; expected one of the two")
     chosen: Plant | None = plant.value if plant is not None else None
-    over: Mask | None = mask.value if mask is not None else None
-    requests = [Request(number, chosen, tuple(effect or ()), None, over) for number in range(seed, seed + cases)]
+    only: Kind | None = kind.value if kind is not None else None
+    over: Mask | None = None
+    if mask is not None and mask is not MaskName.all:
+        over = cast("Mask", mask.value)
+    requests = [Request(number, chosen, tuple(effect or ()), only, over) for number in range(seed, seed + cases)]
     requests[0].draw()  # what does not go together is refused before anything is written
+    results: dict[Mask | None, list[Scored]]
     with start_run(out, seed) as run:
-        scored, rates = challenge(run, requests, scheduler=scheduler, workers=workers, anew=anew)
-    for name, found in rates.items():
-        share = f"{100 * found.value:.1f} % ({found.hits} of {found.of})" if found.of else "no such case"
-        typer.echo(f"{name.replace('_', ' ')}: {share}")
-    right = sum(item.score.right for item in scored)
-    typer.echo(f"{right} of {len(scored)} answered rightly; report: {out / 'report.html'}")
-    if not goals_met(rates, few=len(scored) < 300):
+        if mask is MaskName.all:
+            results = challenge_masks(run, requests, scheduler=scheduler, workers=workers, anew=anew)
+        else:
+            results = {over: challenge(run, requests, scheduler=scheduler, workers=workers, anew=anew)}
+    met = True
+    for name, scored in results.items():
+        if mask is MaskName.all:
+            typer.echo(f"\n{name}")
+        rates, curve = rates_of(scored), fit_curve(detections(scored))
+        for label, found in rates.items():
+            share = f"{100 * found.value:.1f} % ({found.hits} of {found.of})" if found.of else "no such case"
+            typer.echo(f"{label.replace('_', ' ')}: {share}")
+        if curve is not None:
+            typer.echo(f"half-detection size, in detection limits: {curve.text}")
+        typer.echo(f"{sum(item.score.right for item in scored)} of {len(scored)} answered rightly")
+        met = met and goals_met(rates, curve, few=len(scored) < 300)
+    typer.echo(f"report: {out / 'report.html'}")
+    if not met:
         raise typer.Exit(1)

@@ -1,0 +1,246 @@
+"""Write finished challenges into the page on the blind test.
+
+    python -m validation.challenge.document challenge --masks challenge-masks
+
+puts result, confusions, failures (each with the command that reproduces it) and figures of the challenge in the folder
+``challenge`` into docs/challenge.md, and of each mask finished in ``challenge-masks`` a row into its table of masks.
+Only what stands between the page's marks is replaced.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from discsim.errors import InputError
+from discsim.files import read_text, write_text
+from validation.challenge.cases import KINDS, PLANT_SHARES
+from validation.challenge.detection import HALF_GOAL, detections, fit_curve
+from validation.challenge.masks import MASK_HEADER, mask_row, masked_results
+from validation.challenge.page import GOALS, NAMES, deviates_of, draw_all, fault_of, found_of, hidden_of, percent
+from validation.challenge.result import Result, Scored, rates_of, read_result, times
+from validation.challenge.scoring import confusion, has_power_law, rate
+
+__all__ = ["masks_text", "result_text", "with_part"]
+
+PAGE = Path("docs/challenge.md")
+#: beginning of the names of the page's figures
+PREFIX = "challenge-"
+#: figures of the page, and what they show
+_FIGURES = {
+    "detection": "Share of effects named, by size in units of the detection limit",
+    "effects": "Each concealed effect by size, named or not",
+    "confusion": "What was concealed (rows) and what was named (columns)",
+    "deviates": "Errors of parameters in their own standard deviations",
+    "exponents": "Exponents of laws found against those concealed",
+}
+
+
+def with_part(page: str, name: str, text: str) -> str:
+    """Return the page with ``text`` between its marks ``<!-- name -->`` and ``<!-- /name -->``.
+
+    Raises `InputError` where the page lacks the marks.
+    """
+    start, end = f"<!-- {name} -->\n", f"<!-- /{name} -->"
+    before, mark, rest = page.partition(start)
+    _, closed, after = rest.partition(end)
+    if not (mark and closed):
+        raise InputError(f"the page has no marks {start.strip()} and {end}; expected both, each on a line of its own")
+    return f"{before}{start}{text.strip()}\n{end}{after}"
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table of Markdown."""
+    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    lines += ["| " + " | ".join(_cell(cell) for cell in row) + " |" for row in rows]
+    return "\n".join(lines)
+
+
+def _cell(text: str) -> str:
+    return re.sub(r"\s+", " ", text).replace("|", "\\|")
+
+
+def plain_command(command: str) -> str:
+    """Return a command without what says where and by whom it was run."""
+    return re.sub(r" --(out|scheduler|workers)[ =]\S+| --anew", "", command)
+
+
+def made_by(result: Result) -> str:
+    """Return a line that says how a result was made."""
+    first, last = result.seeds
+    return (
+        f"`{plain_command(result.command)}` (seeds {first} to {last}), discsim {result.version}, code "
+        f"`{result.code[:12]}`: {len(result.scored)} cases."
+    )
+
+
+def result_text(result: Result, figures: Sequence[str]) -> str:
+    """Return the page's part on a challenge; ``figures`` are the names of those that are drawn."""
+    scored = result.scored
+    right = sum(item.score.right for item in scored)
+    parts = [
+        f"{made_by(result)} {right} are answered rightly in verdict, effects and place. A diagnosis takes "
+        f"{times(scored).text}, wall clock. A challenge of the same code gives the same; "
+        "the code's digest stands in `challenge.json`.",
+        _goals(scored),
+    ]
+    parts += [f"![{_FIGURES[name]}](images/{PREFIX}{name}.png)" for name in ("detection", "effects") if name in figures]
+    parts += ["### By plant and kind", _kinds(scored), "### What was named in place of what", _confusions(scored)]
+    parts += [f"![{_FIGURES[name]}](images/{PREFIX}{name}.png)" for name in ("confusion",) if name in figures]
+    parts += ["### Errors of parameters and exponents", _errors(scored)]
+    parts += [
+        f"![{_FIGURES[name]}](images/{PREFIX}{name}.png)" for name in ("deviates", "exponents") if name in figures
+    ]
+    parts += ["### Failures", _failures(scored)]
+    return "\n\n".join(part for part in parts if part)
+
+
+def _goals(scored: Sequence[Scored]) -> str:
+    rates = rates_of(scored)
+    rows = []
+    for name, found in rates.items():
+        goal = GOALS.get(name)
+        met = {True: "met", False: "**missed**", None: ""}[goal.met(found) if goal else None]
+        share, interval = percent(found)
+        rows.append((NAMES[name], share, f"{found.hits} of {found.of}", interval, goal.text if goal else "", met))
+    curve = fit_curve(detections(scored))
+    if curve is not None:
+        met = "met" if curve.half <= HALF_GOAL else "**missed**"
+        size, _, interval = curve.text.partition(" (")
+        what = "size at which half of the effects are named, in detection limits"
+        cases = f"{curve.named} of {curve.cases}"
+        rows.append((what, size, cases, interval.rstrip(")"), f"at most {HALF_GOAL:g}", met))
+    return table(("", "share", "cases", "95 % interval", "goal", ""), rows)
+
+
+def _kinds(scored: Sequence[Scored]) -> str:
+    rows = []
+    for plant in PLANT_SHARES:
+        cells = []
+        for kind in KINDS:
+            mine = [item for item in scored if (item.answer.plant, item.answer.kind) == (plant, kind)]
+            cells.append(f"{sum(item.score.right for item in mine)} of {len(mine)}" if mine else "")
+        mine = [item for item in scored if item.answer.plant == plant]
+        if mine:
+            rows.append((plant.replace("_", " "), *cells, times(mine).text))
+    lead = "Cases answered rightly, and the wall clock of a diagnosis."
+    return lead + "\n\n" + table(("plant", *(kind.replace("_", " ") for kind in KINDS), "time"), rows)
+
+
+def _confusions(scored: Sequence[Scored]) -> str:
+    """Return what was not named as itself: the confusion matrix without what is right."""
+    rows = []
+    for concealed, cells in confusion([(item.answer, item.diagnosis, item.score) for item in scored]).items():
+        right = {
+            "nothing": ("consistent", "recalibrated"),
+            "off-catalogue": ("unexplained",),
+        }.get(concealed, (concealed,))
+        wrong = {name: count for name, count in cells.most_common() if name not in right}
+        if wrong:
+            good = sum(count for name, count in cells.items() if name in right)
+            told = ", ".join(f"{name} ({count})" for name, count in wrong.items())
+            rows.append((concealed, f"{good} of {sum(cells.values())}", told))
+    if not rows:
+        return "Nothing: each effect was named as itself."
+    return table(("concealed", "named as itself", "in its place"), rows)
+
+
+def _errors(scored: Sequence[Scored]) -> str:
+    z = np.abs(deviates_of(scored))
+    lines = []
+    if z.size:
+        inside = [rate(bool(ok) for ok in z <= most) for most in (1.0, 2.0)]
+        shares = " and ".join(
+            f"{share} ({interval}) within {most}"
+            for most, (share, interval) in zip((1, 2), map(percent, inside), strict=True)
+        )
+        lines.append(
+            f"Of {z.size} parameters {shares} of their own standard deviations; a normal distribution has 68.3 and "
+            f"95.4 %. {int(np.count_nonzero(z > 4))} are more than 4 off, the largest error is {z.max():.1f}."
+        )
+    rows = []
+    for item in scored:
+        found = item.score.exponent
+        if found is not None:
+            sd, off = found.sd, found.in_sd
+            uncertainty = (f"{sd:.2g}", f"{off:+.1f}") if sd is not None and off is not None else ("", "")
+            plant = item.answer.plant.replace("_", " ")
+            rows.append((str(item.answer.seed), plant, f"{found.true:g}", f"{found.value:.4g}", *uncertainty))
+    of = sum(has_power_law(item.answer) for item in scored)
+    if of:
+        lines.append(f"Of {of} torques with a power law {len(rows)} have an exponent in the law that was found.")
+    if rows:
+        lines.append(table(("seed", "plant", "exponent", "found", "sd", "error in sd"), rows))
+    return "\n\n".join(lines)
+
+
+def _failures(scored: Sequence[Scored]) -> str:
+    wrong = [item for item in scored if not item.score.right]
+    if not wrong:
+        return "None."
+    counts = Counter(fault_of(item) for item in wrong)
+    lead = "; ".join(f"{fault}: {count}" for fault, count in counts.most_common())
+    rows = []
+    for item in sorted(wrong, key=lambda item: (-counts[fault_of(item)], fault_of(item), item.answer.seed)):
+        size = "" if item.strength is None else f"{item.strength:.2g}"
+        said = found_of(item) if item.error is None else item.error.strip().splitlines()[-1][:160]
+        plant = item.answer.plant.replace("_", " ")
+        rows.append((fault_of(item), plant, hidden_of(item), size, said, f"`{item.reproduce}`"))
+    return f"{lead}. Size is that of the least concealed effect in units of its detection limit.\n\n" + table(
+        ("fault", "plant", "concealed", "size", "found", "alone"), rows
+    )
+
+
+def masks_text(folders: Sequence[Path], plain: Result | None) -> str:
+    """Return the page's part on masks: a row each, and one of the same seeds of ``plain`` without any."""
+    results = masked_results(folders)
+    if not results:
+        names = ", ".join(str(folder) for folder in folders)
+        raise InputError(f"--masks {names}: no finished challenge with a mask; expected folders that --mask filled")
+    rows = []
+    if plain is not None:
+        seeds = {item.answer.seed for result in results.values() for item in result.scored}
+        same = [item for item in plain.scored if item.answer.seed in seeds]
+        if same:
+            rows.append(("none (the same seeds)", *mask_row(same)))
+    rows += [(f"`{mask}`", *mask_row(result.scored)) for mask, result in results.items()]
+    commands = "\n".join(f"- `{mask}`: {made_by(result)}" for mask, result in results.items())
+    lead = "Shares with their intervals of 95 %; time is the median of a diagnosis, wall clock."
+    return f"{lead}\n\n{table(('mask', *MASK_HEADER), rows)}\n\n{commands}"
+
+
+def main() -> None:
+    """Write results into the page from the command line."""
+    parser = argparse.ArgumentParser(
+        prog="python -m validation.challenge.document",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("out", type=Path, nargs="?", help="folder of a finished challenge without a mask")
+    parser.add_argument("--masks", type=Path, nargs="+", default=[], help="folders of challenges with a mask")
+    parser.add_argument("--page", type=Path, default=PAGE)
+    given = parser.parse_args()
+    if given.out is None and not given.masks:
+        parser.error("nothing to write; expected the folder of a challenge, or --masks")
+    try:
+        page = read_text(given.page)
+        plain = read_result(given.out) if given.out is not None else None
+        if plain is not None:
+            if plain.mask is not None:
+                raise InputError(f"{given.out}: was made under the mask {plain.mask}; expected it under --masks")
+            drawn = draw_all(plain.scored, given.page.parent / "images", PREFIX)
+            page = with_part(page, "result", result_text(plain, list(drawn)))
+        if given.masks:
+            page = with_part(page, "masks", masks_text(given.masks, plain))
+        write_text(given.page, page)
+    except (InputError, FileNotFoundError) as error:
+        parser.error(str(error))
+
+
+if __name__ == "__main__":
+    main()
