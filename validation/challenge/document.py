@@ -85,8 +85,7 @@ def result_text(result: Result, figures: Sequence[str]) -> str:
     right = sum(item.score.right for item in scored)
     parts = [
         f"{made_by(result)} {right} are answered rightly in verdict, effects and place. A diagnosis takes "
-        f"{times(scored).text}, wall clock. A challenge of the same code gives the same; "
-        "the code's digest stands in `challenge.json`.",
+        f"{times(scored).text}, wall clock on the machine it ran on.",
         _goals(scored),
     ]
     parts += [f"![{_FIGURES[name]}](images/{PREFIX}{name}.png)" for name in ("detection", "effects") if name in figures]
@@ -143,8 +142,13 @@ def _confusions(scored: Sequence[Scored]) -> str:
         wrong = {name: count for name, count in cells.most_common() if name not in right}
         if wrong:
             good = sum(count for name, count in cells.items() if name in right)
+            mine = (
+                item.answer.effects or ("off-catalogue" if item.answer.kind == "off_catalogue" else "nothing",)
+                for item in scored
+            )
+            of = sum(concealed in names for names in mine)
             told = ", ".join(f"{name} ({count})" for name, count in wrong.items())
-            rows.append((concealed, f"{good} of {sum(cells.values())}", told))
+            rows.append((concealed, f"{good} of {of}", told))
     if not rows:
         return "Nothing: each effect was named as itself."
     return table(("concealed", "named as itself", "in its place"), rows)
