@@ -17,6 +17,7 @@ from discsim.arrays import FloatArray, readonly
 from discsim.effects.catalogue import CATALOGUE
 from discsim.model_file import Model
 from discsim.recording import PLANTS, Plant
+from validation.diagnosis.agreement import Agreement
 
 __all__ = [
     "DIAGNOSIS_FORMAT",
@@ -439,6 +440,8 @@ class Diagnosis:
         What to record next, as sentences.
     warnings : tuple of str
         What the reader must know: a sensor that is absent or cannot be used, sensors that contradict one another.
+    agreement : Agreement or None
+        Which sensors agree about the spin, and what single causes reconcile them; None where none can be compared.
     """
 
     datasets: tuple[str, ...]
@@ -456,6 +459,7 @@ class Diagnosis:
     outliers: tuple[Outlier, ...] = ()
     next_recordings: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    agreement: Agreement | None = None
 
     def __post_init__(self) -> None:
         if not self.datasets:
@@ -504,6 +508,7 @@ class Diagnosis:
             "outliers": _list(self.outliers),
             "next_recordings": list(self.next_recordings),
             "warnings": list(self.warnings),
+            "agreement": None if self.agreement is None else self.agreement.to_json(),
         }
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from discsim.recording import Recording
 from validation.diagnosis.advice import advise
+from validation.diagnosis.agreement import agreement_of
 from validation.diagnosis.answer import Outcome
 from validation.diagnosis.assembly import assemble, verdict_of
 from validation.diagnosis.datasets import recording_names
@@ -61,4 +63,6 @@ def diagnose(
         if verdict == "explained" and law is None:
             progress("asking what to record next", 4, 5)
             advice = advise(found, called, plans)
-        return assemble(found, names, called, seed, law, advice)
+        outcome = assemble(found, names, called, seed, law, advice)
+    agreement = agreement_of(recordings, called)
+    return replace(outcome, diagnosis=replace(outcome.diagnosis, agreement=agreement))

@@ -16,6 +16,7 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE
 from discsim.frames import conjugate, multiply
 from discsim.recording import Recording
+from validation.diagnosis.agreement import written_ratios
 from validation.diagnosis.fitting import Fit, Jumps, Parameter, linearised, merit_of, refit
 from validation.diagnosis.noise import channel_of, stated_noise, whitened
 from validation.diagnosis.starts import flight_starts, rig_starts, spin_starts
@@ -82,6 +83,15 @@ def edges_of(recording: Recording) -> FloatArray:
     return np.linspace(0.0, end, count + 1)
 
 
+def chain_in_true_time(recording: Recording, ratio: float) -> Chain:
+    """Return the first chain of a recording all of whose times are written as ``ratio`` times the true ones."""
+    first = first_chain(recording)
+    states = first.states.copy()
+    states[:, 4] *= ratio
+    states[:, 12] *= ratio
+    return replace(first, edges=first.edges / ratio, states=states)
+
+
 def first_chain(recording: Recording, ratio: float = 1.0) -> Chain:
     """Return a recording's chain of pieces with starts from the data; ``ratio`` is that of the magnetometer's clock.
 
@@ -132,19 +142,38 @@ def unknowns(recordings: Sequence[Recording]) -> tuple[Parameter, ...]:
 
 def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), iterations: int = 12) -> Fit:
     """Fit recordings of one plant so loosely that any effect of ordinary size finds room."""
-    chains = tuple(first_chain(recording) for recording in recordings)
     plant = recordings[0].plant
+    ratio = _wrong_time(recordings)
+    chains = tuple(first_chain(one) if ratio == 1.0 else chain_in_true_time(one, ratio) for one in recordings)
     sensors = {readings.sensor for one in chains for readings in one.readings}
-    parameters = (*known, *unknowns(recordings), *ordinary(sensors, plant))
-    fit = Fit(chains, parameters, np.array([q.stated for q in parameters]), loose_jumps(plant), {})
+    clock = () if ratio == 1.0 else (Parameter("clock.rate", "ratio", 1.0, 1e-6, _TIME_SIGMA),)
+    parameters = (*known, *unknowns(recordings), *ordinary(sensors, plant), *clock)
+    at = np.array([ratio if q.group == "clock.rate" else q.stated for q in parameters])
+    fit = Fit(chains, parameters, at, loose_jumps(plant), {})
     bare = linearised(fit, ())
     fit = replace(fit, noise=stated_noise(bare))
     fit = refit(fit, iterations=iterations, tolerance=1e-4 * sum(linear.raw.size for linear in bare))
-    fit = _with_clocks(_from_other_starts(fit))
+    fit = _from_other_starts(fit)
+    if ratio == 1.0:
+        fit = _with_clocks(fit)
     chains = tuple(within_range(chain, linear) for chain, linear in zip(fit.chains, fit.linears, strict=True))
     fit = replace(fit, chains=chains)
     linears = linearised(fit)
     return replace(fit, linears=linears, merit=merit_of(fit, linears))
+
+
+#: how far a clock may be from right where sensors say that the written time is wrong altogether
+_TIME_SIGMA = 0.3
+#: a clock less wrong than this is found by `_with_clocks`, and may be a sensor's own
+_LEAST_WRONG = 0.03
+
+
+def _wrong_time(recordings: Sequence[Recording]) -> float:
+    """Return the ratio of written to true time where most recordings say that it is far from 1, else 1."""
+    if recordings[0].plant not in ("flight", "free_spin"):
+        return 1.0
+    ratio = float(np.median(written_ratios(recordings)))
+    return ratio if abs(ratio - 1.0) > _LEAST_WRONG else 1.0
 
 
 #: a relaxed fit of a recording whose chi-squared per reading is above this started wrong
@@ -168,8 +197,9 @@ def _from_other_starts(fit: Fit) -> Fit:
         return fit
     for i in _astray(fit)[:3]:
         recording = fit.chains[i].recording
-        first = first_chain(recording)
-        starts = (flight_starts if plant == "flight" else spin_starts)(recording, first.edges[:1])
+        ratio = fit.values(i).get(("clock.rate", "ratio"), 1.0)
+        first = first_chain(recording) if ratio == 1.0 else chain_in_true_time(recording, ratio)
+        starts = (flight_starts if plant == "flight" else spin_starts)(recording, np.zeros(1))
         for other in starts.ambiguous[:3]:
             turned = multiply(other, conjugate(first.states[0, 6:10]))
             states = first.states.copy()

@@ -11,6 +11,8 @@ from typing import Any
 from markupsafe import Markup
 
 from discsim.recording import SENSORS
+from validation.diagnosis.agreement import Agreement
+from validation.diagnosis.agreement_tables import tables_of
 from validation.diagnosis.answer import (
     Diagnosis,
     FitFigures,
@@ -93,6 +95,7 @@ def write_diagnosis_report(
         effects=[_effect(item) for item in diagnosis.effects],
         law=None if diagnosis.law is None else _law(diagnosis.law),
         located=[_place(item) for item in diagnosis.located],
+        agreement=_agreement(diagnosis.agreement),
         overview=[(caption, base64.b64encode(file.read_bytes()).decode()) for caption, file in figures],
         heldout=[
             (item.recording, f"{item.baseline:.2f}", f"{item.final:.2f}", _signed(item.delta_log_likelihood, 1))
@@ -303,6 +306,13 @@ def _noise(item: NoiseNote) -> tuple[str, str, str, str, str, str]:
         f"{item.correlation_s:.2g}",
         ", ".join(remarks) or "as stated" if item.stated_rms is not None else ", ".join(remarks),
     )
+
+
+def _agreement(found: Agreement | None) -> dict[str, Any] | None:
+    """Return which sensors agree, as sentences and tables, where any contradict one another."""
+    if found is None or not found.contradiction:
+        return None
+    return {"sentences": found.sentences, "tables": tables_of(found)}
 
 
 def _over_noise(value: float) -> str:

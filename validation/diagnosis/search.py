@@ -91,6 +91,8 @@ class Search:
         return replace(self, final=self.base)
 
 
+# a hypothesis far from the data may send a motion beyond all numbers: such a fit is not finite, and is passed over
+@np.errstate(over="ignore", invalid="ignore")
 def search(recordings: Sequence[Recording], report: Report = lambda stage, done, total: None) -> Search:
     """Find the effects that explain recordings of one plant."""
     known = stated_parameters(recordings)

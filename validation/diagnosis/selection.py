@@ -127,7 +127,13 @@ def tied_fit(
     fit = Fit(_retimed(loose, parameters, at), parameters, at, NO_JUMPS[plant], noise)
     if plant in ("rate_table", "spin_down") and any(q.group in CLOCKS for q in parameters):
         fit = replace(fit, at=_longer_and_longer(fit))
+    begun = fit
     fit = refit(fit, iterations=iterations, bounds=BOUNDS)
+    if not np.isfinite(fit.merit):
+        # algebra from far away may offer numbers under which no motion lasts
+        effects = {trial.id for trial in hypothesis.trials}
+        plain = np.array([v if q.group in effects else q.stated for q, v in zip(parameters, at, strict=True)])
+        fit = refit(replace(begun, at=plain), iterations=iterations, bounds=BOUNDS)
     for _ in range(polish):
         fit = replace(fit, noise=noise_of(fit))
         fit = refit(fit, iterations=2, bounds=BOUNDS)
