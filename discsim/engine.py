@@ -28,6 +28,7 @@ from discsim.files import model_file
 from discsim.frames import body_to_ned, flip_yz, norm3, quaternion_from_matrix, rotate_by_quaternion
 from discsim.law import Law, law_wrench
 from discsim.motion import Motion
+from discsim.own_wrench import own_wrench
 from discsim.parameters import PARAMETERS, Tables, flight_parameters, tables
 
 __all__ = ["RELEASE_HEIGHT", "FlyingDisc", "check_model", "fly", "follow", "passive_force"]
@@ -148,6 +149,9 @@ def flight_force(
     if tables.law.shape[0] > 0:
         Lx, Ly, Lz, Kx, Ky, Kz = law_wrench(tables.law, t, h, u, v, w, P, Q, r)
         Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
+    if tables.own_calls.size > 0:
+        Lx, Ly, Lz, Kx, Ky, Kz = own_wrench(tables.own_calls, tables.own_sizes, t, h, u, v, w, P, Q, r)
+        Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
 
     # a push through the centre of mass; about the geometric centre it has a moment
     qw, qx, qy, qz = qpos[3], qpos[4], -qpos[5], -qpos[6]
@@ -192,14 +196,14 @@ class FlyingDisc:
         *,
         timestep: float = 1e-3,
         contacts: bool = False,
-        law: Law | None = None,
+        law: Law | Sequence[Law] | None = None,
     ) -> None:
         if mujoco.get_mjcb_passive() is not None:
             raise RuntimeError("a passive-force callback is installed; build every disc before entering its block")
         self.disc = disc
         self.environment = environment
         self.parameters = flight_parameters(disc, environment, effects)
-        self.tables = tables(disc, law)
+        self.tables = tables(disc, law, effects)
         record = self.parameters.view(PARAMETERS)[0]
         self.centre_of_mass = readonly(centre_of_mass(record["body_mass_imbalance"]))
         try:
@@ -281,7 +285,7 @@ def fly(
     timestep: float = 1e-3,
     duration: float = 30.0,
     ground: Literal["stop", "skip"] = "stop",
-    law: Law | None = None,
+    law: Law | Sequence[Law] | None = None,
 ) -> Motion:
     """Fly a disc in MuJoCo and return its true motion.
 

@@ -1,19 +1,21 @@
 """Model files (`model.toml`): a disc or a rig with its surroundings and the effects upon it, for every command.
 
 The tables ``[environment]``, ``[disc]`` and ``[rig]`` are those of a recording. Each ``[[effects]]`` names one effect
-of the catalogue with its parameters and their standard deviations, and the recordings that it belongs to. ``[law]``
-is a term that the catalogue does not hold, as a formula with coefficients.
+of the catalogue with its parameters and their standard deviations, and the recordings that it belongs to; one of the
+user's own names the ``file`` that defines it. ``[law]`` is a term that the catalogue does not hold, as a formula with
+coefficients; several are ``[[law]]``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
 from discsim.disc import Disc, Rig
 from discsim.effects.catalogue import Effect, effect, row
+from discsim.effects.own import UserEffect
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import write_text
@@ -43,13 +45,13 @@ class ModelEffect:
 
 @dataclass(frozen=True)
 class Model:
-    """What a simulation needs beside the throw: surroundings, a disc or a rig, effects, and a law if there is one."""
+    """What a simulation needs beside the throw: surroundings, a disc or a rig, effects, and laws if there are any."""
 
     environment: Environment
     disc: Disc | None = None
     rig: Rig | None = None
     effects: tuple[ModelEffect, ...] = ()
-    law: Law | None = None
+    laws: tuple[Law, ...] = ()
 
     def effects_in(self, recording: str | None = None) -> list[Effect]:
         """Return the effects that all recordings share, and those of the named one."""
@@ -60,8 +62,11 @@ class Model:
         ]
 
 
-def read_model(path: Path | str) -> Model:
-    """Read a model file; raises `InputError` naming file, line and what was expected."""
+def read_model(path: Path | str, own: Sequence[UserEffect] = ()) -> Model:
+    """Read a model file; raises `InputError` naming file, line and what was expected.
+
+    ``own`` are the user's own effects that it may hold: a model never runs code that was not given with it.
+    """
     top = read_toml(Path(path))
     top.text("format", choices=(MODEL_FORMAT,))
     disc_table, rig_table = top.table("disc"), top.table("rig")
@@ -70,16 +75,21 @@ def read_model(path: Path | str) -> Model:
     environment = Environment.from_toml(environment_table, air_required=disc_table is not None)
     disc = Disc.from_toml(disc_table, aero_required=False) if disc_table is not None else None
     rig = Rig.from_toml(rig_table) if rig_table is not None else None
-    effects = tuple(_read_effect(table) for table in top.tables("effects"))
-    law_table = top.table("law")
-    law = None if law_table is None else _read_law(law_table)
+    effects = tuple(_read_effect(table, own) for table in top.tables("effects"))
+    several = isinstance(top.raw("law"), list)
+    law_table = None if several else top.table("law")
+    laws = tuple(_read_law(table) for table in (top.tables("law") if several else filter(None, [law_table])))
     top.finish()
-    return Model(environment, disc, rig, effects, law)
+    return Model(environment, disc, rig, effects, laws)
 
 
-def _read_effect(table: TomlTable) -> ModelEffect:
+def _read_effect(table: TomlTable, own: Sequence[UserEffect]) -> ModelEffect:
     id = table.text("id")
     assert id is not None
+    file = table.text("file", required=False)
+    mine = next((effect for effect in own if effect.id == id), None)
+    if file is not None and mine is None:
+        raise table.error("id", f"effect '{id}' is the user's own; expected its file with it: --with {file}")
     names = table.raw("recordings")
     if (
         names is not None
@@ -90,7 +100,7 @@ def _read_effect(table: TomlTable) -> ModelEffect:
     sizes, sigmas = table.table("parameters", required=True), table.table("sigma")
     assert sizes is not None
     try:
-        known = row(id).parameters
+        known = (row(id) if mine is None else mine.row).parameters
     except InputError as error:
         raise table.error("id", str(error)) from None
     size = {name: sizes.number(name, required=False) for name in known}
@@ -100,8 +110,9 @@ def _read_effect(table: TomlTable) -> ModelEffect:
         sigma = {name: sigmas.number(name, required=False, minimum=0.0) for name in known}
         sigmas.finish()
     table.finish()
+    given = {name: value for name, value in size.items() if value is not None}
     return ModelEffect(
-        effect(id, **{name: value for name, value in size.items() if value is not None}),
+        effect(id, **given) if mine is None else mine.sized(given),
         {name: value for name, value in sigma.items() if value is not None},
         None if names in (None, "all") else tuple(names),
     )
@@ -135,12 +146,18 @@ def write_model(model: Model, path: Path) -> None:
     for item in model.effects:
         sizes = item.effect.value._asdict()
         lines += ["", "[[effects]]", f'id = "{item.effect.id}"']
+        if item.effect.own is not None:
+            lines += toml_lines({"file": item.effect.own.path.name})
         lines += toml_lines({"recordings": "all" if item.recordings is None else list(item.recordings)})
         lines += ["[effects.parameters]", *toml_lines(sizes)]
         if item.sigma:
             lines += ["[effects.sigma]", *toml_lines(dict(item.sigma))]
-    if (law := model.law) is not None:
-        lines += ["", "[law]", *toml_lines({"text": law.text, "target": law.target})]
+    for law in model.laws:
+        lines += [
+            "",
+            "[law]" if len(model.laws) == 1 else "[[law]]",
+            *toml_lines({"text": law.text, "target": law.target}),
+        ]
         lines += ["[law.coefficients]", *toml_lines(dict(law.coefficients))]
         if law.sigma:
             lines += ["[law.sigma]", *toml_lines(dict(law.sigma))]

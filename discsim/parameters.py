@@ -8,7 +8,7 @@ Inside compiled code ``array.view(PARAMETERS)[0]`` is a record whose fields read
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -21,6 +21,8 @@ from discsim.errors import InputError
 from discsim.law import LAW_WIDTH, WRENCH_TARGETS, Law
 
 __all__ = ["PARAMETERS", "Tables", "flight_parameters", "parameter_index", "parameters", "tables"]
+
+IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
 _MOTION = tuple(row for row in CATALOGUE.values() if row.acts_on == "motion")
 
@@ -68,7 +70,8 @@ def parameters(
 ) -> FloatArray:
     """Return the flat array (PARAMETERS.itemsize / 8,) of a baseline with effects on it.
 
-    Effects on sensors are passed over: they belong to the sensors. Raises `InputError` for an effect given twice.
+    Effects on sensors are passed over: they belong to the sensors. So are those of the user's own: they stand in
+    `tables`. Raises `InputError` for an effect given twice.
     """
     flat = _BASELINE.copy()
     density = environment.air_density
@@ -82,9 +85,10 @@ def parameters(
         flat[_PLACES["aero"]] = disc.aero or Aero()
     if rig is not None:
         flat[_PLACES["rig"]] = (rig.Izz, rig.viscous)
-    for id, value in by_id(effects).items():
-        if (place := _PLACES.get(CATALOGUE[id].key)) is not None:
-            flat[place] = value
+    by_id(effects)
+    for item in effects:
+        if item.own is None and (place := _PLACES.get(item.row.key)) is not None:
+            flat[place] = item.value
     if not np.all(np.isfinite(flat)):
         raise InputError("a parameter of the physics is not finite; expected finite numbers only")
     return flat
@@ -100,11 +104,12 @@ def flight_parameters(disc: Disc, environment: Environment, effects: Sequence[Ef
 
 
 class Tables(NamedTuple):
-    """Tabulated coefficients as arrays for compiled code; empty where the linear forms hold.
+    """What compiled code needs beside the flat parameters: tabulated coefficients, empty where the linear forms hold.
 
     static is (4, n): alpha, C_L, C_D, C_M. rate (nr,) rad/s and speed (nv,) m/s are the knots of C_Nr, and spline
     (nr - 1, nv - 1, 4, 4) its bicubic coefficients, highest powers first. law (terms, LAW_WIDTH) are the rows of a
-    `discsim.law.Law`.
+    `discsim.law.Law`. own_calls (m,) int64 are the addresses of the user's own effects on motion, and own_sizes (m, k)
+    their parameters, for `discsim.own_wrench`.
     """
 
     static: FloatArray
@@ -112,10 +117,12 @@ class Tables(NamedTuple):
     speed: FloatArray
     spline: FloatArray
     law: FloatArray
+    own_calls: IntArray
+    own_sizes: FloatArray
 
 
-def tables(disc: Disc | None, law: Law | None = None) -> Tables:
-    """Return the tables of a disc, and of a law about motion; one about a sensor has none."""
+def tables(disc: Disc | None, law: Law | Sequence[Law] | None = None, effects: Sequence[Effect] = ()) -> Tables:
+    """Return the tables of a disc, of a law or laws about motion (not of those about a sensor), and of own effects."""
     static = np.empty((4, 0))
     rate, speed, spline = np.empty(0), np.empty(0), np.empty((0, 0, 4, 4))
     if disc is not None and (lookup := disc.aero_table) is not None:
@@ -125,6 +132,11 @@ def tables(disc: Disc | None, law: Law | None = None) -> Tables:
         along_rate = CubicSpline(rate, damping.CNr, axis=0).c  # (4, nr - 1, nv)
         along_both = CubicSpline(speed, along_rate, axis=2).c  # (4, nv - 1, 4, nr - 1)
         spline = np.ascontiguousarray(np.transpose(along_both, (3, 1, 2, 0)))
-    acts = law is not None and law.target in WRENCH_TARGETS
-    rows = np.array(law.rows) if law is not None and acts else np.empty((0, LAW_WIDTH))
-    return Tables(static, rate, speed, spline, rows)
+    laws = [law] if isinstance(law, Law) else law or ()
+    rows = np.concatenate([np.empty((0, LAW_WIDTH)), *(each.rows for each in laws if each.target in WRENCH_TARGETS)])
+    own = [(item.own.address, item.value) for item in effects if item.own is not None and item.row.acts_on == "motion"]
+    sizes = np.zeros((len(own), max((len(value) for _, value in own), default=0)))
+    for place, (_, value) in zip(sizes, own, strict=True):
+        place[: len(value)] = value
+    calls = np.array([address for address, _ in own], dtype=np.int64)
+    return Tables(static, rate, speed, spline, rows, calls, sizes)

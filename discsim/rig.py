@@ -24,8 +24,10 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import model_file, read_text
 from discsim.frames import flip_yz, multiply, turn
+from discsim.law import Law, law_wrench
 from discsim.motion import Motion
-from discsim.parameters import PARAMETERS, parameters
+from discsim.own_wrench import own_wrench
+from discsim.parameters import PARAMETERS, Tables, parameters, tables
 from discsim.recording import COMMAND_HEADER, Samples, read_csv
 
 __all__ = ["default_profile", "read_profile", "spin_down", "turn_table"]
@@ -60,12 +62,16 @@ def read_profile(path: Path) -> Samples:
 
 
 @compiled
-def bearing_force(flat: FloatArray, t: float, qvel: FloatArray, qfrc: FloatArray) -> None:
+def bearing_force(flat: FloatArray, tables: Tables, t: float, qvel: FloatArray, qfrc: FloatArray) -> None:
     """Add the torque of a spin-down rig: ``Izz rdot = -viscous r`` and what a baseline leaves out."""
     p = flat.view(PARAMETERS)[0]
     r = qvel[0]
     torque = -p.rig.viscous * r + coulomb_friction(p.rig_coulomb_friction, r)
     torque += quadratic_drag(p.rig_quadratic_drag, r)
+    if tables.law.shape[0] > 0:
+        torque += law_wrench(tables.law, t, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, r)[5]
+    if tables.own_calls.size > 0:
+        torque += own_wrench(tables.own_calls, tables.own_sizes, t, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, r)[5]
     qfrc[0] += torque + p.rig.Izz * spin_step(p.event_spin_step, t, r)
 
 
@@ -203,8 +209,13 @@ def spin_down(
     *,
     yaw: float = 0.0,
     timestep: float = 1e-3,
+    law: Law | Sequence[Law] | None = None,
 ) -> Motion:
-    """Let a rig run down from ``rate`` (rad/s) for ``duration`` (s) and return its true motion."""
+    """Let a rig run down from ``rate`` (rad/s) for ``duration`` (s) and return its true motion.
+
+    Of a law and of effects of the user's own the moment about the axis acts; they are given no air.
+    """
+    lookup = tables(None, law, effects)
     flat = parameters(environment, rig=rig, effects=effects)
     hinge = _Hinge(environment, flat, rig.Izz, yaw)
     model, data = hinge.model, hinge.data
@@ -212,7 +223,7 @@ def spin_down(
 
     def brake(stepped_model: Any, stepped_data: Any) -> None:
         if stepped_model is model and stepped_data is data:
-            bearing_force(flat, data.time, *views)
+            bearing_force(flat, lookup, data.time, *views)
 
     data.qvel[0] = rate
     with own_warnings(), passive_force(brake):

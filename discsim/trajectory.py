@@ -37,6 +37,7 @@ from discsim.errors import InputError
 from discsim.frames import euler_angles, heading_angles, norm3, quaternion_from_matrix, rotate_by_quaternion
 from discsim.law import Law, law_wrench
 from discsim.motion import Motion, State
+from discsim.own_wrench import own_wrench
 from discsim.parameters import PARAMETERS, Tables, flight_parameters, tables
 
 __all__ = ["ATOL", "RTOL", "Flight", "Landings", "evaluate", "integrate", "predict", "predict_many", "release_state"]
@@ -90,6 +91,9 @@ def derivative(p: Any, tables: Tables, t: float, y: FloatArray, dy: FloatArray) 
     Fx, Fy, Fz, Mx, My, Mz = air_wrench(p, tables, h, u, v, w, P, Q, r)
     if tables.law.shape[0] > 0:
         Lx, Ly, Lz, Kx, Ky, Kz = law_wrench(tables.law, t, h, u, v, w, P, Q, r)
+        Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
+    if tables.own_calls.size > 0:
+        Lx, Ly, Lz, Kx, Ky, Kz = own_wrench(tables.own_calls, tables.own_sizes, t, h, u, v, w, P, Q, r)
         Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
 
     # from the geometric centre to the centre of mass, whose place e turns with psi: M - e x F
@@ -635,14 +639,14 @@ def predict(
     rtol: float = RTOL,
     atol: float = ATOL,
     duration: float = 30.0,
-    law: Law | None = None,
+    law: Law | Sequence[Law] | None = None,
 ) -> Flight:
     """Fly a disc by the standalone model, until its centre of mass reaches the ground or for ``duration`` s.
 
     rtol is of the size of velocity, attitude and rates, atol in SI units: estimated errors of one step. Raises
     `InputError` for a release that lacks something, and where a C_Nr table does not reach.
     """
-    flat, lookup = flight_parameters(disc, environment, effects), tables(disc, law)
+    flat, lookup = flight_parameters(disc, environment, effects), tables(disc, law, effects)
     state = release_state(release)
     ended, t, states, dense = integrate(flat, lookup, state, 0.0, float(duration), rtol, atol, True)
     if ended == _LOST:
@@ -723,7 +727,8 @@ def predict_many(
     width = PARAMETERS.itemsize // 8
     if flats.ndim != 2 or flats.shape[0] not in (1, n) or flats.shape[1] != width:
         raise ValueError(f"parameters: got {flats.shape}, expected ({n}, {width})")
-    lookup, t = tables(disc), np.empty(0) if times is None else np.ascontiguousarray(times, dtype=np.float64)
+    lookup = tables(disc, None, effects)
+    t = np.empty(0) if times is None else np.ascontiguousarray(times, dtype=np.float64)
     end, last, touched = np.empty(n), np.empty((n, WIDTH)), np.empty(n, dtype=np.bool_)
     track = np.empty((n, t.size, WIDTH))
 

@@ -11,7 +11,8 @@ import typer
 
 from discsim.arrays import FloatArray, readonly
 from discsim.disc import Disc
-from discsim.effects.catalogue import Effect, by_id, effect, row
+from discsim.effects.catalogue import Effect, by_id, effect
+from discsim.effects.own import UserEffect
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.law import WRENCH_TARGETS, Law
@@ -25,10 +26,11 @@ __all__ = [
     "OutOption",
     "SeedOption",
     "SiteOption",
+    "WithOption",
     "all_effects",
     "at_site",
     "disc_to_fly",
-    "law_upon",
+    "laws_upon",
     "parse_effects",
     "parse_vector",
 ]
@@ -56,21 +58,36 @@ ModelOption: TypeAlias = Annotated[
     ),
 ]
 
+WithOption: TypeAlias = Annotated[
+    list[Path] | None,
+    typer.Option("--with", help="A Python file with an effect of your own that --model or --effect names; may repeat."),
+]
 
-def disc_to_fly(disc: str | None, model: Path | None) -> tuple[Disc, Environment, Model | None]:
-    """Return the disc of ``--disc`` (by default the driver) or of ``--model``, where it flies, and the model if any."""
+
+def disc_to_fly(
+    disc: str | None, model: Path | None, own: Sequence[UserEffect] = ()
+) -> tuple[Disc, Environment, Model | None]:
+    """Return the disc of ``--disc`` (by default the driver) or of ``--model``, where it flies, and the model if any.
+
+    ``own`` are the effects of ``--with``.
+    """
     if model is None:
         return *load_disc(disc or "driver"), None
     if disc is not None:
         raise InputError(f"--disc {disc} and --model {model} both name a disc; expected one of them")
-    given = read_model(model)
+    given = read_model(model, own)
     if given.disc is None:
         raise InputError(f"{model}: has no [disc]; expected the model of a disc")
     return given.disc, given.environment, given
 
 
 def all_effects(
-    model: Model | None, texts: Sequence[str] | None, plant: Plant, sensors: Sequence[str], recording: str | None
+    model: Model | None,
+    texts: Sequence[str] | None,
+    plant: Plant,
+    sensors: Sequence[str],
+    recording: str | None,
+    own: Sequence[UserEffect] = (),
 ) -> tuple[list[Effect], list[str]]:
     """Return the effects of a model and of ``--effect`` upon a recording, and one line for each that is passed over.
 
@@ -83,27 +100,29 @@ def all_effects(
             notes.append(f"the model's {given.id} is passed over: {problem}")
         else:
             effects.append(given)
-    effects += parse_effects(texts, plant, sensors)
+    effects += parse_effects(texts, plant, sensors, own)
     by_id(effects)
     return effects, notes
 
 
-def law_upon(model: Model | None, plant: Plant) -> tuple[Law | None, list[str]]:
-    """Return a model's law where it acts on the motion of a plant, and else one line that says why it does not."""
-    if model is None or model.law is None:
-        return None, []
-    law = model.law
-    passed = f"the model's law about {law.target} is passed over"
-    if law.target not in WRENCH_TARGETS:
-        return None, [f"{passed}: simulated readings carry no law, only motion does"]
-    if plant == "rate_table":
-        return None, [f"{passed}: a rate table turns as commanded, whatever acts on it"]
-    return law, []
+def laws_upon(model: Model | None, plant: Plant, sensors: Sequence[str]) -> tuple[list[Law], list[str]]:
+    """Return a model's laws that act on a plant with these sensors, and one line for each that is passed over."""
+    acting, notes = [], []
+    for law in () if model is None else model.laws:
+        passed = f"the model's law about {law.target} is passed over"
+        sensor = law.target.partition(".")[0]
+        if law.target in WRENCH_TARGETS and plant == "rate_table":
+            notes.append(f"{passed}: a rate table turns as commanded, whatever acts on it")
+        elif law.target not in WRENCH_TARGETS and sensor not in sensors:
+            notes.append(f"{passed}: there is no {sensor} on board, only {', '.join(sensors)}")
+        else:
+            acting.append(law)
+    return acting, notes
 
 
 def _cannot_act(given: Effect, plant: Plant, sensors: Sequence[str]) -> str:
     """Return why an effect cannot act on a plant with these sensors; empty where it can."""
-    kind = row(given.id)
+    kind = given.row
     if plant not in kind.plants:
         return f"acts on {', '.join(kind.plants)}; this is a {plant}"
     if kind.acts_on not in ("motion", "clock", *sensors):
@@ -118,7 +137,9 @@ def at_site(environment: Environment, site: str | None) -> Environment:
     return replace(environment, magnetic_field=load_site(site).environment.magnetic_field)
 
 
-def parse_effects(texts: Sequence[str] | None, plant: Plant, sensors: Sequence[str]) -> list[Effect]:
+def parse_effects(
+    texts: Sequence[str] | None, plant: Plant, sensors: Sequence[str], own: Sequence[UserEffect] = ()
+) -> list[Effect]:
     """Return the effects of ``--effect ID:name=value,...``; raises `InputError` saying what was expected.
 
     An effect that cannot act is refused: one of another plant, or of a sensor that is not among ``sensors``.
@@ -133,7 +154,8 @@ def parse_effects(texts: Sequence[str] | None, plant: Plant, sensors: Sequence[s
                 sizes[name.strip()] = float(number)
             except ValueError:
                 raise InputError(f"--effect {text}: '{item}' is no name=number; expected ID:name=number,...") from None
-        given = effect(id.strip(), **sizes)
+        mine = next((one for one in own if one.id == id.strip()), None)
+        given = effect(id.strip(), **sizes) if mine is None else mine.sized(sizes)
         if problem := _cannot_act(given, plant, sensors):
             raise InputError(f"--effect {given.id}: {problem}")
         effects.append(given)

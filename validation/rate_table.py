@@ -15,6 +15,7 @@ from discsim.effects.sensors import PositionOffset
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import write_text
+from discsim.law import Law
 from discsim.motion import Motion
 from discsim.recording import Recording, Samples
 from discsim.rig import turn_table
@@ -70,6 +71,7 @@ def run_rate_table(
     *,
     mount: FloatArray | None = None,
     effects: tuple[Effect, ...] = (),
+    laws: tuple[Law, ...] = (),
     name: str = "rate-table",
     progress: Callable[[Sequence[float]], Iterable[float]] = iter,
 ) -> RateTableRun:
@@ -77,8 +79,8 @@ def run_rate_table(
 
     The module is one MPU-9250 drawn within its data sheet; its accelerometer sits ``mount`` (3,) m off its stated
     place. The yaw phase at the start is drawn too. An effect on a sensor takes the place of what was drawn of its
-    kind. ``progress`` is `turn_table`'s. Raises `InputError` where both ``mount`` and ``effects`` move the
-    accelerometer.
+    kind; ``laws`` about sensors come on top. ``progress`` is `turn_table`'s. Raises `InputError` where both ``mount``
+    and ``effects`` move the accelerometer.
     """
     if mount is not None and np.any(mount) and any(item.id == "accel.position_offset" for item in effects):
         raise InputError("a mount error and accel.position_offset both move the accelerometer; expected one of them")
@@ -87,7 +89,7 @@ def run_rate_table(
     module = Instruments.from_parts("mpu9250", "ac1120s").drawn(draw_module)
     if mount is not None:
         module = module.fitted("accelerometer", offset=PositionOffset(*(float(x) for x in mount)))
-    module = module.with_effects(effects)
+    module = module.with_effects(effects).with_laws(laws)
     recording = record(motion, module, noise_module, plant="rate_table", name=name, command=profile)
     wide_module = Instruments.from_parts("adxrs649").drawn(draw_wide)
     wide = record(motion, wide_module, noise_wide, plant="rate_table", name=f"{name}-adxrs649", command=profile)

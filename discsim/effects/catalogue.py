@@ -11,10 +11,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from discsim.effects import aero, air, body, events, rig, sensors
 from discsim.errors import InputError
+
+if TYPE_CHECKING:
+    from discsim.effects.own import UserEffect
 
 __all__ = ["CATALOGUE", "Effect", "Row", "effect", "row"]
 
@@ -119,15 +122,22 @@ _POSITIVE = frozenset({("air.density", "ratio"), ("air.gust", "width_s")})
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect with its size: an id of the catalogue and a value of that row's type."""
+    """An effect with its size: an id of the catalogue and a value of that row's type; or one of the user's ``own``."""
 
     id: str
     value: Any
+    own: UserEffect | None = None
+
+    @property
+    def row(self) -> Row:
+        """What the catalogue, or the user's file, says of it."""
+        return row(self.id) if self.own is None else self.own.row
 
     def __post_init__(self) -> None:
-        if type(self.value) is not row(self.id).type:
-            raise InputError(f"{self.id}: got {type(self.value).__name__}, expected {row(self.id).type.__name__}")
-        for name, size, none in zip(self.value._fields, self.value, row(self.id).baseline, strict=True):
+        kind = self.row
+        if type(self.value) is not kind.type:
+            raise InputError(f"{self.id}: got {type(self.value).__name__}, expected {kind.type.__name__}")
+        for name, size, none in zip(self.value._fields, self.value, kind.baseline, strict=True):
             if not isfinite(size) and size != none:
                 raise InputError(f"{self.id}: {name} is not finite ({size}); expected a finite number")
             if (self.id, name) in _POSITIVE and size <= 0:

@@ -22,6 +22,7 @@ from discsim.errors import InputError
 from discsim.frames import body_to_ned, turn
 from discsim.motion import Motion, State
 from discsim.recording import Samples, SensorSheet
+from discsim.sensors.additions import Addition, added
 from discsim.sensors.sampling import Noise, Sampling, check_lag, digitise, filtered, stated
 
 __all__ = ["Accelerometer", "specific_force"]
@@ -61,6 +62,8 @@ class Accelerometer:
     noise: Noise = field(default_factory=Noise)
     resolution: float = 0.0
     range: float = float("inf")
+    #: what else is added to its readings before lag and noise
+    additions: tuple[Addition, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("position", "misalignment"):
@@ -74,7 +77,8 @@ class Accelerometer:
         f = specific_force(motion.at(t), motion, self.position + np.array(self.offset))
         turned = f @ body_to_ned(turn(self.misalignment))
         drifting = bias_drift(self.drift, t - motion.start)
-        return np.asarray(turned @ sensitivity(self.scale, self.cross_axis).T + np.array(self.bias) + drifting)
+        reading = turned @ sensitivity(self.scale, self.cross_axis).T + np.array(self.bias) + drifting
+        return added(self.additions, np.asarray(reading), t, motion)
 
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
         """Return the samples of a motion, value (n, 3) m/s^2."""

@@ -12,6 +12,7 @@ from discsim.frames import body_to_ned, turn
 from discsim.motion import Motion
 from discsim.recording import Samples, SensorSheet
 from discsim.sensors.accelerometer import specific_force
+from discsim.sensors.additions import Addition, added
 from discsim.sensors.sampling import Noise, Sampling, check_lag, digitise, filtered, stated
 
 __all__ = ["Gyroscope"]
@@ -37,6 +38,8 @@ class Gyroscope:
     noise: Noise = field(default_factory=Noise)
     resolution: float = 0.0
     range: float = float("inf")
+    #: what else is added to its readings before lag and noise
+    additions: tuple[Addition, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("position", "misalignment"):
@@ -50,7 +53,7 @@ class Gyroscope:
         reading = turned @ sensitivity(self.scale).T + np.array(self.bias)
         if any(self.g_sensitivity):
             reading = reading + g_sensitivity(self.g_sensitivity, specific_force(state, motion, self.position))
-        return np.asarray(reading)
+        return added(self.additions, np.asarray(reading), t, motion)
 
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
         """Return the samples of a motion, value (n, 3) rad/s."""

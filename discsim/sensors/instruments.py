@@ -12,13 +12,15 @@ import numpy as np
 
 from discsim.arrays import FloatArray, readonly
 from discsim.disc import Disc, Release, Rig
-from discsim.effects.catalogue import CATALOGUE, Effect, by_id
+from discsim.effects.catalogue import Effect, by_id
 from discsim.effects.sensors import AccelerometerBias, ClockRate, CrossAxis, GSensitivity, GyroscopeBias, Scale
 from discsim.errors import InputError
 from discsim.files import model_file
+from discsim.law import Law
 from discsim.motion import Motion
 from discsim.recording import SENSORS, Plant, Recording, Samples
 from discsim.sensors.accelerometer import Accelerometer
+from discsim.sensors.additions import Addition, by_effect, by_law
 from discsim.sensors.gyroscope import Gyroscope
 from discsim.sensors.magnetometer import Magnetometer
 from discsim.sensors.position import Gps, Tracker
@@ -137,18 +139,33 @@ class Instruments:
     def with_effects(self, effects: Sequence[Effect]) -> Instruments:
         """Return the module with the effects that act on sensors; those of absent sensors are passed over."""
         module = self
-        for id, value in by_id(effects).items():
-            target = CATALOGUE[id].acts_on
+        by_id(effects)
+        for item in effects:
+            id, value, target = item.id, item.value, item.row.acts_on
             if target == "clock":
                 module = replace(module, clock=value)
             elif target in module.sensors:
-                if id in _FIELDS:
+                if item.own is not None:
+                    module = module._adding(target, by_effect(item))
+                elif id in _FIELDS:
                     module = module.fitted(target, **{_FIELDS[id]: value})
                 else:
                     key = _SAMPLING_FIELDS[id.split(".")[1]]
                     sampling = replace(module.sensors[target].sampling, **{key: value})
                     module = module.fitted(target, sampling=sampling)
         return module
+
+    def with_laws(self, laws: Sequence[Law]) -> Instruments:
+        """Return the module with the laws about its sensors; those about motion or absent sensors are passed over."""
+        module = self
+        for law in laws:
+            sensor = law.target.partition(".")[0]
+            if sensor in module.sensors:
+                module = module._adding(sensor, by_law(law))
+        return module
+
+    def _adding(self, sensor: str, addition: Addition) -> Instruments:
+        return self.fitted(sensor, additions=(*self.sensors[sensor].additions, addition))
 
 
 def record(

@@ -12,6 +12,7 @@ from discsim.errors import InputError
 from discsim.frames import body_to_ned, turn
 from discsim.motion import Motion
 from discsim.recording import Samples, SensorSheet
+from discsim.sensors.additions import Addition, added
 from discsim.sensors.sampling import Noise, Sampling, check_lag, digitise, filtered, stated
 
 __all__ = ["Magnetometer"]
@@ -34,6 +35,8 @@ class Magnetometer:
     noise: Noise = field(default_factory=Noise)
     resolution: float = 0.0
     range: float = float("inf")
+    #: what else is added to its readings before lag and noise
+    additions: tuple[Addition, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "misalignment", vector3(self.misalignment, "magnetometer misalignment"))
@@ -47,7 +50,8 @@ class Magnetometer:
         field_b = state.in_body(motion.environment.magnetic_field)
         stray = state.in_body(stray_field(self.stray_field, -state.position[:, 2]))
         bent = hard_iron(self.hard_iron, soft_iron(self.soft_iron, field_b)) + stray
-        return np.asarray(bent @ body_to_ned(turn(self.misalignment)))
+        reading = bent @ body_to_ned(turn(self.misalignment))
+        return added(self.additions, np.asarray(reading), t, motion)
 
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
         """Return the samples of a motion, value (n, 3) uT."""

@@ -10,6 +10,7 @@ from discsim.effects.sensors import Latency
 from discsim.errors import InputError
 from discsim.motion import Motion
 from discsim.recording import Samples, SensorSheet
+from discsim.sensors.additions import Addition, added
 from discsim.sensors.sampling import Noise, Sampling
 
 __all__ = ["Gps", "Tracker"]
@@ -26,6 +27,8 @@ class Gps:
     latency: Latency = field(default_factory=Latency)
     position_noise: Noise = field(default_factory=Noise)
     velocity_noise: Noise = field(default_factory=Noise)
+    #: what else is added to its readings before lag and noise
+    additions: tuple[Addition, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0 <= self.latency.delay_s < np.inf:
@@ -37,8 +40,9 @@ class Gps:
         seen = taken - self.latency.delay_s
         some = seen >= motion.start
         written, state = written[some], motion.at(seen[some])
-        position = state.position + self.position_noise.sample(written, 3, rng)
-        velocity = state.velocity + self.velocity_noise.sample(written, 3, rng)
+        shown = added(self.additions, np.hstack((state.position, state.velocity)), seen[some], motion)
+        position = shown[:, :3] + self.position_noise.sample(written, 3, rng)
+        velocity = shown[:, 3:] + self.velocity_noise.sample(written, 3, rng)
         fixes = np.hstack((position, velocity)).astype(np.float64)
         return Samples(written, np.round(fixes, 9))
 
@@ -57,6 +61,8 @@ class Tracker:
     sampling: Sampling = field(default_factory=lambda: Sampling(30.0))
     noise: Noise = field(default_factory=Noise)
     unseen: float = 0.0
+    #: what else is added to its readings before lag and noise
+    additions: tuple[Addition, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0 <= self.unseen < 1:
@@ -65,7 +71,8 @@ class Tracker:
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
         """Return the track of a motion, value (n, 3) m in N, NaN where unseen."""
         written, taken = self.sampling.instants(motion.start, motion.end, rng)
-        position = np.add(motion.at(taken).position, self.noise.sample(written, 3, rng)).round(9)
+        shown = added(self.additions, motion.at(taken).position, taken, motion)
+        position = np.add(shown, self.noise.sample(written, 3, rng)).round(9)
         if self.unseen > 0:
             position[rng.random(position.shape) < self.unseen] = np.nan
         return Samples(written, position)

@@ -50,10 +50,10 @@ def test_a_rig_is_a_model_too(tmp_path):
 
 def test_a_law_is_carried_with_its_coefficients_and_their_deviations(model, tmp_path):
     law = Law("-c * |r|^n * sign(r)", "moment_z_N_m", {"c": 3.1e-6, "n": 1.503}, {"c": 4e-8})
-    write_model(replace(model, law=law), tmp_path / "model.toml")
-    assert read_model(tmp_path / "model.toml").law == law
+    write_model(replace(model, laws=(law,)), tmp_path / "model.toml")
+    assert read_model(tmp_path / "model.toml").laws == (law,)
     write_model(model, tmp_path / "model.toml")
-    assert read_model(tmp_path / "model.toml").law is None
+    assert read_model(tmp_path / "model.toml").laws == ()
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,7 @@ def test_a_law_is_carried_with_its_coefficients_and_their_deviations(model, tmp_
 def test_a_law_that_cannot_be_read_is_refused_at_its_line(model, tmp_path, old, new, expected):
     law = Law("-c * |r|^n * sign(r)", "moment_z_N_m", {"c": 3.1e-6, "n": 1.503}, {"c": 4e-8})
     path = tmp_path / "model.toml"
-    write_model(replace(model, law=law), path)
+    write_model(replace(model, laws=(law,)), path)
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new, 1))

@@ -28,7 +28,7 @@ def run(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
 
 def written(folder: Path, law: Law | None) -> Path:
     path = folder / ("bare.toml" if law is None else f"{law.target}.toml")
-    write_model(Model(FIELD, DISC, law=law), path)
+    write_model(Model(FIELD, DISC, laws=() if law is None else (law,)), path)
     return path
 
 

@@ -48,11 +48,11 @@ def command(
     """
     from importlib import import_module
 
+    from discsim.effects.own import load_user_effects
     from validation.diagnosis.datasets import read_datasets
     from validation.diagnosis.plans import read_plans
     from validation.diagnosis.progress import shown
     from validation.diagnosis.report import verdict_sentence
-    from validation.diagnosis.user_effects import load_user_effects
     from validation.run import start_run
 
     diagnose = import_module("validation.diagnosis").diagnose

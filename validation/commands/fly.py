@@ -14,10 +14,11 @@ from validation.options import (
     OutOption,
     SeedOption,
     SiteOption,
+    WithOption,
     all_effects,
     at_site,
     disc_to_fly,
-    law_upon,
+    laws_upon,
 )
 
 __all__ = ["command"]
@@ -51,6 +52,7 @@ def command(
     ] = "mpu9250,neo_m8n",
     site: SiteOption = None,
     effect: EffectOption = None,
+    own: WithOption = None,
     ground: Annotated[Ground, typer.Option(help="The ground ends the flight, or the disc skips on.")] = Ground.stop,
     engine: Annotated[
         Engine, typer.Option(help="MuJoCo, or the standalone model of 12 states: the same physics, much faster.")
@@ -66,6 +68,7 @@ def command(
     Example: discsim fly --disc driver --effect air.wind:w_north_m_s=2 --out flight
     or, with what a diagnosis or a fit has written: discsim fly --model model.toml --engine trajectory --out flight
     """
+    from discsim.effects.own import load_user_effects
     from discsim.engine import fly
     from discsim.errors import InputError
     from discsim.recording import write_recording
@@ -77,20 +80,21 @@ def command(
 
     if engine is Engine.trajectory and ground is Ground.skip:
         raise InputError("--engine trajectory knows no contact with the ground; expected --ground stop with it")
-    body, surroundings, stated = disc_to_fly(disc, model)
+    mine = load_user_effects(own or [])
+    body, surroundings, stated = disc_to_fly(disc, model, mine)
     environment = at_site(surroundings, site)
     release = load_throw(throw)
     instruments = Instruments.from_parts(*parts.split(","))
-    effects, notes = all_effects(stated, effect, "flight", list(instruments.sensors), out.resolve().name)
-    instruments = instruments.with_effects(effects)
-    law, passed = law_upon(stated, "flight")
+    effects, notes = all_effects(stated, effect, "flight", list(instruments.sensors), out.resolve().name, mine)
+    laws, passed = laws_upon(stated, "flight", list(instruments.sensors))
+    instruments = instruments.with_effects(effects).with_laws(laws)
     names = (disc or "", throw, site or "", *parts.split(","))
-    inputs = [*([model] if model else []), *(Path(name) for name in names if name.endswith(".toml"))]
+    inputs = [*([model] if model else []), *(own or []), *(Path(name) for name in names if name.endswith(".toml"))]
     with start_run(out, seed, inputs) as run:
         if engine is Engine.trajectory:
-            motion = predict(body, environment, release, effects, duration=duration, law=law).motion()
+            motion = predict(body, environment, release, effects, duration=duration, law=laws).motion()
         else:
-            motion = fly(body, environment, release, effects, duration=duration, ground=ground.value, law=law)
+            motion = fly(body, environment, release, effects, duration=duration, ground=ground.value, law=laws)
         recording = record(motion, instruments, run.rng, plant="flight", name=out.resolve().name, disc=body)
         write_recording(recording, out)
         write_flight_truth(out / "truth.csv", motion)

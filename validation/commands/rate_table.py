@@ -13,9 +13,10 @@ from validation.options import (
     OutOption,
     SeedOption,
     SiteOption,
+    WithOption,
     all_effects,
     at_site,
-    law_upon,
+    laws_upon,
     parse_vector,
 )
 
@@ -36,6 +37,7 @@ def command(
     model: ModelOption = None,
     site: SiteOption = None,
     effect: EffectOption = None,
+    own: WithOption = None,
     out: OutOption = Path("rate-table"),
     seed: SeedOption = 0,
 ) -> None:
@@ -46,6 +48,7 @@ def command(
 
     Example: discsim rate-table --mount 0.001,0.001,0 --out rate-table
     """
+    from discsim.effects.own import load_user_effects
     from discsim.environment import Environment
     from discsim.model_file import read_model
     from discsim.recording import write_recording
@@ -58,13 +61,16 @@ def command(
     knots = default_profile() if profile is None else read_profile(profile)
     offset = parse_vector(mount, "--mount", "m", 0.05)
     sensors = ("magnetometer", "accelerometer", "gyroscope", "rate_reference")
-    stated = read_model(model) if model is not None else None
-    effects, notes = all_effects(stated, effect, "rate_table", sensors, out.resolve().name)
-    _, passed = law_upon(stated, "rate_table")
+    mine = load_user_effects(own or [])
+    stated = read_model(model, mine) if model is not None else None
+    effects, notes = all_effects(stated, effect, "rate_table", sensors, out.resolve().name, mine)
+    laws, passed = laws_upon(stated, "rate_table", sensors)
     for note in (*notes, *passed):
         typer.echo(note)
     surroundings = Environment() if stated is None else stated.environment
-    inputs = [path for path in (profile, model, Path(site) if site and site.endswith(".toml") else None) if path]
+    inputs = [
+        path for path in (profile, model, *(own or []), Path(site) if site and site.endswith(".toml") else None) if path
+    ]
     with start_run(out, seed, inputs) as run:
         run.step("turning the table and measuring")
         result = run_rate_table(
@@ -73,6 +79,7 @@ def command(
             run.rng,
             mount=offset,
             effects=tuple(effects),
+            laws=tuple(laws),
             name=out.resolve().name or "rate-table",
             progress=lambda segments: run.progress(segments, len(segments), "segment of the profile"),
         )

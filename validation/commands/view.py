@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from discsim.errors import InputError
-from validation.options import ModelOption, all_effects, disc_to_fly, law_upon
+from validation.options import ModelOption, WithOption, all_effects, disc_to_fly, laws_upon
 
 if TYPE_CHECKING:
     from validation.replay import Replay
@@ -26,6 +26,7 @@ def command(
         str | None, typer.Option(help="Fly a disc: a shipped name, or a TOML file with [disc] and [environment].")
     ] = None,
     model: ModelOption = None,
+    own: WithOption = None,
     throw: Annotated[
         str | None, typer.Option(help="Its throw: a shipped name, or a TOML file. Default: driver.")
     ] = None,
@@ -73,7 +74,7 @@ def command(
     from validation.run import start_run
     from validation.viewing import Look, draw_stills, draw_whole, show, write_picture
 
-    replay = _replay(recording, disc, model, throw or "driver")
+    replay = _replay(recording, disc, model, throw or "driver", own or [])
     if cut is not None:
         if len(cut) != 2:
             raise InputError(f"--span {span}: expected A:B, two numbers of seconds")
@@ -87,7 +88,7 @@ def command(
         return
     file = out / video
     names = [Path(name) for name in (disc, throw) if name and name.endswith(".toml")]
-    inputs = [path for path in (recording, model) if path is not None] + names
+    inputs = [path for path in (recording, model, *(own or [])) if path is not None] + names
     with start_run(file.parent, None, inputs):
         if whole:
             write_picture(file, draw_whole(replay, look))
@@ -98,17 +99,18 @@ def command(
     typer.echo(f"{file}")
 
 
-def _replay(recording: Path | None, disc: str | None, model: Path | None, throw: str) -> Replay:
+def _replay(recording: Path | None, disc: str | None, model: Path | None, throw: str, own: list[Path]) -> Replay:
+    from discsim.effects.own import load_user_effects
     from discsim.engine import fly
     from discsim.shipped import load_throw
     from validation.replay import replay_motion, replay_recording
 
     if recording is not None:
         return replay_recording(recording)
-    body, environment, stated = disc_to_fly(disc, model)
+    body, environment, stated = disc_to_fly(disc, model, load_user_effects(own))
     effects, _ = all_effects(stated, None, "flight", (), None)
-    law, _ = law_upon(stated, "flight")
-    motion = fly(body, environment, load_throw(throw), effects, law=law)
+    laws, _ = laws_upon(stated, "flight", ())
+    motion = fly(body, environment, load_throw(throw), effects, law=laws)
     return replay_motion(motion, body.diameter, f"flown in MuJoCo: disc {disc or model}, throw {throw}")
 
 

@@ -291,13 +291,16 @@ class Recalibration:
 class Law:
     """A missing force, torque or sensor term as an explicit formula of the state, ``target = text``.
 
-    Text and target are those of `discsim.law.Law`, so that the law can be flown.
+    Text and target are those of `discsim.law.Law`, so that the law can be flown. ``also`` are the laws of the same
+    physics about other targets, such as a sensor's other axes; ``leaves`` says what is left with all of them in.
     """
 
     text: str
     target: str
     coefficients: Mapping[str, ParameterValue]
     heldout_delta_log_likelihood: float | None = None
+    also: tuple[Law, ...] = ()
+    leaves: str = ""
 
     def __post_init__(self) -> None:
         _finite("law", heldout=self.heldout_delta_log_likelihood)
@@ -319,6 +322,10 @@ class Law:
             "target": self.target,
             "coefficients": _values(self.coefficients),
             "heldout_delta_log_likelihood": _plain(self.heldout_delta_log_likelihood),
+            "also": [
+                {"text": law.text, "target": law.target, "coefficients": _values(law.coefficients)} for law in self.also
+            ],
+            "leaves": self.leaves,
         }
 
 

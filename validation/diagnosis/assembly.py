@@ -35,11 +35,13 @@ from validation.diagnosis.answer import (
 )
 from validation.diagnosis.formulae import telling_apart
 from validation.diagnosis.law import FoundLaw
-from validation.diagnosis.noise import chi_squared
+from validation.diagnosis.noise import NoiseModel, chi_squared
 from validation.diagnosis.places import located_effect, located_rest
 from validation.diagnosis.rest import remainders
+from validation.diagnosis.rows import user_effect
 from validation.diagnosis.search import FAR, Search, chi2_in, tried_without
 from validation.diagnosis.selection import Hypothesis, Tied, fitted_parameters
+from validation.diagnosis.trajectory_pieces import Linear
 from validation.diagnosis.trials import Trial, parameters_of
 
 __all__ = ["assemble"]
@@ -171,10 +173,10 @@ def _heldout_chi2(found: Search, hypothesis: Hypothesis, i: int) -> float:
     return chi2
 
 
-def _noise_notes(found: Search) -> list[NoiseNote]:
+def _noise_notes(linears: Sequence[Linear], found: NoiseModel) -> list[NoiseNote]:
+    """Return the sensors whose noise is not as stated: that of the fit which leaves the least beside noise."""
     notes = []
-    linears = found.final.fit.linears
-    for group, noise in found.final.fit.noise.items():
+    for group, noise in found.items():
         channel = next((linear, c) for linear in linears for c in linear.channels if c.group == group)
         stated = float(channel[0].sd[channel[1].rows][0])
         interval = float(np.median(np.diff(channel[0].t[channel[1].rows]))) if channel[1].index.size > 1 else 0.0
@@ -184,6 +186,38 @@ def _noise_notes(found: Search) -> list[NoiseNote]:
             slow = -interval / float(np.log(noise.correlation)) if noise.correlation > 0 else 0.0
             notes.append(NoiseNote(group, stated if np.isfinite(stated) else None, float(noise.sd), slow))
     return notes
+
+
+def _with_law(found: Search, law: FoundLaw) -> tuple[FitFigures, FitFigures, tuple[HeldOut, ...]]:
+    """Return the figures of the baseline and of the fit with a law, and what recordings gain that were set aside."""
+    reference = {group: noise._replace(correlation=0.0) for group, noise in law.tied.fit.noise.items()}
+    rows = [linear.raw.size for linear in law.tied.fit.linears]
+    before, after = chi2_in(found.base, reference), chi2_in(law.tied, reference)
+    held = tuple(
+        HeldOut(str(i), old / rows[i], new / rows[i], law.heldout[i]) for i, (old, new) in sorted(law.chi2.items())
+    )
+    sides = [sum(pair[side] for pair in law.chi2.values()) / sum(rows) if held else None for side in (0, 1)]
+    return (
+        FitFigures(before / found.base.fit.count, sides[0]),
+        FitFigures(after / law.tied.fit.count, sides[1]),
+        held,
+    )
+
+
+def _leaves(law: FoundLaw, names: Sequence[str]) -> str:
+    """Return in words what is left once a law is in."""
+    left = remainders(law.tied.fit.linears, law.tied.residuals, law.tied.fit.noise)
+    if not left:
+        return "With it nothing but noise is left."
+    places = []
+    for item in left:
+        where = item.group.replace("gps.", "gps ")
+        if item.recording is not None:
+            where = f"{where} {item.axis} in {names[item.recording]} from {item.from_s:.2f} to {item.to_s:.2f} s"
+        places.append(where)
+    listed = "; ".join(dict.fromkeys(places[:3]))
+    more = f" and {len(left) - 3} more places" if len(left) > 3 else ""
+    return f"It explains {100.0 * law.share:.0f} % of the excess, and more than noise is left: {listed}{more}."
 
 
 def _figures(found: Search, unexplained: bool) -> tuple[FitFigures, FitFigures, tuple[HeldOut, ...]]:
@@ -231,6 +265,7 @@ def _residuals(found: Search, names: Sequence[str], unexplained: bool) -> list[R
 
 
 def _model(found: Search, effects: Sequence[NamedEffect], law: Law | None) -> Model:
+    """Return the improved model: stated numbers as the final fit has them, effects, laws."""
     first = found.recordings[0]
     environment, disc, rig = first.environment, first.disc, first.rig
     values = {
@@ -252,13 +287,18 @@ def _model(found: Search, effects: Sequence[NamedEffect], law: Law | None) -> Mo
         environment = replace(environment, air_density=values["environment", "air_density"][0])
     carried = []
     for effect in effects:
-        if effect.id not in CATALOGUE:
-            continue
-        kind = CATALOGUE[effect.id].type
         sizes = {name: item.value for name, item in effect.parameters.items()}
         sds = {name: item.sd for name, item in effect.parameters.items() if item.sd is not None}
-        carried.append(ModelEffect(Effect(effect.id, kind(**sizes)), sds, effect.recordings))
-    return Model(environment, disc, rig, tuple(carried), law.for_model() if law is not None else None)
+        own = user_effect(effect.id)
+        sized = Effect(effect.id, CATALOGUE[effect.id].type(**sizes)) if own is None else own.sized(sizes)
+        carried.append(ModelEffect(sized, sds, effect.recordings))
+    return Model(
+        environment,
+        disc,
+        rig,
+        tuple(carried),
+        () if law is None else tuple(one.for_model() for one in (law, *law.also)),
+    )
 
 
 def _next_recordings(found: Search, verdict: Verdict, effects: Sequence[NamedEffect]) -> tuple[str, ...]:
@@ -273,15 +313,6 @@ def _next_recordings(found: Search, verdict: Verdict, effects: Sequence[NamedEff
     if len(found.recordings) == 1:
         told.append("A second recording, unlike the first: with one alone nothing can be set aside to test the answer.")
     return tuple(dict.fromkeys(told))
-
-
-def _not_carried(effects: Sequence[NamedEffect]) -> list[str]:
-    """Return a warning for each effect that model.toml has no place for."""
-    return [
-        f"model.toml does not carry {effect.id}: an effect of the user's own competes here and is not flown"
-        for effect in effects
-        if effect.id not in CATALOGUE
-    ]
 
 
 def assemble(
@@ -299,18 +330,22 @@ def assemble(
     verdict, unexplained = verdict_of(found)
     if law is not None:
         verdict, unexplained = "unexplained", True
-    written = law.law if law is not None else None
+    written = None
+    best = found.at_base() if unexplained else found
+    if law is not None:
+        written = replace(law.law, also=law.also, leaves=_leaves(law, names))
+        best = replace(found, final=law.tied)
     trials = found.final.hypothesis.trials if verdict == "explained" else ()
     effects = tuple(_named(found, trial, names, advice) for trial in trials)
     located = [place for trial in trials for place in located_effect(found, trial, names)]
-    moved = recalibrations(found if not unexplained else found.at_base())
+    moved = recalibrations(best)
     if verdict == "recalibrated":
         located += [
             replace(place, text=f"{place.text}; a stated number is off") for place in located_rest(found, names)[:1]
         ]
     if unexplained:
         located = located_rest(found, names)
-    base, final, held = _figures(found, unexplained)
+    base, final, held = _figures(found, unexplained) if law is None else _with_law(found, law)
     held = tuple(replace(item, recording=names[int(item.recording)]) for item in held)
     candidates = tuple(
         Candidate(
@@ -336,11 +371,16 @@ def assemble(
         effects,
         moved,
         written,
-        tuple(_noise_notes(found)),
+        tuple(
+            _noise_notes(found.loose.linears, found.loose_noise)
+            if unexplained and law is None
+            else _noise_notes(best.final.fit.linears, best.final.fit.noise)
+        ),
         held,
         tuple(Outlier(names[i], s, a, t, d) for i, s, a, t, d in found.outliers),
         _next_recordings(found, verdict, effects),
-        (*found.warnings, *_not_carried(effects)),
+        tuple(found.warnings),
     )
-    model = _model(found if not unexplained else found.at_base(), effects, written)
-    return Outcome(diagnosis, model, tuple(_residuals(found, names, unexplained)), candidates)
+    model = _model(best, effects, written)
+    shown = _residuals(best, names, unexplained and law is None)
+    return Outcome(diagnosis, model, tuple(shown), candidates)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from discsim.effects.own import UserEffect
 from discsim.recording import Recording
 from validation.diagnosis.advice import advise
 from validation.diagnosis.agreement import agreement_of
@@ -15,7 +16,6 @@ from validation.diagnosis.law import find_law
 from validation.diagnosis.plans import Plan
 from validation.diagnosis.rows import competing, row_of
 from validation.diagnosis.search import Search, search
-from validation.diagnosis.user_effects import UserEffect
 
 __all__ = ["diagnose"]
 
@@ -46,9 +46,8 @@ def diagnose(
     """Tell whether the baseline explains recordings of one plant, and if not what was left out.
 
     ``datasets`` are sets of recordings that share their hardware, ``names`` what to call the sets; ``progress`` is
-    called with a stage, steps done and steps in all. ``user_effects`` compete with the catalogue's; raises `InputError`
-    for one that acts on motion. ``plans`` are the recordings that could be made where effects cannot be told apart, by
-    default such as are made easily.
+    called with a stage, steps done and steps in all. ``user_effects`` compete with the catalogue's. ``plans`` are the
+    recordings that could be made where effects cannot be told apart, by default such as are made easily.
     """
     recordings = [recording for dataset in datasets for recording in dataset]
     called = [name for group in recording_names(datasets, names) for name in group]

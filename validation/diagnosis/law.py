@@ -31,9 +31,10 @@ from validation.diagnosis.fitting import (
     refit,
     shared_step,
 )
-from validation.diagnosis.noise import GroupNoise, NoiseModel, log_likelihood, whitened
+from validation.diagnosis.noise import GroupNoise, NoiseModel, chi_squared, log_likelihood, whitened
 from validation.diagnosis.readings import to_body
 from validation.diagnosis.relaxed import NO_JUMPS
+from validation.diagnosis.rest import remainders
 from validation.diagnosis.selection import ENTRY, PER_PARAMETER, Hypothesis, Tied, noise_of, scored, tied_fit
 from validation.diagnosis.trajectory_pieces import Chain, Column, IntArray, Linear, moved, recut, undone
 
@@ -83,7 +84,8 @@ class FoundLaw:
     """A law that holds on recordings that took no part.
 
     ``gain`` is twice the log likelihood gained over the fit without any effect, ``heldout`` the log likelihood gained
-    by recording while it took no part, ``share`` the part of the excess of chi2 that it explains. ``reference`` says
+    by recording while it took no part, ``chi2`` its chi-squared there before and after in the noise of the fit with the
+    law, ``share`` the part of the excess of chi2 that it explains. ``tied`` is that fit. ``reference`` says
     the same law in another way: its value at an ordinary state, which is known better than its coefficients, whose
     errors hang together with those of the exponents.
     """
@@ -95,6 +97,7 @@ class FoundLaw:
     reference: str
     tied: Tied
     also: tuple[Law, ...] = field(default_factory=tuple)
+    chi2: Mapping[int, tuple[float, float]] = field(default_factory=dict)
 
 
 # ------------------------------------------------------------------------------------------------- screening
@@ -628,20 +631,21 @@ def _fitted(
     return scored(Hypothesis(), fit)
 
 
-def _held_out(before: Fit, after: Fit) -> dict[int, float]:
-    """Return the log likelihood gained by each recording while it took no part in either fit.
+def _held_out(before: Fit, after: Fit) -> tuple[dict[int, float], dict[int, tuple[float, float]]]:
+    """Return what each recording gains in log likelihood while it took no part in either fit, and its chi-squared then.
 
     The shared parameters are those of the other recordings, by one step of the fit without it; the recording's own
-    unknowns follow.
+    unknowns follow. chi-squared is in the levels of noise of the fit after.
     """
     count = len(before.chains)
     if count < 2:
-        return {}
-    sides = []
+        return {}, {}
+    levelled = {group: noise._replace(correlation=0.0) for group, noise in after.noise.items()}
+    sides, squares = [], []
     for fit in (before, after):
         linears = fit.linears
         reduced = mapped(lambda linear, chain, f=fit: reduce(linear, chain, f.noise, f.jumps), linears, fit.chains)
-        levels = []
+        levels, squared = [], []
         for i in range(count):
             others = np.sum([r.gram for j, r in enumerate(reduced) if j != i], axis=0)
             step, _, _ = shared_step(others, fit.parameters, fit.at)
@@ -649,8 +653,11 @@ def _held_out(before: Fit, after: Fit) -> dict[int, float]:
             step = np.where(acting, step, 0.0)
             left = linears[i].after(local_step(reduced[i], step), step)
             levels.append(log_likelihood(linears[i], fit.noise, left))
+            squared.append(chi_squared(linears[i], levelled, left))
         sides.append(levels)
-    return {i: 0.5 * (sides[0][i] - sides[1][i]) for i in range(count)}
+        squares.append(squared)
+    gains = {i: 0.5 * (sides[0][i] - sides[1][i]) for i in range(count)}
+    return gains, {i: (squares[0][i], squares[1][i]) for i in range(count)}
 
 
 # --------------------------------------------------------------------------------------------------- a formula
@@ -660,8 +667,19 @@ def _factor(symbol: str, power: str) -> str:
     return f"|{symbol}|^{power}"
 
 
-def _as_law(terms: Sequence[Term], fit: Fit, at: Mapping[str, float], heldout: float | None) -> tuple[Law, str]:
-    """Return a fit's terms as a law of plain SI coefficients, and as values at the reference state.
+def _as_laws(
+    terms: Sequence[Term], fit: Fit, at: Mapping[str, float], heldout: float | None
+) -> tuple[tuple[Law, ...], str]:
+    """Return a fit's terms as laws, one for each target, and as values at the reference state."""
+    by_target: dict[str, list[int]] = {}
+    for i, term in enumerate(terms):
+        by_target.setdefault(term.target, []).append(i)
+    found = [_as_law({i: terms[i] for i in mine}, fit, at, heldout) for mine in by_target.values()]
+    return tuple(law for law, _ in found), "; ".join(note for _, note in found)
+
+
+def _as_law(terms: Mapping[int, Term], fit: Fit, at: Mapping[str, float], heldout: float | None) -> tuple[Law, str]:
+    """Return a fit's terms about one target, by their number, as a law of plain SI coefficients, and as values.
 
     The coefficient of |x|^n is that at x = 1, far from where a disc ever is; its standard deviation holds the
     exponent's share, ln(x / 1) times its own.
@@ -669,7 +687,7 @@ def _as_law(terms: Sequence[Term], fit: Fit, at: Mapping[str, float], heldout: f
     place = {q.name: j for j, q in enumerate(fit.parameters) if q.group == "law"}
     C = fit.covariance
     coefficients, parts, notes = {}, [], []
-    for i, term in enumerate(terms):
+    for i, term in terms.items():
         mark = "" if len(terms) == 1 else str(i + 1)
         j = place[f"{i}.coefficient"]
         c = float(fit.at[j])
@@ -704,7 +722,8 @@ def _as_law(terms: Sequence[Term], fit: Fit, at: Mapping[str, float], heldout: f
             f"{c:.4g} ± {float(np.sqrt(C[j, j])):.2g} {'N' if term.target.endswith('_N') else 'N m'}"
             + (f" at {', '.join(where)}" if where else "")
         )
-    return Law(" + ".join(parts), terms[0].target, coefficients, heldout), "; ".join(notes)
+    target = next(iter(terms.values())).target
+    return Law(" + ".join(parts), target, coefficients, heldout), "; ".join(notes)
 
 
 # ----------------------------------------------------------------------------------------------------- finding
@@ -792,7 +811,44 @@ def find_law(
             found = tied, term
         if _share(base.fit, tied.fit, start.noise) > _ALL:
             break
-    return None if found is None else _believed(found[0], found[1], base, best, at, start.noise)
+    if found is None:
+        return None
+    tied, term = found
+    if isinstance(term, SensorTerm):
+        return _believed(tied, term, base, best, at, start.noise)
+    return _believed(*_more_terms(start, own, own_at, tied, term, at), base, best, at, start.noise)
+
+
+def _more_terms(
+    start: Fit, own: Sequence[Parameter], own_at: FloatArray, tied: Tied, first: Term, at: Mapping[str, float]
+) -> tuple[Tied, tuple[Term, ...]]:
+    """Return the fit of a law with one more term where the first leaves more than noise, and its terms.
+
+    The further term is asked for beside the first from where the motion is beside the data, and must gain its price and
+    held-out likelihood over the law without it.
+    """
+    terms: tuple[Term, ...] = (first,)
+    if not remainders(tied.fit.linears, tied.residuals, tied.fit.noise):
+        return tied, terms
+    plant = start.chains[0].recording.plant
+    held = tuple(q for q in tied.fit.parameters if q.group == "law")
+    beside = Fit(start.chains, (*own, *held), tied.fit.at, start.jumps, start.noise, tied.fit.fixed)
+    beside = refit(beside, iterations=3)
+    coefficient = float(tied.fit.at[[q.name for q in tied.fit.parameters].index("0.coefficient")])
+    powers = {q.name: float(v) for q, v in zip(tied.fit.parameters, tied.fit.at, strict=True) if q.group == "law"}
+    settled = replace(first, powers=tuple((s, powers.get(f"0.power_{s}", n)) for s, n in first.powers))
+    others = [term for term in library(plant) if _key(term) != _key(first)]
+    best, chosen = tied, terms
+    for _, further, term in _spread(_candidates(beside, (*own, *held), others, at)):
+        assert isinstance(term, Term)
+        both = _fitted(start, own, own_at, [settled, term], [coefficient, further], at)
+        if _priced(both) + ENTRY > _priced(best):
+            continue
+        gains, _ = _held_out(tied.fit, both.fit)
+        if gains and (2.0 * sum(gains.values()) < _HELD_OUT or np.mean(np.array([*gains.values()]) > 0.0) < 0.5):
+            continue
+        best, chosen = both, (settled, term)
+    return best, chosen
 
 
 def _key(term: Term | SensorTerm) -> tuple[object, ...]:
@@ -825,21 +881,20 @@ def _priced(tied: Tied) -> float:
 
 
 def _believed(
-    tied: Tied, term: Term | SensorTerm, base: Tied, best: Tied, at: Mapping[str, float], noise: NoiseModel
+    tied: Tied, terms: tuple[Term, ...] | SensorTerm, base: Tied, best: Tied, at: Mapping[str, float], noise: NoiseModel
 ) -> FoundLaw | None:
     """Return the law if it gains what it costs, explains most of the excess, and recordings that took no part."""
     if _priced(tied) + ENTRY > min(base.score, best.score):
         return None
     share = _share(base.fit, tied.fit, noise)
-    heldout = _held_out(base.fit, tied.fit)
+    heldout, chi2 = _held_out(base.fit, tied.fit)
     if heldout and (2.0 * sum(heldout.values()) < _HELD_OUT or np.mean(np.array([*heldout.values()]) > 0.0) < 0.5):
         return None
     if share < _SHARE:
         return None
     total = sum(heldout.values()) if heldout else None
-    if isinstance(term, SensorTerm):
-        laws, reference = _as_sensor_laws(term, tied.fit, total)
+    if isinstance(terms, SensorTerm):
+        laws, reference = _as_sensor_laws(terms, tied.fit, total)
     else:
-        law, reference = _as_law([term], tied.fit, at, total)
-        laws = (law,)
-    return FoundLaw(laws[0], base.score - tied.score, heldout, share, reference, tied, laws[1:])
+        laws, reference = _as_laws(terms, tied.fit, at, total)
+    return FoundLaw(laws[0], base.score - tied.score, heldout, share, reference, tied, laws[1:], chi2)

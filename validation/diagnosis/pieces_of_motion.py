@@ -26,6 +26,7 @@ from discsim.effects.body import transverse_inertia
 from discsim.effects.events import spin_step
 from discsim.effects.rig import axis, coulomb_friction, quadratic_drag, speed_ripple
 from discsim.law import LAW_WIDTH, SYMBOLS, law_wrench
+from discsim.own_wrench import own_wrench
 from discsim.parameters import PARAMETERS, Tables
 from discsim.trajectory import derivative, evaluate, in_body, interpolant, step
 
@@ -42,7 +43,7 @@ __all__ = [
 
 #: numbers of a state and of a row of motion
 STATE, ROW = 13, 19
-#: numbers of the physics; what a row of flats holds beyond are the terms of a law
+#: numbers of the physics; what a row of flats holds beyond are those of the user's own effects and the terms of a law
 SIZE = PARAMETERS.itemsize // 8
 #: names of the numbers of a law's term: those of a row of `discsim.law`, and per symbol where its power is one
 LAW_PLACES = (
@@ -59,17 +60,25 @@ _PLACES, _COUNT = len(LAW_PLACES), len(SYMBOLS)
 
 
 @compiled
-def _law(flat: FloatArray) -> FloatArray:
-    """Return the rows (terms, LAW_WIDTH) of the law at the end of a row of flats."""
-    terms = (flat.size - SIZE) // _PLACES
+def _law(flat: FloatArray, first: int) -> FloatArray:
+    """Return the rows (terms, LAW_WIDTH) of the law that stands in a row of flats from place ``first`` on."""
+    terms = (flat.size - first) // _PLACES
     rows = np.zeros((terms, LAW_WIDTH))
     for i in range(terms):
-        given = flat[SIZE + i * _PLACES : SIZE + (i + 1) * _PLACES]
+        given = flat[first + i * _PLACES : first + (i + 1) * _PLACES]
         rows[i] = given[:LAW_WIDTH]
         for k in range(_COUNT):
             if given[LAW_WIDTH + k] > 0.0:
                 rows[i, 1] /= given[LAW_WIDTH + k] ** given[2 + k]
     return rows
+
+
+@compiled
+def _moved(given: Tables, flat: FloatArray) -> Tables:
+    """Return tables with a law and the user's own effects as a row of flats has them."""
+    own = given.own_sizes.size
+    sizes = flat[SIZE : SIZE + own].copy().reshape(given.own_sizes.shape)
+    return Tables(given.static, given.rate, given.speed, given.spline, _law(flat, SIZE + own), given.own_calls, sizes)
 
 
 @compiled_nogil
@@ -93,7 +102,7 @@ def flight_pieces(
     for c in range(states.shape[0]):
         flat = flats[c, :SIZE].copy()
         p = flat.view(PARAMETERS)[0]
-        tables = Tables(given.static, given.rate, given.speed, given.spline, _law(flats[c]))
+        tables = _moved(given, flats[c])
         path[0, :10] = states[c, :10]
         path[0, 10:13] = states[c, 10:13]
         path[0, 13] = 0.0
@@ -263,18 +272,21 @@ def _rig_row(p: Any, psi: float, r: float, dr: float, row: FloatArray) -> None:
 
 
 @compiled
-def _friction(p: Any, law: FloatArray, t: float, r: float) -> float:
+def _friction(p: Any, tables: Tables, t: float, r: float) -> float:
     """Angular acceleration of a rig that runs down, rad/s^2."""
     torque = -p.rig.viscous * r + coulomb_friction(p.rig_coulomb_friction, r)
     torque += quadratic_drag(p.rig_quadratic_drag, r)
-    if law.shape[0] > 0:
-        torque += law_wrench(law, t, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, r)[5]
+    if tables.law.shape[0] > 0:
+        torque += law_wrench(tables.law, t, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, r)[5]
+    if tables.own_calls.size > 0:
+        torque += own_wrench(tables.own_calls, tables.own_sizes, t, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, r)[5]
     return float(torque / p.rig.Izz + spin_step(p.event_spin_step, t, r))
 
 
 @compiled_nogil
 def spin_down_pieces(
     flats: FloatArray,
+    tables: Tables,
     states: FloatArray,
     times: FloatArray,
     last: int,
@@ -287,18 +299,18 @@ def spin_down_pieces(
     psi, r, slope = np.empty(n), np.empty(n), np.empty(n)
     for c in range(states.shape[0]):
         flat = flats[c, :SIZE].copy()
-        p, law = flat.view(PARAMETERS)[0], _law(flats[c])
+        p, acting = flat.view(PARAMETERS)[0], _moved(tables, flats[c])
         psi[0], r[0] = states[c, 0], states[c, 1]
-        slope[0] = _friction(p, law, times[0], r[0])
+        slope[0] = _friction(p, acting, times[0], r[0])
         for k in range(n - 1):
             t, h = times[k], times[k + 1] - times[k]
             k1 = slope[k]
-            k2 = _friction(p, law, t + 0.5 * h, r[k] + 0.5 * h * k1)
-            k3 = _friction(p, law, t + 0.5 * h, r[k] + 0.5 * h * k2)
-            k4 = _friction(p, law, t + h, r[k] + h * k3)
+            k2 = _friction(p, acting, t + 0.5 * h, r[k] + 0.5 * h * k1)
+            k3 = _friction(p, acting, t + 0.5 * h, r[k] + 0.5 * h * k2)
+            k4 = _friction(p, acting, t + h, r[k] + h * k3)
             r[k + 1] = r[k] + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
             psi[k + 1] = psi[k] + h * r[k] + h * h / 6.0 * (k1 + k2 + k3)
-            slope[k + 1] = _friction(p, law, times[k + 1], r[k + 1])
+            slope[k + 1] = _friction(p, acting, times[k + 1], r[k + 1])
         _between(p, times, psi, r, slope, out, rows[c])
         ends[c] = 0.0
         ends[c, 0], ends[c, 1] = psi[last], r[last]

@@ -220,9 +220,17 @@ def _where(item: NamedEffect) -> str:
 def _law(law: Law) -> dict[str, Any]:
     gain = law.heldout_delta_log_likelihood
     return {
-        "target": target_in_words(law.target),
-        "text": Markup(law_text(law.text)),
-        "coefficients": [(name, plus_minus(value.value, value.sd)) for name, value in law.coefficients.items()],
+        "parts": [
+            {
+                "target": target_in_words(part.target),
+                "text": Markup(law_text(part.text)),
+                "coefficients": [
+                    (name, plus_minus(value.value, value.sd)) for name, value in part.coefficients.items()
+                ],
+            }
+            for part in (law, *law.also)
+        ],
+        "leaves": law.leaves,
         "evidence": "No recording could be set aside to test it."
         if gain is None
         else f"With it, recordings set aside become more likely by {gain:,.1f} in natural logarithm.",

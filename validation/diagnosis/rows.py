@@ -8,8 +8,7 @@ from contextvars import ContextVar
 from types import MappingProxyType
 
 from discsim.effects.catalogue import CATALOGUE, Row
-from discsim.errors import InputError
-from validation.diagnosis.user_effects import UserEffect
+from discsim.effects.own import UserEffect
 
 __all__ = ["competing", "row_of", "rows", "user_effect", "user_effects_on"]
 
@@ -20,14 +19,7 @@ _OWN: ContextVar[Mapping[str, UserEffect]] = ContextVar("user_effects", default=
 
 @contextmanager
 def competing(effects: Sequence[UserEffect]) -> Iterator[None]:
-    """Let effects of the user's own compete within the block; raises `InputError` for one that acts on motion."""
-    for effect in effects:
-        if effect.row.acts_on == "motion":
-            raise InputError.at(
-                effect.path,
-                None,
-                f"{effect.id} acts on motion; expected an effect on a sensor, for only these compete so far",
-            )
+    """Let effects of the user's own compete within the block."""
     token = _OWN.set(MappingProxyType({effect.id: effect for effect in effects}))
     try:
         yield
@@ -53,6 +45,6 @@ def user_effect(id: str) -> UserEffect | None:
     return _OWN.get().get(id)
 
 
-def user_effects_on(sensor: str) -> tuple[UserEffect, ...]:
-    """Return the user's own effects on a sensor, in the order in which they act."""
-    return tuple(effect for effect in _OWN.get().values() if effect.row.acts_on == sensor)
+def user_effects_on(target: str) -> tuple[UserEffect, ...]:
+    """Return the user's own effects on a sensor or on "motion", in the order in which they act."""
+    return tuple(effect for effect in _OWN.get().values() if effect.row.acts_on == target)

@@ -33,7 +33,7 @@ from validation.diagnosis.pieces_of_motion import (
 )
 from validation.diagnosis.plateau import plateau
 from validation.diagnosis.readings import CLOCKS, Values, delay, is_motion, predicted, value
-from validation.diagnosis.rows import row_of
+from validation.diagnosis.rows import row_of, user_effects_on
 from validation.diagnosis.starts import spin_starts
 
 __all__ = [
@@ -338,7 +338,7 @@ def base_flat(recording: Recording, values: Values, columns: Sequence[tuple[str,
 
     ``columns`` are keys that need a place, too.
     """
-    flat = parameters(recording.environment, recording.disc, recording.rig)
+    flat = np.concatenate([parameters(recording.environment, recording.disc, recording.rig), _own_sizes().ravel()])
     terms = 1 + max((_term(name) for group, name in (*values, *columns) if group == "law"), default=-1)
     flat = np.concatenate([flat, np.zeros(terms * len(LAW_PLACES))])
     for (group, name), number in values.items():
@@ -352,10 +352,21 @@ def _term(name: str) -> int:
 
 
 def _place(group: str, name: str) -> int:
-    """Return the place of a parameter in a flat array, a law's terms standing behind the physics."""
+    """Return the place of a parameter in a flat array: behind the physics own effects stand, and then a law's terms."""
     if group == "law":
-        return SIZE + _term(name) * len(LAW_PLACES) + LAW_PLACES.index(name.partition(".")[2])
+        behind = SIZE + _own_sizes().size
+        return behind + _term(name) * len(LAW_PLACES) + LAW_PLACES.index(name.partition(".")[2])
+    own = [effect.id for effect in user_effects_on("motion")]
+    if group in own:
+        row = row_of(group)
+        assert row is not None
+        return SIZE + own.index(group) * _own_sizes().shape[1] + row.parameters.index(name)
     return parameter_index(group, name)
+
+
+def _own_sizes() -> FloatArray:
+    """Return the parameters of the user's own effects on motion at which they do nothing, (effects, k)."""
+    return tables(None, None, [effect.sized({}) for effect in user_effects_on("motion")]).own_sizes
 
 
 _FLAT_ENVIRONMENT = {("environment", name) for name in PARAMETERS["environment"].names or ()}
@@ -453,7 +464,7 @@ class _Runner:
         elif plant == "free_spin":
             free_spin_pieces(flats, wobbles, states, times, last, out, rows, ends)
         elif plant == "spin_down":
-            spin_down_pieces(flats, states, times, last, out, rows, ends)
+            spin_down_pieces(flats, self.lookup, states, times, last, out, rows, ends)
         else:
             table_pieces(flats, self.knots, states, times, last, out, rows, ends)
         return rows, ends
@@ -492,7 +503,7 @@ _UNEVEN_BODY = (
 def _runner(recording: Recording, values: Values, columns: Sequence[Column] = ()) -> _Runner:
     return _Runner(
         recording,
-        tables(recording.disc),
+        tables(recording.disc, None, [effect.sized({}) for effect in user_effects_on("motion")]),
         _knots(recording),
         _events(values, columns),
         _order(values, columns),

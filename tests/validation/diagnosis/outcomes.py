@@ -229,7 +229,7 @@ def unexplained() -> Outcome:
         ),
         law=law,
     )
-    model = replace(outcome.model, law=law.for_model())
+    model = replace(outcome.model, laws=(law.for_model(),))
     return replace(outcome, diagnosis=answer, model=model, residuals=residuals(True))
 
 

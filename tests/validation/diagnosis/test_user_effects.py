@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from discsim.effects.own import compiled_wrench, load_user_effect, load_user_effects
 from discsim.errors import InputError
 from discsim.motion import State
-from validation.diagnosis.user_effects import compiled_wrench, load_user_effect, load_user_effects
 
 PAGE = (Path(__file__).parents[3] / "docs" / "diagnosing.md").read_text(encoding="utf-8")
 SENSOR, MOTION = (block for block in re.findall(r"```python\n(.*?)```", PAGE, re.S) if "NamedTuple" in block)

@@ -11,6 +11,7 @@ import pytest
 
 from discsim.disc import Rig
 from discsim.effects.catalogue import CATALOGUE
+from discsim.effects.own import UserEffect, load_user_effect
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.frames import turn
@@ -25,7 +26,6 @@ from validation.diagnosis.relaxed import first_chain
 from validation.diagnosis.rows import competing, row_of, rows
 from validation.diagnosis.trajectory_pieces import Column, linearise
 from validation.diagnosis.trials import available, parameters_of, trials_for
-from validation.diagnosis.user_effects import UserEffect, load_user_effect
 
 FIELD, RIG = Environment(air_density=None), Rig(1e-3, 8e-5)
 MODULE = Instruments.from_parts("mpu9250")

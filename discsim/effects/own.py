@@ -1,4 +1,4 @@
-"""Effects of the user's own: one Python file each, checked when it is read, that compete with the catalogue's.
+"""Effects of the user's own: one Python file each, checked when it is read. They compete with the catalogue's and fly.
 
 What such a file holds is told in docs/diagnosing.md. A file is code and runs as such: only files of one's own.
 """
@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import re
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import isfinite
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -17,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import CATALOGUE, Row
+from discsim.effects.catalogue import CATALOGUE, Effect, Row
 from discsim.errors import InputError
 from discsim.files import read_text
 from discsim.frames import turn
@@ -29,6 +30,9 @@ __all__ = ["SENSOR_WIDTHS", "UserEffect", "compiled_wrench", "load_user_effect",
 #: sensors that a user's effect may act on, and the width of their readings
 SENSOR_WIDTHS = MappingProxyType({"magnetometer": 3, "accelerometer": 3, "gyroscope": 3, "gps": 6})
 _ACTS_ON = (*SENSOR_WIDTHS, "motion")
+#: where forces and moments of one's own move something: a table turns as commanded, and in a free spin, whose path
+#: nobody knows, any moment is an unknown already
+_MOVED = ("flight", "spin_down")
 #: what a file must define beside its type
 _NEEDED = ("ID", "ACTS_ON", "SCALE", "apply")
 _ID = re.compile(r"[a-z][a-z0-9_]*\.[a-z][a-z0-9_]*")
@@ -62,6 +66,33 @@ class UserEffect:
     def id(self) -> str:
         """Its id."""
         return self.row.id
+
+    def sized(self, sizes: Mapping[str, float]) -> Effect:
+        """Return the effect with its parameters, those left out as they do nothing; raises `InputError`."""
+        for name in sizes:
+            if name not in self.row.parameters:
+                raise InputError(f"{self.id}: unknown parameter '{name}'; expected {', '.join(self.row.parameters)}")
+        return Effect(self.id, self.row.type(**{name: float(size) for name, size in sizes.items()}), self)
+
+    @cached_property
+    def address(self) -> int:
+        """Where the compiled wrench of an effect on motion starts, for `discsim.own_wrench`."""
+        return int(self._native.address)
+
+    @cached_property
+    def _native(self) -> Any:
+        import numba
+        from numba import carray, types
+
+        wrench, count = compiled_wrench(self), len(self.row.parameters)
+        number, numbers = types.float64, types.CPointer(types.float64)
+
+        @numba.cfunc(types.void(numbers, *(number,) * 8, numbers))
+        def native(sizes, t, h, u, v, w, P, Q, r, out):  # type: ignore[no-untyped-def]
+            six = carray(out, 6)
+            six[0], six[1], six[2], six[3], six[4], six[5] = wrench(carray(sizes, count), t, h, u, v, w, P, Q, r)
+
+        return native
 
     def on_readings(self, values: Sequence[float], readings: FloatArray, t: FloatArray, motion: State) -> FloatArray:
         """Return a sensor's readings (n, k) with the effect of size ``values`` on them.
@@ -112,8 +143,9 @@ def load_user_effect(path: Path) -> UserEffect:
     if not callable(function):
         raise InputError.at(path, None, "apply is no function")
     plants = found.get("PLANTS", ("flight",) if acts_on in ("motion", "gps") else PLANTS)
-    if not isinstance(plants, tuple | list) or not plants or not set(plants) <= set(PLANTS):
-        raise InputError.at(path, None, f"PLANTS is {plants!r}, expected a tuple of some of {', '.join(PLANTS)}")
+    possible = _MOVED if acts_on == "motion" else PLANTS
+    if not isinstance(plants, tuple | list) or not plants or not set(plants) <= set(possible):
+        raise InputError.at(path, None, f"PLANTS is {plants!r}, expected a tuple of some of {', '.join(possible)}")
     row = Row(id, kind, acts_on, tuple(plants), _scale(path, found["SCALE"], kind))
     text = (kind.__doc__ or "").strip().splitlines()
     effect = UserEffect(row, function, text[0] if text and not text[0].startswith(f"{kind.__name__}(") else id, path)
@@ -240,7 +272,9 @@ def compiled_wrench(effect: UserEffect) -> Callable[..., tuple[float, float, flo
     from numba.core.errors import NumbaError
     from numba.np.unsafe.ndarray import to_fixed_tuple
 
-    function = effect.function if hasattr(effect.function, "py_func") else numba.njit(effect.function)
+    function = effect.function
+    if not hasattr(function, "py_func"):
+        function = numba.njit(error_model="numpy")(function)
     kind, count = effect.row.type, len(effect.row.parameters)
 
     fixed: Any = to_fixed_tuple  # its second argument is only seen by the compiler
