@@ -76,9 +76,7 @@ def read_model(path: Path | str, own: Sequence[UserEffect] = ()) -> Model:
     disc = Disc.from_toml(disc_table, aero_required=False) if disc_table is not None else None
     rig = Rig.from_toml(rig_table) if rig_table is not None else None
     effects = tuple(_read_effect(table, own) for table in top.tables("effects"))
-    several = isinstance(top.raw("law"), list)
-    law_table = None if several else top.table("law")
-    laws = tuple(_read_law(table) for table in (top.tables("law") if several else filter(None, [law_table])))
+    laws = tuple(_read_law(table) for table in top.tables("law", single=True))
     top.finish()
     return Model(environment, disc, rig, effects, laws)
 

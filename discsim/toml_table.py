@@ -144,11 +144,13 @@ class TomlTable:
             raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected a table")
         return TomlTable(value, self.path, self._full(key), self._lines)
 
-    def tables(self, key: str) -> list[TomlTable]:
-        """Take an array of tables (``[[key]]``); none where the key is absent."""
+    def tables(self, key: str, *, single: bool = False) -> list[TomlTable]:
+        """Take an array of tables (``[[key]]``); none where the key is absent. ``single`` allows one ``[key]``, too."""
         value = self._take(key, "an array of tables", False)
         if value is None:
             return []
+        if single and isinstance(value, dict):
+            value = [value]
         if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
             raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected an array of tables [[{key}]]")
         return [TomlTable(item, self.path, self._full(key), self._lines) for item in value]

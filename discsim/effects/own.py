@@ -82,12 +82,13 @@ class UserEffect:
     @cached_property
     def _native(self) -> Any:
         import numba
-        from numba import carray, types
 
+        compiler: Any = numba
+        types, carray = compiler.types, compiler.carray
         wrench, count = compiled_wrench(self), len(self.row.parameters)
         number, numbers = types.float64, types.CPointer(types.float64)
 
-        @numba.cfunc(types.void(numbers, *(number,) * 8, numbers))
+        @compiler.cfunc(types.void(numbers, *(number,) * 8, numbers))
         def native(sizes, t, h, u, v, w, P, Q, r, out):  # type: ignore[no-untyped-def]
             six = carray(out, 6)
             six[0], six[1], six[2], six[3], six[4], six[5] = wrench(carray(sizes, count), t, h, u, v, w, P, Q, r)

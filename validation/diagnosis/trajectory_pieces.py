@@ -360,7 +360,7 @@ def _place(group: str, name: str) -> int:
     if group in own:
         row = row_of(group)
         assert row is not None
-        return SIZE + own.index(group) * _own_sizes().shape[1] + row.parameters.index(name)
+        return int(SIZE + own.index(group) * _own_sizes().shape[1] + row.parameters.index(name))
     return parameter_index(group, name)
 
 
