@@ -227,6 +227,14 @@ def test_a_brake_that_no_effect_describes_is_unexplained_and_told_as_a_law():
     torque = diagnosis.law.for_model().evaluate({"r": np.array([30.0])})
     assert torque == pytest.approx(-rig.Izz * c * 30.0**1.5, rel=0.01)
     assert diagnosis.located
+    # the final fit is that with the law: what it leaves is the noise as stated
+    assert diagnosis.law.leaves == "With it nothing but noise is left."
+    assert diagnosis.baseline.chi2_per_sample > 2.0
+    assert diagnosis.final.chi2_per_sample == pytest.approx(1.0, abs=0.1)
+    assert diagnosis.final.heldout_chi2_per_sample == pytest.approx(1.0, abs=0.1)
+    assert len(diagnosis.heldout) == 2
+    assert all(item.final < item.baseline and item.delta_log_likelihood > 0 for item in diagnosis.heldout)
+    assert diagnosis.noise == ()
 
 
 # ---------------------------------------------------------------------------------------------- robustness
