@@ -11,7 +11,8 @@ import pytest
 from discsim.frames import body_to_ned
 from discsim.shipped import load_disc
 from validation.golf_throws.page import write_page
-from validation.golf_throws.prediction import INPUTS, THROWS, _drawn, predict_throw
+from validation.golf_throws.prediction import INPUTS, THROWS, predict_throw
+from validation.golf_throws.prediction import drawn as drawn_inputs
 from validation.importing import find_map, read_map
 
 RECORDINGS = Path(os.environ.get("DISCSIM_RECORDINGS") or Path(__file__).parents[3] / "shared" / "recordings") / "real"
@@ -26,7 +27,7 @@ def drawn(column: int, sigmas: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Return the release state and flat parameters with one input moved, less those as stated."""
     z = np.zeros((2, 12))
     z[1, column] = sigmas
-    states, flats = _drawn(MAP.throws["throw1"], DISC, AIR, np.zeros(2), np.array([1.0, 0.17, 0.0]), z)
+    states, flats = drawn_inputs(MAP.throws["throw1"], DISC, AIR, np.zeros(2), np.array([1.0, 0.17, 0.0]), z)
     return states[1] - states[0], flats[1] - flats[0]
 
 
@@ -41,7 +42,7 @@ class TestDraws:
         """The source's yaw turns the whole throw: the angle between velocity and axis stays."""
         z = np.zeros((2, 12))
         z[1, 2] = 3.0
-        states, _ = _drawn(MAP.throws["throw1"], DISC, AIR, np.zeros(2), np.zeros(3), z)
+        states, _ = drawn_inputs(MAP.throws["throw1"], DISC, AIR, np.zeros(2), np.zeros(3), z)
         axes = [body_to_ned(state[6:10])[:, 2] for state in states]
         angles = [axis @ state[3:6] for axis, state in zip(axes, states, strict=True)]
         assert angles[0] == pytest.approx(angles[1], abs=1e-9)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,13 +10,14 @@ import numpy as np
 
 from discsim.arrays import FloatArray, readonly
 from discsim.disc import Disc, Release
+from discsim.effects.catalogue import Effect
 from discsim.environment import Environment
 from discsim.parameters import flight_parameters, parameter_index
 from discsim.trajectory import predict_many, release_state
 from validation.importing import find_map, import_recording, read_map
 from validation.importing.throw import MeasuredThrow
 
-__all__ = ["THROWS", "Prediction", "predict_throw"]
+__all__ = ["INPUTS", "THROWS", "Prediction", "drawn", "predict_throw"]
 
 #: stems of the raw files, in the order of the paper's table
 THROWS = ("throw1", "throw6", "throw15")
@@ -98,7 +99,7 @@ def predict_throw(name: str, folder: Path, draws: int, rng: np.random.Generator)
 
     z = rng.standard_normal((draws, 12))
     z[0] = 0.0
-    states, flats = _drawn(measured, disc, environment, place, wind_sigma, z)
+    states, flats = drawn(measured, disc, environment, place, wind_sigma, z)
     t = np.maximum(track.t, 0.0)
     flown = predict_many(disc, environment, states, parameters=flats, times=t)
     ends = np.column_stack((flown.state[:, :2], flown.end))
@@ -107,7 +108,7 @@ def predict_throw(name: str, folder: Path, draws: int, rng: np.random.Generator)
     one = np.zeros((len(INPUTS), 12))
     for row, columns in enumerate(([0], [1], [2], [3], [4], [5], [6], [8], [9])):
         one[row, columns] = 1.0
-    states, flats = _drawn(measured, disc, environment, place, wind_sigma, one)
+    states, flats = drawn(measured, disc, environment, place, wind_sigma, one)
     moved = predict_many(disc, environment, states, parameters=flats).state[:, :2] - ends[0, :2]
     paths = flown.track[:, :, :2]
     return Prediction(
@@ -122,19 +123,20 @@ def predict_throw(name: str, folder: Path, draws: int, rng: np.random.Generator)
     )
 
 
-def _drawn(
+def drawn(
     measured: MeasuredThrow,
     disc: Disc,
     environment: Environment,
     place: FloatArray,
     wind_sigma: FloatArray,
     z: FloatArray,
+    effects: Sequence[Effect] = (),
 ) -> tuple[FloatArray, FloatArray]:
     """Return release states (n, 14) and flat parameters (n, k) for inputs z (n, 12) sigmas from what is stated.
 
     Columns of z: the five conditions, spin, two of wobble, height, three of wind.
     """
-    flats = np.repeat(flight_parameters(disc, environment)[None], len(z), axis=0)
+    flats = np.repeat(flight_parameters(disc, environment, effects)[None], len(z), axis=0)
     for axis, name in enumerate(("wind_north", "wind_east", "wind_down")):
         flats[:, parameter_index("environment", name)] += wind_sigma[axis] * z[:, 9 + axis]
     states = []

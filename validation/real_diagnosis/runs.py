@@ -1,0 +1,66 @@
+"""Diagnoses of measured recordings: made once, kept as ``discsim diagnose`` writes them, and read from there."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from discsim.model_file import Model, read_model
+from discsim.recording import Recording, write_recording
+from validation.commands.diagnose import write_outcome
+from validation.diagnosis import diagnose
+from validation.diagnosis.datasets import read_datasets
+
+__all__ = ["Found", "diagnosed", "without"]
+
+
+@dataclass(frozen=True)
+class Found:
+    """A diagnosis as its files hold it.
+
+    ``answer`` is the content of ``diagnosis.json``, ``names`` the recordings that it was made from, ``folder`` where
+    its figures are.
+    """
+
+    names: tuple[str, ...]
+    answer: Mapping[str, Any]
+    model: Model
+    folder: Path
+
+    @property
+    def verdict(self) -> str:
+        """The verdict."""
+        return str(self.answer["verdict"])
+
+    def chi2(self, which: str, *, held_out: bool = False) -> float | None:
+        """Return chi-squared per reading of the "baseline" or "final" model."""
+        value = self.answer["fit"][which]["heldout_chi2_per_sample" if held_out else "chi2_per_sample"]
+        return None if value is None else float(value)
+
+
+def diagnosed(
+    recordings: Mapping[str, Recording], folder: Path, say: Callable[[str], None] = lambda text: None, seed: int = 0
+) -> Found:
+    """Diagnose recordings into ``folder``, or read what an earlier run has left there.
+
+    ``diagnosis.json`` is written last, so a run that was broken off is made again.
+    """
+    names = tuple(recordings)
+    if not (folder / "diagnosis.json").is_file():
+        say(f"diagnosing {folder.name}")
+        data = folder / "data"
+        for name, recording in recordings.items():
+            write_recording(recording, data / name)
+        read, called = read_datasets([data])
+        outcome = diagnose(read, called, seed=seed)
+        write_outcome(outcome, folder, {"recordings": ", ".join(names), "seed": str(seed)})
+    answer = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
+    return Found(names, answer, read_model(folder / "model.toml"), folder)
+
+
+def without(recordings: Mapping[str, Recording], name: str) -> dict[str, Recording]:
+    """Return the recordings but one."""
+    return {other: recording for other, recording in recordings.items() if other != name}
