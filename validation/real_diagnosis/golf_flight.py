@@ -53,7 +53,7 @@ def flown(recording: Recording, model: Model, name: str | None = None) -> Flown:
     assert model.disc is not None
     assert recording.release is not None
     release = replace(recording.release, yaw=recording.release.yaw or 0.0)
-    flight = predict(model.disc, model.environment, release, model.effects_in(name), law=model.law)
+    flight = predict(model.disc, model.environment, release, model.effects_in(name), law=model.laws)
     track = recording.need("track")
     plan = track.value[:, :2]
     both = (track.t >= 0.0) & (track.t <= flight.end)
