@@ -62,6 +62,8 @@ IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 STEP, NUTATION = 0.01, 1.2
 #: and where an uneven body makes the motion follow the spin
 UNEVEN = 0.6
+#: and where coefficients come from a table, whose corners a step may not leap over
+CORNERED = 0.5
 #: a fit that has gone astray to faster spins, rad/s, is not followed with ever shorter steps
 FASTEST = 400.0
 #: longest step of a table's integrator in radians of its ripple
@@ -420,7 +422,8 @@ class _Runner:
             assert disc is not None
             spin = min(abs(float(state[12])), FASTEST)
             nutation = max(spin * disc.Izz / disc.Ixx, spin, 1.0)
-            h = min(STEP, (UNEVEN if self.uneven else NUTATION) / nutation)
+            largest = CORNERED if disc.aero_table is not None else UNEVEN if self.uneven else NUTATION
+            h = min(STEP, largest / nutation)
         elif plant == "free_spin":
             h = min(0.00125, 0.15 / max(min(abs(float(state[12])), FASTEST) * 2.0, 1.0))
         elif plant == "spin_down":
