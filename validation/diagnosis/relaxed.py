@@ -54,6 +54,7 @@ _ORDINARY = (
     ("air.wind", "w_north_m_s", 3.0),
     ("air.wind", "w_east_m_s", 3.0),
     ("air.density", "ratio", 0.1),
+    ("aero.yaw_quadratic", "CNrr", 1e-3),
     ("body.inertia_asymmetry", "dIyy_kg_m2", 2e-5),
     ("body.mass_imbalance", "ex_m", 1e-3),
     ("body.mass_imbalance", "ey_m", 1e-3),
