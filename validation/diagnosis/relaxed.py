@@ -18,9 +18,10 @@ from discsim.frames import conjugate, multiply
 from discsim.recording import Recording
 from validation.diagnosis.agreement import written_ratios
 from validation.diagnosis.fitting import Fit, Jumps, Parameter, linearised, merit_of, refit
-from validation.diagnosis.noise import channel_of, stated_noise, whitened
+from validation.diagnosis.noise import channel_of, estimate_noise, stated_noise, whitened
+from validation.diagnosis.readings import delay
 from validation.diagnosis.starts import flight_starts, rig_starts, spin_starts
-from validation.diagnosis.trajectory_pieces import WOBBLE, Chain, Linear, chain
+from validation.diagnosis.trajectory_pieces import WOBBLE, Chain, Linear, Readings, chain, shown
 
 __all__ = ["NO_JUMPS", "PIECE", "beginning", "first_chain", "loose_jumps", "relaxed", "without_outliers"]
 
@@ -93,12 +94,13 @@ def chain_in_true_time(recording: Recording, ratio: float) -> Chain:
     return replace(first, edges=first.edges / ratio, states=states)
 
 
-def first_chain(recording: Recording, ratio: float = 1.0) -> Chain:
+def first_chain(recording: Recording, ratio: float = 1.0, edges: FloatArray | None = None) -> Chain:
     """Return a recording's chain of pieces with starts from the data; ``ratio`` is that of the magnetometer's clock.
 
-    Starts stand in the time that the magnetometer writes.
+    Starts stand in the time that the magnetometer writes. ``edges`` (k + 1,) are the boundaries of the pieces, s, where
+    they are not those that `edges_of` a recording takes.
     """
-    edges = edges_of(recording)
+    edges = edges_of(recording) if edges is None else edges
     states = np.zeros((edges.size - 1, 13))
     if recording.plant in ("flight", "free_spin"):
         written = np.minimum(edges[:-1] * ratio, recording.end)
@@ -156,7 +158,7 @@ def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), it
     fit = refit(fit, iterations=iterations, tolerance=1e-4 * sum(linear.raw.size for linear in bare))
     fit = _from_other_starts(fit)
     if ratio == 1.0:
-        fit = _with_clocks(fit)
+        fit = _with_clocks(_led_by_others(fit))
     chains = tuple(within_range(chain, linear) for chain, linear in zip(fit.chains, fit.linears, strict=True))
     fit = replace(fit, chains=chains)
     linears = linearised(fit)
@@ -211,6 +213,72 @@ def _from_other_starts(fit: Fit) -> Fit:
             if trial.merit < 0.8 * fit.merit:
                 fit = trial
     return fit
+
+
+#: sensors without which the motion of a flight can still be followed, with the effect that is their clock
+_LED = {"accelerometer": ("accel.clock_rate", "ratio"), "gyroscope": ("gyro.clock_rate", "ratio")}
+#: clocks that are tried on a motion that the other sensors tell
+_CLOCKS_TRIED = 1.0 + 1e-4 * np.arange(-300, 301)
+
+
+def _led_by_others(fit: Fit) -> Fit:
+    """Follow flights that went astray without one sensor: its clock may be wrong, or samples of it lost.
+
+    Its clock is read off the motion that the others tell. Where that reconciles it, all are fitted together; where it
+    does not, the motion is left as the others tell it, for a search to find what the sensor has.
+    """
+    there = {readings.sensor for one in fit.chains for readings in one.readings}
+    if fit.chains[0].recording.plant != "flight" or not _astray(fit):
+        return fit
+    few = 1e-4 * fit.count
+    for sensor, clock in _LED.items():
+        if sensor not in there or not (there - {sensor}) & {"magnetometer", "gyroscope"}:
+            continue
+        chains = tuple(_silenced(one.recording, sensor) for one in fit.chains)
+        at = np.array([q.stated for q in fit.parameters])
+        led = refit(replace(fit, chains=chains, at=at), iterations=12, tolerance=few)
+        if _astray(led):
+            continue
+        ratio = _clock_read(led, [one.readings for one in fit.chains], sensor, clock)
+        chains = tuple(
+            replace(new, recording=old.recording, readings=old.readings)
+            for new, old in zip(led.chains, fit.chains, strict=True)
+        )
+        free = Parameter(*clock, 1.0, 1e-6, _CLOCK_SIGMA)
+        both = replace(led, chains=chains, parameters=(*fit.parameters, free), at=np.append(led.at, ratio))
+        both = refit(both, iterations=12, tolerance=few)
+        if not _astray(both):
+            return both
+        kept = replace(led, chains=chains)
+        linears = linearised(kept)
+        level = estimate_noise(linears, [linear.residual for linear in linears], coloured=False)[sensor]
+        kept = replace(kept, linears=linears, noise={**kept.noise, sensor: level})
+        return replace(kept, merit=merit_of(kept, linears))
+    return fit
+
+
+def _silenced(recording: Recording, sensor: str) -> Chain:
+    """Return a recording's first chain as if it had not a sensor."""
+    samples = {name: own for name, own in recording.samples.items() if name != sensor}
+    return first_chain(replace(recording, samples=samples), edges=edges_of(recording))
+
+
+def _clock_read(led: Fit, readings: Sequence[Sequence[Readings]], sensor: str, clock: tuple[str, str]) -> float:
+    """Return the clock by which a sensor's readings fit a motion best."""
+    misfit = np.zeros(_CLOCKS_TRIED.size)
+    for i, (one, own) in enumerate(zip(led.chains, readings, strict=True)):
+        told = next((r for r in own if r.sensor == sensor), None)
+        if told is None:
+            continue
+        end = one.edges[-1]
+        for k, ratio in enumerate(_CLOCKS_TRIED):
+            values = {**led.values(i), clock: float(ratio)}
+            at = told.t - delay(values, sensor, told.t)
+            inside = (at > 0.0) & (at < end)
+            left = np.where(told.good, told.value, np.nan)[inside] - shown(one, values, sensor, at[inside])
+            left = left[:, np.isfinite(left).any(axis=0)]
+            misfit[k] += float(np.nanmean(np.abs(left - np.nanmedian(left, axis=0)))) if left.size else 0.0
+    return float(_CLOCKS_TRIED[int(np.argmin(misfit))])
 
 
 #: how far clocks may be wrong where a fit went astray, and how long its first look is, s

@@ -255,6 +255,8 @@ def _pruned(found: Search, current: Tied) -> Tied:
     while len(current.hypothesis.trials) > 1:
         weakest: Tied | None = None
         for trial in current.hypothesis.trials[:-1]:
+            if trial.told:  # kept in the chains whatever the hypothesis says
+                continue
             less = tied_fit(
                 current.fit,
                 current.hypothesis.without(trial),

@@ -144,7 +144,7 @@ def lost_along(
     cost = np.minimum(np.nansum(off**2, axis=2), _MOST)
     # loggers mostly stop all their sensors together: then as many as are missing at the end were lost before, and
     # where the readings do not tell the place of one, there are so many places that it costs nothing
-    missing = int((end - samples.t[-1]) * rate_hz + 1e-3)
+    missing = max(int((end - samples.t[-1]) * rate_hz + 1e-3), 0)
     believed = cost.copy()
     if missing <= most:
         believed[-1] += _TOGETHER + _COST * missing
