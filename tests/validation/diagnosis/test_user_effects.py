@@ -22,6 +22,11 @@ def written(folder: Path, text: str, name: str = "mine.py") -> Path:
     return path
 
 
+def line_of(part: str, text: str) -> int:
+    """Return the line of an example of the documents that has a part."""
+    return next(k for k, line in enumerate(text.splitlines(), 1) if part in line)
+
+
 def still(n: int) -> State:
     """Return a motion that rests: t (n,) s."""
     zero = np.zeros((n, 3))
@@ -67,7 +72,11 @@ def test_an_effect_sees_the_motion(tmp_path):
     ("old", "new", "expected"),
     [
         ("def apply(", "def apply((", r"mine\.py:\d+: no valid Python"),
-        ("SCALE = (1e-5,)", "SCALE = 1 / 0", r"mine\.py:14: reading the file failed: ZeroDivisionError"),
+        (
+            "SCALE = (1e-5,)",
+            "SCALE = 1 / 0",
+            rf"mine\.py:{line_of('SCALE', SENSOR)}: reading the file failed: ZeroDivisionError",
+        ),
         ("SCALE = (1e-5,)", "", "defines no SCALE; expected ID, ACTS_ON, SCALE, apply"),
         ("SCALE = (1e-5,)", "SCALE = (1e-5, 1.0)", "expected 1 number above zero"),
         ("SCALE = (1e-5,)", "SCALE = (0.0,)", "expected 1 number above zero"),
@@ -81,7 +90,11 @@ def test_an_effect_sees_the_motion(tmp_path):
         ("np.abs(readings)", "np.nan", "changes something"),
         ("readings * (1.0 +", "np.ravel(readings + 0 *", r"shape \(63,\), expected that of the readings"),
         ("np.abs(readings)", "np.log(-1.0 * (effect.k_per_m_s2 > 0) + 1.0)", "NaN or infinity"),
-        ("np.abs(readings)", "np.absolut(readings)", r"mine\.py:18: apply\(\) with .* AttributeError"),
+        (
+            "np.abs(readings)",
+            "np.absolut(readings)",
+            rf"mine\.py:{line_of('np.abs', SENSOR)}: apply\(\) with .* AttributeError",
+        ),
         ("    return readings *", "    readings *= 2.0\n    return readings *", "read-only"),
     ],
 )
@@ -98,7 +111,7 @@ def test_a_bad_file_is_refused_with_what_was_expected(tmp_path, old, new, expect
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("-k * u", "u.first", r"mine\.py:17: apply\(\) cannot be compiled .*first"),
+        ("-k * u", "u.first", rf"mine\.py:{line_of('-k * u', MOTION)}: apply\(\) cannot be compiled .*first"),
         (", 0.0, 0.0, 0.0", ", 0.0, 0.0", "six of them returned"),
         ("-k * u", "1.0 - k * u", "expected nothing at the defaults"),
     ],
