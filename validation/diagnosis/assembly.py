@@ -188,6 +188,17 @@ def _noise_notes(linears: Sequence[Linear], found: NoiseModel) -> list[NoiseNote
     return notes
 
 
+def _noise_beside(found: Search) -> list[NoiseNote]:
+    """Return the sensors whose noise is not as stated where nothing explains the mismatch.
+
+    The relaxed fit follows the data; a sensor that it leaves more than noise on says nothing of its noise.
+    """
+    linears = found.loose.linears
+    left = remainders(linears, [linear.residual for linear in linears], found.loose_noise)
+    spoilt = {item.group for item in left}
+    return _noise_notes(linears, {group: noise for group, noise in found.loose_noise.items() if group not in spoilt})
+
+
 def _with_law(found: Search, law: FoundLaw) -> tuple[FitFigures, FitFigures, tuple[HeldOut, ...]]:
     """Return the figures of the baseline and of the fit with a law, and what recordings gain that were set aside."""
     reference = {group: noise._replace(correlation=0.0) for group, noise in law.tied.fit.noise.items()}
@@ -282,7 +293,8 @@ def _model(found: Search, effects: Sequence[NamedEffect], law: Law | None) -> Mo
         disc = replace(disc, aero=disc.aero._replace(**aero), sigma=sigma, **fields)  # type: ignore[arg-type]
     if rig is not None:
         fields = {name: values["rig", name][0] for name in ("Izz", "viscous") if ("rig", name) in values}
-        rig = replace(rig, **fields)  # type: ignore[arg-type]
+        keys = {name: _RECALIBRATED_NAMES["rig", name] for name in fields}
+        rig = replace(rig, **fields, sigma={**rig.sigma, **{keys[n]: values["rig", n][1] for n in fields}})
     if ("environment", "air_density") in values:
         environment = replace(environment, air_density=values["environment", "air_density"][0])
     carried = []
@@ -372,7 +384,7 @@ def assemble(
         moved,
         written,
         tuple(
-            _noise_notes(found.loose.linears, found.loose_noise)
+            _noise_beside(found)
             if unexplained and law is None
             else _noise_notes(best.final.fit.linears, best.final.fit.noise)
         ),
