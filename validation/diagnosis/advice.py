@@ -181,7 +181,7 @@ def _recorded(found: Search, plan: Plan, own: Sequence[Parameter], like: int) ->
     if old.recording.plant == "free_spin":
         state[4] = float(np.mean(old.states[:, 4]))  # the spin dies at the pace that it had
     bare = replace(old.recording, command=plan.command, release=None, name="planned", path=None, samples={})
-    whole = Chain(bare, (), np.array([0.0, plan.duration]), state[None])
+    whole = chain(bare, np.array([0.0, plan.duration]), state[None])
     end = _landing(whole, values) if bare.plant == "flight" else plan.duration
     count = max(1, round(end / PIECE[bare.plant]))
     cut = recut(whole, values, np.linspace(0.0, end + 1e-6, count + 1))

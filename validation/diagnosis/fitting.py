@@ -158,7 +158,7 @@ def release_rows(current: Chain) -> tuple[FloatArray, FloatArray]:
         for axis in range(3):
             tangent = np.zeros(d)
             tangent[6 + axis] = h
-            turned = shifted("flight", state, tangent)
+            turned = shifted(current.recording.plant, state, tangent)
             changed = float(euler_angles(turned[None, 6:10])[place][0]) - angles[place]
             row[6 + axis] = (np.remainder(changed + np.pi, 2 * np.pi) - np.pi) / h
         off = float(np.remainder(stated_angle - angles[place] + np.pi, 2 * np.pi) - np.pi)
@@ -169,7 +169,7 @@ def release_rows(current: Chain) -> tuple[FloatArray, FloatArray]:
 #: what is known of a state without any reading: m, m/s, rad, rad/s; nuisances of a free spin; rigs
 _ANYWHERE = {
     "flight": np.repeat([1e4, 300.0, 30.0, 1e3], 3),
-    "free_spin": np.array([100.0, 100.0, 100.0, 100.0, 3.0, 3.0, 30.0, 30.0, 30.0, 1e3, 1e3, 1e3]),
+    "free_spin": np.array([100.0, 100.0, 100.0, 100.0, 3.0, 3.0, 30.0, 30.0, 30.0, 1e3, 1e3, 1e3, 0.01]),
     "spin_down": np.array([1e6, 1e3]),
     "rate_table": np.array([1e6]),
 }
@@ -315,13 +315,14 @@ def linearised(fit: Fit, parameters: Sequence[Parameter] | None = None) -> tuple
 
 
 def linearised_columns(fit: Fit, columns: Sequence[Column]) -> tuple[Linear, ...]:
-    """Linearise all chains where they stand, with any columns."""
-    return tuple(
-        mapped(
-            lambda index: linearise(fit.chains[index], fit.values(index), columns, fit.jumps.allowed),
-            range(len(fit.chains)),
-        )
-    )
+    """Linearise all chains where they stand, with any columns; one that is another recording's own is zero."""
+
+    def one(index: int) -> Linear:
+        active = [j for j, c in enumerate(columns) if dict(c.given).get("recording", index) == index]
+        linear = linearise(fit.chains[index], fit.values(index), [columns[j] for j in active], fit.jumps.allowed)
+        return linear.spread(active, len(columns)) if len(active) < len(columns) else linear
+
+    return tuple(mapped(one, range(len(fit.chains))))
 
 
 def merit_of(fit: Fit, linears: Sequence[Linear]) -> float:
@@ -350,12 +351,14 @@ def refit(
     iterations: int = 8,
     tolerance: float = 0.05,
     bounds: Mapping[tuple[str, str], tuple[float, float]] | None = None,
+    moved_on: bool = True,
 ) -> Fit:
     """Go on from where a fit stands by Gauss-Newton steps, halved where they do not improve.
 
-    Stops when the gain, expected or found, is below ``tolerance`` of chi-squared.
+    Stops when the gain, expected or found, is below ``tolerance`` of chi-squared. ``moved_on`` is false where only the
+    noise has changed since the last linearisation.
     """
-    linears = linearised(fit)
+    linears = linearised(fit) if moved_on else fit.linears
     fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
     for _ in range(iterations):
         reduced = mapped(_reduced(fit), fit.linears, fit.chains)

@@ -1,14 +1,14 @@
 """Short pieces of motion of each plant, for many neighbouring states and parameters at once: compiled.
 
-A piece starts from a state of 13 numbers and yields rows of 19 at given instants: position, velocity and acceleration
-in N, attitude (quaternion from B to N), body rates and their derivatives in B.
+A piece starts from a state of 13 numbers (14 in free spin) and yields rows of 19 at given instants: position, velocity
+and acceleration in N, attitude (quaternion from B to N), body rates and their derivatives in B.
 
 ==========  =======================================================================================================
 plant       state
 ==========  =======================================================================================================
 flight      position and velocity in N, attitude, body rates
 free spin   transverse angular acceleration that is not rigid-body motion, in B at the piece's start (x, y), and its
-            slope; rdot/r and its slope; attitude, body rates
+            slope; rdot/r and its slope; attitude, body rates; how much faster the wobble turns than by its course
 rigs        yaw angle psi, rate r; the other eleven are not used
 ==========  =======================================================================================================
 """
@@ -41,8 +41,8 @@ __all__ = [
     "table_pieces",
 ]
 
-#: numbers of a state and of a row of motion
-STATE, ROW = 13, 19
+#: numbers of a state, by plant, and of a row of motion
+STATE, ROW = {"flight": 13, "free_spin": 14, "spin_down": 13, "rate_table": 13}, 19
 #: numbers of the physics; what a row of flats holds beyond are those of the user's own effects and the terms of a law
 SIZE = PARAMETERS.itemsize // 8
 #: names of the numbers of a law's term: those of a row of `discsim.law`, and per symbol where its power is one
@@ -149,7 +149,9 @@ def _spinning(
 
     wobble (10,) is how fast the wobble dies, 1/s, how much faster it turns for the stiffness of the air, rad/s, and how
     both differ along the wind and across it (cosine and sine of twice the wind's direction), each with its change
-    over the first seconds. heading is that of x_B in N where psi is zero.
+    over the first seconds. heading is that of x_B in N where psi is zero. Air is as stiff as the slope of its moment
+    over the angle of attack, which need not be smooth: state[13] is what that adds in this piece, rad/s. A moment about
+    one axis turns the wobble as much as it tells that axis from the other.
     """
     Ixx, Izz = p.disc.Ixx, p.disc.Izz
     Iyy = transverse_inertia(p.body_inertia_asymmetry, Ixx)
@@ -159,8 +161,10 @@ def _spinning(
     later = t / (1.0 + t)  # bounded, or a wobble that is long gone would grow again
     decay = wobble[0] + later * (wobble[1] + later * wobble[8])
     faster = wobble[2] + later * (wobble[3] + later * wobble[9])
-    along = wobble[4] + later * wobble[5]
-    across = wobble[6] + later * wobble[7]
+    stiffer = 1.0 + state[13] * faster / (1.0 + faster * faster)
+    faster += state[13]
+    along = stiffer * (wobble[4] + later * wobble[5])
+    across = stiffer * (wobble[6] + later * wobble[7])
     c2, s2 = cos(2.0 * (psi + heading)), sin(2.0 * (psi + heading))
     a, b = along * c2 + across * s2, across * c2 - along * s2
     dw[0] = (Iyy - Izz) / Ixx * w[1] * w[2] + c * mx + s * my - decay * w[0] - faster * w[1]
@@ -182,7 +186,7 @@ def free_spin_pieces(
     rows: FloatArray,
     ends: FloatArray,
 ) -> None:
-    """Spin freely from states (c, 13); wobbles (c, 10) as for `_spinning`. Else as `flight_pieces`.
+    """Spin freely from states (c, 14); wobbles (c, 10) as for `_spinning`. Else as `flight_pieces`.
 
     Rates by the classical fourth-order steps, attitude by the fourth-order Magnus step through them.
     """
@@ -239,7 +243,7 @@ def free_spin_pieces(
         end[0], end[1] = cosine * mx + sine * my, cosine * my - sine * mx
         end[2], end[3] = cosine * state[2] + sine * state[3], cosine * state[3] - sine * state[2]
         end[4], end[5] = state[4] + span * state[5], state[5]
-        end[6:10], end[10:13] = attitude[last], rate[last]
+        end[6:10], end[10:13], end[13] = attitude[last], rate[last], state[13]
 
 
 @compiled

@@ -34,8 +34,9 @@ _LOOSE = {
     "spin_down": np.array([0.5, 0.5]),
     "rate_table": np.array([0.5]),
 }
-#: how the slopes of what a free spin does not model change from piece to piece: rad/s^3, 1/s^2; for good
-_WANDER = np.array([0, 0, 100.0, 100.0, 0, 0.02, 0, 0, 0, 0, 0, 0])
+#: how the slopes of what a free spin does not model change from piece to piece, rad/s^3 and 1/s^2, and how much faster
+#: stiffer air turns the wobble, rad/s; for good
+_WANDER = np.array([0, 0, 300.0, 300.0, 0, 0.02, 0, 0, 0, 0, 0, 0, 0.5])
 NO_JUMPS = {
     "flight": Jumps(np.zeros(12)),
     "free_spin": Jumps(_WANDER),
@@ -77,9 +78,11 @@ def edges_of(recording: Recording) -> FloatArray:
     """Return the boundaries of a recording's pieces, s."""
     length = PIECE[recording.plant]
     end = max(recording.end, 1e-3) + 1e-6
-    if recording.plant == "free_spin" and end > 1.5:
+    if recording.plant == "free_spin":
         # just after release the moments of the air change fast
-        first = np.concatenate([np.arange(0.0, 0.3, 0.05), np.arange(0.3, 0.8, 0.1)])
+        first = np.concatenate([np.arange(0.0, 0.2, 0.025), np.arange(0.2, 0.4, 0.05), np.arange(0.4, 0.8, 0.1)])
+        if end < 0.9:
+            return np.append(first[first < end - 0.02], end)
         return np.concatenate([first, np.linspace(0.8, end, max(1, round((end - 0.8) / length)) + 1)])
     count = max(1, round(recording.end / length))
     return np.linspace(0.0, end, count + 1)

@@ -17,7 +17,7 @@ from validation.diagnosis.board import Board, board_of, free_columns
 from validation.diagnosis.fitting import Fit, Parameter
 from validation.diagnosis.noise import NoiseModel, chi_squared, estimate_noise, robust_noise
 from validation.diagnosis.relaxed import NO_JUMPS, relaxed, unknowns, without_outliers
-from validation.diagnosis.searches import Shifted, searched
+from validation.diagnosis.searches import EARLIEST, Shifted, searched
 from validation.diagnosis.selection import (
     ONE_SIDED,
     RIVAL,
@@ -31,6 +31,7 @@ from validation.diagnosis.selection import (
     tied_fit,
 )
 from validation.diagnosis.stated import stated_parameters
+from validation.diagnosis.trajectory_pieces import WOBBLE
 from validation.diagnosis.trials import Trial, parameters_of, trials_for
 
 __all__ = ["Considered", "Rival", "Search", "search"]
@@ -105,7 +106,7 @@ def search(recordings: Sequence[Recording], report: Report = lambda stage, done,
     report("asking every effect", 1, 4)
     board = board_of(loose, trials, noise, NO_JUMPS[plant])
     report("fitting the baseline", 2, 4)
-    base = tied_fit(loose, Hypothesis(), own, noise, _start(board, Hypothesis(), own))
+    base = tied_fit(loose, Hypothesis(), own, noise, {**_start(board, Hypothesis(), own), **_wobbles(loose)})
     found = Search(tuple(recordings), own, loose, noise, trials, base, base)
     found.outliers = left_out
     current = base
@@ -131,6 +132,15 @@ def _start(board: Board, hypothesis: Hypothesis, own: Sequence[Parameter]) -> St
     """Return what algebra expects of a hypothesis's parameters."""
     taken = board.columns_of(fitted_parameters(hypothesis, own))
     return {(q.key, q.recordings): q.stated + float(v) for (_, q), v in zip(taken, board.ask(taken).value, strict=True)}
+
+
+def _wobbles(loose: Fit) -> Start:
+    """Return how the wobble of free spins dies and turns in the relaxed fit, which its pieces go with.
+
+    What algebra expects of it is far from linear where turning for a second makes a radian.
+    """
+    parameters = zip(loose.parameters, loose.at, strict=True)
+    return {(q.key, q.recordings): float(v) for q, v in parameters if q.key in WOBBLE}
 
 
 def values_of_fit(tied: Tied) -> Start:
@@ -242,10 +252,13 @@ def _from_here(proposal: Proposal, current: Tied) -> Proposal:
 
 
 def _possible(tied: Tied) -> bool:
-    """Tell whether a fit's parameters make physical sense: friction that drives by more than its error does not."""
+    """Tell whether a fit's parameters make sense: friction does not drive, an event is told from the start."""
     sd = np.sqrt(np.maximum(np.diag(tied.fit.covariance), 0.0))
+    plant = tied.fit.chains[0].recording.plant
     for q, value, error in zip(tied.fit.parameters, tied.fit.at, sd, strict=True):
         if q.key in ONE_SIDED and ONE_SIDED[q.key] * value < -3.0 * error:
+            return False
+        if q.key == ("event.spin_step", "t_s") and value < EARLIEST[plant]:
             return False
     return True
 

@@ -32,6 +32,7 @@ from validation.diagnosis.trajectory_pieces import (
 from validation.diagnosis.trials import Trial, available
 
 __all__ = [
+    "EARLIEST",
     "Asked",
     "Shifted",
     "asked_of",
@@ -51,6 +52,8 @@ _IMPULSE = (3, 4, 5)
 _SPIN = {"flight": (11,), "free_spin": (11,), "spin_down": (1,)}
 #: how far about the best boundary the instant of an event is looked for, s
 _NEAR = {"flight": 0.09, "free_spin": 0.2, "spin_down": 0.12}
+#: an event of a free spin before this instant, s, is not told from where the spin and its decay started
+EARLIEST = {"flight": 0.0, "free_spin": 0.1, "spin_down": 0.0}
 #: how many recordings and kinds of event are followed up at a time: the strongest, the others come after them
 _FOLLOWED = 3
 #: widths of gusts tried, s, and the spacing of their instants
@@ -245,6 +248,7 @@ def events(asked: Asked, least: float = 25.0) -> list[Proposal]:
     """
     recordings = [chain.recording for chain in asked.fit.chains]
     plant = recordings[0].plant
+    first = EARLIEST[plant]
     there = available(recordings)
     kinds: list[tuple[str, Sequence[int], tuple[str, ...]]] = []
     if "event.impulse" in there:
@@ -263,9 +267,12 @@ def events(asked: Asked, least: float = 25.0) -> list[Proposal]:
         inner, end = ground.chain.edges[1:-1], float(ground.chain.edges[-1])
         near = np.concatenate([inner[j] + _NEAR[plant] * np.linspace(-1.0, 1.0, 13) for j in _peaks(gain, 2)])
         near = np.unique(near.round(4))
-        best = max(_events_at(ground, asked.fit, i, trial, near[(near > 0.01) & (near < end)]), key=_gain)
+        near = near[(near > max(0.01, first)) & (near < end)]
+        if near.size == 0:
+            return None
+        best = max(_events_at(ground, asked.fit, i, trial, near), key=_gain)
         about = best.trial.shapes["t_s"] + np.linspace(-0.012, 0.012, 7)
-        best = max([best, *_events_at(ground, asked.fit, i, trial, about[(about > 0.0) & (about < end)])], key=_gain)
+        best = max([best, *_events_at(ground, asked.fit, i, trial, about[(about > first) & (about < end)])], key=_gain)
         return best if best.gain > least else None
 
     tasks = [(i, kind) for i in asked.grounds for kind in kinds]

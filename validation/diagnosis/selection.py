@@ -136,7 +136,7 @@ def tied_fit(
         fit = refit(replace(begun, at=plain), iterations=iterations, bounds=BOUNDS)
     for _ in range(polish):
         fit = replace(fit, noise=noise_of(fit))
-        fit = refit(fit, iterations=2, bounds=BOUNDS)
+        fit = refit(fit, iterations=2, bounds=BOUNDS, moved_on=False)
     return scored(hypothesis, fit)
 
 

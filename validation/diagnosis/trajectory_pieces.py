@@ -73,7 +73,7 @@ CORNER = 4e-3
 #: half the differences of states: m, m/s, rad, rad/s
 STEPS = {
     "flight": np.repeat([1e-3, 1e-3, 1e-5, 1e-4], 3),
-    "free_spin": np.array([1e-2, 1e-2, 1e-2, 1e-2, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4]),
+    "free_spin": np.array([1e-2, 1e-2, 1e-2, 1e-2, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-3]),
     "spin_down": np.array([1e-5, 1e-4]),
     "rate_table": np.array([1e-5]),
 }
@@ -137,7 +137,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Chain:
-    """The pieces of one recording: boundaries (k + 1,) s and the states (k, 13) they start from."""
+    """The pieces of one recording: boundaries (k + 1,) s and the states (k, s) they start from."""
 
     recording: Recording
     readings: tuple[Readings, ...]
@@ -149,7 +149,7 @@ class Chain:
     @property
     def tangent(self) -> int:
         """Number of directions in which a state can move."""
-        return {"flight": 12, "free_spin": 12, "spin_down": 2, "rate_table": 1}[self.recording.plant]
+        return {"flight": 12, "free_spin": 13, "spin_down": 2, "rate_table": 1}[self.recording.plant]
 
 
 @dataclass(frozen=True)
@@ -294,8 +294,9 @@ def readings_of(recording: Recording) -> tuple[Readings, ...]:
     return tuple(found)
 
 
-#: a reading of a turn's mean is a mean over this many turns, weighted by Hann: what turns once per turn is not seen
-_TURNS = 2.0
+#: a reading of a turn's mean is a mean over this many turns, weighted as if a turn's mean were taken three times: what
+#: turns once per turn is not seen, nor its slope, nor its curvature
+_TURNS = 3.0
 
 
 def _over_turns(recording: Recording, one: Readings) -> list[Readings]:
@@ -315,7 +316,9 @@ def _over_turns(recording: Recording, one: Readings) -> list[Readings]:
     place = np.minimum(first[None, :] + np.arange(width)[:, None], one.t.size - 1)
     inside = np.arange(width)[:, None] < (last - first)[None, :]
     usable = np.all(one.good[:, :2], axis=1)
-    weights = np.where(inside & usable[place], 1.0 + np.cos(2.0 * np.pi * (phase[place] - centres) / _TURNS), 0.0)
+    off = np.abs(phase[place] - centres)
+    bell = np.where(off < 0.5, 0.75 - off**2, 0.5 * np.maximum(_TURNS / 2 - off, 0.0) ** 2)
+    weights = np.where(inside & usable[place], bell, 0.0)
     # where samples are missing, what turns with the spin does not average out
     whole = np.sum(inside & ~usable[place], axis=0) == 0
     weights = weights / np.maximum(np.sum(weights, axis=0), 1e-12)
@@ -375,12 +378,13 @@ _FLAT_ENVIRONMENT = {("environment", name) for name in PARAMETERS["environment"]
 
 
 def shifted(plant: str, states: FloatArray, tangents: FloatArray) -> FloatArray:
-    """Return states (..., 13) moved by tangents (..., d): rotations are small turns in B."""
-    moved = np.array(np.broadcast_to(states, (*np.broadcast_shapes(states.shape[:-1], tangents.shape[:-1]), STATE)))
+    """Return states (..., s) moved by tangents (..., d): rotations are small turns in B."""
+    shape = (*np.broadcast_shapes(states.shape[:-1], tangents.shape[:-1]), states.shape[-1])
+    moved = np.array(np.broadcast_to(states, shape))
     if plant in ("flight", "free_spin"):
         moved[..., :6] += tangents[..., :6]
         moved[..., 6:10] = multiply(moved[..., 6:10], turn(tangents[..., 6:9]))
-        moved[..., 10:13] += tangents[..., 9:12]
+        moved[..., 10:] += tangents[..., 9:]
     else:
         d = tangents.shape[-1]
         moved[..., :d] += tangents
@@ -388,7 +392,7 @@ def shifted(plant: str, states: FloatArray, tangents: FloatArray) -> FloatArray:
 
 
 def difference(plant: str, a: FloatArray, b: FloatArray, d: int) -> FloatArray:
-    """Return the tangents (..., d) that move states b (..., 13) to a."""
+    """Return the tangents (..., d) that move states b (..., s) to a."""
     if plant in ("flight", "free_spin"):
         return np.concatenate(
             [
@@ -458,9 +462,9 @@ class _Runner:
     def run(
         self, flats: FloatArray, wobbles: FloatArray, states: FloatArray, times: FloatArray, last: int, out: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return rows (c, m, 19) at instants out and the states (c, 13) at ``times[last]``."""
+        """Return rows (c, m, 19) at instants out and the states (c, s) at ``times[last]``."""
         c = states.shape[0]
-        rows, ends = np.empty((c, out.size, ROW)), np.empty((c, STATE))
+        rows, ends = np.empty((c, out.size, ROW)), np.empty(states.shape)
         plant = self.recording.plant
         if plant == "flight":
             flight_pieces(flats, self.lookup, states, times, last, out, rows, ends)
@@ -520,7 +524,12 @@ def _runner(recording: Recording, values: Values, columns: Sequence[Column] = ()
 def chain(
     recording: Recording, edges: FloatArray, states: FloatArray, lost: Mapping[str, FloatArray] | None = None
 ) -> Chain:
-    """Return a recording cut at edges (k + 1,) s with states (k, 13) at the starts of its pieces."""
+    """Return a recording cut at edges (k + 1,) s with states (k, s) at the starts of its pieces.
+
+    Numbers of a state beyond those given are zero.
+    """
+    missing = STATE[recording.plant] - states.shape[1]
+    states = np.hstack([states, np.zeros((len(states), missing))])
     return Chain(recording, readings_of(recording), edges, states, dict(lost or {}))
 
 
@@ -906,7 +915,7 @@ def recut(current: Chain, values: Values, edges: FloatArray) -> Chain:
     recording = current.recording
     runner = _runner(recording, values)
     flat, wobble = base_flat(recording, values), np.array([values.get(key, 0.0) for key in WOBBLE])
-    states = np.empty((edges.size - 1, STATE))
+    states = np.empty((edges.size - 1, current.states.shape[1]))
     piece = np.clip(np.searchsorted(current.edges, edges[:-1] + 1e-9, side="right") - 1, 0, len(current.states) - 1)
     for j, i in enumerate(piece):
         start, state = float(current.edges[i]), current.states[i]

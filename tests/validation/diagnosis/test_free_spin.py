@@ -1,0 +1,105 @@
+"""A disc in the air whose path nobody recorded: what its wobble, its gyroscope and its first moments may say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made import DRIVER, FIELD, MODULE, flight, release_of, rows_of
+
+from discsim.arrays import FloatArray
+from discsim.effects import effect
+from discsim.engine import fly
+from discsim.recording import Recording
+from discsim.sensors import record
+from discsim.shipped import load_disc
+from validation.diagnosis.fitting import Fit, Jumps, Parameter, linearised_columns
+from validation.diagnosis.noise import estimate_noise, whitened
+from validation.diagnosis.readings import predicted
+from validation.diagnosis.relaxed import NO_JUMPS, first_chain, relaxed, unknowns
+from validation.diagnosis.search import _possible
+from validation.diagnosis.selection import Hypothesis, Tied, tied_fit
+from validation.diagnosis.trajectory_pieces import WOBBLE, Column
+
+#: numbers of a gyroscope's and a magnetometer's module without a path
+BLIND = MODULE.without("gps").fitted("gyroscope", range=104.72)
+
+
+def spin_of_tables(seconds: float) -> Recording:
+    """Return a free spin of a disc whose coefficients are tables over the angle of attack, wobbling at 2.5 rad/s."""
+    disc, field = load_disc("cd1")
+    release = replace(release_of(0.4, 70.0), body_rate=np.array([2.0, -1.5, 70.0]))
+    motion = fly(disc, field, release, duration=seconds)
+    bare = replace(disc, aero=None, aero_table=None, yaw_damping_table=None, sigma={})
+    return record(motion, BLIND, np.random.default_rng(3), plant="free_spin", name="tables", disc=bare)
+
+
+def left_by(fit: Fit) -> float:
+    """Return chi-squared per reading of the gyroscope's x and y, in stated noise, of pieces that hang together."""
+    own = unknowns([chain.recording for chain in fit.chains])
+    noise = estimate_noise(fit.linears, [linear.residual for linear in fit.linears], coloured=False)
+    start = {(q.key, q.recordings): float(v) for q, v in zip(fit.parameters, fit.at, strict=True)}
+    tied = tied_fit(fit, Hypothesis(), own, noise, start, polish=0)
+    linear = tied.fit.linears[0]
+    stated = {
+        group: level._replace(sd=float(linear.sd[c.rows][0]), correlation=0.0)
+        for group, level in noise.items()
+        for c in linear.channels
+        if c.group == group
+    }
+    white: FloatArray = whitened(linear, stated, tied.residuals[0][:, None])[:, 0]
+    turning = [white[c.rows] for c in linear.channels if c.sensor == "gyroscope" and c.axis != "z_rad_s"]
+    return float(np.mean(np.concatenate(turning) ** 2))
+
+
+def test_air_that_is_stiffer_at_some_angles_of_attack_leaves_noise_alone(monkeypatch):
+    fit = relaxed([spin_of_tables(1.2)])
+    assert left_by(fit) < 1.2  # 700 readings: 1 +- 0.05, and pieces follow tables to a tenth
+    held = NO_JUMPS["free_spin"].sd.copy()
+    held[12] = 0.0
+    monkeypatch.setitem(NO_JUMPS, "free_spin", Jumps(held))
+    assert left_by(fit) > 2.0  # one course in time is not enough
+
+
+def test_a_gyroscope_that_feels_force_feels_all_of_it_where_the_path_is_unknown():
+    motion = flight(seconds=0.5)
+    faked = effect("gyro.g_sensitivity", kx=2e-3, ky=-3e-3)
+    module = BLIND.with_effects([faked])
+    recording = record(motion, module, np.random.default_rng(4), plant="free_spin", name="faked", disc=DRIVER)
+    t, sd = recording.samples["gyroscope"].t, recording.sheets["gyroscope"].noise_rms
+    values = {("gyro.g_sensitivity", "kx"): 2e-3, ("gyro.g_sensitivity", "ky"): -3e-3}
+    rows = rows_of(motion, t)
+    left = recording.samples["gyroscope"].value - predicted("gyroscope", recording, values, t, rows)
+    # gravity and lift, 10 m/s^2 that turn with the spin, would leave seven times the noise on each axis
+    assert np.std(left[:, :2], axis=0) == pytest.approx(sd, rel=0.25)
+
+
+def test_a_wobble_of_one_recording_moves_no_other():
+    recordings = [
+        record(flight(seconds=0.4), BLIND, np.random.default_rng(k), plant="free_spin", name=f"{k}", disc=DRIVER)
+        for k in range(2)
+    ]
+    fit = Fit(tuple(first_chain(r) for r in recordings), (), np.empty(0), NO_JUMPS["free_spin"], {})
+    columns = [Column(*WOBBLE[0], 1e-3, (("recording", float(k)),)) for k in range(2)]
+    first, second = linearised_columns(fit, columns)
+    assert np.any(first.shared[:, 0])
+    assert not np.any(first.shared[:, 1])
+    assert not np.any(second.shared[:, 0])
+    assert np.any(second.shared[:, 1])
+
+
+@pytest.mark.parametrize(("instant", "told"), [(0.04, False), (0.6, True)])
+def test_a_knock_at_the_very_start_is_not_told_from_where_the_spin_started(instant, told):
+    recording = record(
+        fly(DRIVER, FIELD, release_of(0.4, 70.0), duration=0.3),
+        BLIND,
+        np.random.default_rng(5),
+        plant="free_spin",
+        name="start",
+        disc=DRIVER,
+    )
+    q = Parameter("event.spin_step", "t_s", instant, 1e-3, recordings=frozenset([0]))
+    chains = (first_chain(recording),)
+    fit = Fit(chains, (q,), np.array([instant]), NO_JUMPS["free_spin"], {}, covariance=np.full((1, 1), 1e-6))
+    assert _possible(Tied(Hypothesis(), fit, 0.0)) is told
