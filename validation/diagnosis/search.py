@@ -43,6 +43,10 @@ Start: TypeAlias = dict[tuple[tuple[str, str], frozenset[int] | None], float]
 MOST_EFFECTS = 4
 #: how many proposals are refitted at each step
 REFITTED = 4
+#: most steps of the baseline's fit: what a free spin leaves open makes it slow, and what a candidate then gains is not its
+_BASE_ITERATIONS = {"flight": 8, "free_spin": 16, "spin_down": 8, "rate_table": 8}
+#: a gain below this may be due to where the fits started
+_DOUBTFUL = 200.0
 #: a fit whose chi-squared per reading, in the noise of the relaxed fit, is above this is far from the data
 FAR = 1.6
 
@@ -106,7 +110,8 @@ def search(recordings: Sequence[Recording], report: Report = lambda stage, done,
     report("asking every effect", 1, 4)
     board = board_of(loose, trials, noise, NO_JUMPS[plant])
     report("fitting the baseline", 2, 4)
-    base = tied_fit(loose, Hypothesis(), own, noise, {**_start(board, Hypothesis(), own), **_wobbles(loose)})
+    start = {**_start(board, Hypothesis(), own), **_wobbles(loose)}
+    base = tied_fit(loose, Hypothesis(), own, noise, start, iterations=_BASE_ITERATIONS[plant])
     found = Search(tuple(recordings), own, loose, noise, trials, base, base)
     found.outliers = left_out
     current = base
@@ -114,6 +119,13 @@ def search(recordings: Sequence[Recording], report: Report = lambda stage, done,
         report("refitting candidates", 3, 4)
         better = _next(found, board, current, step)
         if better is None:
+            break
+        again = _from_there(found, current, better)
+        if again is not None:
+            # it was not the effect that gained, but where its fit had started
+            current = again
+            if step == 0:
+                found.base = again
             break
         if step >= 1 and chi2_in(better, noise) > FAR * better.fit.count:
             # two effects and still far from the data: none of these
@@ -134,12 +146,12 @@ def _start(board: Board, hypothesis: Hypothesis, own: Sequence[Parameter]) -> St
     return {(q.key, q.recordings): q.stated + float(v) for (_, q), v in zip(taken, board.ask(taken).value, strict=True)}
 
 
-def _wobbles(loose: Fit) -> Start:
-    """Return how the wobble of free spins dies and turns in the relaxed fit, which its pieces go with.
+def _wobbles(fit: Fit) -> Start:
+    """Return how the wobble of free spins dies and turns in a fit whose pieces go with it.
 
     What algebra expects of it is far from linear where turning for a second makes a radian.
     """
-    parameters = zip(loose.parameters, loose.at, strict=True)
+    parameters = zip(fit.parameters, fit.at, strict=True)
     return {(q.key, q.recordings): float(v) for q, v in parameters if q.key in WOBBLE}
 
 
@@ -196,7 +208,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
             hypothesis,
             found.own,
             noise if far else current.fit.noise,
-            {**values_of_fit(current), **proposal.start},
+            {**values_of_fit(current), **proposal.start, **_wobbles(fit)},
         )
         refitted = replace(refitted, score=refitted.score + found.cost + cost)
         gain = current.score - refitted.score
@@ -243,6 +255,20 @@ def tried_without(found: Search, trial: Trial) -> Tied:
         if set(step.hypothesis.trials) == set(rest.trials):
             return step
     return tied_fit(found.loose, rest, found.own, found.loose_noise, values_of_fit(final), iterations=5, polish=1)
+
+
+def _from_there(found: Search, current: Tied, better: Tied) -> Tied | None:
+    """Return the fit without the last effect from where that with it stands, if then the effect is not worth its price.
+
+    None where it is, or where it gains so much that no start could.
+    """
+    trial = better.hypothesis.trials[-1]
+    if current.score - better.score > _DOUBTFUL or found.recordings[0].plant != "free_spin":
+        return None
+    start = values_of_fit(better)
+    again = tied_fit(better.fit, current.hypothesis, found.own, better.fit.noise, start)
+    again = replace(again, score=again.score + found.cost)
+    return again if again.score - better.score < price(trial) else None
 
 
 def _from_here(proposal: Proposal, current: Tied) -> Proposal:
