@@ -43,7 +43,7 @@ Start: TypeAlias = dict[tuple[tuple[str, str], frozenset[int] | None], float]
 MOST_EFFECTS = 4
 #: how many proposals are refitted at each step
 REFITTED = 4
-#: most steps of the baseline's fit: what a free spin leaves open makes it slow, and what a candidate then gains is not its
+#: most steps of the baseline's fit: a free spin's is slow, and what it has left to gain is no candidate's
 _BASE_ITERATIONS = {"flight": 8, "free_spin": 16, "spin_down": 8, "rate_table": 8}
 #: a gain below this may be due to where the fits started
 _DOUBTFUL = 200.0
