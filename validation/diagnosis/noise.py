@@ -90,11 +90,17 @@ def chi_squared(linear: Linear, noise: NoiseModel, residual: FloatArray) -> floa
 
 
 def log_likelihood(linear: Linear, noise: NoiseModel, residual: FloatArray) -> float:
-    """Return -2 log likelihood of residuals (n,), less a constant."""
+    """Return -2 log likelihood of residuals (n,), less what readings that fit in the stated noise have.
+
+    So a reading that one hypothesis leaves out, as those are in which a lag remembers what nobody recorded, neither
+    wins nor loses.
+    """
     total = chi_squared(linear, noise, residual)
     for channel in linear.channels:
         own = noise[channel.group]
-        total += 2.0 * channel.index.size * float(np.log(own.sd))
+        stated = float(linear.sd[channel.rows][0])
+        usual = stated if np.isfinite(stated) and stated > 0.0 else DEFAULT[channel.group]
+        total += channel.index.size * (2.0 * float(np.log(own.sd / usual)) - 1.0)
         if own.correlation and own.share >= 1.0:
             total += float(np.sum(np.log1p(-(own.correlation ** (2.0 * np.diff(channel.index))))))
         elif own.correlation:
