@@ -93,7 +93,19 @@ def test_the_likelihood_is_that_of_the_dense_covariance():
         covariance = sd**2 * (phi**apart if phi else np.eye(channel.index.size))
         dense = multivariate_normal(np.zeros(channel.index.size), covariance)
         expected += -2.0 * float(dense.logpdf(e[channel.rows])) - channel.index.size * np.log(2.0 * np.pi)
+        expected -= channel.index.size  # what readings that fit in the stated noise, of level 1 here, have
     assert log_likelihood(linear, noise, e) == pytest.approx(expected, rel=1e-10)
+
+
+@pytest.mark.parametrize("level", [0.003, 1.0, 40.0])
+def test_readings_that_are_left_out_win_and_lose_nothing(level: float):
+    """A lag leaves out those that it cannot know; in the sensor's own unit each would have a price of its own."""
+    e = level * np.random.default_rng(4).standard_normal(2000)
+    e *= level / np.std(e)
+    noise = {"gyroscope": GroupNoise(level)}
+    whole = log_likelihood(rows(("gyroscope", 2000), sd=level), noise, e)
+    less = log_likelihood(rows(("gyroscope", 1500), sd=level), noise, e[500:])
+    assert abs(whole - less) < 4.0 * np.sqrt(2.0 * 500)
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.3, 0.85])

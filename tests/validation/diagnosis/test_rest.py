@@ -35,6 +35,20 @@ def test_rounding_is_noise():
     assert left([np.round(e / 1.5) * 1.5 for e in noise(1)]) == []
 
 
+def test_a_drift_that_is_the_same_in_all_recordings_is_not_slow_noise():
+    """A gyroscope that warms up: 1 - exp(-t/2 s), of the size of the noise."""
+    drift = np.tile(1.0 - np.exp(-np.arange(N) / 200.0), AXES)
+    found = left([e + drift for e in noise(5)])
+    assert [item.kind for item in found] == ["course"]
+    assert found[0].recording is None
+
+
+def test_drifts_that_differ_from_recording_to_recording_are_slow_noise():
+    drift = np.tile(1.0 - np.exp(-np.arange(N) / 200.0), AXES)
+    residuals = [sign * drift + e for sign, e in zip((1.0, -1.0, 1.0, -1.0), noise(5), strict=True)]
+    assert [item for item in left(residuals) if item.kind == "course"] == []
+
+
 @pytest.mark.parametrize("frequency", [0.07, 0.2, 0.43])
 def test_a_sine_of_the_size_of_the_noise_is_not_noise(frequency: float):
     """Half of its power would do: what turns with the spin stands in one band."""

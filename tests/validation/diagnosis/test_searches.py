@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -17,7 +18,7 @@ from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
 from validation.diagnosis.fitting import Fit
 from validation.diagnosis.noise import estimate_noise
-from validation.diagnosis.plateau import plateau_of
+from validation.diagnosis.plateau import equal_beyond_chance, plateau_of
 from validation.diagnosis.relaxed import NO_JUMPS, first_chain, relaxed
 from validation.diagnosis.searches import Asked, asked_of, dropped_accelerometer, events, gusts, ripple, saturation
 from validation.diagnosis.selection import Hypothesis, tied_fit
@@ -155,6 +156,14 @@ def test_lost_samples_of_the_accelerometer_are_counted_by_the_motion_of_the_othe
     assert share == pytest.approx(0.02, abs=4.0 * sd)
 
 
+@pytest.mark.parametrize("ratio", [1.015, 0.985])
+def test_a_flight_is_followed_by_the_others_where_the_clock_of_one_sensor_is_wrong(ratio: float) -> None:
+    """With all at once the accelerometer's phase, off by turns, leads the fit astray."""
+    fit = loose((), (effect("accel.clock_rate", ratio=ratio),))
+    assert fit.merit < 1.2 * fit.count
+    assert fit.values(0)["accel.clock_rate", "ratio"] == pytest.approx(ratio, abs=2e-4)
+
+
 def test_counts_never_fall_and_follow_the_cheapest_way() -> None:
     # samples 0 1 2 | 4 5 of a ramp: one was lost before the fourth
     ramp, taken = np.arange(7.0), np.array([0, 1, 2, 4, 5])
@@ -180,6 +189,17 @@ def test_noise_alone_makes_no_plateau() -> None:
         steady = 60.0 + 0.08 * rng.standard_normal((size, 3))
         assert plateau_of(np.round(steady / 0.005) * 0.005, 0.005, 0.08) is None
         assert plateau_of(np.minimum(np.round(steady / 0.005) * 0.005, 60.0), 0.005, 0.08) == 60.0
+
+
+def test_equal_readings_count_against_chance() -> None:
+    def spun(top: float) -> Recording:
+        made = throws()[0]
+        felt = made.need("accelerometer")
+        samples = {**made.samples, "accelerometer": Samples(felt.t, np.clip(felt.value, -top, top))}
+        return replace(made, samples=samples)
+
+    assert equal_beyond_chance(spun(1e3)) < 25.0
+    assert equal_beyond_chance(spun(60.0)) > 100.0
 
 
 def test_a_ripple_is_found_at_its_order_amplitude_and_phase() -> None:

@@ -199,6 +199,16 @@ def test_the_path_and_the_lift_stand_in_for_a_missing_sensor(missing):
     assert found["transverse"] < (1.5 if missing == "gyroscope" else TRANSVERSE_RAD_S)
 
 
+@pytest.mark.parametrize("spin_deg_s", [4200.0, -3100.0])
+def test_the_pull_to_the_axis_shows_a_spin_that_no_other_sensor_does(spin_deg_s):
+    """No field, and the gyroscope's z clipped: the force across the axis alone loses count where it vanishes."""
+    motion = flight(spin_deg_s)
+    recording = measured(motion, without=("magnetometer",))
+    assert recording.sheets["gyroscope"].clipped(recording.need("gyroscope").value[:, 2]).all()
+    # at the very start nothing before it is there to be smoothed with
+    assert errors_of(flight_starts(recording, instants(motion)[1:]), motion)["rate"] < RATE
+
+
 SENSORS = ("magnetometer", "accelerometer", "gyroscope", "gps")
 
 
