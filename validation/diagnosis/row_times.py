@@ -160,7 +160,10 @@ def rows_of(recordings: Sequence[Recording], names: Sequence[str]) -> Rows | Non
     tick = max((k for k in peaks if scores[k] > _AS_WELL * np.max(scores)), default=int(np.argmax(scores)))
     measured, sd = _measured(found, float(ticks[tick]))
     each = {item.name: _measured([item], measured) for item in found}
-    return Rows(measured, sd, float(scores[tick]), each, tuple(found))
+    rows = Rows(measured, sd, float(scores[tick]), each, tuple(found))
+    # where all last the same number of ticks it was the phase's noise that made them look uneven
+    unlike = np.mean([1.0 - max(rows.shares(item.name).values()) for item in found])
+    return rows if unlike >= _SHARE else None
 
 
 def _measured(found: Sequence[Durations], tick: float) -> tuple[float, float]:
