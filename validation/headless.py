@@ -1,4 +1,4 @@
-"""The validation run: closed forms, rate table, throws, C_Nr fed back; figures with tolerances, pictures and a page."""
+"""The validation run: closed forms, rate table, throws, C_Nr fed back, concealed cases; scores, pictures, a page."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from discsim.rig import PLATEAUS_DEG_S, default_profile
 from discsim.shipped import load_disc
 from validation.closed_forms import closed_form_checks
+from validation.concealed import FULL_CASES, QUICK_CASES, Concealed, concealed_cases, concealed_checks
 from validation.feedback.figures import draw_fig_13
 from validation.feedback.loop import Loop, close_loop
 from validation.feedback.scoring import OUTPUT_ERROR
@@ -58,11 +59,15 @@ def validate(run: Run, *, quick: bool, junit: Path | None = None) -> list[Score]
     draw_sources(loop.found, run.out / "cnr-sources.png")
     draw_fig_13(loop.flown[0], run.out / "feedback.png")
 
+    requests = QUICK_CASES if quick else FULL_CASES
+    concealed = list(run.progress(concealed_cases(requests), len(requests), "concealed case"))
+    scores += concealed_checks(concealed)
+
     run.step("report")
     run.write_json("scores.json", [item.as_dict() for item in scores])
     if junit is not None:
         write_junit(junit, scores, time.monotonic() - started)
-    _write_report(run, scores, results, loop)
+    _write_report(run, scores, results, loop, concealed)
     return scores
 
 
@@ -97,7 +102,13 @@ def draw_throws(results: Sequence[ThrowResult], path: Path) -> None:
     save_figure(figure, path)
 
 
-def _write_report(run: Run, scores: Sequence[Score], results: Sequence[ThrowResult], loop: Loop) -> None:
+def _write_report(
+    run: Run,
+    scores: Sequence[Score],
+    results: Sequence[ThrowResult],
+    loop: Loop,
+    concealed: Sequence[Concealed],
+) -> None:
     failed = sum(not item.ok for item in scores)
     verdict = (
         "every score is within its tolerance" if all_ok(scores) else f"{failed} scores are outside their tolerance"
@@ -155,6 +166,15 @@ def _write_report(run: Run, scores: Sequence[Score], results: Sequence[ThrowResu
                 ("C_Nr by source", run.out / "cnr-sources.png"),
                 ("Predicted flights against the truth", run.out / "feedback.png"),
             ],
+        ),
+        Section(
+            "Concealed cases",
+            (
+                "Drawn and simulated as discsim challenge does, diagnosed by another process that got the recordings "
+                "and nothing else. The command repeats a case alone.",
+            ),
+            ("concealed", "found", "", "command"),
+            [case.row for case in concealed],
         ),
     ]
     write_report(

@@ -234,6 +234,7 @@ def test_validate_scores_everything_and_leaves_its_report(monkeypatch, tmp_path,
     assert len(scores) >= 10
     assert set(scores[0]) == {"name", "value", "unit", "expected", "tolerance", "ok"}
     assert all(score["ok"] for score in scores)
+    assert sum("concealed" in score["name"] for score in scores) == 3
     page = (out / "report.html").read_text()
     assert page.count("data:image/png;base64,") == 6
     suite = ElementTree.parse(junit).getroot()[0]
@@ -244,5 +245,7 @@ def test_validate_scores_everything_and_leaves_its_report(monkeypatch, tmp_path,
 
 def test_validate_exits_with_1_where_a_score_is_outside_its_tolerance(monkeypatch, tmp_path):
     monkeypatch.setattr(headless, "throw_checks", lambda results: [at_most("throws: made up", 2.0, "m", 1.0)])
+    monkeypatch.setattr(headless, "QUICK_CASES", ())
+    monkeypatch.setattr(headless, "concealed_checks", lambda cases: [])
     assert run(monkeypatch, "validate", "--quick", "--out", str(tmp_path / "report")) == 1
     assert "FAIL" in (tmp_path / "report" / "report.html").read_text()
