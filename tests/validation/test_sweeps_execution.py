@@ -97,6 +97,8 @@ def test_a_sweep_that_was_stopped_goes_on_and_gives_the_same_bytes(plan, undistu
         stdout=subprocess.DEVNULL,
         text=True,
         start_new_session=True,
+        # where the tests themselves run in the background, an interrupt is ignored, and that would be inherited
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     wait_until(lambda: finished(out) >= 2 or process.poll() is not None, "two chunks")
     if stop is signal.SIGINT:  # a terminal interrupts all processes of a command
