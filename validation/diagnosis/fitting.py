@@ -18,7 +18,17 @@ from discsim.arrays import BoolArray, FloatArray
 from discsim.frames import euler_angles
 from validation.diagnosis.noise import NoiseModel, chi_squared, whitened
 from validation.diagnosis.readings import Values
-from validation.diagnosis.trajectory_pieces import STEPS, Chain, Column, Linear, linearise, moved, shifted, stepped
+from validation.diagnosis.trajectory_pieces import (
+    STEPS,
+    WOBBLE,
+    Chain,
+    Column,
+    Linear,
+    linearise,
+    moved,
+    shifted,
+    stepped,
+)
 
 __all__ = [
     "Fit",
@@ -235,11 +245,13 @@ def unknown_prior(linear: Linear, current: Chain, jumps: Jumps) -> tuple[FloatAr
     return H, right, chi2
 
 
-def reduce(linear: Linear, current: Chain, noise: NoiseModel, jumps: Jumps) -> Reduced:
-    """Eliminate the local unknowns of a recording."""
+def reduce(linear: Linear, current: Chain, noise: NoiseModel, jumps: Jumps, hold: float = 0.0) -> Reduced:
+    """Eliminate the local unknowns of a recording; ``hold`` keeps its attitude from turning far in one step."""
     u = linear.unknowns
     G = normal_matrix(linear, noise)
     H, right, chi2 = unknown_prior(linear, current, jumps)
+    if hold:
+        H[_TURNS, _TURNS] += hold * _ATTITUDE_REACH**-2.0
     G[:u, :u] += H
     G[:u, -1] += right
     G[-1, :u] += right
@@ -262,9 +274,9 @@ def local_step(reduced: Reduced, shared: FloatArray) -> FloatArray:
 
 
 def shared_step(
-    gram: FloatArray, parameters: Sequence[Parameter], at: FloatArray
+    gram: FloatArray, parameters: Sequence[Parameter], at: FloatArray, reach: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Solve for the shared parameters from a summed gram (p + 1, p + 1).
+    """Solve for the shared parameters from a summed gram (p + 1, p + 1), each held back to its ``reach`` (p,).
 
     Returns the step (p,), its covariance (p, p) and what chi-squared is expected to become, priors included; all NaN
     where the fit has gone where its predictions are not finite.
@@ -272,7 +284,7 @@ def shared_step(
     p = len(parameters)
     prior = np.array([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for q in parameters])
     off = np.array([q.stated for q in parameters]) - at
-    H = gram[:p, :p] + np.diag(prior)
+    H = gram[:p, :p] + np.diag(prior if reach is None else prior + reach**-2.0)
     right = gram[:p, -1] + prior * off
     if p == 0:
         return np.empty(0), np.empty((0, 0)), float(gram[-1, -1])
@@ -299,8 +311,10 @@ def mapped(function: Callable[..., Any], *arguments: Sequence[Any]) -> list[Any]
         return [task.result() for task in tasks]
 
 
-def linearised(fit: Fit, parameters: Sequence[Parameter] | None = None) -> tuple[Linear, ...]:
-    """Linearise all chains where they stand; the shared columns are those of ``parameters``."""
+def linearised(
+    fit: Fit, parameters: Sequence[Parameter] | None = None, only: Sequence[int] | None = None
+) -> tuple[Linear, ...]:
+    """Linearise all chains where they stand, or ``only`` some; the shared columns are those of ``parameters``."""
     chosen = fit.parameters if parameters is None else parameters
 
     def one(index: int) -> Linear:
@@ -311,7 +325,7 @@ def linearised(fit: Fit, parameters: Sequence[Parameter] | None = None) -> tuple
             linear = linear.spread([j for j, column in enumerate(columns) if column.step > 0], len(columns))
         return linear
 
-    return tuple(mapped(one, range(len(fit.chains))))
+    return tuple(mapped(one, range(len(fit.chains)) if only is None else only))
 
 
 def linearised_columns(fit: Fit, columns: Sequence[Column]) -> tuple[Linear, ...]:
@@ -360,46 +374,188 @@ def refit(
     """
     linears = linearised(fit) if moved_on else fit.linears
     fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
-    for _ in range(iterations):
-        reduced = mapped(_reduced(fit), fit.linears, fit.chains)
+    fit, settled = _gone_on(fit, iterations, tolerance, bounds or {}, _FREE)
+    if not settled and iterations >= _LONG and open_gaps(fit) and fit.chains[0].recording.plant == "free_spin":
+        # free steps hop about where the readings say little: short ones, and what held them back is not known
+        fit, _ = _gone_on(fit, iterations, tolerance, bounds or {}, _FIRST_HOLD)
+        reduced = mapped(_reduced(fit), fit.linears, fit.chains, [0.0] * len(fit.chains))
         gram = np.sum([r.gram for r in reduced], axis=0)
-        step, covariance, expected = shared_step(gram, fit.parameters, fit.at)
+        fit = replace(fit, covariance=shared_step(gram, fit.parameters, fit.at)[1])
+    return fit
+
+
+#: steps of a fit that is to end where it is best, not only to follow a change of the noise
+_LONG = 5
+
+
+def _gone_on(
+    fit: Fit,
+    iterations: int,
+    tolerance: float,
+    bounds: Mapping[tuple[str, str], tuple[float, float]],
+    first: float,
+) -> tuple[Fit, bool]:
+    """Return a fit after up to so many steps, and whether no more are wanted. ``first`` is how hard they are held."""
+    hold = np.full(len(fit.chains), first)
+    for _ in range(iterations):
+        reduced = mapped(_reduced(fit), fit.linears, fit.chains, list(hold))
+        gram = np.sum([r.gram for r in reduced], axis=0)
+        step, covariance, expected = shared_step(gram, fit.parameters, fit.at, _reach(fit, hold))
         fit = replace(fit, covariance=covariance)
         gain = fit.merit - expected
         if gain < max(tolerance, 1e-7 * fit.merit) and not open_gaps(fit):
-            break
-        share, better = 1.0, None
-        for _ in range(5):
-            at = fit.at + share * step
-            if bounds:
-                at = np.array(
-                    [np.clip(a, *bounds.get(q.key, (-np.inf, np.inf))) for a, q in zip(at, fit.parameters, strict=True)]
-                )
+            return fit, True
+        going = _Going(fit, reduced, step, bounds)
+        if first > _FREE:
+            better, rose = going.each_its_share()
+            hold = np.where(rose, np.clip(_TIGHTER * hold, _LEAST_HOLD, _MOST_HOLD), _LOOSER * hold)
+        else:
+            better = going.all_by_one_share()
+        if better is None:
+            return fit, True
+        improved = fit.merit - better.merit
+        were_open = open_gaps(fit)
+        fit = better
+        if not were_open and improved < max(tolerance, 1e-7 * fit.merit):
+            return fit, True
+    return fit, False
+
+
+#: tries at a step, and what a step that leads astray is shortened by
+_TRIES, _SHORTER = 5, 0.4
+#: a recording whose chi-squared per reading is above this is far from its data
+_FAR = 3.0
+#: by how much chi-squared may rise while pieces hang together to first order only
+_RISE = 1.3
+#: a rise by more than this is a step that went too far
+_ROSE = 1.02
+
+
+@dataclass(frozen=True)
+class _Going:
+    """A step from where a fit stands, and how much of it is taken."""
+
+    fit: Fit
+    reduced: Sequence[Reduced]
+    step: FloatArray
+    bounds: Mapping[tuple[str, str], tuple[float, float]]
+
+    def _bounded(self, at: FloatArray) -> FloatArray:
+        """Return parameters (p,) within their bounds."""
+        if not self.bounds:
+            return at
+        return np.array(
+            [
+                np.clip(a, *self.bounds.get(q.key, (-np.inf, np.inf)))
+                for a, q in zip(at, self.fit.parameters, strict=True)
+            ]
+        )
+
+    def all_by_one_share(self) -> Fit | None:
+        """Return the fit after the largest share of the step that improves it, the same for all; None if none does."""
+        fit, share = self.fit, 1.0
+        for _ in range(_TRIES):
+            at = self._bounded(fit.at + share * self.step)
             taken = at - fit.at
             chains = tuple(
-                moved(chain, linear, share * local_step(r, taken / share), taken)
+                moved(chain, linear, local_step(r, taken), taken)
                 if share == 1.0
-                else _part(chain, linear, local_step(r, step), step, share)
-                for chain, linear, r in zip(fit.chains, fit.linears, reduced, strict=True)
+                else _part(chain, linear, local_step(r, self.step), self.step, share)
+                for chain, linear, r in zip(fit.chains, fit.linears, self.reduced, strict=True)
             )
             trial = replace(fit, chains=chains, at=at)
-            if all(np.all(np.isfinite(chain.states)) for chain in chains):
+            if _finite(chains):
                 new = linearised(trial)
                 merit = merit_of(trial, new)
                 # while gaps are open the merit is that of the closed chain to first order only: too good
                 bar = fit.merit * (1.0 + 1e-9) if not open_gaps(fit) else 1.5 * fit.merit + 10.0 * fit.count
                 if np.isfinite(merit) and merit < bar:
-                    better = replace(trial, linears=new, merit=merit, iterations=fit.iterations + 1)
-                    break
-            share *= 0.4
-        if better is None:
-            break
-        improved = fit.merit - better.merit
-        were_open = open_gaps(fit)
-        fit = better
-        if not were_open and improved < max(tolerance, 1e-7 * fit.merit):
-            break
-    return fit
+                    return replace(trial, linears=new, merit=merit, iterations=fit.iterations + 1)
+            share *= _SHORTER
+        return None
+
+    def each_its_share(self) -> tuple[Fit | None, BoolArray]:
+        """Return the fit after a step of which each recording takes as much as leads it nearer, what they share whole.
+
+        What recordings share changes little here, and their own unknowns far from linearly. None where no share serves.
+        Beside it which of them (c,) the whole step led astray, or nearly.
+        """
+        fit, count = self.fit, len(self.fit.chains)
+        own = [np.array([q.recordings == frozenset([i]) for q in fit.parameters], dtype=bool) for i in range(count)]
+        shares, again = np.ones(count), list(range(count))
+        at, chains, new = fit.at, list(fit.chains), list(fit.linears)
+        for _ in range(_TRIES):
+            wanted = self.step.copy()
+            for i in range(count):
+                wanted[own[i]] *= shares[i]
+            at = self._bounded(fit.at + wanted)
+            taken = at - fit.at
+            for i in again:
+                linear, r, share = fit.linears[i], self.reduced[i], shares[i]
+                # a share of the way at once, and all that what is shared asks for
+                still = local_step(r, np.zeros_like(taken))
+                local = share * still + (local_step(r, taken) - still)
+                tangents = linear.moves @ np.concatenate([local, taken]) + share * linear.closing
+                chains[i] = stepped(fit.chains[i], tangents)
+            if not _finite(chains):
+                shares[again] *= _SHORTER
+                continue
+            trial = replace(fit, chains=tuple(chains), at=at)
+            for i, linear in zip(again, linearised(trial, only=again), strict=True):
+                new[i] = linear
+            again = [i for i in again if not self._nearer(i, trial, new[i])]
+            if not again:
+                new_fit = replace(trial, linears=tuple(new), merit=merit_of(trial, new), iterations=fit.iterations + 1)
+                rose = [
+                    self._own_merit(i, new_fit, new[i]) > _ROSE * self._own_merit(i, fit, fit.linears[i])
+                    for i in range(count)
+                ]
+                return new_fit, (shares < 1.0) | np.array(rose)
+            shares[again] *= _SHORTER
+        return self.all_by_one_share(), shares < 1.0
+
+    def _nearer(self, i: int, trial: Fit, new: Linear) -> bool:
+        """Tell whether a step has not led a recording astray."""
+        was, now = (self._own_merit(i, fit, linear) for fit, linear in ((self.fit, self.fit.linears[i]), (trial, new)))
+        if not np.isfinite(now):
+            return False
+        count = new.residual.size
+        bar = _RISE * was if was < _FAR * count else 1.5 * was + 10.0 * count
+        return bool(now < bar)
+
+    def _own_merit(self, i: int, fit: Fit, linear: Linear) -> float:
+        """Return the chi-squared of one recording, its jumps included."""
+        one = replace(fit, chains=(fit.chains[i],), parameters=(), at=np.empty(0))
+        return merit_of(one, (linear,))
+
+
+def _finite(chains: Sequence[Chain]) -> bool:
+    """Tell whether all states are numbers."""
+    return all(bool(np.all(np.isfinite(chain.states))) for chain in chains)
+
+
+#: how far one step goes where the readings of a free spin say little, beyond which its turning is far from linear:
+#: shares of the sigma of how its wobble dies and turns, and rad of its attitude, which may turn about the field
+_WOBBLE_REACH, _ATTITUDE_REACH = 1.0 / 15.0, 0.02
+_TURNS = np.arange(6, 9)
+#: how hard steps are held to that: not at all, at first, at least after a step that went too far, and at most; what it
+#: is multiplied by after a step that went too far, and after one that did not
+_FREE, _FIRST_HOLD, _LEAST_HOLD, _MOST_HOLD = 0.0, 0.3, 0.1, 3.0
+_TIGHTER, _LOOSER = 5.0, 0.7
+
+
+def _reach(fit: Fit, hold: FloatArray) -> FloatArray | None:
+    """Return how far one step takes each parameter (p,) of which the readings say little; None where steps are free.
+
+    ``hold`` (c,) is how hard each recording's own are held to it. Where a fit ends does not depend on it.
+    """
+    if not np.any(hold):
+        return None
+    reach = np.full(len(fit.parameters), np.inf)
+    for j, q in enumerate(fit.parameters):
+        if q.key in WOBBLE and q.recordings is not None:
+            reach[j] = _WOBBLE_REACH * q.sigma / np.sqrt(np.max(hold[list(q.recordings)]))
+    return reach
 
 
 #: gaps of a chain below this share of the steps of its differences are closed
@@ -413,9 +569,9 @@ def open_gaps(fit: Fit) -> bool:
     return any(bool(np.any(np.abs(linear.gaps[:, forbidden]) > _CLOSED * steps[forbidden])) for linear in fit.linears)
 
 
-def _reduced(fit: Fit) -> Callable[[Linear, Chain], Reduced]:
+def _reduced(fit: Fit) -> Callable[[Linear, Chain, float], Reduced]:
     """Return `reduce` with the noise and the jumps of a fit."""
-    return lambda linear, chain: reduce(linear, chain, fit.noise, fit.jumps)
+    return lambda linear, chain, hold: reduce(linear, chain, fit.noise, fit.jumps, hold)
 
 
 def _part(chain: Chain, linear: Linear, local: FloatArray, shared: FloatArray, share: float) -> Chain:

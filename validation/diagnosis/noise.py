@@ -11,12 +11,14 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import minimize
 from scipy.signal import lfilter
+from scipy.special import expit, logit
 
 from discsim.arrays import FloatArray
 from validation.diagnosis.trajectory_pieces import Channel, IntArray, Linear
 
-__all__ = ["GroupNoise", "NoiseModel", "chi_squared", "estimate_noise", "log_likelihood", "whitened"]
+__all__ = ["GroupNoise", "NoiseModel", "chi_squared", "estimate_noise", "likeliest_noise", "log_likelihood", "whitened"]
 
 #: correlations from one sample to the next that are tried; slower noise than the last is not taken for noise
 CORRELATIONS = np.concatenate([np.linspace(0.05, 0.9, 18), 1.0 - np.geomspace(0.08, 0.005, 9)])
@@ -101,10 +103,8 @@ def log_likelihood(linear: Linear, noise: NoiseModel, residual: FloatArray) -> f
         stated = float(linear.sd[channel.rows][0])
         usual = stated if np.isfinite(stated) and stated > 0.0 else DEFAULT[channel.group]
         total += channel.index.size * (2.0 * float(np.log(own.sd / usual)) - 1.0)
-        if own.correlation and own.share >= 1.0:
-            total += float(np.sum(np.log1p(-(own.correlation ** (2.0 * np.diff(channel.index))))))
-        elif own.correlation:
-            total += 2.0 * (channel.index.size - 1) * float(np.log(own.innovation[1]))
+        if own.correlation:
+            total += _log_determinant(own, channel.index)
     return total
 
 
@@ -168,6 +168,88 @@ def _correlation(rho: FloatArray, pairs: FloatArray) -> tuple[float, float]:
     if part > 0.9 and 0.0 < rho[0] < CORRELATIONS[-1]:
         return float(rho[0]), 1.0
     return phi, part
+
+
+#: the slowest noise that a likelihood is asked for, s: what is slower is not taken for noise
+_SLOWEST = 2.0
+#: residuals this many times the stated noise are not noise: what they are likeliest with says nothing
+_NOT_NOISE = 5.0
+
+
+def likeliest_noise(linears: Sequence[Linear], residuals: Sequence[FloatArray], model: NoiseModel) -> NoiseModel:
+    """Return noise whose correlated groups have the level, correlation and share that residuals are likeliest with.
+
+    Autocorrelations at a few lags give these roughly where noise is slow beside a recording. What they lack would be
+    won by whatever changes the residuals a little, and taken for evidence of it.
+    """
+    found = dict(model)
+    usual = stated_noise(linears)
+    for group, own in model.items():
+        if not own.correlation or own.sd > _NOT_NOISE * usual[group].sd:
+            continue
+        parts = [
+            (residual[channel.rows], channel.index)
+            for linear, residual in zip(linears, residuals, strict=True)
+            for channel in linear.channels
+            if channel.group == group
+        ]
+        count = sum(x.size for x, _ in parts)
+        spacing = min(
+            (
+                float(np.median(np.diff(linear.t[channel.rows])))
+                for linear in linears
+                for channel in linear.channels
+                if channel.group == group and channel.index.size > 1
+            ),
+            default=np.inf,
+        )
+        slowest = max(-1.0 / float(np.log(CORRELATIONS[-1])), _SLOWEST / spacing)
+        found[group] = _likeliest(parts, count, own, slowest)
+    return found
+
+
+def _likeliest(parts: Sequence[tuple[FloatArray, IntArray]], count: int, own: GroupNoise, slowest: float) -> GroupNoise:
+    """Return the noise of one group that its residuals (n,), each with the numbers of its samples, are likeliest with.
+
+    ``slowest`` is its longest memory in samples. The level keeps its correction for what was fitted.
+    """
+    whole = own.share >= 1.0
+    squares = sum(float(x @ x) for x, _ in parts)
+    corrected = own.sd**2 * count / squares if squares > 0 else 1.0
+
+    def noise(at: FloatArray) -> GroupNoise:
+        correlation = float(np.exp(-np.exp(-min(at[0], np.log(slowest)))))
+        return GroupNoise(1.0, correlation, 1.0 if whole else float(expit(at[1])))
+
+    def cost(at: FloatArray) -> tuple[float, float]:
+        trial = noise(at)
+        total = determinant = 0.0
+        for x, index in parts:
+            if x.size == 0:
+                continue
+            white = _freed(x[:, None].copy(), trial, index)
+            total += float(np.sum(white**2))
+            determinant += _log_determinant(trial, index)
+        variance = max(total / count, 1e-300)
+        return count * float(np.log(variance)) + determinant, variance
+
+    memory = -np.log(-np.log(own.correlation))
+    first = np.array([memory] if whole else [memory, logit(np.clip(own.share, 1e-4, 1.0 - 1e-4))])
+
+    def badness(at: FloatArray) -> float:
+        return cost(at)[0]
+
+    best = minimize(badness, first, method="Nelder-Mead", options={"xatol": 0.01, "fatol": 0.05, "maxfev": 50})
+    if not best.fun < cost(first)[0]:
+        return own
+    return noise(best.x)._replace(sd=float(np.sqrt(cost(best.x)[1] * corrected)))
+
+
+def _log_determinant(noise: GroupNoise, index: IntArray) -> float:
+    """Return twice the log determinant of the whitening of one channel of unit level, less its sign."""
+    if noise.share >= 1.0:
+        return float(np.sum(np.log1p(-(noise.correlation ** (2.0 * np.diff(index))))))
+    return 2.0 * (index.size - 1) * float(np.log(noise.innovation[1]))
 
 
 def robust_noise(linears: Sequence[Linear], residuals: Sequence[FloatArray]) -> dict[str, GroupNoise]:

@@ -10,7 +10,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from validation.diagnosis.board import Board, free_columns
 from validation.diagnosis.fitting import Fit, Parameter, penalty_of, refit, values_of
-from validation.diagnosis.noise import NoiseModel, estimate_noise, log_likelihood
+from validation.diagnosis.noise import NoiseModel, estimate_noise, likeliest_noise, log_likelihood
 from validation.diagnosis.readings import CLOCKS
 from validation.diagnosis.relaxed import NO_JUMPS, beginning
 from validation.diagnosis.trajectory_pieces import Chain
@@ -180,8 +180,8 @@ def noise_of(fit: Fit) -> NoiseModel:
 
 def scored(hypothesis: Hypothesis, fit: Fit) -> Tied:
     """Return a fit with its score."""
-    fit = replace(fit, noise=noise_of(fit))
     residuals = tuple(linear.residual for linear in fit.linears)
+    fit = replace(fit, noise=likeliest_noise(fit.linears, residuals, noise_of(fit)))
     score = sum(log_likelihood(linear, fit.noise, e) for linear, e in zip(fit.linears, residuals, strict=True))
     return Tied(hypothesis, fit, score + penalty_of(fit, fit.linears), residuals)
 
