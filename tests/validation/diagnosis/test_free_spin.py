@@ -14,8 +14,8 @@ from discsim.engine import fly
 from discsim.recording import Recording
 from discsim.sensors import record
 from discsim.shipped import load_disc
-from validation.diagnosis.fitting import Fit, Jumps, Parameter, linearised_columns
-from validation.diagnosis.noise import estimate_noise, whitened
+from validation.diagnosis.fitting import Fit, Jumps, Parameter, _Going, linearised, linearised_columns, reduce
+from validation.diagnosis.noise import estimate_noise, stated_noise, whitened
 from validation.diagnosis.readings import predicted
 from validation.diagnosis.relaxed import NO_JUMPS, first_chain, relaxed, unknowns
 from validation.diagnosis.search import _possible
@@ -103,3 +103,31 @@ def test_a_knock_at_the_very_start_is_not_told_from_where_the_spin_started(insta
     chains = (first_chain(recording),)
     fit = Fit(chains, (q,), np.array([instant]), NO_JUMPS["free_spin"], {}, covariance=np.full((1, 1), 1e-6))
     assert _possible(Tied(Hypothesis(), fit, 0.0)) is told
+
+
+def test_a_recording_that_a_step_leads_astray_takes_less_of_it_and_the_other_all():
+    recordings = [
+        record(flight(seconds=0.4), BLIND, np.random.default_rng(k), plant="free_spin", name=f"{k}", disc=DRIVER)
+        for k in range(2)
+    ]
+    fit = Fit(tuple(first_chain(r) for r in recordings), (), np.empty(0), NO_JUMPS["free_spin"], {})
+    fit = replace(fit, noise=stated_noise(linearised(fit)))
+    for _ in range(3):  # near enough that a whole step leads nearer
+        fit, _ = going(fit, 1.0).each_its_share()
+    for too_far, shortened in ((1.0, [False, False]), (1e3, [True, False])):
+        taken, astray = going(fit, too_far).each_its_share()
+        assert taken is not None
+        assert astray.tolist() == shortened
+        # what is not led astray goes as far as by itself
+        alone, _ = going(fit, 1.0).each_its_share()
+        np.testing.assert_array_equal(taken.chains[1].states, alone.chains[1].states)
+
+
+def going(fit: Fit, too_far: float) -> _Going:
+    """Return the next step of a fit that in the first recording goes so many times as far as it should."""
+    fit = replace(fit, linears=linearised(fit))
+    reduced = [
+        reduce(linear, chain, fit.noise, fit.jumps) for linear, chain in zip(fit.linears, fit.chains, strict=True)
+    ]
+    reduced[0] = replace(reduced[0], cross=too_far * reduced[0].cross)
+    return _Going(fit, reduced, np.empty(0), {})

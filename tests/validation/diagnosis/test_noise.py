@@ -8,7 +8,14 @@ from scipy.signal import lfilter
 from scipy.stats import multivariate_normal
 
 from discsim.arrays import FloatArray
-from validation.diagnosis.noise import GroupNoise, estimate_noise, log_likelihood, stated_noise, whitened
+from validation.diagnosis.noise import (
+    GroupNoise,
+    estimate_noise,
+    likeliest_noise,
+    log_likelihood,
+    stated_noise,
+    whitened,
+)
 from validation.diagnosis.trajectory_pieces import Channel, Linear
 
 
@@ -145,3 +152,44 @@ def test_what_a_sheet_states_is_the_first_guess_and_something_stands_in_where_it
     silent = stated_noise([rows(("gyroscope", 5), sd=np.nan)])["gyroscope"]
     assert np.isfinite(silent.sd)
     assert silent.sd > 0
+
+
+def slow(seed: int, memory: float) -> tuple[Linear, FloatArray]:
+    """Three axes of 30 s: white noise of 0.6 and, over so many samples, noise of 0.8."""
+    rng, phi = np.random.default_rng(seed), float(np.exp(-1.0 / memory))
+    axes = [0.6 * rng.standard_normal(3000) + coloured(rng, 3000, 0.8, phi) for _ in range(3)]
+    return rows(*[("gyroscope", 3000)] * 3), np.concatenate(axes)
+
+
+def likeliest(linear: Linear, residual: FloatArray) -> GroupNoise:
+    return likeliest_noise([linear], [residual], estimate_noise([linear], [residual]))["gyroscope"]
+
+
+@pytest.mark.parametrize("memory", [20.0, 50.0, 150.0])
+def test_slow_noise_under_white_noise_is_told_by_its_likelihood(memory: float):
+    found = [likeliest(*slow(seed, memory)) for seed in range(12)]
+    memories = -1.0 / np.log([noise.correlation for noise in found])
+    # the mean of twelve, each with the scatter of 90 s of noise that is over after some samples
+    scatter = memory * np.sqrt(2.0 * memory / 9000.0) * 4.0 / np.sqrt(len(found))
+    assert np.mean(memories) == pytest.approx(memory, abs=max(scatter, 0.05 * memory))
+    assert np.mean([noise.share for noise in found]) == pytest.approx(0.64, abs=0.03)
+    assert np.mean([noise.sd for noise in found]) == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_constant_gains_no_more_than_chance_in_slow_noise():
+    """Three numbers that are not there gain what chi-squared of three degrees of freedom does."""
+    gains = []
+    for seed in range(24):
+        linear, residual = slow(seed, 150.0)
+        level = np.concatenate([axis - np.mean(axis) for axis in np.split(residual, 3)])
+        with_it, without = (log_likelihood(linear, {"gyroscope": likeliest(linear, e)}, e) for e in (level, residual))
+        gains.append(without - with_it)
+    assert np.mean(gains) == pytest.approx(3.0, abs=4.0 * np.sqrt(6.0 / len(gains)))
+    assert max(gains) < 16.3  # one in a thousand
+
+
+def test_what_is_far_beyond_the_stated_noise_is_not_made_the_likeliest_noise():
+    linear = rows(("gyroscope", 2000), sd=0.01)
+    residual = coloured(np.random.default_rng(5), 2000, 1.0, 0.95)
+    model = estimate_noise([linear], [residual])
+    assert likeliest_noise([linear], [residual], model) == model
