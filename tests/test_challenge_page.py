@@ -6,7 +6,7 @@ from pathlib import Path
 
 from page_table import with_table
 
-from validation.challenge.cases import MASKS
+from validation.challenge.case import MASKS
 from validation.challenge.sizes import HIDING
 
 PAGE = Path(__file__).parents[1] / "docs" / "challenge.md"

@@ -15,7 +15,8 @@ from scipy.stats import binom
 from discsim.effects.catalogue import effect
 from discsim.errors import InputError
 from validation.challenge.blind import Request, diagnose_blind, open_answers, seal_answers
-from validation.challenge.cases import Concealed, draw_case
+from validation.challenge.case import Concealed
+from validation.challenge.cases import draw_case
 from validation.challenge.conceal import Answer
 from validation.challenge.page import GOALS, goals_met
 from validation.challenge.result import rates_of, read_result

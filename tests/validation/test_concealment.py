@@ -15,10 +15,12 @@ from discsim.files import digest
 from discsim.recording import PLANTS, SENSORS, Samples, read_dataset
 from discsim.rig import spin_down
 from discsim.sensors import Noise
-from validation.challenge.cases import MASKS, Case, Coast, Turning, draw_case
+from validation.challenge.case import MASKS, Case, Coast, Turning
+from validation.challenge.cases import draw_case
 from validation.challenge.conceal import Answer, conceal, read_answer, recordings
 from validation.challenge.physics import OFF_CATALOGUE, coast, play
-from validation.challenge.sizes import HIDING, conceivable, draw_effect
+from validation.challenge.sizes import HIDING, conceivable, draw_effect, scaled
+from validation.challenge.strength import sizes
 
 #: which plant each effect is tried on here: the first of its own
 TRIED = [(id, row.plants[0]) for id, row in CATALOGUE.items()]
@@ -199,7 +201,7 @@ def test_what_cannot_be_concealed_there_is_refused():
         draw_case(0, "spin_down", ["turbulence"])
 
 
-@pytest.mark.parametrize("mask", MASKS)
+@pytest.mark.parametrize("mask", [mask for mask in MASKS if mask != "near_limit"])
 def test_a_mask_makes_the_same_case_harder(mask):
     for seed in range(25):
         bare, masked = draw_case(seed), draw_case(seed, mask=mask)
@@ -230,6 +232,26 @@ def test_a_mask_makes_the_same_case_harder(mask):
 def test_a_flight_that_is_cut_short_is_recorded_no_longer():
     case = draw_case(2, "flight", mask="short")
     assert recordings(replace(case, runs=case.runs[:1], stated_releases=()))[0].end <= 1.5
+
+
+def test_sizes_near_the_limit_are_those_of_the_case_itself():
+    """Scaled by the information in these very recordings, not by that in ordinary ones."""
+    for seed, plant, id in (
+        (3, "flight", "air.wind"),
+        (4, "free_spin", "mag.clock_rate"),
+        (5, "rate_table", "gyro.scale"),
+    ):
+        bare, near = (draw_case(seed, plant, [id], mask=mask) for mask in (None, "near_limit"))
+        assert 0.4 <= sizes(near)[id] <= 4.0
+        grown = scaled(bare.concealed[0].effect, sizes(near)[id] / sizes(bare)[id], plant).value
+        np.testing.assert_allclose(near.concealed[0].effect.value, grown, rtol=1e-3)
+        assert len(near.runs) == len(bare.runs)
+
+
+def test_no_effect_is_scaled_beyond_the_largest_that_are_drawn():
+    wind = effect("air.wind", w_north_m_s=0.3, w_east_m_s=0.4)
+    assert scaled(wind, 2.0, "flight").value == effect("air.wind", w_north_m_s=0.6, w_east_m_s=0.8).value
+    assert np.hypot(*scaled(wind, 1e6, "flight").value[:2]) == pytest.approx(HIDING["air.wind"].largest)
 
 
 def test_a_mask_that_leaves_no_sensor_to_conceal_in_is_refused():

@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 from discsim.errors import InputError
 from discsim.files import digest, write_text
 from discsim.recording import Plant
-from validation.challenge.cases import Kind, Mask, draw_case
+from validation.challenge.case import Kind, Mask
+from validation.challenge.cases import draw_case
 from validation.challenge.conceal import Answer, read_answer, write_recordings
 
 __all__ = ["DIAGNOSE", "Request", "diagnose_blind", "open_answers", "seal_answers"]

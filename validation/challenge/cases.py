@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Literal, TypeAlias
+from dataclasses import replace
 
 import numpy as np
 
 from discsim.arrays import FloatArray, readonly
 from discsim.disc import Aero, Disc, Release, Rig
-from discsim.effects.catalogue import CATALOGUE, Effect, row
+from discsim.effects.catalogue import CATALOGUE, row
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.recording import Plant, Samples
@@ -27,34 +26,16 @@ from discsim.sensors import (
 )
 from discsim.sensors.instruments import Sensor
 from discsim.shipped import load_disc
-from validation.challenge.physics import OFF_CATALOGUE, OffCatalogue
-from validation.challenge.sizes import conceivable, draw_effect
+from validation.challenge.case import Case, Coast, Concealed, Kind, Mask, Run, Turning
+from validation.challenge.physics import OFF_CATALOGUE, log_uniform
+from validation.challenge.sizes import conceivable, draw_effect, scaled
+from validation.challenge.strength import sizes
 from validation.throws import Throw
 
-__all__ = ["KINDS", "MASKS", "Case", "Coast", "Concealed", "Kind", "Mask", "Run", "Turning", "draw_case"]
+__all__ = ["KINDS", "PLANT_SHARES", "draw_case"]
 
-Mask = Literal[
-    "stated_loosely", "coloured_noise", "second_effect", "few_recordings", "short", "clipped", "magnetometer_only"
-]
-#: under what an effect may hide, in words
-MASKS: Mapping[Mask, str] = {
-    "stated_loosely": "every coefficient is off by its stated sigma",
-    "coloured_noise": "the noise of every sensor is louder than stated and correlated",
-    "second_effect": "a second effect, as large as they come, hides the first",
-    "few_recordings": "two recordings only",
-    "short": "flights end after 1.5 s, runs of a rig after 6 s",
-    "clipped": "accelerometer of 8 g and gyroscope of 500 deg/s, clipped most of the time",
-    "magnetometer_only": "no other sensor",
-}
 #: lengths of what a ``short`` case records, s
 SHORT_FLIGHT_S, SHORT_RUN_S = 1.5, 6.0
-#: nearly all flights of the challenge last longer, s
-ORDINARY_FLIGHT_S = 3.5
-#: no throw of the challenge stays up this long, s
-LONGEST_FLIGHT_S = 20.0
-
-Kind = Literal["nothing", "noise", "within_sigma", "beyond_sigma", "one", "two", "off_catalogue"]
-
 #: shares of the kinds of case: nothing hidden in a third (plain, other noise than stated, coefficients within their
 #: stated sigma, or beyond it), one effect in a third, two in a sixth, physics of no catalogue in a sixth
 KINDS: Mapping[Kind, float] = {
@@ -72,76 +53,6 @@ PLANT_SHARES: Mapping[Plant, float] = {"flight": 0.49, "rate_table": 0.17, "spin
 _WELL_KNOWN = ("CL0", "CLa", "CD0", "CDa", "CM0", "CMa", "CNr")
 #: effects that moving the coefficients within a few per cent cannot imitate
 _BESIDE_COEFFICIENTS = ("air.wind", "aero.spin_side_force", "event.", "mag.", "accel.", "gyro.", "gps.")
-
-
-@dataclass(frozen=True)
-class Coast:
-    """One run of a spin-down rig: rate rad/s and yaw rad at the start, duration s."""
-
-    rate: float
-    yaw: float
-    duration: float
-
-
-@dataclass(frozen=True)
-class Turning:
-    """One run of a rate table: its profile, and the yaw at the start, rad."""
-
-    profile: Samples
-    yaw: float
-
-
-#: what happens in one recording
-Run: TypeAlias = Release | Coast | Turning
-
-
-@dataclass(frozen=True)
-class Concealed:
-    """One effect with its size; ``recording`` is the only one it is in (from 0), or None for all."""
-
-    effect: Effect
-    recording: int | None = None
-
-
-@dataclass(frozen=True)
-class Case:
-    """Everything about one case; only what is ``stated`` and what the instruments read reaches a recording.
-
-    ``disc`` and ``rig`` are the true ones, ``sheets_of`` the instruments as their data sheets describe them. A flight
-    is recorded until it ends or for ``longest`` (s).
-    """
-
-    seed: int
-    plant: Plant
-    kind: Kind
-    environment: Environment
-    runs: tuple[Run, ...]
-    instruments: Instruments
-    sheets_of: Instruments
-    concealed: tuple[Concealed, ...] = ()
-    secret: OffCatalogue | None = None
-    disc: Disc | None = None
-    stated_disc: Disc | None = None
-    rig: Rig | None = None
-    stated_rig: Rig | None = None
-    stated_releases: tuple[Release | None, ...] = ()
-    moved: Mapping[str, float] = field(default_factory=dict)
-    longest: float = LONGEST_FLIGHT_S
-
-    @property
-    def recorded(self) -> float:
-        """Shortest time that a recording lasts, s; of a flight about."""
-        rig_runs = [run.duration for run in self.runs if isinstance(run, Coast)]
-        return min(rig_runs, default=min(self.longest, ORDINARY_FLIGHT_S))
-
-    @property
-    def verdict(self) -> str:
-        """The right answer."""
-        if self.secret is not None:
-            return "unexplained"
-        if self.concealed:
-            return "explained"
-        return "recalibrated" if self.kind == "beyond_sigma" else "consistent"
 
 
 def draw_case(
@@ -169,7 +80,25 @@ def draw_case(
     case = _with_sensors(case, _sensors_wanted(effects), rng, mask)
     case = _shortened(case, mask)
     case = _hide(case, effects, rng, doubled=mask == "second_effect")
-    return _stated(_noisy(case, rng, everywhere=mask == "coloured_noise"), rng, loosely=loosely)
+    case = _stated(_noisy(case, rng, everywhere=mask == "coloured_noise"), rng, loosely=loosely)
+    return _near_limit(case, rng) if mask == "near_limit" else case
+
+
+#: how far from its detection limit an effect is that lies near it, in limits
+_NEAR = (0.4, 4.0)
+#: effects that have no limit to scale to: what they change in readings does not grow with their size
+_NOT_SCALED = ("accel.saturation",)
+
+
+def _near_limit(case: Case, rng: np.random.Generator) -> Case:
+    """Draw the sizes of what is concealed anew, near the case's own detection limits."""
+    limits, near = sizes(case), []
+    for item in case.concealed:
+        size = limits[item.effect.id]
+        if size > 0.0 and item.effect.id not in _NOT_SCALED:
+            item = replace(item, effect=scaled(item.effect, log_uniform(rng, *_NEAR) / size, case.plant))
+        near.append(item)
+    return replace(case, concealed=tuple(near))
 
 
 def _shortened(case: Case, mask: Mask | None) -> Case:

@@ -25,7 +25,8 @@ from discsim.recording import PLANTS, Plant, Recording, toml_lines, write_record
 from discsim.rig import turn_table
 from discsim.sensors import record
 from discsim.toml_table import read_toml
-from validation.challenge.cases import Case, Coast, Kind, Mask, Run, Turning, draw_case
+from validation.challenge.case import Case, Coast, Kind, Mask, Run, Turning
+from validation.challenge.cases import draw_case
 from validation.challenge.physics import HiddenDisc, coast, haunted
 
 __all__ = ["Answer", "conceal", "read_answer", "recordings", "seal", "write_recordings"]

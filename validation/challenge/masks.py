@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from validation.challenge.blind import Request
-from validation.challenge.cases import MASKS, Mask
+from validation.challenge.case import MASKS, Mask
 from validation.challenge.page import percent
 from validation.challenge.result import RESULT, Result, Scored, rates_of, read_result, times
 from validation.challenge.run import challenge

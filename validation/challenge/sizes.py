@@ -15,7 +15,7 @@ import numpy as np
 from discsim.effects.catalogue import CATALOGUE, Effect, effect
 from discsim.recording import Plant
 
-__all__ = ["HIDING", "Hiding", "conceivable", "draw_effect"]
+__all__ = ["HIDING", "Hiding", "conceivable", "draw_effect", "scaled"]
 
 
 @dataclass(frozen=True)
@@ -258,3 +258,16 @@ def draw_effect(
     for name, (least, most) in hiding.ranges.items():
         sizes[name] = float(rng.uniform(least, most)) * (recorded if name == "t_s" else 1.0)
     return effect(id, **{name: float(f"{value:.7g}") for name, value in sizes.items()})
+
+
+def scaled(item: Effect, factor: float, plant: Plant) -> Effect:
+    """Return an effect of so many times its size, in the same direction, at the same instant.
+
+    It does not become larger than effects are drawn.
+    """
+    hiding, values = HIDING[item.id], item.value._asdict()
+    size = float(np.linalg.norm([values[name] - hiding.about for name in hiding.sized]))
+    factor = min(factor, hiding.limits(plant)[1] / size)
+    for name in hiding.sized:
+        values[name] = float(f"{hiding.about + factor * (values[name] - hiding.about):.7g}")
+    return effect(item.id, **values)

@@ -25,7 +25,7 @@ from discsim.motion import Motion, State
 from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, Noise, record
 from discsim.trajectory import predict
-from validation.challenge.cases import Case, Coast, Concealed, Run, Turning
+from validation.challenge.case import Case, Coast, Concealed, Run, Turning
 from validation.challenge.sizes import HIDING
 
 __all__ = ["THRESHOLD", "sizes", "strength"]

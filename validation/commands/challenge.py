@@ -12,7 +12,7 @@ from validation.options import OutOption, SeedOption
 
 if TYPE_CHECKING:
     from discsim.recording import Plant
-    from validation.challenge.cases import Kind, Mask
+    from validation.challenge.case import Kind, Mask
     from validation.challenge.result import Scored
 
 __all__ = ["command"]
@@ -50,6 +50,7 @@ class MaskName(enum.StrEnum):
     short = "short"
     clipped = "clipped"
     magnetometer_only = "magnetometer_only"
+    near_limit = "near_limit"
 
 
 def command(

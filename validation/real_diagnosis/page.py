@@ -12,7 +12,9 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.files import write_text
 from discsim.model_file import Model
-from discsim.recording import Samples
+from discsim.recording import Recording, Samples
+from validation.diagnosis.agreement import agreement_of
+from validation.diagnosis.agreement_tables import tables_of
 from validation.golf_throws.prediction import THROWS
 from validation.importing import find_map, import_recording, read_map
 from validation.real_diagnosis.charts import draw_fields, draw_golf, draw_rows
@@ -109,6 +111,7 @@ def _flatball(real: Path, figures: Path, work: Path, seed: int, say: Say) -> str
         "",
         *_answer_lines(answer, list(throws)),
         "",
+        *_agreement_lines(throws),
         "### How long is a row?",
         "",
         _table(
@@ -189,6 +192,17 @@ def _answer_lines(answer: Found, names: Sequence[str]) -> list[str]:
     if places:
         lines += ["Where they part most:", "", *(_wrapped(text, "- ") for text in places), ""]
     return lines[:-1]
+
+
+def _agreement_lines(throws: Mapping[str, Recording]) -> list[str]:
+    """Return which sensors agree, and what reconciles them on throws that took no part."""
+    found = agreement_of(list(throws.values()), list(throws))
+    if found is None or not found.contradiction:
+        return []
+    lines = ["### Which sensors agree", "", *(_wrapped(text, "- ") for text in found.sentences), ""]
+    for caption, header, rows in tables_of(found):
+        lines += [f"*{caption}*", "", _table(header, rows), ""]
+    return lines
 
 
 def _effect_cells(one: Mapping[str, Any]) -> list[str]:
@@ -325,10 +339,11 @@ def _answered(answer: Found, reached: float) -> list[str]:
     )
     if noise["observed_rms"] > 2.0 * reached:
         said += (
-            f" That is no verdict to rely on: the plain fit below leaves {reached:.1f} m with the same freedom, so the "
-            "diagnosis has not found where the stated releases would fit best. Its search expects a sensor on board "
-            "that tells attitude and spin; from two coordinates of a track it stops short. It errs on the silent side: "
-            "nothing false is named."
+            f" That is no verdict to rely on: the plain fit below moves the same releases and the same wind and leaves "
+            f"{reached:.1f} m. It asks for less: {LEFT:g} m at each point instead of the scatter of the track, every "
+            f"{APART:g} s, with the track's end on the ground. So the diagnosis has not found where the stated "
+            "releases would fit best. Its search expects a sensor on board that tells attitude and spin; from two "
+            "coordinates of a track it stops short. It errs on the silent side: nothing false is named."
         )
     return [_wrapped(said)]
 
