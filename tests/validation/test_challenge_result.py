@@ -16,10 +16,10 @@ from validation.challenge.blind import Request
 from validation.challenge.conceal import Answer
 from validation.challenge.detection import Sized, allowed, detections, fit_curve, has_curve
 from validation.challenge.document import main as write_document
-from validation.challenge.document import masks_text, plain_command, with_part
+from validation.challenge.document import masks_text, plain_command, pooled, with_part
 from validation.challenge.masks import challenge_masks, masked_results
 from validation.challenge.page import fault_of, goals_met
-from validation.challenge.result import Scored, rates_of, times
+from validation.challenge.result import Scored, rates_of, read_result, times
 from validation.challenge.run import challenge
 from validation.challenge.scoring import score_case
 from validation.run import start_run
@@ -245,6 +245,18 @@ def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, blind,
     assert {f"images/{name}" in text for name in drawn_there} == {True}
     write_document()
     assert page.read_text() == text
+
+    # effects near their limit count in the curve: the same ones here, so there are twice as many
+    near = tmp_path / "near" / "challenge.json"
+    near.parent.mkdir()
+    near.write_text(
+        json.dumps({**json.loads((tmp_path / "plain" / "challenge.json").read_text()), "mask": "near_limit"})
+    )
+    monkeypatch.setattr("validation.challenge.masks.MASKS", {"near_limit": "near"})
+    assert len(pooled(read_result(tmp_path / "plain"), read_result(near.parent))) == 2
+    monkeypatch.setattr(sys, "argv", ["document", *given[:1], "--masks", str(near.parent), "--page", str(page)])
+    write_document()
+    assert "count the 1 effects" in page.read_text()
 
 
 def test_what_is_not_there_is_not_written(tmp_path):

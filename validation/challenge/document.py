@@ -3,7 +3,8 @@
     python -m validation.challenge.document challenge --masks challenge-masks
 
 puts result, confusions, failures (each with the command that reproduces it) and figures of the challenge in the folder
-``challenge`` into docs/challenge.md, and of each mask finished in ``challenge-masks`` a row into its table of masks.
+``challenge`` into docs/challenge.md, and of each mask finished in ``challenge-masks`` a row into its table of masks;
+the detection curve counts the effects of the mask near_limit, too.
 Only what stands between the page's marks is replaced.
 """
 
@@ -20,7 +21,7 @@ import numpy as np
 from discsim.errors import InputError
 from discsim.files import read_text, write_text
 from validation.challenge.cases import KINDS, PLANT_SHARES
-from validation.challenge.detection import HALF_GOAL, detections, fit_curve
+from validation.challenge.detection import HALF_GOAL, Sized, detections, fit_curve
 from validation.challenge.masks import MASK_HEADER, mask_row, masked_results
 from validation.challenge.page import GOALS, NAMES, deviates_of, draw_all, fault_of, found_of, hidden_of, percent
 from validation.challenge.result import Result, Scored, rates_of, read_result, times
@@ -79,15 +80,23 @@ def made_by(result: Result) -> str:
     )
 
 
-def result_text(result: Result, figures: Sequence[str]) -> str:
-    """Return the page's part on a challenge; ``figures`` are the names of those that are drawn."""
+def result_text(result: Result, figures: Sequence[str], near: Result | None = None) -> str:
+    """Return the page's part on a challenge; ``figures`` are the names of those that are drawn.
+
+    ``near`` is a challenge under the mask near_limit, whose effects count for the size at which half are named.
+    """
     scored = result.scored
     right = sum(item.score.right for item in scored)
     parts = [
         f"{made_by(result)} {right} are answered rightly in verdict, effects and place. A diagnosis takes "
         f"{times(scored).text}, wall clock on the machine it ran on.",
-        _goals(scored),
+        _goals(scored, pooled(result, near)),
     ]
+    if near is not None:
+        parts.append(
+            f"The size at which half are named, and the two figures, count the {len(detections(near.scored))} effects "
+            f"of {made_by(near).rstrip('.')} as well, whose sizes lie near the limit."
+        )
     parts += [f"![{_FIGURES[name]}](images/{PREFIX}{name}.png)" for name in ("detection", "effects") if name in figures]
     parts += ["### By plant and kind", _kinds(scored), "### What was named in place of what", _confusions(scored)]
     parts += [f"![{_FIGURES[name]}](images/{PREFIX}{name}.png)" for name in ("confusion",) if name in figures]
@@ -99,7 +108,12 @@ def result_text(result: Result, figures: Sequence[str]) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
-def _goals(scored: Sequence[Scored]) -> str:
+def pooled(result: Result, near: Result | None) -> list[Sized]:
+    """Return the effects by which the detection curve is told."""
+    return [*detections(result.scored), *(detections(near.scored) if near is not None else ())]
+
+
+def _goals(scored: Sequence[Scored], items: Sequence[Sized]) -> str:
     rates = rates_of(scored)
     rows = []
     for name, found in rates.items():
@@ -107,7 +121,7 @@ def _goals(scored: Sequence[Scored]) -> str:
         met = {True: "met", False: "**missed**", None: ""}[goal.met(found) if goal else None]
         share, interval = percent(found)
         rows.append((NAMES[name], share, f"{found.hits} of {found.of}", interval, goal.text if goal else "", met))
-    curve = fit_curve(detections(scored))
+    curve = fit_curve(items)
     if curve is not None:
         met = "met" if curve.half <= HALF_GOAL else "**missed**"
         size, _, interval = curve.text.partition(" (")
@@ -237,8 +251,9 @@ def main() -> None:
         if plain is not None:
             if plain.mask is not None:
                 raise InputError(f"{given.out}: was made under the mask {plain.mask}; expected it under --masks")
-            drawn = draw_all(plain.scored, given.page.parent / "images", PREFIX)
-            page = with_part(page, "result", result_text(plain, list(drawn)))
+            near = masked_results(given.masks).get("near_limit")
+            drawn = draw_all(plain.scored, given.page.parent / "images", PREFIX, pooled(plain, near))
+            page = with_part(page, "result", result_text(plain, list(drawn), near))
         if given.masks:
             page = with_part(page, "masks", masks_text(given.masks, plain))
         write_text(given.page, page)

@@ -115,8 +115,13 @@ def deviates_of(scored: Sequence[Scored]) -> FloatArray:
     return np.array([z for item in scored for each in item.score.deviations if (z := each.in_sd) is not None])
 
 
-def draw_all(scored: Sequence[Scored], folder: Path, prefix: str = "") -> dict[str, Path]:
-    """Draw what the cases can show into ``folder``; return the files by name."""
+def draw_all(
+    scored: Sequence[Scored], folder: Path, prefix: str = "", items: Sequence[Sized] | None = None
+) -> dict[str, Path]:
+    """Draw what the cases can show into ``folder``; return the files by name.
+
+    ``items`` are the effects whose detection is drawn where they are not those of the cases.
+    """
     drawn = {}
     table = confusion([(item.answer, item.diagnosis, item.score) for item in scored])
     drawn["confusion"] = folder / f"{prefix}confusion.png"
@@ -125,7 +130,7 @@ def draw_all(scored: Sequence[Scored], folder: Path, prefix: str = "") -> dict[s
     if z.size:
         drawn["deviates"] = folder / f"{prefix}deviates.png"
         draw_deviates(z, drawn["deviates"])
-    items = detections(scored)
+    items = detections(scored) if items is None else items
     if items:
         drawn["detection"], drawn["effects"] = folder / f"{prefix}detection.png", folder / f"{prefix}effects.png"
         draw_detection(items, fit_curve(items), drawn["detection"])

@@ -121,7 +121,7 @@ class Rows:
             f"The rows are not evenly spaced: by the field's phase over the rate, row by row, they last whole numbers "
             f"of a tick of {1e3 * self.tick_s:.3f} ± {1e3 * self.sd_s:.3f} ms, the same in every recording. The "
             f"ordinary row lasts {1e3 * ordinary * self.tick_s:.2f} ms (ticks: {ordinary}); longer ones are rows that "
-            f"came late or were lost, so that of all rows there should be {lost} are missing.",
+            f"came late or were lost. Of the rows that there should be these are missing: {lost}.",
             f"So the mean row lasts {mean}: where a recording's clock seems to differ from another's, it lacks more.",
         ]
 
