@@ -256,7 +256,7 @@ def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, blind,
     assert len(pooled(read_result(tmp_path / "plain"), read_result(near.parent))) == 2
     monkeypatch.setattr(sys, "argv", ["document", *given[:1], "--masks", str(near.parent), "--page", str(page)])
     write_document()
-    assert "count the 1 effects" in page.read_text()
+    assert "whose sizes lie near the limit: `discsim" in page.read_text()
 
 
 def test_what_is_not_there_is_not_written(tmp_path):

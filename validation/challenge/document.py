@@ -94,8 +94,8 @@ def result_text(result: Result, figures: Sequence[str], near: Result | None = No
     ]
     if near is not None:
         parts.append(
-            f"The size at which half are named, and the two figures, count the {len(detections(near.scored))} effects "
-            f"of {made_by(near).rstrip('.')} as well, whose sizes lie near the limit."
+            "The size at which half are named, and the two figures, count the effects of a second challenge as well, "
+            f"whose sizes lie near the limit: {made_by(near)}"
         )
     parts += [f"![{_FIGURES[name]}](images/{PREFIX}{name}.png)" for name in ("detection", "effects") if name in figures]
     parts += ["### By plant and kind", _kinds(scored), "### What was named in place of what", _confusions(scored)]
