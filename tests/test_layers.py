@@ -65,6 +65,26 @@ def test_no_import_points_the_wrong_way(package, source):
     assert forbidden(package, imported(source.read_text(encoding="utf-8"), module, is_package)) == set()
 
 
+def test_the_diagnosis_reaches_no_code_that_conceals():
+    """Followed through every import of ours: a blind test needs an examinee that cannot ask the examiner."""
+    files = {
+        ".".join((path.parent if path.name == "__init__.py" else path.with_suffix("")).relative_to(ROOT).parts): path
+        for package in MAY_IMPORT
+        for path in (ROOT / package).rglob("*.py")
+    }
+    ahead = {"validation.commands.diagnose", *(name for name in files if name.startswith("validation.diagnosis"))}
+    reached: set[str] = set()
+    while ahead:
+        name = ahead.pop()
+        reached.add(name)
+        path = files[name]
+        found = imported(path.read_text(encoding="utf-8"), name, path.name == "__init__.py")
+        modules = {target.rpartition(".")[0] if target not in files else target for target in found}
+        ahead |= (modules & files.keys()) - reached
+    assert "discsim.trajectory" in reached
+    assert not {name for name in reached if name.startswith("validation.challenge")}
+
+
 def test_every_package_is_looked_at():
     assert {package for package, _ in SOURCES} == set(MAY_IMPORT)
 

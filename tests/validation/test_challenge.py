@@ -19,9 +19,9 @@ from validation.challenge.case import Concealed
 from validation.challenge.cases import draw_case
 from validation.challenge.conceal import Answer
 from validation.challenge.page import GOALS, goals_met
-from validation.challenge.result import rates_of, read_result
+from validation.challenge.result import Scored, rates_of, read_result
 from validation.challenge.run import challenge
-from validation.challenge.scoring import CaseScore, confusion, rate, score_case, summary
+from validation.challenge.scoring import CaseScore, clustered_rate, confusion, rate, score_case, summary
 from validation.challenge.strength import THRESHOLD, noncentrality, strength
 from validation.run import start_run
 
@@ -73,7 +73,23 @@ def test_the_right_effect_is_right_and_its_errors_are_counted_in_its_own_sd():
     )
     assert score.right
     assert [item.in_sd for item in score.deviations] == pytest.approx([2.0, 0.0])
-    assert score.right_place is None
+    assert score.right_place
+
+
+def test_an_effect_of_all_recordings_that_is_named_in_one_is_in_the_wrong_place():
+    score = score_case(answer(), diagnosis("explained", named("air.wind", ["01"], w_north_m_s=(1.02, 0.01))))
+    assert score.right_set
+    assert score.right_place is False
+    assert not score.right
+
+
+def test_an_effect_named_twice_is_not_the_right_set():
+    parameters = {"t_s": 1.4, "dv_north_m_s": 0.5, "dv_east_m_s": 0.0, "dv_down_m_s": 0.1}
+    given = answer(effects=("event.impulse",), recordings=("02",), parameters=parameters)
+    right = named("event.impulse", ["02"], t_s=(1.4, 0.01), dv_north_m_s=(0.5, 0.1))
+    invented = named("event.impulse", ["05"], t_s=(2.0, 0.01), dv_north_m_s=(0.1, 0.1))
+    assert score_case(given, diagnosis("explained", right)).right
+    assert not score_case(given, diagnosis("explained", right, invented)).right_set
 
 
 @pytest.mark.parametrize(
@@ -165,6 +181,18 @@ def test_a_diagnosis_that_breaks_its_contract_is_refused():
         score_case(answer(), {"verdict": "explained"})
 
 
+def test_a_standard_deviation_of_nothing_breaks_the_contract():
+    with pytest.raises(InputError, match="sd of w_north_m_s is not positive"):
+        score_case(answer(), diagnosis("explained", named("air.wind", w_north_m_s=(1.0, 0.0))))
+
+
+def test_an_answer_that_breaks_its_contract_is_none_and_spoils_no_other_case():
+    item = Scored.opened(answer(), {"verdict": "explained"}, error=None, seconds=1.0, recordings_sha256="")
+    assert item.score.crashed
+    assert item.diagnosis is None
+    assert "not as its contract says" in (item.error or "")
+
+
 def test_no_answer_is_never_right():
     score = score_case(NOTHING, None)
     assert score.crashed
@@ -180,6 +208,17 @@ def test_the_interval_is_the_exact_one(hits, of):
         assert binom.sf(hits - 1, of, found.low) == pytest.approx(0.025)
     if hits < of:
         assert binom.cdf(hits, of, found.high) == pytest.approx(0.025)
+
+
+def test_outcomes_that_hang_together_give_a_wider_interval():
+    """Thirty cases of ten parameters that are all inside or all outside say what thirty parameters say."""
+    alone = clustered_rate([True] * 9 + [False] for _ in range(30))
+    assert alone == rate([True] * 270 + [False] * 30)
+    together = clustered_rate([index >= 3] * 10 for index in range(30))
+    few = rate([True] * 27 + [False] * 3)
+    assert (together.hits, together.of) == (270, 300)
+    assert (together.low, together.high) == pytest.approx((few.low, few.high), abs=0.01)
+    assert clustered_rate([[True] * 3, [], [True]]) == rate([True] * 4)
 
 
 def test_no_cases_say_nothing():
@@ -212,9 +251,11 @@ def test_the_summary_counts_what_a_person_would_count():
         "right_set_rate_above_twice_the_limit": (1, 1),
         "right_set_or_listed_confusion_rate": (1, 2),
         "right_verdict_rate": (4, 7),
-        "right_place_rate": (0, 0),
+        "right_place_rate": (1, 1),
         "coverage_1sd": (1, 2),
         "coverage_2sd": (1, 2),
+        "coverage_2sd_effects": (1, 2),
+        "coverage_2sd_recalibrated": (0, 0),
         "off_catalogue_misnamed_rate": (1, 2),
         "off_catalogue_noticed_rate": (1, 2),
         "law_given_rate": (0, 1),

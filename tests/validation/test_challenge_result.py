@@ -183,9 +183,10 @@ def test_each_way_to_be_wrong_has_its_name():
     assert [fault_of(scored(given, found)) for given, found, _ in told] == [fault for _, _, fault in told]
 
 
-def test_times_are_those_of_diagnoses_that_answered():
+def test_times_are_those_of_all_diagnoses_also_of_one_that_was_given_up():
     found = [scored(POWER, diagnosis("unexplained"), seconds=float(s)) for s in range(1, 12)]
-    assert times([*found, scored(POWER, None, seconds=1800.0)]) == (6.0, 10.0, 11.0)
+    assert times(found) == (6.0, 10.0, 11.0)
+    assert times([*found, scored(POWER, None, seconds=1800.0)]).longest == 1800.0
     assert np.isnan(times([]).median)
 
 
@@ -245,6 +246,17 @@ def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, blind,
     assert {f"images/{name}" in text for name in drawn_there} == {True}
     write_document()
     assert page.read_text() == text
+
+    # more cases without anything in them count for the false alarms, and only such cases
+    with start_run(tmp_path / "blank", 50) as run:
+        challenge(run, [Request(50, "spin_down", (), "nothing")], workers=1, command=blind)
+    monkeypatch.setattr(sys, "argv", ["document", *given[:1], "--blank", str(tmp_path / "blank"), *given[-2:]])
+    write_document()
+    (alarms,) = [line for line in page.read_text().splitlines() if line.startswith("| false alarms")]
+    assert "| 0 of 2 |" in alarms
+    monkeypatch.setattr(sys, "argv", ["document", *given[:1], "--blank", str(tmp_path / "plain"), *given[-2:]])
+    with pytest.raises(SystemExit):
+        write_document()
 
     # effects near their limit count in the curve: the same ones here, so there are twice as many
     near = tmp_path / "near" / "challenge.json"

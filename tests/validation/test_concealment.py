@@ -18,6 +18,7 @@ from discsim.sensors import Noise
 from validation.challenge.case import MASKS, Case, Coast, Turning
 from validation.challenge.cases import draw_case
 from validation.challenge.conceal import Answer, conceal, read_answer, recordings
+from validation.challenge.hiding import possible
 from validation.challenge.physics import OFF_CATALOGUE, coast, play
 from validation.challenge.sizes import HIDING, conceivable, draw_effect, scaled
 from validation.challenge.strength import sizes
@@ -199,6 +200,8 @@ def test_what_cannot_be_concealed_there_is_refused():
         draw_case(0, "rate_table", ["air.wind"])
     with pytest.raises(InputError, match="turbulence: cannot act on a spin_down"):
         draw_case(0, "spin_down", ["turbulence"])
+    with pytest.raises(InputError, match=r"air.gust and air.wind: cannot be told apart"):
+        draw_case(0, "flight", ["air.wind", "air.gust"])
 
 
 @pytest.mark.parametrize("mask", [mask for mask in MASKS if mask != "near_limit"])
@@ -208,6 +211,16 @@ def test_a_mask_makes_the_same_case_harder(mask):
         assert masked.plant == bare.plant
         assert masked.verdict == bare.verdict
         sensors = masked.instruments.sensors
+        fewer = mask in ("clipped", "magnetometer_only")  # what cannot show there is exchanged
+        here = [item.effect.id in possible(masked) for item in bare.concealed]
+        assert all(here) or fewer
+        if all(here):
+            ids = [item.effect.id for item in masked.concealed]
+            assert ids[: len(bare.concealed)] == [item.effect.id for item in bare.concealed] or mask == "second_effect"
+        if mask not in ("few_recordings", "short"):
+            assert repr(masked.runs) == repr(bare.runs)
+        else:
+            assert all(item.recording is None or item.recording < len(masked.runs) for item in masked.concealed)
         if mask == "few_recordings":
             assert len(masked.runs) == 2
         elif mask == "short":

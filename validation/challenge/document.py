@@ -4,7 +4,8 @@
 
 puts result, confusions, failures (each with the command that reproduces it) and figures of the challenge in the folder
 ``challenge`` into docs/challenge.md, and of each mask finished in ``challenge-masks`` a row into its table of masks;
-the detection curve counts the effects of the mask near_limit, too.
+the detection curve counts the effects of the mask near_limit, too. ``--blank DIR`` names challenges in which nothing is
+concealed: the share of false alarms counts them as well, since an upper bound of 3 % takes 122 such cases and more.
 Only what stands between the page's marks is replaced.
 """
 
@@ -25,7 +26,7 @@ from validation.challenge.detection import HALF_GOAL, Sized, detections, fit_cur
 from validation.challenge.masks import MASK_HEADER, mask_row, masked_results
 from validation.challenge.page import GOALS, NAMES, deviates_of, draw_all, fault_of, found_of, hidden_of, percent
 from validation.challenge.result import Result, Scored, rates_of, read_result, times
-from validation.challenge.scoring import confusion, has_power_law, rate
+from validation.challenge.scoring import NOTHING, confusion, has_power_law
 
 __all__ = ["masks_text", "result_text", "with_part"]
 
@@ -80,18 +81,23 @@ def made_by(result: Result) -> str:
     )
 
 
-def result_text(result: Result, figures: Sequence[str], near: Result | None = None) -> str:
+def result_text(
+    result: Result, figures: Sequence[str], near: Result | None = None, blank: Sequence[Result] = ()
+) -> str:
     """Return the page's part on a challenge; ``figures`` are the names of those that are drawn.
 
-    ``near`` is a challenge under the mask near_limit, whose effects count for the size at which half are named.
+    ``near`` is a challenge under the mask near_limit, whose effects count for the size at which half are named;
+    ``blank`` are challenges in which nothing is concealed, which count for the share of false alarms.
     """
     scored = result.scored
     right = sum(item.score.right for item in scored)
     parts = [
         f"{made_by(result)} {right} are answered rightly in verdict, effects and place. A diagnosis takes "
         f"{times(scored).text}, wall clock on the machine it ran on.",
-        _goals(scored, pooled(result, near)),
+        _goals(scored, pooled(result, near), [item for other in blank for item in other.scored]),
     ]
+    if blank:
+        parts.append("The share of false alarms counts as well " + " ".join(map(made_by, blank)))
     if near is not None:
         parts.append(
             "The size at which half are named, and the two figures, count the effects of a second challenge as well, "
@@ -113,8 +119,9 @@ def pooled(result: Result, near: Result | None) -> list[Sized]:
     return [*detections(result.scored), *(detections(near.scored) if near is not None else ())]
 
 
-def _goals(scored: Sequence[Scored], items: Sequence[Sized]) -> str:
-    rates = rates_of(scored)
+def _goals(scored: Sequence[Scored], items: Sequence[Sized], blank: Sequence[Scored]) -> str:
+    alarms = "false_alarm_rate"
+    rates = {**rates_of(scored), alarms: rates_of([*scored, *blank])[alarms]}
     rows = []
     for name, found in rates.items():
         goal = GOALS.get(name)
@@ -172,15 +179,18 @@ def _errors(scored: Sequence[Scored]) -> str:
     z = np.abs(deviates_of(scored))
     lines = []
     if z.size:
-        inside = [rate(bool(ok) for ok in z <= most) for most in (1.0, 2.0)]
+        rates = rates_of(scored)
         shares = " and ".join(
             f"{share} ({interval}) within {most}"
-            for most, (share, interval) in zip((1, 2), map(percent, inside), strict=True)
+            for most, (share, interval) in ((most, percent(rates[f"coverage_{most}sd"])) for most in (1, 2))
         )
+        unknown = sum(each.sd is None for item in scored for each in item.score.deviations)
         lines.append(
             f"Of {z.size} parameters {shares} of their own standard deviations; a normal distribution has 68.3 and "
-            f"95.4 %. {int(np.count_nonzero(z > 4))} are more than 4 off, the largest error is {z.max():.1f}."
+            f"95.4 %. {int(np.count_nonzero(z > 4))} are more than 4 off, the largest error is {z.max():.1f}. "
+            f"{unknown} more are given without a standard deviation: the recordings do not determine them."
         )
+    lines += _held_out(scored)
     rows = []
     for item in scored:
         found = item.score.exponent
@@ -195,6 +205,23 @@ def _errors(scored: Sequence[Scored]) -> str:
     if rows:
         lines.append(table(("seed", "plant", "exponent", "found", "sd", "error in sd"), rows))
     return "\n\n".join(lines)
+
+
+def _held_out(scored: Sequence[Scored]) -> list[str]:
+    """Return how recordings that took no part fit, by the baseline and with what was named, where that was right."""
+    pairs = [
+        (score.heldout_before, score.heldout_after)
+        for score in (item.score for item in scored if item.answer.effects and item.score.right_set)
+        if score.heldout_before is not None and score.heldout_after is not None
+    ]
+    if not pairs:
+        return []
+    before, after = np.quantile(pairs, (0.1, 0.5, 0.9), axis=0).T
+    told = [f"{middle:.3g} (eight in ten between {low:.3g} and {high:.3g})" for low, middle, high in (before, after)]
+    return [
+        f"Held-out recordings of the {len(pairs)} cases whose effects were named rightly have a chi2 per reading of "
+        f"{told[0]} by the baseline and of {told[1]} with the effects: medians."
+    ]
 
 
 def _failures(scored: Sequence[Scored]) -> str:
@@ -232,6 +259,16 @@ def masks_text(folders: Sequence[Path], plain: Result | None) -> str:
     return f"{lead}\n\n{table(('mask', *MASK_HEADER), rows)}\n\n{commands}"
 
 
+def _blank(folder: Path, plain: Result) -> Result:
+    """Read a challenge that may count for the false alarms of another one; raises `InputError` where it may not."""
+    result = read_result(folder)
+    if result.mask is not None or any(item.answer.kind not in NOTHING for item in result.scored):
+        raise InputError(f"{folder}: conceals something; expected a challenge of --kind {', '.join(NOTHING)}")
+    if {item.answer.seed for item in result.scored} & {item.answer.seed for item in plain.scored}:
+        raise InputError(f"{folder}: has seeds of the challenge itself; expected others")
+    return result
+
+
 def main() -> None:
     """Write results into the page from the command line."""
     parser = argparse.ArgumentParser(
@@ -241,6 +278,7 @@ def main() -> None:
     )
     parser.add_argument("out", type=Path, nargs="?", help="folder of a finished challenge without a mask")
     parser.add_argument("--masks", type=Path, nargs="+", default=[], help="folders of challenges with a mask")
+    parser.add_argument("--blank", type=Path, nargs="+", default=[], help="folders of challenges that conceal nothing")
     parser.add_argument("--page", type=Path, default=PAGE)
     given = parser.parse_args()
     if given.out is None and not given.masks:
@@ -251,9 +289,10 @@ def main() -> None:
         if plain is not None:
             if plain.mask is not None:
                 raise InputError(f"{given.out}: was made under the mask {plain.mask}; expected it under --masks")
+            blank = [_blank(folder, plain) for folder in given.blank]
             near = masked_results(given.masks).get("near_limit")
             drawn = draw_all(plain.scored, given.page.parent / "images", PREFIX, pooled(plain, near))
-            page = with_part(page, "result", result_text(plain, list(drawn), near))
+            page = with_part(page, "result", result_text(plain, list(drawn), near, blank))
         if given.masks:
             page = with_part(page, "masks", masks_text(given.masks, plain))
         write_text(given.page, page)

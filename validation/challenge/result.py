@@ -79,16 +79,26 @@ class Scored:
             recordings=None if only == "all" else tuple(only),
             **told,
         )
-        return cls(
+        return cls.opened(
             answer,
             entry["diagnosis"],
-            score_case(answer, entry["diagnosis"]),
-            entry["error"],
-            entry["seconds"],
-            entry["recordings_sha256"],
-            entry["sizes_over_limit"],
-            entry["reproduce"],
+            error=entry["error"],
+            seconds=entry["seconds"],
+            recordings_sha256=entry["recordings_sha256"],
+            sizes=entry["sizes_over_limit"],
+            reproduce=entry["reproduce"],
         )
+
+    @classmethod
+    def opened(cls, answer: Answer, diagnosis: dict[str, Any] | None, *, error: str | None, **told: Any) -> Scored:
+        """Return the scored case; a diagnosis that breaks its contract is no answer, and the ``error`` says why.
+
+        ``told`` are the other fields.
+        """
+        try:
+            return cls(answer, diagnosis, score_case(answer, diagnosis), error, **told)
+        except InputError as fault:
+            return cls(answer, None, score_case(answer, None), str(fault), **told)
 
 
 class Times(NamedTuple):
@@ -109,8 +119,8 @@ class Times(NamedTuple):
 
 
 def times(scored: Sequence[Scored]) -> Times:
-    """Return how long the diagnoses that gave an answer took; NaN where none did."""
-    seconds = [item.seconds for item in scored if item.diagnosis is not None]
+    """Return how long the diagnoses took, with an answer or without; NaN of none."""
+    seconds = [item.seconds for item in scored]
     if not seconds:
         return Times(float("nan"), float("nan"), float("nan"))
     return Times(*(float(np.quantile(seconds, share)) for share in (0.5, 0.9, 1.0)))

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import discsim
+from discsim.files import digest, model_file, model_names
 from validation.challenge.blind import DIAGNOSE, Request, diagnose_blind, open_answers, seal_answers
 from validation.challenge.detection import detections, fit_curve
 from validation.challenge.page import write_page
 from validation.challenge.result import RESULT, Scored, rates_of, times
-from validation.challenge.scoring import score_case
 from validation.challenge.strength import sizes
 from validation.run import Run, package_version
 from validation.sweeps.execution import Task, claim, discard, run_tasks
@@ -45,7 +44,8 @@ def challenge(
     if anew:
         discard(folder)
         (run.out / "sealed.json").unlink(missing_ok=True)
-    versions = {"discsim": package_version(), "numpy": np.__version__, "code": code_digest()}
+    others = {name: version(name) for name in ("mujoco", "numba", "numpy", "scipy")}
+    versions = {"discsim": package_version(), **others, "code": code_digest()}
     claim(folder, {"cases": [list(request) for request in requests], "command": command, "versions": versions})
     seal_answers(requests, run.out)
     run.step(f"{len(requests)} answers are sealed; their digests stand in {run.out / 'sealed.json'}")
@@ -71,16 +71,7 @@ def challenge(
         progress=lambda items, total: run.progress(items, total, "limit"),
     )
     scored = [
-        Scored(
-            answer,
-            result["diagnosis"],
-            score_case(answer, result["diagnosis"]),
-            result["error"],
-            result["seconds"],
-            result["recordings_sha256"],
-            limit["sizes"],
-            request.command,
-        )
+        Scored.opened(answer, **result, sizes=limit["sizes"], reproduce=request.command)
         for request, answer, result, limit in zip(
             requests, open_answers(requests, run.out), results, limits, strict=True
         )
@@ -105,7 +96,7 @@ def challenge(
 
 
 def code_digest() -> str:
-    """Return the SHA-256 of simulation, diagnosis and concealment: a result of other code is no result of it."""
+    """Return the SHA-256 of simulation, diagnosis, concealment and discs: a result of other code is no result of it."""
     total = hashlib.sha256()
     here = Path(__file__).parents[1]
     for folder in (Path(discsim.__file__).parent, here / "diagnosis", here / "challenge"):
@@ -113,6 +104,10 @@ def code_digest() -> str:
             if folder.name == "challenge" and file.name in _AFTERWARDS:
                 continue
             total.update(str(file.relative_to(folder)).encode() + b"\0" + file.read_bytes() + b"\0")
+    for file in (here / "throws.py", here / "commands" / "diagnose.py"):
+        total.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
+    for name in model_names("discs"):
+        total.update(digest(model_file(f"discs/{name}.toml")).encode())
     return total.hexdigest()
 
 

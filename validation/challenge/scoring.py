@@ -19,12 +19,25 @@ from discsim.effects.catalogue import CATALOGUE, row
 from discsim.errors import InputError
 from validation.challenge.conceal import Answer
 
-__all__ = ["NOTHING", "CaseScore", "Deviation", "Rate", "confusion", "has_power_law", "rate", "score_case", "summary"]
+__all__ = [
+    "NOTHING",
+    "CaseScore",
+    "Deviation",
+    "Rate",
+    "clustered_rate",
+    "confusion",
+    "has_power_law",
+    "rate",
+    "score_case",
+    "summary",
+]
 
 #: an event is in the right place within this, s (docs/diagnosis contract)
 INSTANT_S = 0.1
 #: kinds of case in which the baseline, with what it states, explains the recordings
 NOTHING = ("nothing", "noise", "within_sigma", "beyond_sigma")
+#: what stands for an effect where a stated number was moved
+RECALIBRATED = "recalibrated"
 #: the verdicts that claim that something is missing
 _ALARMS = ("explained", "unexplained")
 #: keys under which a rig's friction may stand in ``recalibrated``
@@ -45,9 +58,7 @@ class Deviation(NamedTuple):
     @property
     def in_sd(self) -> float | None:
         """The error in standard deviations; None where the data do not determine the parameter."""
-        if self.sd is None or self.sd <= 0:
-            return None
-        return (self.value - self.true) / self.sd
+        return None if self.sd is None else (self.value - self.true) / self.sd
 
     def to_json(self) -> dict[str, Any]:
         """Return what ``challenge.json`` keeps of it."""
@@ -58,10 +69,10 @@ class Deviation(NamedTuple):
 class CaseScore:
     """How one diagnosis compares with its answer.
 
-    ``right_place`` is None where nothing was concealed that has a place (an event, a sensor). ``named`` are the ids
-    that the diagnosis names; ``within_confusion`` tells that each concealed effect is named or listed as
-    indistinguishable from one that is, and nothing else is named. ``law_given`` tells that the diagnosis has a law,
-    ``exponent`` how its power of the spin rate compares with the concealed one, where there is one.
+    ``right_place`` is None where no effect was concealed. ``named`` are the ids that the diagnosis names, each once;
+    ``right_set`` tells that each concealed effect is named once and nothing else is; ``within_confusion`` that each is
+    named or listed as indistinguishable from one that is, and nothing else is named. ``law_given`` tells that the
+    diagnosis has a law, ``exponent`` how its power of the spin rate compares with the concealed one, if there is one.
     """
 
     named: tuple[str, ...]
@@ -103,13 +114,17 @@ def score_case(answer: Answer, diagnosis: Mapping[str, Any] | None) -> CaseScore
         fit = diagnosis["fit"]
         before, after = (fit[stage]["heldout_chi2_per_sample"] for stage in ("baseline", "final"))
         hidden = set(answer.effects)
+        deviations = tuple(_deviations(answer, effects, diagnosis["recalibrated"]))
+        if surely := [item.name for item in deviations if item.sd is not None and not item.sd > 0.0]:
+            raise ValueError(f"sd of {surely[0]} is not positive")
         return CaseScore(
             named=named,
             right_verdict=found in answer.verdict.split("|"),
-            right_set=set(named) == hidden and (bool(hidden) or found not in _ALARMS or answer.verdict == found),
+            right_set=sorted(effect["id"] for effect in effects) == sorted(hidden)
+            and (bool(hidden) or found not in _ALARMS or answer.verdict == found),
             within_confusion=_within_confusion(hidden, effects),
             right_place=_right_place(answer, effects, diagnosis["located"]),
-            deviations=tuple(_deviations(answer, effects, diagnosis["recalibrated"])),
+            deviations=deviations,
             heldout_before=before,
             heldout_after=after,
             law_given=diagnosis["law"] is not None,
@@ -139,15 +154,22 @@ def _within_confusion(hidden: set[str], effects: Sequence[Mapping[str, Any]]) ->
 def _right_place(
     answer: Answer, effects: Sequence[Mapping[str, Any]], located: Sequence[Mapping[str, Any]]
 ) -> bool | None:
-    """Tell whether events are named in their recording at their instant, and faults of sensors located at them."""
-    verdicts = []
+    """Tell whether effects are named where they are; None where none is concealed.
+
+    An event in its recording at its instant, anything else in all recordings, a sensor's fault at that sensor.
+    """
+    if not answer.effects:
+        return None
     for id in answer.effects:
         kind = row(id)
-        if kind.event:
-            verdicts.append(any(effect["id"] == id and _at_instant(answer, effect) for effect in effects))
-        elif kind.acts_on not in ("motion", "clock"):
-            verdicts.append(any(place["sensor"] in ("all", kind.acts_on) for place in located))
-    return all(verdicts) if verdicts else None
+        entries = [effect for effect in effects if effect["id"] == id]
+        if kind.event and not any(_at_instant(answer, effect) for effect in entries):
+            return False
+        if not kind.event and not any(effect["recordings"] == "all" for effect in entries):
+            return False
+        if kind.acts_on not in ("motion", "clock") and not any(place["sensor"] == kind.acts_on for place in located):
+            return False
+    return True
 
 
 def _at_instant(answer: Answer, effect: Mapping[str, Any]) -> bool:
@@ -176,7 +198,7 @@ def _deviations(
     for name, true in answer.moved.items():
         for key in _RIG_KEYS.get(name, (name,)):
             if key in recalibrated:
-                yield Deviation("recalibrated", name, true, recalibrated[key]["value"], recalibrated[key]["sd"])
+                yield Deviation(RECALIBRATED, name, true, recalibrated[key]["value"], recalibrated[key]["sd"])
 
 
 def has_power_law(answer: Answer) -> bool:
@@ -247,6 +269,26 @@ def rate(outcomes: Iterable[bool]) -> Rate:
     return Rate(count, of, low, high)
 
 
+def clustered_rate(groups: Iterable[Sequence[bool]]) -> Rate:
+    """Return the share of true outcomes among those of all groups, whose outcomes depend on each other within a group.
+
+    The interval is Clopper and Pearson's of as many independent outcomes as give the scatter between groups (Korn and
+    Graubard, Survey Methodology 24, 1998, p. 193); it is never narrower than that of independent ones.
+    """
+    lists = [list(group) for group in groups if len(group)]
+    plain = rate(outcome for group in lists for outcome in group)
+    if len(lists) < 2 or plain.hits in (0, plain.of):
+        return plain
+    share = plain.value
+    apart = np.array([sum(group) - share * len(group) for group in lists])
+    scatter = len(lists) / (len(lists) - 1) * float(np.sum(apart**2)) / plain.of**2
+    independent = min(share * (1.0 - share) / scatter, plain.of) if scatter > 0 else plain.of
+    hits = share * independent
+    low = float(beta.ppf(0.025, hits, independent - hits + 1.0))
+    high = float(beta.ppf(0.975, hits + 1.0, independent - hits))
+    return Rate(plain.hits, plain.of, low, high)
+
+
 def summary(
     scored: Sequence[tuple[Answer, Mapping[str, Any] | None, CaseScore]], strengths: Sequence[float | None] = ()
 ) -> dict[str, Rate]:
@@ -254,7 +296,7 @@ def summary(
 
     ``strengths`` (where given) holds each case's smallest concealed size in units of its detection limit: the rate of
     right sets is also told for the cases above twice that. A diagnosis that crashed is never right, and no false
-    alarm. Parameters of one case are not independent, so intervals of the coverage are a little too narrow.
+    alarm. Parameters of one case depend on each other; the intervals of the coverage allow for it.
     """
     strengths = list(strengths) or [None] * len(scored)
     blank = [(d, s) for a, d, s in scored if a.kind in NOTHING]
@@ -263,9 +305,11 @@ def summary(
         s for (a, _, s), size in zip(scored, strengths, strict=True) if a.effects and size is not None and size >= 2.0
     ]
     unknown = [(d, s) for a, d, s in scored if a.kind == "off_catalogue"]
-    deviates = [z for _, _, s in scored for item in s.deviations if (z := item.in_sd) is not None]
+    errors = [[(d.effect, abs(z)) for d in s.deviations if (z := d.in_sd) is not None] for _, _, s in scored]
+    stated = [[z for effect, z in group if effect == RECALIBRATED] for group in errors]
+    of_effects = [[z for effect, z in group if effect != RECALIBRATED] for group in errors]
     exponents = [z for _, _, s in scored if s.exponent is not None and (z := s.exponent.in_sd) is not None]
-    placed = [s.right_place for _, _, s in scored if s.right_place is not None]
+    placed = [s.right_place for s in hidden if s.right_set]
     gained = [
         s.heldout_after < s.heldout_before
         for s in hidden
@@ -278,8 +322,10 @@ def summary(
         "right_set_or_listed_confusion_rate": rate(s.within_confusion for s in hidden),
         "right_verdict_rate": rate(s.right_verdict for _, _, s in scored),
         "right_place_rate": rate(bool(place) for place in placed),
-        "coverage_1sd": rate(abs(z) <= 1.0 for z in deviates),
-        "coverage_2sd": rate(abs(z) <= 2.0 for z in deviates),
+        "coverage_1sd": clustered_rate([z <= 1.0 for _, z in group] for group in errors),
+        "coverage_2sd": clustered_rate([z <= 2.0 for _, z in group] for group in errors),
+        "coverage_2sd_effects": clustered_rate([z <= 2.0 for z in group] for group in of_effects),
+        "coverage_2sd_recalibrated": clustered_rate([z <= 2.0 for z in group] for group in stated),
         "off_catalogue_misnamed_rate": rate(d is not None and d["verdict"] == "explained" for d, _ in unknown),
         "off_catalogue_noticed_rate": rate(d is not None and d["verdict"] == "unexplained" for d, _ in unknown),
         "law_given_rate": rate(s.law_given for d, s in unknown if d is not None and d["verdict"] == "unexplained"),

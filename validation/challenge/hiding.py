@@ -1,0 +1,94 @@
+"""What is concealed in a case: effects of the catalogue, or physics that is in none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discsim.effects.catalogue import row
+from discsim.errors import InputError
+from validation.challenge.case import Case, Concealed
+from validation.challenge.physics import OFF_CATALOGUE, OffCatalogue
+from validation.challenge.sizes import conceivable, draw_effect
+
+__all__ = ["can_act", "choose", "choose_secret", "hide", "possible"]
+
+
+def hide(case: Case, effects: Sequence[str], rng: np.random.Generator) -> Case:
+    """Choose and size what is concealed: ``effects`` where given.
+
+    Raises `InputError` where they cannot act on the plant, or not both at once.
+    """
+    if case.kind == "off_catalogue":
+        return replace(case, secret=choose_secret(case, rng, *effects))
+    if case.kind not in ("one", "two"):
+        return case
+    for number, id in enumerate(effects):
+        if case.plant not in row(id).plants:
+            raise InputError(f"{id}: acts on {', '.join(row(id).plants)}; this is a {case.plant}")
+        for other in effects[:number]:
+            if not _goes_with(id, other):
+                raise InputError(f"{id} and {other}: cannot be told apart in one answer; expected another pair")
+    concealed: list[Concealed] = []
+    for number in range(max(len(effects), 2 if case.kind == "two" else 1)):
+        asked = effects[number] if number < len(effects) else None
+        concealed.append(choose(case, rng, concealed, asked))
+    return replace(case, concealed=tuple(concealed))
+
+
+def choose(
+    case: Case, rng: np.random.Generator, beside: Sequence[Concealed], id: str | None = None, *, largest: bool = False
+) -> Concealed:
+    """Draw one effect that goes with those ``beside`` it (or take the one of ``id``), its size or its ``largest``."""
+    if id is None:
+        others = [item.effect.id for item in beside]
+        id = str(rng.choice([id for id in possible(case) if all(_goes_with(id, other) for other in others)]))
+    only = int(rng.integers(len(case.runs))) if row(id).event else None
+    return Concealed(draw_effect(id, case.plant, rng, case.recorded, largest=largest), only)
+
+
+def choose_secret(case: Case, rng: np.random.Generator, name: str | None = None) -> OffCatalogue:
+    """Draw physics of no catalogue that can act on the case (of a ``name`` where given)."""
+    sensors = tuple(case.instruments.sensors)
+    names = [name for name, kind in OFF_CATALOGUE.items() if case.plant in kind.plants and _present(name, sensors)]
+    name = name or str(rng.choice(names))
+    if name not in names:
+        raise InputError(f"{name}: cannot act on a {case.plant}; expected one of {', '.join(names)}")
+    secret = OFF_CATALOGUE[name].drawn(case.plant, rng)
+    while getattr(secret, "sensor", sensors[0]) not in sensors:
+        secret = OFF_CATALOGUE[name].drawn(case.plant, rng)
+    return secret
+
+
+def can_act(secret: OffCatalogue, case: Case) -> bool:
+    """Tell whether the sensor that a secret acts on, if any, is on board."""
+    sensors = tuple(case.instruments.sensors)
+    name = next(name for name, kind in OFF_CATALOGUE.items() if isinstance(secret, kind))
+    return _present(name, sensors) and getattr(secret, "sensor", sensors[0]) in sensors
+
+
+def possible(case: Case) -> list[str]:
+    """Return the ids of the catalogue that can act, and show, in a case."""
+    ids = conceivable(case.plant, tuple(case.instruments.sensors))
+    accelerometer = case.instruments.sensors.get("accelerometer")
+    if accelerometer is not None and accelerometer.range < 100.0:  # type: ignore[union-attr]
+        ids.remove("accel.saturation")  # it clips by its sheet before it could by a fault
+    return ids
+
+
+def _present(name: str, sensors: tuple[str, ...]) -> bool:
+    needed = {"rotating_magnet": ("magnetometer",), "sensor_hysteresis": ("accelerometer",)}
+    if name == "warming":
+        return "accelerometer" in sensors or "gyroscope" in sensors
+    return all(sensor in sensors for sensor in needed.get(name, ()))
+
+
+def _goes_with(id: str, other: str) -> bool:
+    """Tell whether two effects can be told apart when both are there, and have no parameter's name in common."""
+    a, b = row(id), row(other)
+    if id == other or set(a.parameters) & set(b.parameters) or (a.event and b.event):
+        return False
+    clocks = [item for item in (id, other) if "clock" in item or item.endswith(("lag", "latency", "dropped_samples"))]
+    return len(clocks) < 2
