@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
@@ -17,7 +18,7 @@ import numpy as np
 from discsim.errors import InputError
 from discsim.files import digest, write_text
 
-__all__ = ["Run", "package_version", "start_run"]
+__all__ = ["Run", "package_version", "source_digest", "start_run"]
 
 T = TypeVar("T")
 
@@ -28,6 +29,17 @@ def package_version() -> str:
         return version("discsim")
     except PackageNotFoundError:
         return "unknown"
+
+
+def source_digest(*places: Path, without: Container[Path] = ()) -> str:
+    """Return the SHA-256 of Python files and of those in folders, with their names; some may be left out."""
+    total = hashlib.sha256()
+    for place in places:
+        files = sorted(place.rglob("*.py")) if place.is_dir() else [place]
+        for file in files:
+            if file not in without:
+                total.update(str(file.relative_to(place.parent)).encode() + b"\0" + file.read_bytes() + b"\0")
+    return total.hexdigest()
 
 
 def json_text(content: Any) -> str:

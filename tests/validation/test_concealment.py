@@ -22,6 +22,7 @@ from validation.challenge.hiding import possible
 from validation.challenge.physics import OFF_CATALOGUE, coast, play
 from validation.challenge.sizes import HIDING, conceivable, draw_effect, scaled
 from validation.challenge.strength import sizes
+from validation.concealed import FULL_CASES, QUICK_CASES
 
 #: which plant each effect is tried on here: the first of its own
 TRIED = [(id, row.plants[0]) for id, row in CATALOGUE.items()]
@@ -316,3 +317,9 @@ def test_a_play_follows_late_both_ways():
     assert y[49] == pytest.approx(4.0)
     assert y[-1] == pytest.approx(1.0)
     assert np.all(np.abs(x - y) <= 1.0 + 1e-12)
+
+
+def test_a_validation_looks_at_one_concealed_case_of_each_verdict():
+    verdicts = [request.draw().verdict for request in FULL_CASES]
+    assert sorted(verdicts) == ["consistent", "explained", "recalibrated", "unexplained"]
+    assert {"consistent", "explained"} <= {request.draw().verdict for request in QUICK_CASES}

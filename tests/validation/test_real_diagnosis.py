@@ -195,8 +195,11 @@ def test_a_throw_flown_in_its_own_world_comes_down_at_its_tracks_end():
 def test_a_cause_that_all_throws_share_is_found_by_the_plain_fit_and_lands_the_throw_left_out():
     throws = {name: thrown(name, DRAG, -0.2) for name in ("throw1", "throw6")}
     other = thrown("throw15", DRAG, -0.2)
-    none, found = fit_cause(NONE, throws), fit_cause(DRAG, throws)
+    none = fit_cause(NONE, throws)
+    found = fit_cause(DRAG, throws, none)
     assert found.merit < none.merit
+    # from what is stated the same place is found
+    assert fit_cause(DRAG, throws).x == pytest.approx(found.x, rel=0.02)
     assert abs(found.x + 0.2) < 2.0 * found.sd
     assert max(found.rms.values()) < 0.2
     stated = flown(other.recording, Model(AIR, DISC))
@@ -207,6 +210,16 @@ def test_a_cause_that_all_throws_share_is_found_by_the_plain_fit_and_lands_the_t
     assert disc.aero_table is not None
     assert DISC.aero_table is not None
     assert_allclose(disc.aero_table.CD, DISC.aero_table.CD * (1.0 + found.x))
+
+
+def test_no_cause_makes_a_fit_worse():
+    """It may always stay at nothing, and the fit goes on from there."""
+    throws = {name: thrown(name, DRAG, -0.2) for name in ("throw1", "throw6")}
+    none = fit_cause(NONE, throws)
+    for cause in CAUSES[1:]:
+        found = fit_cause(cause, throws, none)
+        assert found.merit <= none.merit + 1e-3, cause.name
+        assert abs(found.x) <= cause.most
 
 
 def test_the_inputs_of_a_throw_as_stated_are_its_stated_release():

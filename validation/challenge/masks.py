@@ -19,7 +19,7 @@ __all__ = ["MASK_HEADER", "challenge_masks", "mask_row", "masked_results"]
 MASK_HEADER = (
     "cases",
     "right verdict",
-    "right set above twice the limit",
+    "right set, all sizes",
     "false alarms",
     "misnamed",
     "no answer",
@@ -27,7 +27,7 @@ MASK_HEADER = (
 )
 _RATES = (
     "right_verdict_rate",
-    "right_set_rate_above_twice_the_limit",
+    "right_set_rate",
     "false_alarm_rate",
     "off_catalogue_misnamed_rate",
     "crash_rate",
@@ -64,7 +64,7 @@ def write_masks_page(out: Path, results: Mapping[Mask | None, Sequence[Scored]])
     """Write ``report.html`` with a row for each mask into ``out``."""
     rows = [(mask or "none", MASKS[mask] if mask else "", *mask_row(scored)) for mask, scored in results.items()]
     text = (
-        "The same seeds under each mask; each has a report of its own in its folder. Intervals are Clopper and "
+        "The same cases under each mask; each has a report of its own in its folder. Intervals are Clopper and "
         "Pearson's, of 95 %. Time is the median of a diagnosis."
     )
     section = Section("Masks", (text,), ("mask", "what", *MASK_HEADER), rows)

@@ -15,7 +15,7 @@ from validation.challenge.detection import detections, fit_curve
 from validation.challenge.page import write_page
 from validation.challenge.result import RESULT, Scored, rates_of, times
 from validation.challenge.strength import sizes
-from validation.run import Run, package_version
+from validation.run import Run, package_version, source_digest
 from validation.sweeps.execution import Task, claim, discard, run_tasks
 
 __all__ = ["challenge", "limit_of"]
@@ -97,18 +97,12 @@ def challenge(
 
 def code_digest() -> str:
     """Return the SHA-256 of simulation, diagnosis, concealment and discs: a result of other code is no result of it."""
-    total = hashlib.sha256()
     here = Path(__file__).parents[1]
-    for folder in (Path(discsim.__file__).parent, here / "diagnosis", here / "challenge"):
-        for file in sorted(folder.rglob("*.py")):
-            if folder.name == "challenge" and file.name in _AFTERWARDS:
-                continue
-            total.update(str(file.relative_to(folder)).encode() + b"\0" + file.read_bytes() + b"\0")
-    for file in (here / "throws.py", here / "commands" / "diagnose.py"):
-        total.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
-    for name in model_names("discs"):
-        total.update(digest(model_file(f"discs/{name}.toml")).encode())
-    return total.hexdigest()
+    afterwards = {here / "challenge" / name for name in _AFTERWARDS}
+    folders = (Path(discsim.__file__).parent, here / "diagnosis", here / "challenge")
+    code = source_digest(*folders, here / "throws.py", here / "commands" / "diagnose.py", without=afterwards)
+    discs = [digest(model_file(f"discs/{name}.toml")) for name in model_names("discs")]
+    return hashlib.sha256("".join((code, *discs)).encode()).hexdigest()
 
 
 def limit_of(request: tuple[Any, ...], shared: Any) -> dict[str, dict[str, float]]:

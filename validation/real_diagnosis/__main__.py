@@ -27,11 +27,11 @@ def command(
     ),
     work: Annotated[
         Path,
-        typer.Option(help="Folder of the diagnoses. One that is there already is taken as it is: empty it to redo."),
+        typer.Option(help="Folder of the diagnoses. One of the same recordings, seed and code is taken as it is."),
     ] = Path("real-diagnosis"),
     seed: Annotated[int, typer.Option(min=0, help="Seed of the diagnoses.")] = 0,
 ) -> None:
-    """Diagnose measured recordings, all and all but one, and write a page with tables and figures.
+    """Diagnose measured recordings and write a page with tables and figures.
 
     Example: python -m validation.real_diagnosis --work real-diagnosis
     """

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from discsim.arrays import FloatArray
 from discsim.disc import Disc
@@ -23,7 +24,7 @@ from validation.golf_throws.prediction import drawn
 from validation.importing.throw import MeasuredThrow
 from validation.real_diagnosis.golf_flight import Flown, flown
 
-__all__ = ["CAUSES", "NONE", "Cause", "CauseFit", "CauseHeldOut", "Throw", "fit_cause", "held_out"]
+__all__ = ["CAUSES", "NONE", "Cause", "CauseFit", "CauseHeldOut", "Throw", "fit_cause", "held_out", "without_cause"]
 
 #: what is left to what no cause here describes, m, and between what times it is taken to be independent, s
 LEFT, APART = 0.5, 0.2
@@ -33,19 +34,20 @@ GROUND = 0.5
 OWN, WIND = 9, 3
 #: difference of an input, in its sigmas
 DIFFERENCE = 0.02
-ITERATIONS = 20
+ITERATIONS = 60
 
 
 @dataclass(frozen=True)
 class Cause:
     """A change of the model by one number x: ``apply`` returns the disc and the effects that go with it.
 
-    ``step`` is the size by which it is tried, zero for a cause that is not fitted.
+    ``step`` is the size by which it is tried, zero for a cause that is not fitted; beyond ``most`` it makes no sense.
     """
 
     name: str
     step: float
     apply: Callable[[Disc, float], tuple[Disc, tuple[Effect, ...]]]
+    most: float = np.inf
 
 
 def _of_table(
@@ -75,7 +77,7 @@ CAUSES: Sequence[Cause] = (
     Cause("aero.spin_drag, CDrr", 0.002, _of_catalogue("aero.spin_drag", "CDrr")),
     Cause("aero.spin_side_force, CYr", 0.002, _of_catalogue("aero.spin_side_force", "CYr")),
     Cause("aero.spin_pitching_moment, CMr", 0.0002, _of_catalogue("aero.spin_pitching_moment", "CMr")),
-    Cause("air.ground_effect, k", 0.05, _of_catalogue("air.ground_effect", "k")),
+    Cause("air.ground_effect, k", 0.05, _of_catalogue("air.ground_effect", "k"), 2.0),
 )  # fmt: skip
 
 
@@ -116,6 +118,8 @@ class CauseFit:
         Move of the wind in its sigmas.
     model : Model
         Disc, wind and cause as fitted.
+    inputs : (p,) array
+        Moves of all that is stated, in sigmas: the releases of the throws in turn, then the wind.
     """
 
     cause: Cause
@@ -127,41 +131,46 @@ class CauseFit:
     moves: Mapping[str, float]
     wind: FloatArray
     model: Model
+    inputs: FloatArray
 
 
-def fit_cause(cause: Cause, throws: Mapping[str, Throw]) -> CauseFit:
-    """Fit one cause, the releases and the wind to throws: least squares, stated uncertainties as priors."""
+def fit_cause(cause: Cause, throws: Mapping[str, Throw], start: CauseFit | None = None) -> CauseFit:
+    """Fit one cause, the releases and the wind to throws: least squares, stated uncertainties as priors.
+
+    The fit goes on from the releases and the wind of ``start``, a fit of the same throws; else from what is stated.
+    """
     names = list(throws)
-    free = int(cause.step > 0.0)
-    count = OWN * len(names) + WIND + free
-    u = np.zeros(count)  # inputs and wind in sigmas, the cause in steps
-    merit = np.inf
-    covariance: FloatArray = np.zeros((count, count))
-    share, before = 1.0, u
-    for _ in range(ITERATIONS):
-        e, J = _linearised(cause, throws, u)
-        prior = np.append(np.ones(count - free), np.zeros(free))
-        now = float(e @ e + u @ (prior * u))
-        if not now < merit:  # too far, or lost: half of the way
-            share *= 0.5
-            if share < 0.1:
-                u = before
-                break
-            u = before + share * (u - before)
-            continue
-        if merit - now < 1e-3 * now:
-            merit = now
-            break
-        H = J.T @ J + np.diag(prior)
-        covariance = np.asarray(np.linalg.inv(H), dtype=np.float64)
-        merit, before, share = now, u, 1.0
-        u = u + covariance @ (J.T @ e - prior * u)
+    free, stated = int(cause.step > 0.0), OWN * len(throws) + WIND
+    prior = np.eye(stated, stated + free)
+    last: dict[bytes, tuple[FloatArray, FloatArray]] = {}
+
+    def both(u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return residuals and derivatives, those of what is stated last; kept, for they are asked for in turn."""
+        key = u.tobytes()
+        if key not in last:
+            last.clear()
+            e, J = _linearised(cause, throws, u)
+            last[key] = np.append(-e, prior @ u), np.vstack((J, prior))
+        return last[key]
+
+    def residuals(u: FloatArray) -> FloatArray:
+        return both(u)[0]
+
+    def derivatives(u: FloatArray) -> FloatArray:
+        return both(u)[1]
+
+    reach = np.append(np.full(stated, np.inf), np.full(free, cause.most / (cause.step or 1.0)))
+    begin = np.zeros(reach.size) if start is None else np.append(start.inputs, np.zeros(free))
+    solved = least_squares(residuals, begin, derivatives, bounds=(-reach, reach), ftol=1e-6, max_nfev=ITERATIONS)
+    u, merit = solved.x, 2.0 * float(solved.cost)
+    J = derivatives(u)
+    covariance = np.linalg.inv(J.T @ J)
     paths, rms = {}, {}
     for k, (name, throw) in enumerate(throws.items()):
-        path = paths[name] = _positions(cause, throw, _inputs(u, k)[None], _size(cause, u))[0]
+        path = paths[name] = _positions(cause, throw, _inputs(u, k, free)[None], _size(cause, u))[0]
         apart = (path - throw.recording.need("track").value[throw.kept])[:, :2]
         rms[name] = float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
-    moves = {name: float(np.max(np.abs(_inputs(u, k)[:OWN]))) for k, name in enumerate(names)}
+    moves = {name: float(np.max(np.abs(_inputs(u, k, free)[:OWN]))) for k, name in enumerate(names)}
     wind = u[OWN * len(names) : OWN * len(names) + WIND]
     first = throws[names[0]].recording
     assert first.disc is not None
@@ -170,7 +179,7 @@ def fit_cause(cause: Cause, throws: Mapping[str, Throw]) -> CauseFit:
     environment = replace(first.environment, wind=first.environment.wind + sigma * wind)
     sd = cause.step * float(np.sqrt(covariance[-1, -1])) if free else 0.0
     model = Model(environment, disc, effects=tuple(ModelEffect(one) for one in effects))
-    return CauseFit(cause, _size(cause, u), sd, merit, paths, rms, moves, wind, model)
+    return CauseFit(cause, _size(cause, u), sd, merit, paths, rms, moves, wind, model, u[:stated])
 
 
 def known(found: CauseFit) -> Cause:
@@ -192,29 +201,34 @@ class CauseHeldOut:
     gains: Mapping[str, float]
 
 
-def held_out(cause: Cause, throws: Mapping[str, Throw]) -> CauseHeldOut:
-    """Fit a cause to all throws, and to all but each; fly the one left out from its stated release."""
-    others = {name: fit_cause(cause, {k: one for k, one in throws.items() if k != name}) for name in throws}
-    alone = {name: {name: throw} for name, throw in throws.items()}
-    return CauseHeldOut(
-        fit_cause(cause, throws),
-        others,
-        {name: flown(throw.recording, others[name].model) for name, throw in throws.items()},
-        {
-            name: fit_cause(NONE, alone[name]).merit - fit_cause(known(others[name]), alone[name]).merit
-            for name in throws
-        },
-    )
+def held_out(cause: Cause, throws: Mapping[str, Throw], plain: Mapping[tuple[str, ...], CauseFit]) -> CauseHeldOut:
+    """Fit a cause to all throws, and to all but each; fly the one left out from its stated release.
+
+    ``plain`` are the fits `without_cause`, from which these go on.
+    """
+    rest = {name: {k: one for k, one in throws.items() if k != name} for name in throws}
+    others = {name: fit_cause(cause, rest[name], plain[tuple(rest[name])]) for name in throws}
+    gains = {}
+    for name, throw in throws.items():
+        itself = plain[name,]
+        gains[name] = itself.merit - fit_cause(known(others[name]), {name: throw}, itself).merit
+    landings = {name: flown(throw.recording, others[name].model) for name, throw in throws.items()}
+    return CauseHeldOut(fit_cause(cause, throws, plain[tuple(throws)]), others, landings, gains)
+
+
+def without_cause(throws: Mapping[str, Throw]) -> dict[tuple[str, ...], CauseFit]:
+    """Fit releases and wind alone, with no cause, to all throws, to all but each and to each, by their names."""
+    sets = [tuple(throws), *(tuple(k for k in throws if k != name) for name in throws), *((name,) for name in throws)]
+    return {names: fit_cause(NONE, {name: throws[name] for name in names}) for names in sets}
 
 
 def _size(cause: Cause, u: FloatArray) -> float:
     return cause.step * float(u[-1]) if cause.step else 0.0
 
 
-def _inputs(u: FloatArray, throw: int) -> FloatArray:
-    """Return the inputs (12,) of a throw in sigmas, the shared wind last."""
+def _inputs(u: FloatArray, throw: int, free: int) -> FloatArray:
+    """Return the inputs (12,) of a throw in sigmas, the shared wind last; behind it ``free`` sizes of a cause."""
     own = u[OWN * throw : OWN * (throw + 1)]
-    free = u.size % OWN - WIND
     return np.concatenate((own, u[u.size - free - WIND : u.size - free]))
 
 
@@ -226,7 +240,7 @@ def _linearised(cause: Cause, throws: Mapping[str, Throw], u: FloatArray) -> tup
     """Return residuals (m,) in sigmas, and the derivatives (m, p) of what the model says."""
     residuals, rows = [], []
     for k, throw in enumerate(throws.values()):
-        z = _inputs(u, k)
+        z = _inputs(u, k, int(cause.step > 0.0))
         moved = np.vstack((z, z + DIFFERENCE * np.eye(OWN + WIND)))
         x = _size(cause, u)
         said = _positions(cause, throw, moved, x)

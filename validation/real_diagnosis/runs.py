@@ -8,13 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import discsim
+from discsim.files import digest, write_text
 from discsim.model_file import Model, read_model
 from discsim.recording import Recording, write_recording
 from validation.commands.diagnose import write_outcome
 from validation.diagnosis import diagnose
 from validation.diagnosis.datasets import read_datasets
+from validation.run import source_digest
 
-__all__ = ["Found", "diagnosed", "without"]
+__all__ = ["Found", "diagnosed", "diagnosis_digest"]
 
 
 @dataclass(frozen=True)
@@ -44,23 +47,27 @@ class Found:
 def diagnosed(
     recordings: Mapping[str, Recording], folder: Path, say: Callable[[str], None] = lambda text: None, seed: int = 0
 ) -> Found:
-    """Diagnose recordings into ``folder``, or read what an earlier run has left there.
+    """Diagnose recordings into ``folder``, or read what an earlier run of the same code left there on the same data.
 
-    ``diagnosis.json`` is written last, so a run that was broken off is made again.
+    ``made-of.json``, which tells, is written last: a run that was broken off is made again.
     """
     names = tuple(recordings)
-    if not (folder / "diagnosis.json").is_file():
+    data, note = folder / "data", folder / "made-of.json"
+    for name, recording in recordings.items():
+        write_recording(recording, data / name)
+    made_of = {"recordings": digest(data), "diagnosis": diagnosis_digest(), "seed": seed}
+    if not note.is_file() or json.loads(note.read_text(encoding="utf-8")) != made_of:
         say(f"diagnosing {folder.name}")
-        data = folder / "data"
-        for name, recording in recordings.items():
-            write_recording(recording, data / name)
+        note.unlink(missing_ok=True)
         read, called = read_datasets([data])
         outcome = diagnose(read, called, seed=seed)
         write_outcome(outcome, folder, {"recordings": ", ".join(names), "seed": str(seed)})
+        write_text(note, json.dumps(made_of, indent=2) + "\n")
     answer = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
     return Found(names, answer, read_model(folder / "model.toml"), folder)
 
 
-def without(recordings: Mapping[str, Recording], name: str) -> dict[str, Recording]:
-    """Return the recordings but one."""
-    return {other: recording for other, recording in recordings.items() if other != name}
+def diagnosis_digest() -> str:
+    """Return the SHA-256 of the code of models and diagnosis."""
+    here = Path(__file__).parents[1]
+    return source_digest(Path(discsim.__file__).parent, here / "diagnosis", here / "commands" / "diagnose.py")
