@@ -82,7 +82,7 @@ def command(
 
     Effects are concealed in MuJoCo and written as plain recordings; another process that gets nothing but those
     diagnoses them; then the sealed answers are opened. Writes challenge.json and report.html into --out. Stopped at
-    any moment, the same command goes on. Exit status 1 where a goal is missed (under a mask: where an answer is missing).
+    any moment, the same command goes on. Exit status 1 where a goal is missed, under a mask where an answer is missing.
 
     Example: discsim challenge --cases 20 --out challenge
     """
@@ -121,10 +121,9 @@ def command(
         if curve is not None:
             typer.echo(f"half-detection size, in detection limits: {curve.text}")
         typer.echo(f"{sum(item.score.right for item in scored)} of {len(scored)} answered rightly")
-        if name is None:
-            met = goals_met(rates, curve, few=len(scored) < 300)
-        else:  # the goals are for cases as they come; under a mask an answer is all that can be asked for
-            met = met and not rates["crash_rate"].hits
+        # the goals are for cases as they come; under a mask an answer is all that can be asked for
+        good = goals_met(rates, curve, few=len(scored) < 300) if name is None else not rates["crash_rate"].hits
+        met = met and good
     typer.echo(f"report: {out / 'report.html'}")
     if not met:
         raise typer.Exit(1)
