@@ -336,9 +336,9 @@ def _golf(real: Path, figures: Path, work: Path, seed: int, say: Say) -> str:
                     if farther or min(best.gains.values()) < 0.0
                     else "Leave-one-throw-out supports it; three throws of one evening are too few to name it."
                 ),
-                "Release and wind as the other two throws have them, with no cause, land "
+                "The wind as the other two throws have it, with no cause and the release as stated, lands them "
                 + ", ".join(f"{none.landings[name].distance:.1f}" for name in names)
-                + " m off: what two throws say of the wind carries over to the third "
+                + " m off: what two throws say of it carries over to the third "
                 + ("in each case." if all(lands_nearer) else f"in {sum(lands_nearer)} of {len(names)} cases."),
                 "What would decide: heights (a second camera), a logger on board for spin and attitude at release, "
                 "the wind where the disc flies; and ten throws, half of them against the wind.",
@@ -378,8 +378,8 @@ def _answered(answer: Found, noise: float, reached: float) -> list[str]:
         )
     elif not named:
         said += (
-            " That is twenty times what the tracks scatter by, and no effect of the catalogue, common to all three, "
-            "takes it away: what is left differs from throw to throw."
+            " That is more than twenty times what the tracks scatter by, and no effect of the catalogue, common to all "
+            "three, takes it away: what is left differs from throw to throw."
             if left > 20.0 * noise
             else " What is left no effect of the catalogue takes away."
         )
