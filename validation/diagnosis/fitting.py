@@ -395,32 +395,47 @@ def _gone_on(
     bounds: Mapping[tuple[str, str], tuple[float, float]],
     first: float,
 ) -> tuple[Fit, bool]:
-    """Return a fit after up to so many steps, and whether no more are wanted. ``first`` is how hard they are held."""
+    """Return a fit after up to so many steps, and whether no more are wanted. ``first`` is how hard they are held.
+
+    Where the steps end with pieces that do not hang together though they did on the way, the best such fit counts.
+    """
     hold = np.full(len(fit.chains), first)
+    closed: Fit | None = None
+    settled, stuck = False, 0
     for _ in range(iterations):
         reduced = mapped(_reduced(fit), fit.linears, fit.chains, list(hold))
         gram = np.sum([r.gram for r in reduced], axis=0)
         step, covariance, expected = shared_step(gram, fit.parameters, fit.at, _reach(fit, hold))
         fit = replace(fit, covariance=covariance)
-        gain = fit.merit - expected
-        if gain < max(tolerance, 1e-7 * fit.merit) and not open_gaps(fit):
+        closed = _better_closed(closed, fit)
+        least = max(tolerance, 1e-7 * fit.merit)
+        if fit.merit - expected < least and not open_gaps(fit):
             return fit, True
         going = _Going(fit, reduced, step, bounds)
         if first > _FREE:
             better, rose = going.each_its_share()
             hold = np.where(rose, np.clip(_TIGHTER * hold, _LEAST_HOLD, _MOST_HOLD), _LOOSER * hold)
+            stuck = stuck + 1 if better is None else 0
+            better = better or going.all_by_one_share()
         else:
             better = going.all_by_one_share()
-        if better is None:
-            return fit, True
-        improved = fit.merit - better.merit
-        were_open = open_gaps(fit)
-        fit = better
-        if not were_open and improved < max(tolerance, 1e-7 * fit.merit):
-            return fit, True
-    return fit, False
+        settled = better is None or (not open_gaps(fit) and fit.merit - better.merit < least)
+        fit = better or fit
+        if settled or stuck == _STUCK:
+            break
+    closed = _better_closed(closed, fit)
+    return (closed if closed is not None and open_gaps(fit) else fit), settled
 
 
+def _better_closed(known: Fit | None, fit: Fit) -> Fit | None:
+    """Return the better one of two fits whose pieces hang together; ``fit`` may be one whose pieces do not."""
+    if open_gaps(fit) or (known is not None and known.merit <= fit.merit):
+        return known
+    return fit
+
+
+#: so many held steps in turn of which no share served every recording lead nowhere
+_STUCK = 4
 #: tries at a step, and what a step that leads astray is shortened by
 _TRIES, _SHORTER = 5, 0.4
 #: a recording whose chi-squared per reading is above this is far from its data
@@ -512,7 +527,7 @@ class _Going:
                 ]
                 return new_fit, (shares < 1.0) | np.array(rose)
             shares[again] *= _SHORTER
-        return self.all_by_one_share(), shares < 1.0
+        return None, shares < 1.0
 
     def _nearer(self, i: int, trial: Fit, new: Linear) -> bool:
         """Tell whether a step has not led a recording astray."""
