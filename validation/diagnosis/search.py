@@ -41,8 +41,11 @@ Start: TypeAlias = dict[tuple[tuple[str, str], frozenset[int] | None], float]
 
 #: how many effects are ever added
 MOST_EFFECTS = 4
-#: how many proposals are refitted at each step
-REFITTED = 4
+#: how many proposals are refitted at each step, and how many while none comes near the data: far from it, or with two
+#: effects at work, algebra ranks many a wrong one before the right one
+REFITTED, REFITTED_AT_MOST = 4, 9
+#: chi-squared per reading, in the noise of the relaxed fit, below which a fit is near the data
+_NEAR = 1.2
 #: most steps of the baseline's fit: a free spin's is slow, and what it has left to gain is no candidate's
 _BASE_ITERATIONS = {"flight": 8, "free_spin": 16, "spin_down": 8, "rate_table": 8}
 #: a gain below this may be due to where the fits started
@@ -192,13 +195,14 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     worth.sort(key=lambda item: (item[2] <= 0.0, RIVAL * len(parameters_of(item[0].trial)) - item[0].gain))
     fits: list[tuple[float, Tied, Fit, float]] = []
     seen: set[tuple[str, frozenset[int] | None]] = set()
+    near_data = chi2_in(current, noise) < _NEAR * current.fit.count
     for proposal, fit, cost in worth:
         key = (proposal.trial.id, proposal.trial.recordings)
         if key in seen:
             continue
-        seen.add(key)
-        if len(seen) > REFITTED:
+        if len(seen) >= (REFITTED if near_data else REFITTED_AT_MOST):
             break
+        seen.add(key)
         hypothesis = current.hypothesis.plus(proposal.trial)
         if proposal.trial.id == "accel.saturation":
             # readings at the limit take no part in a fit: what the motion asks for beyond it is the evidence
@@ -223,6 +227,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
             # far from the data chi-squared says more than a likelihood that has swallowed the mismatch as noise
             merit = (chi2_in(refitted, noise) + cost if far else refitted.score) + RIVAL * hypothesis.size
             fits.append((merit, refitted, fit, cost))
+            near_data |= chi2_in(refitted, noise) < _NEAR * refitted.fit.count
     if not fits:
         return None
     _, best, fit, cost = min(fits, key=lambda item: item[0])

@@ -1,0 +1,68 @@
+"""How many proposals a step of the search refits: few near the data, more where algebra is led astray far from it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made import coasts
+
+from discsim.effects.catalogue import CATALOGUE
+from validation.diagnosis import search as searching
+from validation.diagnosis.fitting import Fit, linearised
+from validation.diagnosis.noise import stated_noise
+from validation.diagnosis.relaxed import NO_JUMPS, first_chain
+from validation.diagnosis.selection import Hypothesis, Proposal, Tied
+from validation.diagnosis.trials import Trial
+
+#: what algebra ranks, best first; none but the seventh comes near the data
+RANKED = [Trial(id, ()) for id, row in CATALOGUE.items() if id.startswith(("mag.", "gyro.")) and not row.event]
+RIGHT = RANKED[6]
+
+
+def step(monkeypatch: pytest.MonkeyPatch, *, far: bool, right: Trial) -> tuple[str, list[str]]:
+    """Return what one step of the search adds, and what it refitted, where fits are not made but told."""
+    recordings = coasts(seconds=1.0)
+    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), NO_JUMPS["spin_down"], {})
+    linears = linearised(fit)
+    fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
+    base = Tied(Hypothesis(), fit, 1e6)
+    refitted = []
+
+    def told(fit: Fit, hypothesis: Hypothesis, *others: object) -> Tied:
+        refitted.append(hypothesis.trials[-1].id)
+        return Tied(hypothesis, fit, 0.0 if hypothesis.trials[-1] == right else 5e5)
+
+    def chi2(tied: Tied, noise: object) -> float:
+        left = 20.0 if far else 1.1
+        for trial in tied.hypothesis.trials:
+            left = 1.0 if trial == right else 0.9 * left
+        return left * fit.count
+
+    monkeypatch.setattr(searching, "tied_fit", told)
+    monkeypatch.setattr(searching, "chi2_in", chi2)
+    monkeypatch.setattr(searching, "board_of", lambda *_: None)
+    monkeypatch.setattr(searching, "searched", lambda *_: [])
+    monkeypatch.setattr(searching, "proposals", lambda *_: [])
+    ranked = [Proposal(trial, 1e6 - rank, {}) for rank, trial in enumerate(RANKED)]
+    monkeypatch.setattr(searching, "one_per_effect", lambda _: ranked)
+    found = searching.Search(tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base)
+    best = searching._next(found, None, base, 0)  # type: ignore[arg-type]
+    assert best is not None
+    return best.hypothesis.trials[-1].id, refitted
+
+
+def test_far_from_the_data_more_is_refitted_until_something_comes_near(monkeypatch):
+    best, refitted = step(monkeypatch, far=True, right=RIGHT)
+    assert best == RIGHT.id
+    assert refitted == [trial.id for trial in RANKED[:7]]
+
+
+def test_what_comes_near_the_data_early_ends_the_search_at_four(monkeypatch):
+    best, refitted = step(monkeypatch, far=True, right=RANKED[1])
+    assert best == RANKED[1].id
+    assert len(refitted) == 4
+
+
+def test_near_the_data_four_are_refitted(monkeypatch):
+    _, refitted = step(monkeypatch, far=False, right=RIGHT)
+    assert len(refitted) == 4
