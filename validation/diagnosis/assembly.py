@@ -351,6 +351,9 @@ def assemble(
     effects = tuple(_named(found, trial, names, advice) for trial in trials)
     located = [place for trial in trials for place in located_effect(found, trial, names)]
     moved = recalibrations(best)
+    if verdict == "unexplained":
+        # what is missing, or put into a law that only resembles it, moves them by more than any noise
+        moved = {name: replace(item, sd=None) for name, item in moved.items()}
     if verdict == "recalibrated":
         located += [
             replace(place, text=f"{place.text}; a stated number is off") for place in located_rest(found, names)[:1]

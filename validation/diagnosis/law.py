@@ -35,7 +35,7 @@ from validation.diagnosis.noise import GroupNoise, NoiseModel, chi_squared, log_
 from validation.diagnosis.readings import to_body
 from validation.diagnosis.relaxed import NO_JUMPS
 from validation.diagnosis.rest import remainders
-from validation.diagnosis.selection import ENTRY, PER_PARAMETER, Hypothesis, Tied, noise_of, scored, tied_fit
+from validation.diagnosis.selection import BOUNDS, ENTRY, PER_PARAMETER, Hypothesis, Tied, noise_of, scored, tied_fit
 from validation.diagnosis.trajectory_pieces import Chain, Column, IntArray, Linear, moved, recut, undone
 
 __all__ = ["FoundLaw", "Term", "find_law"]
@@ -623,7 +623,8 @@ def _fitted(
         start.noise,
         _fixed(terms, at),
     )
-    bounds = {q.key: (-4.0, 8.0) for q in parameters if ".power_" in q.name}
+    bounds = dict(BOUNDS)
+    bounds |= {q.key: (-4.0, 8.0) for q in parameters if ".power_" in q.name}
     bounds |= {q.key: (0.01 * q.stated, 50.0 * q.stated) for q in parameters if q.name.endswith(".decay")}
     fit = refit(fit, iterations=iterations, bounds=bounds)
     for _ in range(2):

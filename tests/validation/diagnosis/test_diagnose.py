@@ -215,7 +215,7 @@ def power_law(rate: float, c: float, seconds: float) -> Motion:
 
 
 def test_a_brake_that_no_effect_describes_is_unexplained_and_told_as_a_law():
-    c, rig = 0.012, Rig(RIG.Izz, 0.0)
+    c, rig = 0.012, Rig(RIG.Izz, 0.0, {"viscous_N_m_s": 1e-8})
     recordings = [coasting(power_law(rate, c, 4.0), rig, k) for k, rate in enumerate((60.0, 25.0))]
     diagnosis = answer_of(recordings)
     assert diagnosis.verdict == "unexplained"
@@ -227,6 +227,8 @@ def test_a_brake_that_no_effect_describes_is_unexplained_and_told_as_a_law():
     torque = diagnosis.law.for_model().evaluate({"r": np.array([30.0])})
     assert torque == pytest.approx(-rig.Izz * c * 30.0**1.5, rel=0.01)
     assert diagnosis.located
+    # what is missing moves a stated number by more than noise does: nobody knows how far off it is
+    assert [item.sd for item in diagnosis.recalibrated.values()] == [None]
     # the final fit is that with the law: what it leaves is the noise as stated
     assert diagnosis.law.leaves == "With it nothing but noise is left."
     assert diagnosis.baseline.chi2_per_sample > 2.0
