@@ -22,7 +22,7 @@ from validation.challenge.page import GOALS, goals_met
 from validation.challenge.result import Scored, rates_of, read_result
 from validation.challenge.run import challenge
 from validation.challenge.scoring import CaseScore, clustered_rate, confusion, rate, score_case, summary
-from validation.challenge.strength import THRESHOLD, noncentrality, strength
+from validation.challenge.strength import noncentrality, strength
 from validation.run import start_run
 
 #: two throws are enough to be diagnosed by what only counts files
@@ -395,6 +395,22 @@ def test_a_challenge_scores_reports_and_goes_on_where_it_was_stopped(tmp_path, s
         challenge(run, requests, workers=1, command=spy)
 
 
+def test_more_cases_join_those_that_are_done(tmp_path, spy):
+    few = [Request(seed, "spin_down", (), "nothing") for seed in (40, 41)]
+    with start_run(tmp_path / "out", 40) as run:
+        done = challenge(run, few, workers=1, command=spy)
+    sealed = json.loads((tmp_path / "out" / "sealed.json").read_text())
+    with start_run(tmp_path / "out", 40) as run:
+        more = challenge(run, [*few, Request(42, "spin_down", (), "nothing")], workers=1, command=spy)
+    assert more[:2] == done
+    assert len(more) == 3
+    assert json.loads((tmp_path / "out" / "sealed.json").read_text()).items() > sealed.items()
+    # under a mask the same seeds are other cases
+    masked = [request._replace(mask="short") for request in few]
+    with start_run(tmp_path / "out", 40) as run, pytest.raises(InputError, match="drawn differ"):
+        challenge(run, masked, workers=1, command=spy)
+
+
 # ------------------------------------------------------------------------------------------------ limits
 
 
@@ -416,7 +432,6 @@ def test_an_effect_twice_as_large_is_twice_as_far_above_its_limit():
         friction = effect("rig.quadratic_drag", coefficient_N_m_s2=size)
         sizes.append(strength(replace(case, concealed=(Concealed(friction),))))
     assert sizes[1] == pytest.approx(2 * sizes[0], rel=1e-3)  # differences of 1e-3 of the size
-    assert THRESHOLD > 0
 
 
 def test_a_limit_is_known_where_no_sensor_shows_an_unknown():

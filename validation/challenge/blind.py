@@ -62,20 +62,20 @@ class Request(NamedTuple):
 def seal_answers(requests: Sequence[Request], out: Path) -> dict[str, str]:
     """Write each answer to ``out/answers`` and the digests of all to ``out/sealed.json``; return the digests.
 
-    This comes before any diagnosis. Where it was done before, the digests must be the same.
+    This comes before any diagnosis. Where it was done before the digests must be the same; more cases may join them.
     """
     texts = {request.name: Answer.of(request.draw()).text for request in requests}
     digests = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
     file = out / "sealed.json"
-    if file.exists() and (known := json.loads(file.read_text("utf-8"))) != digests:
-        changed = [name for name in known if known[name] != digests.get(name, known[name])]
+    known = json.loads(file.read_text("utf-8")) if file.exists() else {}
+    if changed := [name for name, sealed in known.items() if digests.get(name, sealed) != sealed]:
         raise InputError(
-            f"{file}: the answers are sealed, and {', '.join(changed[:3]) or 'the list of cases'} would differ; "
+            f"{file}: the answers are sealed, and {', '.join(changed[:3])} would differ; "
             "expected the same command, or another --out"
         )
     for name, text in texts.items():
         write_text(out / "answers" / f"{name}.toml", text)
-    write_text(file, json.dumps(digests, indent=2) + "\n")
+    write_text(file, json.dumps({**known, **digests}, indent=2) + "\n")
     return digests
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -46,7 +47,9 @@ def challenge(
         (run.out / "sealed.json").unlink(missing_ok=True)
     others = {name: version(name) for name in ("mujoco", "numba", "numpy", "scipy")}
     versions = {"discsim": package_version(), **others, "code": code_digest()}
-    claim(folder, {"cases": [list(request) for request in requests], "command": command, "versions": versions})
+    # each case belongs to its seed: more of them may be asked for later, all drawn in the same way
+    drawn = sorted({json.dumps(request[1:]) for request in requests})
+    claim(folder, {"drawn": drawn, "command": command, "versions": versions})
     seal_answers(requests, run.out)
     run.step(f"{len(requests)} answers are sealed; their digests stand in {run.out / 'sealed.json'}")
     tasks = [Task(request.name, tuple(request)) for request in requests]
