@@ -22,9 +22,9 @@ import numpy as np
 from discsim.errors import InputError
 from discsim.files import read_text, write_text
 from validation.challenge.cases import KINDS, PLANT_SHARES
-from validation.challenge.detection import HALF_GOAL, Sized, detections, fit_curve
+from validation.challenge.detection import Sized, detections, fit_curve
 from validation.challenge.masks import MASK_HEADER, mask_row, masked_results
-from validation.challenge.page import GOALS, NAMES, deviates_of, draw_all, fault_of, found_of, hidden_of, percent
+from validation.challenge.page import deviates_of, draw_all, fault_of, found_of, goal_rows, hidden_of, percent
 from validation.challenge.result import Result, Scored, rates_of, read_result, times
 from validation.challenge.scoring import NOTHING, confusion, has_power_law
 
@@ -122,19 +122,8 @@ def pooled(result: Result, near: Result | None) -> list[Sized]:
 def _goals(scored: Sequence[Scored], items: Sequence[Sized], blank: Sequence[Scored]) -> str:
     alarms = "false_alarm_rate"
     rates = {**rates_of(scored), alarms: rates_of([*scored, *blank])[alarms]}
-    rows = []
-    for name, found in rates.items():
-        goal = GOALS.get(name)
-        met = {True: "met", False: "**missed**", None: ""}[goal.met(found) if goal else None]
-        share, interval = percent(found)
-        rows.append((NAMES[name], share, f"{found.hits} of {found.of}", interval, goal.text if goal else "", met))
-    curve = fit_curve(items)
-    if curve is not None:
-        met = "met" if curve.half <= HALF_GOAL else "**missed**"
-        size, _, interval = curve.text.partition(" (")
-        what = "size at which half of the effects are named, in detection limits"
-        cases = f"{curve.named} of {curve.cases}"
-        rows.append((what, size, cases, interval.rstrip(")"), f"at most {HALF_GOAL:g}", met))
+    told = {"ok": "met", "FAIL": "**missed**"}
+    rows = [(*row, told.get(state, "")) for *row, state in goal_rows(rates, fit_curve(items))]
     return table(("", "share", "cases", "95 % interval", "goal", ""), rows)
 
 

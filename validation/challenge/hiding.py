@@ -57,7 +57,7 @@ def choose_secret(case: Case, rng: np.random.Generator, name: str | None = None)
     if name not in names:
         raise InputError(f"{name}: cannot act on a {case.plant}; expected one of {', '.join(names)}")
     secret = OFF_CATALOGUE[name].drawn(case.plant, rng)
-    while getattr(secret, "sensor", sensors[0]) not in sensors:
+    while not _on_board(secret, sensors):
         secret = OFF_CATALOGUE[name].drawn(case.plant, rng)
     return secret
 
@@ -66,7 +66,7 @@ def can_act(secret: OffCatalogue, case: Case) -> bool:
     """Tell whether the sensor that a secret acts on, if any, is on board."""
     sensors = tuple(case.instruments.sensors)
     name = next(name for name, kind in OFF_CATALOGUE.items() if isinstance(secret, kind))
-    return _present(name, sensors) and getattr(secret, "sensor", sensors[0]) in sensors
+    return _present(name, sensors) and _on_board(secret, sensors)
 
 
 def possible(case: Case) -> list[str]:
@@ -83,6 +83,11 @@ def _present(name: str, sensors: tuple[str, ...]) -> bool:
     if name == "warming":
         return "accelerometer" in sensors or "gyroscope" in sensors
     return all(sensor in sensors for sensor in needed.get(name, ()))
+
+
+def _on_board(secret: OffCatalogue, sensors: tuple[str, ...]) -> bool:
+    """Tell whether the sensor that was drawn for a secret, if any was, is on board."""
+    return getattr(secret, "sensor", sensors[0]) in sensors
 
 
 def _goes_with(id: str, other: str) -> bool:

@@ -19,7 +19,7 @@ from validation.challenge.case import Case, Coast, Concealed, Mask
 from validation.challenge.hiding import can_act, choose, choose_secret, possible
 from validation.challenge.physics import log_uniform
 from validation.challenge.sizes import scaled
-from validation.challenge.stating import noisy, stated_loosely
+from validation.challenge.stating import noisy, with_sigmas
 from validation.challenge.strength import sizes
 
 __all__ = ["masked"]
@@ -75,7 +75,7 @@ def _stated_loosely(case: Case, rng: np.random.Generator) -> Case:
     if case.plant == "flight" and case.stated_disc is not None and case.stated_disc.aero_table is not None:
         driver, _ = load_disc("driver")
         case = replace(case, disc=driver, stated_disc=driver)
-    return stated_loosely(case, rng)
+    return with_sigmas(case, rng, loosely=True)
 
 
 def _doubled(case: Case, rng: np.random.Generator) -> Case:

@@ -19,11 +19,12 @@ from validation.report import Section, write_report
 
 __all__ = [
     "GOALS",
-    "NAMES",
     "Goal",
+    "deviates_of",
     "draw_all",
     "fault_of",
     "found_of",
+    "goal_rows",
     "goals_met",
     "hidden_of",
     "percent",
@@ -171,23 +172,29 @@ NAMES: Mapping[str, str] = {
 }
 
 
-def _goals(rates: Mapping[str, Rate], curve: Curve | None) -> Section:
+def goal_rows(rates: Mapping[str, Rate], curve: Curve | None) -> list[tuple[str, str, str, str, str, str]]:
+    """Return what was measured: what, share, cases, interval, goal, and "ok" or "FAIL" where there is a goal."""
+    state = {True: "ok", False: "FAIL", None: ""}
     rows = []
     for name, found in rates.items():
         goal = GOALS.get(name)
-        met = goal.met(found) if goal else None
         share, interval = percent(found)
-        state = {True: "ok", False: "FAIL", None: ""}[met]
-        rows.append((NAMES[name], share, f"{found.hits} of {found.of}", interval, goal.text if goal else "", state))
+        met = goal.met(found) if goal else None
+        rows.append(
+            (NAMES[name], share, f"{found.hits} of {found.of}", interval, goal.text if goal else "", state[met])
+        )
     if curve is not None:
-        state = "ok" if curve.half <= HALF_GOAL else "FAIL"
         size, _, interval = curve.text.partition(" (")
+        what = "size at which half of the effects are named, in detection limits"
         cases = f"{curve.named} of {curve.cases}"
-        goal_text = f"at most {HALF_GOAL:g} limits"
-        what = "size at which half are named, in detection limits"
-        rows.append((what, size, cases, interval.rstrip(")"), goal_text, state))
+        goal_text = f"at most {HALF_GOAL:g}"
+        rows.append((what, size, cases, interval.rstrip(")"), goal_text, state[curve.half <= HALF_GOAL]))
+    return rows
+
+
+def _goals(rates: Mapping[str, Rate], curve: Curve | None) -> Section:
     text = "Intervals are Clopper and Pearson's, of 95 %. Goals are meant for 300 cases or more."
-    return Section("Result", (text,), ("", "share", "cases", "95 % interval", "goal", ""), rows)
+    return Section("Result", (text,), ("", "share", "cases", "95 % interval", "goal", ""), goal_rows(rates, curve))
 
 
 def _kinds(scored: Sequence[Scored]) -> Section:

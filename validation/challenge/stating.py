@@ -11,7 +11,7 @@ from discsim.disc import Release, Rig
 from discsim.sensors import Noise
 from validation.challenge.case import Case, Run
 
-__all__ = ["noisy", "stated", "stated_loosely"]
+__all__ = ["noisy", "stated", "with_sigmas"]
 
 #: coefficients that an ordinary flight determines far better than a sigma of some per cent
 _WELL_KNOWN = ("CL0", "CLa", "CD0", "CDa", "CM0", "CMa", "CNr")
@@ -40,20 +40,17 @@ def noisy(case: Case, rng: np.random.Generator, *, everywhere: bool) -> Case:
 
 def stated(case: Case, rng: np.random.Generator, *, loosely: bool) -> Case:
     """Turn what is drawn so far (the stated numbers) into stated ones with a sigma, and true ones that differ."""
-    if case.plant == "spin_down":
-        case = _stated_rig(case, rng, loosely=loosely)
-    elif case.plant == "flight":
-        case = _stated_coefficients(case, rng, loosely=loosely)
-        if rng.random() < 0.25:
-            case = replace(case, stated_releases=tuple(_stated_release(run, rng) for run in case.runs))
+    case = with_sigmas(case, rng, loosely=loosely)
+    if case.plant == "flight" and rng.random() < 0.25:
+        case = replace(case, stated_releases=tuple(_stated_release(run, rng) for run in case.runs))
     return case
 
 
-def stated_loosely(case: Case, rng: np.random.Generator) -> Case:
-    """State every number that can have a sigma with one, and let the true ones differ by it."""
+def with_sigmas(case: Case, rng: np.random.Generator, *, loosely: bool) -> Case:
+    """State some numbers with a sigma, by which the true ones differ; ``loosely``: all that can have one."""
     if case.plant == "spin_down":
-        return _stated_rig(case, rng, loosely=True)
-    return _stated_coefficients(case, rng, loosely=True) if case.plant == "flight" else case
+        return _stated_rig(case, rng, loosely=loosely)
+    return _stated_coefficients(case, rng, loosely=loosely) if case.plant == "flight" else case
 
 
 def _within(rng: np.random.Generator, size: int, largest: float) -> FloatArray:

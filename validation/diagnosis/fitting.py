@@ -378,10 +378,16 @@ def refit(
     if not settled and iterations >= _LONG and open_gaps(fit) and fit.chains[0].recording.plant == "free_spin":
         # free steps hop about where the readings say little: short ones, and what held them back is not known
         fit, _ = _gone_on(fit, iterations, tolerance, bounds or {}, _FIRST_HOLD)
-        reduced = mapped(_reduced(fit), fit.linears, fit.chains, [0.0] * len(fit.chains))
-        gram = np.sum([r.gram for r in reduced], axis=0)
-        fit = replace(fit, covariance=shared_step(gram, fit.parameters, fit.at)[1])
+        _, (_, covariance, _) = _solved(fit, np.full(len(fit.chains), _FREE))
+        fit = replace(fit, covariance=covariance)
     return fit
+
+
+def _solved(fit: Fit, hold: FloatArray) -> tuple[list[Reduced], tuple[FloatArray, FloatArray, float]]:
+    """Return what each recording says where a fit stands, and `shared_step` from all of it, held by ``hold`` (c,)."""
+    reduced = mapped(_reduced(fit), fit.linears, fit.chains, list(hold))
+    gram = np.sum([r.gram for r in reduced], axis=0)
+    return reduced, shared_step(gram, fit.parameters, fit.at, _reach(fit, hold))
 
 
 #: steps of a fit that is to end where it is best, not only to follow a change of the noise
@@ -403,9 +409,7 @@ def _gone_on(
     closed: Fit | None = None
     settled, stuck = False, 0
     for _ in range(iterations):
-        reduced = mapped(_reduced(fit), fit.linears, fit.chains, list(hold))
-        gram = np.sum([r.gram for r in reduced], axis=0)
-        step, covariance, expected = shared_step(gram, fit.parameters, fit.at, _reach(fit, hold))
+        reduced, (step, covariance, expected) = _solved(fit, hold)
         fit = replace(fit, covariance=covariance)
         closed = _better_closed(closed, fit)
         least = max(tolerance, 1e-7 * fit.merit)
@@ -423,7 +427,6 @@ def _gone_on(
         fit = better or fit
         if settled or stuck == _STUCK:
             break
-    closed = _better_closed(closed, fit)
     return (closed if closed is not None and open_gaps(fit) else fit), settled
 
 

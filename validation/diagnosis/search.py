@@ -174,7 +174,8 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     """Return the fit with the best further effect, or None where none is worth its price."""
     plant = found.recordings[0].plant
     noise = found.loose_noise
-    far = chi2_in(current, noise) > FAR * current.fit.count
+    chi2_now = chi2_in(current, noise)
+    far = chi2_now > FAR * current.fit.count
     offered: list[tuple[Proposal, Fit, float]] = []
     if far or step == 0:
         ranked = one_per_effect(proposals(board, found.trials, current.hypothesis, found.own))
@@ -195,7 +196,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     worth.sort(key=lambda item: (item[2] <= 0.0, RIVAL * len(parameters_of(item[0].trial)) - item[0].gain))
     fits: list[tuple[float, Tied, Fit, float]] = []
     seen: set[tuple[str, frozenset[int] | None]] = set()
-    near_data = chi2_in(current, noise) < _NEAR * current.fit.count
+    near_data = chi2_now < _NEAR * current.fit.count
     for proposal, fit, cost in worth:
         key = (proposal.trial.id, proposal.trial.recordings)
         if key in seen:
@@ -216,18 +217,18 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
         )
         refitted = replace(refitted, score=refitted.score + found.cost + cost)
         gain = current.score - refitted.score
-        chi2_gain = chi2_in(current, noise) - chi2_in(refitted, noise)
+        chi2 = chi2_in(refitted, noise)
         values = {
             q.name: float(v)
             for q, v in zip(refitted.fit.parameters, refitted.fit.at, strict=True)
             if q.group == proposal.trial.id and q.recordings == proposal.trial.recordings
         }
-        found.considered.append(Considered(proposal.trial, gain, chi2_gain, values))
+        found.considered.append(Considered(proposal.trial, gain, chi2_now - chi2, values))
         if gain > price(proposal.trial) and _possible(refitted):
             # far from the data chi-squared says more than a likelihood that has swallowed the mismatch as noise
-            merit = (chi2_in(refitted, noise) + cost if far else refitted.score) + RIVAL * hypothesis.size
+            merit = (chi2 + cost if far else refitted.score) + RIVAL * hypothesis.size
             fits.append((merit, refitted, fit, cost))
-            near_data |= chi2_in(refitted, noise) < _NEAR * refitted.fit.count
+            near_data |= chi2 < _NEAR * refitted.fit.count
     if not fits:
         return None
     _, best, fit, cost = min(fits, key=lambda item: item[0])

@@ -361,8 +361,6 @@ def _answered(answer: Found, noise: float, reached: float) -> list[str]:
     if answer.verdict == "unexplained" and law is None:
         said += " It offers no law either: none holds on the throws that did not make it."
     before, after = answer.chi2("baseline"), answer.chi2("final")
-    assert before is not None
-    assert after is not None
     left = noise * after**0.5
     said += (
         f" χ² per reading is {before:.0f} for the baseline and {after:.0f} for the final model, in the {noise:g} m "

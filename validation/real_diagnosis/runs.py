@@ -38,10 +38,9 @@ class Found:
         """The verdict."""
         return str(self.answer["verdict"])
 
-    def chi2(self, which: str, *, held_out: bool = False) -> float | None:
+    def chi2(self, which: str) -> float:
         """Return chi-squared per reading of the "baseline" or "final" model."""
-        value = self.answer["fit"][which]["heldout_chi2_per_sample" if held_out else "chi2_per_sample"]
-        return None if value is None else float(value)
+        return float(self.answer["fit"][which]["chi2_per_sample"])
 
 
 def diagnosed(
