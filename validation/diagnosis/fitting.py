@@ -179,7 +179,7 @@ def release_rows(current: Chain) -> tuple[FloatArray, FloatArray]:
 #: what is known of a state without any reading: m, m/s, rad, rad/s; nuisances of a free spin; rigs
 _ANYWHERE = {
     "flight": np.repeat([1e4, 300.0, 30.0, 1e3], 3),
-    "free_spin": np.array([100.0, 100.0, 100.0, 100.0, 3.0, 3.0, 30.0, 30.0, 30.0, 1e3, 1e3, 1e3, 0.01]),
+    "free_spin": np.array([100.0, 100.0, 100.0, 100.0, 3.0, 3.0, 30.0, 30.0, 30.0, 1e3, 1e3, 1e3, 0.01, 0.5, 0.5]),
     "spin_down": np.array([1e6, 1e3]),
     "rate_table": np.array([1e6]),
 }

@@ -1,6 +1,6 @@
 """Short pieces of motion of each plant, for many neighbouring states and parameters at once: compiled.
 
-A piece starts from a state of 13 numbers (14 in free spin) and yields rows of 19 at given instants: position, velocity
+A piece starts from a state of 13 numbers (16 in free spin) and yields rows of 19 at given instants: position, velocity
 and acceleration in N, attitude (quaternion from B to N), body rates and their derivatives in B.
 
 ==========  =======================================================================================================
@@ -8,14 +8,15 @@ plant       state
 ==========  =======================================================================================================
 flight      position and velocity in N, attitude, body rates
 free spin   transverse angular acceleration that is not rigid-body motion, in B at the piece's start (x, y), and its
-            slope; rdot/r and its slope; attitude, body rates; how much faster the wobble turns than by its course
+            slope; rdot/r and its slope; attitude, body rates; how much faster the wobble turns than by its course; how
+            the stiffness of the air bends (x, y)
 rigs        yaw angle psi, rate r; the other eleven are not used
 ==========  =======================================================================================================
 """
 
 from __future__ import annotations
 
-from math import atan2, cos, sin, sqrt
+from math import atan2, copysign, cos, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -42,7 +43,7 @@ __all__ = [
 ]
 
 #: numbers of a state, by plant, and of a row of motion
-STATE, ROW = {"flight": 13, "free_spin": 14, "spin_down": 13, "rate_table": 13}, 19
+STATE, ROW = {"flight": 13, "free_spin": 16, "spin_down": 13, "rate_table": 13}, 19
 #: numbers of the physics; what a row of flats holds beyond are those of the user's own effects and the terms of a law
 SIZE = PARAMETERS.itemsize // 8
 #: names of the numbers of a law's term: those of a row of `discsim.law`, and per symbol where its power is one
@@ -133,6 +134,10 @@ def _turned(q: FloatArray, wx: float, wy: float, wz: float, h: float, new: Float
     new[3] = q[0] * z + q[1] * y - q[2] * x + q[3] * c
 
 
+#: what tells axes apart by less than the root of this, 1/s^2, says little about where they are
+_NO_AXIS = 0.1
+
+
 @compiled
 def _spinning(
     p: Any,
@@ -152,6 +157,9 @@ def _spinning(
     over the first seconds. heading is that of x_B in N where psi is zero. Air is as stiff as the slope of its moment
     over the angle of attack, which need not be smooth: state[13] is what that adds in this piece, rad/s. A moment about
     one axis turns the wobble as much as it tells that axis from the other.
+
+    How that moment bends with the angle of attack drives the wobble at twice its own frequency, by the square of the
+    rates: m = (w_x + i w_y)^2 (state[14] + i state[15]), 1/rad, where psi is zero, and its mirror image at that axis.
     """
     Ixx, Izz = p.disc.Ixx, p.disc.Izz
     Iyy = transverse_inertia(p.body_inertia_asymmetry, Ixx)
@@ -163,14 +171,23 @@ def _spinning(
     faster = wobble[2] + later * (wobble[3] + later * wobble[9])
     stiffer = 1.0 + state[13] * faster / (1.0 + faster * faster)
     faster += state[13]
-    along = stiffer * (wobble[4] + later * wobble[5])
-    across = stiffer * (wobble[6] + later * wobble[7])
+    along, across = wobble[4] + later * wobble[5], wobble[6] + later * wobble[7]
     c2, s2 = cos(2.0 * (psi + heading)), sin(2.0 * (psi + heading))
     a, b = along * c2 + across * s2, across * c2 - along * s2
+    # the axis: a moment about one at the angle chi tells axes apart by -i k exp(2 i chi), and turns the wobble by k,
+    # which has the sign opposite to the spin where the moment grows with the angle of attack
+    mirror = copysign(1.0 / sqrt(along * along + across * across + _NO_AXIS), -w[2])
+    ux, uy = -b * mirror, a * mirror
+    a, b = stiffer * a, stiffer * b
+    bx, by = c * state[14] - s * state[15], s * state[14] + c * state[15]
+    wx, wy = w[0] * w[0] - w[1] * w[1], 2.0 * w[0] * w[1]
+    px, py = bx * wx - by * wy, bx * wy + by * wx
     dw[0] = (Iyy - Izz) / Ixx * w[1] * w[2] + c * mx + s * my - decay * w[0] - faster * w[1]
     dw[0] += a * w[0] + b * w[1]
     dw[1] = (Izz - Ixx) / Iyy * w[2] * w[0] + c * my - s * mx - decay * w[1] + faster * w[0]
     dw[1] += b * w[0] - a * w[1]
+    dw[0] += px + ux * px + uy * py
+    dw[1] += py + uy * px - ux * py
     dw[2] = (Ixx - Iyy) / Izz * w[0] * w[1] + (state[4] + since * state[5]) * w[2]
     dw[2] += spin_step(p.event_spin_step, t, w[2])
 
@@ -186,7 +203,7 @@ def free_spin_pieces(
     rows: FloatArray,
     ends: FloatArray,
 ) -> None:
-    """Spin freely from states (c, 14); wobbles (c, 10) as for `_spinning`. Else as `flight_pieces`.
+    """Spin freely from states (c, 16); wobbles (c, 10) as for `_spinning`. Else as `flight_pieces`.
 
     Rates by the classical fourth-order steps, attitude by the fourth-order Magnus step through them.
     """
@@ -244,6 +261,7 @@ def free_spin_pieces(
         end[2], end[3] = cosine * state[2] + sine * state[3], cosine * state[3] - sine * state[2]
         end[4], end[5] = state[4] + span * state[5], state[5]
         end[6:10], end[10:13], end[13] = attitude[last], rate[last], state[13]
+        end[14], end[15] = cosine * state[14] - sine * state[15], sine * state[14] + cosine * state[15]
 
 
 @compiled

@@ -35,8 +35,8 @@ _LOOSE = {
     "rate_table": np.array([0.5]),
 }
 #: how the slopes of what a free spin does not model change from piece to piece, rad/s^3 and 1/s^2, and how much faster
-#: stiffer air turns the wobble, rad/s; for good
-_WANDER = np.array([0, 0, 300.0, 300.0, 0, 0.02, 0, 0, 0, 0, 0, 0, 0.5])
+#: stiffer air turns the wobble, rad/s, and how its stiffness bends, 1/rad; for good
+_WANDER = np.array([0, 0, 300.0, 300.0, 0, 0.02, 0, 0, 0, 0, 0, 0, 0.5, 0.5, 0.5])
 NO_JUMPS = {
     "flight": Jumps(np.zeros(12)),
     "free_spin": Jumps(_WANDER),

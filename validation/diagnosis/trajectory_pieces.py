@@ -73,7 +73,7 @@ CORNER = 4e-3
 #: half the differences of states: m, m/s, rad, rad/s
 STEPS = {
     "flight": np.repeat([1e-3, 1e-3, 1e-5, 1e-4], 3),
-    "free_spin": np.array([1e-2, 1e-2, 1e-2, 1e-2, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-3]),
+    "free_spin": np.array([1e-2, 1e-2, 1e-2, 1e-2, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-3, 3e-3, 3e-3]),
     "spin_down": np.array([1e-5, 1e-4]),
     "rate_table": np.array([1e-5]),
 }
@@ -149,7 +149,7 @@ class Chain:
     @property
     def tangent(self) -> int:
         """Number of directions in which a state can move."""
-        return {"flight": 12, "free_spin": 13, "spin_down": 2, "rate_table": 1}[self.recording.plant]
+        return {"flight": 12, "free_spin": 15, "spin_down": 2, "rate_table": 1}[self.recording.plant]
 
 
 @dataclass(frozen=True)

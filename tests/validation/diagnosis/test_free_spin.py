@@ -53,13 +53,14 @@ def left_by(fit: Fit) -> float:
     return float(np.mean(np.concatenate(turning) ** 2))
 
 
-def test_air_that_is_stiffer_at_some_angles_of_attack_leaves_noise_alone(monkeypatch):
+@pytest.mark.parametrize(("place", "least"), [(12, 2.0), (13, 1.2)])
+def test_air_that_is_stiffer_at_some_angles_of_attack_leaves_noise_alone(monkeypatch, place, least):
     fit = relaxed([spin_of_tables(1.2)])
-    assert left_by(fit) < 1.2  # 700 readings: 1 +- 0.05, and pieces follow tables to a tenth
+    assert left_by(fit) < 1.1  # 700 readings: 1 +- 0.05
     held = NO_JUMPS["free_spin"].sd.copy()
-    held[12] = 0.0
+    held[place] = 0.0
     monkeypatch.setitem(NO_JUMPS, "free_spin", Jumps(held))
-    assert left_by(fit) > 2.0  # one course in time is not enough
+    assert left_by(fit) > least  # one course in time is not enough, nor is one bend
 
 
 def test_a_gyroscope_that_feels_force_feels_all_of_it_where_the_path_is_unknown():

@@ -463,7 +463,8 @@ def test_columns_of_a_free_spin_are_those_of_the_whole_motion():
     motion = flight(seconds=0.6)
     module = Instruments.from_parts("mpu9250").without("accelerometer")
     recording = record(motion, module, np.random.default_rng(1), plant="free_spin", name="spin", disc=DRIVER)
-    state = np.zeros((1, 13))
+    state = np.zeros((1, 16))
+    state[0, 14:] = 0.3, -0.2
     state[0, :6] = [1.0, -2.0, 3.0, 1.0, -0.05, 0.01]
     state[0, 6:10], state[0, 10:13] = motion.attitude[0], motion.rate[0]
     # the wind's direction in the disc's plane is told by the piece, and so differs by the square of the tilt
@@ -471,13 +472,13 @@ def test_columns_of_a_free_spin_are_those_of_the_whole_motion():
     one = chain(recording, np.array([0.0, 0.6]), state)
     three = recut(one, values, np.array([0.0, 0.2, 0.4, 0.6]))
     columns = [Column(*WOBBLE[0], 1e-3), Column(*WOBBLE[3], 1e-3), Column("body.inertia_asymmetry", "dIyy_kg_m2", 1e-7)]
-    linear = linearise(three, values, columns, np.zeros(13, dtype=np.bool_))
+    linear = linearise(three, values, columns, np.zeros(15, dtype=np.bool_))
     # what wanders is told by the piece: its slope goes on, so that three pieces are the same motion as one
     assert predictions(three, values) == pytest.approx(predictions(one, values), abs=1e-3)
-    for k in (0, 2, 4, 6, 9, 11, 12):
+    for k in (0, 2, 4, 6, 9, 11, 12, 13, 14):
         h = STEPS["free_spin"][k]
         moved = [
-            predictions(replace(one, states=shifted("free_spin", one.states, s * h * np.eye(13)[k])), values)
+            predictions(replace(one, states=shifted("free_spin", one.states, s * h * np.eye(15)[k])), values)
             for s in (1.0, -1.0)
         ]
         assert_column(linear, linear.local[:, k], (moved[1] - moved[0]) / (2.0 * h), 1e-3, k)
