@@ -9,6 +9,7 @@ import pytest
 from made import DRIVER, FIELD, MODULE, flight, release_of, rows_of
 
 from discsim.arrays import FloatArray
+from discsim.disc import Release
 from discsim.effects import effect
 from discsim.engine import fly
 from discsim.recording import Recording
@@ -26,11 +27,15 @@ from validation.diagnosis.trajectory_pieces import WOBBLE, Column
 BLIND = MODULE.without("gps").fitted("gyroscope", range=104.72)
 
 
-def spin_of_tables(seconds: float) -> Recording:
-    """Return a free spin of a disc whose coefficients are tables over the angle of attack, wobbling at 2.5 rad/s."""
-    disc, field = load_disc("cd1")
-    release = replace(release_of(0.4, 70.0), body_rate=np.array([2.0, -1.5, 70.0]))
-    motion = fly(disc, field, release, duration=seconds)
+def spin_of_tables() -> Recording:
+    """Return a free spin of a disc whose coefficients are tables over the angle of attack, thrown nose down.
+
+    That angle goes from -5 degrees to zero in 0.3 s, over corners of the table, while the disc wobbles at 2.5 rad/s.
+    """
+    disc, field = load_disc("dd2")
+    rate = np.array([0.0, 0.4, -55.0])
+    release = Release(np.array([0.0, 0.0, -1.2]), np.array([0.0, -23.7, -4.0]), 0.08, -0.28, -1.6, rate)
+    motion = fly(disc, field, release, duration=1.2)
     bare = replace(disc, aero=None, aero_table=None, yaw_damping_table=None, sigma={})
     return record(motion, BLIND, np.random.default_rng(3), plant="free_spin", name="tables", disc=bare)
 
@@ -53,14 +58,15 @@ def left_by(fit: Fit) -> float:
     return float(np.mean(np.concatenate(turning) ** 2))
 
 
-@pytest.mark.parametrize(("place", "least"), [(12, 2.0), (13, 1.2)])
-def test_air_that_is_stiffer_at_some_angles_of_attack_leaves_noise_alone(monkeypatch, place, least):
-    fit = relaxed([spin_of_tables(1.2)])
-    assert left_by(fit) < 1.1  # 700 readings: 1 +- 0.05
-    held = NO_JUMPS["free_spin"].sd.copy()
-    held[place] = 0.0
-    monkeypatch.setitem(NO_JUMPS, "free_spin", Jumps(held))
-    assert left_by(fit) > least  # one course in time is not enough, nor is one bend
+def test_air_that_is_stiffer_at_some_angles_of_attack_leaves_noise_alone(monkeypatch):
+    fit = relaxed([spin_of_tables()])
+    assert left_by(fit) < 1.4  # 700 readings: 1 +- 0.05, and what is sharper than a piece is not followed
+    for places in ([12], [13, 14]):  # one course in time is not enough, nor is one bend
+        held = NO_JUMPS["free_spin"].sd.copy()
+        held[places] = 0.0
+        with monkeypatch.context() as patch:
+            patch.setitem(NO_JUMPS, "free_spin", Jumps(held))
+            assert left_by(fit) > 3.0
 
 
 def test_a_gyroscope_that_feels_force_feels_all_of_it_where_the_path_is_unknown():
