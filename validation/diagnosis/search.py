@@ -23,9 +23,11 @@ from validation.diagnosis.selection import (
     RIVAL,
     Hypothesis,
     Proposal,
+    Start,
     Tied,
     fitted_parameters,
     one_per_effect,
+    pairs,
     price,
     proposals,
     tied_fit,
@@ -37,7 +39,6 @@ from validation.diagnosis.trials import Trial, parameters_of, trials_for
 __all__ = ["Considered", "Rival", "Search", "search"]
 
 Report: TypeAlias = Callable[[str, int, int], None]
-Start: TypeAlias = dict[tuple[tuple[str, str], frozenset[int] | None], float]
 
 #: how many effects are ever added
 MOST_EFFECTS = 4
@@ -119,8 +120,16 @@ def search(recordings: Sequence[Recording], report: Report = lambda stage, done,
     found.outliers = left_out
     current = base
     for step in range(MOST_EFFECTS):
+        if len(current.hypothesis.trials) >= MOST_EFFECTS:
+            break
         report("refitting candidates", 3, 4)
         better = _next(found, board, current, step)
+        if step == 0 and (better is None or (_far(found, better) and not better.hypothesis.trials[-1].told)):
+            together = _together(found, board)
+            if together is not None:
+                current = _pruned(found, together)
+                found.steps.append(current)
+                continue
         if better is None:
             break
         again = _from_there(found, current, better)
@@ -130,11 +139,11 @@ def search(recordings: Sequence[Recording], report: Report = lambda stage, done,
             if step == 0:
                 found.base = again
             break
-        if step >= 1 and chi2_in(better, noise) > FAR * better.fit.count:
+        if step >= 1 and _far(found, better):
             # two effects and still far from the data: none of these
             current = better
             break
-        current = _pruned(found, better)
+        current = _pruned(found, better, kept=better.hypothesis.trials[-1])
         found.steps.append(current)
     found.final = current
     found.board = board_of(found.final.fit, trials, found.final.fit.noise, NO_JUMPS[plant])
@@ -170,9 +179,13 @@ def chi2_in(tied: Tied, noise: NoiseModel) -> float:
     )
 
 
+def _far(found: Search, tied: Tied) -> bool:
+    """Tell whether a fit is far from the data."""
+    return chi2_in(tied, found.loose_noise) > FAR * tied.fit.count
+
+
 def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     """Return the fit with the best further effect, or None where none is worth its price."""
-    plant = found.recordings[0].plant
     noise = found.loose_noise
     chi2_now = chi2_in(current, noise)
     far = chi2_now > FAR * current.fit.count
@@ -181,7 +194,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
         ranked = one_per_effect(proposals(board, found.trials, current.hypothesis, found.own))
         offered += [(p, found.loose, 0.0) for p in ranked]
     if not far or step > 0:
-        near = board_of(current.fit, found.trials, current.fit.noise, NO_JUMPS[plant])
+        near = board_of(current.fit, found.trials, current.fit.noise, NO_JUMPS[found.recordings[0].plant])
         offered += [
             (_from_here(p, current), current.fit, 0.0)
             for p in one_per_effect(proposals(near, found.trials, current.hypothesis, found.own))
@@ -204,29 +217,21 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
         if len(seen) >= (REFITTED if near_data else REFITTED_AT_MOST):
             break
         seen.add(key)
-        hypothesis = current.hypothesis.plus(proposal.trial)
         if proposal.trial.id == "accel.saturation":
             # readings at the limit take no part in a fit: what the motion asks for beyond it is the evidence
             cost = -proposal.gain
         refitted = tied_fit(
             fit,
-            hypothesis,
+            current.hypothesis.plus(proposal.trial),
             found.own,
             noise if far else current.fit.noise,
             {**values_of_fit(current), **proposal.start, **_wobbles(fit)},
         )
         refitted = replace(refitted, score=refitted.score + found.cost + cost)
-        gain = current.score - refitted.score
-        chi2 = chi2_in(refitted, noise)
-        values = {
-            q.name: float(v)
-            for q, v in zip(refitted.fit.parameters, refitted.fit.at, strict=True)
-            if q.group == proposal.trial.id and q.recordings == proposal.trial.recordings
-        }
-        found.considered.append(Considered(proposal.trial, gain, chi2_now - chi2, values))
+        gain, chi2 = _consider(found, current, refitted, proposal.trial)
         if gain > price(proposal.trial) and _possible(refitted):
             # far from the data chi-squared says more than a likelihood that has swallowed the mismatch as noise
-            merit = (chi2 + cost if far else refitted.score) + RIVAL * hypothesis.size
+            merit = (chi2 + cost if far else refitted.score) + RIVAL * refitted.hypothesis.size
             fits.append((merit, refitted, fit, cost))
             near_data |= chi2 < _NEAR * refitted.fit.count
     if not fits:
@@ -236,6 +241,42 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     if cost > 0:
         found.loose = replace(found.loose, chains=fit.chains)
     return best
+
+
+def _consider(found: Search, current: Tied, refitted: Tied, trial: Trial) -> tuple[float, float]:
+    """Note what a trial gains upon a fit; return the gain, and the chi-squared that is left."""
+    gain = current.score - refitted.score
+    chi2 = chi2_in(refitted, found.loose_noise)
+    values = {
+        q.name: float(v)
+        for q, v in zip(refitted.fit.parameters, refitted.fit.at, strict=True)
+        if q.group == trial.id and q.recordings == trial.recordings
+    }
+    found.considered.append(Considered(trial, gain, chi2_in(current, found.loose_noise) - chi2, values))
+    return gain, chi2
+
+
+#: how many pairs of effects are refitted where no effect alone comes near the data
+_PAIRS_REFITTED = 5
+
+
+def _together(found: Search, board: Board) -> Tied | None:
+    """Return the fit with the best two effects where it comes near the data, else None.
+
+    Far from the data each of two effects alone may be fitted with numbers that serve for both, and a third may do
+    better than either; algebra about the fit that follows the data tells both at once.
+    """
+    base, noise = found.base, found.loose_noise
+    for pair in pairs(board, found.trials, found.own)[:_PAIRS_REFITTED]:
+        start = {**pair.start, **_wobbles(found.loose)}
+        both = tied_fit(found.loose, pair.hypothesis, found.own, noise, start)
+        both = replace(both, score=both.score + found.cost)
+        for trial in pair.hypothesis.trials:
+            _consider(found, base, both, trial)
+        worth = base.score - both.score > sum(map(price, pair.hypothesis.trials))
+        if worth and _possible(both) and not _far(found, both):
+            return both
+    return None
 
 
 #: where most readings lie within this many times the stated noise, what raises its level is short
@@ -295,12 +336,12 @@ def _possible(tied: Tied) -> bool:
     return True
 
 
-def _pruned(found: Search, current: Tied) -> Tied:
-    """Leave out effects that the later ones have made superfluous."""
+def _pruned(found: Search, current: Tied, kept: Trial | None = None) -> Tied:
+    """Leave out effects that the others have made superfluous, but for one that is ``kept``."""
     while len(current.hypothesis.trials) > 1:
         weakest: Tied | None = None
-        for trial in current.hypothesis.trials[:-1]:
-            if trial.told:  # kept in the chains whatever the hypothesis says
+        for trial in current.hypothesis.trials:
+            if trial.told or trial is kept:  # what is told is kept in the chains whatever the hypothesis says
                 continue
             less = tied_fit(
                 current.fit,

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
+from typing import TypeAlias
 
 import numpy as np
 
 from discsim.arrays import FloatArray
-from validation.diagnosis.board import Board, free_columns
+from validation.diagnosis.board import Answer, Board, free_columns
 from validation.diagnosis.fitting import Fit, Parameter, penalty_of, refit, values_of
 from validation.diagnosis.noise import NoiseModel, estimate_noise, likeliest_noise, log_likelihood
 from validation.diagnosis.readings import CLOCKS
 from validation.diagnosis.relaxed import NO_JUMPS, beginning
-from validation.diagnosis.trajectory_pieces import Chain
+from validation.diagnosis.trajectory_pieces import Chain, Column
 from validation.diagnosis.trials import Trial, parameters_of
 
-__all__ = ["Hypothesis", "Tied", "price", "tied_fit"]
+__all__ = ["Hypothesis", "Start", "Tied", "price", "tied_fit"]
+
+#: values of parameters by what they are and the recordings that share them
+Start: TypeAlias = Mapping[tuple[tuple[str, str], frozenset[int] | None], float]
 
 #: what evidence costs: twice the log likelihood that an effect must gain, and more for each of its parameters
 ENTRY, PER_PARAMETER, EVENT_ENTRY = 24.0, 4.0, 42.0
@@ -113,7 +118,7 @@ def tied_fit(
     hypothesis: Hypothesis,
     own: Sequence[Parameter],
     noise: NoiseModel,
-    start: Mapping[tuple[tuple[str, str], frozenset[int] | None], float],
+    start: Start,
     *,
     iterations: int = 8,
     polish: int = 2,
@@ -193,7 +198,7 @@ class Proposal:
 
     trial: Trial
     gain: float
-    start: Mapping[tuple[tuple[str, str], frozenset[int] | None], float]
+    start: Start
 
 
 def proposals(
@@ -220,17 +225,9 @@ def proposals(
             rest = [(c, q) for c, q in taken if q.key not in {p.key for _, p in columns} or scope is not None]
             answer = board.ask([*rest, *columns])
             gain = base - answer.chi2
-            if any(
-                q.key in ONE_SIDED and ONE_SIDED[q.key] * float(v) < 0
-                for (_, q), v in zip(columns, answer.value[len(rest) :], strict=True)
-            ):
+            if _backwards([*rest, *columns], answer):
                 continue
-            start = {
-                (q.key, q.recordings): q.stated + float(v)
-                for (_, q), v in zip([*rest, *columns], answer.value, strict=True)
-            }
-            start |= {((trial.id, name), scope): value for name, value in trial.shapes.items()}
-            proposal = Proposal(scoped, gain, start)
+            proposal = Proposal(scoped, gain, _start([*rest, *columns], answer, (scoped,)))
             # one recording alone must do better than all by what choosing it costs
             if best is None or gain > best.gain + (2.0 * np.log(board.recordings) + 6.0 if scope is not None else 0.0):
                 best = proposal
@@ -239,9 +236,51 @@ def proposals(
     return sorted(found, key=lambda p: RIVAL * len(parameters_of(p.trial)) - p.gain)
 
 
+def _backwards(asked: Sequence[tuple[Column, Parameter]], answer: Answer) -> bool:
+    """Tell whether algebra wants a friction that drives or a lag that is early."""
+    return any(
+        q.key in ONE_SIDED and ONE_SIDED[q.key] * float(v) < 0 for (_, q), v in zip(asked, answer.value, strict=True)
+    )
+
+
+def _start(asked: Sequence[tuple[Column, Parameter]], answer: Answer, trials: Sequence[Trial]) -> Start:
+    """Return the values of an answer, and those at which its trials are shaped."""
+    start = {(q.key, q.recordings): q.stated + float(v) for (_, q), v in zip(asked, answer.value, strict=True)}
+    for trial in trials:
+        start |= {((trial.id, name), trial.recordings): value for name, value in trial.shapes.items()}
+    return start
+
+
 def one_per_effect(found: Sequence[Proposal]) -> list[Proposal]:
     """Keep the best shape of each effect."""
     seen: dict[str, Proposal] = {}
     for proposal in found:
         seen.setdefault(proposal.trial.id, proposal)
     return list(seen.values())
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two effects, what is left with both by algebra, charged for parameters, and values to start from."""
+
+    hypothesis: Hypothesis
+    merit: float
+    start: Start
+
+
+def pairs(board: Board, trials: Sequence[Trial], own: Sequence[Parameter]) -> list[Pair]:
+    """Return what algebra expects of every two effects in all recordings, the best shapes of each, best pair first."""
+    taken = board.columns_of(fitted_parameters(Hypothesis(), own))
+    found: dict[tuple[str, str], Pair] = {}
+    for both in combinations(trials, 2):
+        ids = both[0].id, both[1].id
+        if ids[0] == ids[1]:
+            continue
+        freed = [item for trial in both for item in free_columns(trial)]
+        asked = [*((c, q) for c, q in taken if q.key not in {p.key for _, p in freed}), *freed]
+        answer = board.ask(asked)
+        hypothesis = Hypothesis(both)
+        merit = answer.chi2 + RIVAL * hypothesis.size
+        if merit < (found[ids].merit if ids in found else np.inf) and not _backwards(asked, answer):
+            found[ids] = Pair(hypothesis, merit, _start(asked, answer, both))
+    return sorted(found.values(), key=lambda pair: pair.merit)
