@@ -91,8 +91,23 @@ def confusions(found: Search, trial: Trial) -> list[Rival]:
     return [
         rival
         for rival in found.rivals.get(trial.name, [])
-        if rival.worse < CONFUSED + 4.0 * max(0, len(parameters_of(rival.trial)) - size)
+        if rival.worse < CONFUSED + 4.0 * max(0, len(parameters_of(rival.trial)) - size) and not _become(rival, trial)
     ]
+
+
+#: (an effect, what it is at one shape) -> the parameter that shapes it, its value there, and how well it must be known
+_SPECIAL = {("air.wind_shear", "air.wind"): ("exponent", 0.0, 0.05)}
+
+
+def _become(rival: Rival, trial: Trial) -> bool:
+    """Tell whether the recordings shape a rival so that it is the effect in whose place it stands."""
+    if (rival.trial.id, trial.id) not in _SPECIAL:
+        return False
+    name, value, known = _SPECIAL[rival.trial.id, trial.id]
+    fit = rival.tied.fit
+    place = next(k for k, q in enumerate(fit.parameters) if q.key == (rival.trial.id, name))
+    sd = float(np.sqrt(max(float(fit.covariance[place, place]), 0.0)))
+    return 0.0 < sd < known and abs(float(fit.at[place]) - value) < 3.0 * sd
 
 
 def advise(found: Search, names: Sequence[str], plans: Sequence[Plan] | None = None) -> dict[tuple[str, str], Advice]:

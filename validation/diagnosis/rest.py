@@ -1,7 +1,8 @@
 """Is what is left noise? Tests of residuals that no first-order noise could have made.
 
 A sensor whose noise is larger or slower than stated is no physics. What tells the two apart: noise with one level and
-one correlation, once whitened, is flat over frequency and the same at all times; missing physics is neither.
+one correlation, once whitened, is flat over frequency and the same at all times; missing physics is neither. And what
+is many times as loud as stated and hardly changes within a recording is no noise.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ WINDOW, WINDOW_Z = 24, 9.0
 WILD = 30.0
 #: terms of a course over time that recordings may have in common, and what it must gain in twice the log likelihood
 COURSE_TERMS, COURSE_GAIN = 5, 90.0
+#: a sensor is no longer merely noisy where its noise is more than this many times as loud as stated, and slower than
+#: this share of the longest recording
+LOUD, SLOW = 10.0, 0.1
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,12 @@ def remainders(linears: Sequence[Linear], residuals: Sequence[FloatArray], noise
         whitened(linear, noise, residual[:, None])[:, 0] for linear, residual in zip(linears, residuals, strict=True)
     ]
     return sorted(
-        [*_bands(linears, white), *_windows(linears, white), *_courses(linears, residuals, noise)],
+        [
+            *_bands(linears, white),
+            *_windows(linears, white),
+            *_courses(linears, residuals, noise),
+            *_swallowed(linears, noise),
+        ],
         key=lambda item: -item.z,
     )
 
@@ -135,6 +144,25 @@ def _courses(linears: Sequence[Linear], residuals: Sequence[FloatArray], noise: 
             after = min(after, sum(log_likelihood(linear, now, e) for linear, e in zip(alone, left, strict=True)))
         if before - after > COURSE_GAIN:
             found.append(Remainder(group, None, "course", float(np.sqrt(before - after)), 0.0, max(ends)))
+    return found
+
+
+def _swallowed(linears: Sequence[Linear], noise: NoiseModel) -> list[Remainder]:
+    """Test that no noise so loud and slow was supposed that it has swallowed what is missing."""
+    found = []
+    for group, slow in noise.items():
+        if slow.correlation <= 0.0:
+            continue
+        channels = [(linear, c) for linear in linears for c in linear.channels if c.group == group and c.index.size > 1]
+        if not channels:
+            continue
+        stated = float(channels[0][0].sd[channels[0][1].rows][0])
+        times = [linear.t[c.rows] for linear, c in channels]
+        interval = float(np.median(np.diff(times[0])))
+        longest = max(float(t[-1] - t[0]) for t in times)
+        time = -interval / float(np.log(slow.correlation))
+        if slow.sd > LOUD * stated and time > SLOW * longest:
+            found.append(Remainder(group, None, "swallowed", slow.sd / stated, 0.0, max(float(t[-1]) for t in times)))
     return found
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import zip_longest
 from typing import TypeAlias
 
 import numpy as np
@@ -39,6 +40,8 @@ from validation.diagnosis.trials import Trial, parameters_of, trials_for
 __all__ = ["Considered", "Rival", "Search", "search"]
 
 Report: TypeAlias = Callable[[str, int, int], None]
+#: what is proposed, the fit whose motion a fit of it starts from, and what choosing lost samples costs
+Offer: TypeAlias = tuple[Proposal, Fit, float]
 
 #: how many effects are ever added
 MOST_EFFECTS = 4
@@ -145,9 +148,15 @@ def search(recordings: Sequence[Recording], report: Report = lambda stage, done,
             break
         current = _pruned(found, better, kept=better.hypothesis.trials[-1])
         found.steps.append(current)
-    found.final = current
-    found.board = board_of(found.final.fit, trials, found.final.fit.noise, NO_JUMPS[plant])
-    _rivals(found)
+    for _ in range(_EXCHANGES + 1):
+        found.final = current
+        found.board = board_of(current.fit, trials, current.fit.noise, NO_JUMPS[plant])
+        found.rivals = _rivals(found)
+        better = _exchanged(found)
+        if better is None:
+            break
+        current = better
+        found.steps.append(current)
     report("done", 4, 4)
     return found
 
@@ -189,24 +198,27 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     noise = found.loose_noise
     chi2_now = chi2_in(current, noise)
     far = chi2_now > FAR * current.fit.count
-    offered: list[tuple[Proposal, Fit, float]] = []
+    # what is asked of the relaxed fit, and of the present one
+    there: list[Offer] = []
+    here: list[Offer] = []
     if far or step == 0:
         ranked = one_per_effect(proposals(board, found.trials, current.hypothesis, found.own))
-        offered += [(p, found.loose, 0.0) for p in ranked]
+        there += [(p, found.loose, 0.0) for p in ranked]
     if not far or step > 0:
         near = board_of(current.fit, found.trials, current.fit.noise, NO_JUMPS[found.recordings[0].plant])
-        offered += [
+        here += [
             (_from_here(p, current), current.fit, 0.0)
             for p in one_per_effect(proposals(near, found.trials, current.hypothesis, found.own))
         ]
     for item in searched(found.loose, current, found.own, _steady_noise(found)):
         if isinstance(item, Shifted):
-            offered.append((item.proposal, replace(found.loose, chains=item.chains), item.cost))
+            there.append((item.proposal, replace(found.loose, chains=item.chains), item.cost))
+        elif current.hypothesis.trials:
+            here.append((item, found.loose if far else current.fit, 0.0))
         else:
-            offered.append((item, current.fit if not far and current.hypothesis.trials else found.loose, 0.0))
-    worth = [item for item in offered if item[0].gain > 0.5 * price(item[0].trial)]
-    # lost samples first: they bend what algebra says of everything else
-    worth.sort(key=lambda item: (item[2] <= 0.0, RIVAL * len(parameters_of(item[0].trial)) - item[0].gain))
+            there.append((item, found.loose, 0.0))
+    # far from the data the two are asked in different noise: what they gain does not compare
+    worth = _in_turn(there, here) if far and step > 0 else _in_turn([*there, *here])
     fits: list[tuple[float, Tied, Fit, float]] = []
     seen: set[tuple[str, frozenset[int] | None]] = set()
     near_data = chi2_now < _NEAR * current.fit.count
@@ -241,6 +253,17 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     if cost > 0:
         found.loose = replace(found.loose, chains=fit.chains)
     return best
+
+
+def _in_turn(*offers: Sequence[Offer]) -> list[Offer]:
+    """Return offers that may be worth their price, from each list the best in turn."""
+
+    def later(offer: Offer) -> tuple[bool, float]:
+        # lost samples first: they bend what algebra says of everything else
+        return offer[2] <= 0.0, RIVAL * len(parameters_of(offer[0].trial)) - offer[0].gain
+
+    worth = [sorted((o for o in some if o[0].gain > 0.5 * price(o[0].trial)), key=later) for some in offers]
+    return [offer for turn in zip_longest(*worth) for offer in turn if offer is not None]
 
 
 def _consider(found: Search, current: Tied, refitted: Tied, trial: Trial) -> tuple[float, float]:
@@ -324,14 +347,25 @@ def _from_here(proposal: Proposal, current: Tied) -> Proposal:
     return replace(proposal, start={**values_of_fit(current), **own})
 
 
+#: effects whose parameters are distances from the disc's centre or from another place on it, m
+_ON_THE_DISC = ("accel.position_offset", "body.mass_imbalance")
+
+
 def _possible(tied: Tied) -> bool:
-    """Tell whether a fit's parameters make sense: friction does not drive, an event is told from the start."""
+    """Tell whether a fit's parameters make sense.
+
+    Friction does not drive, an event is told from the start, neither a sensor nor the centre of mass lies off the disc.
+    """
     sd = np.sqrt(np.maximum(np.diag(tied.fit.covariance), 0.0))
-    plant = tied.fit.chains[0].recording.plant
+    recording = tied.fit.chains[0].recording
+    plant = recording.plant
+    radius = np.inf if recording.disc is None else 0.5 * recording.disc.diameter
     for q, value, error in zip(tied.fit.parameters, tied.fit.at, sd, strict=True):
         if q.key in ONE_SIDED and ONE_SIDED[q.key] * value < -3.0 * error:
             return False
         if q.key == ("event.spin_step", "t_s") and value < EARLIEST[plant]:
+            return False
+        if q.group in _ON_THE_DISC and abs(value) - 3.0 * error > radius:
             return False
     return True
 
@@ -359,29 +393,39 @@ def _pruned(found: Search, current: Tied, kept: Trial | None = None) -> Tied:
     return current
 
 
-def _rivals(found: Search) -> None:
-    """Find effects that could stand in for a named one."""
+#: rivals that algebra finds worse than this in chi-squared, and than this share of what the effect gains, are none
+_WORST, _WORST_SHARE = 60.0, 0.05
+
+
+def _rivals(found: Search) -> dict[str, list[Rival]]:
+    """Return the effects that could stand in for a named one, by its name."""
     final = found.final
     board = found.board
     assert board is not None
+    rivals: dict[str, list[Rival]] = {}
     for trial in final.hypothesis.trials:
         if trial.told:  # found in the readings themselves, and kept in the chains: nothing else could do it from there
             continue
         rest = final.hypothesis.without(trial)
         taken = board.columns_of(fitted_parameters(rest, found.own))
         best = board.ask(board.columns_of(fitted_parameters(final.hypothesis, found.own))).chi2
+        # of a large effect algebra knows the last percents badly
+        worst = max(_WORST, _WORST_SHARE * (board.ask(taken).chi2 - best))
         near = []
         for other in found.trials:
             if other.id == trial.id or any(other.id == t.id for t in rest.trials):
                 continue
             scoped = replace(other, recordings=trial.recordings)
-            worse = board.ask([*taken, *free_columns(scoped)]).chi2 - best
-            near.append((worse, scoped))
+            freed = free_columns(scoped)
+            answer = board.ask([*taken, *freed])
+            values = answer.value[len(taken) :]
+            start = {(q.key, q.recordings): q.stated + float(v) for (_, q), v in zip(freed, values, strict=True)}
+            near.append((answer.chi2 - best, scoped, start))
         near.sort(key=lambda item: item[0])
-        found.rivals[trial.name] = []
+        rivals[trial.name] = []
         seen: set[str] = set()
-        for worse, scoped in near:
-            if scoped.id in seen or worse > 60.0 or len(seen) >= 3:
+        for worse, scoped, start in near:
+            if scoped.id in seen or worse > worst or len(seen) >= 3:
                 continue
             seen.add(scoped.id)
             other_fit = tied_fit(
@@ -389,9 +433,31 @@ def _rivals(found: Search) -> None:
                 rest.plus(scoped),
                 found.own,
                 final.fit.noise,
-                {**values_of_fit(final), **_shape_start(scoped)},
+                {**values_of_fit(final), **start, **_shape_start(scoped)},
             )
-            found.rivals[trial.name].append(Rival(scoped, other_fit.score - final.score, other_fit))
+            other_fit = replace(other_fit, score=other_fit.score + found.cost)
+            rivals[trial.name].append(Rival(scoped, other_fit.score - final.score, other_fit))
+    return rivals
+
+
+#: how often a named effect may give way to another, and by how much that must be better than chance makes it
+_EXCHANGES, _BETTER = 2, 2.0
+
+
+def _exchanged(found: Search) -> Tied | None:
+    """Return the fit with a rival in the place of a named effect where that explains more for its parameters.
+
+    An effect that was taken up while another was missing may have been the one that bends most, not the right one.
+    """
+    own = {trial.name: len(parameters_of(trial)) for trial in found.final.hypothesis.trials}
+    better = [
+        (rival.worse + RIVAL * (len(parameters_of(rival.trial)) - own[name]), rival)
+        for name, rivals in found.rivals.items()
+        for rival in rivals
+        if _possible(rival.tied)
+    ]
+    merit, best = min(better, key=lambda item: item[0], default=(0.0, None))
+    return best.tied if best is not None and merit < -_BETTER else None
 
 
 def _shape_start(trial: Trial) -> Start:

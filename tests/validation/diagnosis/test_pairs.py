@@ -1,20 +1,24 @@
-"""Two effects at once: what algebra expects of every pair, and the search where no effect alone comes near the data."""
+"""Two effects: what algebra expects of every pair, and the search where no effect alone comes near the data."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
+import numpy as np
 import pytest
 from made import throws
 
 from discsim.effects import Effect, effect
 from validation.diagnosis import search as searching
+from validation.diagnosis.advice import confusions
 from validation.diagnosis.board import board_of
 from validation.diagnosis.noise import estimate_noise
 from validation.diagnosis.relaxed import NO_JUMPS, relaxed, unknowns
-from validation.diagnosis.selection import Pair, fitted_parameters, pairs
+from validation.diagnosis.search import Rival
+from validation.diagnosis.selection import Hypothesis, Pair, Proposal, Tied, fitted_parameters, pairs
 from validation.diagnosis.stated import stated_parameters
-from validation.diagnosis.trials import trials_for
+from validation.diagnosis.trials import Trial, trials_for
 
 YAW, CLOCK = effect("aero.yaw_reynolds", exponent=0.3), effect("mag.clock_rate", ratio=0.9996)
 
@@ -69,3 +73,71 @@ def test_of_two_at_once_the_superfluous_one_goes(monkeypatch):
 def test_two_at_once_are_not_named_where_there_is_nothing(monkeypatch):
     monkeypatch.setattr(searching, "_next", lambda *_: None)
     assert named([], []) == []
+
+
+@cache
+def windy() -> searching.Search:
+    """Return what is found in throws through a wind that is the same at every height."""
+    return searching.search(throws([effect("air.wind", w_north_m_s=-1.4, w_east_m_s=-1.0)], seconds=2.0))
+
+
+def of(id: str) -> Trial:
+    return next(trial for trial in windy().trials if trial.id == id)
+
+
+def test_an_effect_gives_way_to_one_that_explains_as_much_with_fewer_parameters():
+    sheared = searching.tied_fit(
+        windy().loose, Hypothesis((of("air.wind_shear"),)), windy().own, windy().loose_noise, {}
+    )
+    found = replace(windy(), final=sheared)
+    found.board = board_of(sheared.fit, found.trials, sheared.fit.noise, NO_JUMPS["flight"])
+    found.rivals = searching._rivals(found)
+    assert next(rival.trial.id for rival in found.rivals["air.wind_shear"]) == "air.wind"
+    better = searching._exchanged(found)
+    assert better is not None
+    assert [trial.id for trial in better.hypothesis.trials] == ["air.wind"]
+
+
+def test_an_effect_does_not_give_way_to_one_that_needs_more_parameters_for_the_same():
+    assert [trial.id for trial in windy().final.hypothesis.trials] == ["air.wind"]
+    assert searching._exchanged(windy()) is None
+
+
+def test_a_shear_that_is_known_to_have_none_is_not_confused_with_the_wind():
+    (wind,) = windy().final.hypothesis.trials
+    sheared = searching.tied_fit(
+        windy().loose, Hypothesis((of("air.wind_shear"),)), windy().own, windy().loose_noise, {}
+    )
+    place = [q.name for q in sheared.fit.parameters].index("exponent")
+    assert sheared.fit.covariance[place, place] ** 0.5 < 0.05
+    found = replace(windy(), rivals={wind.name: [Rival(of("air.wind_shear"), 0.0, sheared)]})
+    assert confusions(found, wind) == []
+    # where the exponent is not known, nobody can tell
+    wide = replace(sheared, fit=replace(sheared.fit, covariance=1e4 * sheared.fit.covariance))
+    found = replace(windy(), rivals={wind.name: [Rival(of("air.wind_shear"), 0.0, wide)]})
+    assert [rival.trial.id for rival in confusions(found, wind)] == ["air.wind_shear"]
+
+
+def test_a_sensor_far_off_the_disc_is_impossible():
+    trial = of("accel.position_offset")
+    places = ((trial.id, name) for name in ("dx_m", "dy_m", "dz_m"))
+    values = dict.fromkeys(((key, None) for key in places), 1e-4)
+    fit = searching.tied_fit(
+        windy().loose, Hypothesis((trial,)), windy().own, windy().loose_noise, values, iterations=0, polish=0
+    )
+
+    def with_offset(x: float) -> Tied:
+        at = fit.fit.at.copy()
+        at[[q.name for q in fit.fit.parameters].index("dx_m")] = x
+        return replace(fit, fit=replace(fit.fit, at=at, covariance=1e-6 * np.eye(at.size)))
+
+    assert searching._possible(with_offset(0.1))
+    assert not searching._possible(with_offset(0.2))
+
+
+def test_offers_from_two_fits_come_in_turn_and_lost_samples_first():
+    big, small = of("air.wind"), of("aero.stall")
+    there = [(Proposal(trial, gain, {}), windy().loose, 0.0) for trial, gain in ((big, 1e6), (small, 9e5), (big, 1.0))]
+    here = [(Proposal(small, 5e3, {}), windy().loose, 0.0), (Proposal(big, 1e4, {}), windy().loose, 30.0)]
+    gains = [offer[0].gain for offer in searching._in_turn(there, here)]
+    assert gains == [1e6, 1e4, 9e5, 5e3]

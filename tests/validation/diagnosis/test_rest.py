@@ -86,3 +86,9 @@ def test_the_strongest_remainder_comes_first():
     residuals[1][300:324] += 20.0
     strengths = [item.z for item in left(residuals)]
     assert strengths == sorted(strengths, reverse=True)
+
+
+@pytest.mark.parametrize(("sd", "phi", "kinds"), [(30.0, 0.995, ["swallowed"]), (30.0, 0.9, []), (3.0, 0.995, [])])
+def test_what_is_many_times_as_loud_as_stated_and_hardly_changes_is_no_noise(sd: float, phi: float, kinds: list[str]):
+    """Loud noise is noise, and slow noise is; what is both has swallowed something that is missing."""
+    assert [item.kind for item in left(noise(3, sd, phi))] == kinds
