@@ -127,7 +127,7 @@ def search(recordings: Sequence[Recording], report: Report = lambda stage, done,
             break
         report("refitting candidates", 3, 4)
         better = _next(found, board, current, step)
-        if step == 0 and (better is None or (_far(found, better) and not better.hypothesis.trials[-1].told)):
+        if step == 0 and _far(found, base) and (better is None or _far(found, better)) and not _told(better):
             together = _together(found, board)
             if together is not None:
                 current = _pruned(found, together)
@@ -191,6 +191,11 @@ def chi2_in(tied: Tied, noise: NoiseModel) -> float:
 def _far(found: Search, tied: Tied) -> bool:
     """Tell whether a fit is far from the data."""
     return chi2_in(tied, found.loose_noise) > FAR * tied.fit.count
+
+
+def _told(tied: Tied | None) -> bool:
+    """Tell whether a fit's last effect was found in the readings themselves and is in its chains."""
+    return tied is not None and bool(tied.hypothesis.trials[-1].told)
 
 
 def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:

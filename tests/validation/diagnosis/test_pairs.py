@@ -70,8 +70,9 @@ def test_of_two_at_once_the_superfluous_one_goes(monkeypatch):
     assert named([YAW], []) == [YAW.id]
 
 
-def test_two_at_once_are_not_named_where_there_is_nothing(monkeypatch):
+def test_two_at_once_are_not_asked_for_near_the_data(monkeypatch):
     monkeypatch.setattr(searching, "_next", lambda *_: None)
+    monkeypatch.setattr(searching, "_together", lambda *_: pytest.fail("asked"))
     assert named([], []) == []
 
 
