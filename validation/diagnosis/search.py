@@ -121,44 +121,54 @@ def search(recordings: Sequence[Recording], report: Report = lambda stage, done,
     base = tied_fit(loose, Hypothesis(), own, noise, start, iterations=_BASE_ITERATIONS[plant])
     found = Search(tuple(recordings), own, loose, noise, trials, base, base)
     found.outliers = left_out
-    current = base
+    report("refitting candidates", 3, 4)
+    _settle(found, _grown(found, board))
+    report("done", 4, 4)
+    return found
+
+
+def _grown(found: Search, board: Board) -> Tied:
+    """Return the fit to which effects were added as long as one is worth its price."""
+    current = found.base
     for step in range(MOST_EFFECTS):
-        if len(current.hypothesis.trials) >= MOST_EFFECTS:
-            break
-        report("refitting candidates", 3, 4)
         better = _next(found, board, current, step)
-        if step == 0 and _far(found, base) and (better is None or _far(found, better)) and not _told(better):
+        if step == 0 and _far(found, current) and (better is None or _far(found, better)) and not _told(better):
             together = _together(found, board)
             if together is not None:
                 current = _pruned(found, together)
                 found.steps.append(current)
                 continue
-        if better is None:
+        if better is None or len(better.hypothesis.trials) > MOST_EFFECTS:
             break
         again = _from_there(found, current, better)
         if again is not None:
             # it was not the effect that gained, but where its fit had started
-            current = again
             if step == 0:
                 found.base = again
-            break
+            return again
         if step >= 1 and _far(found, better):
             # two effects and still far from the data: none of these
-            current = better
-            break
+            return better
         current = _pruned(found, better, kept=better.hypothesis.trials[-1])
         found.steps.append(current)
-    for _ in range(_EXCHANGES + 1):
-        found.final = current
-        found.board = board_of(current.fit, trials, current.fit.noise, NO_JUMPS[plant])
+    return current
+
+
+#: how often a named effect may give way to another, and by how much that must be better than chance makes it
+_EXCHANGES, _BETTER = 2, 2.0
+
+
+def _settle(found: Search, final: Tied) -> None:
+    """Take a fit as the final one, its effects exchanged for rivals that explain more for their parameters."""
+    for exchanges in range(_EXCHANGES + 1):
+        found.final = final
+        found.board = board_of(final.fit, found.trials, final.fit.noise, NO_JUMPS[found.recordings[0].plant])
         found.rivals = _rivals(found)
         better = _exchanged(found)
-        if better is None:
-            break
-        current = better
-        found.steps.append(current)
-    report("done", 4, 4)
-    return found
+        if better is None or exchanges == _EXCHANGES:
+            return
+        final = better
+        found.steps.append(final)
 
 
 def _start(board: Board, hypothesis: Hypothesis, own: Sequence[Parameter]) -> Start:
@@ -443,10 +453,6 @@ def _rivals(found: Search) -> dict[str, list[Rival]]:
             other_fit = replace(other_fit, score=other_fit.score + found.cost)
             rivals[trial.name].append(Rival(scoped, other_fit.score - final.score, other_fit))
     return rivals
-
-
-#: how often a named effect may give way to another, and by how much that must be better than chance makes it
-_EXCHANGES, _BETTER = 2, 2.0
 
 
 def _exchanged(found: Search) -> Tied | None:
