@@ -160,6 +160,8 @@ def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), it
     fit = replace(fit, noise=stated_noise(bare))
     fit = refit(fit, iterations=iterations, tolerance=1e-4 * sum(linear.raw.size for linear in bare))
     fit = _from_other_starts(fit)
+    if plant in ("spin_down", "rate_table"):
+        fit = _with_own_clock(fit)
     if ratio == 1.0:
         fit = _with_clocks(_led_by_others(fit))
     chains = tuple(within_range(chain, linear) for chain, linear in zip(fit.chains, fit.linears, strict=True))
@@ -258,6 +260,40 @@ def _led_by_others(fit: Fit) -> Fit:
         kept = replace(kept, linears=linears, noise={**kept.noise, sensor: level})
         return replace(kept, merit=merit_of(kept, linears))
     return fit
+
+
+#: a gyroscope on a rig whose residual is this many times its stated noise may have a clock far from right
+_LOST = 10.0
+#: a clock is taken up where it leaves less than this share of what was left of its sensor
+_RECONCILED = 0.2
+
+
+def _with_own_clock(fit: Fit) -> Fit:
+    """Fit again with a free clock of the gyroscope on a rig where the motion contradicts it and a clock reconciles it.
+
+    A rig's motion is told by others. Half a second off, a sensor's own readings would pass for noise that is slow. An
+    accelerometer is left to the search for lost samples, which look like a slow clock.
+    """
+    sensor, clock = "gyroscope", _LED["gyroscope"]
+    before = _misfit(fit, sensor)
+    if not before > _LOST:
+        return fit
+    ratio = _clock_read(fit, [one.readings for one in fit.chains], sensor, clock)
+    free = Parameter(*clock, 1.0, 1e-6, _CLOCK_SIGMA)
+    timed = replace(fit, parameters=(*fit.parameters, free), at=np.append(fit.at, ratio))
+    timed = refit(timed, iterations=8, tolerance=1e-4 * fit.count)
+    return timed if _misfit(timed, sensor) < _RECONCILED * before else fit
+
+
+def _misfit(fit: Fit, sensor: str) -> float:
+    """Return what a fit leaves of a sensor, root mean square in stated deviations; NaN where nothing is stated."""
+    left = [
+        linear.residual[c.rows] / linear.sd[c.rows]
+        for linear in fit.linears
+        for c in linear.channels
+        if c.sensor == sensor
+    ]
+    return float(np.sqrt(np.mean(np.concatenate(left) ** 2))) if left else np.nan
 
 
 def _silenced(recording: Recording, sensor: str) -> Chain:

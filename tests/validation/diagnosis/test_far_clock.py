@@ -1,0 +1,40 @@
+"""A gyroscope on a rig whose clock is so far off that its readings would pass for slow noise."""
+
+from __future__ import annotations
+
+import pytest
+from made import tables
+
+from discsim.effects import effect
+from discsim.recording import Recording
+from validation.diagnosis.relaxed import relaxed
+from validation.diagnosis.search import search
+from validation.diagnosis.stated import stated_parameters
+
+FAST = effect("gyro.clock_rate", ratio=1.017)
+KEY = ("gyro.clock_rate", "ratio")
+
+
+def clock_in(recordings: list[Recording]) -> float | None:
+    """Return the gyroscope's clock in a relaxed fit, None where it has none."""
+    fit = relaxed(recordings, stated_parameters(recordings))
+    return next((float(v) for q, v in zip(fit.parameters, fit.at, strict=True) if q.key == KEY), None)
+
+
+def test_the_relaxed_fit_of_a_table_takes_the_clock_up():
+    assert clock_in(tables(errors=[FAST])) == pytest.approx(1.017, abs=1e-4)
+
+
+def test_a_clock_that_is_right_is_left_alone():
+    assert clock_in(tables()) is None
+
+
+def test_a_scale_is_not_taken_for_a_clock():
+    assert clock_in(tables(errors=[effect("gyro.scale", sx=0.0, sy=0.0, sz=0.03)])) is None
+
+
+def test_it_is_named_alone():
+    final = search(tables(errors=[FAST])).final
+    assert [trial.id for trial in final.hypothesis.trials] == ["gyro.clock_rate"]
+    place = [q.key for q in final.fit.parameters].index(KEY)
+    assert final.fit.at[place] == pytest.approx(1.017, abs=3e-4)
