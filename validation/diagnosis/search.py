@@ -154,8 +154,9 @@ def _grown(found: Search, board: Board) -> Tied:
     return current
 
 
-#: how often a named effect may give way to another, and by how much that must be better than chance makes it
-_EXCHANGES, _BETTER = 2, 2.0
+#: how often a named effect may give way to another, and by how much that must be better than chance makes it: where it
+#: has fewer parameters, and where it has as many or more
+_EXCHANGES, _SIMPLER, _BETTER = 2, 2.0, 20.0
 
 
 def _settle(found: Search, final: Tied) -> None:
@@ -460,15 +461,14 @@ def _exchanged(found: Search) -> Tied | None:
 
     An effect that was taken up while another was missing may have been the one that bends most, not the right one.
     """
-    own = {trial.name: len(parameters_of(trial)) for trial in found.final.hypothesis.trials}
-    better = [
-        (rival.worse + RIVAL * (len(parameters_of(rival.trial)) - own[name]), rival)
-        for name, rivals in found.rivals.items()
-        for rival in rivals
-        if _possible(rival.tied)
-    ]
-    merit, best = min(better, key=lambda item: item[0], default=(0.0, None))
-    return best.tied if best is not None and merit < -_BETTER else None
+    better = []
+    for trial in found.final.hypothesis.trials:
+        for rival in found.rivals.get(trial.name, []):
+            more = len(parameters_of(rival.trial)) - len(parameters_of(trial))
+            merit = rival.worse + RIVAL * more
+            if merit < -(_SIMPLER if more < 0 else _BETTER) and _possible(rival.tied):
+                better.append((merit, rival.tied))
+    return min(better, key=lambda item: item[0])[1] if better else None
 
 
 def _shape_start(trial: Trial) -> Start:
