@@ -225,7 +225,7 @@ def proposals(
             rest = [(c, q) for c, q in taken if q.key not in {p.key for _, p in columns} or scope is not None]
             answer = board.ask([*rest, *columns])
             gain = base - answer.chi2
-            if _backwards([*rest, *columns], answer):
+            if _backwards(columns, answer):
                 continue
             proposal = Proposal(scoped, gain, _start([*rest, *columns], answer, (scoped,)))
             # one recording alone must do better than all by what choosing it costs
@@ -236,11 +236,10 @@ def proposals(
     return sorted(found, key=lambda p: RIVAL * len(parameters_of(p.trial)) - p.gain)
 
 
-def _backwards(asked: Sequence[tuple[Column, Parameter]], answer: Answer) -> bool:
-    """Tell whether algebra wants a friction that drives or a lag that is early."""
-    return any(
-        q.key in ONE_SIDED and ONE_SIDED[q.key] * float(v) < 0 for (_, q), v in zip(asked, answer.value, strict=True)
-    )
+def _backwards(freed: Sequence[tuple[Column, Parameter]], answer: Answer) -> bool:
+    """Tell whether algebra wants, of the columns that were asked for last, a friction that drives or an early lag."""
+    values = answer.value[len(answer.value) - len(freed) :]
+    return any(q.key in ONE_SIDED and ONE_SIDED[q.key] * float(v) < 0 for (_, q), v in zip(freed, values, strict=True))
 
 
 def _start(asked: Sequence[tuple[Column, Parameter]], answer: Answer, trials: Sequence[Trial]) -> Start:
@@ -281,6 +280,6 @@ def pairs(board: Board, trials: Sequence[Trial], own: Sequence[Parameter]) -> li
         answer = board.ask(asked)
         hypothesis = Hypothesis(both)
         merit = answer.chi2 + RIVAL * hypothesis.size
-        if merit < (found[ids].merit if ids in found else np.inf) and not _backwards(asked, answer):
+        if merit < (found[ids].merit if ids in found else np.inf) and not _backwards(freed, answer):
             found[ids] = Pair(hypothesis, merit, _start(asked, answer, both))
     return sorted(found.values(), key=lambda pair: pair.merit)
