@@ -183,7 +183,7 @@ def _noise_notes(linears: Sequence[Linear], found: NoiseModel) -> list[NoiseNote
         n = sum(c.index.size for linear in linears for c in linear.channels if c.group == group)
         surprising = abs(noise.sd / stated - 1.0) > max(0.1, 5.0 / np.sqrt(2.0 * n)) if np.isfinite(stated) else True
         if surprising or noise.correlation > 0.15:
-            slow = -interval / float(np.log(noise.correlation)) if noise.correlation > 0 else 0.0
+            slow = noise.memory(interval)
             notes.append(NoiseNote(group, stated if np.isfinite(stated) else None, float(noise.sd), slow))
     return notes
 

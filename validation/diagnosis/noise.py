@@ -38,6 +38,10 @@ class GroupNoise(NamedTuple):
     correlation: float = 0.0
     share: float = 1.0
 
+    def memory(self, interval: float) -> float:
+        """Return the time constant of the correlated part, s, of samples that lie ``interval`` s apart."""
+        return -interval / float(np.log(self.correlation)) if self.correlation > 0.0 else 0.0
+
     @property
     def innovation(self) -> tuple[float, float]:
         """Return the moving-average coefficient of the noise as ARMA(1, 1), and its innovation over the level."""

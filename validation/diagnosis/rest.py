@@ -160,8 +160,7 @@ def _swallowed(linears: Sequence[Linear], noise: NoiseModel) -> list[Remainder]:
         times = [linear.t[c.rows] for linear, c in channels]
         interval = float(np.median(np.diff(times[0])))
         longest = max(float(t[-1] - t[0]) for t in times)
-        time = -interval / float(np.log(slow.correlation))
-        if slow.sd > LOUD * stated and time > SLOW * longest:
+        if slow.sd > LOUD * stated and slow.memory(interval) > SLOW * longest:
             found.append(Remainder(group, None, "swallowed", slow.sd / stated, 0.0, max(float(t[-1]) for t in times)))
     return found
 

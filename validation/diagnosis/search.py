@@ -31,6 +31,7 @@ from validation.diagnosis.selection import (
     pairs,
     price,
     proposals,
+    start_of,
     tied_fit,
 )
 from validation.diagnosis.stated import stated_parameters
@@ -175,7 +176,7 @@ def _settle(found: Search, final: Tied) -> None:
 def _start(board: Board, hypothesis: Hypothesis, own: Sequence[Parameter]) -> Start:
     """Return what algebra expects of a hypothesis's parameters."""
     taken = board.columns_of(fitted_parameters(hypothesis, own))
-    return {(q.key, q.recordings): q.stated + float(v) for (_, q), v in zip(taken, board.ask(taken).value, strict=True)}
+    return start_of(taken, board.ask(taken))
 
 
 def _wobbles(fit: Fit) -> Start:
@@ -256,7 +257,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
             {**values_of_fit(current), **proposal.start, **_wobbles(fit)},
         )
         refitted = replace(refitted, score=refitted.score + found.cost + cost)
-        gain, chi2 = _consider(found, current, refitted, proposal.trial)
+        gain, chi2 = _consider(found, (current.score, chi2_now), refitted, proposal.trial)
         if gain > price(proposal.trial) and _possible(refitted):
             # far from the data chi-squared says more than a likelihood that has swallowed the mismatch as noise
             merit = (chi2 + cost if far else refitted.score) + RIVAL * refitted.hypothesis.size
@@ -282,16 +283,17 @@ def _in_turn(*offers: Sequence[Offer]) -> list[Offer]:
     return [offer for turn in zip_longest(*worth) for offer in turn if offer is not None]
 
 
-def _consider(found: Search, current: Tied, refitted: Tied, trial: Trial) -> tuple[float, float]:
-    """Note what a trial gains upon a fit; return the gain, and the chi-squared that is left."""
-    gain = current.score - refitted.score
+def _consider(found: Search, before: tuple[float, float], refitted: Tied, trial: Trial) -> tuple[float, float]:
+    """Note what a trial gains upon a fit of score and chi-squared ``before``; return gain and chi-squared left."""
+    score, chi2_before = before
+    gain = score - refitted.score
     chi2 = chi2_in(refitted, found.loose_noise)
     values = {
         q.name: float(v)
         for q, v in zip(refitted.fit.parameters, refitted.fit.at, strict=True)
         if q.group == trial.id and q.recordings == trial.recordings
     }
-    found.considered.append(Considered(trial, gain, chi2_in(current, found.loose_noise) - chi2, values))
+    found.considered.append(Considered(trial, gain, chi2_before - chi2, values))
     return gain, chi2
 
 
@@ -306,12 +308,13 @@ def _together(found: Search, board: Board) -> Tied | None:
     better than either; algebra about the fit that follows the data tells both at once.
     """
     base, noise = found.base, found.loose_noise
+    before = base.score, chi2_in(base, noise)
     for pair in pairs(board, found.trials, found.own)[:_PAIRS_REFITTED]:
         start = {**pair.start, **_wobbles(found.loose)}
         both = tied_fit(found.loose, pair.hypothesis, found.own, noise, start)
         both = replace(both, score=both.score + found.cost)
         for trial in pair.hypothesis.trials:
-            _consider(found, base, both, trial)
+            _consider(found, before, both, trial)
         worth = base.score - both.score > sum(map(price, pair.hypothesis.trials))
         if worth and _possible(both) and not _far(found, both):
             return both
@@ -426,21 +429,23 @@ def _rivals(found: Search) -> dict[str, list[Rival]]:
         taken = board.columns_of(fitted_parameters(rest, found.own))
         best = board.ask(board.columns_of(fitted_parameters(final.hypothesis, found.own))).chi2
         # of a large effect algebra knows the last percents badly
-        worst = max(_WORST, _WORST_SHARE * (board.ask(taken).chi2 - best))
+        without = board.ask(taken).chi2
+        worst = max(_WORST, _WORST_SHARE * (without - best))
         near = []
         for other in found.trials:
             if other.id == trial.id or any(other.id == t.id for t in rest.trials):
                 continue
             scoped = replace(other, recordings=trial.recordings)
-            freed = free_columns(scoped)
-            answer = board.ask([*taken, *freed])
-            values = answer.value[len(taken) :]
-            start = {(q.key, q.recordings): q.stated + float(v) for (_, q), v in zip(freed, values, strict=True)}
-            near.append((answer.chi2 - best, scoped, start))
+            asked = [*taken, *free_columns(scoped)]
+            answer = board.ask(asked)
+            near.append(
+                (answer.chi2 - best, Proposal(scoped, without - answer.chi2, start_of(asked, answer, (scoped,))))
+            )
         near.sort(key=lambda item: item[0])
         rivals[trial.name] = []
         seen: set[str] = set()
-        for worse, scoped, start in near:
+        for worse, proposal in near:
+            scoped = proposal.trial
             if scoped.id in seen or worse > worst or len(seen) >= 3:
                 continue
             seen.add(scoped.id)
@@ -449,7 +454,7 @@ def _rivals(found: Search) -> dict[str, list[Rival]]:
                 rest.plus(scoped),
                 found.own,
                 final.fit.noise,
-                {**values_of_fit(final), **start, **_shape_start(scoped)},
+                _from_here(proposal, final).start,
             )
             other_fit = replace(other_fit, score=other_fit.score + found.cost)
             rivals[trial.name].append(Rival(scoped, other_fit.score - final.score, other_fit))
@@ -469,7 +474,3 @@ def _exchanged(found: Search) -> Tied | None:
             if merit < -(_SIMPLER if more < 0 else _BETTER) and _possible(rival.tied):
                 better.append((merit, rival.tied))
     return min(better, key=lambda item: item[0])[1] if better else None
-
-
-def _shape_start(trial: Trial) -> Start:
-    return {((trial.id, name), trial.recordings): value for name, value in trial.shapes.items()}

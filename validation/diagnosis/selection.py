@@ -18,7 +18,7 @@ from validation.diagnosis.relaxed import NO_JUMPS, beginning
 from validation.diagnosis.trajectory_pieces import Chain, Column
 from validation.diagnosis.trials import Trial, parameters_of
 
-__all__ = ["Hypothesis", "Start", "Tied", "price", "tied_fit"]
+__all__ = ["Hypothesis", "Start", "Tied", "price", "start_of", "tied_fit"]
 
 #: values of parameters by what they are and the recordings that share them
 Start: TypeAlias = Mapping[tuple[tuple[str, str], frozenset[int] | None], float]
@@ -227,7 +227,7 @@ def proposals(
             gain = base - answer.chi2
             if _backwards(columns, answer):
                 continue
-            proposal = Proposal(scoped, gain, _start([*rest, *columns], answer, (scoped,)))
+            proposal = Proposal(scoped, gain, start_of([*rest, *columns], answer, (scoped,)))
             # one recording alone must do better than all by what choosing it costs
             if best is None or gain > best.gain + (2.0 * np.log(board.recordings) + 6.0 if scope is not None else 0.0):
                 best = proposal
@@ -242,7 +242,7 @@ def _backwards(freed: Sequence[tuple[Column, Parameter]], answer: Answer) -> boo
     return any(q.key in ONE_SIDED and ONE_SIDED[q.key] * float(v) < 0 for (_, q), v in zip(freed, values, strict=True))
 
 
-def _start(asked: Sequence[tuple[Column, Parameter]], answer: Answer, trials: Sequence[Trial]) -> Start:
+def start_of(asked: Sequence[tuple[Column, Parameter]], answer: Answer, trials: Sequence[Trial] = ()) -> Start:
     """Return the values of an answer, and those at which its trials are shaped."""
     start = {(q.key, q.recordings): q.stated + float(v) for (_, q), v in zip(asked, answer.value, strict=True)}
     for trial in trials:
@@ -281,5 +281,5 @@ def pairs(board: Board, trials: Sequence[Trial], own: Sequence[Parameter]) -> li
         hypothesis = Hypothesis(both)
         merit = answer.chi2 + RIVAL * hypothesis.size
         if merit < (found[ids].merit if ids in found else np.inf) and not _backwards(freed, answer):
-            found[ids] = Pair(hypothesis, merit, _start(asked, answer, both))
+            found[ids] = Pair(hypothesis, merit, start_of(asked, answer, both))
     return sorted(found.values(), key=lambda pair: pair.merit)

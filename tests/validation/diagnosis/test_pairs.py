@@ -86,10 +86,14 @@ def of(id: str) -> Trial:
     return next(trial for trial in windy().trials if trial.id == id)
 
 
+@cache
+def as_shear() -> Tied:
+    """Return the fit of that wind as one that grows with height."""
+    return searching.tied_fit(windy().loose, Hypothesis((of("air.wind_shear"),)), windy().own, windy().loose_noise, {})
+
+
 def test_an_effect_gives_way_to_one_that_explains_as_much_with_fewer_parameters():
-    sheared = searching.tied_fit(
-        windy().loose, Hypothesis((of("air.wind_shear"),)), windy().own, windy().loose_noise, {}
-    )
+    sheared = as_shear()
     found = replace(windy(), final=sheared)
     found.board = board_of(sheared.fit, found.trials, sheared.fit.noise, NO_JUMPS["flight"])
     found.rivals = searching._rivals(found)
@@ -106,9 +110,7 @@ def test_an_effect_does_not_give_way_to_one_that_needs_more_parameters_for_the_s
 
 def test_a_shear_that_is_known_to_have_none_is_not_confused_with_the_wind():
     (wind,) = windy().final.hypothesis.trials
-    sheared = searching.tied_fit(
-        windy().loose, Hypothesis((of("air.wind_shear"),)), windy().own, windy().loose_noise, {}
-    )
+    sheared = as_shear()
     place = [q.name for q in sheared.fit.parameters].index("exponent")
     assert sheared.fit.covariance[place, place] ** 0.5 < 0.05
     found = replace(windy(), rivals={wind.name: [Rival(of("air.wind_shear"), 0.0, sheared)]})
