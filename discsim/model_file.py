@@ -1,7 +1,8 @@
 """Model files (`model.toml`): a disc or a rig with its surroundings and the effects upon it, for every command.
 
 The tables ``[environment]``, ``[disc]`` and ``[rig]`` are those of a recording. Each ``[[effects]]`` names one effect
-of the catalogue with its parameters and their standard deviations, and the recordings that it belongs to; one of the
+of the catalogue with its parameters and their standard deviations, or its ``[effects.setting]`` where that is a text,
+and the recordings that it belongs to; one of the
 user's own names the ``file`` that defines it. ``[law]`` is a term that the catalogue does not hold, as a formula with
 coefficients; several are ``[[law]]``.
 """
@@ -14,7 +15,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from discsim.disc import Disc, Rig
-from discsim.effects.catalogue import Effect, effect, row
+from discsim.effects.catalogue import Effect, Row, effect, row
 from discsim.effects.own import UserEffect
 from discsim.environment import Environment
 from discsim.errors import InputError
@@ -95,14 +96,16 @@ def _read_effect(table: TomlTable, own: Sequence[UserEffect]) -> ModelEffect:
         and not (isinstance(names, list) and all(isinstance(n, str) for n in names))
     ):
         raise table.error("recordings", f"'effects.recordings' is {names!r}, expected \"all\" or a list of names")
-    sizes, sigmas = table.table("parameters", required=True), table.table("sigma")
-    assert sizes is not None
     try:
-        known = (row(id) if mine is None else mine.row).parameters
+        kind = row(id) if mine is None else mine.row
     except InputError as error:
         raise table.error("id", str(error)) from None
-    size = {name: sizes.number(name, required=False) for name in known}
-    sizes.finish()
+    known = kind.parameters
+    sizes, sigmas = table.table("parameters", required=bool(known)), table.table("sigma")
+    size = {} if sizes is None else {name: sizes.number(name, required=False) for name in known}
+    if sizes is not None:
+        sizes.finish()
+    setting = _read_setting(table, kind)
     sigma: dict[str, float | None] = {}
     if sigmas is not None:
         sigma = {name: sigmas.number(name, required=False, minimum=0.0) for name in known}
@@ -110,10 +113,24 @@ def _read_effect(table: TomlTable, own: Sequence[UserEffect]) -> ModelEffect:
     table.finish()
     given = {name: value for name, value in size.items() if value is not None}
     return ModelEffect(
-        effect(id, **given) if mine is None else mine.sized(given),
+        effect(id, **given, **setting) if mine is None else mine.sized(given),
         {name: value for name, value in sigma.items() if value is not None},
         None if names in (None, "all") else tuple(names),
     )
+
+
+def _read_setting(table: TomlTable, kind: Row) -> dict[str, str]:
+    """Return the settings of an effect; raises `InputError` at the line of one that cannot be."""
+    texts = table.table("setting", required=bool(kind.settings))
+    if texts is None:
+        return {}
+    given = {name: text for name in kind.settings if (text := texts.text(name)) is not None}
+    texts.finish()
+    try:
+        effect(kind.id, **given)
+    except InputError as error:
+        raise texts.error(next(iter(given)), str(error)) from None
+    return given
 
 
 def _read_law(table: TomlTable) -> Law:
@@ -142,12 +159,14 @@ def write_model(model: Model, path: Path) -> None:
     if model.rig is not None:
         lines += rig_toml(model.rig)
     for item in model.effects:
-        sizes = item.effect.value._asdict()
         lines += ["", "[[effects]]", f'id = "{item.effect.id}"']
         if item.effect.own is not None:
             lines += toml_lines({"file": item.effect.own.path.name})
         lines += toml_lines({"recordings": "all" if item.recordings is None else list(item.recordings)})
-        lines += ["[effects.parameters]", *toml_lines(sizes)]
+        if item.effect.sizes:
+            lines += ["[effects.parameters]", *toml_lines(item.effect.sizes)]
+        if item.effect.setting:
+            lines += ["[effects.setting]", *toml_lines(item.effect.setting)]
         if item.sigma:
             lines += ["[effects.sigma]", *toml_lines(dict(item.sigma))]
     for law in model.laws:

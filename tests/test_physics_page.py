@@ -18,7 +18,7 @@ def catalogue_table() -> str:
     for row in CATALOGUE.values():
         what = re.sub(r"\s+", " ", (row.type.__doc__ or "").partition("\n")[0])
         what = re.sub(r" \([a-z, _.]*\)\.$", "", what).rstrip(".").replace("``", "`").replace("|", "\\|")
-        rows.append(f"| {row.id} | {', '.join(row.parameters)} | {what} |")
+        rows.append(f"| {row.id} | {', '.join((*row.parameters, *row.settings))} | {what} |")
     return "\n".join(rows)
 
 

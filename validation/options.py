@@ -11,7 +11,7 @@ import typer
 
 from discsim.arrays import FloatArray, readonly
 from discsim.disc import Disc
-from discsim.effects.catalogue import Effect, by_id, effect
+from discsim.effects.catalogue import Effect, by_id, effect, row
 from discsim.effects.own import UserEffect
 from discsim.environment import Environment
 from discsim.errors import InputError
@@ -41,7 +41,8 @@ EffectOption: TypeAlias = Annotated[
     list[str] | None,
     typer.Option(
         "--effect",
-        help="An effect of the catalogue, ID:name=value,name=value; may repeat. Example: air.wind:w_north_m_s=1.5",
+        help="An effect of the catalogue, ID:name=value,name=value; may repeat. Examples: air.wind:w_north_m_s=1.5, "
+        "'mag.axes:axes=x -y z'",
     ),
 ]
 
@@ -125,7 +126,7 @@ def _cannot_act(given: Effect, plant: Plant, sensors: Sequence[str]) -> str:
     kind = given.row
     if plant not in kind.plants:
         return f"acts on {', '.join(kind.plants)}; this is a {plant}"
-    if kind.acts_on not in ("motion", "clock", *sensors):
+    if not kind.acts_with(sensors):
         return f"there is no {kind.acts_on} on board, only {', '.join(sensors)}"
     return ""
 
@@ -147,15 +148,20 @@ def parse_effects(
     effects = []
     for text in texts or ():
         id, _, rest = text.partition(":")
-        sizes = {}
+        mine = next((one for one in own if one.id == id.strip()), None)
+        settings = (row(id.strip()) if mine is None else mine.row).settings
+        sizes: dict[str, float] = {}
+        setting: dict[str, str] = {}
         for item in filter(None, rest.split(",")):
-            name, _, number = item.partition("=")
+            name, _, value = (part.strip() for part in item.partition("="))
+            if name in settings:
+                setting[name] = value
+                continue
             try:
-                sizes[name.strip()] = float(number)
+                sizes[name] = float(value)
             except ValueError:
                 raise InputError(f"--effect {text}: '{item}' is no name=number; expected ID:name=number,...") from None
-        mine = next((one for one in own if one.id == id.strip()), None)
-        given = effect(id.strip(), **sizes) if mine is None else mine.sized(sizes)
+        given = effect(id.strip(), **sizes, **setting) if mine is None else mine.sized(sizes)
         if problem := _cannot_act(given, plant, sensors):
             raise InputError(f"--effect {given.id}: {problem}")
         effects.append(given)

@@ -7,13 +7,13 @@ term, a new hypothesis and a new line of the docs. Forms and parameters are thos
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from discsim.effects import aero, air, body, events, rig, sensors
+from discsim.effects import aero, air, body, events, rig, sensors, setup
 from discsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -25,13 +25,16 @@ FLIGHT = ("flight",)
 AIRBORNE = ("flight", "free_spin")
 RIGS = ("rate_table", "spin_down")
 EVERYWHERE = ("flight", "rate_table", "spin_down", "free_spin")
+#: the sensors that share one board
+BOARD = frozenset({"magnetometer", "accelerometer", "gyroscope"})
 
 
 class Row(NamedTuple):
     """One effect of the catalogue.
 
-    ``acts_on`` is "motion" or the sensor it belongs to ("clock" for all of a recording's sensors); ``scale`` gives a
-    small but visible size of each parameter, in its unit; an ``event`` happens in one recording.
+    ``acts_on`` is "motion", the sensor it belongs to, "clock" for all of a recording's sensors or "board" for those
+    that share one; ``scale`` gives a small but visible size of each parameter, in its unit; an ``event`` happens in
+    one recording; a ``setup`` fault is one of what was set up or stated, and no physics.
     """
 
     id: str
@@ -40,6 +43,7 @@ class Row(NamedTuple):
     plants: tuple[str, ...]
     scale: tuple[float, ...]
     event: bool = False
+    setup: bool = False
 
     @property
     def key(self) -> str:
@@ -48,13 +52,29 @@ class Row(NamedTuple):
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the parameters, units in the name."""
-        return tuple(self.type._fields)
+        """Names of the parameters, which are numbers, units in the name."""
+        return tuple(self.sizes)
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """Names of the settings, which are texts; no fit can move one."""
+        return tuple(name for name, none in self.baseline._asdict().items() if isinstance(none, str))
+
+    @property
+    def sizes(self) -> dict[str, float]:
+        """The parameters at the baseline, by name."""
+        return {name: none for name, none in self.baseline._asdict().items() if not isinstance(none, str)}
 
     @property
     def baseline(self) -> Any:
         """The effect at its baseline: no effect."""
         return self.type()
+
+    def acts_with(self, sensors: Collection[str]) -> bool:
+        """Tell whether it can act on a recording that has these sensors."""
+        if self.acts_on == "board":
+            return not BOARD.isdisjoint(sensors)
+        return self.acts_on in ("motion", "clock") or self.acts_on in sensors
 
 
 _ROWS = (
@@ -102,6 +122,19 @@ _ROWS = (
     Row("gps.clock_rate", sensors.ClockRate, "gps", FLIGHT, (1e-4,)),
     Row("gps.latency", sensors.Latency, "gps", FLIGHT, (0.002,)),
     Row("clock.rate", sensors.ClockRate, "clock", EVERYWHERE, (1e-5,)),
+    Row("mag.axes", setup.Axes, "magnetometer", EVERYWHERE, (), setup=True),
+    Row("accel.axes", setup.Axes, "accelerometer", EVERYWHERE, (), setup=True),
+    Row("gyro.axes", setup.Axes, "gyroscope", EVERYWHERE, (), setup=True),
+    Row("gps.axes", setup.GpsAxes, "gps", FLIGHT, (), setup=True),
+    Row("mag.units", setup.MagnetometerUnit, "magnetometer", EVERYWHERE, (), setup=True),
+    Row("accel.units", setup.AccelerometerUnit, "accelerometer", EVERYWHERE, (), setup=True),
+    Row("gyro.units", setup.GyroscopeUnit, "gyroscope", EVERYWHERE, (), setup=True),
+    Row("mag.time_offset", setup.TimeOffset, "magnetometer", EVERYWHERE, (1e-4,), setup=True),
+    Row("accel.time_offset", setup.TimeOffset, "accelerometer", EVERYWHERE, (1e-4,), setup=True),
+    Row("gyro.time_offset", setup.TimeOffset, "gyroscope", EVERYWHERE, (1e-4,), setup=True),
+    Row("board.rotation", setup.BoardRotation, "board", EVERYWHERE, (0.002, 0.002, 0.002), setup=True),
+    Row("site.field", setup.SiteField, "magnetometer", EVERYWHERE, (0.002, 0.002, 0.002), setup=True),
+    Row("clock.units", setup.ClockUnit, "clock", EVERYWHERE, (), setup=True),
 )
 
 CATALOGUE: Mapping[str, Row] = MappingProxyType({row.id: row for row in _ROWS})
@@ -117,7 +150,7 @@ def row(id: str) -> Row:
 
 
 #: parameters of motion that have no meaning at or below zero; each sensor checks its own
-_POSITIVE = frozenset({("air.density", "ratio"), ("air.gust", "width_s")})
+_POSITIVE = frozenset({("air.density", "ratio"), ("air.gust", "width_s"), ("site.field", "ratio")})
 
 
 @dataclass(frozen=True)
@@ -133,28 +166,50 @@ class Effect:
         """What the catalogue, or the user's file, says of it."""
         return row(self.id) if self.own is None else self.own.row
 
+    @property
+    def sizes(self) -> dict[str, float]:
+        """Its parameters, by name."""
+        return {name: getattr(self.value, name) for name in self.row.parameters}
+
+    @property
+    def setting(self) -> dict[str, str]:
+        """Its settings, by name; empty for most effects."""
+        return {name: getattr(self.value, name) for name in self.row.settings}
+
     def __post_init__(self) -> None:
         kind = self.row
         if type(self.value) is not kind.type:
             raise InputError(f"{self.id}: got {type(self.value).__name__}, expected {kind.type.__name__}")
-        for name, size, none in zip(self.value._fields, self.value, kind.baseline, strict=True):
-            if not isfinite(size) and size != none:
+        try:
+            object.__setattr__(self, "value", setup.checked(self.value))
+        except InputError as error:
+            raise InputError(f"{self.id}: {error}") from None
+        for name, size in self.sizes.items():
+            if not isfinite(size) and size != kind.sizes[name]:
                 raise InputError(f"{self.id}: {name} is not finite ({size}); expected a finite number")
             if (self.id, name) in _POSITIVE and size <= 0:
                 raise InputError(f"{self.id}: {name} is {size:g}; expected a number above zero")
 
 
-def effect(id: str, **parameters: float) -> Effect:
-    """Return an effect by id and parameters; those left out stay at the baseline.
+def effect(id: str, **given: float | str) -> Effect:
+    """Return an effect by id, parameters and settings; those left out stay at the baseline.
 
     >>> effect("air.wind", w_north_m_s=1.1).value
     Wind(w_north_m_s=1.1, w_east_m_s=0.0)
+    >>> effect("mag.axes", axes="x -y z").value
+    Axes(axes='x -y z')
     """
     kind = row(id)
-    for name in parameters:
-        if name not in kind.parameters:
-            raise InputError(f"{id}: unknown parameter '{name}'; expected {', '.join(kind.parameters)}")
-    return Effect(id, kind.type(**{name: float(value) for name, value in parameters.items()}))
+    for name, value in given.items():
+        if name not in (*kind.parameters, *kind.settings):
+            what = "parameter" if kind.parameters else "setting"
+            raise InputError(f"{id}: unknown {what} '{name}'; expected {', '.join((*kind.parameters, *kind.settings))}")
+        if isinstance(value, str) != (name in kind.settings):
+            expected = "a text" if name in kind.settings else "a number"
+            raise InputError(f"{id}: {name} is {value!r}, expected {expected}")
+    return Effect(
+        id, kind.type(**{name: value if isinstance(value, str) else float(value) for name, value in given.items()})
+    )
 
 
 def by_id(effects: Sequence[Effect]) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from discsim.effects.sensors import (
     bias_drift,
     sensitivity,
 )
+from discsim.effects.setup import BoardRotation, on_board
 from discsim.errors import InputError
 from discsim.frames import body_to_ned, turn
 from discsim.motion import Motion, State
@@ -64,6 +65,8 @@ class Accelerometer:
     range: float = float("inf")
     #: what else is added to its readings before lag and noise
     additions: tuple[Addition, ...] = ()
+    #: how the board that it sits on is turned in the disc
+    board: BoardRotation = field(default_factory=BoardRotation)
 
     def __post_init__(self) -> None:
         for name in ("position", "misalignment"):
@@ -75,7 +78,7 @@ class Accelerometer:
     def ideal(self, motion: Motion, t: FloatArray) -> FloatArray:
         """Return the reading (n, 3) m/s^2 before lag and noise, S_T f + bias, Eq. (5), at instants t (n,)."""
         f = specific_force(motion.at(t), motion, self.position + np.array(self.offset))
-        turned = f @ body_to_ned(turn(self.misalignment))
+        turned = on_board(self.board, f) @ body_to_ned(turn(self.misalignment))
         drifting = bias_drift(self.drift, t - motion.start)
         reading = turned @ sensitivity(self.scale, self.cross_axis).T + np.array(self.bias) + drifting
         return added(self.additions, np.asarray(reading), t, motion)

@@ -8,6 +8,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray, readonly, vector3
 from discsim.effects.sensors import GSensitivity, GyroscopeBias, Lag, Scale, g_sensitivity, sensitivity
+from discsim.effects.setup import BoardRotation, on_board
 from discsim.frames import body_to_ned, turn
 from discsim.motion import Motion
 from discsim.recording import Samples, SensorSheet
@@ -40,6 +41,8 @@ class Gyroscope:
     range: float = float("inf")
     #: what else is added to its readings before lag and noise
     additions: tuple[Addition, ...] = ()
+    #: how the board that it sits on is turned in the disc
+    board: BoardRotation = field(default_factory=BoardRotation)
 
     def __post_init__(self) -> None:
         for name in ("position", "misalignment"):
@@ -49,10 +52,11 @@ class Gyroscope:
     def ideal(self, motion: Motion, t: FloatArray) -> FloatArray:
         """Return the reading (n, 3) rad/s before lag and noise at instants t (n,)."""
         state = motion.at(t)
-        turned = state.rate @ body_to_ned(turn(self.misalignment))
+        turned = on_board(self.board, state.rate) @ body_to_ned(turn(self.misalignment))
         reading = turned @ sensitivity(self.scale).T + np.array(self.bias)
         if any(self.g_sensitivity):
-            reading = reading + g_sensitivity(self.g_sensitivity, specific_force(state, motion, self.position))
+            felt = on_board(self.board, specific_force(state, motion, self.position))
+            reading = reading + g_sensitivity(self.g_sensitivity, felt)
         return added(self.additions, np.asarray(reading), t, motion)
 
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:

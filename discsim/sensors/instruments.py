@@ -12,7 +12,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray, readonly
 from discsim.disc import Disc, Release, Rig
-from discsim.effects.catalogue import Effect, by_id
+from discsim.effects.catalogue import BOARD, Effect, by_id
 from discsim.effects.sensors import AccelerometerBias, ClockRate, CrossAxis, GSensitivity, GyroscopeBias, Scale
 from discsim.errors import InputError
 from discsim.files import model_file
@@ -27,6 +27,7 @@ from discsim.sensors.position import Gps, Tracker
 from discsim.sensors.rate_reference import RateReference
 from discsim.sensors.sampling import Noise, Sampling
 from discsim.toml_table import TomlTable, read_toml
+from discsim.written import as_written
 
 __all__ = ["Instruments", "Sensor", "read_part", "record"]
 
@@ -51,9 +52,12 @@ _FIELDS: Mapping[str, str] = MappingProxyType(
         "gyro.scale": "scale",
         "gyro.g_sensitivity": "g_sensitivity",
         "gps.latency": "latency",
+        "site.field": "site",
     }
 )
-_SAMPLING_FIELDS: Mapping[str, str] = MappingProxyType({"clock_rate": "clock", "dropped_samples": "dropped"})
+_SAMPLING_FIELDS: Mapping[str, str] = MappingProxyType(
+    {"clock_rate": "clock", "dropped_samples": "dropped", "time_offset": "offset"}
+)
 
 
 @dataclass(frozen=True)
@@ -89,12 +93,14 @@ class WorstCase:
 class Instruments:
     """The sensors of one module by name (`discsim.recording.SENSORS`), and the clock they share.
 
-    ``worst_case`` holds, by sensor, what the data sheets allow of errors that differ from part to part.
+    ``worst_case`` holds, by sensor, what the data sheets allow of errors that differ from part to part; ``written``
+    the faults of what the logger writes, which act on the finished recording.
     """
 
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
     clock: ClockRate = field(default_factory=ClockRate)
     worst_case: Mapping[str, WorstCase] = field(default_factory=dict)
+    written: tuple[Effect, ...] = ()
 
     def __post_init__(self) -> None:
         for name in self.sensors:
@@ -142,8 +148,13 @@ class Instruments:
         by_id(effects)
         for item in effects:
             id, value, target = item.id, item.value, item.row.acts_on
-            if target == "clock":
+            if item.row.settings:
+                module = replace(module, written=(*(one for one in module.written if one.id != id), item))
+            elif target == "clock":
                 module = replace(module, clock=value)
+            elif target == "board":
+                for name in BOARD & module.sensors.keys():
+                    module = module.fitted(name, board=value)
             elif target in module.sensors:
                 if item.own is not None:
                     module = module._adding(target, by_effect(item))
@@ -180,7 +191,10 @@ def record(
     release: Release | None = None,
     command: Samples | None = None,
 ) -> Recording:
-    """Let the instruments measure a motion; each sensor draws from a random stream of its own."""
+    """Let the instruments measure a motion, and write it as their logger does.
+
+    Each sensor draws from a random stream of its own.
+    """
     streams = dict(zip(SENSORS, rng.spawn(len(SENSORS)), strict=True))
     samples, sheets = {}, {}
     for sensor_name in SENSORS:
@@ -192,7 +206,8 @@ def record(
         taken = replace(sensor, sampling=shared).measure(motion, streams[sensor_name])
         if len(taken):
             samples[sensor_name], sheets[sensor_name] = taken, sensor.sheet
-    return Recording(plant, name, motion.environment, disc, rig, release, sheets, samples, command)
+    sound = Recording(plant, name, motion.environment, disc, rig, release, sheets, samples, command)
+    return as_written(sound, instruments.written)
 
 
 # ------------------------------------------------------------------------------------------------ part files

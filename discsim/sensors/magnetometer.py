@@ -8,6 +8,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray, readonly, vector3
 from discsim.effects.sensors import HardIron, Lag, SoftIron, StrayField, hard_iron, soft_iron, stray_field
+from discsim.effects.setup import BoardRotation, SiteField, field_there, on_board
 from discsim.errors import InputError
 from discsim.frames import body_to_ned, turn
 from discsim.motion import Motion
@@ -37,6 +38,10 @@ class Magnetometer:
     range: float = float("inf")
     #: what else is added to its readings before lag and noise
     additions: tuple[Addition, ...] = ()
+    #: how the board that it sits on is turned in the disc
+    board: BoardRotation = field(default_factory=BoardRotation)
+    #: how the field that is there differs from the stated one
+    site: SiteField = field(default_factory=SiteField)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "misalignment", vector3(self.misalignment, "magnetometer misalignment"))
@@ -47,8 +52,9 @@ class Magnetometer:
     def ideal(self, motion: Motion, t: FloatArray) -> FloatArray:
         """Return the reading (n, 3) uT before lag and noise at instants t (n,)."""
         state = motion.at(t)
-        field_b = state.in_body(motion.environment.magnetic_field)
-        stray = state.in_body(stray_field(self.stray_field, -state.position[:, 2]))
+        there = field_there(self.site, motion.environment.magnetic_field)
+        field_b = on_board(self.board, state.in_body(there))
+        stray = on_board(self.board, state.in_body(stray_field(self.stray_field, -state.position[:, 2])))
         bent = hard_iron(self.hard_iron, soft_iron(self.soft_iron, field_b)) + stray
         reading = bent @ body_to_ned(turn(self.misalignment))
         return added(self.additions, np.asarray(reading), t, motion)

@@ -11,6 +11,7 @@ import numpy as np
 from discsim.arrays import BoolArray, FloatArray
 from discsim.compiled import compiled
 from discsim.effects.sensors import ClockRate, DroppedSamples, Lag, lag, true_time
+from discsim.effects.setup import TimeOffset
 from discsim.errors import InputError
 from discsim.motion import Motion
 from discsim.recording import SensorSheet
@@ -28,9 +29,10 @@ FINE_STEP = 1e-4
 class Sampling:
     """When samples are taken and what time is written for them.
 
-    Sample k is written as ``phase_s + k/rate_hz``. It was taken at the written time over the clock's ratio, plus a
-    jitter of ``jitter_s`` rms that nobody knows. Of the samples a share ``gaps`` is lost honestly (their time stamps
-    are missing), and a share ``dropped`` silently: the rest are written at the nominal spacing.
+    Sample k is written as ``phase_s + k/rate_hz``. It was taken at the written time less the offset, over the clock's
+    ratio, plus a jitter of ``jitter_s`` rms that nobody knows; there is none from before the motion. Of the samples a
+    share ``gaps`` is lost honestly (their time stamps are missing), and a share ``dropped`` silently: the rest are
+    written at the nominal spacing.
     """
 
     rate_hz: float
@@ -39,6 +41,7 @@ class Sampling:
     gaps: float = 0.0
     clock: ClockRate = field(default_factory=ClockRate)
     dropped: DroppedSamples = field(default_factory=DroppedSamples)
+    offset: TimeOffset = field(default_factory=TimeOffset)
 
     def __post_init__(self) -> None:
         for name, value, unit in (("rate", self.rate_hz, " Hz"), ("clock rate", self.clock.ratio, "")):
@@ -56,9 +59,12 @@ class Sampling:
 
         ``start`` is time zero of the recording.
         """
-        count = int(np.floor(((stop - start) * self.clock.ratio - self.phase_s) * self.rate_hz + 1e-9)) + 1
+        late = self.offset.offset_s - self.phase_s
+        count = int(np.floor(((stop - start) * self.clock.ratio + late) * self.rate_hz + 1e-9)) + 1
         nominal = self.phase_s + np.arange(max(count, 0)) / self.rate_hz
-        taken = start + true_time(self.clock, nominal)
+        if self.offset.offset_s > 0.0:
+            nominal = nominal[nominal >= self.offset.offset_s - 1e-9 / self.rate_hz]
+        taken = start + true_time(self.clock, nominal - self.offset.offset_s)
         written = nominal
         if self.dropped.fraction > 0:
             taken = taken[rng.random(taken.size) >= self.dropped.fraction]

@@ -11,7 +11,7 @@ from flights import DRIVER, FIELD, throw
 from turning import turning
 
 from discsim.disc import Rig
-from discsim.effects import CATALOGUE, Effect, effect
+from discsim.effects import CATALOGUE, Effect, Row, effect
 from discsim.effects.sensors import ClockRate, PositionOffset
 from discsim.engine import fly
 from discsim.errors import InputError
@@ -44,6 +44,28 @@ def recorded(
     fitted = module.with_effects(effects)
     stated = {"plant": "flight", "name": "test", "disc": DRIVER} | stated
     return record(motion, fitted, np.random.default_rng(seed), **stated)
+
+
+#: another setting than the sound one, by the end of the effect's id or by the whole of it
+FAULTS = {
+    "axes": "y x -z",
+    "gps.axes": "east north up",
+    "mag.units": "G",
+    "accel.units": "g",
+    "gyro.units": "rpm",
+    "clock.units": "ms",
+}
+
+
+def sized(row: Row, times: float) -> Effect:
+    """An effect of so many times its scale, or of another setting; a saturation and a stray field that show."""
+    given = {name: none + times * scale for (name, none), scale in zip(row.sizes.items(), row.scale, strict=True)}
+    if row.id == "accel.saturation":
+        given = {"limit_m_s2": 30.0}
+    if row.id == "mag.stray_field":
+        given["height_m"] = 1.0
+    faulty = FAULTS.get(row.id) or FAULTS.get(row.id.split(".")[1], "")
+    return effect(row.id, **given, **dict.fromkeys(row.settings, faulty))
 
 
 def same(a: Recording, b: Recording, *sensors: str) -> bool:
@@ -216,15 +238,11 @@ class TestEffects:
 
     @pytest.mark.parametrize("row", ON_SENSORS, ids=lambda row: row.id)
     def test_an_effect_changes_its_own_sensor_and_no_other(self, row):
-        sizes = np.array(row.baseline) + 20 * np.array(row.scale)
-        if row.id == "accel.saturation":
-            sizes = np.array([30.0])
-        if row.id == "mag.stray_field":
-            sizes[3] = 1.0
-        changed = recorded(IDEAL, effects=(Effect(row.id, row.type(*sizes.tolist())),))
+        changed = recorded(IDEAL, effects=(sized(row, 20.0),))
         plain = recorded(IDEAL)
+        board = ("magnetometer", "accelerometer", "gyroscope")
         for name in plain.samples:
-            touched = row.acts_on in (name, "clock")
+            touched = row.acts_on in (name, "clock") or (row.acts_on == "board" and name in board)
             assert same(plain, changed, name) is not touched, name
 
     def test_all_baselines_together_change_no_bit(self):
@@ -296,10 +314,7 @@ class TestRecord:
 
     def test_sheets_state_no_hidden_error(self):
         """The sheet of a bad specimen with every effect on it is the data sheet's."""
-        sizes = {row.id: np.array(row.baseline) + np.array(row.scale) for row in ON_SENSORS}
-        sizes["accel.saturation"] = np.array([100.0])
-        sizes["mag.stray_field"] = np.array([1.0, 1.0, 1.0, 1.0])
-        bad = tuple(Effect(row.id, row.type(*sizes[row.id].tolist())) for row in ON_SENSORS)
+        bad = tuple(sized(row, 1.0) for row in ON_SENSORS)
         stated = recorded(MODULE.drawn(np.random.default_rng(1)), effects=bad).sheets
         for name, sheet in recorded(MODULE).sheets.items():
             for what in ("rate_hz", "noise_rms", "resolution", "range", "velocity_noise_rms"):

@@ -32,7 +32,7 @@ def sensors_wanted(effects: Sequence[str]) -> set[str]:
     acting = {CATALOGUE[id].acts_on for id in effects if id in CATALOGUE}
     if "rotating_magnet" in effects:
         acting.add("magnetometer")
-    return acting - {"motion", "clock"}
+    return acting - {"motion", "clock", "board"}
 
 
 def with_sensors(case: Case, wanted: set[str], rng: np.random.Generator) -> Case:

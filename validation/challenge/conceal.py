@@ -56,9 +56,8 @@ class Answer:
         """Return the answer of a case."""
         parameters: dict[str, float] = {}
         for item in case.concealed:
-            none = type(item.effect.value)()._asdict()
-            sizes = item.effect.value._asdict()
-            parameters.update({name: size for name, size in sizes.items() if size != none[name]})
+            none = item.effect.row.sizes
+            parameters.update({name: size for name, size in item.effect.sizes.items() if size != none[name]})
         if case.secret is not None:
             numbers = {name: value for name, value in vars(case.secret).items() if isinstance(value, float)}
             parameters.update(numbers)

@@ -167,7 +167,7 @@ def _right_place(
             return False
         if not kind.event and not any(effect["recordings"] == "all" for effect in entries):
             return False
-        if kind.acts_on not in ("motion", "clock") and not any(place["sensor"] == kind.acts_on for place in located):
+        if not kind.acts_with({place["sensor"] for place in located}):
             return False
     return True
 
@@ -189,7 +189,7 @@ def _deviations(
             continue
         if row(id).event and not _at_instant(answer, effect):
             continue  # another event: its numbers have no true ones
-        none = row(id).baseline._asdict()
+        none = row(id).sizes
         found = {name: (item["value"], item["sd"]) for name, item in effect["parameters"].items()}
         for name, (value, sd) in _one_way_to_say_it(id, found).items():
             true = answer.parameters.get(name, none[name])

@@ -229,12 +229,13 @@ _HIDDEN_FOR_GOOD: Mapping[Plant, frozenset[str]] = MappingProxyType(
 
 
 def conceivable(plant: Plant, sensors: tuple[str, ...]) -> list[str]:
-    """Return the ids of the catalogue that can act, and show, on a plant with these sensors on board."""
+    """Return the ids of physical effects that can act, and show, on a plant with these sensors on board."""
     return [
         row.id
         for row in CATALOGUE.values()
         if plant in row.plants
-        and (row.acts_on in ("motion", "clock") or row.acts_on in sensors)
+        and not row.setup
+        and row.acts_with(sensors)
         and row.id not in _HIDDEN_FOR_GOOD.get(plant, ())
     ]
 

@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias, get_args
 
 import discsim.law
 from discsim.arrays import FloatArray, readonly
-from discsim.effects.catalogue import CATALOGUE
+from discsim.effects.catalogue import CATALOGUE, effect
 from discsim.model_file import Model
 from discsim.recording import PLANTS, Plant
 from validation.diagnosis.agreement import Agreement
@@ -95,6 +95,13 @@ class ParameterValue:
 
 def _values(values: Mapping[str, ParameterValue]) -> dict[str, Any]:
     return {name: value.to_json() for name, value in values.items()}
+
+
+def _setting(id: str, setting: Mapping[str, str]) -> Mapping[str, str]:
+    """Return settings in their one spelling; raises ValueError where the catalogue has none such."""
+    if not setting:
+        return MappingProxyType({})
+    return MappingProxyType(effect(id, **setting).setting)
 
 
 @dataclass(frozen=True)
@@ -195,22 +202,28 @@ class Confusion:
     """An effect that these recordings cannot tell from a named one, and the recording that would.
 
     ``next_recording`` says in a sentence what to record; ``advice`` is what was computed for that, None where no
-    recording can be advised.
+    recording can be advised. ``setting`` and ``parameters`` tell which of an id's settings it is, or what sizes.
     """
 
     id: str
     delta_bic: float
     next_recording: str | None = None
     advice: Advice | None = None
+    setting: Mapping[str, str] = field(default_factory=dict)
+    parameters: Mapping[str, ParameterValue] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         _finite(f"confused with {self.id}", delta_bic=self.delta_bic)
+        object.__setattr__(self, "setting", _setting(self.id, self.setting))
+        object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
 
     def to_json(self) -> dict[str, Any]:
         """Return the JSON object."""
         told = self.advice
         return {
             "id": self.id,
+            **({"setting": dict(self.setting)} if self.setting else {}),
+            **({"parameters": _values(self.parameters)} if self.parameters else {}),
             "delta_bic": _plain(self.delta_bic),
             "next_recording": self.next_recording,
             "separated_by": None if told is None else told.best.to_json(),
@@ -221,17 +234,21 @@ class Confusion:
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """An effect that was added: its parameters by their names in the catalogue, and what speaks for it."""
+    """An effect that was added: its parameters by their names in the catalogue, and what speaks for it.
+
+    ``setting`` holds what is no number, such as the axes that a sensor's columns hold; an effect has either or both.
+    """
 
     id: str
     parameters: Mapping[str, ParameterValue]
     evidence: Evidence
     recordings: Recordings = None
     confused_with: tuple[Confusion, ...] = ()
+    setting: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if not self.parameters:
-            raise ValueError(f"{self.id}: no parameters; expected at least one")
+        if not self.parameters and not self.setting:
+            raise ValueError(f"{self.id}: no parameters; expected at least one, or a setting")
         if self.recordings is not None and not self.recordings:
             raise ValueError(f"{self.id}: in no recording; expected None for all of them, or names")
         if self.id in CATALOGUE:
@@ -240,6 +257,7 @@ class NamedEffect:
                 if name not in known:
                     raise ValueError(f"{self.id}: unknown parameter '{name}'; expected {', '.join(known)}")
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
+        object.__setattr__(self, "setting", _setting(self.id, self.setting))
 
     def to_json(self) -> dict[str, Any]:
         """Return the JSON object."""
@@ -247,6 +265,7 @@ class NamedEffect:
             "id": self.id,
             "recordings": _shared(self.recordings),
             "parameters": _values(self.parameters),
+            **({"setting": dict(self.setting)} if self.setting else {}),
             "evidence": self.evidence.to_json(),
             "confused_with": [other.to_json() for other in self.confused_with],
         }
@@ -526,13 +545,13 @@ def _list(items: Iterable[Any]) -> list[dict[str, Any]]:
 def _each_once(effects: Sequence[NamedEffect]) -> None:
     """Refuse one effect twice in one recording; only events repeat."""
     seen: dict[str, list[Recordings]] = {}
-    for effect in effects:
-        if effect.id in CATALOGUE and CATALOGUE[effect.id].event:
+    for item in effects:
+        if item.id in CATALOGUE and CATALOGUE[item.id].event:
             continue
-        for other in seen.setdefault(effect.id, []):
-            if other is None or effect.recordings is None or set(other) & set(effect.recordings):
-                raise ValueError(f"diagnosis: {effect.id} twice in one recording; expected disjoint recordings")
-        seen[effect.id].append(effect.recordings)
+        for other in seen.setdefault(item.id, []):
+            if other is None or item.recordings is None or set(other) & set(item.recordings):
+                raise ValueError(f"diagnosis: {item.id} twice in one recording; expected disjoint recordings")
+        seen[item.id].append(item.recordings)
 
 
 @dataclass(frozen=True)

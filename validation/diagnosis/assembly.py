@@ -11,7 +11,7 @@ from scipy.stats import chi2 as chi2_law
 
 from discsim.arrays import FloatArray
 from discsim.disc import Aero, aero_key
-from discsim.effects.catalogue import CATALOGUE, Effect
+from discsim.effects.catalogue import effect as catalogued
 from discsim.model_file import Model, ModelEffect
 from validation.diagnosis.advice import confusions, in_words
 from validation.diagnosis.answer import (
@@ -302,7 +302,7 @@ def _model(found: Search, effects: Sequence[NamedEffect], law: Law | None) -> Mo
         sizes = {name: item.value for name, item in effect.parameters.items()}
         sds = {name: item.sd for name, item in effect.parameters.items() if item.sd is not None}
         own = user_effect(effect.id)
-        sized = Effect(effect.id, CATALOGUE[effect.id].type(**sizes)) if own is None else own.sized(sizes)
+        sized = catalogued(effect.id, **sizes, **effect.setting) if own is None else own.sized(sizes)
         carried.append(ModelEffect(sized, sds, effect.recordings))
     return Model(
         environment,

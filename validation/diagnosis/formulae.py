@@ -33,6 +33,8 @@ __all__ = [
     "with_unit",
 ]
 
+_NO_SETTING: Mapping[str, str] = MappingProxyType({})
+
 
 class Formula(NamedTuple):
     """What an effect is called and its form as HTML, parameters in braces."""
@@ -44,6 +46,9 @@ class Formula(NamedTuple):
 _LAG = "{tau_s} ẏ = x − y, y the reading"
 _CLOCK = "written time = {ratio} × true time, of {clock}"
 _DROPPED = "a share of {fraction} of the {sensor}'s samples is lost, the rest written as if none were"
+_AXES = "columns x, y, z hold {axes} of the body"
+_UNIT = "numbers are written in {written_in}"
+_OFFSET = "written time = true time + {offset_s}"
 
 FORMULAE: Mapping[str, Formula] = MappingProxyType(
     {
@@ -146,6 +151,27 @@ FORMULAE: Mapping[str, Formula] = MappingProxyType(
         "gps.clock_rate": Formula("a wrong clock of the GPS", _CLOCK.replace("{clock}", "the GPS")),
         "gps.latency": Formula("GPS fixes that come late", "a fix stamped t shows the state at t − {delay_s}"),
         "clock.rate": Formula("a wrong clock of the recorder", _CLOCK.replace("{clock}", "all sensors")),
+        "mag.axes": Formula("a magnetometer whose axes are mixed up", _AXES),
+        "accel.axes": Formula("an accelerometer whose axes are mixed up", _AXES),
+        "gyro.axes": Formula("a gyroscope whose axes are mixed up", _AXES),
+        "gps.axes": Formula(
+            "a GPS in other directions than stated", "columns north, east, down, and their velocities, hold {axes}"
+        ),
+        "mag.units": Formula("a magnetometer in another unit", _UNIT),
+        "accel.units": Formula("an accelerometer in another unit", _UNIT),
+        "gyro.units": Formula("a gyroscope in another unit", _UNIT),
+        "mag.time_offset": Formula("times of the magnetometer that are shifted", _OFFSET),
+        "accel.time_offset": Formula("times of the accelerometer that are shifted", _OFFSET),
+        "gyro.time_offset": Formula("times of the gyroscope that are shifted", _OFFSET),
+        "board.rotation": Formula(
+            "a sensor board that is turned in the disc",
+            "readings = C<sup>T</sup> (true vector), C the rotation by ({rx_rad}, {ry_rad}, {rz_rad})",
+        ),
+        "site.field": Formula(
+            "another magnetic field than stated",
+            "stated field turned about down by {declination_rad}, dipped further by {inclination_rad}, times {ratio}",
+        ),
+        "clock.units": Formula("times in another unit", "times of all sensors are written in {written_in}"),
     }
 )
 
@@ -250,11 +276,12 @@ def form(id: str) -> str:
     return _filled(id, {}) if id in FORMULAE else ""
 
 
-def found(id: str, parameters: Mapping[str, ParameterValue]) -> str:
+def found(id: str, parameters: Mapping[str, ParameterValue], setting: Mapping[str, str] = _NO_SETTING) -> str:
     """Return an effect's form with the values found, as HTML; what is not among them is at its baseline."""
     if id not in FORMULAE:
         return ", ".join(f"{escape(name)} = {with_unit(id, name, item)}" for name, item in parameters.items())
-    values = {name: f"{size:g}" for name, size in CATALOGUE[id].baseline._asdict().items()}
+    values = {name: f"{size:g}" for name, size in CATALOGUE[id].sizes.items()}
+    values |= {name: f"<b>{text.replace('-', '−')}</b>" for name, text in setting.items()}
     values |= {name: f"<b>{with_unit(id, name, item)}</b>" for name, item in parameters.items()}
     return _filled(id, values)
 

@@ -71,6 +71,19 @@ _TRACES: Mapping[str, tuple[str, str]] = MappingProxyType(
         "gps.clock_rate": ("time", "fixes run away from the motion that the other sensors show"),
         "gps.latency": ("speed", "fixes show where the disc was a moment before"),
         "clock.rate": ("time", "all rates and times are off by one and the same factor"),
+        "mag.axes": ("nothing: it is constant", "the magnetometer's columns hold other axes than stated"),
+        "accel.axes": ("nothing: it is constant", "the accelerometer's columns hold other axes than stated"),
+        "gyro.axes": ("nothing: it is constant", "the gyroscope's columns hold other axes than stated"),
+        "gps.axes": ("nothing: it is constant", "the GPS's columns hold other directions than stated"),
+        "mag.units": ("field", "fields are off by the factor between two units"),
+        "accel.units": ("specific force", "specific forces are off by the factor between two units"),
+        "gyro.units": ("rate", "rates are off by the factor between two units"),
+        "mag.time_offset": ("spin", "readings are early or late by one and the same time, all of their size there"),
+        "accel.time_offset": ("spin", "readings are early or late by one and the same time, all of their size there"),
+        "gyro.time_offset": ("rate of change", "readings are early or late by one and the same time"),
+        "board.rotation": ("the vector itself", "all sensors of the board show what is along other axes of the disc"),
+        "site.field": ("nothing: it is constant", "the field points elsewhere, or is of another size, than stated"),
+        "clock.units": ("time", "times are off by the factor between two units"),
     }
 )
 

@@ -15,6 +15,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.sensors import CrossAxis, Scale, sensitivity
+from discsim.effects.setup import BoardRotation, SiteField, field_there, on_board
 from discsim.motion import State
 from discsim.recording import Recording
 from validation.diagnosis.rows import row_of, user_effects_on
@@ -28,9 +29,19 @@ Values: TypeAlias = Mapping[tuple[str, str], float]
 #: sensor -> prefix of its effects
 PREFIX = {"magnetometer": "mag", "accelerometer": "accel", "gyroscope": "gyro", "gps": "gps"}
 #: the effects that only move the instants at which samples were taken
-CLOCKS = ("clock.rate", "mag.clock_rate", "accel.clock_rate", "gyro.clock_rate", "gps.clock_rate", "gps.latency")
+CLOCKS = (
+    "clock.rate",
+    "mag.clock_rate",
+    "accel.clock_rate",
+    "gyro.clock_rate",
+    "gps.clock_rate",
+    "gps.latency",
+    "mag.time_offset",
+    "accel.time_offset",
+    "gyro.time_offset",
+)
 _FIELD = ("magnetic_north", "magnetic_east", "magnetic_down")
-_BASELINE = {(row.id, name): none for row in CATALOGUE.values() for name, none in row.baseline._asdict().items()}
+_BASELINE = {(row.id, name): none for row in CATALOGUE.values() for name, none in row.sizes.items()}
 
 
 def value(values: Values, group: str, name: str) -> float:
@@ -52,10 +63,11 @@ def is_motion(group: str) -> bool:
 def delay(values: Values, sensor: str, written: FloatArray) -> FloatArray:
     """Return by how much earlier (s) than written (n,) the samples of a sensor show the motion."""
     ratio = value(values, "clock.rate", "ratio")
-    prefix = PREFIX.get(sensor)
+    offset, prefix = 0.0, PREFIX.get(sensor)
     if prefix is not None:
         ratio *= value(values, f"{prefix}.clock_rate", "ratio")
-    late = written - written / ratio
+        offset = value(values, f"{prefix}.time_offset", "offset_s")
+    late = written - (written - offset) / ratio
     if sensor == "gps":
         late = late + value(values, "gps.latency", "delay_s")
     return late
@@ -107,11 +119,17 @@ def to_body(rows: FloatArray, vector: FloatArray) -> FloatArray:
 def _field(recording: Recording, values: Values) -> FloatArray:
     moved = [values.get(("environment", name)) for name in _FIELD]
     stated = recording.environment.magnetic_field
-    return np.array([own if new is None else new for own, new in zip(stated, moved, strict=True)])
+    meant = np.array([own if new is None else new for own, new in zip(stated, moved, strict=True)])
+    return field_there(SiteField(*(value(values, "site.field", name) for name in SiteField._fields)), meant)
+
+
+def _on_board(values: Values, vector: FloatArray) -> FloatArray:
+    """Return vectors (..., 3) of B along the axes of the sensor board."""
+    return on_board(BoardRotation(*(value(values, "board.rotation", n) for n in BoardRotation._fields)), vector)
 
 
 def _magnetometer(recording: Recording, values: Values, rows: FloatArray) -> FloatArray:
-    m = to_body(rows, np.broadcast_to(_field(recording, values), (*rows.shape[:-1], 3)))
+    m = _on_board(values, to_body(rows, np.broadcast_to(_field(recording, values), (*rows.shape[:-1], 3))))
     xx, xy, xz, yy, yz, zz = (
         value(values, "mag.soft_iron", f"s{name}") for name in ("xx", "xy", "xz", "yy", "yz", "zz")
     )
@@ -121,7 +139,7 @@ def _magnetometer(recording: Recording, values: Values, rows: FloatArray) -> Flo
     if np.any(stray):
         h = np.maximum(-rows[..., 2], 0.02)
         decay = np.exp(-h / value(values, "mag.stray_field", "height_m"))
-        m = m + to_body(rows, decay[..., None] * stray)
+        m = m + _on_board(values, to_body(rows, decay[..., None] * stray))
     return np.asarray(m)
 
 
@@ -151,7 +169,7 @@ def specific_force(recording: Recording, values: Values, rows: FloatArray) -> Fl
 
 
 def _accelerometer(recording: Recording, values: Values, t: FloatArray, rows: FloatArray) -> FloatArray:
-    f = specific_force(recording, values, rows)
+    f = _on_board(values, specific_force(recording, values, rows))
     scale = Scale(*(value(values, "accel.scale", f"s{axis}") for axis in "xyz"))
     cross = CrossAxis(*(value(values, "accel.cross_axis", name) for name in CrossAxis._fields))
     if any(scale) or any(cross):
@@ -166,7 +184,8 @@ def _accelerometer(recording: Recording, values: Values, t: FloatArray, rows: Fl
 
 def _gyroscope(recording: Recording, values: Values, t: FloatArray, rows: FloatArray) -> FloatArray:
     scale = np.array([value(values, "gyro.scale", f"s{axis}") for axis in "xyz"])
-    w = rows[..., 13:16] * (1.0 + scale) + np.array([value(values, "gyro.bias", f"b{axis}_rad_s") for axis in "xyz"])
+    w = _on_board(values, rows[..., 13:16]) * (1.0 + scale)
+    w = w + np.array([value(values, "gyro.bias", f"b{axis}_rad_s") for axis in "xyz"])
     faked = np.array([value(values, "gyro.g_sensitivity", f"k{axis}") for axis in "xyz"])
     if np.any(faked):
         w = w + faked * _felt(recording, values, t, rows)
@@ -174,7 +193,7 @@ def _gyroscope(recording: Recording, values: Values, t: FloatArray, rows: FloatA
 
 
 def _felt(recording: Recording, values: Values, t: FloatArray, rows: FloatArray) -> FloatArray:
-    """Return the specific force (..., m, 3) that a gyroscope feels at true times t (m,).
+    """Return the specific force (..., m, 3) that a gyroscope feels along its own axes at true times t (m,).
 
     Where the path is unknown the motion tells only the part of it that is centripetal; the accelerometer on the same
     chip has measured all of it, with errors of some per cent and so far below those of the gyroscope's faked rate.
@@ -184,7 +203,8 @@ def _felt(recording: Recording, values: Values, t: FloatArray, rows: FloatArray)
         whole = np.all(np.isfinite(measured.value), axis=1)
         if np.count_nonzero(whole) > 1:
             written = t * value(values, "clock.rate", "ratio") * value(values, "accel.clock_rate", "ratio")
+            written = written + value(values, "accel.time_offset", "offset_s")
             return np.stack([np.interp(written, measured.t[whole], f) for f in measured.value[whole].T], axis=-1)
     # the stated place: both sit on one chip
     here = {key: v for key, v in values.items() if key[0] != "accel.position_offset"}
-    return specific_force(recording, here, rows)
+    return _on_board(values, specific_force(recording, here, rows))

@@ -14,6 +14,7 @@ from discsim.recording import SENSORS
 from validation.diagnosis.agreement import Agreement
 from validation.diagnosis.agreement_tables import tables_of
 from validation.diagnosis.answer import (
+    Confusion,
     Diagnosis,
     FitFigures,
     Law,
@@ -193,22 +194,30 @@ def _effect(item: NamedEffect) -> dict[str, Any]:
         (name, plus_minus(value.value, value.sd), unit(item.id, name), everyday(item.id, name, value))
         for name, value in item.parameters.items()
     ]
+    rows += [(name, text, "", "") for name, text in item.setting.items()]
     if not any(row[-1] for row in rows):
         rows = [row[:-1] for row in rows]
     return {
         "id": item.id,
         "title": name_of(item.id).capitalize() if name_of(item.id) != item.id else "An effect of your own:",
         "where": _where(item),
-        "found": Markup(found(item.id, item.parameters)),
+        "found": Markup(found(item.id, item.parameters, item.setting)),
         "form": Markup(form(item.id)),
         "header": ("parameter", "value", "unit", "that is")[: len(rows[0])],
         "parameters": rows,
         "evidence": " ".join(sentences),
         "confusions": [
-            (other.id, name_of(other.id), f"{other.delta_bic:,.0f}", other.next_recording or "")
+            (other.id, _other(other), f"{other.delta_bic:,.0f}", other.next_recording or "")
             for other in item.confused_with
         ],
     }
+
+
+def _other(item: Confusion) -> str:
+    """Return what a confused effect is called, and which of its settings or sizes it is where that is told."""
+    sizes = [f"{name} = {value.value:.4g}" for name, value in item.parameters.items()]
+    which = ", ".join([*(f"{name} = {text}" for name, text in item.setting.items()), *sizes])
+    return f"{name_of(item.id)} ({which})" if which else name_of(item.id)
 
 
 def _where(item: NamedEffect) -> str:

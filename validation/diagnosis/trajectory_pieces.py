@@ -725,7 +725,7 @@ def _concerns(group: str, sensor: str) -> bool:
     if group == "environment":
         return sensor == "magnetometer"
     row = row_of(group)
-    return row is not None and row.acts_on == sensor
+    return row is not None and row.acts_with((sensor,))
 
 
 class _Sampled:

@@ -73,7 +73,7 @@ def _step(id: str, name: str) -> float:
 
 
 def available(recordings: Sequence[Recording]) -> list[str]:
-    """Return the ids of effects that can act on these recordings."""
+    """Return the ids of effects that can act on these recordings and have a size that a fit can move."""
     plant = recordings[0].plant
     sensors = {sensor for recording in recordings for sensor in recording.samples}
     found = []
@@ -82,7 +82,7 @@ def available(recordings: Sequence[Recording]) -> list[str]:
             continue
         if plant == "free_spin" and row.id in _UNSEEN_IN_FREE_SPIN:
             continue
-        if row.acts_on in ("motion", "clock") or row.acts_on in sensors:
+        if not row.settings and row.acts_with(sensors):
             found.append(row.id)
     return found
 
@@ -121,7 +121,7 @@ def parameters_of(trial: Trial, *, shaped: bool = True) -> tuple[Parameter, ...]
     """Return the parameters of a trial for a fit, its shapes among them where ``shaped``."""
     row = row_of(trial.id)
     assert row is not None
-    baseline = row.baseline._asdict()
+    baseline = row.sizes
     found = [
         Parameter(c.group, c.name, float(baseline[c.name]), c.step, _LOOSE * c.step, trial.recordings)
         for c in trial.columns

@@ -294,9 +294,9 @@ def _check_case(plan: Plan, case: Case, path: Path) -> None:
     try:
         module = plan.instruments(case)
         for id in {key.rsplit(".", 1)[0] for key in case.settings if "." in key}:
-            target = row(id).acts_on
-            if target not in ("motion", "clock", *module.sensors):
-                raise InputError(f"{id}: there is no {target} among the parts, only {', '.join(module.sensors)}")
+            kind = row(id)
+            if not kind.acts_with(module.sensors):
+                raise InputError(f"{id}: there is no {kind.acts_on} among the parts, only {', '.join(module.sensors)}")
         module.with_effects(plan.effects(case.settings, moving=False))
         plan.effects(case.settings, moving=True)
         for name in plan.estimators:
@@ -409,7 +409,7 @@ def _read_effect(table: TomlTable, key: str, plant: str) -> Axis:
     id, _, name = key.rpartition(".")
     try:
         kind = row(id)
-        effect(id, **{name: 0.0 if name not in kind.parameters else kind.baseline[kind.parameters.index(name)]})
+        effect(id, **{name: kind.sizes.get(name, 0.0)})
     except InputError as error:
         raise table.error(key, f"'{key}': {error}") from None
     if plant not in kind.plants:

@@ -91,6 +91,11 @@ ON_SENSORS = (
     effect("gps.clock_rate", ratio=1.002),
     effect("gps.latency", delay_s=0.08),
     effect("clock.rate", ratio=1.001),
+    effect("mag.time_offset", offset_s=0.006),
+    effect("accel.time_offset", offset_s=-0.007),
+    effect("gyro.time_offset", offset_s=0.012),
+    effect("board.rotation", rx_rad=0.3, ry_rad=-0.5, rz_rad=1.2),
+    effect("site.field", declination_rad=0.2, inclination_rad=-0.1, ratio=1.05),
 )
 #: lost samples are counted by searches of their own and enter no prediction
 UNPREDICTED = {"mag.dropped_samples", "accel.dropped_samples"}
@@ -117,7 +122,8 @@ def beside(motion: Motion, recording: Recording, pieces: int = 3) -> Chain:
 
 def test_every_effect_of_the_catalogue_takes_part_here():
     rigs = {id for id, row in CATALOGUE.items() if id.startswith("rig.")}
-    assert {e.id for e in (*IN_THE_AIR, *ON_SENSORS)} | rigs | UNPREDICTED == set(CATALOGUE)
+    settings = {id for id, row in CATALOGUE.items() if row.settings}  # no numbers, so no prediction has them
+    assert {e.id for e in (*IN_THE_AIR, *ON_SENSORS)} | rigs | settings | UNPREDICTED == set(CATALOGUE)
 
 
 # ------------------------------------------------------------------------------------------------- motion
@@ -373,6 +379,10 @@ def test_a_gap_that_may_not_be_is_closed_by_the_step():
         (("mag.lag", "tau_s"), 1e-5, {("mag.lag", "tau_s"): 2e-3}),
         (("mag.clock_rate", "ratio"), 1e-6, {("mag.clock_rate", "ratio"): 1.001}),
         (("clock.rate", "ratio"), 1e-6, {("clock.rate", "ratio"): 1.0}),
+        (("gyro.time_offset", "offset_s"), 1e-6, {("gyro.time_offset", "offset_s"): 0.002}),
+        (("board.rotation", "ry_rad"), 1e-4, {("board.rotation", "rx_rad"): 0.4}),
+        (("site.field", "declination_rad"), 1e-3, {}),
+        (("site.field", "ratio"), 1e-3, {("site.field", "ratio"): 1.0}),
         (("gps.latency", "delay_s"), 1e-4, {("gps.latency", "delay_s"): 0.05}),
     ],
     ids=lambda item: ".".join(item) if isinstance(item, tuple) else "",
@@ -394,10 +404,11 @@ def test_columns_of_shared_parameters_are_those_of_the_whole_flight(
         values = {**values, key: float(stated[key])}  # type: ignore[arg-type]
     linear = linearise(three, values, [Column(*key, h)], np.zeros(12, dtype=np.bool_))
     found, expected = linear.shared[:, 0], slope_of(one, values, key, h)
-    if key == ("gps.latency", "delay_s"):  # there are no fixes before
+    if key[1] in ("delay_s", "offset_s"):  # there is nothing from before
         found, expected = np.where(linear.t > 0.06, found, 0.0), np.where(linear.t > 0.06, expected, 0.0)
     # second differences of the readings over h
-    share = ONE_SIDED if key[1] in ("ratio", "tau_s", "delay_s") else 2e-3
+    in_time = key[0] != "site.field" and key[1] in ("ratio", "tau_s", "delay_s", "offset_s")
+    share = ONE_SIDED if in_time else 2e-3
     assert_column(linear, found, expected, share, key)
 
 

@@ -157,12 +157,14 @@ def test_a_short_fault_in_a_long_recording_stays_in_the_figure():
 @pytest.mark.parametrize("id", CATALOGUE)
 def test_every_effect_has_a_name_and_a_formula_with_each_of_its_parameters(id):
     row = CATALOGUE[id]
-    assert set(re.findall(r"\{(\w+)\}", FORMULAE[id].form)) == set(row.parameters)
+    assert set(re.findall(r"\{(\w+)\}", FORMULAE[id].form)) == {*row.parameters, *row.settings}
     assert "{" not in form(id)
     values = {name: ParameterValue(1.2345e-3 * (k + 1), 1e-5) for k, name in enumerate(row.parameters)}
     for k, name in enumerate(row.parameters):
         assert f"{1.2345e-3 * (k + 1):.6f}" in found(id, values)
         assert isinstance(everyday(id, name, values[name]), str)
+    for name in row.settings:
+        assert "<b>as it is</b>" in found(id, values, {name: "as it is"})
 
 
 def test_no_formula_is_of_an_effect_that_is_not_there():
