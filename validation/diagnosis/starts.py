@@ -27,7 +27,17 @@ from discsim.frames import attitude_matrix, body_to_ned, multiply, quaternion_fr
 from discsim.recording import Recording
 from discsim.trajectory import predict
 
-__all__ = ["Starts", "flight_starts", "rig_starts", "spin_starts"]
+__all__ = [
+    "Fixes",
+    "Spin",
+    "Starts",
+    "field_spin",
+    "flight_starts",
+    "local_cubics",
+    "path_fixes",
+    "rig_starts",
+    "spin_starts",
+]
 
 ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
 
@@ -78,7 +88,7 @@ class _Readings(NamedTuple):
     value: FloatArray
 
 
-class _Fixes(NamedTuple):
+class Fixes(NamedTuple):
     """Fixes of a path: t (n,) s, position and velocity (n, 3) in N, the latter NaN where unknown, and their noise."""
 
     t: FloatArray
@@ -107,7 +117,7 @@ class _Felt(NamedTuple):
         return moved + gained * outside + 0.5 * force * outside**2, gained + force * outside
 
 
-class _Spin(NamedTuple):
+class Spin(NamedTuple):
     """Angle turned by the field in the disc's plane, and what belongs to it.
 
     ``grid`` (n,) s; ``phase`` and ``rate`` (n,) of the turning vector, rad and rad/s; ``turning`` (n,) the rate
@@ -172,7 +182,7 @@ def flight_starts(recording: Recording, t: FloatArray) -> Starts:
             return predicted
     frame = _frame(recording)
     grid = _even(t, recording)
-    fixes = _fixes(recording)
+    fixes = path_fixes(recording)
     felt = _felt(recording, frame)
     pair = None if fixes is None else _compared(fixes, felt, grid, recording.environment.gravity)
     normals = None if fixes is None or pair is None else _normals(recording, _path(fixes, None, grid)[1], pair[0])
@@ -239,6 +249,14 @@ def rig_starts(recording: Recording, t: FloatArray) -> tuple[FloatArray, FloatAr
     # m_B = C3(psi) B: the complex field in B is that in N times exp(-i psi)
     psi = np.arctan2(east, north) - spin.phase_at(t)
     return psi, -np.interp(t, spin.grid, spin.turning)
+
+
+def field_spin(recording: Recording, *, steady: bool) -> Spin | None:
+    """Return the spin as the magnetometer alone shows it; None where there are too few readings.
+
+    ``steady`` tells that the axis stands still, so that the field's length across it is constant.
+    """
+    return _spin(replace(recording, samples={"magnetometer": recording.samples["magnetometer"]}), steady=steady)
 
 
 # ---------------------------------------------------------------------------------------------- readings
@@ -393,8 +411,12 @@ def _spread(grid: FloatArray, t: FloatArray, value: ComplexArray, sigma: float) 
 
 
 def _spin(
-    recording: Recording, sensor: str, expected: Callable[[FloatArray], FloatArray] | None, *, steady: bool
-) -> _Spin | None:
+    recording: Recording,
+    sensor: str = "magnetometer",
+    expected: Callable[[FloatArray], FloatArray] | None = None,
+    *,
+    steady: bool,
+) -> Spin | None:
     """Follow the phase of a vector that is fixed, or slow, in N: the field, or else the specific force.
 
     ``steady`` tells that the axis stands still, so that the vector's length across it is constant.
@@ -448,8 +470,8 @@ def _spin(
         rate = shape * _weighted_median(rate / shape, amplitude)
         turned = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)])
         phase = turned + _weighted_median(phase - turned, amplitude)
-        return _Spin(grid, phase, rate, rate, amplitude, t, plane)
-    return _Spin(grid, phase, rate, _without_steps(grid, rate, t, plane, step), amplitude, t, plane)
+        return Spin(grid, phase, rate, rate, amplitude, t, plane)
+    return Spin(grid, phase, rate, _without_steps(grid, rate, t, plane, step), amplitude, t, plane)
 
 
 def _weighted_median(value: FloatArray, weight: FloatArray) -> float:
@@ -625,7 +647,7 @@ def _sign(recording: Recording) -> float:
 
 
 def _without_precession(
-    recording: Recording, spin: _Spin, grid: FloatArray, psi: FloatArray, r: FloatArray, w: ComplexArray
+    recording: Recording, spin: Spin, grid: FloatArray, psi: FloatArray, r: FloatArray, w: ComplexArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return psi and r without the turning of the field's phase by p and q: m_z (p m_x + q m_y)/(m_x^2 + m_y^2)."""
     axial = _readings(recording, "magnetometer", 2)
@@ -1056,7 +1078,7 @@ def _others(recording: Recording, attitude: FloatArray) -> tuple[FloatArray, ...
 # ---------------------------------------------------------------------------------------------- path
 
 
-def _fixes(recording: Recording) -> _Fixes | None:
+def path_fixes(recording: Recording) -> Fixes | None:
     """Return the fixes of GPS, or else of a track, or None where there are fewer than four."""
     for sensor in ("gps", "track"):
         samples = recording.get(sensor)
@@ -1067,11 +1089,17 @@ def _fixes(recording: Recording) -> _Fixes | None:
             continue
         sheet, value = recording.sheets[sensor], samples.value[good]
         velocity = value[:, 3:6] if value.shape[1] >= 6 else np.full((len(value), 3), np.nan)
-        return _Fixes(samples.t[good], value[:, :3], velocity, sheet.noise_rms or 0.2, sheet.velocity_noise_rms or 0.1)
+        return Fixes(samples.t[good], value[:, :3], velocity, sheet.noise_rms or 0.2, sheet.velocity_noise_rms or 0.1)
     return None
 
 
-def _local_cubics(fixes: _Fixes, t: FloatArray, moved: FloatArray, gained: FloatArray) -> FloatArray:
+def local_cubics(fixes: Fixes, t: FloatArray) -> FloatArray:
+    """Fit a cubic to the fixes around each instant t (m,); return its value and three derivatives, (m, 4, 3)."""
+    nothing = np.zeros((fixes.t.size, 0))
+    return _local_cubics(fixes, t, nothing, nothing)
+
+
+def _local_cubics(fixes: Fixes, t: FloatArray, moved: FloatArray, gained: FloatArray) -> FloatArray:
     """Fit a cubic to the fixes around each instant t (m,); return its value and three derivatives, (m, 4, 3 + k).
 
     ``moved`` and ``gained`` (n, k) are positions and velocities of something else at the times of the fixes, to which
@@ -1113,7 +1141,7 @@ def _local_cubics(fixes: _Fixes, t: FloatArray, moved: FloatArray, gained: Float
 
 
 def _compared(
-    fixes: _Fixes, felt: _Felt | None, grid: FloatArray, gravity: float
+    fixes: Fixes, felt: _Felt | None, grid: FloatArray, gravity: float
 ) -> tuple[FloatArray, FloatArray | None]:
     """Return the specific force (n, 3) in N from the path, and that felt in S at the start, over the same windows.
 
@@ -1125,7 +1153,7 @@ def _compared(
     down = np.array([0.0, 0.0, gravity])
     if felt is None:
         nothing = np.zeros((fixes.t.size, 0))
-        return _local_cubics(fixes, inside, nothing, nothing)[:, 2, :] - down, None
+        return local_cubics(fixes, inside)[:, 2, :] - down, None
     found = []
     for delay in (0.0, 0.1, 0.2, 0.3):
         both = _local_cubics(fixes, inside[::3] if delay else inside, *felt.integrals_at(fixes.t - delay))[:, 2, :]
@@ -1143,13 +1171,13 @@ def _compared(
     return both[:, :3] - down, both[:, 3:]
 
 
-def _path(fixes: _Fixes, felt: _Felt | None, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _path(fixes: Fixes, felt: _Felt | None, t: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return position and velocity (k, 3) at t: what the acceleration in N makes, and local cubics for the rest."""
     nothing = np.zeros((fixes.t.size, 0))
     inside = np.clip(t, fixes.t[0], fixes.t[-1])
     outside = (t - inside)[:, None]
     if felt is None:
-        cubic = _local_cubics(fixes, inside, nothing, nothing)
+        cubic = local_cubics(fixes, inside)
         x, v, a = cubic[:, 0], cubic[:, 1], cubic[:, 2]
         return x + v * outside + 0.5 * a * outside**2, v + a * outside
     moved, gained = felt.integrals_at(fixes.t)

@@ -1,0 +1,210 @@
+"""Setup faults, found before anything is fitted: units, axes, offsets of time, a turned board, another field.
+
+Takes recordings of one hardware; gives the faults that make their sensors agree, each as an effect of the catalogue
+with what it gains and what else would do as well, and the recordings as they were meant. Sound recordings come back as
+they are: a fault is named only where the sensors contradict one another as written, and agree with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.effects.catalogue import Effect, effect
+from discsim.recording import Recording
+from discsim.written import corrected
+from validation.setup.hypotheses import Hypothesis, axes_text, board_effect, chosen, hypotheses, pairs
+from validation.setup.proof import left_by_short_fit
+from validation.setup.units import clock_unit, sensor_units
+
+__all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said"]
+
+#: what a fault must gain, in twice the log likelihood of the relations between sensors: the largest gain on sound
+#: recordings is 16 (physics of no catalogue in a flight) of 540 sets, most of them below 3
+PRICE = 45.0
+#: sensors agree where the cost per independent statement is below this; sound sets have 0.02 to 0.25
+AGREE = 0.6
+#: a hypothesis that costs no more than this above the best cannot be told from it
+TWIN = 8.0
+#: most faults of one setup that are looked for, and most twins that are told
+MOST, MOST_TWINS = 3, 8
+_PREFIX = {"magnetometer": "mag", "accelerometer": "accel", "gyroscope": "gyro", "gps": "gps"}
+_OPPOSITE = {"-north": "south", "-east": "west", "-down": "up"}
+
+
+@dataclass(frozen=True)
+class SetupFault:
+    """A fault as an effect of the catalogue, its gain (twice the log likelihood, and on recordings set aside), twins.
+
+    ``twins`` are effects, in place of this one, that these recordings cannot tell from it.
+    """
+
+    effect: Effect
+    gain: float
+    heldout_gain: float | None
+    twins: tuple[Effect, ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """One line for a reader."""
+        text = f"{self.effect.id}: {said(self.effect)}"
+        if self.twins:
+            text += "; these recordings cannot tell it from: " + "; ".join(said(one) for one in self.twins)
+        return text
+
+
+@dataclass(frozen=True)
+class SetupFindings:
+    """The faults of a setup, and the recordings as they were meant, in the order in which they were given."""
+
+    faults: tuple[SetupFault, ...]
+    recordings: tuple[Recording, ...]
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The faults as effects."""
+        return tuple(fault.effect for fault in self.faults)
+
+
+def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
+    """Find what is wrong in how recordings of one hardware were set up and written.
+
+    Takes a second or so. Recordings without a spin, or with one sensor only, tell little: nothing is found then but
+    units of time and magnitude.
+    """
+    current = tuple(recordings)
+    faults: list[SetupFault] = []
+    clock = clock_unit(current)
+    for unit in [] if clock is None else [clock]:
+        faults.append(SetupFault(unit, float("inf"), None))
+        current = tuple(corrected(one, [unit]) for one in current)
+    for unit in sensor_units(current):
+        faults.append(SetupFault(unit, float("inf"), None))
+        current = tuple(corrected(one, [unit]) for one in current)
+    for _ in range(MOST):
+        found = _next(current)
+        if not found:
+            break
+        faults += found
+        current = tuple(corrected(one, [fault.effect for fault in found]) for one in current)
+    return SetupFindings(tuple(faults), current)
+
+
+def _next(recordings: Sequence[Recording]) -> list[SetupFault]:
+    """Return the fault, or the two at once, that make the sensors agree; empty where they do, or nothing does."""
+    ranking = hypotheses(recordings)
+    as_written, found = ranking.as_written, ranking.found
+    site = recordings[0].environment.magnetic_field
+    before = None if as_written is None else as_written.costs
+    if found and _agrees(found[0]) and _gains(as_written, found[0]):
+        tied = [item for item in found if item.charged < found[0].charged + TWIN]
+        best, others = _told_apart(tied, recordings, site)
+        twins = [_effect(item, site) for item in sorted(others, key=lambda item: item.kind != best.kind)]
+        gain = float("inf") if before is None else float(np.sum(before) - best.cost)
+        return [SetupFault(_effect(best, site), gain, _heldout(before, best, found), tuple(twins[:MOST_TWINS]))]
+    if as_written is not None and _agrees(as_written):
+        return []
+    for both, one, other in pairs(ranking.base)[:1]:
+        if _agrees(both) and _gains(as_written, both, 2.0):
+            gain = float("inf") if before is None else float(np.sum(before) - both.cost)
+            return [SetupFault(_effect(item, site), gain, None) for item in (one, other)]
+    return []
+
+
+#: most hypotheses that short fits are made of; a twin is refuted where it leaves this many times more
+_FITTED, _REFUTED = 6, 2.0
+
+
+def _told_apart(
+    tied: Sequence[Hypothesis], recordings: Sequence[Recording], site: FloatArray
+) -> tuple[Hypothesis, list[Hypothesis]]:
+    """Return the best of hypotheses that cost the same, and those that cannot be told from it.
+
+    In a flight the air tells them apart.
+    """
+    if len(tied) == 1 or recordings[0].plant != "flight":
+        return tied[0], list(tied[1:])
+    some = chosen(recordings)
+    left = [left_by_short_fit([corrected(one, [_effect(item, site)]) for one in some]) for item in tied[:_FITTED]]
+    best = int(np.argmin(left))
+    return tied[best], [tied[k] for k in range(len(left)) if k != best and left[k] < _REFUTED * left[best]]
+
+
+def _agrees(item: Hypothesis) -> bool:
+    """Tell whether the sensors agree under a hypothesis."""
+    return item.cost < AGREE * item.weight
+
+
+def _gains(as_written: Hypothesis | None, item: Hypothesis, faults: float = 1.0) -> bool:
+    """Tell whether a hypothesis is worth its price; what cannot be as written has none."""
+    return as_written is None or as_written.cost - item.charged > faults * PRICE
+
+
+def _heldout(before: FloatArray | None, best: Hypothesis, found: Sequence[Hypothesis]) -> float | None:
+    """Return what recordings gain in log likelihood by the hypothesis that the others choose; None for one alone."""
+    if before is None or best.costs.size < 2 or before.size != best.costs.size:
+        return None
+    same = [item for item in found if item.costs.size == best.costs.size]
+    gain = 0.0
+    for i in range(best.costs.size):
+        choice = min(same, key=lambda item: item.charged - item.costs[i])
+        gain += 0.5 * float(before[i] - choice.costs[i])
+    return gain
+
+
+# ---------------------------------------------------------------------------------------------- as effects
+
+
+def _effect(item: Hypothesis, stated: FloatArray) -> Effect:
+    """Return a hypothesis as an effect of the catalogue; ``stated`` (3,) is the stated field, uT."""
+    if item.kind == "axes":
+        if item.sensor != "gps":
+            return effect(f"{_PREFIX[item.sensor]}.axes", axes=axes_text(item.columns.of(item.sensor)))
+        words = axes_text(item.columns.of("gps"), ("north", "east", "down")).split()
+        return effect("gps.axes", axes=" ".join(_OPPOSITE.get(word, word) for word in words))
+    if item.kind == "offset":
+        return effect(f"{_PREFIX[item.sensor]}.time_offset", offset_s=item.columns.offset[item.sensor])
+    if item.kind == "board":
+        return board_effect(next(iter(item.columns.axes.values())))
+    assert item.columns.site is not None
+    declination, inclination, ratio = _apart(item.columns.site, stated)
+    return effect("site.field", declination_rad=declination, inclination_rad=inclination, ratio=ratio)
+
+
+def _apart(site: FloatArray, stated: FloatArray) -> tuple[float, float, float]:
+    """Return by how much a field (3,) is turned about down, dips further, and is larger than another."""
+    turned = np.arctan2(site[1], site[0]) - np.arctan2(stated[1], stated[0])
+    dip = [float(np.arctan2(b[2], np.hypot(b[0], b[1]))) for b in (site, stated)]
+    wrapped = float((turned + np.pi) % (2.0 * np.pi) - np.pi)
+    return wrapped, dip[0] - dip[1], float(np.linalg.norm(site) / np.linalg.norm(stated))
+
+
+# ---------------------------------------------------------------------------------------------- in words
+
+
+_SENSOR = {"mag": "magnetometer", "accel": "accelerometer", "gyro": "gyroscope", "gps": "GPS"}
+
+
+def said(fault: Effect) -> str:
+    """Return what an effect of the setup means for the file that was written."""
+    prefix, _, what = fault.id.partition(".")
+    sensor = _SENSOR.get(prefix, prefix)
+    values = fault.value._asdict()
+    if what == "axes":
+        columns = "north, east, down" if prefix == "gps" else "x, y, z"
+        return f"the {sensor}'s columns {columns} hold {values['axes'].replace(' ', ', ')} of the true axes"
+    if what == "units":
+        names = "times of all sensors" if prefix == "clock" else f"{sensor}'s numbers"
+        return f"the {names} are in {values['written_in']}"
+    if what == "time_offset":
+        return f"the {sensor}'s times are {1e3 * values['offset_s']:+.1f} ms off"
+    if fault.id == "board.rotation":
+        degrees = ", ".join(f"{np.degrees(angle):+.1f}" for angle in fault.value)
+        return f"the sensor board is turned in the body by the rotation vector ({degrees}) deg"
+    return (
+        f"the field that is there is turned by {np.degrees(values['declination_rad']):+.1f} deg about down, dips "
+        f"{np.degrees(values['inclination_rad']):+.1f} deg further and is {values['ratio']:.3f} times the stated one"
+    )

@@ -1,0 +1,292 @@
+"""Which setup fault makes the sensors agree: hypotheses about columns, ranked by the relations between sensors.
+
+Takes recordings of one hardware; gives hypotheses with what their relations cost (`validation.setup.relations`), best
+first. Faults of one sensor's columns are signed permutations, all of them; a whole board is turned by what its sensors
+show (`validation.setup.rotation`); offsets of time turn a sensor's phase against the field's by rate times offset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, permutations, product
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from discsim.arrays import FloatArray
+from discsim.effects.catalogue import Effect, effect
+from discsim.recording import Recording
+from discsim.written import corrected
+from validation.setup.relations import Columns, misfit, wanted_force
+from validation.setup.rotation import board_turns, spin_axis
+from validation.setup.spin_signals import SpinSignals, spin_signals
+
+__all__ = ["PERMUTATIONS", "Hypothesis", "Ranking", "axes_text", "board_effect", "chosen", "hypotheses", "pairs"]
+
+#: sensors that sit on the board
+BOARD = ("magnetometer", "gyroscope", "accelerometer")
+#: so many recordings tell as much as all
+MOST = 4
+#: largest offset of time that is looked for, s, and how far the phase turns between two that are tried, rad
+LATEST, PHASE_STEP = 0.15, 0.25
+#: a board nearer to a right angle than this (root sum of squares of the matrix) stands at it
+SNAP = 0.15
+#: what a statement costs that a hypothesis takes back (as readings that clip become gaps in a turned board): half of
+#: what one costs that misses by its ordinary size
+SILENT = 0.35
+#: what is smaller than this is left to the fit, whose steps from the stated numbers reach it: an offset's phase, rad; a
+#: field's direction, rad, and size, share; a board's tilt and its turn about the axis (less may be an accelerometer off
+#: its stated place), rad
+PHASE_LEAST, FIELD_LEAST, SIZE_LEAST, TILT_LEAST, TURN_LEAST = 0.5, 0.05, 0.05, 0.04, 0.4
+
+
+def _permutations() -> tuple[FloatArray, ...]:
+    found = []
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            matrix = np.zeros((3, 3))
+            matrix[list(order), range(3)] = signs
+            found.append(matrix)
+    return tuple(sorted(found, key=changes))
+
+
+def changes(matrix: FloatArray) -> float:
+    """Return how unlikely a mistake a signed permutation is: one axis reversed 1, two swapped 1.5, more after."""
+    moved = int(np.count_nonzero(np.argmax(np.abs(matrix), axis=0) != np.arange(3)))
+    reversed_ = int(np.count_nonzero(np.sum(matrix, axis=0) < 0))
+    return {0: 0.0, 2: 1.5, 3: 2.5}[moved] + {0: 0.0, 1: 1.0, 2: 1.8, 3: 2.0}[reversed_]
+
+
+def axes_text(matrix: FloatArray, names: Sequence[str] = ("x", "y", "z")) -> str:
+    """Return what written columns hold, as in ``"x -y z"``, of a matrix (3, 3) that takes them to true axes."""
+    rows = np.argmax(np.abs(matrix), axis=0)
+    return " ".join(("-" if matrix[row, column] < 0 else "") + names[row] for column, row in enumerate(rows))
+
+
+#: all signed permutations of three axes, likely mistakes first
+PERMUTATIONS = _permutations()
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A supposed fault: ``kind`` (axes, board, offset, field; "" for none), its sensor, columns, and what it costs.
+
+    ``costs`` (k,) are those of all relations by recording, ``weight`` how many independent statements they are,
+    ``size`` how unlikely the mistake is before looking.
+    """
+
+    kind: str
+    sensor: str
+    columns: Columns
+    costs: FloatArray
+    weight: float
+    size: float = 0.0
+
+    @property
+    def cost(self) -> float:
+        """The cost of all recordings."""
+        return float(np.sum(self.costs))
+
+    @property
+    def charged(self) -> float:
+        """The cost with the mistake's own."""
+        return self.cost + self.size
+
+
+def chosen(recordings: Sequence[Recording]) -> list[Recording]:
+    """Return the recordings that are looked at: as many as are of use, both directions of spin among them."""
+
+    def direction(recording: Recording) -> float:
+        for sensor, column in (("rate_reference", None), ("gyroscope", 2)):
+            if sensor in recording:
+                value = recording.samples[sensor].value
+                return float(np.sign(np.nanmedian(value if column is None else value[:, column])))
+        return 0.0
+
+    if len(recordings) <= MOST:
+        return list(recordings)
+    by_direction: dict[float, list[Recording]] = {}
+    for recording in recordings:
+        by_direction.setdefault(direction(recording), []).append(recording)
+    some: list[Recording] = []
+    while len(some) < MOST:
+        for group in by_direction.values():
+            if group and len(some) < MOST:
+                some.append(group.pop(0))
+    return some
+
+
+@dataclass(frozen=True)
+class _Base:
+    """Columns that are supposed beforehand, so that the spin axis is z, and the signals there."""
+
+    axes: Mapping[str, FloatArray]
+    signals: tuple[SpinSignals, ...]
+
+    def total(self, columns: Columns) -> Columns:
+        """Return columns as they act on what is written."""
+        axes = {name: columns.of(name) @ self.axes.get(name, np.eye(3)) for name in {*self.axes, *columns.axes}}
+        return replace(columns, axes=axes)
+
+
+def _base(recordings: Sequence[Recording], axes: Mapping[str, FloatArray], fault: Effect | None) -> _Base:
+    """Return the signals of recordings corrected by a fault, which is what ``axes`` say."""
+    some = recordings if fault is None else [corrected(one, [fault]) for one in recordings]
+    found = [spin_signals(one) for one in some]
+    return _Base(axes, tuple(one for one in found if one is not None))
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """All hypotheses about recordings, best first; ``as_written`` is None where relations cannot even be asked so."""
+
+    as_written: Hypothesis | None
+    found: tuple[Hypothesis, ...]
+    base: _Base
+
+
+def hypotheses(recordings: Sequence[Recording]) -> Ranking:
+    """Return what the relations between sensors cost as written and under every single fault of the setup."""
+    some = chosen(recordings)
+    axis = spin_axis(some, "magnetometer")
+    main = 2 if axis is None else int(np.argmax(np.abs(axis)))
+    if main == 2:
+        base = _base(some, {}, None)
+    else:
+        upright = _to_z(main)
+        base = _base(some, {"magnetometer": upright}, effect("mag.axes", axes=axes_text(upright)))
+    found: list[Hypothesis] = []
+    as_written = None
+    if base.signals:
+        found += list(_one_sensor(base))
+        if not base.axes:
+            as_written = Hypothesis("", "", Columns(), *misfit(base.signals, Columns()))
+            found += [*_offsets(base), *_field(base)]
+    found += list(_boards(some))
+    most = max((item.weight for item in found), default=0.0)
+    found = [replace(item, size=item.size + SILENT * (most - item.weight)) for item in found]
+    return Ranking(as_written, tuple(sorted(found, key=lambda item: item.charged)), base)
+
+
+#: permutations of each of two sensors that are tried together: all that leave the spin axis where it is
+_OF_EACH = 16
+
+
+def pairs(base: _Base) -> list[tuple[Hypothesis, Hypothesis, Hypothesis]]:
+    """Return hypotheses of two sensors' axes at once, best first: both, and each of them by itself."""
+    if not base.signals:
+        return []
+    each: dict[str, list[Hypothesis]] = {}
+    for item in sorted(_one_sensor(base, alone=False), key=lambda item: item.cost):
+        own = each.setdefault(item.sensor, [])
+        if len(own) < _OF_EACH:
+            own.append(item)
+    found = []
+    for first, second in combinations(each, 2):
+        for one, other in product(each[first], each[second]):
+            axes = {
+                name: matrix @ base.axes.get(name, np.eye(3)).T
+                for item in (one, other)
+                for name, matrix in ((item.sensor, item.columns.of(item.sensor)),)
+            }
+            both = Hypothesis("axes", "", Columns(axes), *misfit(base.signals, Columns(axes)), one.size + other.size)
+            found.append((both, one, other))
+    return sorted(found, key=lambda item: item[0].charged)
+
+
+def _to_z(axis: int) -> FloatArray:
+    """Return the rotation (3, 3) by a third of a turn, or none, that takes an axis to z."""
+    return np.roll(np.eye(3), (2 - axis) % 3, axis=0)
+
+
+def _one_sensor(base: _Base, *, alone: bool = True) -> Iterator[Hypothesis]:
+    """Return the hypotheses of one sensor's axes; unless ``alone``, also those that need another one beside them."""
+    there = [name for name in BOARD if any(name in one.recording for one in base.signals)]
+    there += ["gps"] if any("gps" in one.recording for one in base.signals) else []
+    for sensor in there:
+        if alone and base.axes and sensor not in base.axes:
+            continue  # the magnetometer's spin axis is another: without its own columns nothing can be right
+        for matrix in PERMUTATIONS:
+            if sensor == "magnetometer" and abs(matrix[2, 2]) < 0.5:
+                continue
+            total = base.total(Columns({sensor: matrix}))
+            unlikely = changes(total.of(sensor))
+            if unlikely > 0.0:
+                costs = misfit(base.signals, Columns({sensor: matrix}))
+                yield Hypothesis("axes", sensor, total, *costs, 4.0 + unlikely)
+
+
+def _offsets(base: _Base) -> Iterator[Hypothesis]:
+    fastest = max(float(np.nanmax(np.abs(one.rate))) for one in base.signals)
+    step = PHASE_STEP / fastest
+    count = int(LATEST / step)
+    for sensor in BOARD:
+        if not any(sensor in one.recording for one in base.signals):
+            continue
+        tried = []
+        for k in range(-count, count + 1):
+            columns = Columns({}, {sensor: k * step})
+            tried.append(Hypothesis("offset", sensor, columns, *misfit(base.signals, columns), 6.0))
+        best = min(tried, key=lambda item: item.cost)
+        if abs(best.columns.offset[sensor]) * fastest > PHASE_LEAST:
+            yield best
+
+
+#: iron along the axis that is ordinary, uT, and how far a field may be from the stated one, as a share of it
+_IRON, _APART = 5.0, 0.4
+#: what f . m leaves on sound throws, times the field's size, m/s^2
+_LEFT = 0.25
+
+
+def _field(base: _Base) -> Iterator[Hypothesis]:
+    """Return the field for which f . m in the body equals (a - g) . B along the path: linear in B."""
+    B = base.signals[0].recording.environment.magnetic_field
+    strength = float(np.linalg.norm(B))
+    rows, targets = [], []
+    for one in base.signals:
+        if one.force is not None and one.path is not None:
+            across = np.real(one.force.turning[:, 0] + 1j * one.force.turning[:, 1])
+            axial = one.force.mean[:, 2]
+            felt = one.across * across + one.along * axial
+            A = np.column_stack([wanted_force(one, np.eye(3)), axial])
+            good = np.isfinite(felt) & np.all(np.isfinite(A), axis=1)
+            rows.append(A[good])
+            targets.append(felt[good])
+    if not rows or strength == 0.0:
+        return
+    A, y = np.vstack(rows), np.concatenate(targets)
+    # neighbours share their errors; a robust weight for gusts and touches
+    sd = 2.5 * _LEFT * strength
+    prior = np.diag(1.0 / np.array([_APART * strength] * 3 + [_IRON]) ** 2)
+    start = np.append(B, 0.0)
+    x = start
+    for _ in range(6):
+        weight = 1.0 / (sd**2 * (1.0 + ((y - A @ x) / (3.0 * sd)) ** 2))
+        x = np.linalg.solve((A * weight[:, None]).T @ A + prior, (A * weight[:, None]).T @ y + prior @ start)
+    site = x[:3]
+    apart = np.arccos(np.clip(site @ B / (np.linalg.norm(site) * strength), -1.0, 1.0))
+    if apart > FIELD_LEAST or abs(np.log(np.linalg.norm(site) / strength)) > SIZE_LEAST:
+        columns = Columns({}, {}, site)
+        yield Hypothesis("field", "site", columns, *misfit(base.signals, columns), 9.0)
+
+
+def board_effect(matrix: FloatArray) -> Effect:
+    """Return board.rotation of a matrix (3, 3) that takes what is written to body axes."""
+    rx, ry, rz = Rotation.from_matrix(matrix).as_rotvec().tolist()
+    return effect("board.rotation", rx_rad=rx, ry_rad=ry, rz_rad=rz)
+
+
+def _boards(some: Sequence[Recording]) -> Iterator[Hypothesis]:
+    there = [sensor for sensor in BOARD if any(sensor in one for one in some)]
+    for turned in board_turns(some):
+        right_angle = min(PERMUTATIONS, key=lambda item: float(np.linalg.norm(turned - item)))
+        # right angles are what boards are mounted at, and mix no clipped reading into others
+        matrix = right_angle if np.linalg.norm(turned - right_angle) < SNAP else turned
+        tilt, about = np.arccos(np.clip(matrix[2, 2], -1.0, 1.0)), np.arctan2(matrix[1, 0], matrix[0, 0])
+        if tilt < TILT_LEAST and abs(about) < TURN_LEAST:
+            continue
+        axes = {sensor: matrix for sensor in there}
+        base = _base(some, axes, board_effect(matrix))
+        if base.signals:
+            yield Hypothesis("board", "board", Columns(axes), *misfit(base.signals, Columns()), 9.0)

@@ -1,0 +1,39 @@
+"""Hypotheses that relations between sensors cannot tell apart, told by a short fit of the flight's physics.
+
+A board upside down on a disc that spins the other way reads the same as a sound one in every relation between its
+sensors; the air knows the difference, for a disc has a top. So a second or so of a flight is followed under each
+hypothesis, loosely (`validation.diagnosis.relaxed`), and the one that leaves least is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discsim.recording import Recording
+from validation.diagnosis.fitting import Fit, linearised, refit
+from validation.diagnosis.noise import stated_noise
+from validation.diagnosis.relaxed import beginning, first_chain, loose_jumps, ordinary, unknowns
+from validation.diagnosis.stated import stated_parameters
+
+__all__ = ["left_by_short_fit"]
+
+#: how much of a flight is followed, s, in how many recordings, with how many steps
+_LENGTH, _RECORDINGS, _STEPS = 1.5, 2, 5
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def left_by_short_fit(recordings: Sequence[Recording]) -> float:
+    """Return the merit per reading that a loose fit to the beginnings of flights leaves; infinite where it fails."""
+    some = list(recordings)[:_RECORDINGS]
+    chains = tuple(beginning(first_chain(one), _LENGTH) for one in some)
+    sensors = {readings.sensor for one in chains for readings in one.readings}
+    parameters = (*stated_parameters(some), *unknowns(some), *ordinary(sensors, some[0].plant))
+    at = np.array([q.stated for q in parameters])
+    fit = Fit(chains, parameters, at, loose_jumps(some[0].plant), {})
+    bare = linearised(fit, ())
+    fit = refit(replace(fit, noise=stated_noise(bare)), iterations=_STEPS, tolerance=1e-3 * fit.count)
+    merit = fit.merit / max(fit.count, 1)
+    return float(merit) if np.isfinite(merit) else float("inf")

@@ -1,0 +1,239 @@
+"""What sound sensors of a spinning disc must say of one another, as plain equations between slow signals.
+
+In a frame S that turns with the field's phase, M = (a, 0, b) is the field and W = <(p + i q) exp(i psi)> the transverse
+rate. Then, whatever the air does:
+
+- ``precession``: db/dt = a Im W, from dm/dt = -w x m;
+- ``spin rate``: r = d(psi)/dt + b Re W / a (the gyroscope's own z; where it clips, its sign);
+- ``specific force and field``: f . m = (a_path - g) . B at every instant;
+- ``specific force and path``: |f| = |a_path - g|;
+- ``pull to the axis``: <f_x + i f_y> = -r^2 (d_x + i d_y), Eq. (7), d the accelerometer's stated place;
+- ``lever arm``: <f_z exp(i psi)> = r (d_x - i d_y) W, from w x (w x d) + dw/dt x d under slow precession;
+- ``lift``: the mean of f_z is negative, for most discs fly the right way up: weak, as some do not;
+- ``height``: a path stays above ground; ``release``: it starts with the stated velocity.
+
+Each says in one number how far a hypothesis about the columns is from it, in units of what ordinary errors of parts
+(scale 5 %, place 3 mm, iron, a wind in the path's curvature) leave.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from validation.setup.spin_signals import STEP, ComplexArray, Locked, SpinSignals
+
+__all__ = ["Columns", "Misfit", "misfit", "misfits", "wanted_force"]
+
+#: neighbours within the averaging share their errors: so many instants of the grid are one independent statement
+_TOGETHER = 6.0
+#: what ordinary errors leave: field along the axis uT; spin rad/s and share; f . m in m/s^2 times |B|; |f| m/s^2; share
+#: of the pull and of the lever arm, m/s^2; height m; release m/s
+_ALONG, _ALONG_SHARE = 0.4, 0.12
+_SPIN, _SPIN_SHARE = 1.5, 0.05
+_FORCE, _SIZE, _PULL, _PULL_SHARE, _LEVER, _LEVER_SHARE = 0.5, 1.2, 1.5, 0.25, 0.12, 0.5
+_HEIGHT, _RELEASE = 1.5, 2.0
+#: the mean specific force along z of a disc that flies the right way up is about -g; hammers are few, m/s^2
+_LIFT = 1.5
+#: of a rig: hard iron along the axis, uT; a bias, m/s^2; a ramp over which clocks matter, rad/s^2
+_IRON, _GRAVITY, _STEADY = 15.0, 1.5, 5.0
+
+
+@dataclass(frozen=True)
+class Columns:
+    """A hypothesis: true axes = matrix (3, 3) times written columns, written = true time + offset; a field in N."""
+
+    axes: Mapping[str, FloatArray] = field(default_factory=dict)
+    offset: Mapping[str, float] = field(default_factory=dict)
+    site: FloatArray | None = None
+
+    def of(self, sensor: str) -> FloatArray:
+        """Return the matrix of a sensor, the unit matrix where nothing is supposed."""
+        return self.axes.get(sensor, np.eye(3))
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """How far one relation of one recording is from holding: mean square over the ordinary one, and its weight."""
+
+    relation: str
+    sensors: tuple[str, ...]
+    ratio: float
+    weight: float
+
+    @property
+    def cost(self) -> float:
+        """Twice the log likelihood lost, of a noise whose size is unknown above the ordinary."""
+        return self.weight * float(np.log1p(self.ratio))
+
+
+def misfit(signals: Sequence[SpinSignals], columns: Columns) -> tuple[FloatArray, float]:
+    """Return the costs (k,) of recordings, each summed over its relations, and the sum of all weights."""
+    found = [misfits(one, columns) for one in signals]
+    costs = np.array([sum(item.cost for item in own) for own in found])
+    return costs, sum(item.weight for own in found for item in own)
+
+
+def misfits(signals: SpinSignals, columns: Columns) -> list[Misfit]:
+    """Return the relations that a recording allows, each with how far a hypothesis is from it."""
+    M = columns.of("magnetometer")
+    across = M[:2, :2]
+    mirrored = float(np.linalg.det(across)) < 0
+    angle = complex(across[0, 0], across[1, 0])
+    # psi of the true columns is that of the written ones, backwards where they are mirrored, less an angle
+    rate = -signals.rate if mirrored else signals.rate
+    along = float(M[2, 2]) * signals.along
+
+    def turning(locked: Locked, matrix: FloatArray, sensor: str) -> ComplexArray:
+        own = np.conj(locked.turning) if mirrored else locked.turning
+        late = columns.offset.get(sensor, 0.0) - columns.offset.get("magnetometer", 0.0)
+        shifted = own * np.conj(angle) * np.exp(-1j * np.nan_to_num(rate) * late)[:, None]
+        return np.asarray(_times(shifted, matrix))
+
+    found: list[Misfit] = []
+    W: ComplexArray | None = None
+    if signals.gyro is not None:
+        matrix = columns.of("gyroscope")
+        w = turning(signals.gyro, matrix, "gyroscope")
+        W = w[:, 0] + 1j * w[:, 1]
+        found += _of_gyroscope(signals, W, rate, along, matrix)
+    if signals.force is not None:
+        matrix = columns.of("accelerometer")
+        mean = np.real(_times(signals.force.mean, matrix))
+        turned = turning(signals.force, matrix, "accelerometer")
+        found += _of_force(signals, mean, turned, rate, W)
+        if signals.path is not None:
+            F = turned[:, 0] + 1j * turned[:, 1]
+            found += _of_force_and_path(signals, F, mean[:, 2], along, columns)
+        if signals.recording.plant in ("flight", "free_spin"):
+            lift = float(np.nanmean(mean[:, 2])) if np.any(np.isfinite(mean[:, 2])) else 0.0
+            found.append(Misfit("lift", ("accelerometer",), max(lift / _LIFT, 0.0) ** 2, 2.0))
+    if signals.path is not None:
+        found += _of_path(signals, columns.of("gps"))
+    if signals.recording.plant in ("rate_table", "spin_down"):
+        found += _of_rig(signals, columns, rate, along)
+    return found
+
+
+def _times(columns: ComplexArray | FloatArray, matrix: FloatArray) -> ComplexArray:
+    """Return matrix times each row of columns (n, 3); a NaN column spoils only the axes that it enters."""
+    out = np.zeros(columns.shape, dtype=complex)
+    for i in range(3):
+        for j in range(3):
+            if abs(matrix[i, j]) > 1e-6:
+                out[:, i] += matrix[i, j] * columns[:, j]
+    return out
+
+
+def _judged(
+    relation: str, sensors: tuple[str, ...], left: FloatArray | ComplexArray, usual: FloatArray
+) -> list[Misfit]:
+    good = np.isfinite(left)
+    count = int(np.count_nonzero(good))
+    if count < _TOGETHER:
+        return []
+    ratio = float(np.mean(np.abs(left[good]) ** 2 / np.broadcast_to(usual, left.shape)[good] ** 2))
+    return [Misfit(relation, sensors, ratio, count / _TOGETHER)]
+
+
+def _of_gyroscope(
+    signals: SpinSignals, W: ComplexArray, rate: FloatArray, along: FloatArray, matrix: FloatArray
+) -> list[Misfit]:
+    assert signals.gyro is not None
+    assert signals.gyro_sign is not None
+    both = ("magnetometer", "gyroscope")
+    slope = signals.across * np.imag(W)
+    found = []
+    good = np.isfinite(slope) & np.isfinite(along)
+    if not np.any(np.isfinite(signals.gyro.mean)):  # clipped readings of a turned board say nothing of any axis
+        return []
+    if not np.any(np.isfinite(W)):  # the column that clips is none of the transverse ones
+        found.append(Misfit("transverse rates", ("gyroscope",), 1e4, signals.grid.size / _TOGETHER))
+    elif np.count_nonzero(good) > _TOGETHER:
+        # where the spin is too slow to be followed nothing is said: the sum goes on as if nothing had turned there
+        step = np.where(good[1:] & good[:-1], 0.5 * (slope[1:] + slope[:-1]) * STEP, 0.0)
+        grown = np.concatenate([[0.0], np.cumsum(step)])
+        x = signals.grid[good] - signals.grid[good].mean()
+        basis, _ = np.linalg.qr(np.column_stack([np.ones(x.size), x]))  # iron, and a bias of the gyroscope
+        left, size = (v - basis @ (basis.T @ v) for v in ((along - grown)[good], along[good]))
+        found += _judged("precession", both, left, np.hypot(_ALONG, _ALONG_SHARE * np.std(size)) * np.ones(1))
+    axial = np.real(_times(signals.gyro.mean, matrix)[:, 2])
+    expected = rate + along * np.real(W) / np.maximum(signals.across, 0.2 * np.hypot(signals.across, along))
+    known = np.isfinite(axial)
+    if np.count_nonzero(known) < 0.5 * known.size:  # clipped: the sign alone
+        column = int(np.argmax(np.abs(matrix[2])))
+        axial = np.where(known, axial, matrix[2, column] * signals.gyro_sign[column] * np.abs(expected))
+    return found + _judged("spin rate", both, axial - expected, _SPIN + _SPIN_SHARE * np.abs(rate))
+
+
+def _of_force(
+    signals: SpinSignals, mean: FloatArray, turned: ComplexArray, rate: FloatArray, W: ComplexArray | None
+) -> list[Misfit]:
+    place = signals.recording.sheets["accelerometer"].position
+    if place is None or np.hypot(place[0], place[1]) < 2e-3:
+        return []
+    d = complex(place[0], place[1])
+    pull = mean[:, 0] + 1j * mean[:, 1] + rate**2 * d
+    usual = _PULL + _PULL_SHARE * abs(d) * rate**2
+    found = _judged("pull to the axis", ("magnetometer", "accelerometer"), pull, usual)
+    if W is not None:
+        arm = rate * np.conj(d) * W
+        usual = np.hypot(_LEVER, _LEVER_SHARE * np.abs(arm))
+        found += _judged("lever arm", ("gyroscope", "accelerometer"), turned[:, 2] - arm, usual)
+    return found
+
+
+def _of_force_and_path(
+    signals: SpinSignals, F: ComplexArray, axial: FloatArray, along: FloatArray, columns: Columns
+) -> list[Misfit]:
+    B = signals.recording.environment.magnetic_field if columns.site is None else columns.site
+    wanted = wanted_force(signals, columns.of("gps"))
+    sensors = ("magnetometer", "accelerometer", "gps")
+    felt = signals.across * np.real(F) + along * axial
+    found = _judged("specific force and field", sensors, felt - wanted @ B, _FORCE * np.linalg.norm(B) * np.ones(1))
+    size = np.hypot(np.abs(F), axial) - np.linalg.norm(wanted, axis=1)
+    return found + _judged("specific force and path", ("accelerometer", "gps"), size, _SIZE * np.ones(1))
+
+
+def wanted_force(signals: SpinSignals, matrix: FloatArray) -> FloatArray:
+    """Return the specific force (n, 3) in N that a path asks for, its columns taken to N by a matrix (3, 3)."""
+    assert signals.path is not None
+    gravity = np.array([0.0, 0.0, signals.recording.environment.gravity])
+    return np.asarray(signals.path.acceleration @ matrix.T - gravity)
+
+
+def _of_path(signals: SpinSignals, matrix: FloatArray) -> list[Misfit]:
+    assert signals.path is not None
+    down = (signals.path.position @ matrix.T)[:, 2]
+    found = _judged("height", ("gps",), np.maximum(down, 0.0), _HEIGHT * np.ones(1))
+    release = signals.recording.release
+    if release is not None and release.velocity is not None:
+        sigma = float(np.max(release.sigma.get("velocity_ned_m_s", 0.0)))
+        apart = (signals.path.velocity[:4] @ matrix.T).mean(axis=0) - release.velocity
+        ratio = float(np.mean(apart**2)) / (_RELEASE**2 + sigma**2)
+        found.append(Misfit("release", ("gps",), ratio, 4.0))
+    return found
+
+
+def _of_rig(signals: SpinSignals, columns: Columns, rate: FloatArray, along: FloatArray) -> list[Misfit]:
+    """Return what a rig's axis, straight down, and its command or rate reference add."""
+    recording, found = signals.recording, []
+    B = recording.environment.magnetic_field
+    found += _judged("field along the axis", ("magnetometer",), along - B[2], _IRON * np.ones(1))
+    if signals.force is not None:
+        axial = np.real(_times(signals.force.mean, columns.of("accelerometer")))[:, 2]
+        found += _judged("gravity", ("accelerometer",), axial + recording.environment.gravity, _GRAVITY * np.ones(1))
+    reference = recording.get("rate_reference") or recording.command
+    if reference is not None:
+        own = np.interp(signals.grid, reference.t, reference.value)
+        steady = np.abs(np.gradient(own, signals.grid)) < _STEADY
+        apart = np.where(steady, rate - own, np.nan)
+        found += _judged("spin rate", ("magnetometer",), apart, _SPIN + _SPIN_SHARE * np.abs(own))
+        if signals.gyro is not None:
+            axial = np.real(_times(signals.gyro.mean, columns.of("gyroscope")))[:, 2]
+            apart = np.where(steady, axial - own, np.nan)
+            found += _judged("spin rate", ("gyroscope",), apart, _SPIN + _SPIN_SHARE * np.abs(own))
+    return found

@@ -1,0 +1,195 @@
+"""What the sensors of a spinning body show in the frame that turns with the field's phase.
+
+Takes a recording whose magnetometer has its spin axis along z; gives slow signals on an even grid: the field across and
+along the axis, and each other sensor multiplied by the field's phase and averaged over some turns (synchronous
+detection, as a lock-in amplifier does it). Physics between sensors (`validation.setup.relations`) are plain equations
+between these signals, whatever the columns of a sensor are called.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.recording import Recording
+from validation.diagnosis.starts import field_spin, local_cubics, path_fixes
+from validation.diagnosis.turning import rate_of
+
+__all__ = ["ComplexArray", "FlightPath", "Locked", "SpinSignals", "averages", "spin_signals", "turning_axis", "usable"]
+
+ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
+
+#: spacing of the grid, and the one sigma of the averaging, s: a turn or more at 50 rad/s, slow beside precession
+STEP, SIGMA = 0.05, 0.12
+#: the same of what stands still in the body, s
+STILL = 0.3
+#: what still turns below the averaging's band is no spin: slowest rate, rad/s, that is looked at
+SLOWEST = 12.0
+#: fewest instants of the grid
+FEWEST = 12
+
+
+@dataclass(frozen=True)
+class Locked:
+    """A sensor's three columns: averages of each (n, 3), and of each times exp(i psi) once its average is taken off.
+
+    NaN where a column clips or is silent.
+    """
+
+    mean: FloatArray
+    turning: ComplexArray
+
+
+@dataclass(frozen=True)
+class FlightPath:
+    """What the fixes say, in their written columns: acceleration, velocity, position (n, 3) each."""
+
+    acceleration: FloatArray
+    velocity: FloatArray
+    position: FloatArray
+
+
+@dataclass(frozen=True)
+class SpinSignals:
+    """Slow signals of one recording on a grid (n,); None for a sensor that is absent.
+
+    ``rate`` (n,) is the rate at which the body turns by the field's phase psi, rad/s; ``across`` and ``along`` (n,) are
+    the field across and along the axis, uT; ``gyro_sign`` (3,) the sign of each column of the gyroscope.
+    """
+
+    recording: Recording
+    grid: FloatArray
+    rate: FloatArray
+    across: FloatArray
+    along: FloatArray
+    gyro: Locked | None = None
+    gyro_sign: FloatArray | None = None
+    force: Locked | None = None
+    path: FlightPath | None = None
+
+
+def usable(recording: Recording, sensor: str) -> tuple[FloatArray, FloatArray] | None:
+    """Return times (n,) and readings (n, 3) of a sensor, NaN where clipped; None where it is absent."""
+    samples = recording.get(sensor)
+    if samples is None or len(samples) < FEWEST:
+        return None
+    return samples.t, np.where(recording.sheets[sensor].clipped(samples.value), np.nan, samples.value)
+
+
+def turning_axis(t: FloatArray, y: FloatArray) -> tuple[FloatArray, float] | None:
+    """Return the axis (3,) about which a vector y (n, 3) turns right-handedly, and how pure that turning is (0 to 1).
+
+    Sums the cross products of successive differences: what stands still in the sensor (hard iron) drops out. None
+    where there are too few neighbours.
+    """
+    d, gap = np.diff(y, axis=0), np.diff(t)
+    near = gap < 1.5 * float(np.median(gap))
+    both = near[1:] & near[:-1] & np.all(np.isfinite(d[1:]), axis=1) & np.all(np.isfinite(d[:-1]), axis=1)
+    if np.count_nonzero(both) < FEWEST:
+        return None
+    turned = np.cross(d[:-1][both], d[1:][both])
+    total = np.sum(turned, axis=0)
+    size = float(np.linalg.norm(total))
+    whole = float(np.sum(np.linalg.norm(turned, axis=1)))
+    return (total / size, size / whole) if size > 0.0 else None
+
+
+def averages(t: FloatArray, value: ComplexArray | FloatArray, grid: FloatArray, sigma: float = SIGMA) -> ComplexArray:
+    """Return Gaussian averages of values (n,) at the instants of an even grid (m,); NaN where there are none."""
+    good = np.isfinite(value)
+    fine = STEP / 10.0
+    first = grid[0] - 4.0 * sigma
+    slots = int(np.ceil((grid[-1] - grid[0] + 8.0 * sigma) / fine)) + 1
+    slot = np.rint((t[good] - first) / fine).astype(int)
+    inside = (slot >= 0) & (slot < slots)
+    x, slot = np.asarray(value)[good][inside], slot[inside]
+    count = np.bincount(slot, minlength=slots).astype(float)
+    total = np.bincount(slot, np.real(x), slots) + 1j * np.bincount(slot, np.imag(x), slots)
+    half = int(np.ceil(3.5 * sigma / fine))
+    kernel = np.exp(-0.5 * (np.arange(-half, half + 1) * fine / sigma) ** 2)
+    at = np.rint((grid - first) / fine).astype(int)
+    weight = np.convolve(count, kernel, "same")[at]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.convolve(total, kernel, "same")[at] / np.where(weight > 0.5, weight, np.nan)
+    return np.asarray(mean)
+
+
+def spin_signals(recording: Recording) -> SpinSignals | None:
+    """Return the slow signals of a recording; None where nothing shows a spin fast enough.
+
+    The phase is the field's; without a magnetometer the angle of what shows the rate (a reference, a command, an
+    unclipped gyroscope).
+    """
+    found = _phase(recording)
+    if found is None:
+        return None
+    source, phase, start, stop = found
+    if stop - start < FEWEST * STEP + 0.2:
+        return None
+    grid = np.arange(start + 0.1, stop - 0.1, STEP)
+    rate = -np.gradient(phase(grid), STEP)
+    fast = np.abs(rate) > SLOWEST
+    if grid.size < FEWEST or np.count_nonzero(fast) < FEWEST:
+        return None
+    nothing = np.full(grid.size, np.nan)
+    across, along = nothing, nothing
+    field = usable(recording, "magnetometer")
+    if field is not None and source == "magnetometer":
+        turned = (field[1][:, 0] + 1j * field[1][:, 1]) * np.exp(-1j * phase(field[0]))
+        across = np.abs(averages(field[0], turned, grid))
+        along = np.real(averages(field[0], field[1][:, 2], grid))
+
+    def locked(sensor: str) -> Locked | None:
+        found = usable(recording, sensor)
+        if found is None:
+            return None
+        t, y = found
+        factor = np.exp(-1j * phase(t))
+        coarse = np.arange(t[0], t[-1] + STEP, STEP)
+        turning = []
+        for column in y.T:
+            still = np.real(averages(t, column, coarse, STILL))
+            known = np.isfinite(still)
+            still = np.interp(t, coarse[known], still[known]) if known.any() else np.full(t.size, np.nan)
+            turning.append(averages(t, (column - still) * factor, grid))
+        mean = [np.real(averages(t, column, grid, STILL)) for column in y.T]
+        return Locked(np.column_stack(mean), np.column_stack(turning))
+
+    gyroscope = recording.get("gyroscope")
+    return SpinSignals(
+        recording,
+        grid,
+        np.where(fast, rate, np.nan),
+        across,
+        along,
+        locked("gyroscope"),
+        None if gyroscope is None else np.sign(np.nanmedian(gyroscope.value, axis=0)),
+        locked("accelerometer"),
+        _path(recording, grid),
+    )
+
+
+def _phase(recording: Recording) -> tuple[str, Callable[[FloatArray], FloatArray], float, float] | None:
+    """Return what shows the phase of a vector fixed in N seen from B, the phase over time, and from when to when."""
+    if "magnetometer" in recording:
+        spin = field_spin(recording, steady=recording.plant in ("rate_table", "spin_down"))
+        return None if spin is None else ("magnetometer", spin.phase_at, float(spin.grid[0]), float(spin.grid[-1]))
+    known = rate_of(recording)
+    if known is None and recording.command is not None:
+        known = "command", recording.command.t, recording.command.value
+    if known is None:
+        return None
+    source, t, r = known
+    psi = np.concatenate([[0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(t))])
+    return source, lambda at: -np.interp(at, t, psi), float(t[0]), float(t[-1])
+
+
+def _path(recording: Recording, grid: FloatArray) -> FlightPath | None:
+    fixes = path_fixes(recording)
+    if fixes is None or fixes.t[-1] - fixes.t[0] < 1.0:
+        return None
+    cubic = local_cubics(fixes, np.clip(grid, fixes.t[0] + 0.2, fixes.t[-1] - 0.2))
+    return FlightPath(cubic[:, 2], cubic[:, 1], cubic[:, 0])

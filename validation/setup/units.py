@@ -1,0 +1,173 @@
+"""Units that are not those of the columns: a magnitude off by a factor that some unit has, and by nothing near one.
+
+Field strengths, gravity, the pull towards the axis and the rate at which the field turns are known to some tens of
+per cent before anything is fitted; units lie at least a factor of nine apart. So each magnitude names its unit, or
+none: where it is near one, or near no unit's factor, nothing is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.effects.catalogue import Effect, effect
+from discsim.effects.setup import UNITS, AccelerometerUnit, ClockUnit, GyroscopeUnit, MagnetometerUnit
+from discsim.recording import Recording
+from validation.setup.spin_signals import FEWEST
+
+__all__ = ["clock_unit", "sensor_units"]
+
+#: a magnitude within this factor of another unit's is taken for it, and within it of the right one for right; half way
+#: between the nearest units (rpm and deg/s are 6 apart, s and ms 1000) is 2.4
+NEAR = 2.2
+#: more than the field's own size, with soft iron, turns in no sensor
+_SWING = 1.6
+#: stamps that are the units' whole factor away from the stated rate, within this share, are in that unit
+_STAMPS = 0.3
+
+
+def clock_unit(recordings: Sequence[Recording]) -> Effect | None:
+    """Return clock.units where every sensor's stamps lie a thousand, or a million, times the stated spacing apart.
+
+    Where the rates were taken from the stamps themselves, the fixes' positions over their velocities tell.
+    """
+    ratios = [
+        samples.interval * one.sheets[name].rate_hz
+        for one in recordings
+        for name, samples in one.samples.items()
+        if len(samples) > FEWEST
+    ]
+    ratios += [ratio for one in recordings if (ratio := _path_ratio(one)) is not None]
+    ratios = [ratio for ratio in ratios if np.isfinite(ratio) and ratio > 0]
+    for unit, factor in UNITS[ClockUnit].items():
+        near = [abs(ratio / factor - 1.0) < _STAMPS for ratio in ratios]
+        usual = [abs(np.log(ratio)) < np.log(NEAR) for ratio in ratios]
+        if factor > 1.0 and any(near) and all(a or b for a, b in zip(near, usual, strict=True)) and near[-1]:
+            return effect("clock.units", written_in=unit)
+    return None
+
+
+def _path_ratio(recording: Recording) -> float | None:
+    """Return how many times longer fixes take by their stamps than by their velocities."""
+    samples = recording.get("gps")
+    if samples is None:
+        return None
+    good = np.all(np.isfinite(samples.value), axis=1)
+    if np.count_nonzero(good) < FEWEST:
+        return None
+    way = np.linalg.norm(np.diff(samples.value[good, :3], axis=0), axis=1)
+    speed = np.linalg.norm(samples.value[good, 3:], axis=1)
+    taken = np.diff(samples.t[good])
+    fast = speed[1:] > 3.0
+    if np.count_nonzero(fast) < FEWEST:
+        return None
+    return float(np.median(taken[fast] * speed[1:][fast] / np.maximum(way[fast], 1e-9)))
+
+
+def sensor_units(recordings: Sequence[Recording]) -> list[Effect]:
+    """Return mag.units, accel.units and gyro.units where a sensor's magnitude is that of another unit."""
+    found = []
+    for id, kind, ratio in (
+        ("mag.units", MagnetometerUnit, _field_ratio),
+        ("accel.units", AccelerometerUnit, _force_ratio),
+        ("gyro.units", GyroscopeUnit, _rate_ratio),
+    ):
+        ratios = [value for one in recordings if (value := ratio(one)) is not None]
+        if ratios:
+            unit = _nearest(float(np.median(ratios)), UNITS[kind])
+            if unit is not None:
+                found.append(effect(id, written_in=unit))
+    return found
+
+
+def _nearest(ratio: float, units: Mapping[str, float]) -> str | None:
+    """Return the unit whose factor is nearest to a ratio, None for the right unit, or where none is near."""
+    if not ratio > 0.0:
+        return None
+    apart = {unit: abs(float(np.log(ratio / factor))) for unit, factor in units.items()}
+    unit = min(apart, key=lambda name: apart[name])
+    return unit if units[unit] != 1.0 and apart[unit] < np.log(NEAR) else None
+
+
+def _whole(recording: Recording, sensor: str) -> FloatArray | None:
+    samples = recording.get(sensor)
+    if samples is None:
+        return None
+    good = samples.value[np.all(np.isfinite(samples.value), axis=1)]
+    return good if len(good) >= FEWEST else None
+
+
+def _field_ratio(recording: Recording) -> float | None:
+    """Return the field's size over the stated one, 1 where that can be right; None where none is stated.
+
+    Iron may add any number to the whole, but nothing to what turns, and what turns is at most the field.
+    """
+    value = _whole(recording, "magnetometer")
+    strength = float(np.linalg.norm(recording.environment.magnetic_field))
+    if value is None or strength == 0.0:
+        return None
+    swing = 0.5 * float(np.max(np.percentile(value, 98, axis=0) - np.percentile(value, 2, axis=0))) / strength
+    whole = float(np.median(np.linalg.norm(value, axis=1))) / strength
+    return whole if swing > _SWING or whole < 1.0 / NEAR else 1.0
+
+
+def _spin_of(recording: Recording) -> float | None:
+    """Return the size of the spin, rad/s, that anything but gyroscope and accelerometer shows."""
+    for samples in (recording.get("rate_reference"), recording.command):
+        if samples is not None:
+            return float(np.sqrt(np.nanmean(samples.value**2)))
+    samples = recording.get("magnetometer")
+    if samples is None or len(samples) < FEWEST:
+        return None
+    d = np.diff(samples.value, axis=0)
+    gap = np.diff(samples.t)
+    usual = float(np.median(gap))
+    angles = []
+    for (a, b), (first, second) in zip(pairwise(d), pairwise(gap), strict=True):
+        size = float(np.linalg.norm(a) * np.linalg.norm(b))
+        if size > 0.0 and max(first, second) < 1.5 * usual:
+            angles.append((float(np.arccos(np.clip(a @ b / size, -1.0, 1.0))), size))
+    if len(angles) < FEWEST:
+        return None
+    angle, size = np.array(angles).T
+    return float(np.sum(angle * size) / np.sum(size)) / usual
+
+
+def _steps_ratio(recording: Recording, sensor: str) -> float | None:
+    """Return the step between a sensor's readings over the resolution that its sheet states, where both are known."""
+    value, stated = _whole(recording, sensor), recording.sheets[sensor].resolution
+    if value is None or not stated:
+        return None
+    steps = np.diff(np.unique(value[:, 0]))
+    steps = steps[steps > 1e-9 * float(np.max(np.abs(value)))]
+    return float(np.min(steps)) / stated if steps.size else None
+
+
+def _force_ratio(recording: Recording) -> float | None:
+    value, spin = _whole(recording, "accelerometer"), _spin_of(recording)
+    if value is None:
+        return None
+    if spin is None:  # nothing tells how much a spin pulls
+        return _steps_ratio(recording, "accelerometer")
+    place = recording.sheets["accelerometer"].position
+    pull = 0.0 if place is None or spin is None else spin**2 * float(np.hypot(place[0], place[1]))
+    limit = recording.sheets["accelerometer"].range
+    gravity = max(recording.environment.gravity, 1.0)
+    expected = float(np.hypot(pull if limit is None else min(pull, limit), gravity))
+    return float(np.sqrt(np.mean(np.sum(value**2, axis=1)))) / expected
+
+
+def _rate_ratio(recording: Recording) -> float | None:
+    value, spin = _whole(recording, "gyroscope"), _spin_of(recording)
+    if value is None:
+        return None
+    if spin is None or spin < 1.0:
+        return _steps_ratio(recording, "gyroscope")
+    limit = recording.sheets["gyroscope"].range
+    largest = float(np.max(np.abs(value)))
+    if limit is not None and spin > limit:  # it clips: at its range, in whatever unit
+        return largest / limit
+    return float(np.sqrt(np.mean(np.sum(value**2, axis=1)))) / spin
