@@ -25,7 +25,8 @@ from validation.throws import Throw
 __all__ = ["KINDS", "PLANT_SHARES", "draw_case"]
 
 #: shares of the kinds of case: nothing hidden in a third (plain, other noise than stated, coefficients within their
-#: stated sigma, or beyond it), one effect in a third, two in a sixth, physics of no catalogue in a sixth
+#: stated sigma, or beyond it), one effect in a third, two in a sixth, physics of no catalogue in a sixth; a fault of
+#: the setup only where it is asked for
 KINDS: Mapping[Kind, float] = {
     "nothing": 1 / 9,
     "noise": 1 / 9,
@@ -34,6 +35,7 @@ KINDS: Mapping[Kind, float] = {
     "one": 1 / 3,
     "two": 1 / 6,
     "off_catalogue": 1 / 6,
+    "setup": 0.0,
 }
 PLANT_SHARES: Mapping[Plant, float] = {"flight": 0.49, "rate_table": 0.17, "spin_down": 0.17, "free_spin": 0.17}
 
@@ -78,6 +80,8 @@ def _kind_of(effects: Sequence[str], drawn: str) -> Kind:
         if len(effects) > 1:
             raise InputError("off-catalogue physics is concealed alone; expected one name, or ids of the catalogue")
         return "off_catalogue"
+    if any(row(id).setup for id in effects):
+        return "setup"
     if effects:
         return "one" if len(effects) == 1 else "two"
     return drawn  # type: ignore[return-value]
