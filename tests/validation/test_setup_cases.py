@@ -17,6 +17,7 @@ from validation.challenge.cases import draw_case
 from validation.challenge.conceal import Answer, read_answer, recordings
 from validation.challenge.setups import draw_fault, equivalents, possible_faults
 from validation.challenge.sizes import HIDING, ordinary
+from validation.challenge.strength import sizes
 
 CASES = {plant: draw_case(3, plant, kind="nothing") for plant in PLANTS}
 
@@ -87,17 +88,29 @@ def test_sizes_are_those_of_mistakes_that_are_made(plant):
     for id in possible_faults(case):
         for _ in range(30):
             fault = draw_fault(id, case, rng)
-            sizes = np.abs(list(fault.sizes.values()))
+            drawn_sizes = np.abs(list(fault.sizes.values()))
             if id.endswith("time_offset"):
-                assert 0.005 <= sizes[0] <= 0.1
+                assert 0.005 <= drawn_sizes[0] <= 0.1
             if id == "board.rotation":
-                assert np.radians(2.0) * (1 - 1e-6) <= np.linalg.norm(sizes) <= np.pi * (1 + 1e-6)
+                assert np.radians(2.0) * (1 - 1e-6) <= np.linalg.norm(drawn_sizes) <= np.pi * (1 + 1e-6)
             if id == "site.field":
-                assert sizes[0] <= np.radians(40.0) * (1 + 1e-6)
-                assert sizes[1] <= np.radians(20.0) * (1 + 1e-6)
-                assert 0.9 <= sizes[2] <= 1.1
+                assert drawn_sizes[0] <= np.radians(40.0) * (1 + 1e-6)
+                assert drawn_sizes[1] <= np.radians(20.0) * (1 + 1e-6)
+                assert 0.9 <= drawn_sizes[2] <= 1.1
             if fault.setting:
                 assert fault.value != fault.row.baseline
+
+
+def test_nothing_is_put_over_a_fault_of_the_setup():
+    with pytest.raises(InputError, match="expected no mask with a fault of the setup"):
+        draw_case(1, "flight", kind="setup", mask="clipped")
+    with pytest.raises(InputError, match="expected no mask with a fault of the setup"):
+        draw_case(1, "flight", ["mag.axes"], mask="short")
+
+
+def test_only_physical_effects_have_a_detection_limit():
+    case = brief(draw_case(2, "rate_table", ["mag.units", "gyro.bias"]))
+    assert list(sizes(case)) == ["gyro.bias"]
 
 
 def test_an_answer_with_a_setting_survives_its_file(tmp_path):

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.disc import Aero, Disc, Release, Rig
-from discsim.effects.catalogue import row
+from discsim.effects.catalogue import CATALOGUE, row
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.recording import Plant, Samples
@@ -54,6 +54,8 @@ def draw_case(
     rng = np.random.default_rng(seed)
     drawn_plant: Plant = rng.choice(list(PLANT_SHARES), p=list(PLANT_SHARES.values()))
     drawn_kind: Kind = rng.choice(list(KINDS), p=list(KINDS.values()))
+    if mask is not None and (kind == "setup" or any(id in CATALOGUE and row(id).setup for id in effects)):
+        raise InputError(f"mask {mask}: hides physical effects alone; expected no mask with a fault of the setup")
     plant, kind = plant or _plant_of(effects, str(drawn_plant)), kind or _kind_of(effects, str(drawn_kind))
     if kind in ("within_sigma", "beyond_sigma") and plant in ("rate_table", "free_spin"):
         kind = "nothing"  # nothing stated there has a sigma
