@@ -127,7 +127,8 @@ def _cannot_act(given: Effect, plant: Plant, sensors: Sequence[str]) -> str:
     if plant not in kind.plants:
         return f"acts on {', '.join(kind.plants)}; this is a {plant}"
     if not kind.acts_with(sensors):
-        return f"there is no {kind.acts_on} on board, only {', '.join(sensors)}"
+        absent = "magnetometer, accelerometer or gyroscope" if kind.acts_on == "board" else kind.acts_on
+        return f"there is no {absent} on board, only {', '.join(sensors)}"
     return ""
 
 

@@ -28,6 +28,7 @@ __all__ = [
     "MagnetometerUnit",
     "SiteField",
     "TimeOffset",
+    "axes_of",
     "board_axes",
     "checked",
     "field_there",
@@ -154,6 +155,14 @@ def permutation(effect: Axes | GpsAxes) -> FloatArray:
         axis, sign = _WORDS[type(effect)][word]
         P[row, axis] = sign
     return P
+
+
+def axes_of(P: FloatArray, sensor: str = "") -> str:
+    """Return the setting of a signed permutation P (3, 3), in a gps's words where ``sensor`` is "gps"."""
+    words = _WORDS[GpsAxes if sensor == "gps" else Axes]
+    spelt = {pair: word for word, pair in words.items() if not word.startswith("+")}
+    places = [(int(np.argmax(np.abs(line))), float(np.sum(line))) for line in P]
+    return " ".join(spelt[place] for place in places)
 
 
 def written_per_si(effect: MagnetometerUnit | AccelerometerUnit | GyroscopeUnit | ClockUnit) -> float:

@@ -77,6 +77,43 @@ def test_a_law_that_cannot_be_read_is_refused_at_its_line(model, tmp_path, old, 
         read_model(path)
 
 
+FAULTS = (
+    ModelEffect(effect("mag.axes", axes="x -y z")),
+    ModelEffect(effect("gps.axes", axes="east north up"), recordings=("02",)),
+    ModelEffect(effect("gyro.units", written_in="deg/s")),
+    ModelEffect(effect("board.rotation", rx_rad=0.1, rz_rad=-2.0), {"rx_rad": 0.01}),
+)
+
+
+def test_a_fault_of_the_setup_is_carried_with_its_setting(model, tmp_path):
+    write_model(replace(model, effects=(*model.effects, *FAULTS)), tmp_path / "model.toml")
+    assert read_model(tmp_path / "model.toml").effects == (*model.effects, *FAULTS)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        (
+            'axes = "x -y z"',
+            'axes = "x x z"',
+            r"model.toml:\d+: mag\.axes: axes is 'x x z', expected x, y and z once each",
+        ),
+        ('axes = "x -y z"', "axes = 3", r"model.toml:\d+: .*axes"),
+        ('axes = "x -y z"', 'written_in = "G"', "missing key 'axes'"),
+        ('written_in = "deg/s"', 'written_in = "deg"', "'deg', expected one of rad/s, deg/s, rpm"),
+        ("[effects.setting]", "[effects.settings]", "setting"),
+    ],
+)
+def test_a_setting_that_cannot_be_is_refused_at_its_line(model, tmp_path, old, new, expected):
+    path = tmp_path / "model.toml"
+    write_model(replace(model, effects=FAULTS), path)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match=expected):
+        read_model(path)
+
+
 def test_an_effect_of_one_recording_is_not_in_the_others(model):
     assert [item.id for item in model.effects_in("02")] == ["air.wind", "event.impulse"]
     assert [item.id for item in model.effects_in("01")] == ["air.wind"]

@@ -262,8 +262,50 @@ def test_the_summary_counts_what_a_person_would_count():
         "exponent_given_rate": (0, 0),
         "exponent_within_2sd_rate": (0, 0),
         "heldout_improved_rate": (1, 1),
+        "right_setup_rate": (0, 0),
         "crash_rate": (1, 7),
     }
+
+
+FLIPPED = answer(
+    "setup",
+    effects=("mag.axes",),
+    parameters={},
+    setting={"axes": "x -y z"},
+    equivalents=(("mag.axes", "-x y z"), ("gyro.axes", "-x y -z")),
+)
+
+
+def fault(id: str, axes: str, *confused: tuple[str, str]) -> Any:
+    told = [{"id": other, "setting": {"axes": text}, "delta_bic": 99.0} for other, text in confused]
+    return {**named(id), "setting": {"axes": axes}, "confused_with": told}
+
+
+@pytest.mark.parametrize(
+    ("found", "right"),
+    [
+        (fault("mag.axes", "x -y z"), True),
+        (fault("mag.axes", "-x y z", ("mag.axes", "x -y z")), True),
+        (fault("gyro.axes", "-x y -z", ("mag.axes", "x -y z")), True),
+        (fault("mag.axes", "-x y z"), False),  # the twin is not told
+        (fault("mag.axes", "x y -z", ("mag.axes", "x -y z")), False),  # which recordings do tell apart
+        (fault("mag.axes", "x y -z"), False),
+        (named("mag.axes"), False),
+    ],
+)
+def test_a_setting_is_right_up_to_what_the_recordings_can_tell(found, right):
+    score = score_case(FLIPPED, diagnosis("explained", found, located=("magnetometer",)))
+    assert score.right is right
+    assert summary([(FLIPPED, None, score)])["right_setup_rate"].hits == int(right)
+
+
+def test_a_fault_beside_a_physical_effect_needs_both():
+    both = answer("setup", effects=("gyro.units", "air.wind"), setting={"written_in": "deg/s"})
+    units = {**named("gyro.units"), "setting": {"written_in": "deg/s"}}
+    wind = named("air.wind", w_north_m_s=(1.0, 0.1), w_east_m_s=(-0.5, 0.1))
+    assert score_case(both, diagnosis("explained", units, wind, located=("gyroscope",))).right
+    assert not score_case(both, diagnosis("explained", units, located=("gyroscope",))).right
+    assert not score_case(both, diagnosis("explained", wind, located=("gyroscope",))).right
 
 
 def test_goals_are_met_only_by_rates_that_meet_them():

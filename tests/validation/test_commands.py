@@ -15,6 +15,7 @@ from discsim.effects import effect
 from discsim.model_file import Model, ModelEffect, write_model
 from discsim.recording import read_recording
 from discsim.shipped import load_disc
+from discsim.written import as_written
 from validation import headless
 from validation.cli import main
 from validation.scores import at_most
@@ -86,6 +87,26 @@ def test_an_effect_on_the_command_line_reaches_flight_and_sensors(monkeypatch, t
     assert windy.end < plain.end - 1.0
     # what is concealed is not stated
     assert "hard_iron" not in (tmp_path / "windy" / "recording.toml").read_text()
+
+
+def test_a_fault_of_the_setup_is_flown_by_command_and_by_model(monkeypatch, tmp_path):
+    """Same seed, so what was meant is the same: only what is written differs."""
+    faults = [effect("mag.axes", axes="x -y z"), effect("gyro.units", written_in="deg/s")]
+    disc, environment = load_disc("driver")
+    write_model(Model(environment, disc, effects=tuple(ModelEffect(item) for item in faults)), tmp_path / "model.toml")
+    given = {
+        "sound": [],
+        "typed": ["--effect", "mag.axes:axes=x -y z", "--effect", "gyro.units:written_in=deg/s"],
+        "modelled": ["--model", str(tmp_path / "model.toml")],
+    }
+    for name, more in given.items():
+        assert run(monkeypatch, "fly", "--out", str(tmp_path / name), *more) == 0
+    sound, typed, modelled = (read_recording(tmp_path / name) for name in given)
+    expected = as_written(sound, faults)
+    for name, samples in expected.samples.items():
+        np.testing.assert_allclose(typed.need(name).value, samples.value, rtol=1e-14)
+        np.testing.assert_array_equal(modelled.need(name).value, typed.need(name).value)
+    assert typed.sheets["gyroscope"].range == sound.sheets["gyroscope"].range
 
 
 def test_a_site_replaces_the_field(monkeypatch, tmp_path):
@@ -182,6 +203,11 @@ class TestModel:
         (["fly", "--effect", "air.wnd:w_north_m_s=1"], "did you mean 'air.wind'"),
         (["fly", "--effect", "air.wind:north=1"], "w_north_m_s"),
         (["fly", "--effect", "air.wind:w_north_m_s=strong"], "no name=number"),
+        (["fly", "--effect", "mag.axes:axes=x y"], "mag.axes: axes is 'x y', expected x, y and z once each"),
+        (
+            ["fly", "--parts", "neo_m8n", "--effect", "board.rotation:rx_rad=1"],
+            "no magnetometer, accelerometer or gyroscope on board",
+        ),
         (["fly", "--throw", "nowhere.toml"], "nowhere.toml"),
         (["fly", "--parts", "mpu6050"], "mpu9250"),
         (["fly", "--site", "atlantis"], "berlin"),

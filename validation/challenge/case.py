@@ -41,7 +41,7 @@ ORDINARY_FLIGHT_S = 3.5
 #: no throw of the challenge stays up this long, s
 LONGEST_FLIGHT_S = 20.0
 
-Kind = Literal["nothing", "noise", "within_sigma", "beyond_sigma", "one", "two", "off_catalogue"]
+Kind = Literal["nothing", "noise", "within_sigma", "beyond_sigma", "one", "two", "off_catalogue", "setup"]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.disc import Aero, Disc, Release, Rig
-from discsim.effects.catalogue import row
+from discsim.effects.catalogue import CATALOGUE, row
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.recording import Plant, Samples
@@ -25,7 +25,8 @@ from validation.throws import Throw
 __all__ = ["KINDS", "PLANT_SHARES", "draw_case"]
 
 #: shares of the kinds of case: nothing hidden in a third (plain, other noise than stated, coefficients within their
-#: stated sigma, or beyond it), one effect in a third, two in a sixth, physics of no catalogue in a sixth
+#: stated sigma, or beyond it), one effect in a third, two in a sixth, physics of no catalogue in a sixth; a fault of
+#: the setup only where it is asked for
 KINDS: Mapping[Kind, float] = {
     "nothing": 1 / 9,
     "noise": 1 / 9,
@@ -34,6 +35,7 @@ KINDS: Mapping[Kind, float] = {
     "one": 1 / 3,
     "two": 1 / 6,
     "off_catalogue": 1 / 6,
+    "setup": 0.0,
 }
 PLANT_SHARES: Mapping[Plant, float] = {"flight": 0.49, "rate_table": 0.17, "spin_down": 0.17, "free_spin": 0.17}
 
@@ -52,6 +54,8 @@ def draw_case(
     rng = np.random.default_rng(seed)
     drawn_plant: Plant = rng.choice(list(PLANT_SHARES), p=list(PLANT_SHARES.values()))
     drawn_kind: Kind = rng.choice(list(KINDS), p=list(KINDS.values()))
+    if mask is not None and (kind == "setup" or any(id in CATALOGUE and row(id).setup for id in effects)):
+        raise InputError(f"mask {mask}: hides physical effects alone; expected no mask with a fault of the setup")
     plant, kind = plant or _plant_of(effects, str(drawn_plant)), kind or _kind_of(effects, str(drawn_kind))
     if kind in ("within_sigma", "beyond_sigma") and plant in ("rate_table", "free_spin"):
         kind = "nothing"  # nothing stated there has a sigma
@@ -78,6 +82,8 @@ def _kind_of(effects: Sequence[str], drawn: str) -> Kind:
         if len(effects) > 1:
             raise InputError("off-catalogue physics is concealed alone; expected one name, or ids of the catalogue")
         return "off_catalogue"
+    if any(row(id).setup for id in effects):
+        return "setup"
     if effects:
         return "one" if len(effects) == 1 else "two"
     return drawn  # type: ignore[return-value]

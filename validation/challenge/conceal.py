@@ -28,6 +28,7 @@ from discsim.toml_table import read_toml
 from validation.challenge.case import Case, Coast, Kind, Mask, Run, Turning
 from validation.challenge.cases import draw_case
 from validation.challenge.physics import HiddenDisc, coast, haunted
+from validation.challenge.setups import equivalents
 
 __all__ = ["Answer", "conceal", "read_answer", "recordings", "seal", "write_recordings"]
 
@@ -38,7 +39,8 @@ class Answer:
 
     ``verdict`` is one of the contract's, ``effects`` the ids; ``recordings`` (folder names) those an event is in, None
     where no event is hidden. ``parameters`` holds the sizes by name, ``moved`` the true values of stated coefficients
-    that have a sigma, ``law`` the physics of no catalogue in words.
+    that have a sigma, ``law`` the physics of no catalogue in words. ``setting`` is that of the fault of a setup, by
+    name; ``equivalents`` are the faults (id, axes) that no recording of the case can tell from it.
     """
 
     seed: int
@@ -50,6 +52,8 @@ class Answer:
     parameters: dict[str, float] = field(default_factory=dict)
     moved: dict[str, float] = field(default_factory=dict)
     law: str | None = None
+    setting: dict[str, str] = field(default_factory=dict)
+    equivalents: tuple[tuple[str, str], ...] = ()
 
     @classmethod
     def of(cls, case: Case) -> Answer:
@@ -61,6 +65,8 @@ class Answer:
         if case.secret is not None:
             numbers = {name: value for name, value in vars(case.secret).items() if isinstance(value, float)}
             parameters.update(numbers)
+        setting = {name: text for item in case.concealed for name, text in item.effect.setting.items()}
+        alike = tuple(one for item in case.concealed for one in equivalents(case, item.effect))
         only = tuple(f"{item.recording + 1:02d}" for item in case.concealed if item.recording is not None)
         return cls(
             case.seed,
@@ -72,6 +78,8 @@ class Answer:
             parameters,
             dict(case.moved),
             case.secret.law if case.secret is not None else None,
+            setting,
+            alike,
         )
 
     @property
@@ -84,9 +92,11 @@ class Answer:
             top["law"] = self.law
         lines = toml_lines({**top, "plant": self.plant, "kind": self.kind})
         lines.append(f"seed = {self.seed}")
-        for name, numbers in (("parameters", self.parameters), ("moved", self.moved)):
-            if numbers:
-                lines += ["", f"[{name}]", *toml_lines(numbers)]
+        for name, given in (("parameters", self.parameters), ("moved", self.moved), ("setting", self.setting)):
+            if given:
+                lines += ["", f"[{name}]", *toml_lines(given)]
+        for id, axes in self.equivalents:
+            lines += ["", "[[equivalents]]", *toml_lines({"id": id, "axes": axes})]
         return "\n".join([*lines, ""])
 
 
@@ -101,6 +111,9 @@ def read_answer(path: Path) -> Answer:
         part = table.table(name)
         numbers[name] = {key: float(part.raw(key)) for key in part} if part is not None else {}
     law = table.text("law", required=False)
+    texts = table.table("setting")
+    setting = {name: str(texts.raw(name)) for name in texts} if texts is not None else {}
+    alike = tuple((str(one.text("id")), str(one.text("axes"))) for one in table.tables("equivalents"))
     table.finish()
     assert verdict is not None
     return Answer(
@@ -113,6 +126,8 @@ def read_answer(path: Path) -> Answer:
         numbers["parameters"],
         numbers["moved"],
         law,
+        setting,
+        alike,
     )
 
 

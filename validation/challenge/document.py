@@ -129,16 +129,17 @@ def _goals(scored: Sequence[Scored], items: Sequence[Sized], blank: Sequence[Sco
 
 def _kinds(scored: Sequence[Scored]) -> str:
     rows = []
+    kinds = [kind for kind in KINDS if any(item.answer.kind == kind for item in scored)]
     for plant in PLANT_SHARES:
         cells = []
-        for kind in KINDS:
+        for kind in kinds:
             mine = [item for item in scored if (item.answer.plant, item.answer.kind) == (plant, kind)]
             cells.append(f"{sum(item.score.right for item in mine)} of {len(mine)}" if mine else "")
         mine = [item for item in scored if item.answer.plant == plant]
         if mine:
             rows.append((plant.replace("_", " "), *cells, times(mine).text))
     lead = "Cases answered rightly, and the wall clock of a diagnosis."
-    return lead + "\n\n" + table(("plant", *(kind.replace("_", " ") for kind in KINDS), "time"), rows)
+    return lead + "\n\n" + table(("plant", *(kind.replace("_", " ") for kind in kinds), "time"), rows)
 
 
 def _confusions(scored: Sequence[Scored]) -> str:

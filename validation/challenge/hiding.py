@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -11,7 +12,8 @@ from discsim.effects.catalogue import row
 from discsim.errors import InputError
 from validation.challenge.case import Case, Concealed
 from validation.challenge.physics import OFF_CATALOGUE, OffCatalogue
-from validation.challenge.sizes import conceivable, draw_effect
+from validation.challenge.setups import draw_fault, possible_faults
+from validation.challenge.sizes import conceivable, draw_effect, ordinary
 
 __all__ = ["can_act", "choose", "choose_secret", "hide", "possible"]
 
@@ -23,7 +25,7 @@ def hide(case: Case, effects: Sequence[str], rng: np.random.Generator) -> Case:
     """
     if case.kind == "off_catalogue":
         return replace(case, secret=choose_secret(case, rng, *effects))
-    if case.kind not in ("one", "two"):
+    if case.kind not in ("one", "two", "setup"):
         return case
     for number, id in enumerate(effects):
         if case.plant not in row(id).plants:
@@ -31,11 +33,35 @@ def hide(case: Case, effects: Sequence[str], rng: np.random.Generator) -> Case:
         for other in effects[:number]:
             if not _goes_with(id, other):
                 raise InputError(f"{id} and {other}: cannot be told apart in one answer; expected another pair")
+    if case.kind == "setup":
+        return replace(case, concealed=_faulty_setup(case, effects, rng))
     concealed: list[Concealed] = []
     for number in range(max(len(effects), 2 if case.kind == "two" else 1)):
         asked = effects[number] if number < len(effects) else None
         concealed.append(choose(case, rng, concealed, asked))
     return replace(case, concealed=tuple(concealed))
+
+
+def _faulty_setup(case: Case, effects: Sequence[str], rng: np.random.Generator) -> tuple[Concealed, ...]:
+    """Draw one fault of the setup, and beside it one physical effect of ordinary size in half of the cases.
+
+    With ``effects`` these alone. Raises `InputError` where a fault cannot act, or cannot show, in the case.
+    """
+    faults = [id for id in effects if row(id).setup]
+    if len(faults) > 1:
+        raise InputError(f"{' and '.join(faults)}: expected one fault of the setup in a case")
+    there = possible_faults(case)
+    id = faults[0] if faults else str(rng.choice(there))
+    if id not in there:
+        raise InputError(f"{id}: does not show on a {case.plant} with {', '.join(case.instruments.sensors)}")
+    fault = Concealed(draw_fault(id, case, rng))
+    physical = [other for other in effects if other != id]
+    if not physical and (effects or rng.random() < 0.5):
+        return (fault,)
+    beside = choose(case, rng, [fault], *physical)
+    while not ordinary(beside.effect, case.plant):
+        beside = choose(case, rng, [fault], beside.effect.id)
+    return fault, beside
 
 
 def choose(
@@ -95,5 +121,17 @@ def _goes_with(id: str, other: str) -> bool:
     a, b = row(id), row(other)
     if id == other or set(a.parameters) & set(b.parameters) or (a.event and b.event):
         return False
-    clocks = [item for item in (id, other) if "clock" in item or item.endswith(("lag", "latency", "dropped_samples"))]
+    if other in _ALIKE.get(id, ()) or id in _ALIKE.get(other, ()):
+        return False
+    clocks = [item for item in (id, other) if "clock" in item or item.endswith(_LATE)]
     return len(clocks) < 2
+
+
+_LATE = ("lag", "latency", "dropped_samples", "time_offset")
+#: fault of the setup -> effects that are nearly the same thing in some recordings
+_ALIKE: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "board.rotation": ("accel.position_offset", "accel.cross_axis", "rig.axis_tilt"),
+        "site.field": ("mag.hard_iron", "mag.soft_iron", "mag.stray_field"),
+    }
+)

@@ -53,6 +53,7 @@ GOALS: Mapping[str, Goal] = {
     "right_set_rate_above_twice_the_limit": Goal("at least 95 %", 0.95, 1.0),
     "coverage_2sd": Goal("92 to 98 %", 0.92, 0.98),
     "off_catalogue_misnamed_rate": Goal("at most 5 %", 0.0, 0.05),
+    "right_setup_rate": Goal("at least 98 %", 0.98, 1.0),
     "crash_rate": Goal("none", 0.0, 0.0),
 }
 
@@ -168,6 +169,7 @@ NAMES: Mapping[str, str] = {
     "exponent_given_rate": "power laws: an exponent given",
     "exponent_within_2sd_rate": "power laws: exponent within 2 standard deviations",
     "heldout_improved_rate": "held-out recordings fit better (effects named rightly)",
+    "right_setup_rate": "faults of the setup: verdict, effects, setting and place are right",
     "crash_rate": "no answer at all",
 }
 
@@ -200,7 +202,7 @@ def _goals(rates: Mapping[str, Rate], curve: Curve | None) -> Section:
 def _kinds(scored: Sequence[Scored]) -> Section:
     rows = []
     for plant in ("flight", "rate_table", "spin_down", "free_spin"):
-        for kind in ("nothing", "noise", "within_sigma", "beyond_sigma", "one", "two", "off_catalogue"):
+        for kind in ("nothing", "noise", "within_sigma", "beyond_sigma", "one", "two", "off_catalogue", "setup"):
             mine = [item for item in scored if (item.answer.plant, item.answer.kind) == (plant, kind)]
             if mine:
                 right = rate(item.score.right for item in mine)
@@ -334,7 +336,7 @@ def fault_of(item: Scored) -> str:
         return "physics of no catalogue named as an effect" if score.named else "physics of no catalogue not noticed"
     hidden, named = set(answer.effects), set(score.named)
     if named == hidden:
-        return "right effects in another place"
+        return "right effects in another place" if score.right_setting is not False else "another setting named"
     if not alarm:
         return "not noticed"
     if not named:

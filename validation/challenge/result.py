@@ -55,6 +55,8 @@ class Scored:
                 "parameters": answer.parameters,
                 "moved": answer.moved,
                 "law": answer.law,
+                "setting": answer.setting,
+                "equivalents": [list(one) for one in answer.equivalents],
                 "plant": answer.plant,
                 "kind": answer.kind,
             },
@@ -72,11 +74,12 @@ class Scored:
     def from_json(cls, entry: Mapping[str, Any]) -> Scored:
         """Return the case of an entry of ``challenge.json``, scored anew."""
         told = dict(entry["answer"])
-        only = told.pop("recordings")
+        only, alike = told.pop("recordings"), told.pop("equivalents", ())
         answer = Answer(
             seed=entry["seed"],
             effects=tuple(told.pop("effects")),
             recordings=None if only == "all" else tuple(only),
+            equivalents=tuple((id, axes) for id, axes in alike),
             **told,
         )
         return cls.opened(

@@ -71,7 +71,9 @@ class CaseScore:
 
     ``right_place`` is None where no effect was concealed. ``named`` are the ids that the diagnosis names, each once;
     ``right_set`` tells that each concealed effect is named once and nothing else is; ``within_confusion`` that each is
-    named or listed as indistinguishable from one that is, and nothing else is named. ``law_given`` tells that the
+    named or listed as indistinguishable from one that is, and nothing else is named. ``right_setting`` is None where no
+    setting was concealed; a setting that no recording could tell from it counts as right where the concealed one is
+    listed beside it. ``law_given`` tells that the
     diagnosis has a law, ``exponent`` how its power of the spin rate compares with the concealed one, if there is one.
     """
 
@@ -86,11 +88,13 @@ class CaseScore:
     crashed: bool = False
     law_given: bool = False
     exponent: Deviation | None = None
+    right_setting: bool | None = None
 
     @property
     def right(self) -> bool:
-        """Verdict, set and place are all right."""
-        return self.right_verdict and self.right_set and self.right_place is not False
+        """Verdict, set, setting and place are all right."""
+        told = self.right_place is not False and self.right_setting is not False
+        return self.right_verdict and self.right_set and told
 
     def to_json(self) -> dict[str, Any]:
         """Return what ``challenge.json`` keeps of it."""
@@ -108,7 +112,7 @@ def score_case(answer: Answer, diagnosis: Mapping[str, Any] | None) -> CaseScore
     if diagnosis is None:
         return CaseScore((), False, False, False, None, (), None, None, crashed=True)
     try:
-        effects = list(diagnosis["effects"])
+        effects = [_as_concealed(answer, effect) for effect in diagnosis["effects"]]
         named = tuple(sorted({effect["id"] for effect in effects}))
         found = diagnosis["verdict"]
         fit = diagnosis["fit"]
@@ -129,12 +133,30 @@ def score_case(answer: Answer, diagnosis: Mapping[str, Any] | None) -> CaseScore
             heldout_after=after,
             law_given=diagnosis["law"] is not None,
             exponent=_exponent(answer, diagnosis["law"]),
+            right_setting=_right_setting(answer, effects),
         )
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(
             f"the diagnosis of seed {answer.seed} is not as its contract says ({type(error).__name__}: {error}); "
             "expected the content of a diagnosis.json"
         ) from None
+
+
+def _as_concealed(answer: Answer, effect: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return a named fault of axes as the concealed one where no recording tells them apart and it lists that one."""
+    if (effect["id"], effect.get("setting", {}).get("axes")) not in answer.equivalents:
+        return effect
+    for other in effect["confused_with"]:
+        if other["id"] in answer.effects and other.get("setting") == answer.setting:
+            return {**effect, "id": other["id"], "setting": other["setting"]}
+    return effect
+
+
+def _right_setting(answer: Answer, effects: Sequence[Mapping[str, Any]]) -> bool | None:
+    """Tell whether the setting of a fault is the concealed one; None where no setting is concealed."""
+    if not answer.setting:
+        return None
+    return any(effect["id"] in answer.effects and effect.get("setting") == answer.setting for effect in effects)
 
 
 def _within_confusion(hidden: set[str], effects: Sequence[Mapping[str, Any]]) -> bool:
@@ -332,6 +354,7 @@ def summary(
         "exponent_given_rate": rate(s.exponent is not None for a, _, s in scored if has_power_law(a)),
         "exponent_within_2sd_rate": rate(abs(z) <= 2.0 for z in exponents),
         "heldout_improved_rate": rate(gained),
+        "right_setup_rate": rate(s.right for a, _, s in scored if a.kind == "setup"),
         "crash_rate": rate(s.crashed for _, _, s in scored),
     }
 

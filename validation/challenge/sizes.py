@@ -15,7 +15,7 @@ import numpy as np
 from discsim.effects.catalogue import CATALOGUE, Effect, effect
 from discsim.recording import Plant
 
-__all__ = ["HIDING", "Hiding", "conceivable", "draw_effect", "scaled"]
+__all__ = ["HIDING", "Hiding", "conceivable", "draw_effect", "ordinary", "scaled"]
 
 
 @dataclass(frozen=True)
@@ -259,6 +259,15 @@ def draw_effect(
     for name, (least, most) in hiding.ranges.items():
         sizes[name] = float(rng.uniform(least, most)) * (recorded if name == "t_s" else 1.0)
     return effect(id, **{name: float(f"{value:.7g}") for name, value in sizes.items()})
+
+
+def ordinary(item: Effect, plant: Plant) -> bool:
+    """Tell whether an effect is of ordinary size: in the upper half, by logarithm, of those that are drawn."""
+    hiding = HIDING[item.id]
+    low, high = hiding.limits(plant)
+    size = float(np.linalg.norm([item.sizes[name] - hiding.about for name in hiding.sized]))
+    middle = float(np.sqrt(low * high))
+    return size <= middle if item.id == "accel.saturation" else size >= middle
 
 
 def scaled(item: Effect, factor: float, plant: Plant) -> Effect:

@@ -46,8 +46,12 @@ def strength(case: Case) -> float | None:
 
 
 def sizes(case: Case) -> dict[str, float]:
-    """Return each concealed effect's size in units of its detection limit, by id."""
-    return {item.effect.id: sqrt(max(noncentrality(case, item), 0.0) / THRESHOLD) for item in case.concealed}
+    """Return each concealed effect's size in units of its detection limit, by id; faults of the setup have none."""
+    return {
+        item.effect.id: sqrt(max(noncentrality(case, item), 0.0) / THRESHOLD)
+        for item in case.concealed
+        if not item.effect.row.setup
+    }
 
 
 def noncentrality(case: Case, item: Concealed) -> float:

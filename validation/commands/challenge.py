@@ -37,6 +37,7 @@ class KindName(enum.StrEnum):
     one = "one"
     two = "two"
     off_catalogue = "off_catalogue"
+    setup = "setup"
 
 
 class MaskName(enum.StrEnum):
@@ -91,7 +92,7 @@ def command(
     from validation.challenge.detection import detections, fit_curve
     from validation.challenge.masks import challenge_masks
     from validation.challenge.page import goals_met
-    from validation.challenge.result import rates_of
+    from validation.challenge.result import rates_of, times
     from validation.challenge.run import challenge
     from validation.run import start_run
 
@@ -121,6 +122,7 @@ def command(
         if curve is not None:
             typer.echo(f"half-detection size, in detection limits: {curve.text}")
         typer.echo(f"{sum(item.score.right for item in scored)} of {len(scored)} answered rightly")
+        typer.echo(f"a diagnosis took {times(scored).text}")
         # the goals are for cases as they come; under a mask an answer is all that can be asked for
         good = goals_met(rates, curve, few=len(scored) < 300) if name is None else not rates["crash_rate"].hits
         met = met and good

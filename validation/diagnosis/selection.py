@@ -42,6 +42,8 @@ BOUNDS: Mapping[tuple[str, str], tuple[float, float]] = {
     **{(f"{s}.clock_rate", "ratio"): (0.7, 1.4) for s in ("mag", "accel", "gyro", "gps")},
     ("clock.rate", "ratio"): (0.7, 1.4),
     ("gps.latency", "delay_s"): (0.0, 2.0),
+    **{(f"{s}.time_offset", "offset_s"): (-2.0, 2.0) for s in ("mag", "accel", "gyro")},
+    ("site.field", "ratio"): (0.2, 5.0),
     ("rig", "viscous"): (0.0, np.inf),
     ("rig.speed_ripple", "order"): (0.02, 200.0),
     ("accel.saturation", "limit_m_s2"): (0.5, np.inf),

@@ -59,7 +59,7 @@ SEARCHED = (
 #: a parameter is held this many steps wide, so that one without a trace in the readings stays where it is
 _LOOSE = 1e5
 #: a free spin's accelerometer counts by its means over turns alone, which these do not move
-_UNSEEN_IN_FREE_SPIN = ("accel.lag", "accel.clock_rate", "accel.dropped_samples")
+_UNSEEN_IN_FREE_SPIN = ("accel.lag", "accel.clock_rate", "accel.dropped_samples", "accel.time_offset")
 #: share of an effect's scale that a difference is taken over
 _STEP = 0.1
 

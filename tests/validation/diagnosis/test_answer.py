@@ -49,6 +49,25 @@ def explained() -> Diagnosis:
     )
 
 
+def test_an_effect_with_a_setting_carries_it_and_so_do_its_twins(explained):
+    value = {"rz_rad": ParameterValue(1.57, None)}
+    twin = Confusion("gyro.axes", 90.0, "Turn it by hand.", setting={"axes": "x y -z"})
+    turned = Confusion("board.rotation", 80.0, parameters=value)
+    flipped = NamedEffect("mag.axes", {}, STRONG, confused_with=(twin, turned), setting={"axes": " +x  -y z"})
+    entry = replace(explained, effects=(flipped,)).to_json()["effects"][0]
+    assert (entry["parameters"], entry["setting"]) == ({}, {"axes": "x -y z"})
+    assert [other.get("setting") for other in entry["confused_with"]] == [{"axes": "x y -z"}, None]
+    assert entry["confused_with"][1]["parameters"] == {"rz_rad": {"value": 1.57, "sd": None}}
+    assert "setting" not in explained.to_json()["effects"][0]
+
+
+def test_an_effect_with_neither_size_nor_setting_is_refused():
+    with pytest.raises(ValueError, match="no parameters; expected at least one, or a setting"):
+        NamedEffect("mag.axes", {}, STRONG)
+    with pytest.raises(InputError, match="expected x, y and z once each"):
+        NamedEffect("mag.axes", {}, STRONG, setting={"axes": "x y"})
+
+
 def test_the_json_has_the_contracts_keys_and_values(explained):
     content = explained.to_json()
     assert json.loads(json.dumps(content, allow_nan=False)) == content

@@ -12,7 +12,7 @@ import pytest
 from outcomes import OUTCOMES, explained, unexplained
 
 from discsim.effects import CATALOGUE
-from validation.diagnosis.answer import Confusion, Outcome, ParameterValue, Residuals
+from validation.diagnosis.answer import Confusion, Evidence, NamedEffect, Outcome, ParameterValue, Residuals
 from validation.diagnosis.formulae import FORMULAE, everyday, form, found, law_text, plus_minus, unit
 from validation.diagnosis.report import draw_figures, verdict_sentence, write_diagnosis_report
 from validation.diagnosis.residual_figures import draw_overview, draw_sensor
@@ -85,6 +85,15 @@ def test_confusions_come_with_what_to_record_next(tmp_path):
     assert "cannot tell it from" in text
     assert text.count("A rate-table run with the sensor at another radius") == 2
     assert "A throw at 20 m/s with half the spin" in text
+
+
+def test_a_setting_stands_in_words_and_so_does_its_twin(tmp_path):
+    outcome = explained()
+    twin = Confusion("gyro.axes", 90.0, "Turn the disc by hand.", setting={"axes": "x y -z"})
+    flipped = NamedEffect("mag.axes", {}, Evidence(900.0, None, 0.0), confused_with=(twin,), setting={"axes": "x -y z"})
+    text = page(replace(outcome, diagnosis=replace(outcome.diagnosis, effects=(flipped,))), tmp_path).text
+    assert "columns x, y, z hold x −y z of the body" in text
+    assert "a gyroscope whose axes are mixed up (axes = x y -z)" in text
 
 
 def test_a_law_stands_with_its_coefficients(tmp_path):

@@ -1,0 +1,236 @@
+"""Faults of the setup in the challenge: which are drawn, and which recordings cannot tell apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from discsim.effects import effect
+from discsim.effects.setup import axes_of, permutation
+from discsim.errors import InputError
+from discsim.recording import PLANTS, Plant
+from discsim.written import corrected
+from validation.challenge.case import Case, Coast, Concealed, Turning
+from validation.challenge.cases import draw_case
+from validation.challenge.conceal import Answer, read_answer, recordings
+from validation.challenge.setups import draw_fault, equivalents, possible_faults
+from validation.challenge.sizes import HIDING, ordinary
+from validation.challenge.strength import sizes
+
+CASES = {plant: draw_case(3, plant, kind="nothing") for plant in PLANTS}
+
+
+def on_board(plant: Plant, *sensors: str) -> Case:
+    whole = next(case for seed in range(99) if set(sensors) <= set((case := drawn(seed, plant)).instruments.sensors))
+    return replace(whole, instruments=whole.instruments.without(*(set(whole.instruments.sensors) - set(sensors))))
+
+
+def drawn(seed: int, plant: Plant) -> Case:
+    return draw_case(seed, plant, kind="nothing")
+
+
+def brief(case: Case) -> Case:
+    run = case.runs[0]
+    if isinstance(run, Coast):
+        run = replace(run, duration=2.0)
+    return replace(case, runs=(run,), stated_releases=case.stated_releases[:1], longest=1.5)
+
+
+def test_a_setup_case_conceals_one_fault_and_in_half_of_them_a_physical_effect_beside_it():
+    cases = [draw_case(seed, kind="setup") for seed in range(80)]
+    beside = 0
+    for case in cases:
+        fault, *rest = case.concealed
+        assert case.verdict == "explained"
+        assert fault.effect.row.setup
+        assert fault.effect.id in possible_faults(case)
+        assert (fault.effect.setting or fault.effect.sizes) != (fault.effect.row.sizes or None)
+        beside += len(rest)
+        for item in rest:
+            assert not item.effect.row.setup
+            assert ordinary(item.effect, case.plant)
+    assert 25 <= beside <= 55  # three standard deviations of a half of 80
+    assert {case.plant for case in cases} == set(PLANTS)
+    assert len({case.concealed[0].effect.id for case in cases}) > 9
+
+
+def test_no_fault_of_a_setup_is_drawn_unless_it_is_asked_for():
+    for seed in range(60):
+        assert not any(item.effect.row.setup for item in draw_case(seed).concealed)
+
+
+def test_a_fault_may_be_asked_for_with_an_effect_beside_it():
+    case = draw_case(5, "flight", ["accel.units", "air.wind"])
+    assert case.kind == "setup"
+    assert [item.effect.id for item in case.concealed] == ["accel.units", "air.wind"]
+    assert [item.effect.id for item in draw_case(5, "flight", ["mag.axes"]).concealed] == ["mag.axes"]
+
+
+@pytest.mark.parametrize(
+    ("plant", "ids", "message"),
+    [
+        ("free_spin", ["accel.time_offset"], "does not show on a free_spin"),
+        ("flight", ["mag.axes", "gyro.axes"], "expected one fault of the setup"),
+        ("spin_down", ["gps.axes"], "acts on flight; this is a spin_down"),
+    ],
+)
+def test_a_fault_that_cannot_show_is_refused(plant, ids, message):
+    with pytest.raises(InputError, match=message):
+        draw_case(4, plant, ids)
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_sizes_are_those_of_mistakes_that_are_made(plant):
+    rng = np.random.default_rng(0)
+    case = CASES[plant]
+    for id in possible_faults(case):
+        for _ in range(30):
+            fault = draw_fault(id, case, rng)
+            drawn_sizes = np.abs(list(fault.sizes.values()))
+            if id.endswith("time_offset"):
+                assert 0.005 <= drawn_sizes[0] <= 0.1
+            if id == "board.rotation":
+                assert np.radians(2.0) * (1 - 1e-6) <= np.linalg.norm(drawn_sizes) <= np.pi * (1 + 1e-6)
+            if id == "site.field":
+                assert drawn_sizes[0] <= np.radians(40.0) * (1 + 1e-6)
+                assert drawn_sizes[1] <= np.radians(20.0) * (1 + 1e-6)
+                assert 0.9 <= drawn_sizes[2] <= 1.1
+            if fault.setting:
+                assert fault.value != fault.row.baseline
+
+
+def test_nothing_is_put_over_a_fault_of_the_setup():
+    with pytest.raises(InputError, match="expected no mask with a fault of the setup"):
+        draw_case(1, "flight", kind="setup", mask="clipped")
+    with pytest.raises(InputError, match="expected no mask with a fault of the setup"):
+        draw_case(1, "flight", ["mag.axes"], mask="short")
+
+
+def test_only_physical_effects_have_a_detection_limit():
+    case = brief(draw_case(2, "rate_table", ["mag.units", "gyro.bias"]))
+    assert list(sizes(case)) == ["gyro.bias"]
+
+
+def test_an_answer_with_a_setting_survives_its_file(tmp_path):
+    for seed in range(40):
+        answer = Answer.of(draw_case(seed, kind="setup"))
+        (tmp_path / "answer.toml").write_text(answer.text)
+        assert read_answer(tmp_path / "answer.toml") == answer
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_concealed_fault_is_in_the_recordings_and_nothing_else_is(seed):
+    case = brief(draw_case(seed, kind="setup"))
+    fault = case.concealed[0]
+    (sound,) = recordings(replace(case, concealed=case.concealed[1:]))
+    (faulty,) = recordings(case)
+    assert faulty.environment.magnetic_field.tolist() == sound.environment.magnetic_field.tolist()
+    assert faulty.sheets.keys() == sound.sheets.keys()
+    if fault.effect.setting:
+        meant = corrected(faulty, [fault.effect])
+        for name, samples in sound.samples.items():
+            np.testing.assert_allclose(meant.need(name).value, samples.value, rtol=1e-12, atol=1e-12)
+            np.testing.assert_allclose(meant.need(name).t, samples.t, atol=1e-12)
+    assert any(
+        len(samples) != len(faulty.need(name))
+        or not np.array_equal(samples.value, faulty.need(name).value, equal_nan=True)
+        or not np.array_equal(samples.t, faulty.need(name).t)
+        for name, samples in sound.samples.items()
+    )
+
+
+class TestEquivalents:
+    """A rig's magnetometer by hand: readings (H cos, -H sin, D) of the angle turned from an unknown phase."""
+
+    def test_on_a_rig_a_magnetometer_may_be_turned_about_the_axis(self):
+        case = on_board("rate_table", "magnetometer", "rate_reference")
+        found = equivalents(case, effect("mag.axes", axes="x -y z"))
+        assert {axes for _, axes in found} == {"-x y z", "y x z", "-y -x z"}
+
+    def test_a_turn_of_the_phase_is_what_they_differ_by(self):
+        t = np.linspace(0.0, 1.0, 50)
+        sound = [
+            np.stack([20 * np.cos(30 * t + a), -20 * np.sin(30 * t + a), 40 + 0 * t]) for a in np.arange(4) * np.pi / 2
+        ]
+        case = on_board("rate_table", "magnetometer", "rate_reference")
+        fault = effect("mag.axes", axes="z x y")
+        written = permutation(fault.value) @ sound[0]
+        for _, axes in equivalents(case, fault):
+            meant = permutation(effect("mag.axes", axes=axes).value).T @ written
+            assert any(np.allclose(meant, other) for other in sound)
+
+    def test_a_rig_s_gyroscope_feels_z_alone(self):
+        case = on_board("rate_table", "gyroscope", "rate_reference")
+        assert len(equivalents(case, effect("gyro.axes", axes="z x y"))) == 7
+        rng = np.random.default_rng(1)
+        seen = {draw_fault("gyro.axes", case, rng).value.axes for _ in range(100)}
+        assert seen <= {"x y -z", "z y x", "x z y", "-x -y -z", "y z x", "z x y"}
+
+    def test_a_flipped_magnetometer_is_a_disc_that_spins_the_other_way(self):
+        case = on_board("spin_down", "magnetometer", "gyroscope")
+        twins = equivalents(case, effect("mag.axes", axes="x -y z"))
+        assert ("gyro.axes", "x y -z") in twins
+        assert ("mag.axes", "x -y z") in equivalents(case, effect("gyro.axes", axes="x y -z"))
+        told = on_board("spin_down", "magnetometer", "gyroscope", "rate_reference")
+        assert all(id == "mag.axes" for id, _ in equivalents(told, effect("mag.axes", axes="x -y z")))
+
+    def test_with_nothing_else_on_board_such_a_flip_shows_nowhere(self):
+        case = on_board("spin_down", "magnetometer")
+        rng = np.random.default_rng(2)
+        seen = {draw_fault("mag.axes", case, rng).value.axes for _ in range(100)}
+        assert not seen & {"x -y z", "-x y z", "y x z"}
+        assert "x y -z" in seen
+
+    def test_in_a_flight_every_axis_shows(self):
+        case = on_board("flight", "magnetometer", "accelerometer", "gps")
+        for id in ("mag.axes", "accel.axes"):
+            assert equivalents(case, effect(id, axes="y x z")) == ()
+
+    def test_without_a_magnetometer_a_gps_may_be_turned_about_the_vertical(self):
+        case = on_board("flight", "accelerometer", "gps")
+        found = equivalents(case, effect("gps.axes", axes="east north up"))
+        assert set(found) == {("gps.axes", text) for text in ("north west up", "west south up", "south east up")}
+        assert equivalents(on_board("flight", "magnetometer", "gps"), effect("gps.axes", axes="east north up")) == ()
+
+    def test_a_free_spin_s_accelerometer_shows_only_the_pull_to_the_axis(self):
+        case = on_board("free_spin", "magnetometer", "gyroscope", "accelerometer")
+        place = case.instruments.sensors["accelerometer"].position  # type: ignore[union-attr]
+        flat = place * [1.0, 1.0, 0.0]
+        for _, axes in equivalents(case, effect("accel.axes", axes="-x y z")):
+            P = permutation(effect("accel.axes", axes=axes).value)
+            np.testing.assert_array_equal(P @ flat, [-flat[0], flat[1], 0.0])
+
+    def test_faults_that_are_no_axes_have_none(self):
+        for plant in PLANTS:
+            assert equivalents(CASES[plant], effect("mag.units", written_in="G")) == ()
+            assert equivalents(CASES[plant], effect("board.rotation", rx_rad=1.0)) == ()
+
+    def test_the_axes_of_a_matrix_are_those_that_made_it(self):
+        for axes in ("y x -z", "-z x y", "x y z"):
+            assert axes_of(permutation(effect("mag.axes", axes=axes).value)) == axes
+        ENU = effect("gps.axes", axes="east north up").value
+        assert axes_of(permutation(ENU), "gps") == "east north up"
+
+
+def test_physical_effects_beside_a_fault_are_none_that_it_resembles():
+    for seed in range(60):
+        case = draw_case(seed, kind="setup")
+        ids = [item.effect.id for item in case.concealed]
+        if ids[0] == "site.field":
+            assert not set(ids) & {"mag.hard_iron", "mag.soft_iron"}
+        if ids[0].endswith("time_offset"):
+            assert not any(id.endswith(("lag", "clock_rate", "latency", "dropped_samples")) for id in ids)
+    assert all(id in HIDING for id in ids[1:])
+    assert Concealed(effect("mag.axes", axes="y x z")).effect.row.setup
+
+
+def test_a_table_s_profile_is_no_sensor_and_keeps_its_seconds():
+    case = draw_case(2, "rate_table", ["clock.units"])
+    (faulty, *_) = recordings(replace(case, runs=case.runs[:1]))
+    run = case.runs[0]
+    assert isinstance(run, Turning)
+    assert faulty.command is not None
+    np.testing.assert_array_equal(faulty.command.t, run.profile.t)
+    assert faulty.end > 100.0 * run.profile.t[-1]
