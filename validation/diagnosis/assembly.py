@@ -11,6 +11,7 @@ from scipy.stats import chi2 as chi2_law
 
 from discsim.arrays import FloatArray
 from discsim.disc import Aero, aero_key
+from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.catalogue import effect as catalogued
 from discsim.model_file import Model, ModelEffect
 from validation.diagnosis.advice import confusions, in_words
@@ -85,7 +86,11 @@ def recalibrations(found: Search) -> dict[str, Recalibration]:
     sd = _errors(found.final)
     result = {}
     for q, value, error in zip(fit.parameters, fit.at, sd, strict=True):
-        if q.group == "free_spin" or not any(q.key == p.key and q.recordings == p.recordings for p in found.own):
+        if (
+            q.group == "free_spin"
+            or q.group in CATALOGUE
+            or not any(q.key == p.key and q.recordings == p.recordings for p in found.own)
+        ):
             continue
         sigma = next(p.sigma for p in found.own if q.key == p.key and q.recordings == p.recordings)
         name = aero_key(q.name) if q.group == "aero" else _RECALIBRATED_NAMES.get(q.key, f"{q.group}.{q.name}")

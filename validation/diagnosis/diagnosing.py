@@ -16,6 +16,8 @@ from validation.diagnosis.law import find_law
 from validation.diagnosis.plans import Plan
 from validation.diagnosis.rows import competing, row_of
 from validation.diagnosis.search import Search, search
+from validation.diagnosis.setup_effects import free_parameters, with_setup
+from validation.setup import find_setup_faults
 
 __all__ = ["diagnose"]
 
@@ -51,17 +53,20 @@ def diagnose(
     """
     recordings = [recording for dataset in datasets for recording in dataset]
     called = [name for group in recording_names(datasets, names) for name in group]
+    progress("checking the setup", 0, 5)
+    setup = find_setup_faults(recordings)
     with competing(user_effects):
-        found = search(recordings, progress)
+        found = search(setup.recordings, progress, free_parameters(setup))
         law = None
         verdict, unexplained = verdict_of(found)
         if unexplained or _stacked(found):
             progress("looking for a law", 4, 5)
-            law = find_law(found.loose, found.final, found.own, found.loose_noise, recordings)
+            law = find_law(found.loose, found.final, found.own, found.loose_noise, setup.recordings)
         advice = {}
         if verdict == "explained" and law is None:
             progress("asking what to record next", 4, 5)
             advice = advise(found, called, plans)
         outcome = assemble(found, names, called, seed, law, advice)
-    agreement = agreement_of(recordings, called)
+    outcome = with_setup(outcome, setup, recordings, found.final.fit)
+    agreement = agreement_of(setup.recordings, called)
     return replace(outcome, diagnosis=replace(outcome.diagnosis, agreement=agreement))

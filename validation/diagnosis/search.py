@@ -106,15 +106,20 @@ class Search:
 
 # a hypothesis far from the data may send a motion beyond all numbers: such a fit is not finite, and is passed over
 @np.errstate(over="ignore", invalid="ignore")
-def search(recordings: Sequence[Recording], report: Report = lambda stage, done, total: None) -> Search:
-    """Find the effects that explain recordings of one plant."""
-    known = stated_parameters(recordings)
+def search(
+    recordings: Sequence[Recording],
+    report: Report = lambda stage, done, total: None,
+    free: Sequence[Parameter] = (),
+) -> Search:
+    """Find the effects that explain recordings of one plant; ``free`` are numbers that every fit may move."""
+    known = (*stated_parameters(recordings), *free)
     own = (*known, *unknowns(recordings))
     report("following the data", 0, 4)
     loose, left_out = without_outliers(relaxed(recordings, known))
     noise = estimate_noise(loose.linears, [linear.residual for linear in loose.linears])
     plant = recordings[0].plant
-    trials = trials_for(recordings)
+    given = {q.group for q in free}
+    trials = tuple(trial for trial in trials_for(recordings) if trial.id not in given)
     report("asking every effect", 1, 4)
     board = board_of(loose, trials, noise, NO_JUMPS[plant])
     report("fitting the baseline", 2, 4)

@@ -1152,7 +1152,6 @@ def _compared(
     inside = np.clip(grid, fixes.t[0], fixes.t[-1])
     down = np.array([0.0, 0.0, gravity])
     if felt is None:
-        nothing = np.zeros((fixes.t.size, 0))
         return local_cubics(fixes, inside)[:, 2, :] - down, None
     found = []
     for delay in (0.0, 0.1, 0.2, 0.3):

@@ -98,10 +98,11 @@ def chosen(recordings: Sequence[Recording]) -> list[Recording]:
     """Return the recordings that are looked at: as many as are of use, both directions of spin among them."""
 
     def direction(recording: Recording) -> float:
-        for sensor, column in (("rate_reference", None), ("gyroscope", 2)):
+        for sensor, column in (("rate_reference", 0), ("gyroscope", 2)):
             if sensor in recording:
-                value = recording.samples[sensor].value
-                return float(np.sign(np.nanmedian(value if column is None else value[:, column])))
+                value = recording.samples[sensor].value.reshape(len(recording.samples[sensor]), -1)[:, column]
+                if np.any(np.isfinite(value)):
+                    return float(np.sign(np.nanmedian(value)))
         return 0.0
 
     if len(recordings) <= MOST:

@@ -166,9 +166,17 @@ def spin_signals(recording: Recording) -> SpinSignals | None:
         across,
         along,
         locked("gyroscope"),
-        None if gyroscope is None else np.sign(np.nanmedian(gyroscope.value, axis=0)),
+        None if gyroscope is None else _signs(gyroscope.value),
         locked("accelerometer"),
         _path(recording, grid),
+    )
+
+
+def _signs(value: FloatArray) -> FloatArray:
+    """Return the sign (k,) of most readings of each column; 0 for a column without any."""
+    some = np.any(np.isfinite(value), axis=0)
+    return np.array(
+        [np.sign(np.nanmedian(column)) if there else 0.0 for column, there in zip(value.T, some, strict=True)]
     )
 
 

@@ -1,0 +1,208 @@
+"""Faults of the setup in a diagnosis: numbers that the fit refines, and effects of the answer.
+
+The recordings are corrected before the fit (`validation.setup`). What of a fault is a number (an offset, a rotation, a
+field) stays free about its first value throughout the fit, so that it gets its error beside everything else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from discsim.arrays import FloatArray
+from discsim.effects.catalogue import Effect, effect, row
+from discsim.model_file import ModelEffect
+from discsim.recording import Recording
+from validation.diagnosis.answer import (
+    SMALLEST_P_VALUE,
+    Confusion,
+    Diagnosis,
+    Evidence,
+    FitFigures,
+    Located,
+    NamedEffect,
+    Outcome,
+    ParameterValue,
+)
+from validation.diagnosis.fitting import Fit, Parameter
+from validation.setup import SetupFault, SetupFindings, said
+
+__all__ = ["free_parameters", "with_setup"]
+
+#: how far a number of a fault may be from its first value, one sigma: s; rad; rad and share. Offsets are found to a few
+#: ms, rotations to a tenth of a radian (an accelerometer's place may be 3 mm of 16 off), fields to a few per cent
+_SIGMA = {"time_offset": 0.01, "rotation": 0.2, "field": 0.2}
+#: a number whose error is this share of that was not determined by the recordings
+_UNDETERMINED = 0.3
+#: sensors that share the axes of the board
+_BOARD = ("magnetometer", "gyroscope", "accelerometer")
+_PREFIX = {"mag": "magnetometer", "accel": "accelerometer", "gyro": "gyroscope", "gps": "gps"}
+
+
+def free_parameters(findings: SetupFindings) -> tuple[Parameter, ...]:
+    """Return the numbers of the faults found, about the corrected recordings, for a fit to refine."""
+    free = []
+    for fault in findings.effects:
+        kind = row(fault.id)
+        for name, scale, none in zip(kind.parameters, kind.scale, _numbers(kind.baseline), strict=True):
+            free.append(Parameter(fault.id, name, none, 0.1 * scale, _SIGMA[fault.id.partition(".")[2]]))
+    return tuple(free)
+
+
+def _numbers(value: tuple[float | str, ...]) -> list[float]:
+    return [float(item) for item in value if not isinstance(item, str)]
+
+
+def with_setup(outcome: Outcome, findings: SetupFindings, written: Sequence[Recording], fit: Fit) -> Outcome:
+    """Return an outcome with the faults of the setup among its effects.
+
+    ``written`` are the recordings as they stand in their files, ``fit`` the final one, of the corrected recordings. The
+    baseline's figures become those of the written readings against the motion that the fit found. Where something
+    unexplained is left, the faults stand among the warnings, as the answer names no effect then.
+    """
+    if not findings.faults:
+        return outcome
+    diagnosis = outcome.diagnosis
+    if diagnosis.verdict == "unexplained":
+        told = tuple(f"corrected before the fit: {fault.sentence}" for fault in findings.faults)
+        return replace(outcome, diagnosis=replace(diagnosis, warnings=(*diagnosis.warnings, *told)))
+    excess = [_excess(fault.effect, written, findings.recordings, fit) for fault in findings.faults]
+    named = tuple(
+        _named(fault, _refined(fault.effect, fit), more, fit, len(written))
+        for fault, more in zip(findings.faults, excess, strict=True)
+    )
+    located = tuple(
+        _located(one, fault, more / max(sum(excess), 1e-300), written)
+        for one, fault, more in zip(named, findings.faults, excess, strict=True)
+    )
+    total = sum(excess) / max(fit.count, 1)
+    held = diagnosis.baseline.heldout_chi2_per_sample
+    baseline = FitFigures(diagnosis.baseline.chi2_per_sample + total, None if held is None else held + total)
+    changed = replace(
+        diagnosis,
+        verdict="explained",
+        baseline=baseline,
+        effects=(*named, *diagnosis.effects),
+        located=(*located, *diagnosis.located),
+        next_recordings=_next(diagnosis, named),
+    )
+    carried = tuple(
+        ModelEffect(
+            effect(one.id, **{name: item.value for name, item in one.parameters.items()}, **one.setting),
+            {name: item.sd for name, item in one.parameters.items() if item.sd is not None},
+            None,
+        )
+        for one in named
+    )
+    return replace(outcome, diagnosis=changed, model=replace(outcome.model, effects=(*outcome.model.effects, *carried)))
+
+
+@dataclass(frozen=True)
+class _Refined:
+    """A fault with its numbers as the fit has them; an error of None where the recordings do not determine it."""
+
+    effect: Effect
+    errors: tuple[float | None, ...]
+
+
+def _refined(fault: Effect, fit: Fit) -> _Refined:
+    places = {q.name: k for k, q in enumerate(fit.parameters) if q.group == fault.id}
+    names = row(fault.id).parameters
+    if not names or not places:
+        return _Refined(fault, ())
+    at = [places[name] for name in names]
+    moved = fit.at[at]
+    covariance = fit.covariance[np.ix_(at, at)] if fit.covariance.shape[0] == len(fit.parameters) else None
+    sd = np.full(len(at), np.inf) if covariance is None else np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    first = np.array(_numbers(fault.value))
+    if fault.id == "board.rotation":
+        # the fit turned what was corrected: readings = (R_fit C)^T (vector in B)
+        total = (Rotation.from_rotvec(moved) * Rotation.from_rotvec(first)).as_rotvec()
+    elif fault.id == "site.field":
+        total = np.array([first[0] + moved[0], first[1] + moved[1], first[2] * moved[2]])
+    else:
+        total = first + moved
+    room = _SIGMA[fault.id.partition(".")[2]]
+    errors = tuple(float(one) if one < _UNDETERMINED * room else None for one in sd)
+    return _Refined(effect(fault.id, **dict(zip(names, total.tolist(), strict=True))), errors)
+
+
+def _named(fault: SetupFault, refined: _Refined, excess: float, fit: Fit, recordings: int) -> NamedEffect:
+    names = row(fault.effect.id).parameters
+    values = _numbers(refined.effect.value)
+    errors = refined.errors or (None,) * len(names)
+    parameters = {name: ParameterValue(value, sd) for name, value, sd in zip(names, values, errors, strict=True)}
+    bic = excess - max(len(names), 1) * float(np.log(max(fit.count, 2)))
+    confused = tuple(_confusion(twin, fault, bic) for twin in fault.twins)
+    held = fault.heldout_gain if recordings > 1 else None
+    evidence = Evidence(bic, 0.5 * excess if held is None and recordings > 1 and not names else held, SMALLEST_P_VALUE)
+    return NamedEffect(fault.effect.id, parameters, evidence, None, confused, dict(fault.effect.setting))
+
+
+def _confusion(twin: Effect, fault: SetupFault, bic: float) -> Confusion:
+    names = row(twin.id).parameters
+    parameters = {name: ParameterValue(value, None) for name, value in zip(names, _numbers(twin.value), strict=True)}
+    text = f"{said(twin)} would do as well; to tell: {_telling(twin, fault.effect)}"
+    return Confusion(twin.id, bic, text, None, dict(twin.setting), parameters)
+
+
+def _telling(twin: Effect, fault: Effect) -> str:
+    """Return what tells two faults of a setup apart, in words."""
+    if {twin.id, fault.id} == {"board.rotation"}:
+        return "note which way the disc spins, or log it lying still with its top up, where gravity shows the z axis"
+    return (
+        "lay the disc still with its top up, then stand it on its edge with x up, then with y up, logging all the "
+        "time: gravity and the field show every axis"
+    )
+
+
+def _excess(fault: Effect, written: Sequence[Recording], meant: Sequence[Recording], fit: Fit) -> float:
+    """Return the chi-squared of what the written readings of a fault's sensors are off the corrected ones."""
+    prefix = fault.id.partition(".")[0]
+    total = 0.0
+    for before, after in zip(written, meant, strict=True):
+        for sensor, samples in before.samples.items():
+            if prefix in _PREFIX and sensor != _PREFIX[prefix]:
+                continue
+            if fault.id == "board.rotation" and sensor not in _BOARD:
+                continue
+            if fault.id == "site.field":
+                if sensor == "magnetometer":
+                    apart = after.environment.magnetic_field - before.environment.magnetic_field
+                    total += len(samples) * float(apart @ apart) / _variance(fit, sensor)
+                continue
+            there = after.samples[sensor]
+            value, meant_value = _columns(samples.value), _columns(there.value)
+            if fault.id.endswith("time_offset") or fault.id == "clock.units":
+                meant_value = np.column_stack([_at(samples.t, there.t, column) for column in meant_value.T])
+            left = (value - meant_value) ** 2
+            total += float(np.nansum(left)) / _variance(fit, sensor)
+    return total
+
+
+def _columns(value: FloatArray) -> FloatArray:
+    return value if value.ndim == 2 else value[:, None]
+
+
+def _at(t: FloatArray, known: FloatArray, value: FloatArray) -> FloatArray:
+    good = np.isfinite(value)
+    return np.interp(t, known[good], value[good]) if good.any() else np.full(t.size, np.nan)
+
+
+def _variance(fit: Fit, sensor: str) -> float:
+    sd = [noise.sd for group, noise in fit.noise.items() if group.partition(".")[0] == sensor]
+    return float(np.mean(np.square(sd))) if sd else 1.0
+
+
+def _located(named: NamedEffect, fault: SetupFault, share: float, written: Sequence[Recording]) -> Located:
+    sensor = _PREFIX.get(named.id.partition(".")[0], "all")
+    end = max(float(samples.t[-1]) for one in written for samples in one.samples.values())
+    return Located("all", sensor, "all", 0.0, end, float(np.clip(share, 0.0, 1.0)), said(fault.effect))
+
+
+def _next(diagnosis: Diagnosis, named: Sequence[NamedEffect]) -> tuple[str, ...]:
+    told = [other.next_recording for one in named for other in one.confused_with[:1] if other.next_recording]
+    return tuple(dict.fromkeys([*told, *diagnosis.next_recordings]))
