@@ -95,7 +95,7 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
 
 def _next(recordings: Sequence[Recording]) -> list[SetupFault]:
     """Return the fault, or the two at once, that make the sensors agree; empty where they do, or nothing does."""
-    ranking = hypotheses(recordings)
+    ranking = hypotheses(recordings, PRICE)
     as_written, found = ranking.as_written, ranking.found
     site = recordings[0].environment.magnetic_field
     before = None if as_written is None else as_written.costs

@@ -147,8 +147,11 @@ class Ranking:
     base: _Base
 
 
-def hypotheses(recordings: Sequence[Recording]) -> Ranking:
-    """Return what the relations between sensors cost as written and under every single fault of the setup."""
+def hypotheses(recordings: Sequence[Recording], price: float = 0.0) -> Ranking:
+    """Return what the relations between sensors cost as written and under every single fault of the setup.
+
+    No hypothesis is tried where the written ones cost less than a ``price``: none could gain that much.
+    """
     some = chosen(recordings)
     axis = spin_axis(some, "magnetometer")
     main = 2 if axis is None else int(np.argmax(np.abs(axis)))
@@ -159,11 +162,13 @@ def hypotheses(recordings: Sequence[Recording]) -> Ranking:
         base = _base(some, {"magnetometer": upright}, effect("mag.axes", axes=axes_text(upright)))
     found: list[Hypothesis] = []
     as_written = None
+    if base.signals and not base.axes:
+        as_written = Hypothesis("", "", Columns(), *misfit(base.signals, Columns()))
+        if as_written.cost < price:
+            return Ranking(as_written, (), base)
+        found += [*_offsets(base), *_field(base)]
     if base.signals:
         found += list(_one_sensor(base))
-        if not base.axes:
-            as_written = Hypothesis("", "", Columns(), *misfit(base.signals, Columns()))
-            found += [*_offsets(base), *_field(base)]
     found += list(_boards(some))
     most = max((item.weight for item in found), default=0.0)
     found = [replace(item, size=item.size + SILENT * (most - item.weight)) for item in found]
