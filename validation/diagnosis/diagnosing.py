@@ -16,8 +16,8 @@ from validation.diagnosis.law import find_law
 from validation.diagnosis.plans import Plan
 from validation.diagnosis.rows import competing, row_of
 from validation.diagnosis.search import Search, search
+from validation.diagnosis.setup import find_setup_faults
 from validation.diagnosis.setup_effects import free_parameters, with_setup
-from validation.setup import find_setup_faults
 
 __all__ = ["diagnose"]
 

@@ -1,7 +1,7 @@
 """Faults of the setup in a diagnosis: numbers that the fit refines, and effects of the answer.
 
-The recordings are corrected before the fit (`validation.setup`). What of a fault is a number (an offset, a rotation, a
-field) stays free about its first value throughout the fit, so that it gets its error beside everything else.
+The recordings are corrected before the fit (`validation.diagnosis.setup`). What of a fault is a number (an offset, a
+rotation, a field) stays free about its first value in every fit, so that it gets its error beside everything else.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from validation.diagnosis.answer import (
     ParameterValue,
 )
 from validation.diagnosis.fitting import Fit, Parameter
-from validation.setup import SetupFault, SetupFindings, said
+from validation.diagnosis.setup import SetupFault, SetupFindings, said
 
 __all__ = ["free_parameters", "with_setup"]
 

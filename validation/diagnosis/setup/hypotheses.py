@@ -1,8 +1,8 @@
 """Which setup fault makes the sensors agree: hypotheses about columns, ranked by the relations between sensors.
 
-Takes recordings of one hardware; gives hypotheses with what their relations cost (`validation.setup.relations`), best
-first. Faults of one sensor's columns are signed permutations, all of them; a whole board is turned by what its sensors
-show (`validation.setup.rotation`); offsets of time turn a sensor's phase against the field's by rate times offset.
+Takes recordings of one hardware; gives hypotheses with what their relations cost (`.relations`), best first. Faults of
+one sensor's columns are signed permutations, all of them; a whole board is turned by what its sensors show
+(`.rotation`); offsets of time turn a sensor's phase against the field's by rate times offset.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect
 from discsim.recording import Recording
 from discsim.written import corrected
-from validation.setup.relations import Columns, misfit, wanted_force
-from validation.setup.rotation import board_turns, spin_axis
-from validation.setup.spin_signals import SpinSignals, spin_signals
+from validation.diagnosis.setup.relations import Columns, misfit, wanted_force
+from validation.diagnosis.setup.rotation import board_turns, spin_axis
+from validation.diagnosis.setup.spin_signals import SpinSignals, spin_signals
 
 __all__ = ["PERMUTATIONS", "Hypothesis", "Ranking", "axes_text", "board_effect", "chosen", "hypotheses", "pairs"]
 

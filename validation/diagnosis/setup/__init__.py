@@ -1,5 +1,5 @@
 """Faults of the setup, found before anything is fitted: `find_setup_faults`."""
 
-from validation.setup.find import SetupFault, SetupFindings, find_setup_faults, said
+from validation.diagnosis.setup.find import SetupFault, SetupFindings, find_setup_faults, said
 
 __all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said"]

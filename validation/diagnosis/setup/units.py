@@ -16,7 +16,7 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect
 from discsim.effects.setup import UNITS, AccelerometerUnit, ClockUnit, GyroscopeUnit, MagnetometerUnit
 from discsim.recording import Recording
-from validation.setup.spin_signals import FEWEST
+from validation.diagnosis.setup.spin_signals import FEWEST
 
 __all__ = ["clock_unit", "sensor_units"]
 

@@ -2,8 +2,8 @@
 
 Takes a recording whose magnetometer has its spin axis along z; gives slow signals on an even grid: the field across and
 along the axis, and each other sensor multiplied by the field's phase and averaged over some turns (synchronous
-detection, as a lock-in amplifier does it). Physics between sensors (`validation.setup.relations`) are plain equations
-between these signals, whatever the columns of a sensor are called.
+detection, as a lock-in amplifier does it). Physics between sensors (`validation.diagnosis.setup.relations`) are plain
+equations between these signals, whatever the columns of a sensor are called.
 """
 
 from __future__ import annotations
@@ -56,12 +56,16 @@ class FlightPath:
 class SpinSignals:
     """Slow signals of one recording on a grid (n,); None for a sensor that is absent.
 
-    ``rate`` (n,) is the rate at which the body turns by the field's phase psi, rad/s; ``across`` and ``along`` (n,) are
-    the field across and along the axis, uT; ``gyro_sign`` (3,) the sign of each column of the gyroscope.
+    ``angle`` (n,) is psi, how far the body has turned by the field's phase, rad, ``rate`` (n,) its slope, rad/s, NaN
+    where too slow; ``measured`` tells that the field shows it, and not the sum of another sensor's rate. ``across`` and
+    ``along`` (n,) are the field across and along the axis, uT; ``gyro_sign`` (3,) the sign of each column of the
+    gyroscope.
     """
 
     recording: Recording
     grid: FloatArray
+    angle: FloatArray
+    measured: bool
     rate: FloatArray
     across: FloatArray
     along: FloatArray
@@ -130,7 +134,8 @@ def spin_signals(recording: Recording) -> SpinSignals | None:
     if stop - start < FEWEST * STEP + 0.2:
         return None
     grid = np.arange(start + 0.1, stop - 0.1, STEP)
-    rate = -np.gradient(phase(grid), STEP)
+    angle = -phase(grid)
+    rate = np.gradient(angle, STEP)
     fast = np.abs(rate) > SLOWEST
     if grid.size < FEWEST or np.count_nonzero(fast) < FEWEST:
         return None
@@ -162,6 +167,8 @@ def spin_signals(recording: Recording) -> SpinSignals | None:
     return SpinSignals(
         recording,
         grid,
+        angle,
+        source == "magnetometer",
         np.where(fast, rate, np.nan),
         across,
         along,

@@ -10,6 +10,7 @@ rate. Then, whatever the air does:
 - ``pull to the axis``: <f_x + i f_y> = -r^2 (d_x + i d_y), Eq. (7), d the accelerometer's stated place;
 - ``lever arm``: <f_z exp(i psi)> = r (d_x - i d_y) W, from w x (w x d) + dw/dt x d under slow precession;
 - ``lift``: the mean of f_z is negative, for most discs fly the right way up: weak, as some do not;
+- on a rig ``angle``: psi is the sum of the reference's rate; ``ramps``: f_x + i f_y over d is -r^2 + i dr/dt;
 - ``height``: a path stays above ground; ``release``: it starts with the stated velocity.
 
 Each says in one number how far a hypothesis about the columns is from it, in units of what ordinary errors of parts
@@ -24,7 +25,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discsim.arrays import FloatArray
-from validation.setup.spin_signals import STEP, ComplexArray, Locked, SpinSignals
+from discsim.recording import Samples
+from validation.diagnosis.setup.spin_signals import STEP, ComplexArray, Locked, SpinSignals
 
 __all__ = ["Columns", "Misfit", "misfit", "misfits", "wanted_force"]
 
@@ -38,6 +40,10 @@ _FORCE, _SIZE, _PULL, _PULL_SHARE, _LEVER, _LEVER_SHARE = 0.5, 1.2, 1.5, 0.25, 0
 _HEIGHT, _RELEASE = 1.5, 2.0
 #: the mean specific force along z of a disc that flies the right way up is about -g; hammers are few, m/s^2
 _LIFT = 1.5
+#: degree of the polynomial that a rate runs down along
+_SMOOTH = 4
+#: of a rig: what precession-free phases leave, rad; the share of a ramp that may be another's, and its weight
+_ANGLE, _RAMP, _RAMP_WEIGHT = 0.2, 0.3, 10.0
 #: of a rig: hard iron along the axis, uT; a bias, m/s^2; a ramp over which clocks matter, rad/s^2
 _IRON, _GRAVITY, _STEADY = 15.0, 1.5, 5.0
 
@@ -226,8 +232,14 @@ def _of_rig(signals: SpinSignals, columns: Columns, rate: FloatArray, along: Flo
     if signals.force is not None:
         axial = np.real(_times(signals.force.mean, columns.of("accelerometer")))[:, 2]
         found += _judged("gravity", ("accelerometer",), axial + recording.environment.gravity, _GRAVITY * np.ones(1))
+    if signals.force is not None:
+        mean = np.real(_times(signals.force.mean, columns.of("accelerometer")))
+        found += _of_ramps(signals, mean[:, 0] + 1j * mean[:, 1], rate)
     reference = recording.get("rate_reference") or recording.command
     if reference is not None:
+        if signals.measured:
+            late = columns.offset.get("magnetometer", 0.0)
+            found += _of_angle(signals, reference, -1.0 if rate is not signals.rate else 1.0, late)
         own = np.interp(signals.grid, reference.t, reference.value)
         steady = np.abs(np.gradient(own, signals.grid)) < _STEADY
         apart = np.where(steady, rate - own, np.nan)
@@ -237,3 +249,47 @@ def _of_rig(signals: SpinSignals, columns: Columns, rate: FloatArray, along: Flo
             apart = np.where(steady, axial - own, np.nan)
             found += _judged("spin rate", ("gyroscope",), apart, _SPIN + _SPIN_SHARE * np.abs(own))
     return found
+
+
+def _of_angle(signals: SpinSignals, reference: Samples, sign: float, late: float) -> list[Misfit]:
+    """Compare the angle that the field shows with that of a rate's sum; a phase and a clock's rate are free."""
+    t = np.append(reference.t, max(signals.grid[-1], reference.t[-1] + 1.0))
+    r = np.append(reference.value, reference.value[-1])
+    summed = np.concatenate([[0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(t))])
+    known = np.isfinite(summed)
+    if not known.all():
+        return []
+    # linear rates between knots: the angle is quadratic there, so it is summed on a fine grid
+    fine = np.arange(t[0], t[-1], 0.2 * STEP)
+    rate = np.interp(fine, t, r)
+    own = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * 0.2 * STEP)])
+    there = np.interp(signals.grid - late, fine, own)
+    basis, _ = np.linalg.qr(np.column_stack([np.ones(there.size), there]))
+    left = sign * signals.angle - there
+    left = left - basis @ (basis.T @ left)
+    return _judged("angle", ("magnetometer",), left, _ANGLE * np.ones(1))
+
+
+def _of_ramps(signals: SpinSignals, pull: ComplexArray, rate: FloatArray) -> list[Misfit]:
+    """Compare what an accelerometer reads along its path with the rate's change: f/d = -r^2 + i dr/dt on a rig."""
+    place = signals.recording.sheets["accelerometer"].position
+    if place is None or np.hypot(place[0], place[1]) < 2e-3:
+        return []
+    along = np.imag(pull / complex(place[0], place[1]))
+    known = np.isfinite(along) & np.isfinite(rate)
+    if np.count_nonzero(known) < 4 * _TOGETHER:
+        return []
+    # the slope of a noisy rate would bend the relation: a run-down is smooth, a table does as it is told
+    if signals.recording.command is not None:
+        own = np.interp(signals.grid, signals.recording.command.t, signals.recording.command.value)
+    else:
+        x = signals.grid - signals.grid.mean()
+        own = np.polynomial.Polynomial.fit(x[known], rate[known], _SMOOTH)(x)
+    change, good = np.gradient(own, STEP), known
+    # a place that is off to the side adds a share of r^2, a bias a constant
+    A = np.column_stack([np.ones(along.size), rate**2, change])[good]
+    x, *_ = np.linalg.lstsq(A, along[good], rcond=None)
+    left = along[good] - A @ x
+    error = float(np.sqrt(_TOGETHER * np.mean(left**2) * np.linalg.pinv(A.T @ A)[2, 2]))
+    ratio = (float(x[2]) - 1.0) ** 2 / (_RAMP**2 + error**2)
+    return [Misfit("ramps", ("accelerometer",), ratio, _RAMP_WEIGHT)]

@@ -16,9 +16,9 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect
 from discsim.recording import Recording
 from discsim.written import corrected
-from validation.setup.hypotheses import Hypothesis, axes_text, board_effect, chosen, hypotheses, pairs
-from validation.setup.proof import left_by_short_fit
-from validation.setup.units import clock_unit, sensor_units
+from validation.diagnosis.setup.hypotheses import Hypothesis, axes_text, board_effect, chosen, hypotheses, pairs
+from validation.diagnosis.setup.proof import left_by_short_fit
+from validation.diagnosis.setup.units import clock_unit, sensor_units
 
 __all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said"]
 
