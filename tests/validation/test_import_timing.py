@@ -151,12 +151,27 @@ def test_an_import_takes_repeats_out_and_writes_the_sensors_own_rate_and_times(t
     assert len(field) == pytest.approx(400, abs=2)
     assert result.recording.sheets["magnetometer"].rate_hz == pytest.approx(100.0, rel=1e-3)
     assert result.recording.sheets["gyroscope"].rate_hz == pytest.approx(250.0)
+    (repair,) = result.repairs
+    assert repair.line == 3  # the second row repeats the first
+    assert repair.action == f"{t.size - len(field)} rows left out of magnetometer, the first here"
     note = next(note for note in result.notes if "sample and hold" in note)
     assert "magnetometer: its readings stand on 2.5" in note
     assert "100 Hz in a log of 250 Hz" in note
     assert "magnetometer: 100 Hz is written, not the 250 Hz that the map states" in result.notes
     # the field was taken at even times; the rows' own would be off by up to 4 ms, which is 8 deg of this spin
     assert_allclose(np.diff(field.t), 0.01, atol=2e-5)
+
+
+@pytest.mark.parametrize(("sensor_hz", "log_hz"), [(100.0, 104.0), (100.0, 250.0), (75.0, 100.0), (20.0, 200.0)])
+def test_rows_lost_from_a_held_log_leave_its_sensors_clock_whole(tmp_path, sensor_hz, log_hz):
+    t, mag = held_log(sensor_hz, log_hz, seconds=20.0)
+    keep = np.random.default_rng(5).random(t.size) > 0.005
+    result = imported(tmp_path, [f"{1000 * x:.3f}" for x in t[keep]], mag[keep], turning(int(keep.sum())))
+    field = result.recording.samples["magnetometer"]
+    assert result.recording.sheets["magnetometer"].rate_hz == pytest.approx(sensor_hz, rel=1e-3)
+    taken = (field.t - field.t[0]) * sensor_hz
+    # every reading is at a whole number of periods from the first, rows that were lost or not
+    assert_allclose(taken, np.round(taken), atol=0.05)
 
 
 def test_phases_of_a_held_field_follow_the_spin_within_its_noise(tmp_path):

@@ -480,8 +480,8 @@ SOURCES = [
     (LYNX, "lynx", [20299], 0),
     (SRP, "srp", [2251, 901, 900], 181 + 181 + 179),  # comment lines
     # the magnetometer's rows were held, then interpolated twofold: the file has the pattern ....##......## of repeats
-    (BROAD / "07_undisturbed_fast_rotation_B_30s.csv", "broad", [8571, 3038, 8571], 0),
-    (BROAD / "32_disturbed_attached_magnet_1cm_30s.csv", "broad", [8571, 3032, 8571], 0),
+    (BROAD / "07_undisturbed_fast_rotation_B_30s.csv", "broad", [8571, 3038, 8571], 1),
+    (BROAD / "32_disturbed_attached_magnet_1cm_30s.csv", "broad", [8571, 3032, 8571], 1),
     (PHYPHOX / "z_acc.csv", "phyphox", [982], 0),
     (PHYPHOX / "z_cir.csv", "phyphox", [2239], 0),
     (SHOTSHAPER / "throw1.tsv", "shotshaper", [178], 0),

@@ -100,13 +100,7 @@ def _power(ratio: float, names: dict[int, str]) -> str:
 
 
 def _disc(disc: Disc, *, thrown: bool) -> Iterator[Finding]:
-    """Yield what is wrong with mass, diameter and moments of inertia.
-
-    Of a body of revolution with mass m, diameter d and height h, all mass lies within d/2 of the axis: Izz is at most
-    m d^2/4 (all of it in the rim). A flat uniform disc has m d^2/8; a flying disc has more in its rim; where half of
-    the mass is a board in the middle half of m d^2/8 is left, m d^2/16, which is taken for the least. About a diameter
-    Ixx = Izz/2 + sum of m z^2, the sum being at most m (h/2)^2, and h at most d/6: between Izz/2 and Izz/2 + m d^2/144.
-    """
+    """Yield what is wrong with mass, diameter and moments of inertia; of what is no thrown disc it is only a note."""
     where = "[disc]"
     unusual: Severity = "warning" if thrown else "note"
     remedy = "" if thrown else "no matter if this is no disc"
@@ -134,8 +128,19 @@ def _disc(disc: Disc, *, thrown: bool) -> Iterator[Finding]:
             f"{DIAMETER[0]} to {DIAMETER[1]} m",
             "is it the radius?" if radius else guess,
         )
-    if not (mass_ok and diameter_ok):
-        return  # bounds of inertia need both
+    if mass_ok and diameter_ok:  # bounds of inertia need both
+        yield from _inertia(disc, unusual, remedy)
+
+
+def _inertia(disc: Disc, unusual: Severity, remedy: str) -> Iterator[Finding]:
+    """Yield what is wrong with the moments of inertia.
+
+    Of a body of revolution with mass m, diameter d and height h, all mass lies within d/2 of the axis: Izz is at most
+    m d^2/4 (all of it in the rim). A flat uniform disc has m d^2/8; a flying disc has more in its rim; where half of
+    the mass is a board in the middle half of m d^2/8 is left, m d^2/16, which is taken for the least. About a diameter
+    Ixx = Izz/2 + sum of m z^2, the sum being at most m (h/2)^2, and h at most d/6: between Izz/2 and Izz/2 + m d^2/144.
+    """
+    where = "[disc]"
     unit_inertia = disc.mass * disc.diameter**2
     least, most = unit_inertia / 16, unit_inertia / 4
     if _outside(disc.Izz, (least, most)):

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +21,10 @@ __all__ = ["Cleaned", "Readings", "body_moves", "cleaned", "frozen_runs"]
 CONSTANT = 50
 #: fewest rows, and times the usual standing of a reading, for which a sensor that moved before stands when it froze
 FROZEN_ROWS, FROZEN_TIMES = 20, 10.0
+#: share of a reading's lateness that moves the phase of its sensor, times the share of rows that repeat
+PHASE_GAIN = 0.1
+#: share of readings that one clock must explain; the first row of a reading is lost as often as any row
+ONE_CLOCK = 0.97
 #: readings over which the clock of a held sensor is taken as even where one clock does not do for all
 NEARBY = 21
 #: what moves: a rate (rad/s) above any gyroscope's bias; a span of the field (uT) of a quarter turn of the weakest on
@@ -82,8 +85,10 @@ def cleaned(sensor: str, found: Readings, others: Mapping[str, Readings], stampe
         return Cleaned(found, rate, tuple(notes))
     before = len(found.time)
     row = row_timing(found.time).interval
-    fresh = found.select(fresh_rows(found.value, held))
-    period, time, one_clock = _own_times(fresh.time, held.rows_per_reading, row)
+    is_fresh = fresh_rows(found.value, held)
+    fresh = found.select(is_fresh)
+    shown = np.flatnonzero(is_fresh)
+    period, time, one_clock = _own_times(fresh.time, np.diff(shown).astype(float), held.rows_per_reading, row)
     even = "the even times of its own clock" if one_clock else "times as even as the rows allow"
     bear = f"what is left bears {even}, at most a row before the row at which it first shows"
     per_row = "" if stamped else f" (rows taken as {1 / row:.4g} Hz)"
@@ -141,10 +146,9 @@ def frozen_runs(
     value = found.value
     same = np.all((value[1:] == value[:-1]) | np.isnan(value[1:]), axis=1) & ~np.all(np.isnan(value[1:]), axis=1)
     edges = np.flatnonzero(~np.concatenate([[False], same, [False]]))
+    long = np.diff(edges) >= max(FROZEN_ROWS, FROZEN_TIMES * standing)
     runs = []
-    for first, after in pairwise(edges):
-        if after - first < max(FROZEN_ROWS, FROZEN_TIMES * standing):
-            continue
+    for first, after in zip(edges[:-1][long], edges[1:][long], strict=True):
         span = (float(found.time[first]), float(found.time[after - 1]))
         if any(body_moves(name, others[name], *span) for name in MOVES if name != sensor and name in others):
             runs.append((int(first), int(after)))
@@ -172,23 +176,27 @@ def _thawed(
     return found.select(kept), notes
 
 
-def _own_times(first_shown: FloatArray, rows_per_reading: float, row: float) -> tuple[float, FloatArray, bool]:
+def _own_times(
+    first_shown: FloatArray, written: FloatArray, rows_per_reading: float, row: float
+) -> tuple[float, FloatArray, bool]:
     """Return a held sensor's period (s), the times (n,) of its readings, and whether one even clock explains them all.
 
+    ``first_shown`` (n,) s are the times of the rows at which they first show, ``written`` (n - 1,) the rows between.
     A reading was taken within one row before the row at which it first shows. Where one clock lies within these rows, a
     line through the counted readings, half a row earlier, is that clock. Else (the two clocks run apart, readings came
     in bursts) the line is followed over `NEARBY` readings and the times kept within the row before each first row.
     """
-    # a reading stands on at most one row more than its period, so rows between readings tell the least number of them
-    rows = np.round(np.diff(first_shown) / row)
-    between = np.maximum(1.0, np.ceil((rows - 1) / rows_per_reading - 1e-6))
-    count = np.concatenate([[0.0], np.cumsum(between)])
+    count = _counted(first_shown / row, written, rows_per_reading)
     if first_shown.size < 8:
         return rows_per_reading * row, first_shown - row / 2, False
-    slope, start = np.polyfit(count, first_shown - first_shown[0], 1)
-    late = first_shown - first_shown[0] - (start + slope * count)
-    # lateness is even from 0 to one row; a tenth of a row is left for the stamps' own rounding
-    if np.ptp(late) <= 1.1 * row:
+    near = np.ones(count.size, dtype=np.bool_)
+    for _ in range(4):
+        slope, start = np.polyfit(count[near], first_shown[near] - first_shown[0], 1)
+        late = first_shown - first_shown[0] - (start + slope * count)
+        # lateness is even from 0 to one row; a tenth of a row is left for the stamps' own rounding
+        near = np.abs(late - np.median(late)) <= 0.55 * row
+    # where a row was lost, a reading shows a row or more later
+    if np.mean(near) >= ONE_CLOCK:
         return float(slope), np.asarray(first_shown - late - row / 2), True
     width = min(NEARBY, first_shown.size // 2 * 2 - 1)
     padded = np.pad(late, width // 2, mode="reflect", reflect_type="odd")
@@ -196,3 +204,40 @@ def _own_times(first_shown: FloatArray, rows_per_reading: float, row: float) -> 
     time = first_shown - late + smooth - row / 2
     time = np.clip(time, first_shown - 0.99 * row, first_shown)
     return float(np.median(np.diff(time))), time, False
+
+
+def _counted(first_shown: FloatArray, written: FloatArray, rows_per_reading: float) -> FloatArray:
+    """Return the number (n,) of each reading in its sensor's own count, from the row times of first showing, in rows.
+
+    A reading stands on at most one row more than its period, so the rows between two readings tell the least number of
+    readings in them, and where no row was lost this is the number. Else the sensor's phase decides: its period comes
+    from the longest stretch without a lost row, its phase is followed with a loop that is slow against the beat of the
+    two clocks, over which lateness runs through its row.
+    """
+    rows = np.diff(first_shown)
+    lost = np.maximum(np.round(rows - written), 0.0)
+    before = np.concatenate([[0.0], lost[:-1]])
+    least = np.maximum(1.0, np.ceil((rows - 1 - lost) / rows_per_reading - 0.05))
+    doubtful = lost + before > 0
+    most = np.where(doubtful, np.maximum(least, np.floor((rows + 1 + before) / rows_per_reading + 0.05)), least)
+    if not np.any(doubtful):
+        return np.concatenate([[0.0], np.cumsum(least)])
+    edges = np.concatenate([[0], np.flatnonzero(doubtful) + 1, [first_shown.size]])
+    longest = int(np.argmax(np.diff(edges)))
+    period = rows_per_reading
+    first = np.concatenate([[0.0], np.cumsum(least)])
+    if edges[longest + 1] - edges[longest] > NEARBY:
+        whole = slice(edges[longest], edges[longest + 1])
+        period = float(np.polyfit(first[whole], first_shown[whole], 1)[0])
+    gain = PHASE_GAIN * (1 - 1 / period)
+    numbers = np.zeros(first_shown.size)
+    phase = float(np.mean(first_shown[: edges[1]] - period * first[: edges[1]]))
+    for k in range(rows.size):
+        # a reading that came while rows were lost shows late by half of them, on average
+        expected = first_shown[k + 1] - lost[k] / 2
+        near = float(np.round((expected - phase) / period))
+        step = float(min(max(near, least[k]), most[k]))
+        numbers[k + 1] = numbers[k] + step
+        phase += step * period
+        phase += gain * (expected - phase)
+    return numbers

@@ -78,7 +78,7 @@ def import_recording(raw: Path, import_map: ImportMap, rows: slice | None = None
         main = tables[next(iter(readings))]
         whole, readings = readings, _cut(readings, tables, main, rows)
         notes += [f"no {sensor} in these rows" for sensor in whole if sensor not in readings]
-    readings, rates, said = _fresh(raw, readings, import_map)
+    readings, rates, said = _fresh(raw, readings, import_map, tables, repairs)
     notes += said
     zero = min(found.time[0] for found in readings.values())
     samples = {
@@ -140,7 +140,11 @@ def _read_sensors(
 
 
 def _fresh(
-    raw: Path, readings: dict[str, Readings], import_map: ImportMap
+    raw: Path,
+    readings: dict[str, Readings],
+    import_map: ImportMap,
+    tables: dict[str, RawTable],
+    repairs: RepairList,
 ) -> tuple[dict[str, Readings], dict[str, float], list[str]]:
     """Return the readings without repeats and dead sensors, the rates of sensors that are not the log's, and notes."""
     stamped = import_map.time.column is not None
@@ -150,6 +154,13 @@ def _fresh(
     for sensor, found in readings.items():
         result = cleaned(sensor, found, readings, stamped)
         notes += result.notes
+        kept = np.isin(found.number, [] if result.readings is None else result.readings.number)
+        if not np.all(kept):
+            lines = {row.number: row.line for row in tables[sensor].rows}
+            line = lines[int(found.number[~kept][0])]
+            what = f"{sensor}: {result.notes[0].removeprefix(f'{sensor}: ')}"
+            action = f"{np.count_nonzero(~kept)} rows left out of {sensor}, the first here"
+            repairs.add(None, tables[sensor].path, line, what, action)
         if result.readings is None:
             continue
         fresh[sensor] = result.readings
