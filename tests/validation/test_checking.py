@@ -325,3 +325,22 @@ def test_the_practice_sets_are_sound_but_for_gyroscopes_that_clip(folder):
                 rounding = (sensor.stated_resolution or 0.0) / np.sqrt(12)
                 # the shortest flights have 11 blocks of 64 readings; noise that is coloured comes on top
                 assert sensor.noise == pytest.approx(np.hypot(sensor.stated_noise, rounding), rel=0.2)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 5, 40])
+@pytest.mark.parametrize("gap", [False, True])
+def test_the_shortest_and_the_emptiest_recordings_are_checked_without_a_fault(rows, gap):
+    recording = rolled()
+    samples = {
+        name: Samples(one.t[:rows], np.full_like(one.value[:rows], np.nan) if gap else one.value[:rows])
+        for name, one in recording.samples.items()
+    }
+    gps = np.full((rows, 6), np.nan if gap else 1.0)
+    samples |= {"gps": Samples(np.arange(rows) / 10, gps), "rate_reference": Samples(np.arange(rows) / 10, gps[:, 0])}
+    sheets = recording.sheets | {"gps": SensorSheet(10.0), "rate_reference": SensorSheet(10.0)}
+    check = check_recording(replace(recording, samples=samples, sheets=sheets))
+    text = io.StringIO()
+    print_checks([check], Console(file=text, width=120))
+    json.dumps(check.to_json())
+    assert ids(check, "error") == []
+    assert ("magnetometer.dead" in ids(check, "warning")) is gap

@@ -259,6 +259,27 @@ def test_a_magnetometer_that_freezes_becomes_a_gap_from_that_instant(tmp_path):
     )
 
 
+def test_a_coarse_gyroscope_in_a_steady_spin_is_not_frozen_but_one_in_a_spin_that_changes_is(tmp_path):
+    stamps = [f"{10 * k}" for k in range(600)]
+    mag = spinning(np.arange(600) / 100) + np.random.default_rng(0).normal(0, 0.6, (600, 3))
+    gyro = np.round(turning(600), 0) + np.outer(np.arange(600) < 50, [0, 0, 1.0])
+    steady = imported(tmp_path, stamps, mag, gyro)
+    assert len(steady.recording.samples["gyroscope"]) == 600
+    slowing = turning(600, rate=0.0) + np.outer(np.linspace(40, 5, 600), [0, 0, 1.0])
+    force = np.round(0.02 * slowing**2, 2)
+    force[300:] = force[300]
+    frozen = imported_with_force(tmp_path, stamps, force, slowing)
+    assert frozen.recording.samples["accelerometer"].t[-1] == pytest.approx(3.0)
+
+
+def imported_with_force(folder: Path, stamps: list[str], force: np.ndarray, gyro: np.ndarray) -> Imported:
+    """Import a log whose first three columns are a specific force."""
+    imported(folder, stamps, force, gyro)  # writes the log
+    text = (folder / "map.toml").read_text().replace("[sensors.magnetometer]", "[sensors.accelerometer]")
+    (folder / "map.toml").write_text(text.replace('unit = "uT"', 'unit = "m/s^2"'))
+    return import_recording(folder / "log.csv", read_map(folder / "map.toml"))
+
+
 @pytest.mark.parametrize("cell", ["NaN", "nan", "NA", "n/a", "null", "-", "#N/A", "inf", "-Inf", "1.#QNAN", ""])
 def test_words_for_no_number_are_gaps(cell):
     assert np.isnan(number(cell))
@@ -368,3 +389,16 @@ def test_the_plain_map_takes_a_held_log_as_it_is(tmp_path):
     recording = import_recording(tmp_path / "log.csv", read_map(find_map("csv"))).recording
     assert recording.sheets["magnetometer"].rate_hz == pytest.approx(100.0, rel=1e-3)
     assert_allclose(np.diff(recording.samples["magnetometer"].t), 0.01, rtol=1e-2)
+
+
+def test_a_log_of_two_rows_imports_and_one_row_tells_no_rate(tmp_path):
+    result = imported(tmp_path, ["0", "10"], spinning(np.arange(2) / 100), turning(2))
+    assert len(result.recording.samples["magnetometer"]) == 2
+    with pytest.raises(InputError, match="one sample and no rate_hz in the map"):
+        imported(tmp_path, ["0"], spinning(np.zeros(1)), turning(1))
+
+
+def test_stamps_in_whole_milliseconds_give_the_rate_of_their_mean_and_not_of_one_rounded_step(tmp_path):
+    t = np.arange(1040) / 104
+    result = imported(tmp_path, [f"{1000 * x:.0f}" for x in t], spinning(t), turning(t.size))
+    assert result.recording.sheets["gyroscope"].rate_hz == pytest.approx(104.0, rel=1e-3)

@@ -123,14 +123,22 @@ def nothing_in(sensor: str, found: Readings, others: Mapping[str, Readings]) -> 
     return None
 
 
-def body_moves(sensor: str, found: Readings, start: float = -np.inf, stop: float = np.inf) -> bool:
-    """Tell whether a sensor shows, between two times, that the body moves (`MOVES`)."""
+def body_moves(
+    sensor: str, found: Readings, start: float = -np.inf, stop: float = np.inf, *, unsteadily: bool = False
+) -> bool:
+    """Tell whether a sensor shows, between two times, that the body moves (`MOVES`); or that its motion changes.
+
+    A steady spin turns the field, but leaves a gyroscope and an accelerometer with one reading each.
+    """
     value = found.value[(found.time >= start) & (found.time <= stop)]
     value = value[np.all(np.isfinite(value), axis=1)]
     if len(value) < 3:
         return False
     if sensor == "gyroscope":
-        return bool(np.median(np.linalg.norm(value, axis=1)) > MOVES[sensor])
+        size = np.linalg.norm(value, axis=1)
+        return float(np.ptp(size) if unsteadily else np.median(size)) > MOVES[sensor]
+    if unsteadily and sensor == "magnetometer":
+        return False
     return bool(np.max(np.ptp(value, axis=0)) > MOVES[sensor])
 
 
@@ -150,7 +158,8 @@ def frozen_runs(
     runs = []
     for first, after in zip(edges[:-1][long], edges[1:][long], strict=True):
         span = (float(found.time[first]), float(found.time[after - 1]))
-        if any(body_moves(name, others[name], *span) for name in MOVES if name != sensor and name in others):
+        seen_by = [name for name in MOVES if name != sensor and name in others]
+        if any(body_moves(name, others[name], *span, unsteadily=sensor != "magnetometer") for name in seen_by):
             runs.append((int(first), int(after)))
     return runs
 

@@ -421,9 +421,10 @@ def _sheet(sensor_map: SensorMap, samples: Samples, own_rate: float | None) -> S
         return replace(sensor_map.sheet, rate_hz=float(f"{own_rate:.5g}"))
     if np.isfinite(sensor_map.sheet.rate_hz):
         return sensor_map.sheet
-    if not samples.interval > 0:
+    interval = row_timing(samples.t).interval
+    if not interval > 0:
         raise InputError("one sample and no rate_hz in the map; expected a rate or at least two samples")
-    return replace(sensor_map.sheet, rate_hz=float(f"{1 / samples.interval:.4g}"))
+    return replace(sensor_map.sheet, rate_hz=float(f"{1 / interval:.4g}"))
 
 
 def _release(raw: Path, import_map: ImportMap, readings: dict[str, Readings]) -> Release | None:
