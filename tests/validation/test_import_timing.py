@@ -402,3 +402,31 @@ def test_stamps_in_whole_milliseconds_give_the_rate_of_their_mean_and_not_of_one
     t = np.arange(1040) / 104
     result = imported(tmp_path, [f"{1000 * x:.0f}" for x in t], spinning(t), turning(t.size))
     assert result.recording.sheets["gyroscope"].rate_hz == pytest.approx(104.0, rel=1e-3)
+
+
+def test_time_that_stands_or_runs_backwards_is_refused_in_one_sentence(tmp_path):
+    mag = spinning(np.arange(50) / 100)
+    for stamps in (["7"] * 50, [f"{10 * k}" for k in range(50, 0, -1)]):
+        with pytest.raises(InputError, match="time does not go on over the magnetometer's 50 rows: 'ms' runs from"):
+            imported(tmp_path, stamps, mag, turning(50))
+
+
+def test_stamps_that_are_coarser_than_the_rows_are_said_to_be(tmp_path):
+    result = imported(tmp_path, [f"{100 * (k // 5)}" for k in range(200)], spinning(np.arange(200) / 50), turning(200))
+    assert any("40 different times in 200 rows" in note for note in result.notes)
+
+
+def test_a_log_that_stutters_throughout_has_lost_no_row():
+    rng = np.random.default_rng(6)
+    t = np.cumsum(np.maximum(1 + 0.3 * rng.standard_normal(3000), 0.05)) / 100
+    timing = row_timing(t)
+    assert (timing.lost, timing.twice) == (0, 0)
+    assert timing.late > 1000
+
+
+def test_an_accelerometer_that_is_coarse_for_a_slow_change_is_not_frozen(tmp_path):
+    rate = np.linspace(40, 20, 2000)
+    force = np.round(np.stack([0.016 * rate**2, 0 * rate, 0 * rate - 9.8], axis=1))
+    gyro = turning(2000, rate=0.0) + np.outer(rate, [0, 0, 1.0])
+    result = imported_with_force(tmp_path, [f"{10 * k}" for k in range(2000)], force, gyro)
+    assert len(result.recording.samples["accelerometer"]) == 2000

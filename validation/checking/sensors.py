@@ -24,8 +24,6 @@ RATE_TOLERANCE = 0.01
 SHARE = 0.01
 #: a stretch without rows is silent from this many intervals on
 SILENT = 10.0
-#: steps below this share of the usual one are rows written twice
-DOUBLED = 0.1
 #: noise found is another than the stated from this factor on; found noise scatters by 10 % in a second of 100 Hz, data
 #: sheets state typical values that single parts exceed by half
 NOISE = 2.5
@@ -112,7 +110,7 @@ def check_sensor(recording: Recording, sensor: str) -> SensorCheck:
         repeats,
         timing.late,
         timing.lost,
-        int(np.count_nonzero(steps < DOUBLED * timing.interval)),
+        timing.twice,
         timing.exact,
         *_clipped_shares(recording, sensor),
         float(np.median(found_steps)) if found_steps else None,

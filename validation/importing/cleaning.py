@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
-from validation.importing.held import find_held, find_interpolated, fresh_rows
+from validation.importing.held import find_held, find_interpolated, fresh_rows, step_of
 from validation.importing.timing import row_timing
 
 __all__ = ["Cleaned", "Readings", "body_moves", "cleaned", "frozen_runs"]
@@ -155,6 +155,11 @@ def frozen_runs(
     same = np.all((value[1:] == value[:-1]) | np.isnan(value[1:]), axis=1) & ~np.all(np.isnan(value[1:]), axis=1)
     edges = np.flatnonzero(~np.concatenate([[False], same, [False]]))
     long = np.diff(edges) >= max(FROZEN_ROWS, FROZEN_TIMES * standing)
+    # a resolution too coarse for the motion makes readings stand, too, and go on by a step; a sensor that thaws leaps
+    steps = np.array([step_of(column) or 0.0 for column in value.T])
+    thaw = edges[1:][long & (edges[1:] < len(value))]
+    if np.any(np.all(np.abs(value[thaw] - value[thaw - 1]) <= 2.01 * steps, axis=1)):
+        return []
     runs = []
     for first, after in zip(edges[:-1][long], edges[1:][long], strict=True):
         span = (float(found.time[first]), float(found.time[after - 1]))

@@ -128,8 +128,18 @@ def _read_sensors(
         lost = chosen - found.time.size
         if found.time.size == 0:
             raise InputError.at(table.path, None, f"no usable row of the {sensor}; expected numbers in {names}")
+        if found.time.size == 1 and chosen > 2 and sensor_map.where is None:
+            raise InputError.at(table.path, None, _no_time(sensor, chosen, import_map, clock))
         if lost > MUCH_LOST * chosen and not clock.starts:
-            notes.append(f"WARNING: {lost} of the {sensor}'s {chosen} rows were left out; is this the right map?")
+            times = len(set(clock.time.values()))
+            coarse = sensor_map.where is None and times < (1 - MUCH_LOST) * len(clock.time)
+            why = (
+                f"the file has {times} different times in {len(clock.time)} rows: rows stand twice, or the stamps are "
+                "coarser than the rows (then take another column, or step_s)"
+                if coarse
+                else "is this the right map?"
+            )
+            notes.append(f"WARNING: {lost} of the {sensor}'s {chosen} rows were left out; {why}")
         readings[sensor] = found
     if not readings:
         wanted = "; or ".join(_quoted(sensor_map.columns[0]) for sensor_map in import_map.sensors.values())
@@ -137,6 +147,15 @@ def _read_sensors(
             raw, None, f"no sensor of the map '{import_map.name}' in it; expected {wanted}; {_there(tables, raw)}"
         )
     return readings, notes
+
+
+def _no_time(sensor: str, rows: int, import_map: ImportMap, clock: RowClock) -> str:
+    times = list(clock.time.values())
+    column = import_map.time.column or import_map.time.counter
+    return (
+        f"time does not go on over the {sensor}'s {rows} rows: '{column}' runs from {times[0]:.9g} s to "
+        f"{times[-1]:.9g} s; expected stamps that ascend; name another column in [time], or step_s"
+    )
 
 
 def _fresh(

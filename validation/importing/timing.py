@@ -15,6 +15,8 @@ __all__ = ["RowTiming", "row_timing"]
 LATE = 0.2
 #: rows are missing where a step is at least this many usual ones and the next does not make up for it
 MISSING = 1.5
+#: a row is written twice where its step is below this share of the usual one
+TWICE = 0.1
 #: stamps rounded to more than this share of a step: their mean step is taken, for the median would be off by a per cent
 ROUNDED = 0.01
 #: steps that agree within this are written by a rule, and no clock's: nothing is told from them
@@ -37,6 +39,8 @@ class RowTiming:
         Places where rows are missing.
     longest : float
         The longest step, s.
+    twice : int
+        Rows that follow the one before at once, as if it were written twice.
     exact : bool
         Whether the stamps are even to the last digit, apart from missing rows: then they show no late row, for they
         were made by a rule and not by a clock.
@@ -47,6 +51,7 @@ class RowTiming:
     lost: int
     breaks: int
     longest: float
+    twice: int
     exact: bool
 
 
@@ -54,7 +59,7 @@ def row_timing(t: FloatArray) -> RowTiming:
     """Return what ascending stamps (n,) s tell of late and lost rows."""
     if t.size < 3:
         nan = float("nan")
-        return RowTiming(float(t[1] - t[0]) if t.size == 2 else nan, 0, 0, 0, nan, True)
+        return RowTiming(float(t[1] - t[0]) if t.size == 2 else nan, 0, 0, 0, nan, 0, True)
     steps = np.diff(t)
     usual = float(np.median(steps))
     # stamps rounded to a third of a step or more tell no lateness of that size; a missing row they still do
@@ -66,12 +71,15 @@ def row_timing(t: FloatArray) -> RowTiming:
     # a late row makes one step long and the next as much too short
     after = np.append(ratio[1:], 1.0)
     late_row = (ratio >= MISSING) & (np.abs(ratio + after - 2) <= LATE + rounding)
-    missing = (ratio >= MISSING) & ~late_row
+    # in a log whose every step is uneven, a long step is one of them; six of its scatter are not
+    scatter = 1.4826 * float(np.median(np.abs(ratio - np.median(ratio))))
+    missing = (ratio >= max(MISSING, 1 + 6 * scatter)) & ~late_row
+    twice = int(np.count_nonzero(ratio < TWICE)) if 1 - 6 * scatter > TWICE else 0
     lost = int(np.sum(np.round(ratio[missing]) - 1))
     made_up = np.append(False, late_row[:-1])
     late = int(np.count_nonzero(uneven & ~missing & ~made_up))
     exact = bool(np.all(np.abs(ratio - np.round(ratio)) < EXACT * np.maximum(1.0, np.abs(t[1:]) / usual * 1e-3)))
-    return RowTiming(usual, late, lost, int(np.count_nonzero(missing)), float(np.max(steps)), exact)
+    return RowTiming(usual, late, lost, int(np.count_nonzero(missing)), float(np.max(steps)), twice, exact)
 
 
 def _decimal(t: FloatArray) -> float:
