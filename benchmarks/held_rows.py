@@ -1,6 +1,6 @@
 """How often held readings are found, and chance repeats taken for them: made logs of many rates, resolutions, motions.
 
-    python benchmarks/held_rows.py [--logs 400] [--seed 0]
+    python benchmarks/held_rows.py [--logs 1000] [--seed 0]
 
 Each log is that of a sensor with three axes (a field, or a specific force) on a body that spins at 0 to 7000 deg/s, at
 rest for none to nine tenths of the time, with noise of 0.05 to 20 steps of resolution. Sound logs have a reading a row;
@@ -56,7 +56,7 @@ def log(held: bool, seconds: float, rng: np.random.Generator) -> tuple[FloatArra
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--logs", type=int, default=400)
+    parser.add_argument("--logs", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
     print("seconds  sound logs called held  held logs found: all  noise above a step  error of the rate: median  95 %")

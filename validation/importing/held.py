@@ -23,7 +23,7 @@ axis alive there is no joint evidence: the even spacing must then say more, and 
 resolution (a slow ramp rounded to steps changes as evenly as a held sensor does). Where a logger stutters so much that
 no spacing is left, repeats that are joint ones four times in five and come in no clumps do instead.
 
-How often this is right, on 1000 sound and 1000 held logs of each length (python benchmarks/held_rows.py --logs 1000):
+How often this is right, on 1000 sound and 1000 held logs of each length (python benchmarks/held_rows.py):
 
     length of the log                    0.6 s    3 s    12 s    60 s
     sound logs called held                   0      0       0       0   of 1000 each: below 0.1 % with 95 % confidence
