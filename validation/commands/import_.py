@@ -23,12 +23,14 @@ def command(
     """Turn a raw logger file into a recording folder.
 
     Writes recording.toml, one CSV file per sensor and repairs.csv (what was repaired or left out, by line) into --out.
+    Ends with what `discsim check` finds wrong in the recording.
 
     Example: discsim import 2025-08-31-001-rb.csv --map flatball --rows 1590:1830 --out throw-1
     """
     from discsim.errors import InputError
     from discsim.files import write_text
     from discsim.recording import write_recording
+    from validation.checking import check_recording
     from validation.importing import find_map, import_recording, parse_rows, read_map, repairs_csv
     from validation.run import start_run
 
@@ -44,6 +46,8 @@ def command(
         for note in result.notes:
             run.step(note)
         run.step(result.summary)
+        for advice in check_recording(result.recording).advice:
+            run.step(advice)
     for sensor, samples in result.recording.samples.items():
         typer.echo(
             f"{sensor}: {len(samples)} samples, {samples.t[0]:.3f} to {samples.t[-1]:.3f} s, {samples.gaps} gaps"
