@@ -28,9 +28,12 @@ def command(
     from discsim.recording import read_dataset
     from validation.checking import check_recording
     from validation.checking.table import print_checks
+    from validation.diagnosis.setup import find_setup_faults
     from validation.run import start_run
 
-    checks = [check_recording(recording) for recording in read_dataset(recordings)]
+    dataset = read_dataset(recordings)
+    faults = find_setup_faults(dataset).faults
+    checks = [check_recording(recording, faults) for recording in dataset]
     if out is not None:
         with start_run(out, inputs=[recordings]) as run:
             run.write_json("check.json", {"recordings": [check.to_json() for check in checks]})

@@ -31,6 +31,7 @@ def command(
     from discsim.files import write_text
     from discsim.recording import write_recording
     from validation.checking import check_recording
+    from validation.diagnosis.setup import find_setup_faults
     from validation.importing import find_map, import_recording, parse_rows, read_map, repairs_csv
     from validation.run import start_run
 
@@ -48,6 +49,9 @@ def command(
         run.step(result.summary)
         for advice in check_recording(result.recording).advice:
             run.step(advice)
+        axes = {sensor: own.axes for sensor, own in import_map.sensors.items()}
+        for fault in find_setup_faults([result.recording]).faults:
+            run.step(f"warning: {fault.id}: {fault.advice(axes)}")
     for sensor, samples in result.recording.samples.items():
         typer.echo(
             f"{sensor}: {len(samples)} samples, {samples.t[0]:.3f} to {samples.t[-1]:.3f} s, {samples.gaps} gaps"

@@ -67,7 +67,7 @@ def with_setup(outcome: Outcome, findings: SetupFindings, written: Sequence[Reco
         return outcome
     diagnosis = outcome.diagnosis
     if diagnosis.verdict == "unexplained":
-        told = tuple(f"corrected before the fit: {fault.sentence}" for fault in findings.faults)
+        told = tuple(f"corrected before the fit: {fault.id}, {fault.sentence}" for fault in findings.faults)
         return replace(outcome, diagnosis=replace(diagnosis, warnings=(*diagnosis.warnings, *told)))
     excess = [_excess(fault.effect, written, findings.recordings, fit) for fault in findings.faults]
     named = tuple(

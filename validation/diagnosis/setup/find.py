@@ -7,7 +7,7 @@ they are: a fault is named only where the sensors contradict one another as writ
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from discsim.recording import Recording
 from discsim.written import corrected
 from validation.diagnosis.setup.hypotheses import Hypothesis, axes_text, board_effect, chosen, hypotheses, pairs
 from validation.diagnosis.setup.proof import left_by_short_fit
+from validation.diagnosis.setup.remedy import MapAxes, remedy
 from validation.diagnosis.setup.units import clock_unit, sensor_units
 
 __all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said"]
@@ -48,12 +49,21 @@ class SetupFault:
     twins: tuple[Effect, ...] = ()
 
     @property
+    def id(self) -> str:
+        """The effect's id."""
+        return self.effect.id
+
+    @property
     def sentence(self) -> str:
-        """One line for a reader."""
-        text = f"{self.effect.id}: {said(self.effect)}"
+        """What is wrong, what else it could be, and what mends it."""
+        return self.advice()
+
+    def advice(self, axes: Mapping[str, MapAxes] | None = None) -> str:
+        """Return the sentence with the line for an import map that now has these ``axes``."""
+        text = said(self.effect)
         if self.twins:
-            text += "; these recordings cannot tell it from: " + "; ".join(said(one) for one in self.twins)
-        return text
+            text += "; these recordings cannot tell that from: " + "; ".join(said(one) for one in self.twins)
+        return f"{text}; {remedy(self.effect, axes)}"
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,66 @@
+"""What a person writes into an import map to mend a fault of the setup."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TypeAlias
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.effects.catalogue import Effect
+from discsim.effects.setup import board_axes, permutation
+
+__all__ = ["remedy"]
+
+#: a map's axes: for each body axis the sensor's column and its sign, None where it was not seen
+MapAxes: TypeAlias = tuple[tuple[int, float] | None, ...]
+
+_SENSORS = {"mag": "magnetometer", "accel": "accelerometer", "gyro": "gyroscope", "gps": "gps"}
+#: units as a map spells them, where it has another word
+_MAP_UNITS = {"mG": "mgauss", "G": "gauss"}
+#: a rotation within this of right angles (root sum of squares) is one that a map's axes can write
+_RIGHT = 0.15
+
+
+def remedy(fault: Effect, axes: Mapping[str, MapAxes] | None = None) -> str:
+    """Return the line of an import map that mends a fault, or what else to do.
+
+    ``axes`` are those that the map has now, by sensor; without them the columns are taken as they stand.
+    """
+    prefix, _, what = fault.id.partition(".")
+    sensor = _SENSORS.get(prefix, "")
+    if what == "axes" and prefix == "gps":
+        return "to mend it, swap the columns of the file, or give them in the map in the order north, east, down"
+    if what == "axes":
+        return f"to mend it, write into the import map: {_axes_line(sensor, permutation(fault.value).T, axes)}"
+    if fault.id == "clock.units":
+        return f'to mend it, write into the import map: [time] unit = "{fault.value.written_in}"'
+    if what == "units":
+        unit = _MAP_UNITS.get(fault.value.written_in, fault.value.written_in)
+        return f'to mend it, write into the import map: [sensors.{sensor}] unit = "{unit}"'
+    if what == "time_offset":
+        return f"to mend it, subtract {1e3 * fault.value.offset_s:.1f} ms from the times of {sensor}.csv"
+    if fault.id == "board.rotation":
+        matrix = board_axes(fault.value)
+        right = np.round(matrix)
+        if np.linalg.norm(matrix - right) < _RIGHT and abs(float(np.linalg.det(right))) > 0.5:
+            lines = "; ".join(_axes_line(name, right, axes) for name in list(_SENSORS.values())[:3])
+            return f"to mend it, write into the import map: {lines}"
+        return "turn the board back, or diagnose with it: the rotation is estimated"
+    return "look the field up for the place and the date (--place LAT,LON --date YYYY-MM-DD)"
+
+
+def _axes_line(sensor: str, matrix: FloatArray, axes: Mapping[str, MapAxes] | None) -> str:
+    """Return the map's line for body axes = matrix (3, 3) times the recording's columns."""
+    now = None if axes is None else axes.get(sensor)
+    if now is not None and all(item is not None for item in now):
+        own = np.zeros((3, 3))
+        for body, item in enumerate(now):
+            assert item is not None
+            own[body, item[0]] = item[1]
+        matrix = matrix @ own
+    columns = np.argmax(np.abs(matrix), axis=1)
+    names = [("-" if matrix[body, column] < 0 else "") + "xyz"[column] for body, column in enumerate(columns)]
+    mirrored = ", mirrored = true" if float(np.linalg.det(matrix)) < 0 else ""
+    return f"[sensors.{sensor}] axes = {names}{mirrored}".replace("'", '"')
