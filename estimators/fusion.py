@@ -18,7 +18,8 @@ from discsim.errors import InputError
 from discsim.recording import Recording, Samples, SensorSheet
 from estimators.likelihood import LEAST, span_of
 from estimators.rate import YawRate
-from estimators.tracking import RateRows, Track, TrackingSettings, joined, tracks_of
+from estimators.tracking import RateRows, Track, TrackingSettings, joined, plain_tracks, tracks_of
+from estimators.usable import remembered
 
 __all__ = [
     "Agreement",
@@ -359,12 +360,13 @@ def _compare(
     return agreement, replace(row, sd=np.hypot(row.sd * max(1.0, np.sqrt(chi2)), blur))
 
 
+@remembered
 def _judged(
     recording: Recording, settings: FusionSettings
 ) -> tuple[list[Track], list[Agreement], list[RateRows], tuple[int, bool]]:
     """Return the magnetometer's tracks, every other sensor's agreement, the rows of those that agree, the folding."""
     turns, known = unfolding(recording, settings)
-    tracks = tracks_of(recording, settings.tracking, unfold=turns) if known else []
+    tracks = plain_tracks(recording, settings.tracking, turns) if known else []
     reference = _reference(recording, tracks, settings.tracking)
     agreements, rows = [], []
     gyroscope = _gyroscope_rows(recording, settings)

@@ -26,9 +26,19 @@ from estimators.likelihood import LEAST, LikelihoodSettings, ToneFit, fit_window
 from estimators.precession import STRENGTH_SD, AxialField, axial_field, transverse_gyroscope, transverse_rates
 from estimators.rate import YawRate
 from estimators.spin_spline import IndexArray, SpinSpline
-from estimators.usable import unclipped
+from estimators.usable import remembered, unclipped
 
-__all__ = ["RateRows", "Track", "TrackingSettings", "joined", "track_bound", "track_spin", "tracking", "tracks_of"]
+__all__ = [
+    "RateRows",
+    "Track",
+    "TrackingSettings",
+    "joined",
+    "plain_tracks",
+    "track_bound",
+    "track_spin",
+    "tracking",
+    "tracks_of",
+]
 
 
 @dataclass(frozen=True)
@@ -785,7 +795,13 @@ def tracking(recording: Recording, settings: TrackingSettings | None = None) -> 
     """
     settings = settings or TrackingSettings()
     span = span_of(recording)
-    return joined("tracking", tracks_of(recording, settings), settings, span)
+    return joined("tracking", plain_tracks(recording, settings, 0), settings, span)
+
+
+@remembered
+def plain_tracks(recording: Recording, settings: TrackingSettings, unfold: int) -> list[Track]:
+    """Return `tracks_of` the magnetometer, without other sensors' readings of the rate."""
+    return tracks_of(recording, settings, unfold=unfold)
 
 
 def tracks_of(

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import weakref
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import wraps
+from typing import Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +16,7 @@ from discsim.clipping import clipping_notes, constant_axes
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples
 
-__all__ = ["FASTEST", "Usable", "unclipped", "usable"]
+__all__ = ["FASTEST", "Usable", "remembered", "unclipped", "usable"]
 
 #: Largest reading that a sensor can give, in its unit: ten times the strongest permanent magnets; a thousand times a
 #: shock sensor's 100 g range; and twice the fastest turbines there are (a dental drill's 4e4 rad/s).
@@ -28,6 +32,29 @@ SAME_INSTANT = 1e-6
 SLOWEST = 0.7
 
 
+R = TypeVar("R")
+P = ParamSpec("P")
+
+
+def remembered(function: Callable[Concatenate[Recording, P], R]) -> Callable[Concatenate[Recording, P], R]:
+    """Keep the last result of a function of a recording: several methods ask the same of one, and a smoother is slow.
+
+    The recording is told by its identity, which is sound because it is read-only; other arguments by equality.
+    """
+    last: list[tuple[weakref.ref[Recording], tuple[object, ...], R]] = []
+
+    @wraps(function)
+    def remembering(recording: Recording, /, *args: P.args, **options: P.kwargs) -> R:
+        asked = (args, options)
+        if last and last[0][0]() is recording and last[0][1] == asked:
+            return last[0][2]
+        result = function(recording, *args, **options)
+        last[:] = [(weakref.ref(recording), asked, result)]
+        return result
+
+    return remembering
+
+
 @dataclass(frozen=True)
 class Usable:
     """A recording with what cannot be used taken out, the sensors that are gone with the reason, and all in words."""
@@ -37,13 +64,15 @@ class Usable:
     notes: list[str]
 
 
+@remembered
 def usable(recording: Recording) -> Usable:
     """Take out of a recording what no estimator may use, and say what that is.
 
-    Left out are sensors that are dead (every reading of every axis is the same, or missing), or whose readings are too
-    few or too far apart for a spin; axes of a gyroscope that never change while others do; readings beyond `LARGEST`;
-    and of readings of one instant all but the first. Clipped readings stay, for each method to judge: that there was
-    much is all that they say. Raises `InputError` where nothing is left.
+    Rows without any reading, which a faster log has between a slower sensor's, are no rows of that sensor. Left out are
+    sensors that are dead (every reading of every axis is the same, or missing), or whose readings are too few or too
+    far apart for a spin; axes of a gyroscope that never change while others do; readings beyond `LARGEST`; and of
+    readings of one instant all but the first. Clipped readings stay, for each method to judge: that there was much is
+    all that they say. Raises `InputError` where nothing is left.
     """
     kept: dict[str, Samples] = {}
     gone: dict[str, str] = {}
@@ -85,6 +114,9 @@ def _sound(sensor: str, samples: Samples) -> tuple[Samples, list[str]]:
     if np.any(wild):
         value = np.where(wild, np.nan, value)
         notes.append(f"{sensor}: {np.count_nonzero(wild)} readings beyond {LARGEST[sensor]:.0e}, which no sensor gives")
+    there = np.any(np.isfinite(value.reshape(t.size, -1)), axis=1)
+    if not np.all(there):
+        t, value = t[there], value[there]
     first = _instants(t)
     if first.size < t.size:
         notes.append(f"{sensor}: {t.size - first.size} of {t.size} readings are of the instant of the one before")
