@@ -550,6 +550,8 @@ def accelerometer_calibrated(recording: Recording, settings: FusionSettings | No
 def _rough_rate(accelerometer: Samples, sheet: SensorSheet) -> FloatArray:
     """First guess from the force averaged over half a second."""
     assert sheet.position is not None
+    if len(accelerometer) < 2:
+        return np.zeros(len(accelerometer))
     present = np.all(np.isfinite(accelerometer.value[:, :2]), axis=1)
     value = np.where(present[:, None], accelerometer.value[:, :2], 0.0)
     width = min(max(3, round(0.5 / accelerometer.interval)), len(accelerometer))

@@ -223,7 +223,8 @@ def _centres(start: float, stop: float, interval: float, settings: LikelihoodSet
     if stop - start + interval <= settings.window * (1 + 1e-9):
         return np.array([0.5 * (start + stop)])
     inset = 0.5 * (settings.window - interval)
-    return np.asarray(np.arange(start + inset, stop - inset + 1e-9, settings.step))
+    # windows closer than the readings hold the same ones
+    return np.asarray(np.arange(start + inset, stop - inset + 1e-9, max(settings.step, interval)))
 
 
 def fit_windows(

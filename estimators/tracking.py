@@ -234,7 +234,9 @@ class _Problem:
         self.strength, self.decaying = strength, decaying
         # a quarter of a radian per sub-step: the midpoint rule then errs by 1 % of the wobble's own share
         finest = min(0.005, 0.25 / max(top_rate, 1.0))
-        self.spline = SpinSpline.over(float(t[0]), float(t[-1]), settings.knots)
+        # knots closer than the readings would be told by the prior alone
+        spacing = max(settings.knots, float(np.median(np.diff(t))))
+        self.spline = SpinSpline.over(float(t[0]), float(t[-1]), spacing)
         self.despun = gyroscope is None
         if gyroscope is not None:
             finest = max(finest, float(np.median(np.diff(t))) / MOST_SUBSTEPS)
