@@ -29,6 +29,7 @@ __all__ = [
     "clipped",
     "clipping_notes",
     "constant_axes",
+    "dead_axes",
     "equal_largest",
     "limits",
     "step_of",
@@ -45,10 +46,12 @@ CHANCE = 1e-6
 NEAR_LARGEST = 0.5
 #: Least noise, in steps, with which a constant input visibly toggles: at 0.2 it leaves a step once in 80 readings.
 TOGGLING = 0.2
+#: Neighbouring fourth differences of white noise correlate by -0.8, give or take 0.1 over 32; those of motion above 0.
+ALTERNATING = -0.4
 #: Largest noise, as a share of the limit: what scatters more from reading to reading is motion (the noisiest of common
 #: sensors, a magnetometer of 5 uT in 1000 uT, has half a per cent).
 NOISIEST = 0.02
-#: What rounding alone leaves in second differences, in steps: 1/sqrt(12), and what 32 readings scatter by.
+#: What rounding alone leaves in fourth differences, in steps: 1/sqrt(12), and what 32 readings scatter by.
 ROUNDING = 0.33
 #: Readings over which the noise is looked at, and the share of such windows that are quieter than what counts: the
 #: quietest of all would be so by chance.
@@ -142,6 +145,17 @@ def constant_axes(value: FloatArray) -> BoolArray:
     return np.asarray((np.count_nonzero(known, axis=0) >= LEAST) & (top == bottom))
 
 
+def dead_axes(value: FloatArray) -> BoolArray:
+    """Tell which axes of readings (n, k) never change though others scatter as a real sensor's do, and are not large.
+
+    One that never changes at the largest size there is may stand at its limit.
+    """
+    constant = constant_axes(value)
+    size = np.max(np.where(np.isfinite(value), np.abs(value), 0.0), axis=0, initial=0.0)
+    scatter = [_quietest(value[:, i]) > 1e-9 * size[i] for i in np.flatnonzero(~constant)]
+    return constant & (size < NEAR_LARGEST * np.max(size)) if any(scatter) else np.zeros_like(constant)
+
+
 def equal_largest(value: FloatArray, resolution: float | None = None) -> tuple[int, float]:
     """Return how many of readings (n, k) have the largest size there is, and how many would by those just below."""
     size = np.abs(value[np.isfinite(value)])
@@ -166,14 +180,17 @@ def _not_held(value: FloatArray) -> FloatArray:
 def _axis_step(column: FloatArray) -> float:
     distinct = np.unique(column[np.isfinite(column)])
     spacing = np.diff(distinct)
-    spacing = spacing[
-        spacing > 1e-9 * np.max(np.abs(distinct), initial=0.0)
-    ]  # conversions leave noise in the last digits
+    # conversions leave noise in the last digits
+    spacing = spacing[spacing > 1e-9 * np.max(np.abs(distinct), initial=0.0)]
     if spacing.size == 0:
         return 0.0
-    step = float(np.min(spacing))
-    small = spacing[spacing < 5.5 * step] / step
-    return step if np.mean(np.abs(small - np.rint(small)) > 0.1) <= UNEVEN else 0.0
+    least = float(np.min(spacing))
+    small = spacing[spacing < 5.5 * least]
+    for whole in range(1, 5):  # where few readings are there, none may be a step apart
+        step = least / whole
+        if np.mean(np.abs(small / step - np.rint(small / step)) > 0.1) <= UNEVEN:
+            return step
+    return 0.0
 
 
 class _Noise:
@@ -186,13 +203,12 @@ class _Noise:
     def __init__(self, value: FloatArray, rows: FloatArray, step: float) -> None:
         self.rows, self.step = rows, step
         moving = np.flatnonzero(~constant_axes(rows))
-        self.each = {i: min((_quietest(one[:, i]) for one in (value, rows)), default=0.0) for i in moving.tolist()}
+        self.each = {i: min(_quietest(value[:, i]), _quietest(rows[:, i])) for i in moving.tolist()}
 
     def steps(self, axis: int, without: BoolArray) -> float:
         """Return it in steps for the readings of an axis that are not ``without`` (n,), or else of the other axes.
 
-        From second differences, which smooth motion hardly has: what is left of motion makes it too large, so the
-        quietest windows count. NaN where there are too few readings.
+        NaN where there are too few readings, or they show motion alone.
         """
         own = _quietest(np.where(without, np.nan, self.rows[:, axis]))
         others = [noise for other, noise in self.each.items() if other != axis]
@@ -203,16 +219,27 @@ class _Noise:
 
 
 def _quietest(column: FloatArray) -> float:
-    rough = np.diff(column, 2)
+    """Return the noise of the quietest windows of readings (n,), NaN where no window shows any.
+
+    From fourth differences, which have sqrt(70) times white noise and next to nothing of smooth motion. Those of white
+    noise alternate, neighbours correlating by -0.8; where they do not, they are motion and say nothing.
+    """
+    rough = np.diff(column, 4)
     rough = rough[np.isfinite(rough)]
     if rough.size < WINDOW // 2:
         return float("nan")
     width = min(WINDOW, rough.size)
     # scaled first: a reading of 1e300 has no square
     scale = float(np.max(np.abs(rough))) or 1.0
-    squares = np.concatenate([[0.0], np.cumsum((rough / scale) ** 2)])
-    windows = np.maximum(squares[width:] - squares[:-width], 0.0)
-    return scale * float(np.sqrt(np.quantile(windows, QUIETEST) / width / 6.0))
+    products = np.stack([(rough / scale) ** 2, np.append(rough[1:] * (rough[:-1] / scale / scale), 0.0)])
+    sums = np.cumsum(np.concatenate([np.zeros((2, 1)), products], axis=1), axis=1)
+    squares, neighbours = sums[:, width:] - sums[:, :-width]
+    # what the running sums leave in a window of zeros
+    squares = np.where(squares < 1e-13 * max(sums[0, -1], 1e-300), 0.0, squares)
+    white = neighbours <= ALTERNATING * squares
+    if not np.any(white):
+        return float("nan")
+    return scale * float(np.sqrt(np.quantile(squares[white], QUIETEST) / width / 70.0))
 
 
 def _is_limit(column: FloatArray, axis: int, top: float, step: float, quiet: _Noise) -> bool:
@@ -275,7 +302,6 @@ def clipping_notes(recording: Recording) -> list[str]:
         at_limit = clipped(table, sheet.range, sheet.resolution)
         constant = constant_axes(table)
         name, worth = _READ[unit]
-        moving = np.flatnonzero(~constant)
         if constant.all() and sensor != "rate_reference":
             notes.append(
                 f"{sensor}: all {len(samples)} readings are the same; it is dead, and nothing is taken from it"
@@ -288,8 +314,4 @@ def clipping_notes(recording: Recording) -> list[str]:
             place = "" if table.shape[1] == 1 else f" {'xyz'[axis]}"
             stand = "every one of its readings stands" if share == 100 else f"{share:.2g} % of its readings stand"
             notes.append(f"{sensor}{place}: {stand} at a limit of {level:.6g} {name}: clipped, and not used")
-        for axis in np.flatnonzero(constant & ~np.any(at_limit, axis=0)):
-            if moving.size and table.shape[1] > 1 and sensor == "gyroscope":
-                level = float(np.nanmax(table[:, axis])) * worth
-                notes.append(f"{sensor} {'xyz'[axis]}: every reading is {level:.6g} {name}; that axis does not work")
     return notes

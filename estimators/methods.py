@@ -26,8 +26,10 @@ __all__ = [
     "Method",
     "Options",
     "all_methods",
+    "axis_notes",
     "best",
     "best_of",
+    "clock_notes",
     "estimate",
     "field_notes",
     "folding_notes",
@@ -40,6 +42,13 @@ ENOUGH = 0.5
 
 #: A rate above half the magnetometer's sampling rate is worth a note where this share of a sensor's readings shows it.
 FOLDED_SHARE = 0.01
+
+#: From this rate on, rad/s, and over as many answers, a gyroscope's ratio to the field's rate is looked at; a ratio off
+#: by more than this is beyond the scale of any gyroscope (3 % over parts and temperature).
+SPINNING, FEWEST_SHARES, OFF_CLOCK = 3.0, 8, 0.05
+
+#: From this share of the rate about z on, rates across it are no wobble (a disc's is a tenth at most).
+ACROSS = 0.5
 
 #: A sampling rate from time stamps further than this from the sheet's is worth a note.
 RATE_TOLERANCE = 0.01
@@ -145,7 +154,7 @@ def all_methods(recording: Recording, options: Options | None = None) -> tuple[l
         if np.any(np.isfinite(found.rate)):
             rates.append(found)
         else:
-            left_out[name] = _why_unknown(sound.recording, name)
+            left_out[name] = _why_unknown(sound.recording, name, options)
     if not rates:
         reasons = "; ".join(f"{method}: {reason}" for method, reason in left_out.items())
         raise InputError(f"{recording.path or recording.name}: no method tells the spin ({reasons})")
@@ -182,7 +191,7 @@ def best_of(recording: Recording, options: Options | None = None) -> tuple[YawRa
             reasons[name] = f"knows the rate for {100 * share:.2g} % of its times only"
             candidates.append((share, candidate))
         else:
-            reasons[name] = _why_unknown(sound.recording, name)
+            reasons[name] = _why_unknown(sound.recording, name, options)
     if not candidates:
         told = "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
         raise InputError(f"{recording.path or recording.name}: no method can be used ({told})")
@@ -200,7 +209,47 @@ def field_notes(recording: Recording) -> list[str]:
     ]
 
 
-def _why_unknown(recording: Recording, name: str) -> str:
+def clock_notes(recording: Recording) -> list[str]:
+    """Say where the gyroscope turns by one and the same share faster or slower than the field: a wrong clock, or scale.
+
+    Rates from the field go by the time stamps, a gyroscope's own do not.
+    """
+    if "magnetometer" not in recording or "gyroscope" not in recording or not contradictions(recording):
+        return []
+    field, turning = tracking(recording), _gyroscope(recording, Options())
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shares = turning.at(field.t) / field.rate
+        shares = shares[np.isfinite(shares) & (np.abs(field.rate) > SPINNING)]
+    if shares.size < FEWEST_SHARES:
+        return []
+    share = float(np.median(shares))
+    scatter = 1.4826 * float(np.median(np.abs(shares - share)))
+    if not (share > 0 and abs(share - 1) > OFF_CLOCK and scatter < OFF_CLOCK / 3):
+        return []
+    interval = 1000 * recording.need("magnetometer").interval
+    return [
+        f"the gyroscope turns {share:.3f} times as fast as the field, always (within {scatter:.3f}): rows of "
+        f"{interval / share:.4g} ms, where the time stamps say {interval:.4g} ms, would explain it (then the gyroscope "
+        "is right), and so would a scale of the gyroscope (then the magnetometer is)"
+    ]
+
+
+def axis_notes(recording: Recording) -> list[str]:
+    """Say where a gyroscope shows that the body turns across the z axis as well: then it is no spin about z."""
+    gyroscope = unclipped(recording, "gyroscope")
+    if gyroscope is None or not np.any(known := np.all(np.isfinite(gyroscope.value), axis=1)):
+        return []
+    x, y, z = np.sqrt(np.mean(gyroscope.value[known] ** 2, axis=0))
+    across = float(np.hypot(x, y))
+    if across < ACROSS * z or across < SPINNING:
+        return []
+    return [
+        f"the gyroscope turns by {np.degrees(across):.0f} deg/s (rms) about axes across z and by {np.degrees(z):.0f} "
+        "about z: what is told is the rate about z, which fft, likelihood and the accelerometer's take for the only one"
+    ]
+
+
+def _why_unknown(recording: Recording, name: str, options: Options) -> str:
     """Say why a method knows the rate at no time, by what its sensors show."""
     for sensor in METHODS[name].sensors:
         samples, sheet = recording.need(sensor), recording.sheets[sensor]
@@ -220,7 +269,11 @@ def _why_unknown(recording: Recording, name: str) -> str:
     if name in ("fusion", "accelerometer_calibrated"):
         against = contradictions(recording)
         if against:
-            return f"its sensors contradict each other: {'; '.join(against)}"
+            names = " and ".join(line.split()[0] for line in against)
+            return f"what the {names} shows contradicts the magnetometer, by how much the notes say"
+    if name == "fft":
+        lowest = f"{np.degrees(options.fft.threshold):.0f} deg/s"
+        return f"no window of {options.fft.window} samples shows a line above {lowest}; --threshold looks lower"
     return "no part of the recording shows a spin to it"
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discsim.arrays import FloatArray
-from discsim.clipping import clipping_notes, constant_axes
+from discsim.clipping import clipping_notes, constant_axes, dead_axes
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples
 
@@ -121,11 +121,10 @@ def _sound(sensor: str, samples: Samples) -> tuple[Samples, list[str]]:
     if first.size < t.size:
         notes.append(f"{sensor}: {t.size - first.size} of {t.size} readings are of the instant of the one before")
         t, value = t[first], value[first]
-    constant = constant_axes(value)
-    if sensor == "gyroscope" and np.any(constant) and not np.all(constant):
-        # an axis at its range all through stays: that it is there says that the rate is beyond
-        idle = constant & (np.nanmax(np.abs(value), axis=0, initial=0.0) < 0.5 * np.nanmax(np.abs(value), initial=0.0))
-        value = np.where(idle, np.nan, value) if _noisy(value[:, ~constant]) else value
+    if sensor == "gyroscope" and np.any(dead := dead_axes(value)):
+        value = np.where(dead, np.nan, value)
+        names = " and ".join("xyz"[axis] for axis in np.flatnonzero(dead))
+        notes.append(f"{sensor} {names}: every reading is the same while others change; that axis does not work")
     unchanged = t is samples.t and value is samples.value
     return (samples if unchanged else Samples(t, value)), notes
 
@@ -137,12 +136,6 @@ def _instants(t: FloatArray) -> NDArray[np.int64]:
         return np.arange(t.size)
     slot = np.floor((t - t[0]) / SAME_INSTANT)
     return np.asarray(np.unique(slot, return_index=True)[1])
-
-
-def _noisy(value: FloatArray) -> bool:
-    """Tell whether readings (n, k) change from one to the next as a real sensor's do, at least half of the time."""
-    steps = np.diff(value, axis=0)
-    return bool(np.mean(np.any((steps != 0) & np.isfinite(steps), axis=1)) > 0.5) if len(steps) else False
 
 
 def _useless(sensor: str, samples: Samples) -> str:

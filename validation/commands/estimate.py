@@ -124,12 +124,13 @@ def estimate_all(recording: Recording, name: str, options: Options) -> tuple[lis
 def all_notes(recording: Recording) -> list[str]:
     """Return a line for all that a reader must know of a recording before believing an estimate from it."""
     from estimators.fusion import contradictions
-    from estimators.methods import field_notes, folding_notes, sampling_notes
+    from estimators.methods import axis_notes, clock_notes, field_notes, folding_notes, sampling_notes
     from estimators.usable import usable
 
     sound = usable(recording)
     data = sound.recording
-    return [*sound.notes, *sampling_notes(data), *folding_notes(data), *field_notes(data), *contradictions(data)]
+    about = (sampling_notes, folding_notes, field_notes, axis_notes, contradictions, clock_notes)
+    return [*sound.notes, *(line for notes in about for line in notes(data))]
 
 
 def rate_csv(rates: Sequence[YawRate]) -> str:
@@ -192,7 +193,10 @@ def _print(
         figures = _figures(rate)
         cells = [np.degrees(figures["median_rate_rad_s"]), np.degrees(figures["median_sd_rad_s"])]
         # a deviation that rounds to nothing is not nothing
-        shown = ["" if np.isnan(cell) else f"{cell:.2f}" if abs(cell) >= 0.005 else f"{cell:.1g}" for cell in cells]
+        shown = [
+            "" if np.isnan(cell) else f"{cell:.2f}" if abs(cell) >= 0.005 or not cell else f"{cell:.1g}"
+            for cell in cells
+        ]
         table.add_row(rate.method, str(len(rate)), f"{100 * figures['share_unknown']:.0f} %", *shown)
     Console().print(table)
     for method, reason in left_out.items():
