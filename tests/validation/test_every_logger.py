@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import csv
 import json
+import os
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +20,8 @@ from validation.commands.diagnose import command as diagnose
 from validation.commands.estimate import command as estimate
 from validation.commands.import_ import command as import_
 
-MAPS = sorted(path.stem for path in (Path(__file__).parents[2] / "models" / "imports").glob("*.toml"))
+ROOT = Path(__file__).parents[2]
+MAPS = sorted(path.stem for path in (ROOT / "models" / "imports").glob("*.toml"))
 ROTATING = [name for name in MAPS if LOGGERS[name].methods]
 
 #: Maps of which `diagnose` is to be run: each takes a minute or so. A free spin without [disc] cannot be diagnosed yet.
@@ -114,6 +119,30 @@ def test_a_gyroscope_at_its_limit_is_left_out_and_named_though_no_range_is_state
     assert "gyroscope" in report["left_out"]
     assert "stands at its limit in every reading" in report["left_out"]["gyroscope"]
     assert any("gyroscope z: every one of its readings stands at a limit of 2000 deg/s" in n for n in report["notes"])
+
+
+def test_the_readmes_rows_on_a_log_of_ones_own_run_as_they_stand(tmp_path):
+    """`import` and `estimate` typed as in the table "Where to go", RAW being the log's file."""
+    made = LOGGERS["csv"]
+    raw = made.write(tmp_path, made.motion, np.random.default_rng(5))
+    table = (ROOT / "README.md").read_text()
+    for name in ("import", "estimate"):
+        (typed,) = re.findall(rf"`discsim ({name} [^`]*)`", table)
+        words = typed.replace("RAW", raw.name).split()
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        done = subprocess.run(
+            [sys.executable, "-m", "validation.cli", *words],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+        assert "Traceback" not in done.stderr
+        assert "Warning" not in done.stderr
+    found = rates(tmp_path / "spin")
+    t, rate, sd = found["fusion"].T
+    assert np.sqrt(np.mean(((rate - made.motion.r(t)) / sd) ** 2)) < 3.0
 
 
 @pytest.mark.parametrize("name", [name for name in MAPS if LOGGERS[name].place])
