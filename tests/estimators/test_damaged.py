@@ -10,7 +10,8 @@ import pytest
 from spinning_sensor import Spin, record
 
 from discsim.errors import InputError
-from discsim.recording import Samples
+from discsim.recording import Samples, SensorSheet
+from estimators import gyroscope
 from estimators.methods import all_methods, best_of, estimate
 from estimators.usable import FASTEST, usable
 
@@ -133,8 +134,8 @@ def test_a_dead_z_axis_gives_no_rate_of_zero(sound):
 def test_a_clipped_gyroscope_is_passed_over_by_best_which_says_so(sound):
     """No range is stated; the gyroscope stops at 10 rad/s, the truth is 26."""
     recording = sound[0]
-    gyroscope = recording.samples["gyroscope"]
-    only = {"gyroscope": Samples(gyroscope.t, np.clip(gyroscope.value, -10.0, 10.0))}
+    turning = recording.samples["gyroscope"]
+    only = {"gyroscope": Samples(turning.t, np.clip(turning.value, -10.0, 10.0))}
     only["accelerometer"] = recording.samples["accelerometer"]
     sheets = {**recording.sheets, "gyroscope": replace(recording.sheets["gyroscope"], range=None)}
     found, passed_over = best_of(replace(recording, samples=only, sheets=sheets))
@@ -144,11 +145,9 @@ def test_a_clipped_gyroscope_is_passed_over_by_best_which_says_so(sound):
 
 def test_rounding_alone_is_a_deviation():
     """A gyroscope that stands still half of the time has second differences of zero; its step is 0.01 rad/s."""
-    from discsim.recording import SensorSheet
-    from estimators import gyroscope
-
     rng = np.random.default_rng(0)
-    rate = np.where(np.arange(400) < 300, 0.0, np.linspace(-30.0, 30.0, 400)) + rng.normal(0.0, 1e-4, 400)
+    k = np.arange(400)
+    rate = np.where(k < 300, 0.0, 3.0 * np.sin((k - 300) / 37.0)) + rng.normal(0.0, 1e-4, 400)
     value = np.round(np.stack([0 * rate, 0 * rate, rate], axis=1), 2)
     found = gyroscope(Samples(np.arange(400) / 100, value), SensorSheet(100.0))
     np.testing.assert_allclose(found.sd, 0.01 / np.sqrt(12), rtol=1e-6)
