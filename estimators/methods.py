@@ -14,19 +14,41 @@ from discsim.errors import InputError
 from discsim.recording import Recording
 from estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors, accelerometer
 from estimators.fft import FftSettings, fft
-from estimators.fusion import accelerometer_calibrated, fusion
+from estimators.fusion import accelerometer_calibrated, contradictions, fusion
 from estimators.gyroscope import gyroscope, rate_reference
 from estimators.likelihood import likelihood
 from estimators.rate import YawRate
 from estimators.tracking import tracking
+from estimators.usable import FASTEST, Usable, unclipped, usable
 
-__all__ = ["METHODS", "Method", "Options", "best", "estimate", "folding_notes", "missing_sensors", "sampling_notes"]
+__all__ = [
+    "METHODS",
+    "Method",
+    "Options",
+    "all_methods",
+    "axis_notes",
+    "best",
+    "best_of",
+    "clock_notes",
+    "estimate",
+    "field_notes",
+    "folding_notes",
+    "missing_sensors",
+    "sampling_notes",
+]
 
 #: `best` takes the first method that knows the rate for at least this share of its samples.
 ENOUGH = 0.5
 
 #: A rate above half the magnetometer's sampling rate is worth a note where this share of a sensor's readings shows it.
 FOLDED_SHARE = 0.01
+
+#: From this rate on, rad/s, and over as many answers, a gyroscope's ratio to the field's rate is looked at; a ratio off
+#: by more than this is beyond the scale of any gyroscope (3 % over parts and temperature).
+SPINNING, FEWEST_SHARES, OFF_CLOCK = 3.0, 8, 0.05
+
+#: From this share of the rate about z on, rates across it are no wobble (a disc's is a tenth at most).
+ACROSS = 0.5
 
 #: A sampling rate from time stamps further than this from the sheet's is worth a note.
 RATE_TOLERANCE = 0.01
@@ -48,7 +70,8 @@ class Method(NamedTuple):
 
 
 def _fft(recording: Recording, options: Options) -> YawRate:
-    return fft(recording.need("magnetometer"), options.fft)
+    field = unclipped(recording, "magnetometer")
+    return fft(recording.need("magnetometer") if field is None else field, options.fft)
 
 
 def _accelerometer(recording: Recording, options: Options) -> YawRate:
@@ -87,14 +110,55 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 def estimate(recording: Recording, name: str, options: Options | None = None) -> YawRate:
     """Spin rate of a recording by the method of that name, or by `best`.
 
-    Raises `InputError` for an unknown name (listing those there are), a missing sensor, or what the method raises.
+    What no estimator may use is taken out first (`estimators.usable`). Raises `InputError` for an unknown name (listing
+    those there are), a missing sensor, or what the method raises.
     """
     options = options or Options()
     if name == "best":
         return best(recording, options)
     if name not in METHODS:
         raise InputError(f"no method '{name}'; expected one of best, {', '.join(METHODS)}")
-    return METHODS[name].estimate(recording, options)
+    return _estimate(usable(recording), name, options)
+
+
+def _estimate(sound: Usable, name: str, options: Options) -> YawRate:
+    for sensor in METHODS[name].sensors:
+        if sensor in sound.gone:
+            raise InputError(f"{sensor}: {sound.gone[sensor]}")
+    found = METHODS[name].estimate(sound.recording, options)
+    with np.errstate(invalid="ignore"):
+        possible = (np.abs(found.rate) <= FASTEST) & (found.sd <= FASTEST)
+    if np.all(possible | np.isnan(found.rate)):
+        return found
+    rate, sd = np.where(possible, found.rate, np.nan), np.where(possible, found.sd, np.nan)
+    return replace(found, rate=rate, sd=sd)
+
+
+def all_methods(recording: Recording, options: Options | None = None) -> tuple[list[YawRate], dict[str, str]]:
+    """Return what every method gives, and the methods left out, each with the reason in a sentence.
+
+    Raises `InputError` where no method can be used.
+    """
+    options, sound = options or Options(), usable(recording)
+    rates: list[YawRate] = []
+    left_out: dict[str, str] = {}
+    for name in METHODS:
+        if absent := missing_sensors(recording, name):
+            left_out[name] = f"no {', '.join(absent)} in the recording"
+            continue
+        try:
+            found = _estimate(sound, name, options)
+        except InputError as error:
+            left_out[name] = str(error)
+            continue
+        if np.any(np.isfinite(found.rate)):
+            rates.append(found)
+        else:
+            left_out[name] = _why_unknown(sound.recording, name, options)
+    if not rates:
+        reasons = "; ".join(f"{method}: {reason}" for method, reason in left_out.items())
+        raise InputError(f"{recording.path or recording.name}: no method tells the spin ({reasons})")
+    return rates, left_out
 
 
 def best(recording: Recording, options: Options | None = None) -> YawRate:
@@ -103,24 +167,114 @@ def best(recording: Recording, options: Options | None = None) -> YawRate:
     A gyroscope that clips for most of a recording thus gives way to a magnetometer. The result bears the name of the
     method taken. Raises `InputError` where no method can be used, with each one's reason.
     """
-    options = options or Options()
-    reasons, candidates = [], []
-    for name, method in METHODS.items():
+    return best_of(recording, options)[0]
+
+
+def best_of(recording: Recording, options: Options | None = None) -> tuple[YawRate, dict[str, str]]:
+    """Return the rate of `best`, and why each method that it prefers to the one taken was passed over."""
+    options, sound = options or Options(), usable(recording)
+    reasons: dict[str, str] = {}
+    candidates: list[tuple[float, YawRate]] = []
+    for name in METHODS:
         if absent := missing_sensors(recording, name):
-            reasons.append(f"{name}: no {', '.join(absent)}")
+            reasons[name] = f"no {', '.join(absent)}"
             continue
         try:
-            candidate = method.estimate(recording, options)
+            candidate = _estimate(sound, name, options)
         except InputError as error:
-            reasons.append(str(error))
+            reasons[name] = str(error)
             continue
-        share = float(np.mean(np.isfinite(candidate.rate)))
+        share = float(np.mean(np.isfinite(candidate.rate))) if len(candidate) else 0.0
         if share >= ENOUGH:
-            return candidate
-        candidates.append((share, candidate))
+            return candidate, reasons
+        if share > 0:
+            reasons[name] = f"knows the rate for {100 * share:.2g} % of its times only"
+            candidates.append((share, candidate))
+        else:
+            reasons[name] = _why_unknown(sound.recording, name, options)
     if not candidates:
-        raise InputError(f"{recording.path or recording.name}: no method can be used ({'; '.join(reasons)})")
-    return max(candidates, key=lambda pair: pair[0])[1]  # of equals the first, which is the one preferred
+        told = "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
+        raise InputError(f"{recording.path or recording.name}: no method can be used ({told})")
+    taken = max(candidates, key=lambda pair: pair[0])[1]  # of equals the first, which is the one preferred
+    return taken, {name: reason for name, reason in reasons.items() if name != taken.method}
+
+
+def field_notes(recording: Recording) -> list[str]:
+    """Say what is lost where the magnetic field of the place is not stated."""
+    if "magnetometer" not in recording or recording.environment.field_known:
+        return []
+    return [
+        "the magnetic field of the place is not stated: hard iron along the spin axis is then hardly known, and of the "
+        "magnetometer's methods the standard deviation is larger; --place LAT,LON --date YYYY-MM-DD looks it up"
+    ]
+
+
+def clock_notes(recording: Recording) -> list[str]:
+    """Say where the gyroscope turns by one and the same share faster or slower than the field: a wrong clock, or scale.
+
+    Rates from the field go by the time stamps, a gyroscope's own do not.
+    """
+    if "magnetometer" not in recording or "gyroscope" not in recording or not contradictions(recording):
+        return []
+    field, turning = tracking(recording), _gyroscope(recording, Options())
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shares = turning.at(field.t) / field.rate
+        shares = shares[np.isfinite(shares) & (np.abs(field.rate) > SPINNING)]
+    if shares.size < FEWEST_SHARES:
+        return []
+    share = float(np.median(shares))
+    scatter = 1.4826 * float(np.median(np.abs(shares - share)))
+    if not (share > 0 and abs(share - 1) > OFF_CLOCK and scatter < OFF_CLOCK / 3):
+        return []
+    interval = 1000 * recording.need("magnetometer").interval
+    return [
+        f"the gyroscope turns {share:.3f} times as fast as the field, always (within {scatter:.3f}): rows of "
+        f"{interval / share:.4g} ms, where the time stamps say {interval:.4g} ms, would explain it (then the gyroscope "
+        "is right), and so would a scale of the gyroscope (then the magnetometer is)"
+    ]
+
+
+def axis_notes(recording: Recording) -> list[str]:
+    """Say where a gyroscope shows that the body turns across the z axis as well: then it is no spin about z."""
+    gyroscope = unclipped(recording, "gyroscope")
+    if gyroscope is None or not np.any(known := np.all(np.isfinite(gyroscope.value), axis=1)):
+        return []
+    x, y, z = np.sqrt(np.mean(gyroscope.value[known] ** 2, axis=0))
+    across = float(np.hypot(x, y))
+    if across < ACROSS * z or across < SPINNING:
+        return []
+    return [
+        f"the gyroscope turns by {np.degrees(across):.0f} deg/s (rms) about axes across z and by {np.degrees(z):.0f} "
+        "about z: what is told is the rate about z, which fft, likelihood and the accelerometer's take for the only one"
+    ]
+
+
+def _why_unknown(recording: Recording, name: str, options: Options) -> str:
+    """Say why a method knows the rate at no time, by what its sensors show."""
+    for sensor in METHODS[name].sensors:
+        samples, sheet = recording.need(sensor), recording.sheets[sensor]
+        axes = {"gyroscope": [2], "accelerometer": [0, 1]}.get(sensor, [0])
+        value = samples.value if samples.value.ndim == 2 else samples.value[:, None]
+        known = np.any(np.isfinite(value[:, axes]), axis=0)
+        letters = " and ".join("xyz"[axis] for axis in axes)
+        if not np.any(known):
+            return f"the {sensor} has no usable reading of {letters}"
+        if np.all(np.any(sheet.clipped(value)[:, axes], axis=1) | ~np.isfinite(value[:, axes]).all(axis=1)):
+            return f"the {sensor}'s {letters} stands at its limit in every reading: the spin is beyond what it can show"
+        if sensor == "accelerometer" and (sheet.position is None or not np.hypot(*sheet.position[:2]) > 0):
+            return (
+                "the accelerometer's place off the spin axis is not stated; add position_m = [x, y, z] to "
+                "[sensors.accelerometer] of recording.toml, or to the import map"
+            )
+    if name in ("fusion", "accelerometer_calibrated"):
+        against = contradictions(recording)
+        if against:
+            names = " and ".join(line.split()[0] for line in against)
+            return f"what the {names} shows contradicts the magnetometer, by how much the notes say"
+    if name == "fft":
+        lowest = f"{np.degrees(options.fft.threshold):.0f} deg/s"
+        return f"no window of {options.fft.window} samples shows a line above {lowest}; --threshold looks lower"
+    return "no part of the recording shows a spin to it"
 
 
 def missing_sensors(recording: Recording, name: str) -> tuple[str, ...]:
@@ -136,6 +290,8 @@ def sampling_notes(recording: Recording) -> list[str]:
     notes = []
     for sensor, samples in recording.samples.items():
         stated = recording.sheets[sensor].rate_hz
+        if len(samples) < 2:
+            continue
         found = 1 / samples.interval
         if abs(found / stated - 1) > RATE_TOLERANCE:
             notes.append(f"{sensor}: time stamps say {found:.4g} Hz, its sheet {stated:.4g} Hz; the stamps are used")

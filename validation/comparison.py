@@ -54,9 +54,12 @@ class Disagreement:
     @property
     def text(self) -> str:
         """One sentence for a person."""
+        degrees = f"{np.degrees(self.difference):+.1f} deg/s"
+        # of a rate near zero a difference is no share
+        much = f"{100 * self.relative:.2g} % ({degrees}" if self.relative < 1 else f"({degrees}"
         return (
-            f"{self.first} and {self.second} differ by {100 * self.relative:.2g} % ({np.degrees(self.difference):+.1f} "
-            f"deg/s, {self.sigmas:.1f} sd) at {100 * self.share:.0f} % of their common times, over "
+            f"{self.first} and {self.second} differ by {much}, {self.sigmas:.1f} sd) at {100 * self.share:.0f} % of "
+            "their common times, over "
             f"{self.start:.1f}..{self.stop:.1f} s"
         )
 

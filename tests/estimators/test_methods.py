@@ -20,7 +20,8 @@ SHEETS = {
 
 
 def spinning(rate_deg_s, sensors, duration=3.0, plant="rate_table"):
-    """A level steady spin as every sensor sees it, without noise."""
+    """A level steady spin as every sensor sees it, with less noise than is looked at: none at all is a dead sensor."""
+    rng = np.random.default_rng(1)
     rate = np.radians(rate_deg_s)
     t, fast = np.arange(round(100 * duration)) / 100, np.arange(round(200 * duration)) / 200
     one = np.ones_like(fast)
@@ -30,6 +31,7 @@ def spinning(rate_deg_s, sensors, duration=3.0, plant="rate_table"):
         "gyroscope": Samples(fast, np.clip(np.outer(one, [0, 0, rate]), -np.radians(2000.0), np.radians(2000.0))),
         "rate_reference": Samples(t, np.full(t.size, rate)),
     }
+    values = {name: Samples(v.t, v.value + rng.normal(0.0, 1e-10, v.value.shape)) for name, v in values.items()}
     chosen = {name: values[name] for name in sensors}
     return Recording(plant, "spin", Environment(), sheets={n: SHEETS[n] for n in sensors}, samples=chosen)
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from validation.options import OutOption
+from validation.options import DateOption, OutOption, PlaceOption
 
 __all__ = ["command"]
 
@@ -19,6 +19,8 @@ def command(
         str | None, typer.Option(help="0-based data rows A up to B of the first sensor's file. Default: all.")
     ] = None,
     out: OutOption = Path("imported"),
+    place: PlaceOption = None,
+    date: DateOption = None,
 ) -> None:
     """Turn a raw logger file into a recording folder.
 
@@ -27,12 +29,15 @@ def command(
 
     Example: discsim import 2025-08-31-001-rb.csv --map flatball --rows 1590:1830 --out throw-1
     """
+    from dataclasses import replace
+
     from discsim.errors import InputError
     from discsim.files import write_text
     from discsim.recording import write_recording
     from validation.checking import check_recording
     from validation.diagnosis.setup import find_setup_faults
     from validation.importing import find_map, import_recording, parse_rows, read_map, repairs_csv
+    from validation.options import at_place
     from validation.run import start_run
 
     import_map = read_map(find_map(map_))
@@ -40,6 +45,7 @@ def command(
     source = (raw if raw.is_dir() else raw.parent).resolve()
     if out.resolve() == source:
         raise InputError(f"--out {out}: the raw files are in it; expected another folder, to leave them as they are")
+    import_map = replace(import_map, environment=at_place(import_map.environment, place, date))
     result = import_recording(raw, import_map, chosen)
     with start_run(out, None, [raw, import_map.path]) as run:
         write_text(out / "repairs.csv", repairs_csv(result.repairs))

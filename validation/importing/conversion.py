@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from discsim.clipping import clipping_notes
 from discsim.disc import Release
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
@@ -89,8 +90,11 @@ def import_recording(raw: Path, import_map: ImportMap, rows: slice | None = None
     release = _release(raw, import_map, readings)
     if release is None and (import_map.release is not None or import_map.throws):
         notes.append("no release conditions: the map has none for this file, or the first row is not used")
-    if not import_map.field_known and "magnetometer" in samples:
-        notes.append("magnetic field not known: zeros stand in recording.toml; fill it in, or give it in the map")
+    if not import_map.environment.field_known and "magnetometer" in samples:
+        notes.append(
+            "magnetic field not known: zeros stand in recording.toml; --place LAT,LON --date YYYY-MM-DD looks it up, "
+            "or give it in the map"
+        )
     recording = Recording(
         import_map.plant,
         f"{import_map.name}-{raw.resolve().stem}",
@@ -101,7 +105,7 @@ def import_recording(raw: Path, import_map: ImportMap, rows: slice | None = None
         {sensor: _sheet(import_map.sensors[sensor], samples[sensor], rates.get(sensor)) for sensor in samples},
         samples,
     )
-    return Imported(recording, tuple(repairs.listed()), tuple(notes))
+    return Imported(recording, tuple(repairs.listed()), (*notes, *clipping_notes(recording)))
 
 
 def _read_sensors(
