@@ -169,9 +169,21 @@ def _layout(table: TomlTable | None) -> Layout:
         raise table.error("skip_lines", f"'skip_lines' is {skip_lines!r}, expected a whole number from 0")
     columns = _texts(table, "columns") or ()
     comment = table.text("comment", required=False) or ""
-    layout = Layout(separator, decimal, skip_lines, columns, comment, table.flag("lists"))
+    lists, encoding, thousands = table.flag("lists"), _encoding(table), table.text("thousands", required=False) or ""
+    if len(thousands) > 1 or (thousands and thousands in (decimal, separator)):
+        raise table.error("thousands", f"'thousands' is '{thousands}', expected one character of its own")
+    layout = Layout(separator, decimal, skip_lines, columns, comment, lists, encoding, thousands)
     table.finish()
     return layout
+
+
+def _encoding(table: TomlTable) -> str:
+    encoding = table.text("encoding", required=False) or "utf-8"
+    try:
+        "".encode(encoding)  # a codec such as "hex", which knows no text, fails here too
+    except LookupError:
+        raise table.error("encoding", f"'encoding' is '{encoding}', expected one such as utf-8 or latin-1") from None
+    return encoding
 
 
 def _time_base(table: TomlTable) -> TimeBase:
