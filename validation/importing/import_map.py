@@ -88,7 +88,11 @@ class SensorMap:
 
 @dataclass(frozen=True)
 class ImportMap:
-    """What a map states; ``throws`` are release conditions by the stem of the raw file's name."""
+    """What a map states; ``throws`` are release conditions by the stem of the raw file's name.
+
+    ``recognised_by`` are columns that tell this logger from all others beside those that the map reads; None where the
+    map is taken only if it is named.
+    """
 
     path: Path
     name: str
@@ -102,6 +106,7 @@ class ImportMap:
     release: Release | None
     throws: Mapping[str, MeasuredThrow]
     sensors: Mapping[str, SensorMap]
+    recognised_by: tuple[str, ...] | None = None
 
 
 def find_map(name_or_path: str) -> Path:
@@ -131,10 +136,25 @@ def read_map(path: Path) -> ImportMap:
     release = None if release_table is None else Release.from_toml(release_table)
     throws = _throws(top.table("throws"))
     sensors = _sensors(_need(top, "sensors"), strict=plant != "free_spin")
+    recognised_by = _texts(top, "recognised_by")
     top.finish()
     if throws and "track" not in sensors:
         raise top.error("throws", "[throws] without [sensors.track]; expected the track whose first row is the release")
-    return ImportMap(path, name, plant, layout, time, repairs, environment, field_known, disc, release, throws, sensors)
+    return ImportMap(
+        path,
+        name,
+        plant,
+        layout,
+        time,
+        repairs,
+        environment,
+        field_known,
+        disc,
+        release,
+        throws,
+        sensors,
+        recognised_by,
+    )
 
 
 def _need(table: TomlTable, key: str) -> TomlTable:
