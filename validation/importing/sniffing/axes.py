@@ -24,6 +24,8 @@ FAST = 2 * np.pi
 ONE_AXIS = 0.8
 #: What is left of the field's changes (a ratio) where the gyroscope explains them; a wrong axis leaves 1 and more.
 EXPLAINED = 0.5
+#: ... and where it explains all but a tenth of their power.
+CLEARLY = 0.3
 #: Ways to lay the axes are told apart where one leaves this much less than the other, in the ratio's own size.
 APART = 0.8
 
@@ -53,11 +55,14 @@ def letters(matrix: FloatArray) -> list[str]:
 def body_axes(sensors: Mapping[str, Reading3]) -> BodyAxes:
     """Return how the sensors present lie in the body."""
     axis, found = _spin_axis(sensors)
+    spins = axis is not None
+    if axis is None:
+        axis, found = _lying_axis(sensors, found)
     if axis is None:
         base = np.eye(3)
         decisions = [found]
     else:
-        down, why = _downward(axis, sensors)
+        down, why = _downward(axis, sensors, flies=spins)
         base = _towards_z(axis, down)
         decisions = [found, why]
     matrix = {sensor: base for sensor in sensors}
@@ -99,6 +104,21 @@ def _spin_axis(sensors: Mapping[str, Reading3]) -> tuple[int | None, Decision]:
     return _still_axis(field)
 
 
+def _lying_axis(sensors: Mapping[str, Reading3], kept: Decision) -> tuple[int | None, Decision]:
+    """Return the axis along gravity at rest: a disc lies on its axis, a rocket stands on it."""
+    accel = sensors.get("accelerometer")
+    if accel is None:
+        return None, kept
+    norm = np.linalg.norm(accel.value, axis=1)
+    still = _still(accel, sensors.get("gyroscope")) & (np.abs(norm - G0) < 0.15 * G0)
+    upright = np.abs(accel.value[still]) > 0.9 * norm[still, None]  # within 25 degrees
+    share = upright.mean(axis=0) if len(upright) >= 10 else np.zeros(3)
+    axis = int(np.argmax(share))
+    if share[axis] < 0.5:
+        return None, kept
+    return axis, _said(axis, "guess", f"{kept.why}; gravity lies along it at rest")
+
+
 def _still_axis(field: Reading3) -> tuple[int | None, Decision]:
     """Return the axis along which the field stands still while it goes round in the other two."""
     value = field.value[np.isfinite(field.value).all(axis=1)]
@@ -135,7 +155,7 @@ def _said(axis: int, sure: Sureness, why: str) -> Decision:
 # ---------------------------------------------------------------------------------------------- which end is down
 
 
-def _downward(axis: int, sensors: Mapping[str, Reading3]) -> tuple[bool, Decision]:
+def _downward(axis: int, sensors: Mapping[str, Reading3], *, flies: bool) -> tuple[bool, Decision]:
     """Tell whether the sensor's axis points down: at rest it then reads -g, in flight lift is against it."""
     what, name = "body z", "xyz"[axis]
     accel = sensors.get("accelerometer")
@@ -146,7 +166,7 @@ def _downward(axis: int, sensors: Mapping[str, Reading3]) -> tuple[bool, Decisio
     still = _still(accel, sensors.get("gyroscope")) & (np.abs(norm - G0) < 0.15 * G0)
     upright = still & (np.abs(along) > 0.7 * G0)  # within 45 degrees
     rest = float(np.sign(along[upright]).mean()) if upright.sum() >= 10 else 0.0
-    flight = _lift(axis, sensors)
+    flight = _lift(axis, sensors) if flies else 0.0
     if abs(rest) > 0.8 and not flight * rest < 0:
         sure: Sureness = "certain" if upright.sum() > 0.5 * still.sum() else "likely"
         why = f"at rest it reads {np.median(along[upright]):+.3g} m/s^2; lying upright is assumed"
@@ -195,17 +215,17 @@ def _laid(gyro: Reading3, field: Reading3, accel: Reading3 | None) -> tuple[Floa
     """Return the matrix from the magnetometer's axes to the gyroscope's, and why."""
     what = "magnetometer axes"
     steps = steps_between(gyro.t, gyro.value, field.t, field.value)
-    fits = [] if steps is None else best_axes(steps, 1.0)
-    if steps is None or not fits:
+    fits = best_axes(steps, 1.0)
+    if not fits:
         return np.eye(3), Decision(what, "as the gyroscope's", "guess", "too little turns to compare them")
     best = fits[0]
     if best.ratio > EXPLAINED:
         why = f"the gyroscope leaves {100 * best.ratio:.0f} % of the field's changes whichever way they lie"
         return np.eye(3), Decision(what, "as the gyroscope's", "guess", why)
-    alike = [fit for fit in fits if fit.ratio * APART <= best.ratio + 0.02]
+    alike = [fit for fit in fits if fit.overall * APART <= best.overall]
     if any(np.array_equal(fit.axes, np.eye(3)) for fit in alike):
         same = fits[[np.array_equal(fit.axes, np.eye(3)) for fit in fits].index(True)]
-        sure: Sureness = "certain" if len(alike) <= 2 else "likely"
+        sure: Sureness = "certain" if len(alike) <= 2 and same.ratio < CLEARLY else "likely"
         why = f"so the field turns as the gyroscope says ({100 * same.ratio:.0f} % of its changes left)"
         why += "" if len(alike) <= 2 else f"; {len(alike) - 1} other ways fit as well"
         return np.eye(3), Decision(what, "as the gyroscope's", sure, why)
@@ -222,9 +242,9 @@ def _of_two(alike: list[Fit], field: Reading3, accel: Reading3 | None) -> tuple[
     North of the equator, where nine people of ten live, the field points down.
     """
     ranked = sorted(
-        alike, key=lambda fit: (round(fit.ratio, 2), np.linalg.det(fit.axes) < 0, -float(np.trace(fit.axes)))
+        alike, key=lambda fit: (round(fit.overall, 2), np.linalg.det(fit.axes) < 0, -float(np.trace(fit.axes)))
     )
-    best = min(ranked, key=lambda fit: fit.ratio * (1.0 if np.linalg.det(fit.axes) > 0 else 1.001))
+    best = min(ranked, key=lambda fit: fit.overall * (1.0 if np.linalg.det(fit.axes) > 0 else 1.001))
     pair = [fit for fit in ranked if np.array_equal(fit.axes, best.axes) or np.array_equal(fit.axes, -best.axes)]
     if accel is None or len(pair) < 2:
         return best, ""

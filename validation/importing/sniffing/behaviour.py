@@ -10,7 +10,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from validation.importing.sniffing.decision import Decision
 from validation.importing.sniffing.groups import Triple
-from validation.importing.sniffing.magnitudes import FIELD, PER_G, REST, field_size, rest_norm
+from validation.importing.sniffing.magnitudes import FIELD, PER_G, REST, field_size, gravity_norm, rest_norm
 from validation.importing.sniffing.turning import best_worth, steps_between
 
 __all__ = ["WORTHS", "by_behaviour"]
@@ -57,13 +57,17 @@ def _said(sensor: str, triple: Triple, why: str) -> Decision:
 
 
 def _moves(value: FloatArray) -> bool:
-    return bool(np.all(np.nanstd(value, axis=0) > 0))
+    """Tell three components of a vector: each moves, and no two are copies, as prices of one day are."""
+    sound = value[np.isfinite(value).all(axis=1)]
+    if not np.all(sound.std(axis=0) > 0):
+        return False
+    return bool(np.abs(np.corrcoef(sound.T))[np.triu_indices(3, 1)].min() < 0.9)
 
 
 def _gravity(value: FloatArray) -> str:
     """Return why a triple is an accelerometer; empty where it is none that this shows."""
     sound = value[np.isfinite(value).all(axis=1)]
-    rest = rest_norm(sound)
+    rest = gravity_norm(sound)
     peak = float(np.percentile(np.linalg.norm(sound, axis=1), 99.9))
     counts = PER_G if np.all(sound == np.round(sound)) else ()
     near = [one for one in (9.80665, 1.0, 1000.0, *counts) if abs(rest / one - 1) < REST]
@@ -77,7 +81,7 @@ def _turning_pair(
     best = None
     for gyro, field in permutations(left, 2):
         steps = steps_between(times[gyro], triples[gyro].values, times[field], triples[field].values)
-        fit = None if steps is None else best_worth(steps, WORTHS)
+        fit = best_worth(steps, WORTHS)
         if fit is not None and fit.ratio < TELLING and (best is None or fit.ratio < best[2]):
             best = (gyro, field, fit.ratio)
     return best

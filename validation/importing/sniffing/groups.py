@@ -154,7 +154,7 @@ def _named(
     source = "its name"
     if by_name is None and where is not None:
         by_name, source = sensor_of(where[1]), f"the id {where[1]}"
-    if by_name is None and not (units and units[0].sensor != COUNTS):
+    if by_name is None and says_nothing(name.base) and not (units and units[0].sensor != COUNTS):
         by_name, source = sensor_of(numbers.path.stem), "the file's name"
     if by_name is not None:
         meant = [unit for unit in units if unit.sensor in (by_name, COUNTS)]

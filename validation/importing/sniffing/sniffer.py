@@ -197,7 +197,7 @@ def _one_clock(tables: Sequence[Numbers]) -> Clock:
 
 def _fitted(clock: Clock, fit: Fit | None, unit: Unit) -> tuple[Clock, float]:
     """Return a clock without stamps with the step that the gyroscope and the field's turning give, and their ratio."""
-    if fit is None or fit.ratio > TELLING or unit.decision.sure != "certain":
+    if fit is None or fit.ratio > TELLING or unit.decision.sure == "guess":
         return clock, 1.0
     ratio = fit.worth / unit.factor("rad_s")
     step = float(f"{STEP * ratio:.3g}")
@@ -228,8 +228,11 @@ def _proposal(
         if sensor == "gyroscope":
             turned = fit.worth if fit is not None and fit.ratio < TELLING and clock.column is not None else None
             units[sensor] = gyroscope_unit(value, stated, turned)
+        elif sensor == "accelerometer":
+            units[sensor] = accelerometer_unit(value, stated)
         else:
-            units[sensor] = (accelerometer_unit if sensor == "accelerometer" else magnetometer_unit)(value, stated)
+            counts = any("a count" in unit.decision.choice for unit in units.values())
+            units[sensor] = magnetometer_unit(value, stated, counts=counts)
     if clock.column is None and "gyroscope" in units:
         clock, slower = _fitted(clock, fit, units["gyroscope"])
         times = {sensor: slower * time for sensor, time in times.items()}
@@ -258,4 +261,4 @@ def _turned(found: dict[str, tuple[Triple, Decision]], times: dict[str, FloatArr
         return None
     gyro, field = found["gyroscope"][0], found["magnetometer"][0]
     steps = steps_between(times["gyroscope"], gyro.values, times["magnetometer"], field.values)
-    return None if steps is None else best_worth(steps, WORTHS)
+    return best_worth(steps, WORTHS)

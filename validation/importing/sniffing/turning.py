@@ -17,11 +17,13 @@ from discsim.arrays import FloatArray
 
 __all__ = ["PERMUTATIONS", "Fit", "Steps", "best_axes", "best_worth", "steps_between"]
 
-#: Steps of 0.02 rad stand above a magnetometer's noise (1 % of the field); beyond 1.5 rad the steps say little of the axis.
+#: Steps of 0.02 rad stand above a magnetometer's noise (1 % of the field); one beyond 1.5 rad says little of its axis.
 SMALLEST, LARGEST = 0.02, 1.5
 #: Fewest steps for an answer: 3 unknowns of the offset, 48 ways of the axes, three components a step.
 FEWEST = 30
 MOST = 1500
+#: Steps are taken from a reading to the next, and to the 4th and 16th next, where slow turns stand above the noise.
+LAGS = (1, 4, 16)
 PERMUTATIONS = tuple(
     np.array([[signs[row] if order[row] == column else 0.0 for column in range(3)] for row in range(3)])
     for order in permutations(range(3))
@@ -39,34 +41,45 @@ class Steps:
 
 
 class Fit(NamedTuple):
-    """What is left of the vector's changes (a ratio: 0 all explained, 1 nothing), by which axes, worth, offset."""
+    """What is left of the vector's changes (a ratio: 0 all explained, 1 nothing), by which axes, worth, offset.
+
+    ``overall`` is the geometric mean of what is left over all of `LAGS`, by which ways are ranked.
+    """
 
     ratio: float
     axes: FloatArray
     worth: float
     offset: FloatArray
+    overall: float = float("nan")
 
 
-def steps_between(t_gyro: FloatArray, gyro: FloatArray, t_vector: FloatArray, vector: FloatArray) -> Steps | None:
-    """Return the steps of a vector (sampled and held readings once) and the turning between; None where too few."""
+def steps_between(t_gyro: FloatArray, gyro: FloatArray, t_vector: FloatArray, vector: FloatArray) -> list[Steps]:
+    """Return the steps of a vector (sampled and held readings once) and the turning between; empty where too few.
+
+    There is one entry for each of `LAGS`. Times are (n,) s, values (n, 3).
+    """
     sound = np.isfinite(gyro).all(axis=1) & np.isfinite(t_gyro)
     fresh = np.isfinite(vector).all(axis=1) & np.isfinite(t_vector)
     fresh[1:] &= np.any(np.diff(vector, axis=0) != 0, axis=1)
     if sound.sum() < FEWEST or fresh.sum() < FEWEST:
-        return None
+        return []
     t_gyro, gyro, t_vector, vector = t_gyro[sound], gyro[sound], t_vector[fresh], vector[fresh]
     order = np.argsort(t_gyro, kind="stable")
     t_gyro, gyro = t_gyro[order], gyro[order]
     step = np.diff(t_gyro)[:, None]
     integral = np.concatenate([np.zeros((1, 3)), np.cumsum(step * (gyro[1:] + gyro[:-1]) / 2, axis=0)])
     at = np.column_stack([np.interp(t_vector, t_gyro, integral[:, axis]) for axis in range(3)])
-    clipped = np.abs(gyro) >= 0.999 * np.abs(gyro).max(axis=0)  # where it may stand at its range it tells no turn
-    worst = np.interp(t_vector, t_gyro, (clipped.sum(axis=0) > 5) @ clipped.T.astype(float))
-    spacing = np.diff(t_vector)
-    whole = (spacing > 0) & (spacing < 3 * np.median(spacing)) & (worst[1:] + worst[:-1] == 0)
-    if whole.sum() < FEWEST:
-        return None
-    return Steps(vector[:-1][whole], vector[1:][whole], np.diff(at, axis=0)[whole])
+    # where it may stand at its range it tells no turn
+    extreme = np.abs(gyro) >= 0.999 * np.abs(gyro).max(axis=0)
+    clipped = extreme[:, extreme.sum(axis=0) > 5].any(axis=1)
+    lost = np.interp(t_vector, t_gyro, np.cumsum(clipped).astype(float))
+    found = []
+    for lag in LAGS:
+        spacing = t_vector[lag:] - t_vector[:-lag]
+        whole = (spacing > 0) & (spacing < 3 * np.median(spacing)) & (lost[lag:] == lost[:-lag])
+        if whole.sum() >= FEWEST:
+            found.append(Steps(vector[:-lag][whole], vector[lag:][whole], (at[lag:] - at[:-lag])[whole]))
+    return found
 
 
 def _chosen(steps: Steps, worth: float) -> Steps | None:
@@ -98,7 +111,7 @@ def _fits(steps: Steps, worth: float, ways: Sequence[FloatArray]) -> list[Fit]:
     design = (np.eye(3) - rotation).reshape(-1, 3)
     inverse = np.linalg.pinv(design, rcond=1e-3)
     change = float(np.sqrt(np.mean((chosen.after - chosen.before) ** 2))) or 1.0
-    found = []
+    found: list[Fit] = []
     for way in ways:
         turned = np.einsum("nij,nj->ni", rotation, chosen.before @ way.T)
         left = (chosen.after @ way.T - turned).reshape(-1)
@@ -108,24 +121,33 @@ def _fits(steps: Steps, worth: float, ways: Sequence[FloatArray]) -> list[Fit]:
     return found
 
 
-def best_worth(steps: Steps, worths: Sequence[float], ways: Sequence[FloatArray] = PERMUTATIONS) -> Fit | None:
+def best_worth(steps: Sequence[Steps], worths: Sequence[float]) -> Fit | None:
     """Return the best fit over some worths of a gyroscope's reading (rad/s each), refined by golden section."""
-    fits = [fit for worth in worths for fit in _fits(steps, worth, ways)]
+    fits = [(fit, one) for one in steps for worth in worths for fit in _fits(one, worth, PERMUTATIONS)]
     if not fits:
         return None
-    best = min(fits, key=lambda fit: fit.ratio)
+    best, those = min(fits, key=lambda pair: pair[0].ratio)
     low, high = np.log(best.worth) - 0.7, np.log(best.worth) + 0.7
     golden = (np.sqrt(5) - 1) / 2
     for _ in range(12):  # to 0.4 %
         lower, upper = high - golden * (high - low), low + golden * (high - low)
-        sides = [
-            min((f.ratio for f in _fits(steps, float(np.exp(w)), [best.axes])), default=2.0) for w in (lower, upper)
+        left = [
+            min((fit.ratio for fit in _fits(those, float(np.exp(tried)), [best.axes])), default=2.0)
+            for tried in (lower, upper)
         ]
-        low, high = (low, upper) if sides[0] < sides[1] else (lower, high)
-    refined = _fits(steps, float(np.exp((low + high) / 2)), [best.axes])
+        low, high = (low, upper) if left[0] < left[1] else (lower, high)
+    refined = _fits(those, float(np.exp((low + high) / 2)), [best.axes])
     return min([best, *refined], key=lambda fit: fit.ratio)
 
 
-def best_axes(steps: Steps, worth: float) -> list[Fit]:
-    """Return the fits of all 48 ways to lay the vector's axes on the gyroscope's, the best first."""
-    return sorted(_fits(steps, worth, PERMUTATIONS), key=lambda fit: fit.ratio)
+def best_axes(steps: Sequence[Steps], worth: float) -> list[Fit]:
+    """Return the fits of all 48 ways to lay the vector's axes on the gyroscope's, the best first.
+
+    Each is the fit of the lag that it explains best; ranks are over all lags, as a slow turn shows in a long one only.
+    """
+    each = [fits for one in steps if (fits := _fits(one, worth, PERMUTATIONS))]
+    ways = [
+        min(fits, key=lambda fit: fit.ratio)._replace(overall=float(np.exp(np.mean([np.log(f.ratio) for f in fits]))))
+        for fits in zip(*each, strict=True)
+    ]
+    return sorted(ways, key=lambda fit: fit.overall)
