@@ -33,7 +33,7 @@ class Log:
 
 
 def rates(t: float) -> np.ndarray:
-    """Return the body rates: handled slowly about all axes, spun up in 0.1 s, decaying in flight with a wobble, caught."""
+    """Return the body rates: handled about all axes, spun up in 0.1 s, decaying in flight with a wobble, caught."""
     handled = np.exp(-(((t - 2.2) / 0.5) ** 2)) * np.array([1.9, -2.3, 1.4]) * np.sin(9.0 * (t - 2.2))
     if t < RELEASE - 0.1 or t > LANDING + 0.05:
         return handled

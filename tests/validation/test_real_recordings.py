@@ -193,7 +193,8 @@ def test_gyroscope_and_cameras_agree_in_size_and_the_fft_with_neither(number, me
     found = agreements("broad", number)
     assert found["gyroscope"].ratio == pytest.approx(1.0, abs=0.01)  # about z alone, the axes' alignment counts too
     assert found["fft"].known < 0.7
-    assert found["fft"].ratio > 3  # no steady spin: its answer is not the rate about z
+    # no steady spin: its answer is not the rate about z (of trial 32 it has none)
+    assert found["fft"].ratio > 3 if number == 0 else found["fft"].known == 0
 
 
 @real

@@ -1,4 +1,4 @@
-"""``discsim import``: a raw logger file to a recording, by a map of columns, units, rates and repairs, or without one."""
+"""``discsim import``: a raw logger file to a recording, by a map of columns, units and repairs, or without one."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def command(
         str,
         typer.Option(
             "--map",
-            help="A shipped map's name, a map of your own (a .toml file), 'sniff': propose one, or 'auto': a shipped map "
-            "that was made for this logger, else propose one.",
+            help="A shipped map's name, a map of your own (a .toml file), 'sniff': propose one, or 'auto': the shipped "
+            "map that was made for this logger, else propose one.",
         ),
     ] = "auto",
     rows: Annotated[
@@ -46,8 +46,9 @@ def command(
 ) -> None:
     """Turn a raw logger file into a recording folder.
 
-    Writes recording.toml, one CSV file per sensor, repairs.csv (what was repaired or left out, by line) and raw.html (all
-    traces, the throws found, the map with its reasons) into --out; without --map also the map that it proposes, map.toml.
+    Writes recording.toml, one CSV file per sensor, repairs.csv (what was repaired or left out, by line) and raw.html
+    (all traces, the throws found, the map with its reasons) into --out; without --map also the map that it proposes,
+    map.toml.
 
     Example: discsim import my-log.csv --throw 1 --out throw-1
     or, with a map: discsim import 2025-08-31-001-rb.csv --map flatball --rows 1590:1830 --out throw-1

@@ -10,16 +10,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
 from discsim.disc import Release
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
+from validation.importing.cleaning import Readings, cleaned
 from validation.importing.import_map import ImportMap, SensorMap
 from validation.importing.raw_table import RawRow, RawTable, Repair, RepairList, number, read_raw
+from validation.importing.row_clock import RowClock, row_clock
+from validation.importing.timing import row_timing
 
 __all__ = [
     "Imported",
@@ -33,6 +34,10 @@ __all__ = [
 
 #: Share of a sensor's rows that may be left out before the import says that the file is in a bad state.
 MUCH_LOST = 0.05
+#: A sensor's own rate is said to be another than the map's from this on, as of time stamps (estimators.methods).
+OTHER_RATE = 0.01
+#: Share of rows that may come late before the import says so.
+LATE_SHARE = 0.01
 #: Time stamps are kept to this many decimals: what is below is rounding of the subtraction, not a clock.
 TIME_DECIMALS = 9
 
@@ -55,14 +60,6 @@ class Imported:
         return f"repairs: {len(self.repairs)} in repairs.csv: {listed}{', ...' * (len(counts) > 6)}"
 
 
-class _Readings(NamedTuple):
-    """A sensor's sound rows: their numbers, time (s, on the file's clock) and values in recording units and axes."""
-
-    number: FloatArray
-    time: FloatArray
-    value: FloatArray
-
-
 def parse_rows(text: str) -> slice:
     """Return the slice that ``A:B`` means (either may be left out or count from the end); raises `InputError`."""
     start, colon, stop = text.partition(":")
@@ -82,47 +79,27 @@ class RawReadings:
     import_map: ImportMap
     tables: dict[str, RawTable]
     main: RawTable
-    readings: dict[str, _Readings]
+    readings: dict[str, Readings]
     repairs: tuple[Repair, ...]
     notes: tuple[str, ...]
 
 
-def read_readings(raw: Path, import_map: ImportMap) -> RawReadings:
-    """Read ``raw`` (a file, or a folder with one file per sensor) by a map, all rows.
+def read_readings(raw: Path, import_map: ImportMap, rows: slice | None = None) -> RawReadings:
+    """Read ``raw`` (a file, or a folder with one file per sensor) by a map.
 
+    All rows are read; of a clock that starts anew in the file the longest stretch is kept (of ``rows`` if given).
     Raises `InputError`: no such file or column, a damage that the map does not allow to repair, nothing usable left.
     """
     repairs = RepairList(import_map.repairs)
     tables = _read_tables(raw, import_map, repairs)
-    notes = []
-    readings: dict[str, _Readings] = {}
-    main = None
-    for sensor, sensor_map in import_map.sensors.items():
-        table = tables.get(sensor)
-        names = None if table is None else _columns(table, sensor_map, import_map)
-        if table is None or names is None:
-            notes.append(f"no {sensor} in it")
-            continue
-        main = main or table
-        found = _readings(table, sensor, names, sensor_map, import_map, repairs)
-        chosen = _chosen_rows(table, sensor_map)
-        lost = chosen - found.time.size
-        if found.time.size == 0:
-            raise InputError.at(table.path, None, f"no usable row of the {sensor}; expected numbers in {names}")
-        if lost > MUCH_LOST * chosen:
-            notes.append(f"WARNING: {lost} of the {sensor}'s {chosen} rows were left out; is this the right map?")
-        readings[sensor] = found
-    if main is None:
-        wanted = "; or ".join(_quoted(sensor_map.columns[0]) for sensor_map in import_map.sensors.values())
-        raise InputError.at(
-            raw, None, f"no sensor of the map '{import_map.name}' in it; expected {wanted}; {_there(tables, raw)}"
-        )
+    readings, notes = _read_sensors(raw, tables, import_map, rows, repairs)
+    main = tables[next(iter(readings))]
     return RawReadings(raw, import_map, tables, main, readings, tuple(repairs.listed()), tuple(notes))
 
 
 def import_recording(raw: Path, import_map: ImportMap, rows: slice | None = None) -> Imported:
     """Read ``raw`` by a map and return the recording of ``rows``: `read_readings`, then `recording_of`."""
-    return recording_of(read_readings(raw, import_map), rows)
+    return recording_of(read_readings(raw, import_map, rows), rows)
 
 
 def recording_of(read: RawReadings, rows: slice | None = None) -> Imported:
@@ -138,6 +115,8 @@ def recording_of(read: RawReadings, rows: slice | None = None) -> Imported:
     if rows is not None:
         whole, readings = readings, _cut(readings, read.tables, read.main, rows)
         notes += [f"no {sensor} in these rows" for sensor in whole if sensor not in readings]
+    readings, rates, said = _fresh(raw, readings, import_map)
+    notes += said
     zero = min(found.time[0] for found in readings.values())
     samples = {
         sensor: Samples(np.round(found.time - zero, TIME_DECIMALS), found.value[:, 0] if one else found.value)
@@ -156,10 +135,105 @@ def recording_of(read: RawReadings, rows: slice | None = None) -> Imported:
         import_map.disc,
         None,
         release,
-        {sensor: _sheet(import_map.sensors[sensor], samples[sensor]) for sensor in samples},
+        {sensor: _sheet(import_map.sensors[sensor], samples[sensor], rates.get(sensor)) for sensor in samples},
         samples,
     )
     return Imported(recording, read.repairs, tuple(notes))
+
+
+def _read_sensors(
+    raw: Path, tables: dict[str, RawTable], import_map: ImportMap, rows: slice | None, repairs: RepairList
+) -> tuple[dict[str, Readings], list[str]]:
+    """Return the sound rows of each sensor that is there, that of the first file first, and what to say of the rest."""
+    notes: list[str] = []
+    clocks: dict[Path, RowClock] = {}
+    readings: dict[str, Readings] = {}
+    main: RawTable | None = None
+    for sensor, sensor_map in import_map.sensors.items():
+        table = tables.get(sensor)
+        names = None if table is None else _columns(table, sensor_map, import_map)
+        if table is None or names is None:
+            notes.append(f"no {sensor} in it")
+            continue
+        if table.path not in clocks:
+            clocks[table.path] = row_clock(table, import_map, repairs)
+            main = main or table
+            notes += _stretches(table, clocks[table.path], rows if table is main else None)
+        clock, cut = clocks[table.path], rows if table is main else None
+        found = _readings(table, sensor, names, sensor_map, import_map, clock, cut, repairs)
+        chosen = _chosen_rows(table, sensor_map)
+        lost = chosen - found.time.size
+        if found.time.size == 0:
+            raise InputError.at(table.path, None, f"no usable row of the {sensor}; expected numbers in {names}")
+        if lost > MUCH_LOST * chosen and not clock.starts:
+            notes.append(f"WARNING: {lost} of the {sensor}'s {chosen} rows were left out; is this the right map?")
+        readings[sensor] = found
+    if not readings:
+        wanted = "; or ".join(_quoted(sensor_map.columns[0]) for sensor_map in import_map.sensors.values())
+        raise InputError.at(
+            raw, None, f"no sensor of the map '{import_map.name}' in it; expected {wanted}; {_there(tables, raw)}"
+        )
+    return readings, notes
+
+
+def _fresh(
+    raw: Path, readings: dict[str, Readings], import_map: ImportMap
+) -> tuple[dict[str, Readings], dict[str, float], list[str]]:
+    """Return the readings without repeats and dead sensors, the rates of sensors that are not the log's, and notes."""
+    stamped = import_map.time.column is not None
+    notes: list[str] = []
+    rates: dict[str, float] = {}
+    fresh: dict[str, Readings] = {}
+    for sensor, found in readings.items():
+        result = cleaned(sensor, found, readings, stamped)
+        notes += result.notes
+        if result.readings is None:
+            continue
+        fresh[sensor] = result.readings
+        if result.rate_hz is not None:
+            rates[sensor] = result.rate_hz
+            stated = import_map.sensors[sensor].sheet.rate_hz
+            if abs(result.rate_hz / stated - 1) > OTHER_RATE:
+                notes.append(
+                    f"{sensor}: {result.rate_hz:.4g} Hz is written, not the {stated:.4g} Hz that the map states"
+                )
+        elif stamped:
+            notes += _timing_notes(sensor, result.readings)
+    if not fresh:
+        raise InputError.at(raw, None, f"nothing to import: {'; '.join(notes)}")
+    if not stamped:
+        notes.append(
+            f"no time column: rows are taken as {import_map.time.step:g} s apart; whether they came late or were lost "
+            "cannot be told"
+        )
+    return fresh, rates, notes
+
+
+def _timing_notes(sensor: str, found: Readings) -> list[str]:
+    timing = row_timing(found.time)
+    notes = []
+    if timing.lost:
+        notes.append(
+            f"{sensor}: {timing.lost} rows are lost in {timing.breaks} places (steps of whole multiples of "
+            f"{timing.interval:.4g} s, the longest {timing.longest:.4g} s)"
+        )
+    if timing.late > LATE_SHARE * len(found.time):
+        notes.append(
+            f"{sensor}: {timing.late} of {len(found.time)} rows came late or early by more than a fifth of the usual "
+            f"{timing.interval:.4g} s, none lost there; their stamps are used"
+        )
+    return notes
+
+
+def _stretches(table: RawTable, clock: RowClock, rows: slice | None) -> list[str]:
+    """Say that a log holds several stretches of time, and which is kept."""
+    if not clock.starts:
+        return []
+    lines = ", ".join(str(line) for line, _ in clock.starts[:5]) + ", ..." * (len(clock.starts) > 5)
+    kept = "the longest is kept; --rows A:B takes another" if rows is None else "of --rows the longest is kept"
+    return [
+        f"WARNING: {table.path.name}: the clock starts anew in line {lines}: {len(clock.starts) + 1} stretches; {kept}"
+    ]
 
 
 def repairs_csv(repairs: Sequence[Repair]) -> str:
@@ -248,27 +322,33 @@ def _chosen_rows(table: RawTable, sensor_map: SensorMap) -> int:
 
 
 def _readings(
-    table: RawTable, sensor: str, names: list[str], sensor_map: SensorMap, import_map: ImportMap, repairs: RepairList
-) -> _Readings:
-    """Return the rows of one sensor that hold numbers and whose time ascends."""
+    table: RawTable,
+    sensor: str,
+    names: list[str],
+    sensor_map: SensorMap,
+    import_map: ImportMap,
+    clock: RowClock,
+    cut: slice | None,
+    repairs: RepairList,
+) -> Readings:
+    """Return the rows of one sensor that hold numbers and whose time ascends, of one stretch of the clock."""
     indices = [table.columns.index(name) for name in names]
     filter_at = table.columns.index(sensor_map.where[0]) if sensor_map.where is not None else -1
+    wanted = range(table.total)[cut] if cut is not None else range(table.total)
+    here = [row for row in table.rows if row.number in clock.time]
+    if sensor_map.where is not None:
+        here = [row for row in here if row.cells[filter_at] == sensor_map.where[1]]
+    if clock.starts and here:
+        kept_stretch = clock.longest([row.number for row in here if row.number in wanted] or [here[0].number])
+        here = [row for row in here if clock.stretch[row.number] == kept_stretch]
     rows: list[RawRow] = []
-    times: list[float] = []
     values: list[list[float]] = []
-    counters = _counters(table, import_map, repairs)
-    for row in table.rows:
-        if sensor_map.where is not None and row.cells[filter_at] != sensor_map.where[1]:
-            continue
-        time = _time(table, row, counters, import_map, repairs)
-        if time is None:
-            continue
+    for row in here:
         value = _value(table, row, sensor, names, indices, import_map, repairs)
-        if value is None:
-            continue
-        rows.append(row)
-        times.append(time)
-        values.append(value)
+        if value is not None:
+            rows.append(row)
+            values.append(value)
+    times = [clock.time[row.number] for row in rows]
     kept = _ascending(table, rows, times, repairs)
     read = sensor_map.factor * np.array([values[k] for k in kept]).reshape(len(kept), len(names))
     if len(SENSORS[sensor].columns) == 3:
@@ -276,44 +356,7 @@ def _readings(
         # + 0.0 turns the -0.0 of a reversed zero into 0.0
         columns = [unseen if axis is None else axis[1] * read[:, axis[0]] + 0.0 for axis in sensor_map.axes]
         read = np.column_stack(columns)
-    return _Readings(np.array([rows[k].number for k in kept]), np.array([times[k] for k in kept]), read)
-
-
-def _counters(table: RawTable, import_map: ImportMap, repairs: RepairList) -> dict[int, float]:
-    """Return the counter of each row (by row number), with its jumps listed."""
-    name, decimal = import_map.time.counter, import_map.layout.decimal
-    if name is None:
-        return {}
-    index = table.columns.index(name)
-    counters: dict[int, float] = {}
-    previous = None
-    for row in table.rows:
-        count = number(row.cells[index], decimal)
-        if count is None or np.isnan(count):
-            repairs.add("number", table.path, row.line, f"'{name}' is '{row.cells[index][:40]}'", "row left out")
-            continue
-        if previous is not None and count > previous + 1:
-            lost = f"{count - previous - 1:.0f} missing; time keeps their place"
-            repairs.add("counter", table.path, row.line, f"'{name}' jumps from {previous:.0f} to {count:.0f}", lost)
-        counters[row.number] = previous = count
-    return counters
-
-
-def _time(
-    table: RawTable, row: RawRow, counters: dict[int, float], import_map: ImportMap, repairs: RepairList
-) -> float | None:
-    base = import_map.time
-    if base.counter is not None and row.number not in counters:
-        return None
-    if base.column is None:
-        assert base.step is not None
-        return (counters[row.number] if base.counter is not None else row.number) * base.step
-    cell = row.cells[table.columns.index(base.column)]
-    time = number(cell, import_map.layout.decimal)
-    if time is None or np.isnan(time):
-        repairs.add("number", table.path, row.line, f"'{base.column}' is '{cell[:40]}'", "row left out")
-        return None
-    return time * base.scale
+    return Readings(np.array([rows[k].number for k in kept]), np.array([times[k] for k in kept]), read)
 
 
 def _value(
@@ -333,7 +376,8 @@ def _value(
             repairs.add("number", table.path, row.line, what, f"row left out of {sensor}")
             return None
         if np.isnan(reading):
-            repairs.add("number", table.path, row.line, f"'{name}' is empty", "gap")
+            what = f"'{row.cells[index][:40]}'" if row.cells[index] else "empty"
+            repairs.add("number", table.path, row.line, f"'{name}' is {what}", "gap")
         value.append(reading)
     return value
 
@@ -359,10 +403,15 @@ def _ascending(table: RawTable, rows: list[RawRow], times: list[float], repairs:
         index = before[index]
     kept.reverse()
     sound = set(kept)
+    first = {times[index]: index for index in reversed(kept)}
     for index, row in enumerate(rows):
-        if index not in sound:
-            what = f"time {times[index]:.9g} s is doubled or out of order"
-            repairs.add("time", table.path, row.line, what, "row left out")
+        if index in sound:
+            continue
+        what = f"time {times[index]:.9g} s is out of order"
+        if times[index] in first:
+            again = rows[first[times[index]]]
+            what = f"time {times[index]:.9g} s is doubled" + ", and so is the row" * (row.cells == again.cells)
+        repairs.add("time", table.path, row.line, what, "row left out")
     return kept
 
 
@@ -370,8 +419,8 @@ def _ascending(table: RawTable, rows: list[RawRow], times: list[float], repairs:
 
 
 def _cut(
-    readings: dict[str, _Readings], tables: dict[str, RawTable], main: RawTable, rows: slice
-) -> dict[str, _Readings]:
+    readings: dict[str, Readings], tables: dict[str, RawTable], main: RawTable, rows: slice
+) -> dict[str, Readings]:
     start = 0 if rows.start is None else rows.start + (main.total if rows.start < 0 else 0)
     stop = main.total if rows.stop is None else rows.stop + (main.total if rows.stop < 0 else 0)
     if not 0 <= start < stop <= main.total:
@@ -381,22 +430,21 @@ def _cut(
     spans = []
     for sensor, found in readings.items():
         if tables[sensor] is main:
-            cut[sensor] = _select(found, (found.number >= start) & (found.number < stop))
+            cut[sensor] = found.select((found.number >= start) & (found.number < stop))
             spans += [cut[sensor].time[:1], cut[sensor].time[-1:]]
     span = np.concatenate(spans)
     if span.size == 0:
         raise InputError.at(main.path, None, f"--rows {start}:{stop}: no usable row among them")
     for sensor, found in readings.items():
         if tables[sensor] is not main:
-            cut[sensor] = _select(found, (found.time >= span.min()) & (found.time <= span.max()))
+            cut[sensor] = found.select((found.time >= span.min()) & (found.time <= span.max()))
     return {sensor: cut[sensor] for sensor in readings if cut[sensor].time.size}
 
 
-def _select(found: _Readings, chosen: BoolArray) -> _Readings:
-    return _Readings(found.number[chosen], found.time[chosen], found.value[chosen])
-
-
-def _sheet(sensor_map: SensorMap, samples: Samples) -> SensorSheet:
+def _sheet(sensor_map: SensorMap, samples: Samples, own_rate: float | None) -> SensorSheet:
+    """Return what the map states, with the sensor's own rate where its readings stood on several rows."""
+    if own_rate is not None:
+        return replace(sensor_map.sheet, rate_hz=float(f"{own_rate:.5g}"))
     if np.isfinite(sensor_map.sheet.rate_hz):
         return sensor_map.sheet
     if not samples.interval > 0:
@@ -404,7 +452,7 @@ def _sheet(sensor_map: SensorMap, samples: Samples) -> SensorSheet:
     return replace(sensor_map.sheet, rate_hz=float(f"{1 / samples.interval:.4g}"))
 
 
-def _release(raw: Path, import_map: ImportMap, readings: dict[str, _Readings]) -> Release | None:
+def _release(raw: Path, import_map: ImportMap, readings: dict[str, Readings]) -> Release | None:
     """Return what was measured of the release, which is the file's first row; None where that row is not used."""
     if any(found.number[0] > 0 for found in readings.values()):
         return None

@@ -38,7 +38,7 @@ UNITS: Mapping[str, Mapping[str, float]] = MappingProxyType(
         "": {"SI": 1.0},
     }
 )
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "iso": 1.0}
 BODY_SENSORS = ("magnetometer", "accelerometer", "gyroscope")
 #: Uncertainty of the World Magnetic Model, uT per component.
 FIELD_MODEL_SIGMA = 0.15
@@ -46,12 +46,16 @@ FIELD_MODEL_SIGMA = 0.15
 
 @dataclass(frozen=True)
 class TimeBase:
-    """Time of a row: a column times ``scale`` (s), or the row's number (or its counter) times ``step`` (s)."""
+    """Time of a row: a column times ``scale`` (s), or the row's number (or its counter) times ``step`` (s).
+
+    ``iso``: the column holds dates and times, or times of the day, as ISO 8601 writes them.
+    """
 
     column: str | None = None
     scale: float = 1.0
     step: float | None = None
     counter: str | None = None
+    iso: bool = False
 
 
 @dataclass(frozen=True)
@@ -214,7 +218,7 @@ def _time_base(table: TomlTable) -> TimeBase:
     if (column is None) == (step is None):
         raise table.error(None, "expected either 'column' (of time stamps) or 'step_s' (of rows at one rate) in [time]")
     table.finish()
-    return TimeBase(column, TIME_UNITS[unit], step, counter)
+    return TimeBase(column, TIME_UNITS[unit], step, counter, unit == "iso")
 
 
 def _environment(table: TomlTable, *, flying: bool) -> tuple[Environment, bool]:

@@ -21,7 +21,8 @@ REPAIRS = {
     "comment": "comment lines, and comments glued to a record, are left out",
     "width": "a row with too few or too many cells is left out",
     "number": "an empty cell becomes a gap; a row with a cell that is no number is left out",
-    "time": "the fewest rows are left out that make time ascend",
+    "time": "a counter that wrapped goes on; of a log that began again the longest stretch is kept; "
+    "of what is left the fewest rows are left out that make time ascend",
     "counter": "a row counter that jumps leaves a gap in time",
 }
 
@@ -135,16 +136,54 @@ def _spread(cell: str) -> list[str]:
     return [str(item) for item in items]
 
 
+#: what tools write where there is no number (pandas, R, spreadsheets, C libraries), and for one that is too large
+GAPS = frozenset(
+    {
+        "nan",
+        "-nan",
+        "+nan",
+        "na",
+        "n/a",
+        "#n/a",
+        "null",
+        "none",
+        "nil",
+        "-",
+        "--",
+        "?",
+        "#num!",
+        "#value!",
+        "#div/0!",
+        "1.#qnan",
+        "-1.#ind",
+        "1.#ind",
+        "nan(ind)",
+        "-nan(ind)",
+        "inf",
+        "-inf",
+        "+inf",
+        "infinity",
+        "-infinity",
+        "+infinity",
+        "1.#inf",
+        "-1.#inf",
+        "ovf",
+        "ovfl",
+        "overflow",
+    }
+)
+
+
 def number(cell: str, decimal: str = ".") -> float | None:
-    """Return a cell's finite number, NaN where it is empty or says ``nan``, None where it is neither."""
+    """Return a cell's finite number, NaN where it is empty or one of `GAPS`, None where it is neither."""
     text = cell.replace(",", ".") if decimal == "," else cell
-    if text == "" or text.lower() == "nan":
+    if text == "" or text.lower() in GAPS:
         return float("nan")
     try:
         value = float(text)
     except ValueError:
         return None
-    # float() takes 1_000, inf and nan with a sign; no logger means a number by them
+    # float() takes 1_000, and 1e999 as infinite; no logger means a number by them
     return value if "_" not in text and abs(value) < float("inf") else None
 
 

@@ -211,8 +211,10 @@ def _broad(_: Source, cuts: Sequence[Measured], __: Sequence[Sequence[Agreement]
         "Gyroscope and optical rate have nearly the same size; as vectors they differ by the rms in the table. It is "
         "smaller if the optical rate is taken at another time than its stamp says (figure, right). Which clock is "
         "off, or what delays what, the files do not tell; all else on this page takes the stamps as they are.",
-        "`fft` answers, but neither with the spin about z nor with the size of the rate (both in the tables). The "
-        "rate about z reverses after the mean time in the table, so that its mean over a window is small and the "
+        "The magnetometer's readings came at 100 Hz, stood on some rows of a log of 143 Hz and were then interpolated "
+        "to 286 Hz: the import takes the rows between and the repeats out.",
+        "Where `fft` answers, it is neither with the spin about z nor with the size of the rate (both in the tables). "
+        "The rate about z reverses after the mean time in the table, so that its mean over a window is small and the "
         "ratio to it large.",
     )
     header = (

@@ -18,7 +18,7 @@ __all__ = ["MAX_BYTES", "MAX_FILES", "opened"]
 #: no reader of text could hold more than that; a phone's export has some ten files.
 MAX_FILES = 1000
 MAX_BYTES = 4 << 30
-#: ... and this many bytes for each packed one: columns of numbers shrink by 3 to 20, a constant column by some hundreds.
+#: ... and this many bytes for each packed one: numbers shrink by 3 to 20, a constant column by some hundreds.
 MAX_RATIO = 1000
 _CHUNK = 1 << 20
 

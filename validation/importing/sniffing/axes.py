@@ -1,7 +1,7 @@
 """How the sensors' axes lie in the body. Takes readings in SI; gives each sensor's axes for a map, and why.
 
-Body z is the spin axis, down through the disc. Three steps: which axis turns, which way it points (gravity at rest, lift
-in flight), and how the magnetometer lies on the gyroscope (`turning`).
+Body z is the spin axis, down through the disc. Three steps: which axis turns, which way it points (gravity at rest,
+lift in flight), and how the magnetometer lies on the gyroscope (`turning`).
 """
 
 from __future__ import annotations

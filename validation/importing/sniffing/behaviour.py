@@ -1,4 +1,4 @@
-"""What sensor a triple without a telling name is. Takes triples and time; gives the sensor of each, how sure and why."""
+"""What sensor a triple without a telling name is. Takes triples and time; gives each one's sensor, how sure and why."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which rows become recordings. Takes what was read of a log and its throws; gives the recordings that were asked for."""
+"""Which rows become recordings. Takes what was read of a log and its throws; gives the recordings asked for."""
 
 from __future__ import annotations
 

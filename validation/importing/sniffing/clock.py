@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discsim.arrays import FloatArray
+from validation.importing.clock import iso_seconds
 from validation.importing.sniffing.decision import Decision, Sureness
 from validation.importing.sniffing.dialect import is_stamp
 from validation.importing.sniffing.groups import Numbers
@@ -150,9 +151,8 @@ def _written(name: str) -> str | None:
 
 def _stamps(cells: list[str]) -> FloatArray:
     """Return dates with a time (or times of day) as seconds; NaN where one is neither."""
-    from validation.importing.sniffing.stamps import stamp_seconds
-
-    return np.array([stamp_seconds(cell) for cell in cells])
+    found = [iso_seconds(cell) for cell in cells]
+    return np.array([np.nan if time is None else time for time in found])
 
 
 def _without(numbers: Numbers) -> Clock:

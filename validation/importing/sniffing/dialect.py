@@ -10,7 +10,7 @@ from itertools import product
 from pathlib import Path
 
 from discsim.errors import InputError
-from validation.importing.raw_table import Layout, RepairList, read_raw
+from validation.importing.raw_table import GAPS, Layout, RepairList, read_raw
 from validation.importing.sniffing.text import encoding_of, lines_of
 
 __all__ = ["Dialect", "dialect_of", "is_stamp"]
@@ -43,7 +43,7 @@ class Dialect:
 
 def is_stamp(cell: str) -> bool:
     """Tell whether a cell is a date with a time, or a time of day."""
-    return _STAMP.fullmatch(cell.strip()) is not None
+    return _STAMP.fullmatch(cell.strip().strip('"')) is not None
 
 
 def dialect_of(path: Path) -> Dialect:
@@ -129,14 +129,14 @@ def _score(layout: Layout, sample: list[str]) -> tuple[float, int]:
 
 def _share(cells: Sequence[str], layout: Layout) -> float:
     """Return the share of cells that hold a number or a stamp; empty ones count for neither side."""
-    full = [cell for cell in cells if cell]
+    full = [cell for cell in cells if cell and cell.lower() not in GAPS]
     return sum(_is_number(cell, layout) or is_stamp(cell) for cell in full) / len(full) if full else 0.0
 
 
 def _is_number(cell: str, layout: Layout) -> bool:
     """Tell a number in this layout, strictly: a point is no number's where the decimal mark is a comma."""
     point = re.escape(layout.decimal)
-    return re.fullmatch(rf"[+-]?(\d+({point}\d*)?|{point}\d+)([eE][+-]?\d+)?|nan|NaN|-?inf", cell, re.ASCII) is not None
+    return re.fullmatch(rf"[+-]?(\d+({point}\d*)?|{point}\d+)([eE][+-]?\d+)?", cell, re.ASCII) is not None
 
 
 def _is_record(cells: Sequence[str], width: int, layout: Layout) -> bool:

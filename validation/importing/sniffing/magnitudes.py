@@ -1,7 +1,7 @@
 """Units from the size of readings. Takes a triple's readings; gives the unit, its worth, how sure it is and why.
 
-What is known beforehand: gravity at rest, the earth's field of 22 to 67 uT (World Magnetic Model, the whole earth), and the
-full scales that parts have.
+What is known beforehand: gravity at rest, the earth's field of 22 to 67 uT (World Magnetic Model, the whole earth),
+and the full scales that parts have.
 """
 
 from __future__ import annotations

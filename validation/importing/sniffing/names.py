@@ -27,8 +27,8 @@ _STEMS = {
     ),
     "magnetometer": "mag compass kompass boussole bussola магн 磁 자기 manyetik hmc58 qmc58 lis3m mmc5 ak8963",
     "accelerometer": (
-        "acc acel beschl versnell przysp zrychl akseler kiihty gyorsul ускор акселе 加速 가속 ivme specificforce gforce "
-        "adxl"
+        "acc acel beschl versnell przysp zrychl akseler kiihty gyorsul ускор акселе 加速 가속 ivme "
+        "specificforce gforce adxl"
     ),
 }
 #: The same as whole names, once the axis is off: ax, gx, mx; wx and Bx as physics writes them; gFx of Physics Toolbox.
@@ -41,13 +41,13 @@ _LETTERS = {
     "m": "magnetometer",
     "b": "magnetometer",
 }
-#: Words of columns that are worked out from a sensor, or are another thing: a fused attitude, an acceleration without
-#: gravity or in the earth's axes, errors, set points. The number is how far such a column stands back.
+#: Words of columns that are worked out from a sensor, or are another thing: a fused attitude, an acceleration
+#: without gravity or in the earth's axes, errors, set points. The number is how far such a column stands back.
 _STAND_BACK = {
     9: (
-        "lin linear user fe fl ned enu earth world ohne without sans senza gravity err error bias offset setpoint target "
-        "std var abs absolute absolutbetrag norm magnitude quat euler roll pitch yaw angle orientation vel velocity pos "
-        "delta jerk heading recovery temp motion"
+        "lin linear user fe fl ned enu earth world ohne without sans senza gravity err error bias offset setpoint "
+        "target std var abs absolute absolutbetrag norm magnitude quat euler roll pitch yaw angle orientation vel "
+        "velocity pos delta jerk heading recovery temp motion"
     ),
     2: "uncal uncalibrated unfilt debug 2 second",
     1: "filt filtered lpf",
@@ -67,7 +67,7 @@ def _plain(text: str) -> str:
 
 
 def _without_axis(name: str) -> tuple[str, int | None]:
-    """Return a name without its axis, and the axis: x, y, z (or 0, 1, 2 in brackets) at the end, in front or between."""
+    """Return a name without its axis, and the axis: x, y, z (0, 1, 2 in brackets) at the end, in front or between."""
     patterns = (
         (r"^(.*?)[\s_\-.]*[\[\(]?([xyzXYZ])[\]\)]?$", (1, 2)),
         (r"^(.*?)[\s_\-.]*\[([012])\]$", (1, 2)),
@@ -124,5 +124,5 @@ def is_time_name(name: str) -> bool:
 
 def says_nothing(base: str) -> bool:
     """Tell a name that could be anything's: none, a letter, a column's number, a word for data."""
-    return re.fullmatch(r"(c|ch|chan|channel|col|column|v|val|value|values|data|d|f|field|raw|in|adc|s|var)?[\s_\-]*\d*",
-                        _plain(base)) is not None  # fmt: skip
+    words = "c|ch|chan|channel|col|column|v|val|value|values|data|d|f|field|raw|in|adc|s|var"
+    return re.fullmatch(rf"({words})?[\s_\-]*\d*", _plain(base)) is not None

@@ -1,4 +1,4 @@
-"""A proposed map. Takes nothing but what was decided; gives it as data and as the text of a TOML map with the reasons."""
+"""A proposed map. Takes what was decided; gives it as data and as the text of a TOML map with the reasons."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from validation.importing.sniffing.decision import Decision
 from validation.importing.sniffing.groups import Triple
 from validation.importing.sniffing.magnitudes import Unit
 
-__all__ = ["ProposedSensor", "Proposal", "map_text"]
+__all__ = ["Proposal", "ProposedSensor", "map_text"]
 
 MIRRORED = -0.5  # a signed permutation's determinant is 1 or -1
 
@@ -87,7 +87,9 @@ def map_text(proposal: Proposal) -> str:
     if clock.column is not None:
         lines += [f"column = {_text(clock.column)}", f"unit = {_text(clock.unit)}"]
     else:
-        lines += [f"step_s = {clock.step}"] + [f"counter = {_text(clock.counter)}"] * (clock.counter is not None)
+        lines += [f"step_s = {clock.step}"] + [
+            f"counter = {_text(name)}" for name in [clock.counter] if name is not None
+        ]
     lines += [
         "",
         "[environment]",

@@ -1,4 +1,4 @@
-"""Shipped maps that were made for a logger. Takes a raw path; gives the shipped map whose files and columns are there."""
+"""Shipped maps that were made for a logger. Takes a raw path; gives the one whose files and columns are there."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
 """Throws in a long log. Takes what was read of it; gives the stretches of free spin with their rows.
 
-The rule. It spins: faster than a turn a second, about one axis, for 0.3 s and two turns at least. It is free: over every
-0.1 s the rate changes by less than twice its size per second. A hand that spins a disc up, catches or drops it changes
-the rate by ten times its size per second and more; air and a bearing by at most half. And no row's specific force differs
-from the one before by 0.5 m/s of velocity or more, which no air force does: that is an impact. A stretch so begins after
-the hand's acceleration has ended and ends before the impact, 0.05 s clear of both.
+The rule. It spins: faster than a turn a second, about one axis, for 0.3 s and two turns at least. It is free: over
+every 0.1 s the rate changes by less than twice its size per second. A hand that spins a disc up, catches or drops it
+changes the rate by ten times its size per second and more; air and a bearing by at most half. And no row's specific
+force differs from the one before by 0.5 m/s of velocity or more, which no air force does: that is an impact. A stretch
+so begins after the hand's acceleration has ended and ends before the impact, 0.05 s clear of both.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def _rate(read: RawReadings) -> tuple[str, FloatArray, FloatArray, BoolArray] | 
         return "gyroscope", t, rate, np.asarray(np.linalg.norm(mean, axis=1) > ONE_AXIS)
     if field is None:
         return None
-    fresh = np.isfinite(field.value).all(axis=1)
+    fresh = np.array(np.isfinite(field.value).all(axis=1))
     fresh[1:] &= np.any(np.diff(field.value, axis=0) != 0, axis=1)  # sampled and held
     t, value = field.time[fresh], field.value[fresh]
     if t.size < 16:

@@ -31,7 +31,7 @@ _BOMS = (
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
 _LOOKED_AT = 1 << 16
-_CONTROL = frozenset(range(32)) - {9, 10, 12, 13, 27}  # what no text has: all but tab, line ends, form feed, escape
+_CONTROL = frozenset(range(1, 32)) - {9, 10, 12, 13, 27}  # what no text has: not tab, line ends, form feed, escape
 
 
 def encoding_of(path: Path) -> str:
@@ -53,10 +53,10 @@ def encoding_of(path: Path) -> str:
         if content.startswith(mark):
             return encoding
     head = content[:_LOOKED_AT]
-    if head.count(0):
-        return _wide(path, head)
     if sum(head.count(byte) for byte in _CONTROL) > 0.01 * len(head):  # a damaged line of a text is far below
         raise InputError.at(path, None, "is binary, no text; expected text with rows of numbers")
+    if head.count(0):
+        return _wide(path, head)
     for encoding in ("utf-8", "cp1252"):
         try:
             content.decode(encoding)

@@ -1,0 +1,198 @@
+"""What a sensor's rows hold besides fresh readings: nothing, one value, a frozen stretch, straight lines, repeats.
+
+Each is said in a sentence; the rows that hold no reading of their own are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from discsim.arrays import BoolArray, FloatArray
+from validation.importing.held import find_held, find_interpolated, fresh_rows
+from validation.importing.timing import row_timing
+
+__all__ = ["Cleaned", "Readings", "body_moves", "cleaned", "frozen_runs"]
+
+#: a sensor that shows one value on this many rows, while the body moves, is dead
+CONSTANT = 50
+#: fewest rows, and times the usual standing of a reading, for which a sensor that moved before stands when it froze
+FROZEN_ROWS, FROZEN_TIMES = 20, 10.0
+#: readings over which the clock of a held sensor is taken as even where one clock does not do for all
+NEARBY = 21
+#: what moves: a rate (rad/s) above any gyroscope's bias; a span of the field (uT) of a quarter turn of the weakest on
+#: Earth; a span of the specific force (m/s^2) of half a g
+MOVES = {"gyroscope": 0.5, "magnetometer": 20.0, "accelerometer": 5.0}
+
+
+class Readings(NamedTuple):
+    """A sensor's sound rows: number (n,), time (n,) s on the file's clock, value (n, k) in recording units and axes."""
+
+    number: FloatArray
+    time: FloatArray
+    value: FloatArray
+
+    def select(self, chosen: BoolArray) -> Readings:
+        """Return the chosen (n,) rows."""
+        return Readings(self.number[chosen], self.time[chosen], self.value[chosen])
+
+
+@dataclass(frozen=True)
+class Cleaned:
+    """The rows that are left, None where none is; the sensor's own rate where it is not the log's; sentences."""
+
+    readings: Readings | None
+    rate_hz: float | None
+    notes: tuple[str, ...]
+
+
+def cleaned(sensor: str, found: Readings, others: Mapping[str, Readings], stamped: bool) -> Cleaned:
+    """Return the fresh readings of a sensor.
+
+    ``others`` are all sensors of the import, which tell whether the body moved; ``stamped`` whether times come from the
+    file's own time stamps.
+    """
+    if problem := nothing_in(sensor, found, others):
+        return Cleaned(None, None, (problem,))
+    notes = [
+        f"{sensor}: {axis} holds no number in any row; that axis is a gap throughout"
+        for axis, column in zip("xyz", found.value.T, strict=False)
+        if found.value.shape[1] == 3 and sensor != "track" and np.all(np.isnan(column))
+    ]
+    total = len(found.time)
+    rate = None
+    line = find_interpolated(found.value)
+    if line is not None:
+        every, first = line
+        found = found.select(np.arange(total) % every == first)
+        notes.append(
+            f"{sensor}: only every {_ordinal(every)} row is a reading, the rows between lie on straight lines: they "
+            f"were interpolated; {total - len(found.time)} of {total} rows are left out"
+        )
+        rate = 1 / row_timing(found.time).interval
+    held = find_held(found.value)
+    standing = 1.0 if held is None else held.rows_per_reading
+    found, said = _thawed(sensor, found, others, standing)
+    notes += said
+    if held is None:
+        return Cleaned(found, rate, tuple(notes))
+    before = len(found.time)
+    row = row_timing(found.time).interval
+    fresh = found.select(fresh_rows(found.value, held))
+    period, time, one_clock = _own_times(fresh.time, held.rows_per_reading, row)
+    even = "the even times of its own clock" if one_clock else "times as even as the rows allow"
+    bear = f"what is left bears {even}, at most a row before the row at which it first shows"
+    per_row = "" if stamped else f" (rows taken as {1 / row:.4g} Hz)"
+    notes.append(
+        f"{sensor}: its readings stand on {held.rows_per_reading:.2f} rows each (sample and hold): it runs at "
+        f"{1 / period:.4g} Hz in a log of {1 / row:.4g} Hz{per_row}; {before - len(fresh.time)} of {before} rows "
+        f"repeat and are left out; {bear}"
+    )
+    return Cleaned(Readings(fresh.number, time, fresh.value), 1 / period, tuple(notes))
+
+
+def _ordinal(number: int) -> str:
+    return {2: "second", 3: "third"}.get(number, f"{number}th")
+
+
+def nothing_in(sensor: str, found: Readings, others: Mapping[str, Readings]) -> str | None:
+    """Return why a sensor is left out of the recording: no number, zeros, one value while the body moves."""
+    value = found.value
+    rows = len(value)
+    if np.all(np.isnan(value)):
+        return f"no {sensor}: none of its {rows} rows holds a number; it is left out"
+    if sensor not in MOVES or rows < CONSTANT or not np.all((value == value[0]) | np.isnan(value)):
+        return None
+    if np.all((value == 0) | np.isnan(value)):
+        return f"no {sensor}: all its {rows} rows are zero, so it was not connected or not read; it is left out"
+    moving = [other for other in MOVES if other != sensor and other in others and body_moves(other, others[other])]
+    if sensor == "magnetometer" and moving:
+        return (
+            f"no {sensor}: it shows one value on all {rows} rows while the {moving[0]} shows that the body moves: "
+            "it is dead; it is left out"
+        )
+    return None
+
+
+def body_moves(sensor: str, found: Readings, start: float = -np.inf, stop: float = np.inf) -> bool:
+    """Tell whether a sensor shows, between two times, that the body moves (`MOVES`)."""
+    value = found.value[(found.time >= start) & (found.time <= stop)]
+    value = value[np.all(np.isfinite(value), axis=1)]
+    if len(value) < 3:
+        return False
+    if sensor == "gyroscope":
+        return bool(np.median(np.linalg.norm(value, axis=1)) > MOVES[sensor])
+    return bool(np.max(np.ptp(value, axis=0)) > MOVES[sensor])
+
+
+def frozen_runs(
+    sensor: str, found: Readings, others: Mapping[str, Readings], standing: float = 1.0
+) -> list[tuple[int, int]]:
+    """Return the first row and the row after the last of each run in which all axes stand while the body moves.
+
+    Another sensor must show the motion. Where none is, nothing is called frozen: a body at rest reads like that.
+    """
+    if sensor not in MOVES or found.value.shape[1] < 2:
+        return []
+    value = found.value
+    same = np.all((value[1:] == value[:-1]) | np.isnan(value[1:]), axis=1) & ~np.all(np.isnan(value[1:]), axis=1)
+    edges = np.flatnonzero(~np.concatenate([[False], same, [False]]))
+    runs = []
+    for first, after in pairwise(edges):
+        if after - first < max(FROZEN_ROWS, FROZEN_TIMES * standing):
+            continue
+        span = (float(found.time[first]), float(found.time[after - 1]))
+        if any(body_moves(name, others[name], *span) for name in MOVES if name != sensor and name in others):
+            runs.append((int(first), int(after)))
+    return runs
+
+
+def _thawed(
+    sensor: str, found: Readings, others: Mapping[str, Readings], standing: float
+) -> tuple[Readings, Sequence[str]]:
+    """Return a sensor's rows without those in which it stood frozen, and what to say."""
+    kept = np.ones(len(found.time), dtype=np.bool_)
+    notes = []
+    zero = min(other.time[0] for other in others.values())
+    runs = frozen_runs(sensor, found, others, standing)
+    for first, after in runs[:5]:
+        ends = "to the end" if after == len(kept) else f"to {found.time[after - 1] - zero:.3f} s"
+        notes.append(
+            f"{sensor}: it shows one value from {found.time[first] - zero:.3f} s {ends} while the body moves: frozen; "
+            f"{after - first - 1} rows become a gap"
+        )
+    if len(runs) > 5:
+        notes.append(f"{sensor}: {len(runs) - 5} more frozen stretches become gaps")
+    for first, after in runs:
+        kept[first + 1 : after] = False
+    return found.select(kept), notes
+
+
+def _own_times(first_shown: FloatArray, rows_per_reading: float, row: float) -> tuple[float, FloatArray, bool]:
+    """Return a held sensor's period (s), the times (n,) of its readings, and whether one even clock explains them all.
+
+    A reading was taken within one row before the row at which it first shows. Where one clock lies within these rows, a
+    line through the counted readings, half a row earlier, is that clock. Else (the two clocks run apart, readings came
+    in bursts) the line is followed over `NEARBY` readings and the times kept within the row before each first row.
+    """
+    # a reading stands on at most one row more than its period, so rows between readings tell the least number of them
+    rows = np.round(np.diff(first_shown) / row)
+    between = np.maximum(1.0, np.ceil((rows - 1) / rows_per_reading - 1e-6))
+    count = np.concatenate([[0.0], np.cumsum(between)])
+    if first_shown.size < 8:
+        return rows_per_reading * row, first_shown - row / 2, False
+    slope, start = np.polyfit(count, first_shown - first_shown[0], 1)
+    late = first_shown - first_shown[0] - (start + slope * count)
+    # lateness is even from 0 to one row; a tenth of a row is left for the stamps' own rounding
+    if np.ptp(late) <= 1.1 * row:
+        return float(slope), np.asarray(first_shown - late - row / 2), True
+    width = min(NEARBY, first_shown.size // 2 * 2 - 1)
+    padded = np.pad(late, width // 2, mode="reflect", reflect_type="odd")
+    smooth = np.convolve(padded, np.ones(width) / width, mode="valid")
+    time = first_shown - late + smooth - row / 2
+    time = np.clip(time, first_shown - 0.99 * row, first_shown)
+    return float(np.median(np.diff(time))), time, False

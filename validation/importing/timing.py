@@ -1,0 +1,77 @@
+"""Late and lost rows, told from the time stamps of one sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+
+__all__ = ["RowTiming", "row_timing"]
+
+#: a row is late where its step differs from the usual one by more than this share (beyond the stamps' own rounding):
+#: stamps in whole milliseconds at 250 Hz are 0.25 of a step apart, which the rounding covers
+LATE = 0.2
+#: rows are missing where a step is at least this many usual ones and the next does not make up for it
+MISSING = 1.5
+#: steps that agree within this are written by a rule, and no clock's: nothing is told from them
+EXACT = 1e-6
+
+
+@dataclass(frozen=True)
+class RowTiming:
+    """What the stamps of a sensor tell.
+
+    Attributes
+    ----------
+    interval : float
+        Time between rows where none is late or missing, s (NaN for a single row).
+    late : int
+        Rows whose stamp is off the even spacing while none is missing.
+    lost : int
+        Rows that are missing, by steps of two or more intervals.
+    breaks : int
+        Places where rows are missing.
+    longest : float
+        The longest step, s.
+    exact : bool
+        Whether the stamps are even to the last digit, apart from missing rows: then they show no late row, for they
+        were made by a rule and not by a clock.
+    """
+
+    interval: float
+    late: int
+    lost: int
+    breaks: int
+    longest: float
+    exact: bool
+
+
+def row_timing(t: FloatArray) -> RowTiming:
+    """Return what ascending stamps (n,) s tell of late and lost rows."""
+    if t.size < 3:
+        nan = float("nan")
+        return RowTiming(float(t[1] - t[0]) if t.size == 2 else nan, 0, 0, 0, nan, True)
+    steps = np.diff(t)
+    usual = float(np.median(steps))
+    # stamps rounded to a third of a step or more tell no lateness of that size; a missing row they still do
+    rounding = min(_decimal(t) / usual, 0.3)
+    near = steps[np.abs(steps / usual - 1) < LATE + rounding]
+    usual = float(np.mean(near))
+    ratio = steps / usual
+    uneven = np.abs(ratio - 1) > LATE + rounding
+    # a late row makes one step long and the next as much too short
+    after = np.append(ratio[1:], 1.0)
+    late_row = (ratio >= MISSING) & (np.abs(ratio + after - 2) <= LATE + rounding)
+    missing = (ratio >= MISSING) & ~late_row
+    lost = int(np.sum(np.round(ratio[missing]) - 1))
+    made_up = np.append(False, late_row[:-1])
+    late = int(np.count_nonzero(uneven & ~missing & ~made_up))
+    exact = bool(np.all(np.abs(ratio - np.round(ratio)) < EXACT * np.maximum(1.0, np.abs(t[1:]) / usual * 1e-3)))
+    return RowTiming(usual, late, lost, int(np.count_nonzero(missing)), float(np.max(steps)), exact)
+
+
+def _decimal(t: FloatArray) -> float:
+    """Return the last decimal place that stamps (n,) s were written to, from 1 s to 1 ns."""
+    return next((10.0**-d for d in range(9) if np.all(np.abs(t - np.round(t, d)) < 1e-10)), 1e-9)
