@@ -7,11 +7,16 @@ from dataclasses import dataclass, field
 from datetime import date
 from types import MappingProxyType
 
+import numpy as np
+
 from discsim.arrays import FloatArray, readonly, vector3
 from discsim.errors import InputError
 from discsim.toml_table import TomlTable
 
-__all__ = ["Environment", "world_magnetic_field"]
+__all__ = ["FIELD_MODEL_SIGMA", "Environment", "world_magnetic_field"]
+
+#: Uncertainty of the World Magnetic Model, uT per component.
+FIELD_MODEL_SIGMA = 0.15
 
 
 @dataclass(frozen=True)
@@ -23,7 +28,7 @@ class Environment:
     gravity : float
         m/s^2.
     magnetic_field : (3,) array
-        Field in North-East-Down, uT.
+        Field in North-East-Down, uT; zeros where it is not known (nowhere on Earth is it below 20 uT).
     air_density : float or None
         kg/m^3; None where no air acts (rigs) or it is unknown.
     wind : (3,) array
@@ -42,6 +47,16 @@ class Environment:
         object.__setattr__(self, "magnetic_field", vector3(self.magnetic_field, "magnetic field (uT)"))
         object.__setattr__(self, "wind", vector3(self.wind, "wind (m/s)"))
         object.__setattr__(self, "sigma", MappingProxyType(dict(self.sigma)))
+
+    @property
+    def field_known(self) -> bool:
+        """Whether the magnetic field is stated."""
+        return bool(np.any(self.magnetic_field))
+
+    @property
+    def field_strength(self) -> float | None:
+        """Strength of the field, uT, or None where it is not known."""
+        return float(np.linalg.norm(self.magnetic_field)) if self.field_known else None
 
     @classmethod
     def from_toml(cls, table: TomlTable, *, air_required: bool) -> Environment:

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from discsim.arrays import BoolArray, FloatArray, readonly
+from discsim.clipping import at_range, clipped
 from discsim.disc import Aero, Disc, Release, Rig, aero_key
 from discsim.environment import Environment
 from discsim.errors import InputError
@@ -137,11 +138,12 @@ class SensorSheet:
         object.__setattr__(self, "sigma", MappingProxyType(dict(self.sigma)))
 
     def clipped(self, value: FloatArray) -> BoolArray:
-        """Tell which readings stand at the stated range (within one and a half steps of resolution)."""
-        if self.range is None:
-            return np.zeros(value.shape, dtype=np.bool_)
-        margin = 1.5 * (self.resolution or 0.0) + 1e-9 * self.range
-        return np.abs(value) >= self.range - margin
+        """Tell which of the sensor's readings, (n, k) or (n,), stand at a limit, stated or found in them."""
+        return clipped(value, self.range, self.resolution)
+
+    def at_range(self, value: FloatArray) -> BoolArray:
+        """Tell which readings stand at the stated range."""
+        return at_range(value, self.range, self.resolution or 0.0)
 
 
 @dataclass(frozen=True)

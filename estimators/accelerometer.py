@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from discsim.arrays import FloatArray, vector3
+from discsim.clipping import step_of
 from discsim.errors import InputError
 from discsim.recording import Samples, SensorSheet
 from estimators.rate import YawRate
@@ -60,7 +61,7 @@ def accelerometer(samples: Samples, sheet: SensorSheet, errors: AccelerometerErr
     the distance from it that of -d_x (on the negative x axis both are exactly (12)). The rate has no sign. Holds for
     r^2 well above p^2, q^2 and |dr/dt| (7); an installation error e in d_x scales the rate by sqrt(1 + e / d_x) (9).
 
-    NaN where the component towards the axis is negative, or x or y is missing or at its range; everywhere if the
+    NaN where the component towards the axis is negative, or x or y is missing or at a limit; everywhere if the
     position is unknown or on the axis.
 
     The standard deviation is one-sided upwards, ``sqrt(r^2 + s) - r`` with s that of r^2: s / (2 r) at high rates,
@@ -73,14 +74,14 @@ def accelerometer(samples: Samples, sheet: SensorSheet, errors: AccelerometerErr
     if sheet.position is None or not np.hypot(*sheet.position[:2]) > 0:
         return YawRate("accelerometer", samples.t, unknown, unknown)
     inward, distance = _inward(sheet.position)
-    plane = samples.value[:, :2]
-    towards_axis = np.where(np.any(sheet.clipped(plane), axis=1), np.nan, plane @ inward[:2])
+    at_limit = np.any(sheet.clipped(samples.value)[:, :2], axis=1)
+    towards_axis = np.where(at_limit, np.nan, samples.value[:, :2] @ inward[:2])
     square = np.where(towards_axis >= 0, towards_axis, np.nan) / distance  # (12)
     rate = np.sqrt(square)
 
     sensitivity, tangential, vertical = _sensitivity_bounds(inward, errors)
     count = np.abs(inward).sum()  # 1 on an axis; a mount error and a bias act along each of x and y
-    noise = np.hypot(sheet.noise_rms or 0.0, (sheet.resolution or 0.0) / np.sqrt(12))
+    noise = np.hypot(sheet.noise_rms or 0.0, (sheet.resolution or step_of(samples.value)) / np.sqrt(12))
     fixed = np.array([errors.bias * count, errors.origin, tangential * errors.origin, vertical * errors.vertical])
     stated = sheet.sigma.get("position_m")
     mount = errors.mount * count / np.sqrt(3) if stated is None else float(np.max(stated))

@@ -18,7 +18,8 @@ from discsim.errors import InputError
 from discsim.recording import Recording, Samples, SensorSheet
 from estimators.likelihood import LEAST, span_of
 from estimators.rate import YawRate
-from estimators.tracking import RateRows, Track, TrackingSettings, joined, tracks_of
+from estimators.tracking import RateRows, Track, TrackingSettings, joined, plain_tracks, tracks_of
+from estimators.usable import remembered
 
 __all__ = [
     "Agreement",
@@ -150,7 +151,7 @@ def centripetal(
     times, value = accelerometer.t[present], accelerometer.value[present, :2]
     if times.size < 8:
         return empty
-    good = ~np.any(sheet.clipped(value), axis=1)
+    good = ~np.any(sheet.clipped(accelerometer.value)[present, :2], axis=1)
     r = np.interp(times, t[known], rate[known], left=np.nan, right=np.nan)
     # a hole in the known rate is no rate
     index = np.clip(np.searchsorted(t[known], times), 1, np.count_nonzero(known) - 1)
@@ -238,7 +239,7 @@ def _gyroscope_rows(recording: Recording, settings: FusionSettings) -> RateRows 
     sheet = recording.sheets["gyroscope"]
     z = gyroscope.value[:, 2]
     # beside a clipped reading the sensor's own filter may still be held
-    clipped = sheet.clipped(z)
+    clipped = sheet.clipped(gyroscope.value)[:, 2]
     beside = clipped | np.roll(clipped, 1) | np.roll(clipped, -1)
     good: BoolArray = np.isfinite(z) & ~beside
     if np.count_nonzero(good) < 4:
@@ -359,12 +360,13 @@ def _compare(
     return agreement, replace(row, sd=np.hypot(row.sd * max(1.0, np.sqrt(chi2)), blur))
 
 
+@remembered
 def _judged(
     recording: Recording, settings: FusionSettings
 ) -> tuple[list[Track], list[Agreement], list[RateRows], tuple[int, bool]]:
     """Return the magnetometer's tracks, every other sensor's agreement, the rows of those that agree, the folding."""
     turns, known = unfolding(recording, settings)
-    tracks = tracks_of(recording, settings.tracking, unfold=turns) if known else []
+    tracks = plain_tracks(recording, settings.tracking, turns) if known else []
     reference = _reference(recording, tracks, settings.tracking)
     agreements, rows = [], []
     gyroscope = _gyroscope_rows(recording, settings)
@@ -412,9 +414,9 @@ def unfolding(recording: Recording, settings: FusionSettings | None = None) -> t
     gyroscope, accelerometer = recording.get("gyroscope"), recording.get("accelerometer")
     if gyroscope is not None:
         z = gyroscope.value[:, 2]
+        clipped = recording.sheets["gyroscope"].clipped(gyroscope.value)[np.isfinite(z), 2]
         z = z[np.isfinite(z)]
         if z.size:
-            clipped = recording.sheets["gyroscope"].clipped(z)
             level = float(np.median(z))
             if np.mean(clipped) < 0.5:
                 votes.append({k for k in candidates if abs(middle + k * fold - level) < 0.1 * fold})
@@ -424,15 +426,15 @@ def unfolding(recording: Recording, settings: FusionSettings | None = None) -> t
         sheet = recording.sheets["accelerometer"]
         radius = float(np.hypot(*sheet.position[:2])) if sheet.position is not None else 0.0
         if radius > 1e-4:
-            value = accelerometer.value[:, :2]
-            value = value[np.all(np.isfinite(value), axis=1)]
-            force = float(np.hypot(*np.mean(value, axis=0)))
+            clipped = np.any(sheet.clipped(accelerometer.value)[:, :2], axis=1)
+            present = np.all(np.isfinite(accelerometer.value[:, :2]), axis=1)
+            clipped, value = clipped[present], accelerometer.value[present, :2]
+            force = float(np.hypot(*np.mean(value, axis=0))) if len(value) else 0.0
             seen = np.sqrt(force / radius)
             bias = settings.accelerometer_bias + 0.05 * force
             low = np.sqrt(max(force - 3 * bias, 0.0) / (radius + 2 * settings.mount))
             high = np.sqrt((force + 3 * bias) / max(radius - 2 * settings.mount, 0.2 * radius))
-            clipped = np.any(sheet.clipped(value), axis=1)
-            if np.mean(clipped) > 0.05:
+            if np.any(present) and np.mean(clipped) > 0.05:
                 high = np.inf
             if seen > 0:
                 votes.append({k for k in candidates if low <= abs(middle + k * fold) <= high})
@@ -456,7 +458,8 @@ def _may_fold(recording: Recording, fold: float) -> bool:
     if accelerometer is not None:
         position = recording.sheets["accelerometer"].position
         if position is not None and np.hypot(*position[:2]) > 1e-4:
-            mean = np.nanmean(accelerometer.value[:, :2], axis=0)
+            present = np.all(np.isfinite(accelerometer.value[:, :2]), axis=1)
+            mean = np.mean(accelerometer.value[present, :2], axis=0) if np.any(present) else np.zeros(2)
             if float(np.sqrt(np.hypot(*mean) / np.hypot(*position[:2]))) > 0.4 * fold:
                 return True
     return False
@@ -521,7 +524,10 @@ def accelerometer_calibrated(recording: Recording, settings: FusionSettings | No
     accelerometer = recording.need("accelerometer")
     sheet = recording.sheets["accelerometer"]
     if sheet.position is None or float(np.hypot(*sheet.position[:2])) < 1e-4:
-        raise InputError(f"{recording.path or recording.name}: the accelerometer's position_m is needed, off the axis")
+        raise InputError(
+            "the accelerometer's place off the spin axis is not stated; add position_m = [x, y, z] to "
+            "[sensors.accelerometer] of recording.toml, or to the import map"
+        )
     blank = np.full(len(accelerometer), np.nan)
     unknown = YawRate("accelerometer_calibrated", accelerometer.t, blank, blank)
     if "magnetometer" in recording:
@@ -546,7 +552,7 @@ def _rough_rate(accelerometer: Samples, sheet: SensorSheet) -> FloatArray:
     assert sheet.position is not None
     present = np.all(np.isfinite(accelerometer.value[:, :2]), axis=1)
     value = np.where(present[:, None], accelerometer.value[:, :2], 0.0)
-    width = max(3, round(0.5 / accelerometer.interval))
+    width = min(max(3, round(0.5 / accelerometer.interval)), len(accelerometer))
     kernel = np.ones(width) / width
     count = np.maximum(np.convolve(present.astype(float), kernel, mode="same"), 1e-9)
     mean = np.stack([np.convolve(value[:, i], kernel, mode="same") / count for i in range(2)], axis=1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.clipping import SAME, step_of
 from discsim.recording import Samples, SensorSheet
 from estimators.rate import YawRate
 
@@ -17,12 +18,12 @@ MEDIAN_TO_SD = 1.4826
 def gyroscope(samples: Samples, sheet: SensorSheet) -> YawRate:
     """Rate about +z_B as the gyroscope gives it, signed; ``samples.value`` is (n, 3) rad/s.
 
-    NaN where z is missing or stands at its range (an MPU-9250 clips at 2000 deg/s). The standard deviation is the
-    noise alone, the larger of stated and observed: scale and bias, which a data sheet gives as a spread over parts and
-    which need a rate table to be known, are not in it.
+    NaN where z is missing or stands at a limit, stated or not (an MPU-9250 clips at 2000 deg/s). The standard deviation
+    is the noise alone, the larger of stated and observed, and the rounding to the resolution, stated or observed: scale
+    and bias, which a data sheet gives as a spread over parts and which need a rate table to be known, are not in it.
     """
-    z = samples.value[:, 2]
-    return _measured("gyroscope", samples.t, np.where(sheet.clipped(z), np.nan, z), sheet)
+    z = np.where(sheet.clipped(samples.value)[:, 2], np.nan, samples.value[:, 2])
+    return _measured("gyroscope", samples.t, z, sheet)
 
 
 def rate_reference(samples: Samples, sheet: SensorSheet) -> YawRate:
@@ -36,7 +37,9 @@ def rate_reference(samples: Samples, sheet: SensorSheet) -> YawRate:
 
 def _measured(method: str, t: FloatArray, rate: FloatArray, sheet: SensorSheet) -> YawRate:
     noise = max(sheet.noise_rms or 0.0, _observed_noise(rate))
-    sd = np.hypot(noise, (sheet.resolution or 0.0) / np.sqrt(12))
+    # a number of six digits is rounded, too
+    least = SAME * float(np.max(np.abs(rate[np.isfinite(rate)]), initial=0.0))
+    sd = np.hypot(noise, max(sheet.resolution or step_of(rate[:, None]), least) / np.sqrt(12))
     return YawRate(method, t, rate, np.where(np.isfinite(rate), sd, np.nan), signed=True)
 
 

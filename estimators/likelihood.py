@@ -16,7 +16,7 @@ import numpy as np
 from discsim.arrays import BoolArray, FloatArray
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples, SensorSheet
-from estimators.precession import AxialField, axial_field, transverse_rates
+from estimators.precession import AxialField, axial_field, transverse_gyroscope, transverse_rates
 from estimators.rate import YawRate
 from estimators.tone import ComplexArray, field_shape, fit_tone
 
@@ -127,15 +127,13 @@ def likelihood(recording: Recording, settings: LikelihoodSettings | None = None)
     Raises `InputError` if the recording has no magnetometer, or one of fewer than `LEAST` readings.
     """
     span_of(recording)
-    magnetometer = recording.need("magnetometer")
-    field = recording.environment.magnetic_field
     return likelihood_from_samples(
-        magnetometer,
+        recording.need("magnetometer"),
         settings,
         sheet=recording.sheets.get("magnetometer"),
-        gyroscope=recording.get("gyroscope"),
+        gyroscope=transverse_gyroscope(recording),
         gyroscope_sheet=recording.sheets.get("gyroscope"),
-        field=None if field is None else float(np.linalg.norm(field)),
+        field=recording.environment.field_strength,
         fixed_axis=recording.plant in ("rate_table", "spin_down"),
     )
 
@@ -209,15 +207,23 @@ def usable_field(magnetometer: Samples, sheet: SensorSheet | None = None) -> tup
 
 
 def window_centres(t: FloatArray, settings: LikelihoodSettings) -> FloatArray:
-    """Return the centres of the windows; a recording shorter than one window has its middle."""
+    """Return the centres of the windows; a stretch of readings shorter than one window has its middle.
+
+    A hole longer than the longest window parts two stretches: a clock that jumps by years leaves no windows between.
+    """
     if t.size == 0:
         return np.zeros(0)
     interval = float(np.median(np.diff(t))) if t.size > 1 else 0.0
-    span = float(t[-1] - t[0]) + interval
-    if span <= settings.window * (1 + 1e-9):
-        return np.array([0.5 * (t[0] + t[-1])])
-    first = t[0] + 0.5 * (settings.window - interval)
-    return np.asarray(np.arange(first, t[-1] - 0.5 * (settings.window - interval) + 1e-9, settings.step))
+    holes = 1 + np.flatnonzero(np.diff(t) > max(settings.longest_window, settings.window))
+    stretches = [(t[i], t[j - 1]) for i, j in zip([0, *holes], [*holes, t.size], strict=True)]
+    return np.concatenate([_centres(float(start), float(stop), interval, settings) for start, stop in stretches])
+
+
+def _centres(start: float, stop: float, interval: float, settings: LikelihoodSettings) -> FloatArray:
+    if stop - start + interval <= settings.window * (1 + 1e-9):
+        return np.array([0.5 * (start + stop)])
+    inset = 0.5 * (settings.window - interval)
+    return np.asarray(np.arange(start + inset, stop - inset + 1e-9, settings.step))
 
 
 def fit_windows(

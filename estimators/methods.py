@@ -14,13 +14,26 @@ from discsim.errors import InputError
 from discsim.recording import Recording
 from estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors, accelerometer
 from estimators.fft import FftSettings, fft
-from estimators.fusion import accelerometer_calibrated, fusion
+from estimators.fusion import accelerometer_calibrated, contradictions, fusion
 from estimators.gyroscope import gyroscope, rate_reference
 from estimators.likelihood import likelihood
 from estimators.rate import YawRate
 from estimators.tracking import tracking
+from estimators.usable import FASTEST, Usable, unclipped, usable
 
-__all__ = ["METHODS", "Method", "Options", "best", "estimate", "folding_notes", "missing_sensors", "sampling_notes"]
+__all__ = [
+    "METHODS",
+    "Method",
+    "Options",
+    "all_methods",
+    "best",
+    "best_of",
+    "estimate",
+    "field_notes",
+    "folding_notes",
+    "missing_sensors",
+    "sampling_notes",
+]
 
 #: `best` takes the first method that knows the rate for at least this share of its samples.
 ENOUGH = 0.5
@@ -48,7 +61,8 @@ class Method(NamedTuple):
 
 
 def _fft(recording: Recording, options: Options) -> YawRate:
-    return fft(recording.need("magnetometer"), options.fft)
+    field = unclipped(recording, "magnetometer")
+    return fft(recording.need("magnetometer") if field is None else field, options.fft)
 
 
 def _accelerometer(recording: Recording, options: Options) -> YawRate:
@@ -87,14 +101,55 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 def estimate(recording: Recording, name: str, options: Options | None = None) -> YawRate:
     """Spin rate of a recording by the method of that name, or by `best`.
 
-    Raises `InputError` for an unknown name (listing those there are), a missing sensor, or what the method raises.
+    What no estimator may use is taken out first (`estimators.usable`). Raises `InputError` for an unknown name (listing
+    those there are), a missing sensor, or what the method raises.
     """
     options = options or Options()
     if name == "best":
         return best(recording, options)
     if name not in METHODS:
         raise InputError(f"no method '{name}'; expected one of best, {', '.join(METHODS)}")
-    return METHODS[name].estimate(recording, options)
+    return _estimate(usable(recording), name, options)
+
+
+def _estimate(sound: Usable, name: str, options: Options) -> YawRate:
+    for sensor in METHODS[name].sensors:
+        if sensor in sound.gone:
+            raise InputError(f"{sensor}: {sound.gone[sensor]}")
+    found = METHODS[name].estimate(sound.recording, options)
+    with np.errstate(invalid="ignore"):
+        possible = (np.abs(found.rate) <= FASTEST) & (found.sd <= FASTEST)
+    if np.all(possible | np.isnan(found.rate)):
+        return found
+    rate, sd = np.where(possible, found.rate, np.nan), np.where(possible, found.sd, np.nan)
+    return replace(found, rate=rate, sd=sd)
+
+
+def all_methods(recording: Recording, options: Options | None = None) -> tuple[list[YawRate], dict[str, str]]:
+    """Return what every method gives, and the methods left out, each with the reason in a sentence.
+
+    Raises `InputError` where no method can be used.
+    """
+    options, sound = options or Options(), usable(recording)
+    rates: list[YawRate] = []
+    left_out: dict[str, str] = {}
+    for name in METHODS:
+        if absent := missing_sensors(recording, name):
+            left_out[name] = f"no {', '.join(absent)} in the recording"
+            continue
+        try:
+            found = _estimate(sound, name, options)
+        except InputError as error:
+            left_out[name] = str(error)
+            continue
+        if np.any(np.isfinite(found.rate)):
+            rates.append(found)
+        else:
+            left_out[name] = _why_unknown(sound.recording, name)
+    if not rates:
+        reasons = "; ".join(f"{method}: {reason}" for method, reason in left_out.items())
+        raise InputError(f"{recording.path or recording.name}: no method tells the spin ({reasons})")
+    return rates, left_out
 
 
 def best(recording: Recording, options: Options | None = None) -> YawRate:
@@ -103,24 +158,70 @@ def best(recording: Recording, options: Options | None = None) -> YawRate:
     A gyroscope that clips for most of a recording thus gives way to a magnetometer. The result bears the name of the
     method taken. Raises `InputError` where no method can be used, with each one's reason.
     """
-    options = options or Options()
-    reasons, candidates = [], []
-    for name, method in METHODS.items():
+    return best_of(recording, options)[0]
+
+
+def best_of(recording: Recording, options: Options | None = None) -> tuple[YawRate, dict[str, str]]:
+    """Return the rate of `best`, and why each method that it prefers to the one taken was passed over."""
+    options, sound = options or Options(), usable(recording)
+    reasons: dict[str, str] = {}
+    candidates: list[tuple[float, YawRate]] = []
+    for name in METHODS:
         if absent := missing_sensors(recording, name):
-            reasons.append(f"{name}: no {', '.join(absent)}")
+            reasons[name] = f"no {', '.join(absent)}"
             continue
         try:
-            candidate = method.estimate(recording, options)
+            candidate = _estimate(sound, name, options)
         except InputError as error:
-            reasons.append(str(error))
+            reasons[name] = str(error)
             continue
-        share = float(np.mean(np.isfinite(candidate.rate)))
+        share = float(np.mean(np.isfinite(candidate.rate))) if len(candidate) else 0.0
         if share >= ENOUGH:
-            return candidate
-        candidates.append((share, candidate))
+            return candidate, reasons
+        if share > 0:
+            reasons[name] = f"knows the rate for {100 * share:.2g} % of its times only"
+            candidates.append((share, candidate))
+        else:
+            reasons[name] = _why_unknown(sound.recording, name)
     if not candidates:
-        raise InputError(f"{recording.path or recording.name}: no method can be used ({'; '.join(reasons)})")
-    return max(candidates, key=lambda pair: pair[0])[1]  # of equals the first, which is the one preferred
+        told = "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
+        raise InputError(f"{recording.path or recording.name}: no method can be used ({told})")
+    taken = max(candidates, key=lambda pair: pair[0])[1]  # of equals the first, which is the one preferred
+    return taken, {name: reason for name, reason in reasons.items() if name != taken.method}
+
+
+def field_notes(recording: Recording) -> list[str]:
+    """Say what is lost where the magnetic field of the place is not stated."""
+    if "magnetometer" not in recording or recording.environment.field_known:
+        return []
+    return [
+        "the magnetic field of the place is not stated: hard iron along the spin axis is then hardly known, and of the "
+        "magnetometer's methods the standard deviation is larger; --place LAT,LON --date YYYY-MM-DD looks it up"
+    ]
+
+
+def _why_unknown(recording: Recording, name: str) -> str:
+    """Say why a method knows the rate at no time, by what its sensors show."""
+    for sensor in METHODS[name].sensors:
+        samples, sheet = recording.need(sensor), recording.sheets[sensor]
+        axes = {"gyroscope": [2], "accelerometer": [0, 1]}.get(sensor, [0])
+        value = samples.value if samples.value.ndim == 2 else samples.value[:, None]
+        known = np.any(np.isfinite(value[:, axes]), axis=0)
+        letters = " and ".join("xyz"[axis] for axis in axes)
+        if not np.any(known):
+            return f"the {sensor} has no usable reading of {letters}"
+        if np.all(np.any(sheet.clipped(value)[:, axes], axis=1) | ~np.isfinite(value[:, axes]).all(axis=1)):
+            return f"the {sensor}'s {letters} stands at its limit in every reading: the spin is beyond what it can show"
+        if sensor == "accelerometer" and (sheet.position is None or not np.hypot(*sheet.position[:2]) > 0):
+            return (
+                "the accelerometer's place off the spin axis is not stated; add position_m = [x, y, z] to "
+                "[sensors.accelerometer] of recording.toml, or to the import map"
+            )
+    if name in ("fusion", "accelerometer_calibrated"):
+        against = contradictions(recording)
+        if against:
+            return f"its sensors contradict each other: {'; '.join(against)}"
+    return "no part of the recording shows a spin to it"
 
 
 def missing_sensors(recording: Recording, name: str) -> tuple[str, ...]:
@@ -136,6 +237,8 @@ def sampling_notes(recording: Recording) -> list[str]:
     notes = []
     for sensor, samples in recording.samples.items():
         stated = recording.sheets[sensor].rate_hz
+        if len(samples) < 2:
+            continue
         found = 1 / samples.interval
         if abs(found / stated - 1) > RATE_TOLERANCE:
             notes.append(f"{sensor}: time stamps say {found:.4g} Hz, its sheet {stated:.4g} Hz; the stamps are used")

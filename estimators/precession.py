@@ -14,10 +14,11 @@ from scipy.interpolate import make_interp_spline
 
 from discsim.arrays import FloatArray
 from discsim.errors import InputError
-from discsim.recording import Samples
+from discsim.recording import Recording, Samples
 from estimators.tone import ComplexArray
+from estimators.usable import unclipped
 
-__all__ = ["AxialField", "axial_field", "phase_rate", "transverse_rates"]
+__all__ = ["AxialField", "axial_field", "phase_rate", "transverse_gyroscope", "transverse_rates"]
 
 
 def phase_rate(m: FloatArray, w: FloatArray) -> FloatArray:
@@ -66,6 +67,19 @@ def axial_field(amplitude: FloatArray, axial: FloatArray, strength: float | None
 HARD_IRON_SD = 20.0
 #: Relative standard deviation of the strength of the field that the sensor should show: its own scale, mostly.
 STRENGTH_SD = 0.01
+
+
+#: A gyroscope shows p and q where it has both for this share of its readings at least.
+SHOWN = 0.5
+
+
+def transverse_gyroscope(recording: Recording) -> Samples | None:
+    """Return a recording's gyroscope, with gaps where it clips, or None where it does not show p and q."""
+    gyroscope = unclipped(recording, "gyroscope")
+    if gyroscope is None or len(gyroscope) < 6:
+        return None
+    both = np.isfinite(gyroscope.value[:, 0]) & np.isfinite(gyroscope.value[:, 1])
+    return gyroscope if np.count_nonzero(both) >= max(6, SHOWN * both.size) else None
 
 
 def transverse_rates(gyroscope: Samples, t: FloatArray, step: float = 0.0025) -> tuple[ComplexArray, int]:

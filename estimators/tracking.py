@@ -23,11 +23,22 @@ from discsim.compiled import compiled
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples
 from estimators.likelihood import LEAST, LikelihoodSettings, ToneFit, fit_windows, span_of, usable_field, window_centres
-from estimators.precession import STRENGTH_SD, AxialField, axial_field, transverse_rates
+from estimators.precession import STRENGTH_SD, AxialField, axial_field, transverse_gyroscope, transverse_rates
 from estimators.rate import YawRate
 from estimators.spin_spline import IndexArray, SpinSpline
+from estimators.usable import remembered, unclipped
 
-__all__ = ["RateRows", "Track", "TrackingSettings", "joined", "track_bound", "track_spin", "tracking", "tracks_of"]
+__all__ = [
+    "RateRows",
+    "Track",
+    "TrackingSettings",
+    "joined",
+    "plain_tracks",
+    "track_bound",
+    "track_spin",
+    "tracking",
+    "tracks_of",
+]
 
 
 @dataclass(frozen=True)
@@ -226,10 +237,11 @@ class _Problem:
         self.spline = SpinSpline.over(float(t[0]), float(t[-1]), settings.knots)
         self.despun = gyroscope is None
         if gyroscope is not None:
+            finest = max(finest, float(np.median(np.diff(t))) / MOST_SUBSTEPS)
             rates, self.substeps = transverse_rates(gyroscope, t, finest)
             self.w = np.where(np.isfinite(rates), rates, 0.0).ravel()
         else:
-            self.substeps = max(1, int(np.ceil(float(np.median(np.diff(t))) / finest)))
+            self.substeps = min(max(1, int(np.ceil(float(np.median(np.diff(t))) / finest))), MOST_SUBSTEPS)
             self.w = np.zeros((t.size - 1) * self.substeps, dtype=complex)
         fraction = (np.arange(self.substeps) + 0.5) / self.substeps
         self.h = np.repeat(np.diff(t) / self.substeps, self.substeps)
@@ -424,6 +436,12 @@ class _Linear:
 #: steady change of rate is likelier than a rough one.
 _GRID = np.logspace(-10, 7, 35)
 
+#: Most sub-steps between readings: 0.7 s in steps of 5 ms, and at 100 Hz a quarter of a radian at 500 turns a second.
+MOST_SUBSTEPS = 140
+
+#: Longest span, s, of which every step has an answer, be it that nothing is known: a day, which is 1.7 million.
+LONGEST = 86400.0
+
 #: Least spectral density of r'', over r^2, where precession is unseen: r'/r changes by a third of 1/18 s in 5 s.
 _CHANGE = 5.0 * (0.33 / 18.0 / 5.0) ** 2
 
@@ -455,6 +473,8 @@ def _linearise(
         information += np.outer(gradient, gradient)
         right += gradient * gap
         cost += gap**2
+    if not (np.isfinite(cost) and np.all(np.isfinite(information))):
+        raise np.linalg.LinAlgError("the fit has left the numbers")
     return _Linear(information, right, cost), residual, psi
 
 
@@ -775,7 +795,13 @@ def tracking(recording: Recording, settings: TrackingSettings | None = None) -> 
     """
     settings = settings or TrackingSettings()
     span = span_of(recording)
-    return joined("tracking", tracks_of(recording, settings), settings, span)
+    return joined("tracking", plain_tracks(recording, settings, 0), settings, span)
+
+
+@remembered
+def plain_tracks(recording: Recording, settings: TrackingSettings, unfold: int) -> list[Track]:
+    """Return `tracks_of` the magnetometer, without other sensors' readings of the rate."""
+    return tracks_of(recording, settings, unfold=unfold)
 
 
 def tracks_of(
@@ -789,9 +815,9 @@ def tracks_of(
     magnetometer = recording.need("magnetometer")
     sheet = recording.sheets.get("magnetometer")
     t, m = usable_field(magnetometer, sheet)
-    gyroscope = recording.get("gyroscope")
+    gyroscope = transverse_gyroscope(recording)
     fixed_axis = recording.plant in ("rate_table", "spin_down")
-    strength = float(np.linalg.norm(recording.environment.magnetic_field))
+    strength = recording.environment.field_strength
     if t.size < LEAST:
         return []
     windows = LikelihoodSettings(window=settings.window, step=settings.window / 8, degree=1)
@@ -802,11 +828,14 @@ def tracks_of(
     if gyroscope is not None and not fixed_axis and unfold == 0:
         turned = fit_windows(t, m, centres, windows, gyroscope=gyroscope, axial=axial, start=fits)
         fits = turned if np.any(np.isfinite(turned.phase_rate)) else fits
+    size = float(np.median(np.linalg.norm(m, axis=1))) if strength is None else strength
     noise = None
     if sheet is not None and sheet.noise_rms is not None:
         noise = float(np.hypot(sheet.noise_rms, (sheet.resolution or 0.0) / np.sqrt(12)))
     tracks = []
-    for first, last, rate in _runs(t, replace(fits, phase_rate=fits.phase_rate - fold), gyroscope, recording):
+    for first, last, rate in _runs(
+        t, replace(fits, phase_rate=fits.phase_rate - fold), unclipped(recording, "gyroscope")
+    ):
         for start, stop in _segments(t[first:last], settings):
             chosen = slice(
                 first + int(np.searchsorted(t[first:last], start - 1e-9)),
@@ -826,7 +855,7 @@ def tracks_of(
                 axial=axial,
                 rows=_between(rows or [], float(t[chosen][0]), float(t[chosen][-1])),
                 noise=noise,
-                walk=_walk(recording, noise, strength, stop - start),
+                walk=_walk(recording, noise, size, stop - start),
             )
             if track is not None:
                 tracks.append(track)
@@ -863,9 +892,7 @@ def _between(rows: list[RateRows], start: float, stop: float) -> list[RateRows]:
     return out
 
 
-def _runs(
-    t: FloatArray, fits: ToneFit, gyroscope: Samples | None, recording: Recording
-) -> list[tuple[int, int, FloatArray]]:
+def _runs(t: FloatArray, fits: ToneFit, gyroscope: Samples | None) -> list[tuple[int, int, FloatArray]]:
     """Return stretches of the readings, as index ranges, over which the turns can be counted, with a first rate.
 
     Between windows that are less than a second apart, or where the gyroscope's z is within its range, the rate is
@@ -876,7 +903,7 @@ def _runs(
     lengths = fits.length[known]
     if gyroscope is not None:
         z = gyroscope.value[:, 2]
-        good = np.isfinite(z) & ~recording.sheets["gyroscope"].clipped(z)
+        good = np.isfinite(z)
         smooth = np.interp(t, gyroscope.t[good], z[good]) if np.count_nonzero(good) > 1 else np.full(t.size, np.nan)
         near = np.zeros(t.size, dtype=bool)
         if np.count_nonzero(good) > 1:
@@ -886,10 +913,16 @@ def _runs(
     else:
         smooth, near = np.full(t.size, np.nan), np.zeros(t.size, dtype=bool)
     covered = near.copy()
-    for centre, length in zip(times, lengths, strict=True):
-        covered |= np.abs(t - centre) <= 0.5 * length + 0.25
+    reach = 0.5 * lengths + 0.25
+    for first, last in zip(np.searchsorted(t, times - reach), np.searchsorted(t, times + reach, "right"), strict=True):
+        covered[first:last] = True
     rate = np.interp(t, times, rates) if times.size else np.where(near, smooth, 0.0)
-    distance = np.min(np.abs(np.subtract.outer(t, times)), axis=1) if times.size else np.full(t.size, np.inf)
+    distance = np.full(t.size, np.inf)
+    if times.size:
+        after = (
+            np.clip(np.searchsorted(times, t), 1, max(times.size - 1, 1)) if times.size > 1 else np.zeros(t.size, int)
+        )
+        distance = np.minimum(np.abs(t - times[after]), np.abs(t - times[np.maximum(after - 1, 0)]))
     # where no window tells, the gyroscope does; where both do, it tells how many turns a slow sampling missed
     fold = 2 * np.pi / float(np.median(np.diff(t)))
     missed = np.where(near, np.rint((np.nan_to_num(smooth) - rate) / fold), 0.0)
@@ -909,8 +942,8 @@ def joined(method: str, tracks: list[Track], settings: TrackingSettings, span: t
 
     ``span`` is the recording's first and last time, s; the answers stand at whole steps within it.
     """
-    first, last = int(np.ceil(span[0] / settings.step - 1e-9)), int(np.floor(span[1] / settings.step + 1e-9))
-    grid = settings.step * np.arange(first, last + 1, dtype=np.float64)
+    steps = _answers(tracks, settings, span)
+    grid = settings.step * steps
     rate, sd = np.full(grid.size, np.nan), np.full(grid.size, np.nan)
     for index, track in enumerate(tracks):
         good = _trusted(track, settings)
@@ -918,9 +951,19 @@ def joined(method: str, tracks: list[Track], settings: TrackingSettings, span: t
             good &= track.t > 0.5 * (tracks[index - 1].times[-1] + track.times[0])
         if index + 1 < len(tracks):
             good &= track.t <= 0.5 * (track.times[-1] + tracks[index + 1].times[0])
-        place = np.rint(track.t[good] / settings.step).astype(int) - first
+        place = np.searchsorted(steps, np.rint(track.t[good] / settings.step))
         rate[place], sd[place] = track.rate[good], track.sd[good]
     return YawRate(method, grid, rate, sd, signed=True)
+
+
+def _answers(tracks: list[Track], settings: TrackingSettings, span: tuple[float, float]) -> FloatArray:
+    """Return which whole steps are answered: all of the span, or, where that is longer than `LONGEST`, the tracks'."""
+    first, last = np.ceil(span[0] / settings.step - 1e-9), np.floor(span[1] / settings.step + 1e-9)
+    if span[1] - span[0] <= LONGEST:
+        return np.asarray(np.arange(first, last + 1, dtype=np.float64))
+    # a clock that jumps by years: no answers by the billion that say nothing
+    told = [np.rint(track.t / settings.step) for track in tracks]
+    return np.unique(np.concatenate([[first, last], *told]))
 
 
 def _trusted(track: Track, settings: TrackingSettings) -> BoolArray:

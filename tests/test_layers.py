@@ -16,6 +16,7 @@ MAY_IMPORT = {
     "estimators": (
         "estimators",
         "discsim.arrays",
+        "discsim.clipping",
         "discsim.compiled",
         "discsim.disc",
         "discsim.errors",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from datetime import date
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
@@ -13,7 +14,7 @@ from discsim.arrays import FloatArray, readonly
 from discsim.disc import Disc
 from discsim.effects.catalogue import Effect, by_id, effect
 from discsim.effects.own import UserEffect
-from discsim.environment import Environment
+from discsim.environment import FIELD_MODEL_SIGMA, Environment, world_magnetic_field
 from discsim.errors import InputError
 from discsim.law import WRENCH_TARGETS, Law
 from discsim.model_file import Model, read_model
@@ -21,13 +22,16 @@ from discsim.recording import Plant
 from discsim.shipped import load_disc, load_site
 
 __all__ = [
+    "DateOption",
     "EffectOption",
     "ModelOption",
     "OutOption",
+    "PlaceOption",
     "SeedOption",
     "SiteOption",
     "WithOption",
     "all_effects",
+    "at_place",
     "at_site",
     "disc_to_fly",
     "laws_upon",
@@ -47,6 +51,18 @@ EffectOption: TypeAlias = Annotated[
 
 SiteOption: TypeAlias = Annotated[
     str | None, typer.Option("--site", help="A shipped place's name or a TOML file: its magnetic field is taken.")
+]
+
+PlaceOption: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--place",
+        metavar="LAT,LON",
+        help="Where it was recorded, degrees north and east: the World Magnetic Model gives the field there.",
+    ),
+]
+DateOption: TypeAlias = Annotated[
+    str | None, typer.Option("--date", metavar="YYYY-MM-DD", help="When it was recorded, with --place.")
 ]
 
 ModelOption: TypeAlias = Annotated[
@@ -135,6 +151,28 @@ def at_site(environment: Environment, site: str | None) -> Environment:
     if site is None:
         return environment
     return replace(environment, magnetic_field=load_site(site).environment.magnetic_field)
+
+
+def at_place(environment: Environment, place: str | None, day: str | None) -> Environment:
+    """Return the environment with the World Magnetic Model's field at ``--place`` on ``--date``, or as it is.
+
+    Raises `InputError` for one without the other, and for what is no place or no date.
+    """
+    if place is None and day is None:
+        return environment
+    if place is None or day is None:
+        raise InputError("--place LAT,LON and --date YYYY-MM-DD belong together: the field changes with the years")
+    try:
+        latitude, longitude = (float(part) for part in place.split(","))
+    except ValueError:
+        raise InputError(f"--place {place}: expected LAT,LON, degrees north and east, such as 52.52,13.41") from None
+    try:
+        when = date.fromisoformat(day)
+    except ValueError:
+        raise InputError(f"--date {day}: expected YYYY-MM-DD, such as 2025-08-31") from None
+    field = world_magnetic_field(latitude, longitude, when)
+    sigma = {**environment.sigma, "magnetic_field_ned_uT": FIELD_MODEL_SIGMA}
+    return replace(environment, magnetic_field=field, sigma=sigma)
 
 
 def parse_effects(

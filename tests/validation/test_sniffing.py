@@ -474,7 +474,7 @@ def test_a_shipped_map_that_was_made_for_the_logger_is_taken_and_said(monkeypatc
     columns = [("time_s", log.t), *three(["x_rad_s", "y_rad_s", "z_rad_s"], log.gyro)]
     raw = write_table(tmp_path / "in" / "gyroscope.csv", columns)
     assert run(monkeypatch, "import", raw.parent, "--out", tmp_path / "out") == 0
-    assert "the shipped map 'csv' was made for these columns" in capsys.readouterr().err
+    assert "taken: the shipped map 'csv', made for these columns" in capsys.readouterr().err
     assert not (tmp_path / "out" / "map.toml").exists()
     assert run(monkeypatch, "import", raw.parent, "--map", "sniff", "--out", tmp_path / "out2") == 0
     assert_allclose(read_recording(tmp_path / "out2").samples["gyroscope"].value, log.gyro, atol=1e-6)

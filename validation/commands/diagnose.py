@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from validation.options import OutOption, SeedOption
+from validation.options import DateOption, OutOption, PlaceOption, SeedOption
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -38,6 +38,8 @@ def command(
             "--candidates", help="A TOML file of recordings that you could make, to choose the next one from."
         ),
     ] = None,
+    place: PlaceOption = None,
+    date: DateOption = None,
 ) -> None:
     """Tell whether the baseline explains recordings down to their noise, and if not, what was left out.
 
@@ -46,19 +48,25 @@ def command(
 
     Example: discsim diagnose open-field --out open-field-diagnosis
     """
+    from dataclasses import replace
     from importlib import import_module
 
     from discsim.effects.own import load_user_effects
-    from validation.diagnosis.datasets import read_datasets
+    from validation.diagnosis.datasets import need_field, read_datasets
     from validation.diagnosis.plans import read_plans
     from validation.diagnosis.progress import shown
     from validation.diagnosis.report import verdict_sentence
+    from validation.options import at_place
     from validation.run import start_run
 
     diagnose = import_module("validation.diagnosis").diagnose
     files = user_effects or []
     effects = load_user_effects(files)
     recordings, names = read_datasets(datasets)
+    recordings = [
+        [replace(one, environment=at_place(one.environment, place, date)) for one in set_] for set_ in recordings
+    ]
+    need_field(recordings)
     plans = None
     if candidates is not None:
         plans = read_plans(candidates, recordings[0][0].plant)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from validation.options import OutOption
+from validation.options import DateOption, OutOption, PlaceOption
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from estimators.rate import YawRate
     from validation.comparison import Disagreement
 
-__all__ = ["command", "estimate_all", "rate_csv", "summary"]
+__all__ = ["all_notes", "command", "estimate_all", "rate_csv", "summary"]
 
 
 def command(
@@ -38,24 +38,29 @@ def command(
         bool, typer.Option("--remove-mean", help="fft: take each window's mean off first; the paper does not.")
     ] = False,
     mount_error: Annotated[float, typer.Option(help="accelerometer: bound on its installation error, mm.")] = 1.0,
+    place: PlaceOption = None,
+    date: DateOption = None,
 ) -> None:
     """Estimate the spin rate of a recording and its standard deviation over time.
 
     Writes rate.csv (time_s,method,rate_rad_s,sd_rad_s; a cell is empty where a method cannot tell), rate.png and
     estimate.json into --out. fft and accelerometer give magnitudes. Methods that contradict each other beyond their
-    standard deviations are named, not averaged.
+    standard deviations are named, not averaged. No method needs the magnetic field of the place; where it is stated,
+    or looked up by --place and --date, the magnetometer's methods know more.
 
     Example: discsim estimate throw-01 --method all --out throw-01-rate
     """
+    from dataclasses import replace
+
     import numpy as np
 
     from discsim.files import write_text
     from discsim.recording import read_recording
     from estimators.accelerometer import AccelerometerErrors
     from estimators.fft import FftSettings
-    from estimators.fusion import contradictions
-    from estimators.methods import Options, folding_notes, sampling_notes
+    from estimators.methods import Options
     from validation.comparison import disagreements
+    from validation.options import at_place
     from validation.run import start_run
 
     zeros = max(0, 2**14 - window) if pad is None else pad
@@ -64,8 +69,9 @@ def command(
         AccelerometerErrors(mount=mount_error / 1000),
     )
     data = read_recording(recording)
+    data = replace(data, environment=at_place(data.environment, place, date))
     rates, left_out = estimate_all(data, method, options)
-    notes = sampling_notes(data) + folding_notes(data) + contradictions(data)
+    notes = all_notes(data)
     found = disagreements(rates)
     with start_run(out, inputs=[recording]) as run:
         write_text(out / "rate.csv", rate_csv(rates))
@@ -98,31 +104,32 @@ def draw(rates: Sequence[YawRate], name: str, path: Path) -> None:
 
 
 def estimate_all(recording: Recording, name: str, options: Options) -> tuple[list[YawRate], dict[str, str]]:
-    """Return what the named method gives (of all for "all"), and the methods left out with the reason.
+    """Return what the named method gives (of all for "all"), and with the reason those left out or passed over.
 
     Raises `InputError` for an unknown name, or where nothing can be estimated.
     """
     from discsim.errors import InputError
-    from estimators.methods import METHODS, estimate, missing_sensors
+    from estimators.methods import METHODS, all_methods, best_of, estimate
 
-    if name != "all":
-        if name != "best" and name not in METHODS:
-            raise InputError(f"--method {name}: unknown; expected one of best, all, {', '.join(METHODS)}")
-        return [estimate(recording, name, options)], {}
-    rates: list[YawRate] = []
-    left_out: dict[str, str] = {}
-    for method in METHODS:
-        if absent := missing_sensors(recording, method):
-            left_out[method] = f"no {', '.join(absent)} in the recording"
-            continue
-        try:
-            rates.append(estimate(recording, method, options))
-        except InputError as error:
-            left_out[method] = str(error)
-    if not rates:
-        reasons = "; ".join(f"{method}: {reason}" for method, reason in left_out.items())
-        raise InputError(f"{recording.path or recording.name}: no method can be used ({reasons})")
-    return rates, left_out
+    if name == "all":
+        return all_methods(recording, options)
+    if name == "best":
+        found, passed_over = best_of(recording, options)
+        return [found], passed_over
+    if name not in METHODS:
+        raise InputError(f"--method {name}: unknown; expected one of best, all, {', '.join(METHODS)}")
+    return [estimate(recording, name, options)], {}
+
+
+def all_notes(recording: Recording) -> list[str]:
+    """Return a line for all that a reader must know of a recording before believing an estimate from it."""
+    from estimators.fusion import contradictions
+    from estimators.methods import field_notes, folding_notes, sampling_notes
+    from estimators.usable import usable
+
+    sound = usable(recording)
+    data = sound.recording
+    return [*sound.notes, *sampling_notes(data), *folding_notes(data), *field_notes(data), *contradictions(data)]
 
 
 def rate_csv(rates: Sequence[YawRate]) -> str:
@@ -184,7 +191,8 @@ def _print(
     for rate in rates:
         figures = _figures(rate)
         cells = [np.degrees(figures["median_rate_rad_s"]), np.degrees(figures["median_sd_rad_s"])]
-        shown = ["" if np.isnan(cell) else f"{cell:.2f}" for cell in cells]
+        # a deviation that rounds to nothing is not nothing
+        shown = ["" if np.isnan(cell) else f"{cell:.2f}" if abs(cell) >= 0.005 else f"{cell:.1g}" for cell in cells]
         table.add_row(rate.method, str(len(rate)), f"{100 * figures['share_unknown']:.0f} %", *shown)
     Console().print(table)
     for method, reason in left_out.items():

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from validation.options import OutOption
+from validation.options import DateOption, OutOption, PlaceOption
 
 if TYPE_CHECKING:
-    from validation.importing import Imported
-    from validation.importing.sniffing import Stretch
+    from validation.importing import Imported, ImportMap
+    from validation.importing.sniffing import Proposal, Stretch
     from validation.run import Run
 
 __all__ = ["command"]
@@ -43,6 +43,8 @@ def command(
         Path | None, typer.Option(help="Where a proposed map is written. Default: map.toml in --out.")
     ] = None,
     out: OutOption = Path("imported"),
+    place: PlaceOption = None,
+    date: DateOption = None,
 ) -> None:
     """Turn a raw logger file into a recording folder.
 
@@ -53,13 +55,13 @@ def command(
     Example: discsim import my-log.csv --throw 1 --out throw-1
     or, with a map: discsim import 2025-08-31-001-rb.csv --map flatball --rows 1590:1830 --out throw-1
     """
+    from dataclasses import replace
+
     from discsim.errors import InputError
-    from discsim.files import write_text
     from validation.importing import find_map, parse_rows, read_map, read_readings
-    from validation.importing.sniffing import opened, recognised, sniff, stretches
+    from validation.importing.sniffing import opened, recognised, sniff, stretches, write_raw_page
     from validation.importing.sniffing.chosen import chosen_recordings
-    from validation.importing.sniffing.proposal import map_text
-    from validation.importing.sniffing.raw_page import write_raw_page
+    from validation.options import at_place
     from validation.run import start_run
 
     if sum((rows is not None, throw is not None, all_throws)) > 1:
@@ -69,33 +71,36 @@ def command(
     source = (raw if raw.is_dir() else raw.parent).resolve()
     if out.resolve() == source:
         raise InputError(f"--out {out}: the raw files are in it; expected another folder, to leave them as they are")
-    with opened(raw) as place:
-        proposal = None
-        if named is None:
-            named = recognised(place) if map_ == "auto" else None
-            proposal = sniff(place, plant) if named is None else None
-        target = write_map or out / "map.toml"
-        with start_run(out, None, [raw, *([named.path] if named else [])]) as run:
-            if proposal is not None:
-                write_text(target, map_text(proposal))
-                named = read_map(target)
-                for decision in proposal.all_decisions:
-                    run.step(decision.text)
-                for remark in (*proposal.notes, f"the map with its reasons is in {target}"):
-                    run.step(remark)
-            elif map_ == "auto":
-                assert named is not None
-                run.step(
-                    f"the shipped map '{named.name}' was made for these columns: it is taken (--map sniff asks anew)"
-                )
-            assert named is not None
-            read = read_readings(place, named)
+    with opened(raw) as logged:
+        known = recognised(logged) if map_ == "auto" else named
+        proposal = sniff(logged, plant) if known is None else None
+        with start_run(out, None, [raw, *([known.path] if known else [])]) as run:
+            if known is not None and named is None:
+                run.step(f"taken: the shipped map '{known.name}', made for these columns (--map sniff asks anew)")
+            import_map = known or _proposed(run, proposal, write_map or out / "map.toml")
+            import_map = replace(import_map, environment=at_place(import_map.environment, place, date))
+            read = read_readings(logged, import_map, chosen)
             throws = stretches(read)
             recordings = chosen_recordings(read, throws, chosen, throw, every=all_throws)
             decisions = [] if proposal is None else proposal.all_decisions
-            write_raw_page(out / "raw.html", raw.name, read, throws, decisions, named.path.read_text(encoding="utf-8"))
+            write_raw_page(out / "raw.html", raw.name, read, throws, decisions)
             _write(run, recordings, one_folder=not all_throws)
-    _say(raw, recordings, throws, whole=rows is None and throw is None and not all_throws)
+    _say(recordings, throws, whole=rows is None and throw is None and not all_throws)
+
+
+def _proposed(run: Run, proposal: Proposal | None, target: Path) -> ImportMap:
+    """Write a proposed map, say what was decided, and return the map as it is read."""
+    from discsim.files import write_text
+    from validation.importing import read_map
+    from validation.importing.sniffing import map_text
+
+    assert proposal is not None
+    write_text(target, map_text(proposal))
+    for decision in proposal.all_decisions:
+        run.step(decision.text)
+    for remark in (*proposal.notes, f"the map with its reasons: {target}"):
+        run.step(remark)
+    return read_map(target)
 
 
 def _write(run: Run, recordings: list[Imported], *, one_folder: bool) -> None:
@@ -111,7 +116,7 @@ def _write(run: Run, recordings: list[Imported], *, one_folder: bool) -> None:
     run.step(recordings[0].summary)
 
 
-def _say(raw: Path, recordings: list[Imported], throws: list[Stretch], *, whole: bool) -> None:
+def _say(recordings: list[Imported], throws: list[Stretch], *, whole: bool) -> None:
     for number, result in enumerate(recordings, start=1):
         name = f"{number:02d} " if len(recordings) > 1 else ""
         for sensor, samples in result.recording.samples.items():

@@ -8,7 +8,7 @@ from pathlib import Path
 from discsim.errors import InputError
 from discsim.recording import Recording, read_dataset
 
-__all__ = ["dataset_names", "read_datasets", "recording_names"]
+__all__ = ["dataset_names", "need_field", "read_datasets", "recording_names"]
 
 
 def read_datasets(folders: Sequence[Path]) -> tuple[list[list[Recording]], list[str]]:
@@ -26,6 +26,17 @@ def read_datasets(folders: Sequence[Path]) -> tuple[list[list[Recording]], list[
                 "expected recordings of one plant (diagnose each plant by itself)"
             )
     return datasets, names
+
+
+def need_field(datasets: Sequence[Sequence[Recording]]) -> None:
+    """Raise `InputError` where a recording has a magnetometer and no magnetic field: nothing can be predicted."""
+    for recording in (recording for dataset in datasets for recording in dataset):
+        if "magnetometer" in recording and not recording.environment.field_known:
+            where = recording.path / "recording.toml" if recording.path is not None else recording.name
+            raise InputError(
+                f"{where}: [environment] magnetic_field_ned_uT is [0, 0, 0], which stands for not known, and there is "
+                "a magnetometer; expected the field of the place: --place LAT,LON --date YYYY-MM-DD looks it up"
+            )
 
 
 def dataset_names(folders: Sequence[Path]) -> list[str]:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from discsim.clipping import clipping_notes
 from discsim.disc import Release
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
@@ -126,8 +127,11 @@ def recording_of(read: RawReadings, rows: slice | None = None) -> Imported:
     release = _release(raw, import_map, readings)
     if release is None and (import_map.release is not None or import_map.throws):
         notes.append("no release conditions: the map has none for this file, or the first row is not used")
-    if not import_map.field_known and "magnetometer" in samples:
-        notes.append("magnetic field not known: zeros stand in recording.toml; fill it in, or give it in the map")
+    if not import_map.environment.field_known and "magnetometer" in samples:
+        notes.append(
+            "magnetic field not known: zeros stand in recording.toml; --place LAT,LON --date YYYY-MM-DD looks it up, "
+            "or give it in the map"
+        )
     recording = Recording(
         import_map.plant,
         f"{import_map.name}-{raw.resolve().stem}",
@@ -138,7 +142,7 @@ def recording_of(read: RawReadings, rows: slice | None = None) -> Imported:
         {sensor: _sheet(import_map.sensors[sensor], samples[sensor], rates.get(sensor)) for sensor in samples},
         samples,
     )
-    return Imported(recording, read.repairs, tuple(notes))
+    return Imported(recording, read.repairs, (*notes, *clipping_notes(recording)))
 
 
 def _read_sensors(

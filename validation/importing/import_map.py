@@ -17,7 +17,7 @@ import numpy as np
 
 from discsim.arrays import readonly
 from discsim.disc import Disc, Release
-from discsim.environment import Environment, world_magnetic_field
+from discsim.environment import FIELD_MODEL_SIGMA, Environment, world_magnetic_field
 from discsim.errors import InputError
 from discsim.files import model_file
 from discsim.recording import PLANTS, SENSORS, Plant, SensorSheet, read_sheet
@@ -40,8 +40,6 @@ UNITS: Mapping[str, Mapping[str, float]] = MappingProxyType(
 )
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "iso": 1.0}
 BODY_SENSORS = ("magnetometer", "accelerometer", "gyroscope")
-#: Uncertainty of the World Magnetic Model, uT per component.
-FIELD_MODEL_SIGMA = 0.15
 
 
 @dataclass(frozen=True)
@@ -105,7 +103,6 @@ class ImportMap:
     time: TimeBase
     repairs: tuple[str, ...]
     environment: Environment
-    field_known: bool
     disc: Disc | None
     release: Release | None
     throws: Mapping[str, MeasuredThrow]
@@ -134,7 +131,7 @@ def read_map(path: Path) -> ImportMap:
     repairs = _texts(top, "repairs", choices=tuple(REPAIRS)) or ()
     layout = _layout(top.table("layout"))
     time = _time_base(_need(top, "time"))
-    environment, field_known = _environment(_need(top, "environment"), flying=plant == "flight")
+    environment = _environment(_need(top, "environment"), flying=plant == "flight")
     disc = _disc(top.table("disc", required=plant == "flight"), flying=plant == "flight")
     release_table = top.table("release")
     release = None if release_table is None else Release.from_toml(release_table)
@@ -152,7 +149,6 @@ def read_map(path: Path) -> ImportMap:
         time,
         repairs,
         environment,
-        field_known,
         disc,
         release,
         throws,
@@ -221,8 +217,8 @@ def _time_base(table: TomlTable) -> TimeBase:
     return TimeBase(column, TIME_UNITS[unit], step, counter, unit == "iso")
 
 
-def _environment(table: TomlTable, *, flying: bool) -> tuple[Environment, bool]:
-    """Return the surroundings and whether the field is known (it is zero where it is not)."""
+def _environment(table: TomlTable, *, flying: bool) -> Environment:
+    """Return the surroundings; the field is zero where it is not known."""
     density = table.number("air_density", "kg_m3", required=flying, positive=True)
     wind = table.vector("wind", "m_s", frame="ned", default=(0.0, 0.0, 0.0))
     assert wind is not None
@@ -245,10 +241,10 @@ def _environment(table: TomlTable, *, flying: bool) -> tuple[Environment, bool]:
             stated = table.vector("magnetic_field", "uT", frame="ned", required=False)
             if stated is None:
                 table.finish()
-                return Environment(gravity, readonly([0.0, 0.0, 0.0]), density, wind, table.sigma), False
+                return Environment(gravity, readonly([0.0, 0.0, 0.0]), density, wind, table.sigma)
             field = stated
     table.finish()
-    return Environment(gravity, field, density, wind, table.sigma), True
+    return Environment(gravity, field, density, wind, table.sigma)
 
 
 def _disc(table: TomlTable | None, *, flying: bool) -> Disc | None:

@@ -187,8 +187,8 @@ def test_noise_alone_makes_no_plateau() -> None:
     rng = np.random.default_rng(3)
     for size in (50, 2000, 20000):
         steady = 60.0 + 0.08 * rng.standard_normal((size, 3))
-        assert plateau_of(np.round(steady / 0.005) * 0.005, 0.005, 0.08) is None
-        assert plateau_of(np.minimum(np.round(steady / 0.005) * 0.005, 60.0), 0.005, 0.08) == 60.0
+        assert plateau_of(np.round(steady / 0.005) * 0.005, 0.005) is None
+        assert plateau_of(np.minimum(np.round(steady / 0.005) * 0.005, 60.0), 0.005) == 60.0
 
 
 def test_equal_readings_count_against_chance() -> None:

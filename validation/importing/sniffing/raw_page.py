@@ -41,7 +41,7 @@ def envelope(t: FloatArray, value: FloatArray, bins: int = BINS) -> tuple[FloatA
 
 
 def write_raw_page(
-    path: Path, name: str, read: RawReadings, throws: Sequence[Stretch], decisions: Sequence[Decision], map_text: str
+    path: Path, name: str, read: RawReadings, throws: Sequence[Stretch], decisions: Sequence[Decision]
 ) -> None:
     """Write the page; without decisions (a shipped or own map) it has the traces and throws alone."""
     zero = min(float(found.time[0]) for found in read.readings.values())
@@ -66,7 +66,8 @@ def write_raw_page(
                 )
             )
         sections.append(_throws(throws, close))
-        sections.append(Section("The map", header=["", "map.toml"], rows=_numbered(map_text)))
+        text = read.import_map.path.read_text(encoding="utf-8")
+        sections.append(Section("The map", header=["", read.import_map.path.name], rows=_numbered(text)))
         notes = " ".join(read.notes)
         lead = f"{_described(read, end)} {notes}".strip()
         write_report(path, f"{name}: what is in it", lead, sections)

@@ -1,0 +1,295 @@
+"""Readings that stand at a sensor's limit, known from what is stated and from the readings themselves.
+
+A clipped reading says only that the motion was beyond the limit. Noise is added before a sensor clips, so readings at a
+limit are equal to the last digit, time after time, and nothing lies beyond them. That is told from
+
+- the stated range, reached to within one and a half steps of resolution (16 bits end a step below their range);
+- the ends of a 16-bit number, 32764 to 32768 steps;
+- the largest reading of an axis, of either sign, where it comes more often, or longer on end, than the sensor's own
+  noise lets any reading come. Where the noise does not show, because the resolution is coarser or there is none, a
+  steady motion stands still as well and nothing is concluded.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.special import erf
+
+from discsim.arrays import BoolArray, FloatArray
+
+if TYPE_CHECKING:
+    from discsim.recording import Recording
+
+__all__ = [
+    "SAME",
+    "Limits",
+    "at_range",
+    "clipped",
+    "clipping_notes",
+    "constant_axes",
+    "equal_largest",
+    "limits",
+    "step_of",
+]
+
+#: Fewest equal readings that are taken for a limit, how many times as many as in the steps below it, and how many
+#: steps those are: of a Gaussian with a sd of a step the best case has 3.7 times, of a sine at rest on its crest 1.8.
+FEWEST, DENSER, BELOW = 6, 4.0, 3
+#: Fewest equal readings on end, where equal ones are next to impossible.
+SHORTEST = 4
+#: Chance at which equal readings are no chance, over a whole recording.
+CHANCE = 1e-6
+#: A limit is at least this share of the sensor's largest reading: one at rest stands still at zero or gravity.
+NEAR_LARGEST = 0.5
+#: Least noise, in steps, with which a constant input visibly toggles: at 0.2 it leaves a step once in 80 readings.
+TOGGLING = 0.2
+#: Largest noise, as a share of the limit: what scatters more from reading to reading is motion (the noisiest of common
+#: sensors, a magnetometer of 5 uT in 1000 uT, has half a per cent).
+NOISIEST = 0.02
+#: What rounding alone leaves in second differences, in steps: 1/sqrt(12), and what 32 readings scatter by.
+ROUNDING = 0.33
+#: Readings over which the noise is looked at, and the share of such windows that are quieter than what counts: the
+#: quietest of all would be so by chance.
+WINDOW, QUIETEST = 32, 0.05
+#: Fewest readings that tell a constant axis.
+LEAST = 16
+#: A step is no step where more than this share of the small spacings are no multiples of it.
+UNEVEN = 0.1
+#: Two equal numbers differ by less than this, relative to the largest: conversions between units, single precision.
+SAME = 1e-6
+#: A stated range is taken as reached from at most this share below it: what eight bits step by.
+LARGEST_MARGIN = 0.01
+#: Full scale of 16 bits, in steps; some converters stop three short of it.
+FULL_SCALE = (32763.5, 32768.5)
+
+
+class Limits(NamedTuple):
+    """Where a sensor's axes clip, each (k,) in the sensor's unit: NaN where they do not."""
+
+    lower: FloatArray
+    upper: FloatArray
+
+    @property
+    def largest(self) -> float:
+        """The largest size of any, NaN where there is none."""
+        sizes = np.abs(np.concatenate([self.lower, self.upper]))
+        return float(np.nanmax(sizes)) if np.any(np.isfinite(sizes)) else float("nan")
+
+
+def clipped(value: FloatArray, stated_range: float | None, resolution: float | None) -> BoolArray:
+    """Tell which of a sensor's readings, (n, k) or (n,), stand at its limit, stated or found.
+
+    A whole sensor's readings are wanted: what its other axes and times show of its noise is part of the judgement.
+    """
+    table = value if value.ndim == 2 else value[:, None]
+    step = resolution or step_of(table)
+    found = at_range(table, stated_range, step)
+    lower, upper = limits(table, resolution)
+    tolerance = np.maximum(0.5 * step, SAME * np.fmax(np.abs(lower), np.abs(upper)))
+    with np.errstate(invalid="ignore"):
+        found |= (table >= upper - tolerance) | (table <= lower + tolerance)
+    return found.reshape(value.shape)
+
+
+def at_range(value: FloatArray, stated_range: float | None, step: float) -> BoolArray:
+    """Tell which readings stand at the stated range: to within steps of resolution, and the last digit it is stated to.
+
+    16 bits end a step below their range, and a range of 34.907 rad/s may be one of 34.90659.
+    """
+    if stated_range is None:
+        return np.zeros(value.shape, dtype=np.bool_)
+    exponential = "e" in repr(float(stated_range))
+    decimals = len(repr(float(stated_range)).partition(".")[2])
+    written = 0.0 if exponential else 0.5 * 10.0**-decimals
+    margin = min(max(1.5 * step, written), LARGEST_MARGIN * stated_range) + 1e-9 * stated_range
+    return np.asarray(np.abs(value) >= stated_range - margin)
+
+
+def limits(value: FloatArray, resolution: float | None = None) -> Limits:
+    """Return the limits that a sensor's readings, (n, k), show by themselves."""
+    lower, upper = np.full(value.shape[1], np.nan), np.full(value.shape[1], np.nan)
+    rows = _not_held(value)
+    known = np.isfinite(rows)
+    largest = float(np.max(np.abs(rows[known]), initial=0.0))
+    if largest == 0:
+        return Limits(lower, upper)
+    step = resolution or step_of(rows)
+    quiet = _Noise(value, rows, max(step, SAME * largest))
+    for axis in range(value.shape[1]):
+        for sign, out in ((1.0, upper), (-1.0, lower)):
+            column = sign * rows[:, axis]
+            top = float(np.max(column[known[:, axis]], initial=-np.inf))
+            if top >= NEAR_LARGEST * largest and _is_limit(column, axis, top, step, quiet):
+                out[axis] = sign * top
+    return Limits(lower, upper)
+
+
+def step_of(value: FloatArray) -> float:
+    """Return the smallest spacing of distinct readings (n, k), or 0 where their spacings have no common measure."""
+    steps = [_axis_step(value[:, axis]) for axis in range(value.shape[1])]
+    found = [step for step in steps if step > 0]
+    return min(found) if found else 0.0
+
+
+def constant_axes(value: FloatArray) -> BoolArray:
+    """Tell of which axes of readings (n, k) every single one is the same number: a dead axis, or one at its limit."""
+    table = value if value.ndim == 2 else value[:, None]
+    known = np.isfinite(table)
+    top = np.max(np.where(known, table, -np.inf), axis=0, initial=-np.inf)
+    bottom = np.min(np.where(known, table, np.inf), axis=0, initial=np.inf)
+    return np.asarray((np.count_nonzero(known, axis=0) >= LEAST) & (top == bottom))
+
+
+def equal_largest(value: FloatArray, resolution: float | None = None) -> tuple[int, float]:
+    """Return how many of readings (n, k) have the largest size there is, and how many would by those just below."""
+    size = np.abs(value[np.isfinite(value)])
+    top = float(np.max(size, initial=0.0))
+    return _equal(size, top, max(resolution or step_of(value), SAME * top))
+
+
+def _equal(column: FloatArray, top: float, step: float) -> tuple[int, float]:
+    equal = int(np.count_nonzero(column > top - 0.5 * step))
+    below = int(np.count_nonzero(column > top - (0.5 + BELOW) * step)) - equal
+    return equal, max(below / BELOW, 0.5)
+
+
+def _not_held(value: FloatArray) -> FloatArray:
+    """Return the rows (m, k) that differ from the one before: a faster log repeats a slow sensor's readings."""
+    if value.shape[1] == 1 or len(value) < 2:
+        return value
+    same = (value[1:] == value[:-1]) | (np.isnan(value[1:]) & np.isnan(value[:-1]))
+    return np.asarray(value[np.concatenate([[True], ~np.all(same, axis=1)])])
+
+
+def _axis_step(column: FloatArray) -> float:
+    distinct = np.unique(column[np.isfinite(column)])
+    spacing = np.diff(distinct)
+    spacing = spacing[
+        spacing > 1e-9 * np.max(np.abs(distinct), initial=0.0)
+    ]  # conversions leave noise in the last digits
+    if spacing.size == 0:
+        return 0.0
+    step = float(np.min(spacing))
+    small = spacing[spacing < 5.5 * step] / step
+    return step if np.mean(np.abs(small - np.rint(small)) > 0.1) <= UNEVEN else 0.0
+
+
+class _Noise:
+    """The least noise that a sensor shows over `WINDOW` readings, on any of its axes.
+
+    ``value`` (n, k) are all readings and ``rows`` (m, k) those that differ from the one before; readings of little
+    noise repeat without being held, so both are looked at.
+    """
+
+    def __init__(self, value: FloatArray, rows: FloatArray, step: float) -> None:
+        self.rows, self.step = rows, step
+        moving = np.flatnonzero(~constant_axes(rows))
+        self.each = {i: min((_quietest(one[:, i]) for one in (value, rows)), default=0.0) for i in moving.tolist()}
+
+    def steps(self, axis: int, without: BoolArray) -> float:
+        """Return it in steps for the readings of an axis that are not ``without`` (n,), or else of the other axes.
+
+        From second differences, which smooth motion hardly has: what is left of motion makes it too large, so the
+        quietest windows count. NaN where there are too few readings.
+        """
+        own = _quietest(np.where(without, np.nan, self.rows[:, axis]))
+        others = [noise for other, noise in self.each.items() if other != axis]
+        found = [noise for noise in (own, *others) if np.isfinite(noise)]
+        if not found:
+            return float("nan")
+        return float(np.sqrt(max((min(found) / self.step) ** 2 - ROUNDING**2, 0.0)))
+
+
+def _quietest(column: FloatArray) -> float:
+    rough = np.diff(column, 2)
+    rough = rough[np.isfinite(rough)]
+    if rough.size < WINDOW // 2:
+        return float("nan")
+    width = min(WINDOW, rough.size)
+    # scaled first: a reading of 1e300 has no square
+    scale = float(np.max(np.abs(rough))) or 1.0
+    squares = np.concatenate([[0.0], np.cumsum((rough / scale) ** 2)])
+    windows = np.maximum(squares[width:] - squares[:-width], 0.0)
+    return scale * float(np.sqrt(np.quantile(windows, QUIETEST) / width / 6.0))
+
+
+def _is_limit(column: FloatArray, axis: int, top: float, step: float, quiet: _Noise) -> bool:
+    """Tell whether the largest readings of a column (n,) are at a limit."""
+    at_step = step > 0 and FULL_SCALE[0] <= top / step <= FULL_SCALE[1]
+    if at_step:
+        return True
+    step = max(step, SAME * top)
+    with np.errstate(invalid="ignore"):
+        at_top = column > top - 0.5 * step
+    count = int(np.count_nonzero(at_top))
+    if count < SHORTEST:
+        return False
+    noise = quiet.steps(axis, at_top)
+    if not TOGGLING <= noise < NOISIEST * top / step:
+        return False
+    # the best chance that a constant input has of one reading, and of that one before any larger
+    chance = max(float(erf(1.0 / (2.0 * np.sqrt(2.0) * noise))), 1e-12)
+    longest = _longest_run(at_top)
+    if longest >= SHORTEST and longest * np.log(chance) + np.log(column.size) < np.log(CHANCE):
+        return True
+    equal, expected = _equal(column[np.isfinite(column)], top, step)
+    by_chance = equal * np.log(2.0 * chance / (1.0 + chance))
+    often = equal >= FEWEST and equal > max(DENSER * expected, _most_frequent(column, top, step))
+    return noise >= 1.0 and often and by_chance < np.log(CHANCE)
+
+
+def _most_frequent(column: FloatArray, top: float, step: float) -> int:
+    """Return how often the most frequent of the other large readings comes.
+
+    A noiseless turning sensor whose turn is a whole number of readings repeats every one of them.
+    """
+    others = column[(column > NEAR_LARGEST * top) & (column < top - (0.5 + BELOW) * step)]
+    if others.size == 0:
+        return 0
+    return int(np.max(np.unique(np.rint((top - others) / step), return_counts=True)[1]))
+
+
+def _longest_run(chosen: BoolArray) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
+    return int(np.max(edges[1::2] - edges[::2], initial=0))
+
+
+# ---------------------------------------------------------------------------------------------------- in words
+
+#: how a person reads a sensor's unit: its name, and what a unit of it is worth
+_READ = {"rad_s": ("deg/s", float(np.degrees(1.0))), "m_s2": ("m/s^2", 1.0), "uT": ("uT", 1.0)}
+_SENSORS = {"magnetometer": "uT", "accelerometer": "m_s2", "gyroscope": "rad_s", "rate_reference": "rad_s"}
+
+
+def clipping_notes(recording: Recording) -> list[str]:
+    """Say of each sensor which axes stand at a limit and for how long, and which never change."""
+    notes = []
+    for sensor, unit in _SENSORS.items():
+        samples = recording.get(sensor)
+        if samples is None or len(samples) == 0:
+            continue
+        sheet = recording.sheets[sensor]
+        table = samples.value if samples.value.ndim == 2 else samples.value[:, None]
+        at_limit = clipped(table, sheet.range, sheet.resolution)
+        constant = constant_axes(table)
+        name, worth = _READ[unit]
+        moving = np.flatnonzero(~constant)
+        if constant.all() and sensor != "rate_reference":
+            notes.append(
+                f"{sensor}: all {len(samples)} readings are the same; it is dead, and nothing is taken from it"
+            )
+            continue
+        for axis in np.flatnonzero(np.any(at_limit, axis=0)):
+            known = max(int(np.count_nonzero(np.isfinite(table[:, axis]))), 1)
+            share = 100 * int(np.count_nonzero(at_limit[:, axis])) / known
+            level = float(np.median(np.abs(table[at_limit[:, axis], axis]))) * worth
+            place = "" if table.shape[1] == 1 else f" {'xyz'[axis]}"
+            stand = "every one of its readings stands" if share == 100 else f"{share:.2g} % of its readings stand"
+            notes.append(f"{sensor}{place}: {stand} at a limit of {level:.6g} {name}: clipped, and not used")
+        for axis in np.flatnonzero(constant & ~np.any(at_limit, axis=0)):
+            if moving.size and table.shape[1] > 1 and sensor == "gyroscope":
+                level = float(np.nanmax(table[:, axis])) * worth
+                notes.append(f"{sensor} {'xyz'[axis]}: every reading is {level:.6g} {name}; that axis does not work")
+    return notes
