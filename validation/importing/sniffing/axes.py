@@ -217,7 +217,7 @@ def _laid(gyro: Reading3, field: Reading3, accel: Reading3 | None) -> tuple[Floa
     steps = steps_between(gyro.t, gyro.value, field.t, field.value)
     fits = best_axes(steps, 1.0)
     if not fits:
-        return np.eye(3), Decision(what, "as the gyroscope's", "guess", "too little turns to compare them")
+        return np.eye(3), Decision(what, "as the gyroscope's", "guess", "too few turns to compare them")
     best = fits[0]
     if best.ratio > EXPLAINED:
         why = f"the gyroscope leaves {100 * best.ratio:.0f} % of the field's changes whichever way they lie"

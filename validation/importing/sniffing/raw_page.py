@@ -88,7 +88,7 @@ def _throws(throws: Sequence[Stretch], close: Sequence[tuple[str, Path]]) -> Sec
             f"{throw.start:.2f}",
             f"{throw.end:.2f}",
             f"{throw.first}:{throw.stop}",
-            f"{np.degrees(throw.spin):.0f}",
+            f"{'more than ' * throw.at_least}{np.degrees(throw.spin):.0f}",
         ]
         for number, throw in enumerate(throws, start=1)
     ]

@@ -10,12 +10,14 @@ so begins after the hand's acceleration has ended and ends before the impact, 0.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.signal import savgol_filter
 
 from discsim.arrays import BoolArray, FloatArray
+from discsim.clipping import clipped
 from validation.importing.conversion import RawReadings
 from validation.importing.sniffing.axes import FAST
 
@@ -39,7 +41,8 @@ FIELD_SPAN = 0.25
 class Stretch:
     """A throw: from ``start`` to ``end`` (s, from the log's first sample), rows ``first`` up to ``stop``, and its spin.
 
-    ``spin`` is the median size of the rate, rad/s; ``sensor`` what it was seen by.
+    ``spin`` is the median size of the rate, rad/s; ``sensor`` what it was seen by. ``at_least``: that sensor was
+    clipped, and the spin is faster.
     """
 
     start: float
@@ -48,51 +51,83 @@ class Stretch:
     stop: int
     spin: float
     sensor: str
+    at_least: bool = False
 
     @property
     def text(self) -> str:
         """One line for a person."""
-        return (
-            f"{self.start:.2f} to {self.end:.2f} s, rows {self.first}:{self.stop}, "
-            f"{np.degrees(self.spin):.0f} deg/s by the {self.sensor}"
-        )
+        size = f"{np.degrees(self.spin):.0f} deg/s by the {self.sensor}"
+        size = f"more than {size}, which is clipped" if self.at_least else size
+        return f"{self.start:.2f} to {self.end:.2f} s, rows {self.first}:{self.stop}, {size}"
+
+
+class _Rate(NamedTuple):
+    """Who shows the rate, time (n,), its size (n,), where its axis stands still in the body, where it is clipped."""
+
+    sensor: str
+    t: FloatArray
+    rate: FloatArray
+    steady: BoolArray
+    clipped: BoolArray
 
 
 def stretches(read: RawReadings) -> list[Stretch]:
     """Return the stretches of free spin in a log, in the order of time; none where no sensor shows a spin."""
-    seen = _rate(read)
+    field = _field_rate(read)
+    seen = _gyroscope_rate(read) or field
     if seen is None:
         return []
-    sensor, t, rate, steady = seen
-    half = HALF if sensor == "gyroscope" else FIELD_SPAN
-    free = (rate > FAST) & steady & (_slope(t, rate, half) < CHANGE * rate)
-    free &= ~_impacts(read, t)
+    half = HALF if seen.sensor == "gyroscope" else FIELD_SPAN
+    free = (seen.rate > FAST) & seen.steady & (_slope(seen.t, seen.rate, half) < CHANGE * seen.rate)
+    free &= ~_impacts(read, seen.t)
     zero = min(float(found.time[0]) for found in read.readings.values())
     main = next(iter(read.readings.values()))
     found = []
     for first, stop in _runs(free):
-        start, end = float(t[first]), float(t[stop - 1])
-        spin = float(np.median(rate[first:stop]))
-        if end - start < SHORTEST or spin * (end - start) < TURNS * 2 * np.pi:
+        start, end = float(seen.t[first]), float(seen.t[stop - 1])
+        if end - start < SHORTEST:
             continue
+        told, spin, at_least = _spin(seen, field, start, end)
         rows = main.number[(main.time >= start) & (main.time <= end)]
-        if rows.size > 1:
-            found.append(Stretch(start - zero, end - zero, int(rows[0]), int(rows[-1]) + 1, spin, sensor))
+        if rows.size > 1 and spin * (end - start) >= TURNS * 2 * np.pi:
+            found.append(Stretch(start - zero, end - zero, int(rows[0]), int(rows[-1]) + 1, spin, told, at_least))
     return found
 
 
-def _rate(read: RawReadings) -> tuple[str, FloatArray, FloatArray, BoolArray] | None:
-    """Return who shows the rate, time (n,), size of the rate (n,) and where its axis stands still in the body (n,)."""
-    gyro, field = read.readings.get("gyroscope"), read.readings.get("magnetometer")
-    if gyro is not None:
-        sound = np.isfinite(gyro.value).all(axis=1)
-        t, value = gyro.time[sound], gyro.value[sound]
-        if t.size < 8:
-            return None
-        rate = np.linalg.norm(value, axis=1)
-        wide = _count(t, SHORTEST)
-        mean = uniform_filter1d(value / np.maximum(rate, 1e-9)[:, None], wide, axis=0, mode="nearest")
-        return "gyroscope", t, rate, np.asarray(np.linalg.norm(mean, axis=1) > ONE_AXIS)
+def _spin(seen: _Rate, field: _Rate | None, start: float, end: float) -> tuple[str, float, bool]:
+    """Return who shows the spin of a stretch, its size (rad/s), and whether it is more than that.
+
+    A gyroscope that stands at its limit for half the stretch gives way to the magnetometer.
+    """
+    for one in (seen, field):
+        if one is None:
+            continue
+        inside = (one.t >= start) & (one.t <= end)
+        spin = float(np.median(one.rate[inside])) if inside.any() else 0.0
+        if spin > 0 and not np.mean(one.clipped[inside]) > 0.5:
+            return one.sensor, spin, False
+    inside = (seen.t >= start) & (seen.t <= end)
+    return seen.sensor, float(np.median(seen.rate[inside])), True
+
+
+def _gyroscope_rate(read: RawReadings) -> _Rate | None:
+    gyro = read.readings.get("gyroscope")
+    if gyro is None:
+        return None
+    sound = np.isfinite(gyro.value).all(axis=1)
+    t, value = gyro.time[sound], gyro.value[sound]
+    if t.size < 8:
+        return None
+    rate = np.linalg.norm(value, axis=1)
+    unit = value / np.maximum(rate, 1e-9)[:, None]
+    mean = uniform_filter1d(unit, _count(t, SHORTEST), axis=0, mode="nearest")
+    limit = read.import_map.sensors["gyroscope"].sheet.range
+    at_limit = clipped(value, limit, None).any(axis=1)
+    return _Rate("gyroscope", t, rate, np.asarray(np.linalg.norm(mean, axis=1) > ONE_AXIS), np.asarray(at_limit))
+
+
+def _field_rate(read: RawReadings) -> _Rate | None:
+    field = read.readings.get("magnetometer")
     if field is None:
         return None
     fresh = np.array(np.isfinite(field.value).all(axis=1))
@@ -107,7 +142,7 @@ def _rate(read: RawReadings) -> tuple[str, FloatArray, FloatArray, BoolArray] | 
     rate = median_filter(np.append(turn, turn[-1]), _count(t, FIELD_SPAN))
     size = uniform_filter1d(np.abs(plane), _count(t, FIELD_SPAN), mode="nearest")
     # a field that goes round has a steady size; 5 uT is a quarter of the weakest horizontal field of temperate places
-    return "magnetometer", t, rate, np.asarray(size > 5.0)
+    return _Rate("magnetometer", t, rate, np.asarray(size > 5.0), np.zeros(t.size, dtype=np.bool_))
 
 
 def _count(t: FloatArray, span: float) -> int:
