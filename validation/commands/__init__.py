@@ -11,6 +11,7 @@ __all__ = ["COMMANDS", "register"]
 #: name on the command line -> module in this package
 COMMANDS: dict[str, str] = {
     "import": "import_",
+    "check": "check",
     "diagnose": "diagnose",
     "challenge": "challenge",
     "estimate": "estimate",

@@ -50,7 +50,7 @@ def command(
 
     Writes recording.toml, one CSV file per sensor, repairs.csv (what was repaired or left out, by line) and raw.html
     (all traces, the throws found, the map with its reasons) into --out; without --map also the map that it proposes,
-    map.toml.
+    map.toml. Ends with what `discsim check` finds wrong in the recording.
 
     Example: discsim import my-log.csv --throw 1 --out throw-1
     or, with a map: discsim import 2025-08-31-001-rb.csv --map flatball --rows 1590:1830 --out throw-1
@@ -106,6 +106,7 @@ def _proposed(run: Run, proposal: Proposal | None, target: Path) -> ImportMap:
 def _write(run: Run, recordings: list[Imported], *, one_folder: bool) -> None:
     from discsim.files import write_text
     from discsim.recording import write_recording
+    from validation.checking import check_recording
     from validation.importing import repairs_csv
 
     write_text(run.out / "repairs.csv", repairs_csv(recordings[0].repairs))
@@ -114,6 +115,9 @@ def _write(run: Run, recordings: list[Imported], *, one_folder: bool) -> None:
     for note in dict.fromkeys(note for result in recordings for note in result.notes):
         run.step(note)
     run.step(recordings[0].summary)
+    advice = [advice for result in recordings for advice in check_recording(result.recording).advice]
+    for text in dict.fromkeys(advice):
+        run.step(text)
 
 
 def _say(recordings: list[Imported], throws: list[Stretch], *, whole: bool) -> None:

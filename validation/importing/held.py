@@ -54,6 +54,8 @@ FEWEST = 6
 WORTH = 3.0
 #: share of spacings that are neither of the two whole numbers, in a log whose rows come evenly and in one that stutters
 STUTTER = (0.1, 0.5)
+#: a step this much smaller than the readings is that of the digits in the file; 24 bits have 6e-8
+WRITTEN = 3e-8
 #: fewest stretches over which clumps of repeats are looked for
 CLUMPS = 20
 #: share of spacings that may be anything (a chance repeat among fresh rows, a lost reading)
@@ -295,6 +297,8 @@ def step_of(column: FloatArray) -> float | None:
             continue
         whole = np.round(span[near] / step)
         step = float(whole @ span[near] / (whole @ whole))
+    if step < WRITTEN * max(abs(seen[0]), abs(seen[-1])):
+        return None
     whole = np.round(ladder / step)
     blur = np.abs(ladder / step - whole)
     return step if np.quantile(blur, 0.9) < 0.1 and np.min(whole) >= 1 else None

@@ -15,6 +15,8 @@ __all__ = ["RowTiming", "row_timing"]
 LATE = 0.2
 #: rows are missing where a step is at least this many usual ones and the next does not make up for it
 MISSING = 1.5
+#: stamps rounded to more than this share of a step: their mean step is taken, for the median would be off by a per cent
+ROUNDED = 0.01
 #: steps that agree within this are written by a rule, and no clock's: nothing is told from them
 EXACT = 1e-6
 
@@ -57,8 +59,8 @@ def row_timing(t: FloatArray) -> RowTiming:
     usual = float(np.median(steps))
     # stamps rounded to a third of a step or more tell no lateness of that size; a missing row they still do
     rounding = min(_decimal(t) / usual, 0.3)
-    near = steps[np.abs(steps / usual - 1) < LATE + rounding]
-    usual = float(np.mean(near))
+    if rounding > ROUNDED:  # the median is one of the rounded steps, and off by as much
+        usual = float(np.mean(steps[np.abs(steps / usual - 1) < LATE + rounding]))
     ratio = steps / usual
     uneven = np.abs(ratio - 1) > LATE + rounding
     # a late row makes one step long and the next as much too short

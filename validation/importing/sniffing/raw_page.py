@@ -131,4 +131,4 @@ def _traces(panel: Axes, sensor: str, t: FloatArray, value: FloatArray) -> None:
     for k in range(shown.shape[1]):
         panel.plot(*envelope(t, shown[:, k]), color=_COLOURS[k % 3], lw=0.8, label="xyz"[k % 3])
     panel.set_ylabel(f"{sensor}, {_UNITS[unit]}")
-    panel.legend(loc="upper right", ncols=3, fontsize=7)
+    panel.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=7)

@@ -1,0 +1,101 @@
+"""`check_recording`: what a recording holds, what is wrong with it, and what it can tell; nothing is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from discsim.recording import Recording
+from validation.checking.abilities import methods_that_run, not_told
+from validation.checking.finding import SEVERITIES, Finding
+from validation.checking.readings import reading_findings
+from validation.checking.sensors import SensorCheck, check_sensor, sensor_findings
+from validation.checking.statements import statement_findings
+
+__all__ = ["Check", "SetupFault", "check_recording"]
+
+
+class SetupFault(Protocol):
+    """A setup fault that was found: an axis, a unit, an offset in time."""
+
+    @property
+    def id(self) -> str:
+        """The effect's id in the catalogue (``mag.axes``)."""
+
+    @property
+    def sentence(self) -> str:
+        """What is wrong, and the line that mends it."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """What a recording holds, what is wrong with it (errors first) and what it can tell.
+
+    Attributes
+    ----------
+    name, plant, duration
+        Its name, its plant, and the time of its last row, s.
+    sensors : tuple of SensorCheck
+    findings : tuple of Finding
+    methods, methods_left_out : mapping
+        Methods of `estimate` that can run; those that cannot, with the reason.
+    not_told : tuple of str
+        What the recording cannot tell for want of something.
+    """
+
+    name: str
+    plant: str
+    duration: float
+    sensors: tuple[SensorCheck, ...]
+    findings: tuple[Finding, ...]
+    methods: tuple[str, ...]
+    methods_left_out: dict[str, str]
+    not_told: tuple[str, ...]
+
+    def of(self, severity: str) -> tuple[Finding, ...]:
+        """Return the findings of a severity."""
+        return tuple(finding for finding in self.findings if finding.severity == severity)
+
+    @property
+    def advice(self) -> tuple[str, ...]:
+        """Errors and warnings, a line each."""
+        return tuple(
+            f"{finding.severity}: {finding.sentence}" for finding in self.findings if finding.severity != "note"
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return {
+            "recording": self.name,
+            "plant": self.plant,
+            "duration_s": self.duration,
+            "sensors": [sensor.to_json() for sensor in self.sensors],
+            "findings": [finding.to_json() for finding in self.findings],
+            "methods": list(self.methods),
+            "methods_left_out": self.methods_left_out,
+            "not_told": list(self.not_told),
+        }
+
+
+def check_recording(recording: Recording, faults: Sequence[SetupFault] = ()) -> Check:
+    """Return what is to be said of a recording; ``faults`` are setup faults found in it, which join the findings."""
+    sensors = tuple(check_sensor(recording, name) for name in recording.samples)
+    findings = [
+        *statement_findings(recording),
+        *(finding for found in sensors for finding in sensor_findings(found)),
+        *reading_findings(recording),
+        # setup faults (axes, units, offsets in time) join here: anything with an id and a sentence
+        *(Finding(fault.id, "warning", "setup", fault.sentence) for fault in faults),
+    ]
+    run, left_out = methods_that_run(recording)
+    return Check(
+        recording.path.resolve().name if recording.path is not None else recording.name,
+        recording.plant,
+        recording.end,
+        sensors,
+        tuple(sorted(findings, key=lambda finding: SEVERITIES.index(finding.severity))),
+        tuple(run),
+        left_out,
+        not_told(recording),
+    )

@@ -1,0 +1,196 @@
+"""What the readings show, against gravity, the Earth's field, and what a thrown disc does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from discsim.arrays import BoolArray, FloatArray
+from discsim.recording import Recording
+from validation.checking.finding import Finding
+from validation.checking.statements import FASTEST_SPIN, FIELD
+
+__all__ = ["at_rest", "reading_findings"]
+
+#: a body rests where it turns slower than this (rad/s: above a gyroscope's bias) ...
+TURNS = 0.25
+#: ... and the specific force stands within this share over half a second
+STANDS = 0.03
+STRETCH = 0.5
+#: the field of a body at rest scatters by less than this (uT): the noise of the cheapest parts is 1 per axis
+STILL_FIELD = 2.0
+#: |f| at rest may be off by this share: zero-g offsets of cheap parts are 0.08 g, scales 3 %
+REST = 0.12
+#: |m| may be off by this share of the field for want of calibration; more is iron on board
+IRON = 0.4
+#: what |f| of a body at rest reads in other units, over m/s^2
+FORCES = {"g": 1 / 9.80665, "mg": 1e3 / 9.80665, "cm/s^2": 100.0}
+#: what a field of uT reads in other units
+FIELDS = {"T": 1e-6, "mT": 1e-3, "gauss": 1e-2, "mG": 10.0, "nT": 1e3}
+
+
+def reading_findings(recording: Recording) -> Iterator[Finding]:
+    """Yield what the readings of a recording show that cannot be, or is unlikely."""
+    yield from _force(recording)
+    yield from _field(recording)
+    yield from _rate(recording)
+    yield from _path(recording)
+
+
+def at_rest(recording: Recording) -> BoolArray:
+    """Tell which accelerometer readings (n,) were taken while the body rested, all False where nothing tells.
+
+    A steady spin has a steady force, too: a gyroscope, or the field, must show that there is none.
+    """
+    force = recording.samples["accelerometer"]
+    rest = np.zeros(len(force), dtype=np.bool_)
+    width = int(np.ceil(STRETCH / force.interval)) if force.interval > 0 else 0
+    if width < 5 or len(force) < 2 * width:
+        return rest
+    size = np.linalg.norm(force.value, axis=1)
+    for start in range(0, len(force) - width + 1, width):
+        part = force.value[start : start + width]
+        if not np.all(np.isfinite(part)) or not np.any(part):
+            continue
+        mean = float(np.mean(size[start : start + width]))
+        still = float(np.linalg.norm(np.std(part, axis=0))) < STANDS * mean
+        if still and _slow(recording, float(force.t[start]), float(force.t[start + width - 1])):
+            rest[start : start + width] = True
+    return rest
+
+
+def _slow(recording: Recording, start: float, stop: float) -> bool:
+    """Tell whether the gyroscope, or the field where there is none, shows that the body does not turn."""
+    gyroscope, field = recording.get("gyroscope"), recording.get("magnetometer")
+    if gyroscope is not None:
+        rate = gyroscope.between(start, stop).value
+        return rate.size > 0 and bool(np.median(np.linalg.norm(np.nan_to_num(rate), axis=1)) < TURNS)
+    if field is None:
+        return False
+    seen = field.between(start, stop).value
+    return len(seen) > 3 and float(np.linalg.norm(np.nanstd(seen, axis=0))) < STILL_FIELD
+
+
+def _force(recording: Recording) -> Iterator[Finding]:
+    if "accelerometer" not in recording:
+        return
+    value = recording.samples["accelerometer"].value[at_rest(recording)]
+    if len(value) == 0:
+        return
+    g = recording.environment.gravity
+    sizes = np.linalg.norm(value, axis=1)
+    resting = np.abs(sizes / g - 1) <= REST
+    size = float(np.median(sizes))
+    # a body that falls without turning stands still, too: then some stretch lies at gravity, or the sizes differ
+    if np.mean(resting) < 0.2:
+        if np.quantile(sizes, 0.9) > 1.2 * np.quantile(sizes, 0.1):
+            return
+        unit = next((name for name, factor in FORCES.items() if abs(size / (9.81 * factor) - 1) < REST), None)
+        yield Finding(
+            "accel.units" if unit else "accel.scale",
+            "error" if unit else "warning",
+            "accelerometer",
+            f"at rest it reads {size:.4g} m/s^2",
+            f"gravity, {g:.4g} m/s^2",
+            f"it is written in {unit}" if unit else "its scale or its zero is off, or it is clipped",
+        )
+        return
+    down = value[resting, 2] / g
+    # a body that lies upright at some time has z down, whichever way it lies later
+    if np.mean(down > 0.8) > 0.5 and np.mean(down < -0.8) < 0.1:
+        yield Finding(
+            "accel.upside_down",
+            "warning" if recording.plant != "free_spin" else "note",
+            "accelerometer",
+            f"at rest z reads {np.median(down) * g:+.3g} m/s^2: the body lies upside down, or z points up",
+            f"{-g:.3g} m/s^2 with z down",
+            'if z points up, import with axes = ["x", "-y", "-z"] for all sensors: the spin changes sign',
+        )
+
+
+def _field(recording: Recording) -> Iterator[Finding]:
+    if "magnetometer" not in recording:
+        return
+    value = recording.samples["magnetometer"].value
+    value = value[np.all(np.isfinite(value), axis=1)]
+    if len(value) < 10:
+        return
+    size = np.linalg.norm(value, axis=1)
+    middle = float(np.median(size))
+    swing = float(np.max(np.quantile(value, 0.99, axis=0) - np.quantile(value, 0.01, axis=0))) / 2
+    stated = float(np.linalg.norm(recording.environment.magnetic_field))
+    expected = f"{stated:.3g} uT" if stated else f"{FIELD[0]:g} to {FIELD[1]:g} uT"
+    unit = next(
+        (name for name, f in FIELDS.items() if FIELD[0] * f < middle < FIELD[1] * f and swing < FIELD[1] * f), None
+    )
+    # a field turned in any way swings by its size at most, whatever iron is on board
+    if unit in ("T", "mT", "gauss") or (unit in ("mG", "nT") and swing > FIELD[1]):
+        yield Finding(
+            "mag.units", "error", "magnetometer", f"it reads {middle:.3g} uT", expected, f"it is written in {unit}"
+        )
+    elif swing > 1.3 * FIELD[1]:
+        yield Finding(
+            "mag.scale",
+            "warning",
+            "magnetometer",
+            f"an axis swings by +-{swing:.3g} uT",
+            f"at most the field, {expected}",
+            "is its unit right? A magnet or a current near by would do it, too",
+        )
+    elif (stated and abs(middle / stated - 1) > IRON) or not FIELD[0] * (1 - IRON) < middle < FIELD[1] * (1 + IRON):
+        yield Finding(
+            "mag.iron",
+            "note",
+            "magnetometer",
+            f"it reads {middle:.3g} uT (median size), an axis swings by +-{swing:.3g} uT",
+            expected,
+            "iron or a magnet on board, most likely (hard iron), or a wrong scale",
+        )
+
+
+def _rate(recording: Recording) -> Iterator[Finding]:
+    for sensor in ("gyroscope", "rate_reference"):
+        samples = recording.get(sensor)
+        if samples is None:
+            continue
+        size = (
+            np.abs(samples.value) if samples.value.ndim == 1 else np.linalg.norm(np.nan_to_num(samples.value), axis=1)
+        )
+        fastest = float(np.nanquantile(size, 0.99)) if np.any(np.isfinite(size)) else 0.0
+        if fastest > FASTEST_SPIN:
+            yield Finding(
+                f"{sensor}.units" if sensor != "gyroscope" else "gyro.units",
+                "error",
+                sensor,
+                f"it reads {fastest:.4g} rad/s ({np.degrees(fastest):,.0f} deg/s)",
+                f"up to {FASTEST_SPIN:g} rad/s, the fastest throws spin at 200",
+                "it is written in deg/s" if fastest < 100 * FASTEST_SPIN else "its unit is wrong",
+            )
+
+
+def _path(recording: Recording) -> Iterator[Finding]:
+    gps = recording.get("gps")
+    if gps is None or len(gps) < 6:
+        return
+    value = gps.value[np.all(np.isfinite(gps.value), axis=1)]
+    t = gps.t[np.all(np.isfinite(gps.value), axis=1)]
+    if len(value) < 6:
+        return
+    speed = float(np.max(np.linalg.norm(value[:, 3:], axis=1)))
+    if recording.plant == "flight" and speed > 60:
+        yield Finding("gps.speed", "warning", "gps", f"it goes at {speed:.3g} m/s", "up to 45 m/s", "in km/h?")
+    moved: FloatArray = value[2:, :3] - value[:-2, :3]
+    told = (value[2:, 3:] + value[1:-1, 3:] + value[:-2, 3:]) / 3 * (t[2:] - t[:-2])[:, None]
+    for axis, name in enumerate(("north", "east", "down")):
+        far = np.sum(moved[:, axis] ** 2) + np.sum(told[:, axis] ** 2)
+        # the share of its own motion that an axis's velocity explains: 1 where both agree, -1 where a sign is wrong
+        if far > 1.0 and 2 * float(moved[:, axis] @ told[:, axis]) / far < 0:
+            yield Finding(
+                "gps.axes",
+                "warning",
+                "gps",
+                f"its {name} position and velocity go opposite ways",
+                "the velocity to be the position's change",
+                "is one of them written east-north-up?",
+            )

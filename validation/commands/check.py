@@ -1,0 +1,37 @@
+"""``discsim check``: what a recording or a data set holds, what is wrong with it, and what it can tell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = ["command"]
+
+
+def command(
+    recordings: Annotated[
+        Path, typer.Argument(help="A recording, or a data set (a folder of recordings).", show_default=False)
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for check.json; nothing is written without it.")
+    ] = None,
+) -> None:
+    """Say what a recording holds, what is wrong with it, and what it can tell. Nothing is fitted.
+
+    Prints a table per recording: rates, gaps, held, late and lost rows, clipping, resolution and noise as found in the
+    readings, then what cannot be or is unlikely, with what to do. Writes check.json and run.json where --out is given.
+
+    Example: discsim check throw-01
+    """
+    from discsim.recording import read_dataset
+    from validation.checking import check_recording
+    from validation.checking.table import print_checks
+    from validation.run import start_run
+
+    checks = [check_recording(recording) for recording in read_dataset(recordings)]
+    if out is not None:
+        with start_run(out, inputs=[recordings]) as run:
+            run.write_json("check.json", {"recordings": [check.to_json() for check in checks]})
+    print_checks(checks)
