@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import zipfile
 from collections.abc import Callable
@@ -15,10 +16,13 @@ from numpy.testing import assert_allclose
 from discsim.errors import InputError
 from discsim.recording import read_dataset, read_recording
 from validation.cli import main
-from validation.importing import import_recording, read_map, read_readings
+from validation.importing import find_map, import_recording, read_map, read_readings
 from validation.importing.sniffing import Proposal, map_text, opened, recognised, sniff, stretches
 from validation.importing.sniffing.raw_page import envelope
 
+RECORDINGS = Path(os.environ.get("DISCSIM_RECORDINGS") or Path(__file__).parents[2].parent / "shared" / "recordings")
+REAL = RECORDINGS / "real"
+real = pytest.mark.skipif(not REAL.is_dir(), reason="no measured recordings here (DISCSIM_RECORDINGS)")
 XYZ = ("x", "y", "z")
 
 
@@ -238,6 +242,18 @@ def a_gap_word_and_a_trailing_comma(place: Path, log: Log) -> Path:
     return path
 
 
+def px4_folder(place: Path, log: Log) -> Path:
+    stamps = [("timestamp", whole(1e6 * log.t) + 3_000_000)]
+    columns = [*stamps, *three([f"gyro_rad[{k}]" for k in range(3)], log.gyro)]
+    columns += [("gyro_integral_dt", whole(0 * log.t) + 5000)]
+    columns += three([f"accelerometer_m_s2[{k}]" for k in range(3)], log.accel)
+    write_table(place / "ulog" / "flight_sensor_combined_0.csv", columns)
+    columns = [*stamps, *three([f"magnetometer_ga[{k}]" for k in range(3)], log.mag / 100)]
+    write_table(place / "ulog" / "flight_vehicle_magnetometer_0.csv", columns)
+    write_table(place / "ulog" / "flight_battery_status_0.csv", [*stamps, ("voltage_v", 11.1 + 0 * log.t)])
+    return place / "ulog"
+
+
 def degrees_written_as_radians(place: Path, log: Log) -> Path:
     columns = [
         ("time_s", log.t),
@@ -274,6 +290,7 @@ SHAPES: dict[Callable[[Path, Log], Path], tuple[str, ...]] = {
     spin_about_x: ALL[:2],
     degrees_written_as_radians: ("gyroscope", "magnetometer"),
     iso_stamps: ALL[:2],
+    px4_folder: ALL,
     a_gap_word_and_a_trailing_comma: ("gyroscope", "magnetometer"),
 }
 #: What a reading may be off by: rounding as written above (1/2048 g, 0.15 uT, a whole deg/s), and 0.1 % of a scale.
@@ -505,6 +522,7 @@ REFUSED = {
     "prices.csv": (FINANCE.partition("\n")[2].encode(), "no sensor of motion found in the columns 'c1'"),
     "header.csv": (b"time,ax,ay,az\n", "no rows of numbers"),
     "binary.bin": (bytes(range(256)) * 40, "is binary, no text"),
+    "flight.ulg": (b"ULog\x01\x12\x35" + bytes(100), "is a PX4 ULog; `ulog2csv FILE`"),
     "book.xlsx": (b"PK\x03\x04" + bytes(100), "export it as CSV"),
     "broken.zip": (b"PK\x03\x04" + bytes(100), "cannot be unpacked"),
 }
@@ -555,3 +573,54 @@ def test_a_zip_bomb_is_refused_before_it_fills_the_disk(tmp_path):
             archive.writestr(f"{k}.csv", "")
     with pytest.raises(InputError, match="holds 1001 files"), opened(tmp_path / "many.zip"):
         pass
+
+
+# ------------------------------------------------------------------------------------- measured logs, no shipped map
+
+
+@real
+@pytest.mark.parametrize(
+    ("name", "first", "stop"),
+    [("001-rb", 1590, 1830), ("003-rf", 860, 1125), ("004-rf", 680, 908), ("005-rh", 735, 988)],
+)
+def test_the_flights_of_a_measured_disc_are_found_where_they_are_known_to_be(tmp_path, name, first, stop):
+    raw = REAL / "flatball-ins-ultimate-disc" / f"2025-08-31-{name}.csv"
+    proposal = proposed(raw, tmp_path)
+    (throw,) = stretches(read_readings(raw, read_map(tmp_path / "map.toml")))
+    # a tenth of a second: the rule's own width, and what an eye is good for
+    assert abs(throw.first - first) < 10
+    assert abs(throw.stop - stop) < 10
+    shipped, own = read_map(find_map("flatball")), read_map(tmp_path / "map.toml")
+    for sensor in ALL:
+        assert own.sensors[sensor].factor == shipped.sensors[sensor].factor
+        assert set(own.sensors[sensor].columns) & set(shipped.sensors[sensor].columns)
+    if name != "005-rh":  # a hammer flies upside down, and nothing in it shows which side is the top
+        assert all(own.sensors[sensor].axes == shipped.sensors[sensor].axes for sensor in ALL)
+    assert 0.0115 < proposal.clock.step < 0.0140  # what the shipped map's comments found: 12.2 and 13.3 ms a row
+
+
+@real
+def test_a_rocket_without_header_or_units_is_understood_as_its_shipped_map_does(tmp_path):
+    raw = REAL / "srp-sa-rocket"
+    proposed(raw, tmp_path)
+    shipped, own = read_map(find_map("srp")), read_map(tmp_path / "map.toml")
+    for sensor in ALL:
+        assert own.sensors[sensor].factor == pytest.approx(shipped.sensors[sensor].factor, rel=0.001)
+        assert own.sensors[sensor].axes == shipped.sensors[sensor].axes
+    assert recognised(raw).name == "srp"
+
+
+@real
+@pytest.mark.parametrize(
+    ("raw", "name"),
+    [
+        ("flatball-ins-ultimate-disc/2025-08-31-003-rf.csv", "flatball"),
+        ("cats-euroc21-aris-euler-rocket", "cats"),
+        ("cats-euroc21-skyward-lynx-rocket", "lynx"),
+        ("broad-mocap-rotation/07_undisturbed_fast_rotation_B_30s.csv", "broad"),
+        ("ubsuny-phyphox-roller/z_acc.csv", None),
+    ],
+)
+def test_measured_logs_are_recognised_by_the_maps_that_were_made_for_them(raw, name):
+    found = recognised(REAL / raw)
+    assert (None if found is None else found.name) == name

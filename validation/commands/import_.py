@@ -74,15 +74,16 @@ def command(
     with opened(raw) as logged:
         known = recognised(logged) if map_ == "auto" else named
         proposal = sniff(logged, plant) if known is None else None
+        decisions = [] if proposal is None else proposal.all_decisions
         with start_run(out, None, [raw, *([known.path] if known else [])]) as run:
             if known is not None and named is None:
                 run.step(f"taken: the shipped map '{known.name}', made for these columns (--map sniff asks anew)")
             import_map = known or _proposed(run, proposal, write_map or out / "map.toml")
+            proposal = None  # its table is as large as the one that is read now
             import_map = replace(import_map, environment=at_place(import_map.environment, place, date))
             read = read_readings(logged, import_map, chosen)
             throws = stretches(read)
             recordings = chosen_recordings(read, throws, chosen, throw, every=all_throws)
-            decisions = [] if proposal is None else proposal.all_decisions
             write_raw_page(out / "raw.html", raw.name, read, throws, decisions)
             _write(run, recordings, one_folder=not all_throws)
     _say(recordings, throws, whole=rows is None and throw is None and not all_throws)

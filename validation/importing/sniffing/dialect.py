@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import islice, product
 from pathlib import Path
 
 from discsim.errors import InputError
@@ -53,11 +53,8 @@ def dialect_of(path: Path) -> Dialect:
     comment = _comment(lines)
     bare = [(index, line) for index, line in enumerate(lines) if line.strip() and not _is_comment(line, comment)]
     layout, width = _separators(path, [line for _, line in _sample(bare)], Layout(comment=comment, encoding=encoding))
-    record = next(
-        (index for index, line in bare if len(cells := layout.cells(line)) == width and _share(cells, layout) > 0), None
-    )
-    records = [index for index, line in bare if _is_record(layout.cells(line), width, layout)]
-    if record is None or len(records) < 2:
+    records = [index for index, _ in islice(_records(bare, width, layout), 2)]
+    if len(records) < 2:
         raise InputError.at(path, None, "no rows of numbers in it; expected a table that a logger wrote")
     remarks = _remarks(layout)
     return _named(path, lines, layout, records[0], width, remarks)
@@ -139,8 +136,12 @@ def _is_number(cell: str, layout: Layout) -> bool:
     return re.fullmatch(rf"[+-]?(\d+({point}\d*)?|{point}\d+)([eE][+-]?\d+)?", cell, re.ASCII) is not None
 
 
-def _is_record(cells: Sequence[str], width: int, layout: Layout) -> bool:
-    return len(cells) == width and _share(cells, layout) >= RECORD_SHARE
+def _records(bare: Sequence[tuple[int, str]], width: int, layout: Layout) -> Iterator[tuple[int, str]]:
+    """Yield the lines that are records of this width."""
+    for index, line in bare:
+        cells = layout.cells(line)
+        if len(cells) == width and _share(cells, layout) >= RECORD_SHARE:
+            yield index, line
 
 
 # --------------------------------------------------------------------------------------------------- header

@@ -69,10 +69,11 @@ class Numbers:
         for k, name in enumerate(self.table.columns):
             texts = self.cells(k)
             few = dict.fromkeys(texts)
-            words = sum(number(text, self.dialect.layout.decimal) is None for text in few)
-            named = name.strip().lower() in _ID_NAMES
+            if len(few) > MAX_IDS or len(texts) <= 4 * len(few):
+                continue
+            words = all(number(text, self.dialect.layout.decimal) is None for text in few)
             telling = sum(sensor_of(text) is not None for text in few)
-            if 1 <= len(few) <= MAX_IDS and words == len(few) and (named or telling > 1) and len(texts) > 4 * len(few):
+            if words and (name.strip().lower() in _ID_NAMES or telling > 1):
                 return k, tuple(few)
         return None
 
@@ -157,6 +158,8 @@ def _named(
     if by_name is None and says_nothing(name.base) and not (units and units[0].sensor != COUNTS):
         by_name, source = sensor_of(numbers.path.stem), "the file's name"
     if by_name is not None:
+        if by_name == "gyroscope" and units and units[0].unit == "rad":  # PX4's gyro_rad is in rad/s
+            units = [Reading("gyroscope", "rad/s")]
         meant = [unit for unit in units if unit.sensor in (by_name, COUNTS)]
         other = bool(units) and not meant  # an angle, a speed: not this sensor's reading
         sensor: str | None = OTHER if other else by_name

@@ -21,6 +21,11 @@ SIGNATURES = (
     (b"\x1f\x8b", "a gzip archive; unpack it first"),
     (b"\x89HDF", "an HDF5 file; write its tables as CSV"),
     (b"SQLite format 3", "an SQLite data base; write its tables as CSV"),
+    (b"ULog\x01\x12\x35", "a PX4 ULog; `ulog2csv FILE` (pip install pyulog) writes a folder that can be imported"),
+    (
+        b"\xa3\x95\x80",
+        "an ArduPilot log; `mavlogdump.py --format csv --types IMU FILE` (pip install pymavlink) writes CSV",
+    ),
     (b"\x89MCAP", "an MCAP log; write its topics as CSV"),
 )
 _BOMS = (
