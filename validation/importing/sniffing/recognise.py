@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -11,6 +12,9 @@ from validation.importing.import_map import ImportMap, find_map, read_map
 from validation.importing.raw_table import RepairList, read_raw
 
 __all__ = ["recognised"]
+
+#: Bytes at a file's beginning in which its header stands, with some rows.
+_HEAD = 1 << 16
 
 
 def recognised(raw: Path) -> ImportMap | None:
@@ -50,8 +54,12 @@ def _always(shipped: ImportMap) -> set[str]:
 
 
 def _columns(file: Path, shipped: ImportMap) -> set[str]:
-    """Return the columns of a file as the map reads it; none where it cannot."""
-    try:
-        return set(read_raw(file, shipped.layout, RepairList(shipped.repairs)).columns)
-    except InputError:
-        return set()
+    """Return the columns of a file as the map reads its beginning; none where it cannot."""
+    with tempfile.TemporaryDirectory() as place:
+        head = Path(place) / file.name
+        try:
+            with file.open("rb") as stream:
+                head.write_bytes(stream.read(_HEAD).rpartition(b"\n")[0])
+            return set(read_raw(head, shipped.layout, RepairList(shipped.repairs)).columns)
+        except (InputError, OSError):
+            return set()
