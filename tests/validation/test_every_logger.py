@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_logs import LOGGERS
+from logger_files import LOGGERS
 
 from discsim.errors import InputError
 from discsim.recording import read_recording

@@ -154,7 +154,7 @@ def test_a_damage_that_the_map_does_not_allow_to_repair_is_refused_with_its_line
 
 
 def test_more_than_a_twentieth_of_the_rows_lost_is_a_warning_and_all_of_them_an_error(tmp_path):
-    rows = [f"{k},{k},0,0" for k in range(40)]
+    rows = [f"{k},{k},{2 * k},{3 * k}" for k in range(40)]
     rows[3] = rows[7] = "x"
     assert run(tmp_path, "idx,gx,gy,gz\n" + "\n".join(rows)).notes == NO_STAMPS  # 2 of 40 are 5 %
     rows[9] = "x"
@@ -437,6 +437,7 @@ def test_the_command_writes_a_recording_its_repairs_and_its_run(tmp_path, capsys
     command(raw, str(tmp_path / "own.toml"), rows="0:3", out=tmp_path / "out")
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         "recording.toml",
+        "raw.html",
         "gyroscope.csv",
         "repairs.csv",
         "run.json",

@@ -23,7 +23,15 @@ from validation.importing.raw_table import RawRow, RawTable, Repair, RepairList,
 from validation.importing.row_clock import RowClock, row_clock
 from validation.importing.timing import row_timing
 
-__all__ = ["Imported", "import_recording", "parse_rows", "repairs_csv"]
+__all__ = [
+    "Imported",
+    "RawReadings",
+    "import_recording",
+    "parse_rows",
+    "read_readings",
+    "recording_of",
+    "repairs_csv",
+]
 
 #: Share of a sensor's rows that may be left out before the import says that the file is in a bad state.
 MUCH_LOST = 0.05
@@ -64,20 +72,49 @@ def parse_rows(text: str) -> slice:
         raise InputError(f"--rows {text}: expected A:B, two whole numbers such as 1590:1830") from None
 
 
-def import_recording(raw: Path, import_map: ImportMap, rows: slice | None = None) -> Imported:
+@dataclass(frozen=True)
+class RawReadings:
+    """All that a map finds in a raw file, before rows are chosen; ``main`` is the table whose rows are counted."""
+
+    raw: Path
+    import_map: ImportMap
+    tables: dict[str, RawTable]
+    main: RawTable
+    readings: dict[str, Readings]
+    repairs: tuple[Repair, ...]
+    notes: tuple[str, ...]
+
+
+def read_readings(raw: Path, import_map: ImportMap, rows: slice | None = None) -> RawReadings:
     """Read ``raw`` (a file, or a folder with one file per sensor) by a map.
 
-    ``rows`` are 0-based data rows of the file of the map's first sensor, as numbered in that file: the header,
-    comments and blank lines have no number, a row that was left out keeps its own. Sensors in other files are cut to
-    the same span of time. Time zero is the first sample that is used. Raises `InputError`: no such file or column, a
-    damage that the map does not allow to repair, rows out of range, nothing usable left.
+    All rows are read; of a clock that starts anew in the file the longest stretch is kept (of ``rows`` if given).
+    Raises `InputError`: no such file or column, a damage that the map does not allow to repair, nothing usable left.
     """
     repairs = RepairList(import_map.repairs)
     tables = _read_tables(raw, import_map, repairs)
     readings, notes = _read_sensors(raw, tables, import_map, rows, repairs)
+    main = tables[next(iter(readings))]
+    return RawReadings(raw, import_map, tables, main, readings, tuple(repairs.listed()), tuple(notes))
+
+
+def import_recording(raw: Path, import_map: ImportMap, rows: slice | None = None) -> Imported:
+    """Read ``raw`` by a map and return the recording of ``rows``: `read_readings`, then `recording_of`."""
+    return recording_of(read_readings(raw, import_map, rows), rows)
+
+
+def recording_of(read: RawReadings, rows: slice | None = None) -> Imported:
+    """Return the recording of some rows of what was read.
+
+    ``rows`` are 0-based data rows of the file of the map's first sensor, as numbered in that file: the header,
+    comments and blank lines have no number, a row that was left out keeps its own. Sensors in other files are cut to
+    the same span of time. Time zero is the first sample that is used. Raises `InputError`: rows out of range, or
+    nothing usable among them.
+    """
+    raw, import_map, readings = read.raw, read.import_map, read.readings
+    notes = list(read.notes)
     if rows is not None:
-        main = tables[next(iter(readings))]
-        whole, readings = readings, _cut(readings, tables, main, rows)
+        whole, readings = readings, _cut(readings, read.tables, read.main, rows)
         notes += [f"no {sensor} in these rows" for sensor in whole if sensor not in readings]
     readings, rates, said = _fresh(raw, readings, import_map, tables, repairs)
     notes += said
@@ -105,7 +142,7 @@ def import_recording(raw: Path, import_map: ImportMap, rows: slice | None = None
         {sensor: _sheet(import_map.sensors[sensor], samples[sensor], rates.get(sensor)) for sensor in samples},
         samples,
     )
-    return Imported(recording, tuple(repairs.listed()), (*notes, *clipping_notes(recording)))
+    return Imported(recording, read.repairs, (*notes, *clipping_notes(recording)))
 
 
 def _read_sensors(

@@ -90,7 +90,11 @@ class SensorMap:
 
 @dataclass(frozen=True)
 class ImportMap:
-    """What a map states; ``throws`` are release conditions by the stem of the raw file's name."""
+    """What a map states; ``throws`` are release conditions by the stem of the raw file's name.
+
+    ``recognised_by`` are columns that tell this logger from all others beside those that the map reads; None where the
+    map is taken only if it is named.
+    """
 
     path: Path
     name: str
@@ -103,6 +107,7 @@ class ImportMap:
     release: Release | None
     throws: Mapping[str, MeasuredThrow]
     sensors: Mapping[str, SensorMap]
+    recognised_by: tuple[str, ...] | None = None
 
 
 def find_map(name_or_path: str) -> Path:
@@ -132,10 +137,24 @@ def read_map(path: Path) -> ImportMap:
     release = None if release_table is None else Release.from_toml(release_table)
     throws = _throws(top.table("throws"))
     sensors = _sensors(_need(top, "sensors"), strict=plant != "free_spin")
+    recognised_by = _texts(top, "recognised_by")
     top.finish()
     if throws and "track" not in sensors:
         raise top.error("throws", "[throws] without [sensors.track]; expected the track whose first row is the release")
-    return ImportMap(path, name, plant, layout, time, repairs, environment, disc, release, throws, sensors)
+    return ImportMap(
+        path,
+        name,
+        plant,
+        layout,
+        time,
+        repairs,
+        environment,
+        disc,
+        release,
+        throws,
+        sensors,
+        recognised_by,
+    )
 
 
 def _need(table: TomlTable, key: str) -> TomlTable:
@@ -170,9 +189,21 @@ def _layout(table: TomlTable | None) -> Layout:
         raise table.error("skip_lines", f"'skip_lines' is {skip_lines!r}, expected a whole number from 0")
     columns = _texts(table, "columns") or ()
     comment = table.text("comment", required=False) or ""
-    layout = Layout(separator, decimal, skip_lines, columns, comment, table.flag("lists"))
+    lists, encoding, thousands = table.flag("lists"), _encoding(table), table.text("thousands", required=False) or ""
+    if len(thousands) > 1 or (thousands and thousands in (decimal, separator)):
+        raise table.error("thousands", f"'thousands' is '{thousands}', expected one character of its own")
+    layout = Layout(separator, decimal, skip_lines, columns, comment, lists, encoding, thousands)
     table.finish()
     return layout
+
+
+def _encoding(table: TomlTable) -> str:
+    encoding = table.text("encoding", required=False) or "utf-8"
+    try:
+        "".encode(encoding)  # a codec such as "hex", which knows no text, fails here too
+    except LookupError:
+        raise table.error("encoding", f"'encoding' is '{encoding}', expected one such as utf-8 or latin-1") from None
+    return encoding
 
 
 def _time_base(table: TomlTable) -> TimeBase:

@@ -72,6 +72,10 @@ class Layout:
         What starts a comment; empty where there are none.
     lists : bool
         Whether a cell may hold a list in brackets, which is spread over as many columns.
+    encoding : str
+        Name of the text's encoding, as Python knows it.
+    thousands : str
+        Mark between thousands (``1.234,56`` has ``.``); empty where there is none.
     """
 
     separator: str = ","
@@ -80,6 +84,8 @@ class Layout:
     columns: tuple[str, ...] = ()
     comment: str = ""
     lists: bool = False
+    encoding: str = "utf-8"
+    thousands: str = ""
 
     def cells(self, line: str) -> list[str]:
         """Return the cells of one line, without the blanks around them."""
@@ -91,7 +97,13 @@ class Layout:
             return [line]
         if self.lists:
             cells = [item for cell in cells for item in _spread(cell)]
-        return [cell.strip() for cell in cells]
+        cells = [cell.strip() for cell in cells]
+        return [self._ungrouped(cell) for cell in cells] if self.thousands else cells
+
+    def _ungrouped(self, cell: str) -> str:
+        mark, point = re.escape(self.thousands), re.escape(self.decimal)
+        grouped = re.fullmatch(rf"[+-]?\d{{1,3}}({mark}\d{{3}})+({point}\d*)?([eE][+-]?\d+)?", cell)
+        return cell.replace(self.thousands, "") if grouped else cell
 
 
 class RawRow(NamedTuple):
@@ -182,7 +194,7 @@ def read_raw(path: Path, layout: Layout, repairs: RepairList) -> RawTable:
     broken header have no number, a row that is left out keeps its own. Raises `InputError` where the file cannot
     be read, has no row, or has a damage that may not be repaired.
     """
-    lines = _lines(path, repairs)
+    lines = _lines(path, layout.encoding, repairs)
     at = layout.skip_lines
     columns, header_line = layout.columns, 0
     if not columns:
@@ -207,7 +219,7 @@ def read_raw(path: Path, layout: Layout, repairs: RepairList) -> RawTable:
     return RawTable(path, columns, header_line, tuple(rows), total)
 
 
-def _lines(path: Path, repairs: RepairList) -> list[str]:
+def _lines(path: Path, encoding: str, repairs: RepairList) -> list[str]:
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -215,8 +227,8 @@ def _lines(path: Path, repairs: RepairList) -> list[str]:
     if content.startswith(codecs.BOM_UTF8):
         repairs.add(None, path, 1, "byte-order mark", "mark left out")
         content = content.removeprefix(codecs.BOM_UTF8)
-    # a byte that is no UTF-8 becomes a sign that no number has, so that its cell is found below
-    text = content.decode("utf-8", errors="replace")
+    # a byte that is no text becomes a sign that no number has, so that its cell is found below
+    text = content.decode(encoding, errors="replace").removeprefix("\ufeff")
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 

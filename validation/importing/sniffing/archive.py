@@ -1,0 +1,98 @@
+"""A raw file, folder or zip as a file or folder. Takes a path; gives one whose files can be read, within limits."""
+
+from __future__ import annotations
+
+import shutil
+import stat
+import tempfile
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+
+from discsim.errors import InputError
+
+__all__ = ["MAX_BYTES", "MAX_FILES", "opened"]
+
+#: A zip may hold this many files and bytes unpacked: ten hours of nine channels at 1 kHz as text are below 4 GB, and
+#: no reader of text could hold more than that; a phone's export has some ten files.
+MAX_FILES = 1000
+MAX_BYTES = 4 << 30
+#: ... and this many bytes for each packed one: numbers shrink by 3 to 20, a constant column by some hundreds.
+MAX_RATIO = 1000
+_CHUNK = 1 << 20
+
+
+@contextmanager
+def opened(raw: Path) -> Iterator[Path]:
+    """Give ``raw`` itself, or where it is a zip a folder of that name with its files, which is gone afterwards.
+
+    Raises `InputError` for no such file, a damaged zip, one with a password, one with paths that lead out of it or
+    links, and one above the limits.
+    """
+    if not raw.exists():
+        raise InputError.at(raw, None, "no such file or folder; expected what a logger wrote")
+    if not raw.is_file() or raw.suffix.lower() != ".zip":
+        yield raw
+        return
+    with tempfile.TemporaryDirectory(prefix="discsim-") as place:
+        folder = Path(place) / raw.stem
+        folder.mkdir()
+        _unpack(raw, folder)
+        yield _inner(folder, raw)
+
+
+def _unpack(raw: Path, folder: Path) -> None:
+    try:
+        with zipfile.ZipFile(raw) as archive:
+            members = [member for member in archive.infolist() if not member.is_dir()]
+            if len(members) > MAX_FILES:
+                raise InputError.at(raw, None, f"holds {len(members)} files; expected at most {MAX_FILES}")
+            left = min(MAX_BYTES, MAX_RATIO * max(raw.stat().st_size, 1 << 10))
+            for member in members:
+                target = folder / _checked(raw, member)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                left -= _copy(raw, archive, member, target, left)
+    except (zipfile.BadZipFile, NotImplementedError, EOFError, OSError) as error:
+        raise InputError.at(raw, None, f"cannot be unpacked ({error}); expected a whole zip archive") from None
+    except RuntimeError as error:  # zipfile's word for a password
+        raise InputError.at(raw, None, f"cannot be unpacked ({error}); expected a zip without a password") from None
+
+
+def _checked(raw: Path, member: zipfile.ZipInfo) -> PurePosixPath:
+    name = member.orig_filename.replace("\\", "/").partition("\0")[0]
+    path = PurePosixPath(name)
+    linked = stat.S_ISLNK(member.external_attr >> 16)
+    if linked or path.is_absolute() or ".." in path.parts or ":" in name or not path.parts:
+        what = "is a link" if linked else "leads out of it"
+        raise InputError.at(raw, None, f"'{name[:80]}' in it {what}; expected plain files within the archive")
+    return path
+
+
+def _copy(raw: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo, target: Path, left: int) -> int:
+    """Unpack one file, counting the bytes that come: what the archive says of its size may be wrong."""
+    written = 0
+    with archive.open(member) as source, target.open("wb") as sink:
+        while chunk := source.read(_CHUNK):
+            written += len(chunk)
+            if written > left:
+                limit = f"{MAX_BYTES >> 30} GB and {MAX_RATIO} times its size"
+                raise InputError.at(raw, None, f"unpacks to more than {limit}; expected a logger's export")
+            sink.write(chunk)
+    return written
+
+
+def _inner(folder: Path, raw: Path) -> Path:
+    """Return the folder that holds the files: the only one inside, moved up under the archive's own name."""
+    shutil.rmtree(folder / "__MACOSX", ignore_errors=True)
+    children = [child for child in folder.iterdir() if not child.name.startswith(".")]
+    if len(children) == 1 and children[0].is_dir():
+        inner = folder.parent / "inner" / folder.name
+        inner.parent.mkdir()
+        children[0].rename(inner)
+        return inner
+    if len(children) == 1:
+        return children[0]
+    if not children:
+        raise InputError.at(raw, None, "holds no file; expected a logger's export")
+    return folder

@@ -1,0 +1,100 @@
+"""What sensor a triple without a telling name is. Takes triples and time; gives each one's sensor, how sure and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import permutations
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from validation.importing.sniffing.decision import Decision
+from validation.importing.sniffing.groups import Triple
+from validation.importing.sniffing.magnitudes import FIELD, PER_G, REST, field_size, gravity_norm, rest_norm
+from validation.importing.sniffing.turning import best_worth, steps_between
+
+__all__ = ["WORTHS", "by_behaviour"]
+
+#: What one reading of a gyroscope may be worth, rad/s: rad/s, deg/s, mdeg/s, and counts of 16 bits over 2000 deg/s.
+WORTHS = (1.0, np.pi / 180, np.pi / 180e3, np.pi / 180 / 16.384)
+#: What a gyroscope leaves of the field's changes (a ratio) where both are recognised by it.
+TELLING = 0.35
+#: At rest a gyroscope reads its offset, below 20 deg/s, and in a spin hundreds: less than a tenth of its largest.
+STILL = 0.1
+
+
+def by_behaviour(triples: Sequence[Triple], times: Sequence[FloatArray]) -> list[tuple[Triple, str, Decision]]:
+    """Return triples with the sensors that their readings show; those that show none are left out.
+
+    A gyroscope is near zero at rest and explains how another triple, the magnetometer, turns; an accelerometer reads
+    gravity at rest. ``times`` are the seconds of each triple's rows.
+    """
+    found: list[tuple[Triple, str, Decision]] = []
+    left = [k for k, triple in enumerate(triples) if _moves(triple.values)]
+    for k in list(left):
+        why = _gravity(triples[k].values)
+        if why and not any(sensor == "accelerometer" for _, sensor, _ in found):
+            found.append((triples[k], "accelerometer", _said("accelerometer", triples[k], why)))
+            left.remove(k)
+    pair = _turning_pair(triples, times, left)
+    if pair is not None:
+        gyro, field, ratio = pair
+        why = f"it says how {triples[field].label} turns ({100 * ratio:.0f} % of the changes left)"
+        found.append((triples[gyro], "gyroscope", _said("gyroscope", triples[gyro], why)))
+        why = f"it turns as {triples[gyro].label} says"
+        found.append((triples[field], "magnetometer", _said("magnetometer", triples[field], why)))
+        left = [k for k in left if k not in (gyro, field)]
+    for k in left:
+        sensor, why = _alone(triples[k].values)
+        if sensor and not any(known == sensor for _, known, _ in found):
+            said = _said(sensor, triples[k], why)
+            found.append((triples[k], sensor, said._replace(sure="guess")))
+    return found
+
+
+def _said(sensor: str, triple: Triple, why: str) -> Decision:
+    return Decision(sensor, triple.label, "likely", why)
+
+
+def _moves(value: FloatArray) -> bool:
+    """Tell three components of a vector: each moves, and no two are copies, as prices of one day are."""
+    sound = value[np.isfinite(value).all(axis=1)]
+    if not np.all(sound.std(axis=0) > 0):
+        return False
+    return bool(np.abs(np.corrcoef(sound.T))[np.triu_indices(3, 1)].min() < 0.9)
+
+
+def _gravity(value: FloatArray) -> str:
+    """Return why a triple is an accelerometer; empty where it is none that this shows."""
+    sound = value[np.isfinite(value).all(axis=1)]
+    rest = gravity_norm(sound)
+    peak = float(np.percentile(np.linalg.norm(sound, axis=1), 99.9))
+    counts = PER_G if np.all(sound == np.round(sound)) else ()
+    near = [one for one in (9.80665, 1.0, 1000.0, *counts) if abs(rest / one - 1) < REST]
+    # a field of 10 or 1000 in some unit stays what it is when the thing is thrown; a specific force does not
+    return f"{rest:.4g} at rest is gravity, and it reaches {peak:.3g}" if near and peak > 1.5 * rest else ""
+
+
+def _turning_pair(
+    triples: Sequence[Triple], times: Sequence[FloatArray], left: Sequence[int]
+) -> tuple[int, int, float] | None:
+    best = None
+    for gyro, field in permutations(left, 2):
+        steps = steps_between(times[gyro], triples[gyro].values, times[field], triples[field].values)
+        fit = best_worth(steps, WORTHS)
+        if fit is not None and fit.ratio < TELLING and (best is None or fit.ratio < best[2]):
+            best = (gyro, field, fit.ratio)
+    return best
+
+
+def _alone(value: FloatArray) -> tuple[str, str]:
+    sound = value[np.isfinite(value).all(axis=1)]
+    norm = np.linalg.norm(sound, axis=1)
+    rest, peak = rest_norm(sound), float(np.percentile(norm, 99.5))
+    if rest < STILL * peak:
+        return "gyroscope", f"{rest:.3g} at rest, up to {peak:.3g}"
+    size, what = field_size(sound)
+    steady = float(np.percentile(norm, 90) / np.percentile(norm, 10))
+    if steady < 3 and any(FIELD[0] <= size * factor <= FIELD[1] for factor in (1.0, 0.1, 100.0, 1e-3)):
+        return "magnetometer", f"{size:.4g} ({what}) is the earth's field, and its size hardly changes"
+    return "", ""

@@ -1,0 +1,167 @@
+"""The time of a row. Takes a table; gives the column of time stamps (or the counter), its unit and how sure that is."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from validation.importing.clock import iso_seconds
+from validation.importing.sniffing.decision import Decision, Sureness
+from validation.importing.sniffing.dialect import is_stamp
+from validation.importing.sniffing.groups import Numbers
+from validation.importing.sniffing.names import is_time_name, sensor_of
+from validation.importing.sniffing.units import readings_of, split_unit
+
+__all__ = ["Clock", "clocks_of", "seconds"]
+
+SCALES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+#: Time since 1970 in 2001 to 2065, in seconds: a stamp of 1e9 to 3e9 s (or as many ms, us, ns) is the time of day.
+EPOCH = (1e9, 3e9)
+#: Logs of motion are written at 2 Hz to 20 kHz; outside that no unit is believed.
+SPACING = (5e-5, 0.5)
+#: Loggers without time stamps write 100 rows a second more often than any other number; all rates scale with it.
+STEP = 0.01
+#: Share of steps that ascend in a column of time: a log has some doubled or swapped rows, never every tenth.
+ASCENDING = 0.9
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Time of a row: a column with its unit, or a step (with a counter where there is one), and why."""
+
+    column: str | None
+    unit: str
+    counter: str | None
+    step: float | None
+    decision: Decision
+
+    def with_step(self, step: float, decision: Decision) -> Clock:
+        """Return the clock with another step."""
+        return replace(self, step=step, decision=decision)
+
+
+def clocks_of(numbers: Numbers) -> list[Clock]:
+    """Return the possible clocks of a table, the best first; the last is a step that is guessed."""
+    found = []
+    for k, name in enumerate(numbers.table.columns):
+        clock = _clock(numbers, k, name)
+        if clock is not None:
+            found.append((_rank(numbers, k, clock), k, clock))
+    return [clock for *_, clock in sorted(found, key=lambda item: item[:2])] + [_without(numbers)]
+
+
+def seconds(clock: Clock, numbers: Numbers) -> FloatArray:
+    """Return the time of each row, (n,) s from an origin of its own."""
+    if clock.column is None:
+        assert clock.step is not None
+        count = np.array([row.number for row in numbers.table.rows], dtype=float)
+        if clock.counter is not None:
+            count = numbers.values[:, numbers.table.columns.index(clock.counter)]
+        return count * clock.step
+    k = numbers.table.columns.index(clock.column)
+    if clock.unit == "iso":
+        return _stamps(numbers.cells(k))
+    return (numbers.values[:, k] - np.nanmin(numbers.values[:, k])) * SCALES[clock.unit]
+
+
+def _rank(numbers: Numbers, k: int, clock: Clock) -> int:
+    named = is_time_name(numbers.names[k])
+    return {"certain": 0, "likely": 1, "guess": 2}[clock.decision.sure] + (0 if named else 3)
+
+
+def _clock(numbers: Numbers, k: int, name: str) -> Clock | None:
+    cells = numbers.cells(k)
+    if sum(map(is_stamp, cells[:50])) > 0.5 * len(cells[:50]):
+        time = _stamps(cells)
+        why = Decision("time", f"'{name}', date and time", "certain", "its cells are dates with a time")
+        return Clock(name, "iso", None, None, why) if _ascends(time) else None
+    value = numbers.values[:, k]
+    if not _ascends(value):
+        return None
+    spoken = numbers.names[k]
+    named = is_time_name(spoken)
+    if not named and (numbers.dialect.has_header or k > 1):
+        return None  # what has another name is another thing; without names the first two columns are tried
+    unit, sure, why_unit = _unit(value, spoken)
+    if unit is None:
+        return None
+    said = Decision("time", f"'{name}' in {unit}", sure, why_unit)
+    return Clock(name, unit, None, None, said)
+
+
+def _ascends(value: FloatArray) -> bool:
+    """Tell time from readings: its own rows ascend; rows of several sensors may share a stamp."""
+    steps = np.diff(value[np.isfinite(value)])
+    return steps.size > 1 and bool(np.mean(steps >= 0) > ASCENDING and np.mean(steps > 0) > 0.1)
+
+
+def _unit(value: FloatArray, name: str) -> tuple[str | None, Sureness, str]:
+    """Return the unit of time stamps, how sure that is, and why."""
+    steps = np.diff(value[np.isfinite(value)])
+    step = float(np.median(steps[steps > 0]))
+    largest = float(np.nanmax(value))
+    fits = [unit for unit, scale in SCALES.items() if SPACING[0] <= step * scale <= SPACING[1]]
+    written = _written(name)
+    if written is not None:
+        if written in fits:
+            return written, "certain", f"the header says so, and a row every {step * SCALES[written] * 1e3:.3g} ms fits"
+        for unit, scale in SCALES.items():
+            if EPOCH[0] < largest * scale < EPOCH[1] and unit in fits:
+                return unit, "likely", f"the header says {written}, but only {unit} since 1970 fit {largest:.4g}"
+        if fits:
+            unit = fits[0]
+            why = f"the header says {written}, which is a row every {step * SCALES[written]:.3g} s; {unit} fits a log"
+            return unit, "guess", why
+        return None, "guess", ""
+    for unit, scale in SCALES.items():
+        if EPOCH[0] < largest * scale < EPOCH[1] and unit in fits:
+            return unit, "certain", f"stamps of {largest:.4g} are {unit} since 1970"
+    if not fits:
+        return None, "guess", ""
+    whole = bool(np.all(np.abs(steps - np.round(steps)) < 1e-9))
+    if not whole and "s" in fits:
+        return "s", "likely", f"stamps with decimals, {1 / step:.4g} rows a second"
+    if whole and "s" in fits and len(fits) == 1:
+        return None, "guess", ""  # a counter, or one row a second: no motion shows in that
+    fits = [unit for unit in fits if not (whole and unit == "s")]
+    # of several the one whose rate is nearest 100 Hz on a logarithmic scale, where loggers are
+    unit = min(fits, key=lambda unit: abs(np.log(step * SCALES[unit] / STEP)))
+    sure: Sureness = "likely" if len(fits) == 1 or 1e-3 <= step * SCALES[unit] <= 0.1 else "guess"
+    return unit, sure, f"whole numbers {step:.4g} apart: {1 / (step * SCALES[unit]):.4g} rows a second"
+
+
+def _written(name: str) -> str | None:
+    """Return the unit that a column's name states, or None."""
+    rest, unit = split_unit(name.strip())
+    for spelling in (unit, rest if not unit else ""):
+        meant = readings_of(spelling)
+        if meant and meant[0].sensor == "time":
+            return meant[0].unit
+    glued = re.search(r"(Ms|Us|Ns|Millis|Micros|Nanos|Seconds|_?seconds)(?=$|_|[A-Z])", name) or re.search(
+        r"^(millis|micros|nanos|seconds)", name
+    )
+    if glued is not None and sensor_of(name) is None:
+        meant = readings_of(glued[1].strip("_").lower())
+        return meant[0].unit if meant else None
+    return None
+
+
+def _stamps(cells: list[str]) -> FloatArray:
+    """Return dates with a time (or times of day) as seconds; NaN where one is neither."""
+    found = [iso_seconds(cell) for cell in cells]
+    return np.array([np.nan if time is None else time for time in found])
+
+
+def _without(numbers: Numbers) -> Clock:
+    """Return the clock of a table without time stamps: rows at one rate, counted by a column where one counts."""
+    for k, name in enumerate(numbers.table.columns):
+        value = numbers.values[:, k]
+        steps = np.diff(value[np.isfinite(value)])
+        if steps.size > 1 and np.mean(steps == 1) > ASCENDING and np.nanmax(value) < 1e9:
+            why = f"no time stamps; '{name}' counts the rows, taken as {1 / STEP:.0f} a second: state step_s"
+            return Clock(None, "s", name, STEP, Decision("time", f"counter '{name}'", "guess", why))
+    why = f"no time stamps; rows taken as {1 / STEP:.0f} a second: state step_s"
+    return Clock(None, "s", None, STEP, Decision("time", f"{STEP} s a row", "guess", why))

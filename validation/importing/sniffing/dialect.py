@@ -1,0 +1,215 @@
+"""How the text of a raw file is laid out. Takes a path; gives a `Dialect`: separators, header, units, first record."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice, product
+from pathlib import Path
+
+from discsim.errors import InputError
+from validation.importing.raw_table import GAPS, Layout, RepairList, read_raw
+from validation.importing.sniffing.text import encoding_of, lines_of
+
+__all__ = ["Dialect", "dialect_of", "is_stamp"]
+
+#: Lines looked at for separators: the first ones (after a preamble) and as many spread over the file.
+HEAD_LINES = 200
+#: A line is a record where this share of its cells are numbers or stamps: a record of a long table (sensor, time, x, y,
+#: z) has four of five, a logged event beside numbers two of five; a header has none.
+RECORD_SHARE = 0.4
+_COMMENTS = ("#", "%", "//", "!")
+_STAMP = re.compile(r"\d{4}-\d\d?-\d\d?[T ]\d\d?:\d\d.*|\d\d?:\d\d:\d\d([.,]\d*)?")
+_LIST = re.compile(r"\[[^\[\]]*,[^\[\]]*\]")
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """A layout the reader of raw tables takes, the names it gives, units from a line of their own, and remarks.
+
+    ``record`` is the index of the first record's line; ``width`` the cells of a record.
+    """
+
+    layout: Layout
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    has_header: bool
+    record: int
+    width: int
+    remarks: tuple[str, ...]
+
+
+def is_stamp(cell: str) -> bool:
+    """Tell whether a cell is a date with a time, or a time of day."""
+    return _STAMP.fullmatch(cell.strip().strip('"')) is not None
+
+
+def dialect_of(path: Path) -> Dialect:
+    """Find the layout of a text file; raises `InputError` where it has no rows of numbers."""
+    encoding = encoding_of(path)
+    lines = lines_of(path, encoding)
+    comment = _comment(lines)
+    bare = [(index, line) for index, line in enumerate(lines) if line.strip() and not _is_comment(line, comment)]
+    layout, width = _separators(path, [line for _, line in _sample(bare)], Layout(comment=comment, encoding=encoding))
+    records = [index for index, _ in islice(_records(bare, width, layout), 2)]
+    if len(records) < 2:
+        raise InputError.at(path, None, "no rows of numbers in it; expected a table that a logger wrote")
+    remarks = _remarks(layout)
+    return _named(path, lines, layout, records[0], width, remarks)
+
+
+def _remarks(layout: Layout) -> tuple[str, ...]:
+    words = []
+    if layout.decimal == ",":
+        words.append("decimal comma")
+    if layout.thousands:
+        words.append(f"'{layout.thousands}' between thousands")
+    if layout.encoding != "utf-8":
+        words.append(f"text in {layout.encoding}")
+    return tuple(words)
+
+
+def _comment(lines: Sequence[str]) -> str:
+    """Return what starts a comment: a mark at the beginning of a line that holds no record's number at once."""
+    counts = Counter(mark for line in lines for mark in _COMMENTS if line.lstrip().startswith(mark))
+    return counts.most_common(1)[0][0] if counts else ""
+
+
+def _is_comment(line: str, comment: str) -> bool:
+    return bool(comment) and line.lstrip().startswith(comment)
+
+
+def _sample(bare: list[tuple[int, str]]) -> list[tuple[int, str]]:
+    """Return the first lines, and as many from all over the file, which outweigh a preamble."""
+    step = max(1, len(bare) // HEAD_LINES)
+    return bare[:HEAD_LINES] + bare[HEAD_LINES // 2 :: step]
+
+
+# ------------------------------------------------------------------------------------------------- separators
+
+
+def _separators(path: Path, sample: list[str], base: Layout) -> tuple[Layout, int]:
+    """Return the layout under which most lines are equally wide records of numbers; earlier candidates win ties."""
+    lists = any(_LIST.search(line) for line in sample)
+    best, best_score, width = base, 0.0, 0
+    candidates = product((",", ";", "\t", "|", "blank"), (".", ","), ("", ",", ".", "'", "\u00a0", "\u202f", " "))
+    for separator, decimal, thousands in candidates:
+        if separator == decimal or (thousands and thousands in (separator, decimal)):
+            continue
+        if thousands and not any(re.search(rf"\d{re.escape(thousands)}\d{{3}}", line) for line in sample):
+            continue
+        if separator != "blank" and not any(separator in line for line in sample):
+            continue
+        if thousands == " " and separator == "blank":
+            continue
+        layout = replace(base, separator=separator, decimal=decimal, thousands=thousands, lists=lists)
+        score, wide = _score(layout, sample)
+        if score > best_score + 1e-9:
+            best, best_score, width = layout, score, wide
+    if best_score == 0.0:
+        raise InputError.at(path, None, "no rows of numbers in it; expected a table that a logger wrote")
+    return best, width
+
+
+def _score(layout: Layout, sample: list[str]) -> tuple[float, int]:
+    cells = [layout.cells(line) for line in sample]
+    records = [row for row in cells if len(row) > 1 and _share(row, layout) >= RECORD_SHARE]
+    if not records:
+        return 0.0, 0
+    width, count = Counter(map(len, records)).most_common(1)[0]
+    shares = [_share(row, layout) for row in records if len(row) == width]
+    # squared: a wrong separator leaves cells of two glued numbers, which are none
+    return count / len(sample) * (sum(shares) / len(shares)) ** 2, width
+
+
+def _share(cells: Sequence[str], layout: Layout) -> float:
+    """Return the share of cells that hold a number or a stamp; empty ones count for neither side."""
+    full = [cell for cell in cells if cell and cell.lower() not in GAPS]
+    return sum(_is_number(cell, layout) or is_stamp(cell) for cell in full) / len(full) if full else 0.0
+
+
+def _is_number(cell: str, layout: Layout) -> bool:
+    """Tell a number in this layout, strictly: a point is no number's where the decimal mark is a comma."""
+    point = re.escape(layout.decimal)
+    return re.fullmatch(rf"[+-]?(\d+({point}\d*)?|{point}\d+)([eE][+-]?\d+)?", cell, re.ASCII) is not None
+
+
+def _records(bare: Sequence[tuple[int, str]], width: int, layout: Layout) -> Iterator[tuple[int, str]]:
+    """Yield the lines that are records of this width."""
+    for index, line in bare:
+        cells = layout.cells(line)
+        if len(cells) == width and _share(cells, layout) >= RECORD_SHARE:
+            yield index, line
+
+
+# --------------------------------------------------------------------------------------------------- header
+
+
+def _named(path: Path, lines: list[str], layout: Layout, record: int, width: int, remarks: tuple[str, ...]) -> Dialect:
+    """Find the line of names above the first record (and one of units between), or number the columns."""
+    above = [index for index in range(record) if lines[index].strip()]
+    texts = [_header_cells(lines[index], layout) for index in above]
+    units: tuple[str, ...] = ()
+    if len(texts) > 1 and len(texts[-1]) == len(texts[-2]) >= width - 1 and _looks_like_units(texts[-1], layout):
+        units, texts, above = tuple(texts.pop()), texts, above[:-1]
+        units = units[:width]
+    names = _fitting(texts[-1], width, lines[record], layout) if texts else None
+    if names is None:
+        joined = _joined(path, layout, above, width)
+        if joined is not None:
+            return Dialect(joined[0], joined[1], (), True, record, width, (*remarks, "header broken over two lines"))
+        columns = tuple(f"c{k + 1}" for k in range(width))
+        start = record if not layout.comment and above else 0
+        return Dialect(replace(layout, skip_lines=start, columns=columns), columns, (), False, record, width, remarks)
+    at = above[-1]
+    plain = tuple(texts[-1]) == names and not units and not _is_comment(lines[at], layout.comment)
+    if plain and len(set(names)) == len(names):
+        before = [line for line in lines[:at] if line.strip() and not _is_comment(line, layout.comment)]
+        return Dialect(replace(layout, skip_lines=at if before else 0), names, (), True, record, width, remarks)
+    # names that stand in a comment, twice, or with a line of units below are written into the map
+    unique = tuple(name if name not in names[:k] else f"{name}.{k + 1}" for k, name in enumerate(names))
+    return Dialect(replace(layout, skip_lines=record, columns=unique), unique, units, True, record, width, remarks)
+
+
+def _header_cells(line: str, layout: Layout) -> list[str]:
+    text = line.strip("\n")
+    if layout.comment and _is_comment(text, layout.comment):
+        text = text.lstrip().removeprefix(layout.comment).lstrip(f"{layout.comment} ")
+    cells = replace(layout, lists=False).cells(text)
+    while len(cells) > 1 and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def _fitting(cells: list[str], width: int, record: str, layout: Layout) -> tuple[str, ...] | None:
+    """Return names for ``width`` columns: a record may have an empty last cell, or a row number without a name."""
+    if _share(cells, layout) >= RECORD_SHARE or not any(re.search(r"[^\W\d_]", cell) for cell in cells):
+        return None
+    if len(cells) == width:
+        return tuple(cells)
+    if len(cells) == width - 1:
+        return (*cells, "") if not layout.cells(record)[-1] else ("", *cells)
+    return None
+
+
+def _looks_like_units(cells: list[str], layout: Layout) -> bool:
+    from validation.importing.sniffing.units import readings_of
+
+    full = [cell.strip("()[]{}<> ") for cell in cells if cell.strip("()[]{}<>- ")]
+    known = sum(bool(readings_of(cell)) for cell in full)
+    return bool(full) and known > len(full) / 2 and not any(_is_number(cell, layout) for cell in full)
+
+
+def _joined(path: Path, layout: Layout, above: list[int], width: int) -> tuple[Layout, tuple[str, ...]] | None:
+    """Return the layout and names of a header that broke off and goes on below, as the reader joins it."""
+    for start in above[-3:]:
+        tried = replace(layout, skip_lines=start)
+        try:
+            table = read_raw(path, tried, RepairList(("header", "comment", "width")))
+        except InputError:
+            continue
+        if len(table.columns) == width:
+            return tried, table.columns
+    return None

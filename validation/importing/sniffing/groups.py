@@ -1,0 +1,195 @@
+"""Columns in threes. Takes the tables of a raw file or folder; gives each triple of columns that may be a sensor."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from discsim.arrays import BoolArray, FloatArray
+from validation.importing.raw_table import RawTable, number
+from validation.importing.sniffing.dialect import Dialect
+from validation.importing.sniffing.names import Name, penalty_of, read_name, says_nothing, sensor_of
+from validation.importing.sniffing.units import COUNTS, OTHER, Reading, readings_of
+
+__all__ = ["Numbers", "Triple", "triples_of"]
+
+#: A column of text with at most this many different values names sensors (or parts) row by row.
+MAX_IDS = 20
+_ID_NAMES = ("id", "sensor", "sensorname", "sensor_name", "sensor_id", "sensorid", "type", "name", "source", "device",
+             "kind", "topic", "imu")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """A table's cells as numbers, and what its dialect says of it."""
+
+    table: RawTable
+    dialect: Dialect
+
+    @property
+    def path(self) -> Path:
+        """The raw file."""
+        return self.table.path
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The columns' names, with the units of a line of their own put into brackets."""
+        units = self.dialect.units
+        return tuple(
+            f"{name} [{units[k].strip('()[]{}<> ')}]" if k < len(units) and units[k].strip("()[]{}<>- ") else name
+            for k, name in enumerate(self.table.columns)
+        )
+
+    @cached_property
+    def values(self) -> FloatArray:
+        """The cells as numbers, (n, columns); NaN where one is none."""
+        columns = []
+        decimal = self.dialect.layout.decimal
+        for k in range(len(self.table.columns)):
+            cells = [row.cells[k] for row in self.table.rows]
+            try:
+                columns.append(np.array([cell.replace(",", ".") if decimal == "," else cell for cell in cells], float))
+            except ValueError:
+                found = [number(cell, decimal) for cell in cells]
+                columns.append(np.array([np.nan if value is None else value for value in found], dtype=float))
+        return np.column_stack(columns)
+
+    def cells(self, column: int) -> list[str]:
+        """Return a column's texts."""
+        return [row.cells[column] for row in self.table.rows]
+
+    @cached_property
+    def ids(self) -> tuple[int, tuple[str, ...]] | None:
+        """The column that says whose row it is, and its values in the order of appearance; None where there is none."""
+        for k, name in enumerate(self.table.columns):
+            texts = self.cells(k)
+            few = dict.fromkeys(texts)
+            if len(few) > MAX_IDS or len(texts) <= 4 * len(few):
+                continue
+            words = all(number(text, self.dialect.layout.decimal) is None for text in few)
+            telling = sum(sensor_of(text) is not None for text in few)
+            if words and (name.strip().lower() in _ID_NAMES or telling > 1):
+                return k, tuple(few)
+        return None
+
+
+@dataclass(frozen=True)
+class Triple:
+    """Three columns that may be one sensor's x, y, z.
+
+    ``names`` are the columns as the table calls them; ``sensor`` what names and units say (None: nothing), ``units``
+    what the unit may mean, ``penalty`` how far it stands back, ``where`` the id's column and value.
+    """
+
+    numbers: Numbers
+    columns: tuple[int, int, int]
+    base: str
+    sensor: str | None
+    source: str
+    units: tuple[Reading, ...]
+    spelling: str
+    penalty: int
+    where: tuple[str, str] | None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The columns' names in the table."""
+        return tuple(self.numbers.table.columns[k] for k in self.columns)
+
+    @cached_property
+    def rows(self) -> BoolArray:
+        """The rows that are this triple's, (n,)."""
+        if self.where is None:
+            return np.ones(len(self.numbers.table.rows), dtype=np.bool_)
+        column = self.numbers.table.columns.index(self.where[0])
+        return np.array([cell == self.where[1] for cell in self.numbers.cells(column)])
+
+    @cached_property
+    def values(self) -> FloatArray:
+        """Its readings as written, (n, 3)."""
+        return np.asarray(self.numbers.values[self.rows][:, list(self.columns)])
+
+    @property
+    def label(self) -> str:
+        """The columns as a person reads them."""
+        where = "" if self.where is None else f" where {self.where[0]} = {self.where[1]}"
+        return ", ".join(self.names) + where
+
+
+def triples_of(numbers: Numbers, taken: Sequence[int]) -> list[Triple]:
+    """Return the triples of a table: by names first, and of columns whose names say nothing, in threes.
+
+    ``taken`` are columns that hold time, counters or ids.
+    """
+    ids = numbers.ids
+    wheres: list[tuple[str, str] | None] = [None]
+    if ids is not None:
+        wheres = [(numbers.table.columns[ids[0]], value) for value in ids[1]]
+    free = [k for k in range(len(numbers.names)) if k not in taken and (ids is None or k != ids[0])]
+    found = []
+    for where in wheres:
+        by_base: dict[tuple[str, str], dict[int, int]] = defaultdict(dict)
+        names = {k: read_name(numbers.names[k]) for k in free}
+        for k, name in names.items():
+            if name.axis is not None:
+                by_base[name.base, name.unit].setdefault(name.axis, k)
+        whole = {key: axes for key, axes in by_base.items() if set(axes) == {0, 1, 2}}
+        found += [_named(numbers, names, axes, where) for axes in whole.values()]
+        used = {k for axes in whole.values() for k in axes.values()}
+        found += _unnamed(numbers, [k for k in free if k not in used and says_nothing(names[k].base)], where)
+    return [triple for triple in found if _has_readings(triple)]
+
+
+def _named(
+    numbers: Numbers, names: Mapping[int, Name], axes: Mapping[int, int], where: tuple[str, str] | None
+) -> Triple:
+    columns = (axes[0], axes[1], axes[2])
+    name = names[columns[0]]
+    units = readings_of(name.unit)
+    by_name = sensor_of(name.base)
+    source = "its name"
+    if by_name is None and where is not None:
+        by_name, source = sensor_of(where[1]), f"the id {where[1]}"
+    if by_name is None and says_nothing(name.base) and not (units and units[0].sensor != COUNTS):
+        by_name, source = sensor_of(numbers.path.stem), "the file's name"
+    if by_name is not None:
+        if by_name == "gyroscope" and units and units[0].unit == "rad":  # PX4's gyro_rad is in rad/s
+            units = [Reading("gyroscope", "rad/s")]
+        meant = [unit for unit in units if unit.sensor in (by_name, COUNTS)]
+        other = bool(units) and not meant  # an angle, a speed: not this sensor's reading
+        sensor: str | None = OTHER if other else by_name
+    else:
+        meant, sensor, source = units, (units[0].sensor if units else None), "its unit"
+        if sensor == COUNTS:
+            sensor = None
+    back = penalty_of(name.base) + penalty_of("" if where is None else where[1])
+    if len(numbers.names) <= 8:  # a file per sensor: its name speaks of its columns
+        back += penalty_of(numbers.path.stem)
+    return Triple(numbers, columns, name.base, sensor, source, tuple(meant), name.unit, back, where)
+
+
+def _unnamed(numbers: Numbers, free: list[int], where: tuple[str, str] | None) -> list[Triple]:
+    """Return consecutive columns in threes: from the first if they come out even, else from every column."""
+    step = 3 if len(free) % 3 == 0 else 1
+    file = sensor_of(numbers.path.stem) or (sensor_of(where[1]) if where else None)
+    source = "the file's name" if file else ""
+    sensor = file if len(free) == 3 else None
+    triples = []
+    for start in range(0, len(free) - 2, step):
+        chosen = tuple(free[start : start + 3])
+        if chosen[2] - chosen[0] == 2:
+            columns = (chosen[0], chosen[1], chosen[2])
+            triples.append(Triple(numbers, columns, "", sensor, source, (), "", 0, where))
+    return triples
+
+
+def _has_readings(triple: Triple) -> bool:
+    """Tell whether at least four rows have three numbers; a triple without is another file's or always empty."""
+    if triple.sensor in (OTHER, "time"):
+        return False
+    return int(np.isfinite(triple.values).all(axis=1).sum()) >= 4

@@ -1,0 +1,259 @@
+"""Units from the size of readings. Takes a triple's readings; gives the unit, its worth, how sure it is and why.
+
+What is known beforehand: gravity at rest, the earth's field of 22 to 67 uT (World Magnetic Model, the whole earth),
+and the full scales that parts have.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from validation.importing.import_map import G0, UNITS
+from validation.importing.sniffing.decision import Decision, Sureness
+from validation.importing.sniffing.units import COUNTS, Reading
+
+__all__ = [
+    "Unit",
+    "accelerometer_unit",
+    "field_size",
+    "gravity_norm",
+    "gyroscope_unit",
+    "magnetometer_unit",
+    "rest_norm",
+]
+
+#: How far gravity at rest may be off: a part's zero-g offset, 60 to 80 mg an axis (MPU-9250), and 3 % of scale.
+REST = 0.12
+#: The earth's field, uT, and what a hard iron of its size makes of the readings' norm.
+FIELD = (22.0, 67.0)
+FIELD_WITH_IRON = (10.0, 150.0)
+#: Counts per g of usual parts: 16 bits over 2, 4, 8, 16 g; 12, 10 and 8 bits of older parts. A factor of 2 apart.
+PER_G = (16384.0, 8192.0, 4096.0, 2048.0, 1024.0, 512.0, 256.0, 64.0)
+#: Counts per deg/s over 250, 500, 1000, 2000 deg/s (InvenSense, Bosch) and 245 to 4000 deg/s (ST).
+PER_DEG_S = (131.072, 65.536, 32.768, 16.384, 8.192, 114.286, 57.143, 28.571, 14.286, 7.143)
+#: Counts per uT: AK8963 (16, 14 bit), LIS3MDL at 4 to 16 G, HMC5883L, QMC5883L (2, 8 G), MMC5983 (16, 18 bit), IST8310.
+PER_UT = {
+    "AK8963": 1 / 0.15,
+    "AK8963 at 14 bit": 1 / 0.6,
+    "LIS3MDL at 4 G": 68.42,
+    "LIS3MDL at 8 G": 34.21,
+    "LIS3MDL at 12 G": 22.81,
+    "LIS3MDL at 16 G": 17.11,
+    "HMC5883L": 10.9,
+    "QMC5883L at 2 G": 120.0,
+    "QMC5883L at 8 G": 30.0,
+    "MMC5983": 40.96,
+    "MMC5983 at 18 bit": 163.84,
+    "IST8310": 1 / 0.3,
+}
+#: No rate gyroscope that a log of motion holds shows more than 100 rad/s (5730 deg/s; the widest common part has 4000).
+LARGEST_RAD_S = 100.0
+_RAD = np.pi / 180
+
+
+class Unit(NamedTuple):
+    """A unit of the map and the worth of one reading in it, as `[sensors.NAME]` writes them, and the decision."""
+
+    unit: str
+    scale: float
+    decision: Decision
+
+    def factor(self, sensor_unit: str) -> float:
+        """Return what turns a reading into the recording's unit."""
+        return UNITS[sensor_unit][self.unit] * self.scale
+
+
+def rest_norm(value: FloatArray) -> float:
+    """Return the median norm of the readings (n, 3) in the quietest twentieth of windows of 16 rows; NaN without."""
+    size = 16  # 0.16 s at 100 Hz: shorter than any rest, longer than a turn that would look still
+    count = len(value) // size
+    if count == 0:
+        return float(np.median(np.linalg.norm(value, axis=1)))
+    windows = value[: count * size].reshape(count, size, 3)
+    restless = np.nan_to_num(np.linalg.norm(windows.std(axis=1), axis=1), nan=np.inf)
+    quiet = np.argsort(restless)[: max(1, count // 20)]
+    return float(np.median(np.linalg.norm(np.median(windows[quiet], axis=1), axis=1)))
+
+
+def gravity_norm(value: FloatArray) -> float:
+    """Return the norm of the readings (n, 3) that most steady windows share: where a thing lies, it lies long.
+
+    Steady is a window of 16 rows that scatters by less than 3 % of its norm: MEMS noise is 0.3 % of g, and what a hand
+    holds trembles by a per cent or two. Without any it is `rest_norm`.
+    """
+    count = len(value) // 16
+    windows = value[: count * 16].reshape(count, 16, 3)
+    norm = np.linalg.norm(windows.mean(axis=1), axis=1)
+    steady = norm[np.linalg.norm(windows.std(axis=1), axis=1) < 0.03 * norm]
+    if steady.size == 0:
+        return rest_norm(value)
+    ordered = np.sort(steady)
+    alike = np.searchsorted(ordered, 1.05 * ordered) - np.arange(ordered.size)
+    first = int(np.argmax(alike))
+    return float(np.median(ordered[first : first + alike[first]]))
+
+
+def _whole(value: FloatArray) -> bool:
+    return bool(np.all(np.abs(value - np.round(value)) < 1e-9)) and float(np.ptp(value)) > 50
+
+
+def _said(sensor: str, text: str, sure: Sureness, why: str) -> Decision:
+    return Decision(f"{sensor} unit", text, sure, why)
+
+
+def accelerometer_unit(value: FloatArray, stated: Reading | None) -> Unit:
+    """Return an accelerometer's unit from gravity at rest, checked against the unit that stands in the header."""
+    rest = gravity_norm(value)
+    name = "accelerometer"
+    worth = {"m/s^2": rest / G0, "g": rest, "mg": rest / 1000}
+    fits = next((unit for unit, size in worth.items() if abs(size - 1) < REST), None)
+    if stated is not None and stated.unit != COUNTS:
+        size = worth[stated.unit] * stated.scale
+        if abs(size - 1) < REST:
+            why = f"the header says so, and {rest:.4g} at rest is gravity"
+            return Unit(stated.unit, stated.scale, _said(name, stated.unit, "certain", why))
+        if fits is not None:
+            why = f"{rest:.4g} at rest is gravity in {fits}, although the header says {stated.unit}"
+            return Unit(fits, 1.0, _said(name, fits, "likely", why))
+        why = f"the header says so; nothing in it rests ({size:.2g} g where it is quietest)"
+        return Unit(stated.unit, stated.scale, _said(name, stated.unit, "likely", why))
+    if fits is not None and not (stated is not None and stated.unit == COUNTS):
+        sure: Sureness = "likely" if fits == "mg" else "certain"
+        return Unit(fits, 1.0, _said(name, fits, sure, f"{rest:.4g} at rest is gravity"))
+    per_g = min(PER_G, key=lambda counts: abs(np.log(rest / counts)) if rest > 0 else 1.0)
+    if _whole(value) and abs(rest / per_g - 1) < REST:
+        why = f"whole numbers, {rest:.0f} of them at rest: counts of a part with {per_g:.0f} per g"
+        return Unit("g", 1 / per_g, _said(name, f"1/{per_g:.0f} g a count", "likely", why))
+    why = f"no unit in the header, and {rest:.4g} where it is quietest is no gravity in any usual unit"
+    return Unit("m/s^2", 1.0, _said(name, "m/s^2", "guess", why))
+
+
+def field_size(value: FloatArray) -> tuple[float, str]:
+    """Return the size of the field in readings (n, 3): a sphere's radius where they go round one, else their norm."""
+    sound = value[np.isfinite(value).all(axis=1)]
+    sound = sound[:: max(1, len(sound) // 20000)]
+    median = float(np.median(np.linalg.norm(sound, axis=1)))
+    # one reading of each direction, so that a long rest does not outweigh the turns
+    grid = np.round(sound / (np.ptp(sound, axis=0).max() / 15 or 1.0)).astype(int)
+    sound = sound[np.unique(grid, axis=0, return_index=True)[1]]
+    if len(sound) < 10:
+        return median, "median norm"
+    centred = sound - sound.mean(axis=0)
+    scale = float(np.abs(centred).max()) or 1.0
+    design = np.column_stack([2 * centred / scale, np.ones(len(sound))])
+    solution, *_ = np.linalg.lstsq(design, np.sum((centred / scale) ** 2, axis=1), rcond=None)
+    radius = float(np.sqrt(max(0.0, solution[3] + solution[:3] @ solution[:3]))) * scale
+    left = np.linalg.norm(centred / scale - solution[:3], axis=1) * scale
+    # a sphere is known where the readings spread over 0.3 of its radius in every direction and lie on it within 15 %
+    narrowest = float(np.sqrt(np.linalg.eigvalsh(np.cov(centred.T))[0]))
+    if radius > 0 and narrowest > 0.3 * radius and float(np.std(left)) < 0.15 * radius:
+        return radius, "radius of the sphere through the readings"
+    return median, "median norm"
+
+
+def magnetometer_unit(value: FloatArray, stated: Reading | None, *, counts: bool = False) -> Unit:
+    """Return a magnetometer's unit from the size of the earth's field, checked against the header's.
+
+    ``counts`` tells that another sensor of the log is written in counts, so that whole numbers are counts here as well.
+    """
+    size, what = field_size(value)
+    name = "magnetometer"
+    factors = {"uT": 1.0, "mgauss": 0.1, "gauss": 100.0, "nT": 1e-3, "mT": 1e3}
+    fits = [unit for unit, factor in factors.items() if FIELD[0] <= size * factor <= FIELD[1]]
+    if stated is not None and stated.unit != COUNTS:
+        field = size * UNITS["uT"][stated.unit] * stated.scale
+        if FIELD[0] <= field <= FIELD[1]:
+            why = f"the header says so, and {field:.0f} uT ({what}) is the earth's field"
+            return Unit(stated.unit, stated.scale, _said(name, stated.unit, "certain", why))
+        if FIELD_WITH_IRON[0] <= field <= FIELD_WITH_IRON[1] or not fits:
+            why = f"the header says so; {field:.3g} uT ({what}) is the earth's field with iron near the sensor"
+            return Unit(stated.unit, stated.scale, _said(name, stated.unit, "likely", why))
+        why = f"{size:.4g} ({what}) is the earth's field in {fits[0]}, although the header says {stated.unit}"
+        return Unit(fits[0], 1.0, _said(name, fits[0], "likely", why))
+    counted = stated is not None and stated.unit == COUNTS
+    if fits and not counted and not (_whole(value) and (counts or fits[0] == "nT")):
+        why = f"{size:.4g} ({what}) is the earth's field"
+        return Unit(fits[0], 1.0, _said(name, fits[0], "likely", why))
+    if _whole(value):
+        return _magnetometer_counts(size, what)
+    # nearest to 45 uT, the middle of the earth's field on a logarithmic scale
+    unit = min(factors, key=lambda unit: abs(np.log(max(size, 1e-12) * factors[unit] / 45)))
+    why = f"no unit in the header; {size:.4g} ({what}) is nearest to the earth's field in it"
+    return Unit(unit, 1.0, _said(name, unit, "guess", why))
+
+
+def _magnetometer_counts(size: float, what: str) -> Unit:
+    fits = {part: per for part, per in PER_UT.items() if FIELD[0] <= size / per <= FIELD[1]}
+    part = min(fits or PER_UT, key=lambda part: abs(np.log(size / PER_UT[part] / 45)))
+    per = PER_UT[part]
+    others = ", ".join(other for other in fits if other != part)
+    sure: Sureness = "likely" if len(fits) == 1 else "guess"
+    why = f"whole numbers; of a {part} {size:.0f} ({what}) would be {size / per:.0f} uT"
+    why += f"; it may be a {others} as well" if others else ""
+    text = f"{1 / per:.4g} uT a count"
+    return Unit("uT", 1 / per, _said("magnetometer", text, sure, why))
+
+
+def gyroscope_unit(value: FloatArray, stated: Reading | None, turned: float | None) -> Unit:
+    """Return a gyroscope's unit.
+
+    ``turned`` is how many rad/s one of its readings is worth by the turning of the field in the same log, None where
+    that does not tell. A header's unit stands against all but that; without one, size and steps decide.
+    """
+    name = "gyroscope"
+    peak = float(np.nanmax(np.linalg.norm(value, axis=1)))
+    worths = {"rad/s": 1.0, "deg/s": _RAD, "mdeg/s": _RAD / 1000, "rpm": np.pi / 30, "Hz": 2 * np.pi}
+    near = None
+    if turned is not None:
+        near = min(worths, key=lambda unit: abs(np.log(turned / worths[unit])))
+        # a clock that is off by 30 % is the worst known; units lie a factor of 6 and more apart
+        near = near if abs(np.log(turned / worths[near])) < np.log(1.5) else None
+    if stated is not None and stated.unit != COUNTS:
+        worth = worths[stated.unit] * stated.scale
+        if near == stated.unit:
+            why = "the header says so, and the field turns as fast"
+            return Unit(stated.unit, stated.scale, _said(name, stated.unit, "certain", why))
+        if near is not None:
+            why = f"the field turns as fast as {near} would, although the header says {stated.unit}"
+            return Unit(near, 1.0, _said(name, near, "likely", why))
+        if peak * worth > LARGEST_RAD_S and peak * _RAD < LARGEST_RAD_S and stated.unit == "rad/s":
+            why = f"the header says rad/s, but {peak:.0f} rad/s is beyond any gyroscope"
+            return Unit("deg/s", 1.0, _said(name, "deg/s", "likely", why))
+        why = f"the header says so; up to {np.degrees(peak * worth):.0f} deg/s"
+        return Unit(stated.unit, stated.scale, _said(name, stated.unit, "certain", why))
+    if near is not None and stated is None:
+        return Unit(near, 1.0, _said(name, near, "likely", "the field turns as fast in this unit"))
+    if _whole(value) and (peak > 5000 or stated is not None):
+        return _gyroscope_counts(peak, turned)
+    return _by_size(value, peak)
+
+
+def _gyroscope_counts(peak: float, turned: float | None) -> Unit:
+    name = "gyroscope"
+    if turned is not None:
+        per = min(PER_DEG_S, key=lambda per: abs(np.log(turned / (_RAD / per))))
+        why = f"whole numbers; by the turning of the field one count is 1/{_RAD / turned:.4g} deg/s"
+        return Unit("deg/s", 1 / per, _said(name, f"1/{per:.5g} deg/s a count", "likely", why))
+    why = "whole numbers; taken as 16 bits over 2000 deg/s, the usual range of a fast motion"
+    return Unit("deg/s", 1 / 16.384, _said(name, "1/16.384 deg/s a count", "guess", why))
+
+
+def _by_size(value: FloatArray, peak: float) -> Unit:
+    name = "gyroscope"
+    if peak > LARGEST_RAD_S:
+        return Unit(
+            "deg/s", 1.0, _said(name, "deg/s", "likely", f"{peak:.0f} rad/s would be beyond any gyroscope's range")
+        )
+    steps = np.abs(np.diff(value, axis=0))
+    steps = steps[steps > 0]
+    noise = float(np.median(steps)) if steps.size else 0.0
+    # data sheets state 0.05 to 0.3 deg/s of noise and steps of 0.004 to 0.14 deg/s: 57 times less in rad/s
+    still = float(np.percentile(steps, 5)) if steps.size else 0.0
+    if still > 0.004:
+        why = f"up to {peak:.3g}, and steps of {noise:.2g} from row to row are a gyroscope's in deg/s"
+        return Unit("deg/s", 1.0, _said(name, "deg/s", "guess", why))
+    why = f"up to {peak:.3g}, and steps of {noise:.2g} from row to row are a gyroscope's in rad/s"
+    return Unit("rad/s", 1.0, _said(name, "rad/s", "guess", why))

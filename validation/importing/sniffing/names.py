@@ -1,0 +1,128 @@
+"""What a column's name says. Takes a name; gives the sensor, axis and unit that stand in it (`Name`)."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from typing import NamedTuple
+
+from validation.importing.sniffing.units import readings_of, split_unit
+
+__all__ = ["Name", "is_time_name", "penalty_of", "read_name", "says_nothing", "sensor_of"]
+
+
+class Name(NamedTuple):
+    """A column's name taken apart: what is left without axis and unit, the axis (0, 1, 2 or None) and the unit."""
+
+    base: str
+    axis: int | None
+    unit: str
+
+
+#: Stems of the sensors' names in many languages, without accents; a phone's export is in the phone's language.
+_STEMS = {
+    "gyroscope": (
+        "gyr giro ziro zyro jiro гиро ジャイロ 陀螺 자이로 omega rotationrate rotrate angularvel angvel angularrate "
+        "winkelgeschw drehrate vitesseangulaire"
+    ),
+    "magnetometer": "mag compass kompass boussole bussola магн 磁 자기 manyetik hmc58 qmc58 lis3m mmc5 ak8963",
+    "accelerometer": (
+        "acc acel beschl versnell przysp zrychl akseler kiihty gyorsul ускор акселе 加速 가속 ivme "
+        "specificforce gforce adxl"
+    ),
+}
+#: The same as whole names, once the axis is off: ax, gx, mx; wx and Bx as physics writes them; gFx of Physics Toolbox.
+_LETTERS = {
+    "a": "accelerometer",
+    "gf": "accelerometer",
+    "g": "gyroscope",
+    "w": "gyroscope",
+    "ω": "gyroscope",
+    "m": "magnetometer",
+    "b": "magnetometer",
+}
+#: Words of columns that are worked out from a sensor, or are another thing: a fused attitude, an acceleration
+#: without gravity or in the earth's axes, errors, set points. The number is how far such a column stands back.
+_STAND_BACK = {
+    9: (
+        "lin linear user fe fl ned enu earth world ohne without sans senza gravity err error bias offset setpoint "
+        "target std var abs absolute absolutbetrag norm magnitude quat euler roll pitch yaw angle orientation vel "
+        "velocity pos delta jerk heading recovery temp motion"
+    ),
+    2: "uncal uncalibrated unfilt debug 2 second",
+    1: "filt filtered lpf",
+}
+_TIME_STEMS = (
+    "time zeit temps tiempo tempo tijd czas cas czas tid aika zaman vreme время час 时间 時間 시간 timestamp stamp "
+    "seconds millis micros elapsed clock epoch uhrzeit datum date"
+)
+_TIME_NAMES = "t ts ms us ns sec secs s msec usec tms tus"
+
+
+def _plain(text: str) -> str:
+    """Return text in small letters without accents; words that only a capital parts are parted by a blank."""
+    parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)
+    bare = unicodedata.normalize("NFKD", parted.replace("Ż", "Z").replace("ż", "z"))
+    return "".join(c for c in bare if not unicodedata.combining(c)).casefold().strip()
+
+
+def _without_axis(name: str) -> tuple[str, int | None]:
+    """Return a name without its axis, and the axis: x, y, z (0, 1, 2 in brackets) at the end, in front or between."""
+    patterns = (
+        (r"^(.*?)[\s_\-.]*[\[\(]?([xyzXYZ])[\]\)]?$", (1, 2)),
+        (r"^(.*?)[\s_\-.]*\[([012])\]$", (1, 2)),
+        (r"^()([xyzXYZ])(?:[\s_\-.]+|(?=[A-Z]))(.*)$", (3, 2)),
+        (r"^(.+?[\s_\-.])([xyzXYZ])[\s_\-.](.+)$", (1, 2)),
+        (r"^(.+?[a-z])([XYZ])[\s_\-]?([A-Za-z]+)$", (1, 2)),
+    )
+    for pattern, (base, axis) in patterns:
+        match = re.match(pattern, name)
+        if match:
+            rest = match[3] if len(match.groups()) > 2 and base == 1 else ""
+            letter = match[axis].lower()
+            return f"{match[base]}{rest}".strip(" _-."), "xyz".find(letter) if letter in "xyz" else int(letter)
+    return name, None
+
+
+def read_name(name: str) -> Name:
+    """Take a column's name apart."""
+    rest, unit = split_unit(name.strip())
+    base, axis = _without_axis(rest)
+    base = base.rstrip(" /")
+    if not unit and base:
+        inner, unit = split_unit(base)  # acc_mg_x
+        base, unit = (inner, unit) if readings_of(unit) and sensor_of(inner) else (base, "")
+    return Name(base, axis, unit)
+
+
+def sensor_of(base: str) -> str | None:
+    """Return the sensor that a name (of a column without axis and unit, of a file, of an id) speaks of, or None."""
+    words = re.split(r"[\s_\-.]+", _plain(base))
+    letter = re.sub(r"\d+$", "", words[-1])
+    if letter in _LETTERS:
+        return _LETTERS[letter]
+    squeezed = "".join(words).replace("magnitude", "")
+    return next((sensor for sensor, stems in _STEMS.items() if any(stem in squeezed for stem in stems.split())), None)
+
+
+def penalty_of(base: str) -> int:
+    """Return how far a column stands back behind the plain sensor's: words of what was worked out from it."""
+    words = set(re.split(r"[\s_\-.()]+", _plain(base)))
+    return sum(weight for weight, listed in _STAND_BACK.items() for word in listed.split() if word in words)
+
+
+def is_time_name(name: str) -> bool:
+    """Tell whether a column is called after time."""
+    rest, unit = split_unit(name.strip())
+    plain = _plain(rest)
+    return (
+        any(stem in plain for stem in _TIME_STEMS.split())
+        or plain in _TIME_NAMES.split()
+        or (unit != "" and any(r.sensor == "time" for r in readings_of(unit)) and sensor_of(rest) is None)
+    )
+
+
+def says_nothing(base: str) -> bool:
+    """Tell a name that could be anything's: none, a letter, a column's number, a word for data."""
+    words = "c|ch|chan|channel|col|column|v|val|value|values|data|d|f|field|raw|in|adc|s|var"
+    return re.fullmatch(rf"({words})?[\s_\-]*\d*", _plain(base)) is not None

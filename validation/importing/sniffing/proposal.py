@@ -1,0 +1,147 @@
+"""A proposed map. Takes what was decided; gives it as data and as the text of a TOML map with the reasons."""
+
+from __future__ import annotations
+
+import glob
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from discsim.arrays import FloatArray
+from discsim.recording import Plant
+from validation.importing.raw_table import Layout
+from validation.importing.sniffing.axes import letters
+from validation.importing.sniffing.clock import Clock
+from validation.importing.sniffing.decision import Decision
+from validation.importing.sniffing.groups import Triple
+from validation.importing.sniffing.magnitudes import Unit
+
+__all__ = ["Proposal", "ProposedSensor", "map_text"]
+
+MIRRORED = -0.5  # a signed permutation's determinant is 1 or -1
+
+
+@dataclass(frozen=True)
+class ProposedSensor:
+    """A sensor of a proposed map."""
+
+    sensor: str
+    triple: Triple
+    decision: Decision
+    unit: Unit
+    axes: FloatArray
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A proposed map; ``decisions`` are those on the whole (axes), ``notes`` what else a user should know."""
+
+    name: str
+    raw: Path
+    plant: Plant
+    layout: Layout
+    clock: Clock
+    sensors: tuple[ProposedSensor, ...]
+    decisions: tuple[Decision, ...]
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def all_decisions(self) -> list[Decision]:
+        """Every decision, in the order of the map."""
+        found = [self.clock.decision]
+        for sensor in self.sensors:
+            found += [sensor.decision, sensor.unit.decision]
+        return [*found, *self.decisions]
+
+
+def _text(value: str) -> str:
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _texts(values: Sequence[str]) -> str:
+    return f"[{', '.join(map(_text, values))}]"
+
+
+def _remark(decision: Decision) -> str:
+    return "# " + "".join(c for c in f"{decision.sure}: {decision.why}" if c.isprintable())
+
+
+def map_text(proposal: Proposal) -> str:
+    """Return the map as TOML; each decision stands above its key with how sure it is and why."""
+    layout, clock = proposal.layout, proposal.clock
+    repairs = ["header", "comment", "width", "number", "time"] + ["counter"] * (clock.counter is not None)
+    lines = [
+        f"# Proposed by `discsim import {''.join(c for c in proposal.raw.name if c.isprintable())}`: no map was named.",
+        "# Read the reasons; what is a guess wants your eye. With this file in --map the import is the same again.",
+        *[f"# {note}" for note in proposal.notes],
+        "",
+        f"name = {_text(proposal.name)}",
+        f"plant = {_text(proposal.plant)}",
+        f"repairs = {_texts(repairs)}",
+        *_layout(layout),
+        "",
+        "[time]",
+        _remark(clock.decision),
+    ]
+    if clock.column is not None:
+        lines += [f"column = {_text(clock.column)}", f"unit = {_text(clock.unit)}"]
+    else:
+        lines += [f"step_s = {clock.step}"] + [
+            f"counter = {_text(name)}" for name in [clock.counter] if name is not None
+        ]
+    lines += [
+        "",
+        "[environment]",
+        "gravity_m_s2 = 9.80665 # standard gravity",
+        "# The field of the place is not known: add latitude_deg, longitude_deg and date, or magnetic_field_ned_uT.",
+    ]
+    for sensor in proposal.sensors:
+        lines += _sensor(proposal, sensor)
+    return "\n".join([*lines, ""])
+
+
+def _layout(layout: Layout) -> list[str]:
+    plain = Layout()
+    keys = {
+        "separator": layout.separator,
+        "decimal": layout.decimal,
+        "thousands": layout.thousands,
+        "encoding": layout.encoding,
+        "comment": layout.comment,
+    }
+    lines = [f"{key} = {_text(value)}" for key, value in keys.items() if value != getattr(plain, key)]
+    lines += [f"skip_lines = {layout.skip_lines}"] * (layout.skip_lines > 0)
+    lines += [f"columns = {_texts(layout.columns)}"] * bool(layout.columns)
+    lines += ["lists = true"] * layout.lists
+    return ["", "[layout]", *lines] if lines else []
+
+
+def _sensor(proposal: Proposal, sensor: ProposedSensor) -> list[str]:
+    triple, unit = sensor.triple, sensor.unit
+    lines = ["", f"[sensors.{sensor.sensor}]"]
+    if proposal.raw.is_dir():
+        lines.append(f"file = {_text(glob.escape(triple.numbers.path.name))}")
+    lines += [_remark(sensor.decision), f"columns = {_texts(triple.names)}"]
+    if triple.where is not None:
+        lines.append(f"where = {{ {_text(triple.where[0])} = {_text(triple.where[1])} }}")
+    lines += [_remark(unit.decision), f"unit = {_text(unit.unit)}"]
+    lines += [f"scale = {unit.scale!r}"] * (unit.scale != 1.0)
+    named = letters(sensor.axes)
+    lines += [f"# {decision.text}" for decision in proposal.decisions if _about(decision, sensor.sensor)]
+    lines.append(f"axes = {_texts(named)}")
+    if _determinant(sensor.axes) < MIRRORED:
+        lines.append("mirrored = true")
+    if sensor.sensor == "accelerometer":
+        lines.append("# position_m = [0.0, 0.0, 0.0] # where it sits in the disc: needed for a rate from it")
+    return lines
+
+
+def _about(decision: Decision, sensor: str) -> bool:
+    return not decision.what.startswith("magnetometer") or sensor == "magnetometer"
+
+
+def _determinant(matrix: FloatArray) -> float:
+    import numpy as np
+
+    return float(np.linalg.det(matrix))

@@ -1,0 +1,264 @@
+"""From a raw file or folder to a proposed map. Takes a path; gives a `Proposal`, or one sentence why there is none."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.errors import InputError
+from discsim.recording import SENSORS, Plant
+from validation.importing.raw_table import REPAIRS, Layout, RepairList, read_raw
+from validation.importing.sniffing.archive import MAX_FILES
+from validation.importing.sniffing.axes import Reading3, body_axes
+from validation.importing.sniffing.behaviour import WORTHS, by_behaviour
+from validation.importing.sniffing.clock import SPACING, STEP, Clock, clocks_of, seconds
+from validation.importing.sniffing.decision import Decision
+from validation.importing.sniffing.dialect import dialect_of
+from validation.importing.sniffing.groups import Numbers, Triple, triples_of
+from validation.importing.sniffing.magnitudes import (
+    Unit,
+    accelerometer_unit,
+    gyroscope_unit,
+    magnetometer_unit,
+    rest_norm,
+)
+from validation.importing.sniffing.proposal import Proposal, ProposedSensor
+from validation.importing.sniffing.turning import Fit, best_worth, steps_between
+
+__all__ = ["sniff"]
+
+#: In this order they stand in the map; rows are counted in the first one's file.
+ORDER = ("gyroscope", "accelerometer", "magnetometer")
+#: A gyroscope's worth is taken from the field's turning where it leaves less than this of the field's changes.
+TELLING = 0.35
+#: A column that stands this far back (gravity taken off, worked out, in the earth's axes) is no sensor's reading.
+NO_READING = 9
+
+
+@dataclass(frozen=True)
+class _File:
+    """A table with its possible clocks and triples."""
+
+    numbers: Numbers
+    clocks: tuple[Clock, ...]
+    triples: tuple[Triple, ...]
+
+
+def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
+    """Propose a map for a raw file, or a folder with one file per sensor.
+
+    Raises `InputError` where nothing can be read or no three columns look like a sensor of motion.
+    """
+    files, failures = _read(raw)
+    layout, files, notes = _one_layout(files)
+    found, left = _assigned(files)
+    clock = _one_clock([triple.numbers for triple, _ in found.values()] or [file.numbers for file in files])
+    unknown = [triple for triple in left if triple.sensor is None and _on(clock, triple.numbers)]
+    missing = [sensor for sensor in ORDER if sensor not in found]
+    if unknown and missing:
+        seen = by_behaviour(unknown, [seconds(clock, triple.numbers)[triple.rows] for triple in unknown])
+        found |= {sensor: (triple, decision) for triple, sensor, decision in seen if sensor in missing}
+    found = {s: found[s] for s in ORDER if s in found and _on(clock, found[s][0].numbers)}
+    if not found:
+        raise _nothing(raw, files, failures)
+    notes += _others(found, left)
+    return _proposal(raw, plant, layout, clock, found, notes)
+
+
+# --------------------------------------------------------------------------------------------------- reading
+
+
+def _read(raw: Path) -> tuple[list[_File], list[InputError]]:
+    """Read the file, or every file of a folder that is a table; what failed in a folder is left for the last word."""
+    if raw.is_file():
+        return [_file(raw)], []
+    paths = sorted(path for path in raw.iterdir() if path.is_file() and not path.name.startswith("."))
+    if len(paths) > MAX_FILES:
+        raise InputError.at(raw, None, f"holds {len(paths)} files; expected one folder of a logger's export")
+    files, failures = [], []
+    for path in paths:
+        try:
+            files.append(_file(path))
+        except InputError as error:
+            failures.append(error)
+    if not files:
+        names = ", ".join(path.name for path in paths[:8]) or "nothing"
+        raise InputError.at(raw, None, f"no table of numbers in the files there ({names}); expected a logger's export")
+    return files, failures
+
+
+def _file(path: Path) -> _File:
+    dialect = dialect_of(path)
+    table = read_raw(path, dialect.layout, RepairList(REPAIRS))
+    numbers = Numbers(table, dialect)
+    clocks = clocks_of(numbers)
+    names = table.columns
+    taken = [names.index(name) for clock in clocks for name in (clock.column, clock.counter) if name is not None]
+    return _File(numbers, tuple(clocks), tuple(triples_of(numbers, taken)))
+
+
+def _one_layout(files: Sequence[_File]) -> tuple[Layout, list[_File], list[str]]:
+    """Return the layout that most sensors' files share (a map has one), those files, and what was left out."""
+
+    def key(file: _File) -> Layout:
+        return replace(file.numbers.dialect.layout, comment="", encoding="", decimal=".")
+
+    def weight(file: _File) -> int:
+        return sum(triple.penalty < NO_READING for triple in file.triples)
+
+    classes: dict[Layout, list[_File]] = {}
+    for file in files:
+        classes.setdefault(key(file), []).append(file)
+    best = max(classes.values(), key=lambda members: (sum(map(weight, members)), len(members)))
+    layouts = [file.numbers.dialect.layout for file in best]
+    layout = replace(
+        layouts[0],
+        comment=next((one.comment for one in layouts if one.comment), ""),
+        encoding=next((one.encoding for one in layouts if one.encoding != "utf-8"), "utf-8"),
+        decimal="," if any(one.decimal == "," for one in layouts) else ".",
+    )
+    others = [file.numbers.path.name for file in files if file not in best and weight(file)]
+    notes = [f"left out, laid out in another way: {', '.join(others)}"] if others else []
+    words = [remark for file in best[:1] for remark in file.numbers.dialect.remarks]
+    return layout, best, notes + ([f"text: {', '.join(words)}"] if words else [])
+
+
+# --------------------------------------------------------------------------------------------------- sensors
+
+
+def _assigned(files: Sequence[_File]) -> tuple[dict[str, tuple[Triple, Decision]], list[Triple]]:
+    """Return the best triple of each sensor by names, and the rest."""
+    triples = [triple for file in files for triple in file.triples]
+    found: dict[str, tuple[Triple, Decision]] = {}
+    for sensor in ORDER:
+        mine = [t for t in triples if t.sensor == sensor and t.penalty < NO_READING]
+        if not mine:
+            continue
+        # of several the one with gravity in it, then the plainest name, then the first
+        best = min(mine, key=lambda t: (sensor == "accelerometer" and _weightless(t), t.penalty, triples.index(t)))
+        if sensor == "accelerometer" and _weightless(best) and len(mine) > 1:
+            continue
+        found[sensor] = (best, Decision(sensor, best.label, "certain", f"{best.source} says so"))
+    used = [triple for triple, _ in found.values()]
+    return found, [triple for triple in triples if triple not in used]
+
+
+def _weightless(triple: Triple) -> bool:
+    """Tell an acceleration with gravity taken off: at rest it is nothing, below a fiftieth of its largest."""
+    value = triple.values[np.isfinite(triple.values).all(axis=1)]
+    return rest_norm(value) < 0.02 * float(np.linalg.norm(value, axis=1).max())
+
+
+def _others(found: dict[str, tuple[Triple, Decision]], left: Sequence[Triple]) -> list[str]:
+    notes = []
+    chosen = [triple for triple, _ in found.values()]
+    for triple in left:
+        if triple in chosen or triple.sensor not in SENSORS:
+            continue
+        if triple.sensor == "accelerometer" and (triple.penalty >= NO_READING or _weightless(triple)):
+            why = "worked out from other readings, or without gravity"
+        else:
+            why = "a second one" if triple.sensor in found else "worked out from other readings"
+        notes.append(f"left out: {triple.sensor} in {triple.label} of {triple.numbers.path.name} ({why})")
+    return notes[:6]
+
+
+def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) -> InputError:
+    columns = ", ".join(f"'{name}'" for name in files[0].numbers.table.columns[:12])
+    also = f" ({len(failures)} other files there are no tables)" if failures else ""
+    return InputError.at(
+        raw,
+        None,
+        f"no sensor of motion found in the columns {columns}{also}; expected three columns each of a gyroscope, "
+        "accelerometer or magnetometer; a map of your own can say which they are (--map FILE)",
+    )
+
+
+# ----------------------------------------------------------------------------------------------------- clock
+
+
+def _on(clock: Clock, numbers: Numbers) -> bool:
+    needed = [name for name in (clock.column, clock.counter) if name is not None]
+    return set(needed) <= set(numbers.table.columns)
+
+
+def _one_clock(tables: Sequence[Numbers]) -> Clock:
+    """Return the best clock that most of the tables have; a map has one."""
+    clocks = [clock for numbers in tables for clock in clocks_of(numbers)]
+    ranks = {"certain": 0, "likely": 1, "guess": 2}
+    shared = [clock for clock in clocks if sum(_on(clock, numbers) for numbers in tables) > len(tables) / 2]
+    return min(shared, key=lambda clock: (clock.column is None, ranks[clock.decision.sure], clocks.index(clock)))
+
+
+def _fitted(clock: Clock, fit: Fit | None, unit: Unit) -> tuple[Clock, float]:
+    """Return a clock without stamps with the step that the gyroscope and the field's turning give, and their ratio."""
+    if fit is None or fit.ratio > TELLING or unit.decision.sure == "guess":
+        return clock, 1.0
+    ratio = fit.worth / unit.factor("rad_s")
+    step = float(f"{STEP * ratio:.3g}")
+    if not SPACING[0] <= step <= SPACING[1]:
+        return clock, 1.0
+    why = f"no time stamps; with this step the field turns as fast as the gyroscope says ({unit.unit})"
+    told = Decision("time", f"{step} s a row", "likely", why)
+    return clock.with_step(step, told), step / STEP
+
+
+# -------------------------------------------------------------------------------------------------- proposal
+
+
+def _proposal(
+    raw: Path,
+    plant: Plant,
+    layout: Layout,
+    clock: Clock,
+    found: dict[str, tuple[Triple, Decision]],
+    notes: list[str],
+) -> Proposal:
+    times = {sensor: seconds(clock, triple.numbers)[triple.rows] for sensor, (triple, _) in found.items()}
+    fit = _turned(found, times)
+    units: dict[str, Unit] = {}
+    for sensor, (triple, _) in found.items():
+        value = triple.values[np.isfinite(triple.values).all(axis=1)]
+        stated = triple.units[0] if triple.units else None
+        if sensor == "gyroscope":
+            turned = fit.worth if fit is not None and fit.ratio < TELLING and clock.column is not None else None
+            units[sensor] = gyroscope_unit(value, stated, turned)
+        elif sensor == "accelerometer":
+            units[sensor] = accelerometer_unit(value, stated)
+        else:
+            counts = any("a count" in unit.decision.choice for unit in units.values())
+            units[sensor] = magnetometer_unit(value, stated, counts=counts)
+    if clock.column is None and "gyroscope" in units:
+        clock, slower = _fitted(clock, fit, units["gyroscope"])
+        times = {sensor: slower * time for sensor, time in times.items()}
+    readings = {
+        sensor: _reading(times[sensor], triple.values * units[sensor].factor(SENSORS[sensor].unit))
+        for sensor, (triple, _) in found.items()
+    }
+    axes = body_axes(readings)
+    sensors = tuple(
+        ProposedSensor(sensor, triple, decision, units[sensor], axes.matrix[sensor])
+        for sensor, (triple, decision) in found.items()
+    )
+    name = re.sub(r"[^\w.-]+", "-", raw.resolve().stem).strip("-") or "log"
+    return Proposal(name, raw, plant, layout, clock, sensors, axes.decisions, tuple(notes))
+
+
+def _reading(t: FloatArray, value: FloatArray) -> Reading3:
+    """Return the rows with a time, in its order."""
+    order = np.argsort(t, kind="stable")
+    order = order[np.isfinite(t[order])]
+    return Reading3(t[order], value[order])
+
+
+def _turned(found: dict[str, tuple[Triple, Decision]], times: dict[str, FloatArray]) -> Fit | None:
+    if "gyroscope" not in found or "magnetometer" not in found:
+        return None
+    gyro, field = found["gyroscope"][0], found["magnetometer"][0]
+    steps = steps_between(times["gyroscope"], gyro.values, times["magnetometer"], field.values)
+    return best_worth(steps, WORTHS)

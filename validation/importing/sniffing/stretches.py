@@ -1,0 +1,176 @@
+"""Throws in a long log. Takes what was read of it; gives the stretches of free spin with their rows.
+
+The rule. It spins: faster than a turn a second, about one axis, for 0.3 s and two turns at least. It is free: over
+every 0.1 s the rate changes by less than twice its size per second. A hand that spins a disc up, catches or drops it
+changes the rate by ten times its size per second and more; air and a bearing by at most half. And no row's specific
+force differs from the one before by 0.5 m/s of velocity or more, which no air force does: that is an impact. A stretch
+so begins after the hand's acceleration has ended and ends before the impact, 0.05 s clear of both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import median_filter, uniform_filter1d
+from scipy.signal import savgol_filter
+
+from discsim.arrays import BoolArray, FloatArray
+from discsim.clipping import clipped
+from validation.importing.conversion import RawReadings
+from validation.importing.sniffing.axes import FAST
+
+__all__ = ["Stretch", "stretches"]
+
+#: Between half (the fastest decay on record, a rocket's roll: 0.56 1/s) and ten (4000 deg/s out of a hand in 0.1 s).
+CHANGE = 2.0
+#: Half of what the slope is taken over, s: a hand lets go within 0.1 s.
+HALF = 0.05
+#: A drop from knee height takes 0.3 s; two turns tell a spin from a swing of the arm.
+SHORTEST, TURNS = 0.3, 2.0
+#: The mean of the rate's direction has this length where it stays within 25 degrees of one axis.
+ONE_AXIS = 0.9
+#: Twice the largest air force on a disc, 2 g, over a row at 100 Hz is 0.4 m/s; a ground hit takes some m/s in a row.
+IMPACT = 0.5
+#: A magnetometer alone tells the rate from the field's turning over this span, s.
+FIELD_SPAN = 0.25
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A throw: from ``start`` to ``end`` (s, from the log's first sample), rows ``first`` up to ``stop``, and its spin.
+
+    ``spin`` is the median size of the rate, rad/s; ``sensor`` what it was seen by. ``at_least``: that sensor was
+    clipped, and the spin is faster.
+    """
+
+    start: float
+    end: float
+    first: int
+    stop: int
+    spin: float
+    sensor: str
+    at_least: bool = False
+
+    @property
+    def text(self) -> str:
+        """One line for a person."""
+        size = f"{np.degrees(self.spin):.0f} deg/s by the {self.sensor}"
+        size = f"more than {size}, which is clipped" if self.at_least else size
+        return f"{self.start:.2f} to {self.end:.2f} s, rows {self.first}:{self.stop}, {size}"
+
+
+class _Rate(NamedTuple):
+    """Who shows the rate, time (n,), its size (n,), where its axis stands still in the body, where it is clipped."""
+
+    sensor: str
+    t: FloatArray
+    rate: FloatArray
+    steady: BoolArray
+    clipped: BoolArray
+
+
+def stretches(read: RawReadings) -> list[Stretch]:
+    """Return the stretches of free spin in a log, in the order of time; none where no sensor shows a spin."""
+    field = _field_rate(read)
+    seen = _gyroscope_rate(read) or field
+    if seen is None:
+        return []
+    half = HALF if seen.sensor == "gyroscope" else FIELD_SPAN
+    free = (seen.rate > FAST) & seen.steady & (_slope(seen.t, seen.rate, half) < CHANGE * seen.rate)
+    free &= ~_impacts(read, seen.t)
+    zero = min(float(found.time[0]) for found in read.readings.values())
+    main = next(iter(read.readings.values()))
+    found = []
+    for first, stop in _runs(free):
+        start, end = float(seen.t[first]), float(seen.t[stop - 1])
+        if end - start < SHORTEST:
+            continue
+        told, spin, at_least = _spin(seen, field, start, end)
+        rows = main.number[(main.time >= start) & (main.time <= end)]
+        if rows.size > 1 and spin * (end - start) >= TURNS * 2 * np.pi:
+            found.append(Stretch(start - zero, end - zero, int(rows[0]), int(rows[-1]) + 1, spin, told, at_least))
+    return found
+
+
+def _spin(seen: _Rate, field: _Rate | None, start: float, end: float) -> tuple[str, float, bool]:
+    """Return who shows the spin of a stretch, its size (rad/s), and whether it is more than that.
+
+    A gyroscope that stands at its limit for half the stretch gives way to the magnetometer.
+    """
+    for one in (seen, field):
+        if one is None:
+            continue
+        inside = (one.t >= start) & (one.t <= end)
+        spin = float(np.median(one.rate[inside])) if inside.any() else 0.0
+        if spin > 0 and not np.mean(one.clipped[inside]) > 0.5:
+            return one.sensor, spin, False
+    inside = (seen.t >= start) & (seen.t <= end)
+    return seen.sensor, float(np.median(seen.rate[inside])), True
+
+
+def _gyroscope_rate(read: RawReadings) -> _Rate | None:
+    gyro = read.readings.get("gyroscope")
+    if gyro is None:
+        return None
+    sound = np.isfinite(gyro.value).all(axis=1)
+    t, value = gyro.time[sound], gyro.value[sound]
+    if t.size < 8:
+        return None
+    rate = np.linalg.norm(value, axis=1)
+    unit = value / np.maximum(rate, 1e-9)[:, None]
+    mean = uniform_filter1d(unit, _count(t, SHORTEST), axis=0, mode="nearest")
+    limit = read.import_map.sensors["gyroscope"].sheet.range
+    at_limit = clipped(value, limit, None).any(axis=1)
+    return _Rate("gyroscope", t, rate, np.asarray(np.linalg.norm(mean, axis=1) > ONE_AXIS), np.asarray(at_limit))
+
+
+def _field_rate(read: RawReadings) -> _Rate | None:
+    field = read.readings.get("magnetometer")
+    if field is None:
+        return None
+    fresh = np.array(np.isfinite(field.value).all(axis=1))
+    fresh[1:] &= np.any(np.diff(field.value, axis=0) != 0, axis=1)  # sampled and held
+    t, value = field.time[fresh], field.value[fresh]
+    if t.size < 16:
+        return None
+    # a mean over a second or more holds no turn, and takes the hard iron off
+    centred = value - uniform_filter1d(value, _count(t, 1.0), axis=0, mode="nearest")
+    plane = centred[:, 0] + 1j * centred[:, 1]
+    turn = np.abs(np.angle(plane[1:] * np.conj(plane[:-1]))) / np.diff(t)
+    rate = median_filter(np.append(turn, turn[-1]), _count(t, FIELD_SPAN))
+    size = uniform_filter1d(np.abs(plane), _count(t, FIELD_SPAN), mode="nearest")
+    # a field that goes round has a steady size; 5 uT is a quarter of the weakest horizontal field of temperate places
+    return _Rate("magnetometer", t, rate, np.asarray(size > 5.0), np.zeros(t.size, dtype=np.bool_))
+
+
+def _count(t: FloatArray, span: float) -> int:
+    """Return how many rows a span is, odd and at least 3."""
+    return max(3, min(t.size // 2, round(span / float(np.median(np.diff(t))))) | 1)
+
+
+def _slope(t: FloatArray, rate: FloatArray, half: float) -> FloatArray:
+    """Return the size of the rate's slope over twice ``half`` around each row, rad/s^2."""
+    wide = _count(t, 2 * half)
+    spacing = float(np.median(np.diff(t)))
+    return np.asarray(np.abs(savgol_filter(rate, wide, 1, deriv=1, delta=spacing, mode="nearest")))
+
+
+def _impacts(read: RawReadings, t: FloatArray) -> BoolArray:
+    """Return the rows within `HALF` of an impact, (n,)."""
+    hit = np.zeros(t.size, dtype=np.bool_)
+    accel = read.readings.get("accelerometer")
+    if accel is None:
+        return hit
+    sound = np.isfinite(accel.value).all(axis=1)
+    time, force = accel.time[sound], accel.value[sound]
+    jump = np.linalg.norm(np.diff(force, axis=0), axis=1) * np.diff(time)
+    for moment in time[1:][jump > IMPACT]:
+        hit |= np.abs(t - moment) <= HALF
+    return hit
+
+
+def _runs(mask: BoolArray) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -1,0 +1,89 @@
+"""Which encoding a raw file's bytes are in. Takes a path; gives a codec's name, or one sentence why it is no text."""
+
+from __future__ import annotations
+
+import codecs
+from pathlib import Path
+
+from discsim.errors import InputError
+
+__all__ = ["encoding_of", "lines_of"]
+
+#: First bytes of files that are no tables, and what to do with them.
+SIGNATURES = (
+    (b"\x89PNG", "a PNG image"),
+    (b"\xff\xd8\xff", "a JPEG image"),
+    (b"GIF8", "a GIF image"),
+    (b"RIFF", "a sound, film or image"),
+    (b"%PDF", "a PDF document"),
+    (b"PK\x03\x04", "a zip archive or spreadsheet (.xlsx); export it as CSV"),
+    (b"\xd0\xcf\x11\xe0", "an old Excel or Word document; export it as CSV"),
+    (b"\x1f\x8b", "a gzip archive; unpack it first"),
+    (b"\x89HDF", "an HDF5 file; write its tables as CSV"),
+    (b"SQLite format 3", "an SQLite data base; write its tables as CSV"),
+    (b"ULog\x01\x12\x35", "a PX4 ULog; `ulog2csv FILE` (pip install pyulog) writes a folder that can be imported"),
+    (
+        b"\xa3\x95\x80",
+        "an ArduPilot log; `mavlogdump.py --format csv --types IMU FILE` (pip install pymavlink) writes CSV",
+    ),
+    (b"\x89MCAP", "an MCAP log; write its topics as CSV"),
+)
+_BOMS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF32_LE, "utf-32"),  # before UTF-16, whose mark it begins with
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+_LOOKED_AT = 1 << 16
+_CONTROL = frozenset(range(1, 32)) - {9, 10, 12, 13, 27}  # what no text has: not tab, line ends, form feed, escape
+
+
+def encoding_of(path: Path) -> str:
+    """Return the encoding of a text file; raises `InputError` for an empty file and for what is no text.
+
+    A log's text is ASCII but for a few signs (degree, micro, accents of a locale), so no statistics of languages are
+    needed: valid UTF-8 is UTF-8 (a Latin-1 text with an accent is not valid), all else is Windows' Latin-1.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError.at(path, None, f"cannot be read ({error.strerror}); expected what a logger wrote") from None
+    if not content.strip():
+        raise InputError.at(path, None, "the file is empty; expected rows of numbers")
+    for start, what in SIGNATURES:
+        if content.startswith(start):
+            raise InputError.at(path, None, f"is {what}; expected text with rows of numbers")
+    for mark, encoding in _BOMS:
+        if content.startswith(mark):
+            return encoding
+    head = content[:_LOOKED_AT]
+    if sum(head.count(byte) for byte in _CONTROL) > 0.01 * len(head):  # a damaged line of a text is far below
+        raise InputError.at(path, None, "is binary, no text; expected text with rows of numbers")
+    if head.count(0):
+        return _wide(path, head)
+    for encoding in ("utf-8", "cp1252"):
+        try:
+            content.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        return encoding
+    return "latin-1"
+
+
+def _wide(path: Path, head: bytes) -> str:
+    """Return the UTF-16 that has no byte-order mark: of ASCII signs every second byte is zero."""
+    even, odd = head[::2], head[1::2]
+    if odd.count(0) > 0.9 * len(odd) and not even.count(0):
+        return "utf-16-le"
+    if even.count(0) > 0.9 * len(even) and not odd.count(0):
+        return "utf-16-be"
+    if head.count(0) < 0.01 * len(head):  # a block of zeros that a power cut left in a log
+        return "utf-8"
+    raise InputError.at(path, None, "is binary, no text; expected text with rows of numbers")
+
+
+def lines_of(path: Path, encoding: str) -> list[str]:
+    """Return the lines of a text as the reader of raw tables splits them."""
+    text = path.read_bytes().decode(encoding, errors="replace").removeprefix("\ufeff")
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")

@@ -1,0 +1,153 @@
+"""How well a gyroscope's turning explains a vector's. Takes both sensors' readings; gives axes, worth and how well.
+
+A vector fixed in the room obeys dm/dt = -w x m in the body, so from stamp to stamp m turns by minus the integral of the
+rate. An offset fixed in the body (hard iron) is found with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import permutations, product
+from typing import NamedTuple
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+
+__all__ = ["PERMUTATIONS", "Fit", "Steps", "best_axes", "best_worth", "steps_between"]
+
+#: Steps of 0.02 rad stand above a magnetometer's noise (1 % of the field); one beyond 1.5 rad says little of its axis.
+SMALLEST, LARGEST = 0.02, 1.5
+#: Fewest steps for an answer: 3 unknowns of the offset, 48 ways of the axes, three components a step.
+FEWEST = 30
+MOST = 1500
+#: Steps are taken from a reading to the next, and to the 4th and 16th next, where slow turns stand above the noise.
+LAGS = (1, 4, 16)
+PERMUTATIONS = tuple(
+    np.array([[signs[row] if order[row] == column else 0.0 for column in range(3)] for row in range(3)])
+    for order in permutations(range(3))
+    for signs in product((1.0, -1.0), repeat=3)
+)
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Vectors before and after each step, (n, 3), and the integral of the gyroscope's readings over it, (n, 3)."""
+
+    before: FloatArray
+    after: FloatArray
+    turn: FloatArray
+
+
+class Fit(NamedTuple):
+    """What is left of the vector's changes (a ratio: 0 all explained, 1 nothing), by which axes, worth, offset.
+
+    ``overall`` is the geometric mean of what is left over all of `LAGS`, by which ways are ranked.
+    """
+
+    ratio: float
+    axes: FloatArray
+    worth: float
+    offset: FloatArray
+    overall: float = float("nan")
+
+
+def steps_between(t_gyro: FloatArray, gyro: FloatArray, t_vector: FloatArray, vector: FloatArray) -> list[Steps]:
+    """Return the steps of a vector (sampled and held readings once) and the turning between; empty where too few.
+
+    There is one entry for each of `LAGS`. Times are (n,) s, values (n, 3).
+    """
+    sound = np.isfinite(gyro).all(axis=1) & np.isfinite(t_gyro)
+    fresh = np.isfinite(vector).all(axis=1) & np.isfinite(t_vector)
+    fresh[1:] &= np.any(np.diff(vector, axis=0) != 0, axis=1)
+    if sound.sum() < FEWEST or fresh.sum() < FEWEST:
+        return []
+    t_gyro, gyro, t_vector, vector = t_gyro[sound], gyro[sound], t_vector[fresh], vector[fresh]
+    order = np.argsort(t_gyro, kind="stable")
+    t_gyro, gyro = t_gyro[order], gyro[order]
+    step = np.diff(t_gyro)[:, None]
+    integral = np.concatenate([np.zeros((1, 3)), np.cumsum(step * (gyro[1:] + gyro[:-1]) / 2, axis=0)])
+    at = np.column_stack([np.interp(t_vector, t_gyro, integral[:, axis]) for axis in range(3)])
+    # where it may stand at its range it tells no turn
+    extreme = np.abs(gyro) >= 0.999 * np.abs(gyro).max(axis=0)
+    clipped = extreme[:, extreme.sum(axis=0) > 5].any(axis=1)
+    lost = np.interp(t_vector, t_gyro, np.cumsum(clipped).astype(float))
+    found = []
+    for lag in LAGS:
+        spacing = t_vector[lag:] - t_vector[:-lag]
+        whole = (spacing > 0) & (spacing < 3 * np.median(spacing)) & (lost[lag:] == lost[:-lag])
+        if whole.sum() >= FEWEST:
+            found.append(Steps(vector[:-lag][whole], vector[lag:][whole], (at[lag:] - at[:-lag])[whole]))
+    return found
+
+
+def _chosen(steps: Steps, worth: float) -> Steps | None:
+    size = np.linalg.norm(steps.turn, axis=1) * worth
+    rows = np.flatnonzero((size > SMALLEST) & (size < LARGEST))
+    if rows.size < FEWEST:
+        return None
+    rows = rows[np.linspace(0, rows.size - 1, min(MOST, rows.size)).astype(int)]
+    return Steps(steps.before[rows], steps.after[rows], steps.turn[rows])
+
+
+def _rotations(turn: FloatArray) -> FloatArray:
+    """Return the matrices (n, 3, 3) that turn a vector by minus these rotation vectors (n, 3)."""
+    angle = np.linalg.norm(turn, axis=1)
+    axis = -turn / np.maximum(angle, 1e-12)[:, None]
+    cross = np.zeros((len(turn), 3, 3))
+    cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -axis[:, 2], axis[:, 1], -axis[:, 0]
+    cross -= np.transpose(cross, (0, 2, 1))
+    return np.asarray(
+        np.eye(3) + np.sin(angle)[:, None, None] * cross + (1 - np.cos(angle))[:, None, None] * (cross @ cross)
+    )
+
+
+def _fits(steps: Steps, worth: float, ways: Sequence[FloatArray]) -> list[Fit]:
+    chosen = _chosen(steps, worth)
+    if chosen is None:
+        return []
+    rotation = _rotations(chosen.turn * worth)
+    design = (np.eye(3) - rotation).reshape(-1, 3)
+    inverse = np.linalg.pinv(design, rcond=1e-3)
+    change = float(np.sqrt(np.mean((chosen.after - chosen.before) ** 2))) or 1.0
+    found: list[Fit] = []
+    for way in ways:
+        turned = np.einsum("nij,nj->ni", rotation, chosen.before @ way.T)
+        left = (chosen.after @ way.T - turned).reshape(-1)
+        offset = inverse @ left
+        ratio = float(np.sqrt(np.mean((left - design @ offset) ** 2))) / change
+        found.append(Fit(ratio, way, worth, offset))
+    return found
+
+
+def best_worth(steps: Sequence[Steps], worths: Sequence[float]) -> Fit | None:
+    """Return the best fit over some worths of a gyroscope's reading (rad/s each), refined by golden section."""
+    fits = [(fit, one) for one in steps for worth in worths for fit in _fits(one, worth, PERMUTATIONS)]
+    if not fits:
+        return None
+    best, those = min(fits, key=lambda pair: pair[0].ratio)
+    low, high = np.log(best.worth) - 0.7, np.log(best.worth) + 0.7
+    golden = (np.sqrt(5) - 1) / 2
+    for _ in range(12):  # to 0.4 %
+        lower, upper = high - golden * (high - low), low + golden * (high - low)
+        left = [
+            min((fit.ratio for fit in _fits(those, float(np.exp(tried)), [best.axes])), default=2.0)
+            for tried in (lower, upper)
+        ]
+        low, high = (low, upper) if left[0] < left[1] else (lower, high)
+    refined = _fits(those, float(np.exp((low + high) / 2)), [best.axes])
+    return min([best, *refined], key=lambda fit: fit.ratio)
+
+
+def best_axes(steps: Sequence[Steps], worth: float) -> list[Fit]:
+    """Return the fits of all 48 ways to lay the vector's axes on the gyroscope's, the best first.
+
+    Each is the fit of the lag that it explains best; ranks are over all lags, as a slow turn shows in a long one only.
+    """
+    each = [fits for one in steps if (fits := _fits(one, worth, PERMUTATIONS))]
+    ways = [
+        min(fits, key=lambda fit: fit.ratio)._replace(overall=float(np.exp(np.mean([np.log(f.ratio) for f in fits]))))
+        for fits in zip(*each, strict=True)
+    ]
+    return sorted(ways, key=lambda fit: fit.overall)
