@@ -11,11 +11,17 @@ from validation.diagnosis.advice import advise
 from validation.diagnosis.agreement import agreement_of
 from validation.diagnosis.answer import Outcome
 from validation.diagnosis.assembly import assemble, verdict_of
+from validation.diagnosis.contradicted import contradicted_outcome
 from validation.diagnosis.datasets import recording_names
+from validation.diagnosis.early_verdict import contradiction_after, contradiction_in
+from validation.diagnosis.inertia import with_inertia
 from validation.diagnosis.law import find_law
 from validation.diagnosis.plans import Plan
+from validation.diagnosis.prepared import prepared
+from validation.diagnosis.relaxed import relaxed
 from validation.diagnosis.rows import competing, row_of
 from validation.diagnosis.search import Search, search
+from validation.diagnosis.stated import stated_parameters
 
 __all__ = ["diagnose"]
 
@@ -51,17 +57,37 @@ def diagnose(
     """
     recordings = [recording for dataset in datasets for recording in dataset]
     called = [name for group in recording_names(datasets, names) for name in group]
+    recordings, warnings = prepared(recordings, called)
+    fitted, notes = with_inertia(recordings)
     with competing(user_effects):
-        found = search(recordings, progress)
+        known = stated_parameters(fitted)
+        progress("asking whether sensors contradict one another", 0, 4)
+        contradiction = contradiction_in(fitted, known)
+        if contradiction is None:
+            progress("following the data", 0, 4)
+            followed = relaxed(fitted, known)
+            contradiction = contradiction_after(followed)
+        if contradiction is not None:
+            outcome = contradicted_outcome(contradiction, recordings, names, called, seed)
+            return _with_notes(outcome, [*warnings, *notes], recordings, called)
+        found = search(fitted, progress, recordings, followed)
         law = None
         verdict, unexplained = verdict_of(found)
         if unexplained or _stacked(found):
             progress("looking for a law", 4, 5)
-            law = find_law(found.loose, found.final, found.own, found.loose_noise, recordings)
+            law = find_law(found.loose, found.final, found.own, found.loose_noise, fitted)
         advice = {}
         if verdict == "explained" and law is None:
             progress("asking what to record next", 4, 5)
             advice = advise(found, called, plans)
         outcome = assemble(found, names, called, seed, law, advice)
-    agreement = agreement_of(recordings, called)
-    return replace(outcome, diagnosis=replace(outcome.diagnosis, agreement=agreement))
+    return _with_notes(outcome, [*warnings, *notes], recordings, called)
+
+
+def _with_notes(
+    outcome: Outcome, warnings: Sequence[str], recordings: Sequence[Recording], names: Sequence[str]
+) -> Outcome:
+    """Return an outcome with what the reader must know of the recordings (called ``names``) and their sensors."""
+    said = (*outcome.diagnosis.warnings, *warnings)
+    agreement = agreement_of(recordings, names)
+    return replace(outcome, diagnosis=replace(outcome.diagnosis, warnings=said, agreement=agreement))

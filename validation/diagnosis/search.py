@@ -106,12 +106,21 @@ class Search:
 
 # a hypothesis far from the data may send a motion beyond all numbers: such a fit is not finite, and is passed over
 @np.errstate(over="ignore", invalid="ignore")
-def search(recordings: Sequence[Recording], report: Report = lambda stage, done, total: None) -> Search:
-    """Find the effects that explain recordings of one plant."""
+def search(
+    recordings: Sequence[Recording],
+    report: Report = lambda stage, done, total: None,
+    as_stated: Sequence[Recording] | None = None,
+    followed: Fit | None = None,
+) -> Search:
+    """Find the effects that explain recordings of one plant.
+
+    ``as_stated`` are the same with nothing that stands in for what they do not state, ``followed`` their relaxed fit
+    where it is known already.
+    """
     known = stated_parameters(recordings)
     own = (*known, *unknowns(recordings))
     report("following the data", 0, 4)
-    loose, left_out = without_outliers(relaxed(recordings, known))
+    loose, left_out = without_outliers(relaxed(recordings, known) if followed is None else followed)
     noise = estimate_noise(loose.linears, [linear.residual for linear in loose.linears])
     plant = recordings[0].plant
     trials = trials_for(recordings)
@@ -120,7 +129,7 @@ def search(recordings: Sequence[Recording], report: Report = lambda stage, done,
     report("fitting the baseline", 2, 4)
     start = {**_start(board, Hypothesis(), own), **_wobbles(loose)}
     base = tied_fit(loose, Hypothesis(), own, noise, start, iterations=_BASE_ITERATIONS[plant])
-    found = Search(tuple(recordings), own, loose, noise, trials, base, base)
+    found = Search(tuple(as_stated or recordings), own, loose, noise, trials, base, base)
     found.outliers = left_out
     report("refitting candidates", 3, 4)
     _settle(found, _grown(found, board))
