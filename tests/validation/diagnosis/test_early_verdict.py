@@ -3,11 +3,12 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from tests.validation.diagnosis.made import throws
 from validation.diagnosis.contradicted import contradicted_outcome
-from validation.diagnosis.early_verdict import ASTRAY, contradiction_in
+from validation.diagnosis.early_verdict import ASTRAY, RECONCILED, contradiction_in
 from validation.diagnosis.followed import left_of, left_when_shifted, true_noise
 from validation.diagnosis.relaxed import part_of, relaxed
 from validation.diagnosis.trajectory_pieces import readings_of
@@ -66,10 +67,17 @@ def test_a_part_of_a_fit_leaves_what_the_whole_left_of_it(sound):
     assert left_of(part_of(fit, [1]), noise)[0] == left_of(fit, noise)[1]
 
 
-def test_a_delay_is_reconciled_by_a_shift_and_another_throw_is_not(sound):
+@pytest.mark.parametrize("sensor", ["magnetometer", "accelerometer"])
+def test_a_delay_and_lost_samples_are_reconciled_and_another_throw_is_not(sound, sensor):
     fit = relaxed(sound)
-    own, other = (next(r for r in readings_of(one) if r.sensor == "accelerometer") for one in sound)
+    own, other = (next(r for r in readings_of(one) if r.sensor == sensor) for one in sound)
     noise = true_noise([own])
-    late = replace(own, t=own.t + 0.05)
-    assert left_when_shifted(fit.chains[0], fit.values(0), late, noise) < 3.0
-    assert left_when_shifted(fit.chains[0], fit.values(0), other, noise) > ASTRAY
+
+    def left(readings):
+        return left_when_shifted(fit.chains[0], fit.values(0), readings, noise)
+
+    kept = np.sort(np.random.default_rng(1).choice(own.t.size, int(0.95 * own.t.size), replace=False))
+    lost = replace(own, t=own.t[: kept.size], value=own.value[kept], good=own.good[kept], clipped=own.clipped[kept])
+    assert left(replace(own, t=own.t + 0.05)) < RECONCILED
+    assert left(lost) < RECONCILED
+    assert left(other) > RECONCILED
