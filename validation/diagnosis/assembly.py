@@ -92,6 +92,8 @@ def recalibrations(found: Search) -> dict[str, Recalibration]:
             or not any(q.key == p.key and q.recordings == p.recordings for p in found.own)
         ):
             continue
+        if q.group == "disc" and found.recordings[0].disc is None:
+            continue  # it stands for a ratio that nobody stated
         sigma = next(p.sigma for p in found.own if q.key == p.key and q.recordings == p.recordings)
         name = aero_key(q.name) if q.group == "aero" else _RECALIBRATED_NAMES.get(q.key, f"{q.group}.{q.name}")
         if q.recordings is not None:

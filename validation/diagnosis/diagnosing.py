@@ -11,13 +11,19 @@ from validation.diagnosis.advice import advise
 from validation.diagnosis.agreement import agreement_of
 from validation.diagnosis.answer import Outcome
 from validation.diagnosis.assembly import assemble, verdict_of
+from validation.diagnosis.contradicted import contradicted_outcome
 from validation.diagnosis.datasets import recording_names
+from validation.diagnosis.early_verdict import contradiction_after, contradiction_in
+from validation.diagnosis.inertia import with_inertia
 from validation.diagnosis.law import find_law
 from validation.diagnosis.plans import Plan
+from validation.diagnosis.prepared import prepared
+from validation.diagnosis.relaxed import relaxed
 from validation.diagnosis.rows import competing, row_of
 from validation.diagnosis.search import Search, search
 from validation.diagnosis.setup import find_setup_faults
 from validation.diagnosis.setup_effects import free_parameters, with_setup
+from validation.diagnosis.stated import stated_parameters
 
 __all__ = ["diagnose"]
 
@@ -55,18 +61,40 @@ def diagnose(
     called = [name for group in recording_names(datasets, names) for name in group]
     progress("checking the setup", 0, 5)
     setup = find_setup_faults(recordings)
+    meant, warnings = prepared(list(setup.recordings), called)
+    fitted, notes = with_inertia(meant)
+    free = free_parameters(setup)
     with competing(user_effects):
-        found = search(setup.recordings, progress, free_parameters(setup))
+        known = (*stated_parameters(fitted), *free)
+        progress("asking whether sensors contradict one another", 0, 5)
+        contradiction = contradiction_in(fitted, known)
+        if contradiction is None:
+            progress("following the data", 1, 5)
+            followed = relaxed(fitted, known)
+            contradiction = contradiction_after(followed)
+        if contradiction is not None:
+            outcome = contradicted_outcome(contradiction, meant, names, called, seed)
+            outcome = with_setup(outcome, setup, recordings, None)
+            return _with_notes(outcome, [*warnings, *notes], meant, called)
+        found = search(fitted, progress, meant, followed, free)
         law = None
         verdict, unexplained = verdict_of(found)
         if unexplained or _stacked(found):
             progress("looking for a law", 4, 5)
-            law = find_law(found.loose, found.final, found.own, found.loose_noise, setup.recordings)
+            law = find_law(found.loose, found.final, found.own, found.loose_noise, fitted)
         advice = {}
         if verdict == "explained" and law is None:
             progress("asking what to record next", 4, 5)
             advice = advise(found, called, plans)
         outcome = assemble(found, names, called, seed, law, advice)
     outcome = with_setup(outcome, setup, recordings, found.final.fit)
-    agreement = agreement_of(setup.recordings, called)
-    return replace(outcome, diagnosis=replace(outcome.diagnosis, agreement=agreement))
+    return _with_notes(outcome, [*warnings, *notes], meant, called)
+
+
+def _with_notes(
+    outcome: Outcome, warnings: Sequence[str], recordings: Sequence[Recording], names: Sequence[str]
+) -> Outcome:
+    """Return an outcome with what the reader must know of the recordings (called ``names``) and their sensors."""
+    said = (*outcome.diagnosis.warnings, *warnings)
+    agreement = agreement_of(recordings, names)
+    return replace(outcome, diagnosis=replace(outcome.diagnosis, warnings=said, agreement=agreement))

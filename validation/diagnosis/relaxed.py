@@ -23,7 +23,16 @@ from validation.diagnosis.readings import delay
 from validation.diagnosis.starts import flight_starts, rig_starts, spin_starts
 from validation.diagnosis.trajectory_pieces import WOBBLE, Chain, Linear, Readings, chain, shown
 
-__all__ = ["NO_JUMPS", "PIECE", "beginning", "first_chain", "loose_jumps", "relaxed", "without_outliers"]
+__all__ = [
+    "NO_JUMPS",
+    "PIECE",
+    "beginning",
+    "first_chain",
+    "from_other_starts",
+    "loose_jumps",
+    "relaxed",
+    "without_outliers",
+]
 
 #: length of a piece, s
 PIECE = {"flight": 0.5, "free_spin": 0.2, "spin_down": 0.5, "rate_table": 1.0}
@@ -146,6 +155,13 @@ def unknowns(recordings: Sequence[Recording]) -> tuple[Parameter, ...]:
     )
 
 
+def loose_parameters(recordings: Sequence[Recording], sensors: set[str]) -> tuple[Parameter, ...]:
+    """Return all that a relaxed fit of recordings with some sensors sets free beside stated numbers."""
+    return (*unknowns(recordings), *ordinary(sensors, recordings[0].plant))
+
+
+# far from the data a motion may run beyond all numbers: such a step is not finite, and is not taken
+@np.errstate(over="ignore", invalid="ignore")
 def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), iterations: int = 12) -> Fit:
     """Fit recordings of one plant so loosely that any effect of ordinary size finds room."""
     plant = recordings[0].plant
@@ -153,13 +169,13 @@ def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), it
     chains = tuple(first_chain(one) if ratio == 1.0 else chain_in_true_time(one, ratio) for one in recordings)
     sensors = {readings.sensor for one in chains for readings in one.readings}
     clock = () if ratio == 1.0 else (Parameter("clock.rate", "ratio", 1.0, 1e-6, _TIME_SIGMA),)
-    parameters = (*known, *unknowns(recordings), *ordinary(sensors, plant), *clock)
+    parameters = (*known, *loose_parameters(recordings, sensors), *clock)
     at = np.array([ratio if q.group == "clock.rate" else q.stated for q in parameters])
     fit = Fit(chains, parameters, at, loose_jumps(plant), {})
     bare = linearised(fit, ())
     fit = replace(fit, noise=stated_noise(bare))
     fit = refit(fit, iterations=iterations, tolerance=1e-4 * sum(linear.raw.size for linear in bare))
-    fit = _from_other_starts(fit)
+    fit = from_other_starts(fit)
     if plant in ("spin_down", "rate_table"):
         fit = _with_own_clock(fit)
     if ratio == 1.0:
@@ -198,26 +214,65 @@ def _astray(fit: Fit) -> list[int]:
     return [i for i in np.argsort(chi2)[::-1].tolist() if chi2[i] > _ASTRAY]
 
 
-def _from_other_starts(fit: Fit) -> Fit:
-    """Try other attitudes at release for recordings whose fit went astray."""
+def from_other_starts(fit: Fit) -> Fit:
+    """Try other attitudes at release for recordings whose fit went astray, each by itself."""
     plant = fit.chains[0].recording.plant
     if plant not in ("flight", "free_spin"):
         return fit
-    for i in _astray(fit)[:3]:
+    better = dict[int, Chain]()
+    for i in _astray(fit)[:FEW]:
         recording = fit.chains[i].recording
         ratio = fit.values(i).get(("clock.rate", "ratio"), 1.0)
-        first = first_chain(recording) if ratio == 1.0 else chain_in_true_time(recording, ratio)
+        first = (
+            first_chain(recording, edges=fit.chains[i].edges) if ratio == 1.0 else chain_in_true_time(recording, ratio)
+        )
         starts = (flight_starts if plant == "flight" else spin_starts)(recording, np.zeros(1))
+        alone = part_of(fit, [i])
+        alone = replace(alone, merit=merit_of(alone, alone.linears))
         for other in starts.ambiguous[:3]:
             turned = multiply(other, conjugate(first.states[0, 6:10]))
-            states = first.states.copy()
+            states = first.states[: len(fit.chains[i].states)].copy()
             states[:, 6:10] = multiply(np.broadcast_to(turned, (len(states), 4)), states[:, 6:10])
-            chain_of_i = replace(fit.chains[i], states=states)
-            trial = replace(fit, chains=(*fit.chains[:i], chain_of_i, *fit.chains[i + 1 :]))
+            trial = replace(alone, chains=(replace(fit.chains[i], states=states),))
             trial = refit(trial, iterations=6, tolerance=1e-3 * fit.count)
-            if trial.merit < 0.8 * fit.merit:
-                fit = trial
-    return fit
+            if trial.merit < _RESCUED * alone.merit:
+                alone, better[i] = trial, trial.chains[0]
+    if not better:
+        return fit
+    together = replace(fit, chains=tuple(better.get(i, one) for i, one in enumerate(fit.chains)))
+    together = refit(together, iterations=6, tolerance=1e-3 * fit.count)
+    return together if together.merit < fit.merit else fit
+
+
+#: so many recordings tell whether something that all share reconciles them
+FEW = 3
+#: another start, or a free clock, is taken up where it leaves less than this share of what was left
+_RESCUED = 0.8
+
+
+def part_of(fit: Fit, chosen: Sequence[int]) -> Fit:
+    """Return a fit of some of its recordings alone, with the parameters that act in them where they stand."""
+    place = {i: k for k, i in enumerate(chosen)}
+    kept = [
+        (
+            j,
+            q
+            if q.recordings is None
+            else replace(q, recordings=frozenset(place[i] for i in q.recordings if i in place)),
+        )
+        for j, q in enumerate(fit.parameters)
+        if any(q.acts_in(i) for i in chosen)
+    ]
+    columns = [j for j, _ in kept]
+    return replace(
+        fit,
+        chains=tuple(fit.chains[i] for i in chosen),
+        parameters=tuple(q for _, q in kept),
+        at=fit.at[columns],
+        linears=tuple(fit.linears[i] for i in chosen) if fit.linears else (),
+        merit=np.inf,
+        covariance=np.empty((0, 0)),
+    )
 
 
 #: sensors without which the motion of a flight can still be followed, with the effect that is their clock
@@ -239,9 +294,10 @@ def _led_by_others(fit: Fit) -> Fit:
     for sensor, clock in _LED.items():
         if sensor not in there or not (there - {sensor}) & {"magnetometer", "gyroscope"}:
             continue
-        chains = tuple(_silenced(one.recording, sensor) for one in fit.chains)
-        at = np.array([q.stated for q in fit.parameters])
-        led = refit(replace(fit, chains=chains, at=at), iterations=12, tolerance=few)
+        some = part_of(fit, _astray(fit)[:FEW])
+        if len(some.chains) < len(fit.chains) and _astray(_without(some, sensor, few)):
+            continue
+        led = _without(fit, sensor, few)
         if _astray(led):
             continue
         ratio = _clock_read(led, [one.readings for one in fit.chains], sensor, clock)
@@ -302,6 +358,13 @@ def _silenced(recording: Recording, sensor: str) -> Chain:
     return first_chain(replace(recording, samples=samples), edges=edges_of(recording))
 
 
+def _without(fit: Fit, sensor: str, tolerance: float) -> Fit:
+    """Return a fit from the start to recordings as if they had not a sensor."""
+    chains = tuple(_silenced(one.recording, sensor) for one in fit.chains)
+    at = np.array([q.stated for q in fit.parameters])
+    return refit(replace(fit, chains=chains, at=at), iterations=12, tolerance=tolerance)
+
+
 def _clock_read(led: Fit, readings: Sequence[Sequence[Readings]], sensor: str, clock: tuple[str, str]) -> float:
     """Return the clock by which a sensor's readings fit a motion best."""
     misfit = np.zeros(_CLOCKS_TRIED.size)
@@ -324,6 +387,15 @@ def _clock_read(led: Fit, readings: Sequence[Sequence[Readings]], sensor: str, c
 _CLOCK_SIGMA, _FIRST_LOOK = 0.02, 1.3
 
 
+def free_clocks(sensors: set[str]) -> tuple[Parameter, ...]:
+    """Return the clocks of sensors on board, free within a few per cent."""
+    return tuple(
+        Parameter(f"{prefix}.clock_rate", "ratio", 1.0, 1e-6, _CLOCK_SIGMA)
+        for sensor, prefix in (("magnetometer", "mag"), ("accelerometer", "accel"), ("gyroscope", "gyro"))
+        if sensor in sensors
+    )
+
+
 def _with_clocks(fit: Fit) -> Fit:
     """Fit again with free clocks where recordings went astray: their phases may have run away from one another.
 
@@ -332,23 +404,29 @@ def _with_clocks(fit: Fit) -> Fit:
     plant = fit.chains[0].recording.plant
     if plant not in ("flight", "free_spin") or not _astray(fit):
         return fit
-    sensors = {readings.sensor for one in fit.chains for readings in one.readings}
-    clocks = tuple(
-        Parameter(f"{prefix}.clock_rate", "ratio", 1.0, 1e-6, _CLOCK_SIGMA)
-        for sensor, prefix in (("magnetometer", "mag"), ("accelerometer", "accel"), ("gyroscope", "gyro"))
-        if sensor in sensors
-    )
+    clocks = free_clocks({readings.sensor for one in fit.chains for readings in one.readings})
     parameters = (*fit.parameters, *clocks)
     at = np.array([q.stated for q in parameters])
-    short = tuple(beginning(first_chain(one.recording), _FIRST_LOOK) for one in fit.chains)
-    look = refit(replace(fit, chains=short, parameters=parameters, at=at), iterations=10)
+    free = replace(fit, parameters=parameters, at=at)
+    some = part_of(free, _astray(fit)[:FEW])
+    if len(some.chains) < len(fit.chains) and len(_astray(_first_look(some))) == len(some.chains):
+        return fit
+    look = _first_look(free)
+    if len(_astray(look)) == len(look.chains):
+        return fit
     ratio = look.values(0).get(("mag.clock_rate", "ratio"), 1.0)
     chains = tuple(first_chain(one.recording, ratio) for one in fit.chains)
     # what the first look says of the rest is little: only the clocks are taken over
     known = {q.key for q in clocks}
     at = np.array([v if q.key in known else q.stated for q, v in zip(parameters, look.at, strict=True)])
     whole = refit(replace(fit, chains=chains, parameters=parameters, at=at), iterations=12, tolerance=1e-4 * fit.count)
-    return whole if whole.merit < 0.8 * fit.merit else fit
+    return whole if whole.merit < _RESCUED * fit.merit else fit
+
+
+def _first_look(fit: Fit) -> Fit:
+    """Return a fit to the beginnings of recordings alone, from the start."""
+    short = tuple(beginning(first_chain(one.recording), _FIRST_LOOK) for one in fit.chains)
+    return refit(replace(fit, chains=short), iterations=10)
 
 
 def beginning(current: Chain, length: float) -> Chain:

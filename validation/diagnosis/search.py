@@ -109,13 +109,19 @@ class Search:
 def search(
     recordings: Sequence[Recording],
     report: Report = lambda stage, done, total: None,
+    as_stated: Sequence[Recording] | None = None,
+    followed: Fit | None = None,
     free: Sequence[Parameter] = (),
 ) -> Search:
-    """Find the effects that explain recordings of one plant; ``free`` are numbers that every fit may move."""
+    """Find the effects that explain recordings of one plant.
+
+    ``as_stated`` are the same with nothing that stands in for what they do not state, ``followed`` their relaxed fit
+    where it is known already; ``free`` are numbers that every fit may move.
+    """
     known = (*stated_parameters(recordings), *free)
     own = (*known, *unknowns(recordings))
     report("following the data", 0, 4)
-    loose, left_out = without_outliers(relaxed(recordings, known))
+    loose, left_out = without_outliers(relaxed(recordings, known) if followed is None else followed)
     noise = estimate_noise(loose.linears, [linear.residual for linear in loose.linears])
     plant = recordings[0].plant
     given = {q.group for q in free}
@@ -125,7 +131,7 @@ def search(
     report("fitting the baseline", 2, 4)
     start = {**_start(board, Hypothesis(), own), **_wobbles(loose)}
     base = tied_fit(loose, Hypothesis(), own, noise, start, iterations=_BASE_ITERATIONS[plant])
-    found = Search(tuple(recordings), own, loose, noise, trials, base, base)
+    found = Search(tuple(as_stated or recordings), own, loose, noise, trials, base, base)
     found.outliers = left_out
     report("refitting candidates", 3, 4)
     _settle(found, _grown(found, board))

@@ -56,17 +56,18 @@ def _numbers(value: tuple[float | str, ...]) -> list[float]:
     return [float(item) for item in value if not isinstance(item, str)]
 
 
-def with_setup(outcome: Outcome, findings: SetupFindings, written: Sequence[Recording], fit: Fit) -> Outcome:
+def with_setup(outcome: Outcome, findings: SetupFindings, written: Sequence[Recording], fit: Fit | None) -> Outcome:
     """Return an outcome with the faults of the setup among its effects.
 
-    ``written`` are the recordings as they stand in their files, ``fit`` the final one, of the corrected recordings. The
-    baseline's figures become those of the written readings against the motion that the fit found. Where something
-    unexplained is left, the faults stand among the warnings, as the answer names no effect then.
+    ``written`` are the recordings as they stand in their files, ``fit`` the final one, of the corrected recordings, or
+    None where nothing follows them. The baseline's figures become those of the written readings against the motion that
+    the fit found. Where something unexplained is left, the faults stand among the warnings, as the answer names no
+    effect then.
     """
     if not findings.faults:
         return outcome
     diagnosis = outcome.diagnosis
-    if diagnosis.verdict == "unexplained":
+    if diagnosis.verdict == "unexplained" or fit is None:
         told = tuple(f"corrected before the fit: {fault.id}, {fault.sentence}" for fault in findings.faults)
         return replace(outcome, diagnosis=replace(diagnosis, warnings=(*diagnosis.warnings, *told)))
     excess = [_excess(fault.effect, written, findings.recordings, fit) for fault in findings.faults]

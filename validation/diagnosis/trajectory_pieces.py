@@ -270,11 +270,12 @@ def readings_of(recording: Recording) -> tuple[Readings, ...]:
         sheet = recording.sheets[sensor]
         measured = samples.value if samples.value.ndim == 2 else samples.value[:, None]
         if sensor == "gps":
-            sd = np.repeat([_or_nan(sheet.noise_rms), _or_nan(sheet.velocity_noise_rms)], 3)
+            sd = np.repeat([_or_nan(sheet.noise_rms or None), _or_nan(sheet.velocity_noise_rms or None)], 3)
             clipped, limit = np.zeros(measured.shape, dtype=np.bool_), None
         else:
             level = np.hypot(_or_nan(sheet.noise_rms), (sheet.resolution or 0.0) / np.sqrt(12.0))
-            sd = np.full(measured.shape[1], level)
+            # a noise of zero is none: nobody knows it
+            sd = np.full(measured.shape[1], level if level > 0.0 else np.nan)
             clipped, limit = sheet.clipped(measured), sheet.range
             lower = plateau(recording) if sensor == "accelerometer" else None
             if lower is not None:

@@ -116,7 +116,8 @@ def recording_of(read: RawReadings, rows: slice | None = None) -> Imported:
     if rows is not None:
         whole, readings = readings, _cut(readings, read.tables, read.main, rows)
         notes += [f"no {sensor} in these rows" for sensor in whole if sensor not in readings]
-    readings, rates, said = _fresh(raw, readings, import_map, tables, repairs)
+    repairs = RepairList(import_map.repairs)
+    readings, rates, said = _fresh(raw, readings, import_map, read.tables, repairs)
     notes += said
     zero = min(found.time[0] for found in readings.values())
     samples = {
@@ -142,7 +143,8 @@ def recording_of(read: RawReadings, rows: slice | None = None) -> Imported:
         {sensor: _sheet(import_map.sensors[sensor], samples[sensor], rates.get(sensor)) for sensor in samples},
         samples,
     )
-    return Imported(recording, read.repairs, (*notes, *clipping_notes(recording)))
+    listed = (*read.repairs, *repairs.listed())
+    return Imported(recording, listed, (*notes, *clipping_notes(recording)))
 
 
 def _read_sensors(

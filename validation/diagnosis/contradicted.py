@@ -1,0 +1,85 @@
+"""The outcome where the early look at recordings found that their sensors contradict one another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.model_file import Model
+from discsim.recording import Recording
+from validation.diagnosis.answer import Diagnosis, FitFigures, Located, Outcome, Residuals
+from validation.diagnosis.early_verdict import Contradiction, Look
+
+__all__ = ["contradicted_outcome"]
+
+#: a residual beyond this many times the noise is shown and counted as this: beyond it a number says nothing more
+_MOST = 1e6
+
+
+def contradicted_outcome(
+    found: Contradiction, recordings: Sequence[Recording], datasets: Sequence[str], names: Sequence[str], seed: int
+) -> Outcome:
+    """Return the outcome of recordings that no motion follows: unexplained, located by sensor.
+
+    ``recordings`` (called ``names``) are those of the data sets ``datasets``. Baseline and final figures are those of
+    the look at all sensors together, in noise that no misfit has inflated.
+    """
+    look = found.whole
+    squares = _excess(look)
+    total = sum(squares.values()) or 1.0
+    end = max(float(chain.edges[-1]) for chain in look.fit.chains)
+    located = tuple(
+        Located("all", sensor, "all", 0.0, end, min(squares[sensor] / total, 1.0), _text(found, sensor))
+        for sensor in sorted(found.blamed, key=lambda one: -squares[one])
+    )
+    shown = _residuals(look, names)
+    chi2 = float(np.mean(np.concatenate([one.after for one in shown]) ** 2)) if shown else 0.0
+    figures = FitFigures(chi2, None)
+    first = recordings[0]
+    diagnosis = Diagnosis(
+        tuple(datasets),
+        first.plant,
+        seed,
+        "unexplained",
+        figures,
+        figures,
+        located,
+        next_recordings=("The same again once these sensors agree: until then no effect can be looked for.",),
+        warnings=found.sentences,
+    )
+    return Outcome(diagnosis, Model(first.environment, first.disc, first.rig, (), ()), tuple(shown))
+
+
+def _text(found: Contradiction, sensor: str) -> str:
+    others = found.against.get(sensor, ())
+    if others:
+        return f"it contradicts {', '.join(others)}: no motion follows them together"
+    return "no such motion follows it, even alone" if sensor in found.lost else "no motion follows it with the others"
+
+
+def _left(look: Look, i: int, group: str, rows: slice) -> FloatArray:
+    """Return the residuals (n,) of one channel in its noise, bounded."""
+    left = look.fit.linears[i].residual[rows] / look.noise[group].sd
+    return np.clip(np.nan_to_num(left, nan=_MOST, posinf=_MOST, neginf=-_MOST), -_MOST, _MOST)
+
+
+def _excess(look: Look) -> dict[str, float]:
+    """Return by how much the squares of what is left of each sensor exceed noise."""
+    squares = dict.fromkeys(look.sensors, 0.0)
+    for i, linear in enumerate(look.fit.linears):
+        for channel in linear.channels:
+            left = _left(look, i, channel.group, channel.rows)
+            squares[channel.sensor] += max(float(left @ left) - left.size, 0.0)
+    return squares
+
+
+def _residuals(look: Look, names: Sequence[str]) -> list[Residuals]:
+    shown = []
+    for i, linear in enumerate(look.fit.linears):
+        for channel in linear.channels:
+            left = _left(look, i, channel.group, channel.rows)
+            name = names[look.places[i]]
+            shown.append(Residuals(name, channel.sensor, channel.axis, linear.t[channel.rows], left, left))
+    return shown

@@ -1,0 +1,177 @@
+"""What a diagnosis takes of recordings as they come: what is of no use is left out aloud, or refused in a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.errors import InputError
+from discsim.recording import SENSORS, Recording, Samples, SensorSheet
+from validation.diagnosis.starts import FEWEST
+
+__all__ = ["prepared"]
+
+#: longest recording that is looked at, s: twice the longest throw; ten minutes of a rig
+LONGEST = {"flight": 20.0, "free_spin": 20.0, "spin_down": 600.0, "rate_table": 600.0}
+#: fastest readings that are looked at, Hz: eighty of a turn of the fastest disc (80 rad/s), more would only take time
+FASTEST = 1000.0
+#: fewest fixes of a path that are used at all
+_FIXES = 4
+#: a sensor is silent for a while where nothing comes for this long, s, and for as many of its intervals
+_SILENT, _INTERVALS = 0.25, 5.0
+#: shares of readings above which it is worth saying that they stand at the range, or repeat the one before
+_CLIPPED, _HELD = 0.05, 0.3
+
+
+def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[list[Recording], list[str]]:
+    """Return recordings (called ``names``) as a diagnosis can use them, and what the reader must know of them.
+
+    Sensors without a reading go, axes that stand still become gaps, what is too long or too fast is shortened. Raises
+    `InputError` where nothing is left of a recording, or its plant needs something that it does not state.
+    """
+    usable: list[Recording] = []
+    notes: dict[str, list[str]] = {}
+    for recording, name in zip(recordings, names, strict=True):
+        _refuse(recording, name)
+        kept = {}
+        sheets = dict(recording.sheets)
+        for sensor, samples in recording.samples.items():
+            left, step = _shortened(samples, sheets[sensor], LONGEST[recording.plant])
+            for note in _notes(recording, sensor, samples, left, step):
+                notes.setdefault(note, []).append(name)
+            if left is not None:
+                kept[sensor] = left
+                sheets[sensor] = replace(sheets[sensor], rate_hz=sheets[sensor].rate_hz / step)
+        usable.append(replace(recording, samples=kept, sheets=sheets))
+        _enough(usable[-1], name)
+    said = [note if len(where) == len(names) else f"{', '.join(where)}: {note}" for note, where in notes.items()]
+    return usable, [*_absent(usable, names), *said]
+
+
+def _refuse(recording: Recording, name: str) -> None:
+    """Refuse a recording that lacks what its plant cannot do without, or whose time does not begin near zero."""
+    place = recording.path or name
+    if recording.plant == "flight" and (recording.disc is None or recording.environment.air_density is None):
+        raise InputError(f"{place}: a flight needs [disc] and air_density_kg_m3; add them to recording.toml")
+    if recording.plant == "spin_down" and recording.rig is None:
+        raise InputError(f"{place}: a spin_down needs [rig] with Izz_kg_m2 and viscous_N_m_s; add it to recording.toml")
+    if recording.plant == "rate_table" and recording.command is None:
+        raise InputError(f"{place}: a rate_table needs command.csv, the rate that was asked for; add it")
+    first = min((float(s.t[0]) for s in recording.samples.values() if len(s)), default=0.0)
+    if first > LONGEST[recording.plant]:
+        raise InputError(
+            f"{place}: its first reading is at {first:.6g} s; expected time to count from the release or the start of "
+            "the run, in seconds (import the rows of one throw, --rows A:B)"
+        )
+
+
+def _enough(recording: Recording, name: str) -> None:
+    """Refuse a recording of which too few readings are left to tell a motion."""
+    counts = {sensor: _rows(samples) for sensor, samples in recording.samples.items()}
+    if any(count >= (_FIXES if sensor in ("gps", "track") else FEWEST) for sensor, count in counts.items()):
+        return
+    told = ", ".join(f"{sensor} {count}" for sensor, count in counts.items()) or "none"
+    raise InputError(
+        f"{recording.path or name}: too few readings for a diagnosis (whole rows within "
+        f"{LONGEST[recording.plant]:g} s: {told}); expected at least {FEWEST} of one sensor, in seconds"
+    )
+
+
+def _rows(samples: Samples) -> int:
+    """Return how many rows hold a number on some axis."""
+    return int(np.count_nonzero(np.isfinite(_table(samples)).any(axis=1)))
+
+
+def _table(samples: Samples) -> FloatArray:
+    return samples.value.reshape(len(samples), -1)
+
+
+def _shortened(samples: Samples, sheet: SensorSheet, longest: float) -> tuple[Samples | None, int]:
+    """Return what is used of a sensor, None for nothing, and of how many of its readings one is looked at."""
+    end = float(samples.t[0]) + longest if len(samples) else 0.0
+    own = samples.between(-np.inf, min(end, longest)) if len(samples) and float(samples.t[-1]) > longest else samples
+    interval = own.interval
+    step = max(1, int(1.0 / (interval * FASTEST) + 1e-6)) if np.isfinite(interval) else 1
+    value = _table(own).copy()[::step]
+    for axis in range(value.shape[1]):
+        if _stands(value[:, axis], sheet):
+            value[:, axis] = np.nan
+    if not np.any(np.isfinite(value)):
+        return None, 1
+    return Samples(own.t[::step], value.reshape(-1, *own.value.shape[1:])), step
+
+
+def _stands(value: FloatArray, sheet: SensorSheet) -> bool:
+    """Tell whether readings (n,) of an axis are one and the same number where noise would have moved them.
+
+    Steps of resolution that are coarser than the noise, and sensors without noise, may stand still on a steady motion.
+    """
+    some = value[np.isfinite(value)]
+    coarse = sheet.noise_rms == 0.0 or (sheet.resolution or 0.0) > (sheet.noise_rms or 0.0)
+    return bool(some.size >= FEWEST and np.all(some == some[0]) and not coarse)
+
+
+def _absent(recordings: Sequence[Recording], names: Sequence[str]) -> Iterator[str]:
+    """Yield which sensors only some recordings have."""
+    for sensor in SENSORS:
+        without = [name for one, name in zip(recordings, names, strict=True) if sensor not in one]
+        if 0 < len(without) < len(names):
+            yield f"{', '.join(without)}: no {sensor}; what only it shows cannot be said of them."
+
+
+def _notes(recording: Recording, sensor: str, samples: Samples, left: Samples | None, step: int) -> Iterator[str]:
+    """Yield what there is to say of one sensor of a recording."""
+    columns = SENSORS[sensor].columns
+    value, sheet = _table(samples), recording.sheets[sensor]
+    finite = np.isfinite(value)
+    if left is None:
+        dead = "holds no reading" if not np.any(finite) else "stands still at one value"
+        yield f"the {sensor} {dead}: it is left out, and nothing is said of it."
+        return
+    for axis, column in enumerate(columns):
+        if not np.any(finite[:, axis]):
+            yield f"{column} of the {sensor} holds no reading: nothing is said of that axis."
+        elif _stands(value[:, axis], sheet):
+            yield f"{column} of the {sensor} stands still at {value[finite[:, axis], axis][0]:g}: it is left out."
+    if float(samples.t[-1]) > LONGEST[recording.plant]:
+        yield (
+            f"the {sensor} goes on to {samples.t[-1]:.4g} s, longer than any {recording.plant} lasts: its first "
+            f"{LONGEST[recording.plant]:g} s are looked at."
+        )
+    if step > 1:
+        yield f"the {sensor} is faster than {FASTEST:g} Hz: one of {step} of its readings is looked at."
+    if _rows(left) < FEWEST and sensor not in ("gps", "track"):
+        yield f"the {sensor} has {_rows(left)} readings only: it says little."
+    yield from _silences(left, recording, sensor)
+    at_range = sheet.clipped(value) & finite
+    for axis, column in enumerate(columns):
+        share = float(np.sum(at_range[:, axis])) / max(float(np.sum(finite[:, axis])), 1.0)
+        if share > _CLIPPED:
+            yield (
+                f"{column} of the {sensor} stands at its range in {100.0 * share:.0f} % of its readings: they say only "
+                "that the motion was beyond it."
+            )
+    rows = value[finite.all(axis=1)]
+    same = np.all(np.diff(rows, axis=0) == 0.0, axis=1) if len(rows) > FEWEST else np.zeros(1)
+    if np.mean(same) > _HELD and np.any(np.ptp(rows, axis=0) > 0.0):
+        yield (
+            f"the {sensor} repeats {100.0 * np.mean(same):.0f} % of its readings, as a slower sensor does that is "
+            "written with every row of a faster log: such repeats count as readings, and their noise looks wrong."
+        )
+
+
+def _silences(samples: Samples, recording: Recording, sensor: str) -> Iterator[str]:
+    """Yield where a sensor says nothing for a while, at its start, in between or to its end."""
+    t = samples.t[np.isfinite(_table(samples)).any(axis=1)]
+    ends = [s.t[-1] for s in recording.samples.values() if len(s)]
+    end = min(float(max(ends)), LONGEST[recording.plant])
+    long = max(_SILENT, _INTERVALS * (samples.interval if len(samples) > 1 else 0.0))
+    marks = np.concatenate([[0.0], t, [end]])
+    for k in np.flatnonzero(np.diff(marks) > long):
+        yield (
+            f"the {sensor} is silent from {marks[k]:.2f} to {marks[k + 1]:.2f} s: what happened then is told by the "
+            "other sensors alone."
+        )
