@@ -521,6 +521,7 @@ REFUSED = {
     "finance.csv": (FINANCE.encode(), "no sensor of motion found in the columns 'Date', 'Open'"),
     "prices.csv": (FINANCE.partition("\n")[2].encode(), "no sensor of motion found in the columns 'c1'"),
     "header.csv": (b"time,ax,ay,az\n", "no rows of numbers"),
+    "short.csv": (b"t_s,gx_dps,gy_dps,gz_dps\n0,1,2,3\n0.1,1,2,4\n", "2 rows of numbers in it"),
     "binary.bin": (bytes(range(256)) * 40, "is binary, no text"),
     "flight.ulg": (b"ULog\x01\x12\x35" + bytes(100), "is a PX4 ULog; `ulog2csv FILE`"),
     "book.xlsx": (b"PK\x03\x04" + bytes(100), "export it as CSV"),

@@ -16,10 +16,12 @@ from validation.importing.sniffing.dialect import Dialect
 from validation.importing.sniffing.names import Name, penalty_of, read_name, says_nothing, sensor_of
 from validation.importing.sniffing.units import COUNTS, OTHER, Reading, readings_of
 
-__all__ = ["Numbers", "Triple", "triples_of"]
+__all__ = ["FEWEST_ROWS", "Numbers", "Triple", "triples_of"]
 
 #: A column of text with at most this many different values names sensors (or parts) row by row.
 MAX_IDS = 20
+#: Rows without which a triple is no sensor: three say nothing of a unit or an axis, and a line of text may hold them.
+FEWEST_ROWS = 4
 _ID_NAMES = ("id", "sensor", "sensorname", "sensor_name", "sensor_id", "sensorid", "type", "name", "source", "device",
              "kind", "topic", "imu")  # fmt: skip
 
@@ -189,7 +191,7 @@ def _unnamed(numbers: Numbers, free: list[int], where: tuple[str, str] | None) -
 
 
 def _has_readings(triple: Triple) -> bool:
-    """Tell whether at least four rows have three numbers; a triple without is another file's or always empty."""
+    """Tell whether enough rows have three numbers; a triple without is another file's or always empty."""
     if triple.sensor in (OTHER, "time"):
         return False
-    return int(np.isfinite(triple.values).all(axis=1).sum()) >= 4
+    return int(np.isfinite(triple.values).all(axis=1).sum()) >= FEWEST_ROWS

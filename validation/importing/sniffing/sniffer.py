@@ -19,7 +19,7 @@ from validation.importing.sniffing.behaviour import WORTHS, by_behaviour
 from validation.importing.sniffing.clock import SPACING, STEP, Clock, clocks_of, seconds
 from validation.importing.sniffing.decision import Decision
 from validation.importing.sniffing.dialect import dialect_of
-from validation.importing.sniffing.groups import Numbers, Triple, triples_of
+from validation.importing.sniffing.groups import FEWEST_ROWS, Numbers, Triple, triples_of
 from validation.importing.sniffing.magnitudes import (
     Unit,
     accelerometer_unit,
@@ -169,6 +169,9 @@ def _others(found: dict[str, tuple[Triple, Decision]], left: Sequence[Triple]) -
 
 
 def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) -> InputError:
+    rows = max(len(file.numbers.table.rows) for file in files)
+    if rows < FEWEST_ROWS:
+        return InputError.at(raw, None, f"{rows} rows of numbers in it; expected a log of {FEWEST_ROWS} at least")
     columns = ", ".join(f"'{name}'" for name in files[0].numbers.table.columns[:12])
     also = f" ({len(failures)} other files there are no tables)" if failures else ""
     return InputError.at(
