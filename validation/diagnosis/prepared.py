@@ -111,7 +111,9 @@ def _stands(value: FloatArray, sheet: SensorSheet) -> bool:
     """
     some = value[np.isfinite(value)]
     coarse = sheet.noise_rms == 0.0 or (sheet.resolution or 0.0) > (sheet.noise_rms or 0.0)
-    return bool(some.size >= FEWEST and np.all(some == some[0]) and not coarse)
+    # what stands at its range all along says that the motion was beyond it
+    clipped = some.size > 0 and bool(sheet.clipped(some[:1])[0])
+    return bool(some.size >= FEWEST and np.all(some == some[0]) and not coarse and not clipped)
 
 
 def _absent(recordings: Sequence[Recording], names: Sequence[str]) -> Iterator[str]:
