@@ -30,6 +30,9 @@ BOARD = ("magnetometer", "gyroscope", "accelerometer")
 MOST = 4
 #: largest offset of time that is looked for, s, and how far the phase turns between two that are tried, rad
 LATEST, PHASE_STEP = 0.15, 0.25
+#: lags that are tried as rivals, as phases, rad; and how wrong a clock may be
+LAGS = np.array([0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.2, 3.3, 5.0, 8.0])
+MOST_CLOCK = 0.01
 #: a board nearer to a right angle than this (root sum of squares of the matrix) stands at it
 SNAP = 0.15
 #: what a statement costs that a hypothesis takes back (as readings that clip become gaps in a turned board): half of
@@ -166,7 +169,7 @@ def hypotheses(recordings: Sequence[Recording], price: float = 0.0) -> Ranking:
         as_written = Hypothesis("", "", Columns(), *misfit(base.signals, Columns()))
         if as_written.cost < price:
             return Ranking(as_written, (), base)
-        found += [*_offsets(base), *_field(base)]
+        found += [*_offsets(base), *_field(base), *_rivals(base)]
     if base.signals:
         found += list(_one_sensor(base))
     found += list(_boards(some))
@@ -239,14 +242,37 @@ def _offsets(base: _Base) -> Iterator[Hypothesis]:
             yield best
 
 
-#: iron along the axis that is ordinary, uT, and how far a field may be from the stated one, as a share of it
-_IRON, _APART = 5.0, 0.4
-#: what f . m leaves on sound throws, times the field's size, m/s^2
-_LEFT = 0.25
+def _rivals(base: _Base) -> Iterator[Hypothesis]:
+    """Return physics that is no fault of the setup, so that what it explains is not taken for one: lags and clocks."""
+    fastest = max(float(np.nanmax(np.abs(one.rate))) for one in base.signals)
+    longest = max(float(one.grid[-1]) for one in base.signals)
+    for sensor in BOARD:
+        if not any(sensor in one.recording for one in base.signals):
+            continue
+        step = PHASE_STEP / (fastest * longest)
+        count = int(MOST_CLOCK / step)
+        sizes = {
+            "lag": LAGS / fastest,
+            "clock": step * np.arange(-count, count + 1),
+        }
+        for kind, tried in sizes.items():
+            found = []
+            for size in tried.tolist():
+                columns = Columns({}, {}, None, {f"{sensor}.{kind}": size})
+                found.append(Hypothesis("rival", sensor, columns, *misfit(base.signals, columns), 6.0))
+            yield min(found, key=lambda item: item.cost)
+
+
+#: what f . m leaves on sound throws, times the field's size, m/s^2; how far a field may be from the stated one, as a
+#: share of it, and iron along the axis, uT
+_LEFT, _APART, _IRON = 0.25, 0.4, 40.0
 
 
 def _field(base: _Base) -> Iterator[Hypothesis]:
-    """Return the field for which f . m in the body equals (a - g) . B along the path: linear in B."""
+    """Return the field for which f . m in the body is (a - g) . B along the path, and its rival: iron along the axis.
+
+    Both are linear in what is looked for.
+    """
     B = base.signals[0].recording.environment.magnetic_field
     strength = float(np.linalg.norm(B))
     rows, targets = [], []
@@ -262,19 +288,26 @@ def _field(base: _Base) -> Iterator[Hypothesis]:
     if not rows or strength == 0.0:
         return
     A, y = np.vstack(rows), np.concatenate(targets)
-    # neighbours share their errors; a robust weight for gusts and touches
-    sd = 2.5 * _LEFT * strength
-    prior = np.diag(1.0 / np.array([_APART * strength] * 3 + [_IRON]) ** 2)
-    start = np.append(B, 0.0)
-    x = start
-    for _ in range(6):
-        weight = 1.0 / (sd**2 * (1.0 + ((y - A @ x) / (3.0 * sd)) ** 2))
-        x = np.linalg.solve((A * weight[:, None]).T @ A + prior, (A * weight[:, None]).T @ y + prior @ start)
-    site = x[:3]
+    left = y - A[:, :3] @ B
+    site = B + _linear(A[:, :3], left, _LEFT * strength, _APART * strength)
     apart = np.arccos(np.clip(site @ B / (np.linalg.norm(site) * strength), -1.0, 1.0))
     if apart > FIELD_LEAST or abs(np.log(np.linalg.norm(site) / strength)) > SIZE_LEAST:
         columns = Columns({}, {}, site)
         yield Hypothesis("field", "site", columns, *misfit(base.signals, columns), 9.0)
+    iron = _linear(A[:, 3:], left, _LEFT * strength, _IRON)
+    columns = Columns({}, {}, None, {"iron": float(iron[0])})
+    yield Hypothesis("rival", "magnetometer", columns, *misfit(base.signals, columns), 6.0)
+
+
+def _linear(A: FloatArray, y: FloatArray, usual: float, sigma: float) -> FloatArray:
+    """Return x (k,) of y = A x with robust weights, a scatter that neighbours share, and a prior of zero +- sigma."""
+    sd = 2.5 * usual
+    x: FloatArray = np.zeros(A.shape[1])
+    for _ in range(6):
+        weight = 1.0 / (sd**2 * (1.0 + ((y - A @ x) / (3.0 * sd)) ** 2))
+        normal = (A * weight[:, None]).T @ A + np.eye(x.size) / sigma**2
+        x = np.asarray(np.linalg.solve(normal, (A * weight[:, None]).T @ y))
+    return np.asarray(x)
 
 
 def board_effect(matrix: FloatArray) -> Effect:

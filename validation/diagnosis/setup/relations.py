@@ -11,6 +11,7 @@ rate. Then, whatever the air does:
 - ``lever arm``: <f_z exp(i psi)> = r (d_x - i d_y) W, from w x (w x d) + dw/dt x d under slow precession;
 - ``lift``: the mean of f_z is negative, for most discs fly the right way up: weak, as some do not;
 - on a rig ``angle``: psi is the sum of the reference's rate; ``ramps``: f_x + i f_y over d is -r^2 + i dr/dt;
+- ``spin axis``: the field turns, and the mean rate points, along z;
 - ``height``: a path stays above ground; ``release``: it starts with the stated velocity.
 
 Each says in one number how far a hypothesis about the columns is from it, in units of what ordinary errors of parts
@@ -36,8 +37,12 @@ _TOGETHER = 6.0
 #: of the pull and of the lever arm, m/s^2; height m; release m/s
 _ALONG, _ALONG_SHARE = 0.4, 0.12
 _SPIN, _SPIN_SHARE = 1.5, 0.05
-_FORCE, _SIZE, _PULL, _PULL_SHARE, _LEVER, _LEVER_SHARE = 0.5, 1.2, 1.5, 0.25, 0.12, 0.5
+_FORCE, _SIZE, _PULL, _PULL_SHARE, _LEVER, _LEVER_SHARE = 0.3, 1.2, 1.5, 0.25, 0.12, 0.5
 _HEIGHT, _RELEASE = 1.5, 2.0
+#: how far the axis of turning may be off z, rad: soft iron of 10 % bends a magnetometer's, a gyroscope's cross-axis its
+#: own; and the weight of that
+_TILT: Mapping[str, float] = {"magnetometer": 0.07, "gyroscope": 0.04}
+_TILT_WEIGHT = 8.0
 #: the mean specific force along z of a disc that flies the right way up is about -g; hammers are few, m/s^2
 _LIFT = 1.5
 #: degree of the polynomial that a rate runs down along
@@ -50,11 +55,16 @@ _IRON, _GRAVITY, _STEADY = 15.0, 1.5, 5.0
 
 @dataclass(frozen=True)
 class Columns:
-    """A hypothesis: true axes = matrix (3, 3) times written columns, written = true time + offset; a field in N."""
+    """A hypothesis: true axes = matrix (3, 3) times written columns, written = true time + offset; a field in N.
+
+    ``rival`` holds physics that is no fault of the setup and may look like one: "SENSOR.lag" s, "SENSOR.clock" (written
+    over true time, less one), "iron" along the axis, uT.
+    """
 
     axes: Mapping[str, FloatArray] = field(default_factory=dict)
     offset: Mapping[str, float] = field(default_factory=dict)
     site: FloatArray | None = None
+    rival: Mapping[str, float] = field(default_factory=dict)
 
     def of(self, sensor: str) -> FloatArray:
         """Return the matrix of a sensor, the unit matrix where nothing is supposed."""
@@ -91,15 +101,21 @@ def misfits(signals: SpinSignals, columns: Columns) -> list[Misfit]:
     angle = complex(across[0, 0], across[1, 0])
     # psi of the true columns is that of the written ones, backwards where they are mirrored, less an angle
     rate = -signals.rate if mirrored else signals.rate
-    along = float(M[2, 2]) * signals.along
+    along = float(M[2, 2]) * signals.along - columns.rival.get("iron", 0.0)
+    speed = np.nan_to_num(rate)
 
     def turning(locked: Locked, matrix: FloatArray, sensor: str) -> ComplexArray:
         own = np.conj(locked.turning) if mirrored else locked.turning
         late = columns.offset.get(sensor, 0.0) - columns.offset.get("magnetometer", 0.0)
-        shifted = own * np.conj(angle) * np.exp(-1j * np.nan_to_num(rate) * late)[:, None]
+        drift = columns.rival.get(f"{sensor}.clock", 0.0) - columns.rival.get("magnetometer.clock", 0.0)
+        shifted = own * np.conj(angle) * np.exp(-1j * speed * (late + drift * signals.grid))[:, None]
+        # what stands still in N turns at -rate in B: a lag leaves 1/(1 - i rate tau) of it
+        for name, sign in ((sensor, -1.0), ("magnetometer", 1.0)):
+            lag = 1.0 + sign * 1j * speed * columns.rival.get(f"{name}.lag", 0.0)
+            shifted = shifted * (lag if name == sensor else np.conj(lag) / np.abs(lag))[:, None]
         return np.asarray(_times(shifted, matrix))
 
-    found: list[Misfit] = []
+    found = _of_axes(signals, columns)
     W: ComplexArray | None = None
     if signals.gyro is not None:
         matrix = columns.of("gyroscope")
@@ -132,6 +148,15 @@ def _times(columns: ComplexArray | FloatArray, matrix: FloatArray) -> ComplexArr
             if abs(matrix[i, j]) > 1e-6:
                 out[:, i] += matrix[i, j] * columns[:, j]
     return out
+
+
+def _of_axes(signals: SpinSignals, columns: Columns) -> list[Misfit]:
+    """Return how far each sensor's own axis of turning is from z; a sensor whose axis is another has its weight."""
+    found = []
+    for sensor, axis in signals.axes.items():
+        tilt = float(np.arccos(np.clip(abs((columns.of(sensor) @ axis)[2]), 0.0, 1.0)))
+        found.append(Misfit("spin axis", (sensor,), (tilt / _TILT[sensor]) ** 2, _TILT_WEIGHT))
+    return found
 
 
 def _judged(
@@ -264,7 +289,8 @@ def _of_angle(signals: SpinSignals, reference: Samples, sign: float, late: float
     rate = np.interp(fine, t, r)
     own = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * 0.2 * STEP)])
     there = np.interp(signals.grid - late, fine, own)
-    basis, _ = np.linalg.qr(np.column_stack([np.ones(there.size), there]))
+    late_by_clock = signals.grid * np.interp(signals.grid - late, fine, rate)
+    basis, _ = np.linalg.qr(np.column_stack([np.ones(there.size), late_by_clock]))
     left = sign * signals.angle - there
     left = left - basis @ (basis.T @ left)
     return _judged("angle", ("magnetometer",), left, _ANGLE * np.ones(1))

@@ -14,12 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
 from discsim.recording import Recording
-from validation.diagnosis.setup.spin_signals import averages, turning_axis, usable
+from validation.diagnosis.setup.spin_signals import averages, turning_line, usable
 
 __all__ = ["board_turns", "spin_axis"]
-
-#: a turning less pure than this has no axis worth the name; sound throws have 0.9 and more
-_PURE = 0.4
 
 
 def spin_axis(recordings: Sequence[Recording], sensor: str) -> FloatArray | None:
@@ -29,20 +26,9 @@ def spin_axis(recordings: Sequence[Recording], sensor: str) -> FloatArray | None
     """
     total = np.zeros((3, 3))
     for recording in recordings:
-        found = usable(recording, sensor)
-        if found is None:
-            continue
-        if sensor == "magnetometer":
-            turned = turning_axis(*found)
-            if turned is None or turned[1] < _PURE:
-                continue
-            axis = turned[0]
-        else:
-            axis = np.mean(found[1], axis=0)
-            if not np.all(np.isfinite(axis)) or float(np.linalg.norm(axis)) < 1.0:
-                continue
-            axis = axis / np.linalg.norm(axis)
-        total += np.outer(axis, axis)
+        axis = turning_line(recording, sensor)
+        if axis is not None:
+            total += np.outer(axis, axis)
     if not np.any(total):
         return None
     own = np.linalg.eigh(total)[1][:, 2]

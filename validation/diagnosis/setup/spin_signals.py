@@ -8,8 +8,8 @@ equations between these signals, whatever the columns of a sensor are called.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from discsim.recording import Recording
 from validation.diagnosis.starts import field_spin, local_cubics, path_fixes
 from validation.diagnosis.turning import rate_of
 
-__all__ = ["ComplexArray", "FlightPath", "Locked", "SpinSignals", "averages", "spin_signals", "turning_axis", "usable"]
+__all__ = ["ComplexArray", "FlightPath", "Locked", "SpinSignals", "averages", "spin_signals", "turning_line", "usable"]
 
 ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
 
@@ -59,7 +59,7 @@ class SpinSignals:
     ``angle`` (n,) is psi, how far the body has turned by the field's phase, rad, ``rate`` (n,) its slope, rad/s, NaN
     where too slow; ``measured`` tells that the field shows it, and not the sum of another sensor's rate. ``across`` and
     ``along`` (n,) are the field across and along the axis, uT; ``gyro_sign`` (3,) the sign of each column of the
-    gyroscope.
+    gyroscope; ``axes`` the lines (3,) about which magnetometer and gyroscope show the body turning.
     """
 
     recording: Recording
@@ -73,6 +73,7 @@ class SpinSignals:
     gyro_sign: FloatArray | None = None
     force: Locked | None = None
     path: FlightPath | None = None
+    axes: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 def usable(recording: Recording, sensor: str) -> tuple[FloatArray, FloatArray] | None:
@@ -99,6 +100,27 @@ def turning_axis(t: FloatArray, y: FloatArray) -> tuple[FloatArray, float] | Non
     size = float(np.linalg.norm(total))
     whole = float(np.sum(np.linalg.norm(turned, axis=1)))
     return (total / size, size / whole) if size > 0.0 else None
+
+
+#: a turning less pure than this has no axis worth the name; sound throws have 0.9 and more
+PURE = 0.4
+
+
+def turning_line(recording: Recording, sensor: str) -> FloatArray | None:
+    """Return the unit vector (3,) in written columns along which the body turns, of either sign.
+
+    By a magnetometer, about which its field turns; by a gyroscope that does not clip, of its mean rate. None where
+    nothing turns.
+    """
+    found = usable(recording, sensor)
+    if found is None:
+        return None
+    if sensor == "magnetometer":
+        turned = turning_axis(*found)
+        return None if turned is None or turned[1] < PURE else turned[0]
+    axis = np.mean(found[1], axis=0)
+    size = float(np.linalg.norm(axis))
+    return np.asarray(axis / size) if np.isfinite(size) and size > 1.0 else None
 
 
 def averages(t: FloatArray, value: ComplexArray | FloatArray, grid: FloatArray, sigma: float = SIGMA) -> ComplexArray:
@@ -141,11 +163,11 @@ def spin_signals(recording: Recording) -> SpinSignals | None:
         return None
     nothing = np.full(grid.size, np.nan)
     across, along = nothing, nothing
-    field = usable(recording, "magnetometer")
-    if field is not None and source == "magnetometer":
-        turned = (field[1][:, 0] + 1j * field[1][:, 1]) * np.exp(-1j * phase(field[0]))
-        across = np.abs(averages(field[0], turned, grid))
-        along = np.real(averages(field[0], field[1][:, 2], grid))
+    known = usable(recording, "magnetometer")
+    if known is not None and source == "magnetometer":
+        t, m = known
+        across = np.abs(averages(t, (m[:, 0] + 1j * m[:, 1]) * np.exp(-1j * phase(t)), grid))
+        along = np.real(averages(t, m[:, 2], grid))
 
     def locked(sensor: str) -> Locked | None:
         found = usable(recording, sensor)
@@ -176,6 +198,7 @@ def spin_signals(recording: Recording) -> SpinSignals | None:
         None if gyroscope is None else _signs(gyroscope.value),
         locked("accelerometer"),
         _path(recording, grid),
+        {name: axis for name in ("magnetometer", "gyroscope") if (axis := turning_line(recording, name)) is not None},
     )
 
 
