@@ -23,8 +23,8 @@ from validation.diagnosis.setup.units import clock_unit, sensor_units
 
 __all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said"]
 
-#: what a fault must gain, in twice the log likelihood of the relations between sensors. On 40 concealed sets of all kinds
-#: the largest gain of any fault that is not there is 15 (lost samples of a magnetometer), the next 0.3
+#: what a fault must gain, in twice the log likelihood of the relations between sensors; on 40 concealed sets of all
+#: kinds the largest gain of a fault that is not there is 15 (lost samples of a magnetometer), the next 0.3
 PRICE = 30.0
 #: sensors agree where the cost per independent statement is below this; sound sets have 0.02 to 0.25
 AGREE = 0.6
