@@ -60,6 +60,7 @@ def command(
     from estimators.fft import FftSettings
     from estimators.methods import Options
     from validation.comparison import disagreements
+    from validation.diagnosis.setup import find_setup_faults
     from validation.options import at_place
     from validation.run import start_run
 
@@ -70,8 +71,11 @@ def command(
     )
     data = read_recording(recording)
     data = replace(data, environment=at_place(data.environment, place, date))
+    setup = find_setup_faults([data])
+    data = setup.recordings[0]
     rates, left_out = estimate_all(data, method, options)
-    notes = all_notes(data)
+    notes = [f"{fault.sentence}; the estimates are of the readings so corrected" for fault in setup.faults]
+    notes += all_notes(data)
     found = disagreements(rates)
     with start_run(out, inputs=[recording]) as run:
         write_text(out / "rate.csv", rate_csv(rates))
