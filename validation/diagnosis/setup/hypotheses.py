@@ -226,13 +226,17 @@ def _one_sensor(base: _Base, *, alone: bool = True) -> Iterator[Hypothesis]:
                 yield Hypothesis("axes", sensor, total, *costs, 4.0 + unlikely)
 
 
+def _shifting(base: _Base) -> list[str]:
+    """Return the sensors whose phase is seen: on a rig, where nothing precesses, only that of the field."""
+    rig = base.signals[0].recording.plant in ("rate_table", "spin_down")
+    return [name for name in (BOARD[:1] if rig else BOARD) if any(name in one.recording for one in base.signals)]
+
+
 def _offsets(base: _Base) -> Iterator[Hypothesis]:
     fastest = max(float(np.nanmax(np.abs(one.rate))) for one in base.signals)
     step = PHASE_STEP / fastest
     count = int(LATEST / step)
-    for sensor in BOARD:
-        if not any(sensor in one.recording for one in base.signals):
-            continue
+    for sensor in _shifting(base):
         tried = []
         for k in range(-count, count + 1):
             columns = Columns({}, {sensor: k * step})
@@ -246,9 +250,9 @@ def _rivals(base: _Base) -> Iterator[Hypothesis]:
     """Return physics that is no fault of the setup, so that what it explains is not taken for one: lags and clocks."""
     fastest = max(float(np.nanmax(np.abs(one.rate))) for one in base.signals)
     longest = max(float(one.grid[-1]) for one in base.signals)
-    for sensor in BOARD:
-        if not any(sensor in one.recording for one in base.signals):
-            continue
+    if base.signals[0].recording.plant in ("rate_table", "spin_down"):
+        return
+    for sensor in _shifting(base):
         step = PHASE_STEP / (fastest * longest)
         count = int(MOST_CLOCK / step)
         sizes = {

@@ -26,7 +26,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.recording import Samples
 from validation.diagnosis.setup.spin_signals import STEP, ComplexArray, Locked, SpinSignals
 
 __all__ = ["Columns", "Misfit", "misfit", "misfits", "wanted_force"]
@@ -260,12 +259,11 @@ def _of_rig(signals: SpinSignals, columns: Columns, rate: FloatArray, along: Flo
     if signals.force is not None:
         mean = np.real(_times(signals.force.mean, columns.of("accelerometer")))
         found += _of_ramps(signals, mean[:, 0] + 1j * mean[:, 1], rate)
-    reference = recording.get("rate_reference") or recording.command
-    if reference is not None:
+    if signals.reference is not None:
         if signals.measured:
             late = columns.offset.get("magnetometer", 0.0)
-            found += _of_angle(signals, reference, -1.0 if rate is not signals.rate else 1.0, late)
-        own = np.interp(signals.grid, reference.t, reference.value)
+            found += _of_angle(signals, -1.0 if rate is not signals.rate else 1.0, late)
+        own = np.interp(signals.grid, signals.reference[0], signals.reference[2])
         steady = np.abs(np.gradient(own, signals.grid)) < _STEADY
         apart = np.where(steady, rate - own, np.nan)
         found += _judged("spin rate", ("magnetometer",), apart, _SPIN + _SPIN_SHARE * np.abs(own))
@@ -276,21 +274,13 @@ def _of_rig(signals: SpinSignals, columns: Columns, rate: FloatArray, along: Flo
     return found
 
 
-def _of_angle(signals: SpinSignals, reference: Samples, sign: float, late: float) -> list[Misfit]:
+def _of_angle(signals: SpinSignals, sign: float, late: float) -> list[Misfit]:
     """Compare the angle that the field shows with that of a rate's sum; a phase and a clock's rate are free."""
-    t = np.append(reference.t, max(signals.grid[-1], reference.t[-1] + 1.0))
-    r = np.append(reference.value, reference.value[-1])
-    summed = np.concatenate([[0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(t))])
-    known = np.isfinite(summed)
-    if not known.all():
-        return []
-    # linear rates between knots: the angle is quadratic there, so it is summed on a fine grid
-    fine = np.arange(t[0], t[-1], 0.2 * STEP)
-    rate = np.interp(fine, t, r)
-    own = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * 0.2 * STEP)])
-    there = np.interp(signals.grid - late, fine, own)
-    late_by_clock = signals.grid * np.interp(signals.grid - late, fine, rate)
-    basis, _ = np.linalg.qr(np.column_stack([np.ones(there.size), late_by_clock]))
+    assert signals.reference is not None
+    t, angle, rate = signals.reference
+    at = signals.grid - late
+    there = np.interp(at, t, angle)
+    basis, _ = np.linalg.qr(np.column_stack([np.ones(there.size), signals.grid * np.interp(at, t, rate)]))
     left = sign * signals.angle - there
     left = left - basis @ (basis.T @ left)
     return _judged("angle", ("magnetometer",), left, _ANGLE * np.ones(1))

@@ -59,7 +59,8 @@ class SpinSignals:
     ``angle`` (n,) is psi, how far the body has turned by the field's phase, rad, ``rate`` (n,) its slope, rad/s, NaN
     where too slow; ``measured`` tells that the field shows it, and not the sum of another sensor's rate. ``across`` and
     ``along`` (n,) are the field across and along the axis, uT; ``gyro_sign`` (3,) the sign of each column of the
-    gyroscope; ``axes`` the lines (3,) about which magnetometer and gyroscope show the body turning.
+    gyroscope; ``axes`` the lines (3,) about which magnetometer and gyroscope show the body turning; ``reference`` times
+    (m,) s, and the angle and the rate there by a rig's rate reference or command.
     """
 
     recording: Recording
@@ -74,6 +75,7 @@ class SpinSignals:
     force: Locked | None = None
     path: FlightPath | None = None
     axes: Mapping[str, FloatArray] = field(default_factory=dict)
+    reference: tuple[FloatArray, FloatArray, FloatArray] | None = None
 
 
 def usable(recording: Recording, sensor: str) -> tuple[FloatArray, FloatArray] | None:
@@ -199,7 +201,21 @@ def spin_signals(recording: Recording) -> SpinSignals | None:
         locked("accelerometer"),
         _path(recording, grid),
         {name: axis for name in ("magnetometer", "gyroscope") if (axis := turning_line(recording, name)) is not None},
+        _reference(recording, float(grid[-1])),
     )
+
+
+def _reference(recording: Recording, end: float) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Return times (m,) s, and the angle and the rate there, of what shows or orders a rig's rate."""
+    samples = recording.get("rate_reference") or recording.command
+    if samples is None or not np.any(known := np.isfinite(samples.value)):
+        return None
+    t, r = samples.t[known], samples.value[known]
+    # between knots a rate is linear and the angle quadratic: summed on a fine grid
+    fine = np.arange(t[0], max(end, float(t[-1])) + 1.0, 0.2 * STEP)
+    rate = np.interp(fine, t, r)
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * 0.2 * STEP)])
+    return fine, angle, rate
 
 
 def _signs(value: FloatArray) -> FloatArray:
