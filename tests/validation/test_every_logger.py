@@ -126,7 +126,7 @@ def test_the_readmes_rows_on_a_log_of_ones_own_run_as_they_stand(tmp_path):
     made = LOGGERS["csv"]
     raw = made.write(tmp_path, made.motion, np.random.default_rng(5))
     table = (ROOT / "README.md").read_text()
-    for name in ("import", "estimate"):
+    for name in ("import RAW", "estimate"):
         (typed,) = re.findall(rf"`discsim ({name} [^`]*)`", table)
         words = typed.replace("RAW", raw.name).split()
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
