@@ -16,6 +16,7 @@ from logger_files import LOGGERS
 
 from discsim.errors import InputError
 from discsim.recording import read_recording
+from validation.checking import check_recording
 from validation.commands.diagnose import command as diagnose
 from validation.commands.estimate import command as estimate
 from validation.commands.import_ import command as import_
@@ -105,6 +106,15 @@ def test_every_method_that_can_tells_the_rate_within_its_deviation(name, answers
     for method, reason in report["left_out"].items():
         assert reason, method
         assert "\n" not in reason, method
+
+
+@pytest.mark.parametrize("name", ROTATING)
+def test_check_promises_the_methods_that_estimate_runs_and_leaves_out_none_of_them(name, answers):
+    """Which sensors and statements a method needs is told twice; the readings may still refuse one that can run."""
+    folder, out = answers(name)
+    check = check_recording(read_recording(folder))
+    assert not set(rates(out)) & set(check.methods_left_out)
+    assert set(LOGGERS[name].methods) <= set(check.methods)
 
 
 def test_a_recording_that_shows_no_spin_is_refused_in_one_sentence(tmp_path):
