@@ -16,6 +16,7 @@ from logger_files import LOGGERS
 
 from discsim.errors import InputError
 from discsim.recording import read_recording
+from validation.checking import check_recording
 from validation.commands.diagnose import command as diagnose
 from validation.commands.estimate import command as estimate
 from validation.commands.import_ import command as import_
@@ -107,6 +108,15 @@ def test_every_method_that_can_tells_the_rate_within_its_deviation(name, answers
         assert "\n" not in reason, method
 
 
+@pytest.mark.parametrize("name", ROTATING)
+def test_check_promises_the_methods_that_estimate_runs_and_leaves_out_none_of_them(name, answers):
+    """Which sensors and statements a method needs is told twice; the readings may still refuse one that can run."""
+    folder, out = answers(name)
+    check = check_recording(read_recording(folder))
+    assert not set(rates(out)) & set(check.methods_left_out)
+    assert set(LOGGERS[name].methods) <= set(check.methods)
+
+
 def test_a_recording_that_shows_no_spin_is_refused_in_one_sentence(tmp_path):
     recording = imported("shotshaper", tmp_path)
     with pytest.raises(InputError, match=r"no sensor that shows a spin .*none of magnetometer, accelerometer"):
@@ -126,7 +136,7 @@ def test_the_readmes_rows_on_a_log_of_ones_own_run_as_they_stand(tmp_path):
     made = LOGGERS["csv"]
     raw = made.write(tmp_path, made.motion, np.random.default_rng(5))
     table = (ROOT / "README.md").read_text()
-    for name in ("import", "estimate"):
+    for name in ("import RAW", "estimate"):
         (typed,) = re.findall(rf"`discsim ({name} [^`]*)`", table)
         words = typed.replace("RAW", raw.name).split()
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}

@@ -227,8 +227,11 @@ def _signs(value: FloatArray) -> FloatArray:
 
 
 def _phase(recording: Recording) -> tuple[str, Callable[[FloatArray], FloatArray], float, float] | None:
-    """Return what shows the phase of a vector fixed in N seen from B, the phase over time, and from when to when."""
-    if "magnetometer" in recording:
+    """Return what shows the phase of a vector fixed in N seen from B, the phase over time, and from when to when.
+
+    A magnetometer does where the field is stated: against its size iron is told from what turns.
+    """
+    if "magnetometer" in recording and recording.environment.field_known:
         spin = field_spin(recording, steady=recording.plant in ("rate_table", "spin_down"))
         return None if spin is None else ("magnetometer", spin.phase_at, float(spin.grid[0]), float(spin.grid[-1]))
     known = rate_of(recording)

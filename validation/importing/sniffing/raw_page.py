@@ -47,15 +47,19 @@ def write_raw_page(
     zero = min(float(found.time[0]) for found in read.readings.values())
     end = max(float(found.time[-1]) for found in read.readings.values()) - zero
     with tempfile.TemporaryDirectory() as place:
-        whole = Path(place) / "whole.png"
-        _draw(whole, read, zero, (0.0, end), throws)
-        close = []
+        traces: list[tuple[str, Path]] = []
+        close: list[tuple[str, Path]] = []
+        if _drawable(read):
+            whole = Path(place) / "whole.png"
+            _draw(whole, read, zero, (0.0, end), throws)
+            traces.append(("All traces, in body axes and SI units.", whole))
         for number, throw in enumerate(throws[:CLOSE_UPS], start=1):
             margin = max(0.3, 0.3 * (throw.end - throw.start))
             file = Path(place) / f"{number}.png"
             _draw(file, read, zero, (throw.start - margin, throw.end + margin), [throw], number)
             close.append((f"Throw {number}: {throw.text}. The shaded rows are taken by --throw {number}.", file))
-        sections = [Section("The whole log", figures=[("All traces, in body axes and SI units.", whole)])]
+        text = [] if traces else ["It holds no sensor whose traces are drawn; `view` shows a path."]
+        sections = [Section("The whole log", text, figures=traces)]
         if decisions:
             sections.append(
                 Section(
@@ -101,6 +105,10 @@ def _numbered(text: str) -> list[list[str]]:
     return [[str(k), line] for k, line in enumerate(text.splitlines(), start=1)]
 
 
+def _drawable(read: RawReadings) -> list[str]:
+    return [sensor for sensor in read.readings if SENSORS[sensor].unit in _UNITS]
+
+
 def _draw(
     path: Path,
     read: RawReadings,
@@ -109,7 +117,7 @@ def _draw(
     throws: Sequence[Stretch],
     first: int = 1,
 ) -> None:
-    shown = [sensor for sensor in read.readings if SENSORS[sensor].unit in _UNITS]
+    shown = _drawable(read)
     figure, axes = new_figure(len(shown), 1, width=11.0, height=2.2 * len(shown) + 0.6, sharex=True, squeeze=False)
     for panel, sensor in zip(axes[:, 0], shown, strict=True):
         found = read.readings[sensor]
