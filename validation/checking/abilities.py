@@ -37,8 +37,6 @@ def methods_that_run(recording: Recording) -> tuple[dict[str, str], dict[str, st
 def _hindered(recording: Recording, name: str) -> str:
     if name == "fft" and len(recording.samples["magnetometer"]) < WINDOW:
         return f"{len(recording.samples['magnetometer'])} readings, a window needs {WINDOW}"
-    if name == "fusion" and not np.any(recording.environment.magnetic_field):
-        return "the field is not stated"
     position = recording.sheets["accelerometer"].position if "accelerometer" in recording.sheets else None
     if name.startswith("accelerometer") and (position is None or not np.any(position[:2])):
         return "position_m is not stated, or on the axis"
@@ -59,6 +57,6 @@ def not_told(recording: Recording) -> tuple[str, ...]:
         lines.append("no [release]: how it was thrown is fitted with everything else")
     if recording.plant == "free_spin" and recording.disc is None:
         lines.append("no [disc]: the ratio of inertias, which sets how fast it nutates, is not known")
-    if "magnetometer" in recording and not np.any(recording.environment.magnetic_field):
+    if "magnetometer" in recording and not recording.environment.field_known:
         lines.append("no field stated: the attitude has no reference, and no fault of a magnetometer's scale shows")
     return tuple(lines)

@@ -65,7 +65,7 @@ def _environment(recording: Recording) -> Iterator[Finding]:
             "[environment]",
             "magnetic_field_ned_uT is zero: the field is not known",
             f"{FIELD[0]:g} to {FIELD[1]:g} uT",
-            "state it, or latitude, longitude and date in the map of the import; fusion and diagnose need it",
+            "state it, or latitude, longitude and date in the map of the import; diagnose needs it",
         )
     elif size and _outside(size, FIELD):
         guess = _power(size / 50, {-5: "T", -3: "mT (10 per 10 000 uT)", -2: "gauss", 1: "mG", 3: "nT"})
