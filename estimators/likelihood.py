@@ -43,6 +43,10 @@ LARGEST_CORRELATION = 0.3
 #: by within the window is in the standard deviation.
 LARGEST_MISFIT = 0.05
 
+#: Residual's variance per axis, over the amplitude squared, above which a window shows no tone: with a tenth the
+#: readings lie as far from the circle as a third of its radius, and turns are miscounted.
+LARGEST_SHARE = 0.1
+
 #: Relative standard deviation of the correction by p and q: the gyroscope's gain (2 %), and soft iron (3 % on the field
 #: along the axis, and the mean of two such across it).
 CORRECTION_SD = 0.042
@@ -280,9 +284,12 @@ def fit_windows(
             if abs(rate) * 2 * half < 2 * np.pi * settings.turns and length is not lengths[-1]:
                 continue
             sd = float(np.sqrt(covariance[1, 1] * variance)) / half
+            misfit = variance > LARGEST_SHARE * parameters[powers] ** 2
+            if misfit and abs(rate) * 2 * half >= 2 * np.pi * settings.turns:
+                break  # whole turns that no tone explains: a longer window explains them no better
             if parameters[powers] < settings.significance * np.sqrt(covariance[powers, powers] * variance):
                 continue
-            if sd > settings.largest_sd or sd > 0.25 * abs(rate) or variance > 0.1 * parameters[powers] ** 2:
+            if sd > settings.largest_sd or sd > 0.25 * abs(rate) or misfit:
                 continue
             correlation, wobble = _correlation(window, parameters, powers, u)
             # n white samples are worth more than n correlated ones
@@ -334,18 +341,18 @@ def _search(
 ) -> _Result | None:
     """Fit from every likely start and keep the best; None where two different rates explain the data alike."""
     tau = window.t - window.centre
-    starts = [(rate, 0.0) for rate, _ in _peaks(tau, window.z, window.interval)]
+    starts = [(rate, 0.0) for rate, _ in _peaks(tau, window.z[None], window.interval)[0]]
     if previous is not None:
         starts.insert(0, (previous[0] + previous[1] * (window.centre - previous[2]), previous[1]))
     power = float(np.sum(np.abs(window.z - np.mean(window.z)) ** 2))
     results = _fits(window, starts, settings)
     if chirping and (not results or results[0][2] * 2 * len(tau) > 0.2 * power):
         # a strong change of rate smears the line: look for it on a grid of chirps
-        smeared = []
-        for chirp in _chirp_grid(window.half):
-            # about the mean, for hard iron would be smeared instead
-            turned = (window.z - np.mean(window.z)) * np.exp(-0.5j * chirp * tau**2)
-            smeared += [(height, rate, chirp) for rate, height in _peaks(tau, turned, window.interval, count=1)]
+        # about the mean, for hard iron would be smeared instead
+        chirps = _chirp_grid(window.half)
+        turned = (window.z - np.mean(window.z)) * np.exp(-0.5j * chirps[:, None] * tau**2)
+        highest = _peaks(tau, turned, window.interval, count=1)
+        smeared = [(height, rate, float(c)) for c, found in zip(chirps, highest, strict=True) for rate, height in found]
         results += _fits(window, [(rate, chirp) for _, rate, chirp in sorted(smeared)[-3:]], settings)
         results.sort(key=lambda result: result[2])
     if not results:
@@ -452,8 +459,8 @@ def _correlation(window: _Window, parameters: FloatArray, powers: int, u: Comple
     return float(correlation), float(np.sqrt(max(0.0, fall / 1.5)) / window.interval)
 
 
-def _peaks(tau: FloatArray, z: ComplexArray, interval: float, count: int = 3) -> list[tuple[float, float]]:
-    """Return angular frequency and power of the highest peaks of the periodogram with floating mean.
+def _peaks(tau: FloatArray, z: ComplexArray, interval: float, count: int = 3) -> list[list[tuple[float, float]]]:
+    """Return angular frequency and power of the highest peaks of the periodograms with floating mean of z (k, n).
 
     The power that a tone of each frequency takes with the mean fitted along, zero where tone and mean cannot be told
     apart.
@@ -464,41 +471,49 @@ def _peaks(tau: FloatArray, z: ComplexArray, interval: float, count: int = 3) ->
     frequency = np.asarray(2 * np.pi * np.fft.fftfreq(size, interval), dtype=np.float64)
     tone, value = _transforms(tau - tau[0], z, frequency, interval)
     left = n - np.abs(tone) ** 2 / n
-    value -= tone * np.sum(z) / n
-    power = np.where(left > 1e-3 * n, np.abs(value) ** 2 / np.maximum(left, 1e-9 * n), 0.0)
-    local = (power >= np.roll(power, 1)) & (power >= np.roll(power, -1))
-    candidates = np.flatnonzero(local)
-    order = candidates[np.argsort(power[candidates])[::-1][:count]]
-    best = power[order[0]] if order.size else 0.0
-    return [(float(frequency[i]), float(power[i])) for i in order if power[i] > 0.1 * best]
+    value -= tone * (np.sum(z, axis=1, keepdims=True) / n)
+    power = np.where(left > 1e-3 * n, (value.real**2 + value.imag**2) / np.maximum(left, 1e-9 * n), 0.0)
+    if count == 1:
+        highest = np.argmax(power, axis=1)
+        return [[(float(frequency[i]), float(row[i]))] for i, row in zip(highest, power, strict=True) if row[i] > 0]
+    found = []
+    for row in power:
+        candidates = np.flatnonzero((row >= np.roll(row, 1)) & (row >= np.roll(row, -1)))
+        order = candidates[np.argsort(row[candidates])[::-1][:count]]
+        best = row[order[0]] if order.size else 0.0
+        found.append([(float(frequency[i]), float(row[i])) for i in order if row[i] > 0.1 * best])
+    return found
 
 
 def _transforms(
     t: FloatArray, z: ComplexArray, frequency: FloatArray, interval: float
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Return the sums of exp(-i w t) and of z exp(-i w t) at the FFT's frequencies w, for time stamps t >= 0 (n,).
+    """Return the sums of exp(-i w t), (size,), and of z exp(-i w t), (k, size), at the FFT's frequencies w.
 
-    Each stamp is rounded to the grid and the rest d expanded, ``exp(-i w d) = sum (-i w d)^j/j!``: one FFT per term,
-    as many as leave less than a thousandth at half the sampling rate; one on an even grid.
+    t >= 0 (n,) are time stamps and z (k, n) signals. Each stamp is rounded to the grid and the rest d expanded,
+    ``exp(-i w d) = sum (-i w d)^j/j!``: one FFT per term, as many as leave less than a thousandth at half the sampling
+    rate; one on an even grid.
     """
     slots = np.rint(t / interval).astype(np.int64)
     rest = t - slots * interval
     most = np.pi / interval * float(np.max(np.abs(rest)))
-    tone, value = np.zeros(frequency.size, dtype=complex), np.zeros(frequency.size, dtype=complex)
+    rows = np.concatenate([np.ones((1, t.size)), z])
+    shared = bool(np.any(slots[1:] == slots[:-1]))
+    total = np.zeros((len(rows), frequency.size), dtype=complex)
     share, term, factor = 1.0, np.ones_like(rest), np.ones(frequency.size, dtype=complex)
     power = 0
     while share > 1e-3:
-        grid = np.zeros((2, frequency.size), dtype=complex)
-        np.add.at(grid[0], slots, term)
-        np.add.at(grid[1], slots, term * z)
-        once = np.fft.fft(grid)
-        tone += factor * once[0]
-        value += factor * once[1]
+        grid = np.zeros((len(rows), frequency.size), dtype=complex)
+        if shared:
+            np.add.at(grid.T, slots, (rows * term).T)
+        else:
+            grid[:, slots] = rows * term
+        total += factor * np.fft.fft(grid)
         power += 1
         share *= most / power
         term = term * rest
         factor = factor * (-1j * frequency / power)
-    return tone, value
+    return total[0], total[1:]
 
 
 def _chirp_grid(half: float) -> FloatArray:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import BoolArray, FloatArray
 from discsim.errors import InputError
 from discsim.recording import Recording
 from estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors, accelerometer
@@ -50,6 +50,10 @@ SPINNING, FEWEST_SHARES, OFF_CLOCK = 3.0, 8, 0.05
 #: From this share of the rate about z on, rates across it are no wobble (a disc's is a tenth at most).
 ACROSS = 0.5
 
+#: Least share of the turning's square that is a steady spin about z where a spectrum shows it. A ramp from rest has
+#: 3/4, a disc that wobbles by a tenth 0.99; a body whose axis wanders, by hand or under a parachute, 0 to 1/3.
+STEADY = 0.5
+
 #: A sampling rate from time stamps further than this from the sheet's is worth a note.
 RATE_TOLERANCE = 0.01
 
@@ -71,7 +75,34 @@ class Method(NamedTuple):
 
 def _fft(recording: Recording, options: Options) -> YawRate:
     field = unclipped(recording, "magnetometer")
-    return fft(recording.need("magnetometer") if field is None else field, options.fft)
+    found = fft(recording.need("magnetometer") if field is None else field, options.fft)
+    length = options.fft.window * recording.need("magnetometer").interval
+    late = length / 2 if options.fft.stamp == "unshifted" else 0.0
+    fits = ~_tumbling(recording, found.t - late, length)
+    return replace(found, rate=np.where(fits, found.rate, np.nan), sd=np.where(fits, found.sd, np.nan))
+
+
+def _tumbling(recording: Recording, centres: FloatArray, length: float) -> BoolArray:
+    """Tell in which windows (n,), of ``length`` s, a gyroscope shows no steady spin about z: a spectrum's line is none.
+
+    There the square of the mean rate about z is less than `STEADY` of the mean square of the whole rate. Where the
+    gyroscope has no reading, clips, or there is none, nothing is told.
+    """
+    gyroscope = unclipped(recording, "gyroscope")
+    if gyroscope is None or len(gyroscope) < 2:
+        return np.zeros(centres.size, dtype=np.bool_)
+    sums = np.concatenate([np.zeros((1, 3)), np.cumsum(np.nan_to_num(_turning(gyroscope.value)), axis=0)])
+    first = np.searchsorted(gyroscope.t, centres - length / 2)
+    after = np.searchsorted(gyroscope.t, centres + length / 2)
+    count, z, square = (sums[after] - sums[first]).T
+    whole = (after - first > 0) & (count >= after - first)
+    return np.asarray(whole & (z**2 < STEADY * square * count))
+
+
+def _turning(rate: FloatArray) -> FloatArray:
+    """Return for readings (n, 3) one, the rate about z, and the square of the whole rate, (n, 3); NaN for gaps."""
+    square = np.sum(rate**2, axis=1)
+    return np.where(np.isnan(square)[:, None], np.nan, np.stack([np.ones(len(rate)), rate[:, 2], square], axis=1))
 
 
 def _accelerometer(recording: Recording, options: Options) -> YawRate:
@@ -245,7 +276,8 @@ def axis_notes(recording: Recording) -> list[str]:
         return []
     return [
         f"the gyroscope turns by {np.degrees(across):.0f} deg/s (rms) about axes across z and by {np.degrees(z):.0f} "
-        "about z: what is told is the rate about z, which fft, likelihood and the accelerometer's take for the only one"
+        "about z: what is told is the rate about z, which likelihood and the accelerometer's take for the only one; "
+        "fft is silent where less than half of the turning is a steady spin about z"
     ]
 
 
@@ -272,6 +304,9 @@ def _why_unknown(recording: Recording, name: str, options: Options) -> str:
             names = " and ".join(line.split()[0] for line in against)
             return f"what the {names} shows contradicts the magnetometer, by how much the notes say"
     if name == "fft":
+        magnetometer = recording.need("magnetometer")
+        if np.all(_tumbling(recording, magnetometer.t, options.fft.window * magnetometer.interval)):
+            return "the gyroscope shows no steady spin about z, which a line in the field's spectrum takes for granted"
         lowest = f"{np.degrees(options.fft.threshold):.0f} deg/s"
         return f"no window of {options.fft.window} samples shows a line above {lowest}; --threshold looks lower"
     return "no part of the recording shows a spin to it"

@@ -822,14 +822,8 @@ def tracks_of(
     strength = recording.environment.field_strength
     if t.size < LEAST:
         return []
-    windows = LikelihoodSettings(window=settings.window, step=settings.window / 8, degree=1)
-    centres = window_centres(t, windows)
-    fits = fit_windows(t, m, centres, windows)
-    axial = axial_field(fits.amplitude, fits.axial, strength)
+    fits, axial = _window_fits(recording, settings.window, turning=unfold == 0)
     fold = 2 * np.pi / float(np.median(np.diff(t))) * unfold
-    if gyroscope is not None and not fixed_axis and unfold == 0:
-        turned = fit_windows(t, m, centres, windows, gyroscope=gyroscope, axial=axial, start=fits)
-        fits = turned if np.any(np.isfinite(turned.phase_rate)) else fits
     size = float(np.median(np.linalg.norm(m, axis=1))) if strength is None else strength
     noise = None
     if sheet is not None and sheet.noise_rms is not None:
@@ -862,6 +856,24 @@ def tracks_of(
             if track is not None:
                 tracks.append(track)
     return tracks
+
+
+@remembered
+def _window_fits(recording: Recording, window: float, *, turning: bool) -> tuple[ToneFit, AxialField]:
+    """Fit the field's tone in windows, s, that start the search, and the hard iron along z that they show.
+
+    With ``turning`` the gyroscope's p and q, where they are there, are part of the model.
+    """
+    t, m = usable_field(recording.need("magnetometer"), recording.sheets.get("magnetometer"))
+    gyroscope = transverse_gyroscope(recording)
+    windows = LikelihoodSettings(window=window, step=window / 8, degree=1)
+    centres = window_centres(t, windows)
+    fits = fit_windows(t, m, centres, windows)
+    axial = axial_field(fits.amplitude, fits.axial, recording.environment.field_strength)
+    if gyroscope is not None and recording.plant not in ("rate_table", "spin_down") and turning:
+        turned = fit_windows(t, m, centres, windows, gyroscope=gyroscope, axial=axial, start=fits)
+        fits = turned if np.any(np.isfinite(turned.phase_rate)) else fits
+    return fits, axial
 
 
 def _walk(recording: Recording, noise: float | None, strength: float, length: float) -> float:

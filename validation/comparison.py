@@ -60,7 +60,7 @@ class Disagreement:
         return (
             f"{self.first} and {self.second} differ by {much}, {self.sigmas:.1f} sd) at {100 * self.share:.0f} % of "
             "their common times, over "
-            f"{self.start:.1f}..{self.stop:.1f} s"
+            f"{self.start + 0.0:.1f}..{self.stop:.1f} s"
         )
 
 

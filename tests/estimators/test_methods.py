@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples, SensorSheet
 from estimators import METHODS, best, estimate
-from estimators.methods import folding_notes, sampling_notes
+from estimators.methods import all_methods, folding_notes, sampling_notes
 
 SHEETS = {
     "magnetometer": SensorSheet(100.0, 0.6, 0.15, 4912.0),
@@ -115,3 +117,25 @@ def test_a_spin_that_folds_is_named_with_what_the_field_shows(sensor):
 def test_a_spin_within_half_the_sampling_rate_is_no_matter_for_a_note():
     assert folding_notes(spinning(7000.0, SHEETS)) == []
     assert folding_notes(spinning(7000.0, ("gyroscope",))) == []
+
+
+def test_the_fft_is_silent_where_a_gyroscope_shows_no_steady_spin_about_z():
+    """The same field, which alone looks like a spin: the body turns half of the time about x at the same rate."""
+    steady = spinning(1500.0, ("magnetometer", "gyroscope"))
+    assert np.isfinite(estimate(steady, "fft").rate).all()
+    rates = steady.samples["gyroscope"].value.copy()
+    across = steady.samples["gyroscope"].t >= 1.5
+    rates[across] = rates[across][:, [2, 0, 1]]
+    wandering = replace(steady, samples={**steady.samples, "gyroscope": Samples(steady.samples["gyroscope"].t, rates)})
+    found = estimate(wandering, "fft")
+    # the square of the mean about z is half of the whole where sqrt(1/2) of the window turns about z
+    silent = found.t > 1.5 + 1.28 * (0.5 - np.sqrt(0.5)) + 0.02
+    assert np.isnan(found.rate[silent]).all()
+    assert np.isfinite(found.rate[found.t < 1.5 + 1.28 * (0.5 - np.sqrt(0.5)) - 0.02]).all()
+
+
+def test_all_methods_say_why_the_fft_is_silent_on_a_body_that_tumbles():
+    steady = spinning(1500.0, ("magnetometer", "gyroscope"))
+    turned = Samples(steady.samples["gyroscope"].t, steady.samples["gyroscope"].value[:, [2, 0, 1]])
+    _, left_out = all_methods(replace(steady, samples={**steady.samples, "gyroscope": turned}))
+    assert "no steady spin about z" in left_out["fft"]

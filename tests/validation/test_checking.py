@@ -17,10 +17,12 @@ from discsim.environment import Environment
 from discsim.files import model_names
 from discsim.recording import Recording, Samples, SensorSheet, read_dataset, write_recording
 from discsim.shipped import load_disc
+from estimators.methods import all_methods
 from validation.checking import Check, check_recording
 from validation.checking.noise import noise_of
 from validation.checking.table import print_checks
 from validation.commands.check import command
+from validation.diagnosis.setup import find_setup_faults
 
 RECORDINGS = Path(os.environ.get("DISCSIM_RECORDINGS") or Path(__file__).parents[2].parent / "shared" / "recordings")
 PRACTICE = RECORDINGS / "practice"
@@ -311,6 +313,25 @@ def test_what_several_recordings_share_is_said_once():
     print_checks([check_recording(low)] * 3, Console(file=text, width=200))
     assert text.getvalue().count("the field is not known") == 1
     assert text.getvalue().count("as in a recording above: site.field") == 2
+
+
+def test_a_log_without_a_field_is_checked_and_what_estimate_can_use_is_what_it_uses():
+    low = replace(rolled(), environment=replace(rolled().environment, magnetic_field=np.zeros(3)))
+    assert find_setup_faults([low]).faults == ()
+    bare = replace(low, samples={"magnetometer": low.samples["magnetometer"]})
+    assert find_setup_faults([bare]).faults == ()
+    check = check_recording(low)
+    rates, _ = all_methods(low)
+    assert {rate.method for rate in rates} <= set(check.methods)
+    assert "fusion" in check.methods
+
+
+def test_a_log_that_mostly_rests_is_not_taken_for_one_in_g_and_one_in_g_is():
+    """One second of spin in twenty: the mean square of the whole log says little of the pull in that second."""
+    log = rolled(seconds=20.0, rate_deg_s=3200.0, rest=19.0)
+    assert find_setup_faults([log]).faults == ()
+    faults = find_setup_faults([scaled(log, "accelerometer", 1 / G)]).faults
+    assert [(fault.id, fault.effect.settings) for fault in faults] == [("accel.units", {"written_in": "g"})]
 
 
 @practice

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.errors import InputError
 from validation.diagnosis.fitting import Fit, Jumps, Parameter, Reduced, linearised_columns, mapped, reduce
 from validation.diagnosis.noise import NoiseModel
 from validation.diagnosis.trajectory_pieces import WOBBLE, Column, Linear
@@ -67,7 +68,8 @@ class Board:
             right += G[free, -1] * active
             chi2 += float(G[-1, -1])
         H = H + np.diag([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for _, q in parameters])
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
+        # what nothing shows stays at its baseline
+        scale = np.where(np.diag(H) > 0.0, 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300)), 0.0)
         w, V = np.linalg.eigh(H * np.outer(scale, scale))
         kept = w > 1e-9 * max(float(w[-1]), 1e-300)
         covariance = ((V[:, kept] / w[kept]) @ V[:, kept].T) * np.outer(scale, scale)
@@ -91,6 +93,12 @@ def board_of(fit: Fit, trials: Sequence[Trial], noise: NoiseModel, jumps: Jumps)
     linears = linearised_columns(replace(fit, jumps=jumps), columns)
     reduced = mapped(lambda linear, chain: reduce(linear, chain, noise, jumps), linears, fit.chains)
     grams = np.stack([r.gram for r in reduced])
+    if not np.all(np.isfinite(grams)):
+        raise InputError(
+            "diagnose: the best fit of the plant leaves the numbers: the body does not move as it does on that plant "
+            "(a free spin turns by itself, driven by nothing); expected the part of the log in which it does: "
+            "discsim import RAW --throw N or --rows A:B takes it out"
+        )
     for i, G in enumerate(grams):
         away = np.zeros(len(columns))
         for q, number in zip(fit.parameters, fit.at, strict=True):

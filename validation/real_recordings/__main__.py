@@ -10,6 +10,7 @@ import typer
 
 from discsim.errors import InputError
 from validation.real_recordings.page import write_page
+from validation.real_recordings.road import LOGS, walk
 from validation.real_recordings.sources import find_recordings
 
 __all__ = ["app", "command"]
@@ -29,17 +30,29 @@ def command(
         list[str] | None,
         typer.Option(help="A method to try beside the paper's; may repeat. Default: all that there are."),
     ] = None,
+    logs: Annotated[
+        Path, typer.Option(help="Folder that keeps what the commands said of each log; a second run reads it.")
+    ] = Path("real-recordings-logs"),
+    walked: Annotated[
+        bool, typer.Option("--walk/--no-walk", help="Run import, check, estimate and diagnose on each log.")
+    ] = True,
 ) -> None:
-    """Write a page with a table and a figure per measured source: what each method says against a reference sensor.
+    """Write a page: what the four commands say of each measured log, and each method against a reference sensor.
 
     Example: python -m validation.real_recordings --out docs/real-recordings
     """
     try:
-        page = write_page(find_recordings(recordings), out, also, lambda text: print(text, file=sys.stderr, flush=True))
+        real = find_recordings(recordings)
+        found = [walk(log, real, logs, _say) for log in LOGS] if walked else []
+        page = write_page(real, out, also, _say, walked=found)
     except InputError as error:
         typer.echo(f"real_recordings: {error}", err=True)
         raise typer.Exit(2) from None
     typer.echo(f"{page}")
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
 
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)

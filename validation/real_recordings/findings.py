@@ -213,9 +213,8 @@ def _broad(_: Source, cuts: Sequence[Measured], __: Sequence[Sequence[Agreement]
         "off, or what delays what, the files do not tell; all else on this page takes the stamps as they are.",
         "The magnetometer's readings came at 100 Hz, stood on some rows of a log of 143 Hz and were then interpolated "
         "to 286 Hz: the import takes the rows between and the repeats out.",
-        "Where `fft` answers, it is neither with the spin about z nor with the size of the rate (both in the tables). "
-        "The rate about z reverses after the mean time in the table, so that its mean over a window is small and the "
-        "ratio to it large.",
+        "The rate about z reverses after the mean time in the table: there is no steady spin that a line in a spectrum "
+        "could show. The gyroscope tells so, and `fft` is silent there.",
     )
     header = (
         "trial",

@@ -21,6 +21,7 @@ from validation.real_recordings.agreement import (
 )
 from validation.real_recordings.charts import draw
 from validation.real_recordings.findings import FINDINGS
+from validation.real_recordings.road import Answers, road_section
 from validation.real_recordings.sources import SOURCES, Measured, Source, load
 
 __all__ = ["write_page"]
@@ -32,10 +33,12 @@ def write_page(
     also: Sequence[str] | None = None,
     say: Callable[[str], None] = lambda _: None,
     sources: Sequence[Source] = SOURCES,
+    walked: Sequence[Answers] = (),
 ) -> Path:
     """Write ``out``.md and a PNG per source into the folder ``out``; return the page's path.
 
-    ``also`` names the methods that are tried beside the paper's (`attempts`). The same recordings give the same bytes.
+    ``also`` names the methods that are tried beside the paper's (`attempts`); ``walked`` is what the commands said of
+    each log. The same recordings give the same bytes, but for the processor times in ``walked``.
     Raises `InputError` as importing and `attempts` do.
     """
     summary: list[Sequence[str]] = []
@@ -52,7 +55,8 @@ def write_page(
             summary += [[f"[{cut.cut.label}](#{source.key})", *_summary_cells(one)] for one in core]
         sections.append(_section(source, cuts, found, f"{out.name}/{figure.name}"))
     page = out.parent / f"{out.name}.md"
-    write_text(page, "\n".join([_lead(), _table(_SUMMARY, summary), "", *sections]))
+    road = [*road_section(walked), ""] if walked else []
+    write_text(page, "\n".join([_lead(), *road, _summed(), _table(_SUMMARY, summary), "", *sections]))
     return page
 
 
@@ -73,14 +77,25 @@ _DETAIL = (
 
 
 def _lead() -> str:
-    paper = FftSettings()
-    paragraphs = (
-        "What the methods say of measured data, and how far that is from a reference sensor. Every number in the "
-        "tables and findings is computed by the command below from the recordings in `DISCSIM_RECORDINGS` (or "
-        "`--recordings DIR`), and the same recordings give the same bytes. Whatever disagrees is stated with its "
-        "size and left standing.",
-        "How to read it:",
+    what = (
+        "What the commands make of logs that nobody here wrote, and how far each method's rate is from a reference "
+        "sensor. Every number in the tables and findings is computed by the command below from the recordings in "
+        "`DISCSIM_RECORDINGS` (or `--recordings DIR`), and the same recordings give the same bytes, but for processor "
+        "times. Whatever disagrees is stated with its size and left standing."
     )
+    lines = ["# Real recordings", "", _wrapped(what), "", "```sh", "python -m validation.real_recordings", "```", ""]
+    return "\n".join(
+        [
+            *lines,
+            "To import and estimate such data yourself: [Importing](importing.md), [Estimators](estimators.md).",
+            "",
+        ]
+    )
+
+
+def _summed() -> str:
+    paper = FftSettings()
+    lines = ["## The methods against a reference", "", "How to read it:", ""]
     entries = (
         "*known*: share of a method's answers that are numbers; it is silent where it cannot tell.",
         f"*ratio*: median of method over reference, where the reference turns at {np.degrees(RATIO_FROM):.0f} deg/s "
@@ -97,21 +112,7 @@ def _lead() -> str:
         "A reference is a sensor and not the truth; and what a method that takes the gyroscope in says against the "
         "gyroscope is no test of it.",
     )
-    lines = [
-        "# Real recordings",
-        "",
-        _wrapped(paragraphs[0]),
-        "",
-        "```sh",
-        "python -m validation.real_recordings",
-        "```",
-    ]
-    lines += [
-        "",
-        "To import and estimate such data yourself: [Importing](importing.md), [Estimators](estimators.md).",
-        "",
-    ]
-    lines += [paragraphs[1], "", *(_wrapped(entry, "- ") for entry in entries), "", "## Summary", ""]
+    lines += [*(_wrapped(entry, "- ") for entry in entries), "", "### Summary", ""]
     return "\n".join([*lines, "The paper's two methods, and the gyroscope where something else can judge it.", ""])
 
 

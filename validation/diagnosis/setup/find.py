@@ -8,7 +8,7 @@ they are: a fault is named only where the sensors contradict one another as writ
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -91,16 +91,26 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
     for unit in [] if clock is None else [clock]:
         faults.append(SetupFault(unit, float("inf"), None))
         current = tuple(corrected(one, [unit]) for one in current)
-    for unit in sensor_units(current):
+    if not all(_judgeable(one).samples for one in current):
+        return SetupFindings(tuple(faults), current)
+    for unit in sensor_units([_judgeable(one) for one in current]):
         faults.append(SetupFault(unit, float("inf"), None))
         current = tuple(corrected(one, [unit]) for one in current)
     for _ in range(MOST):
-        found = _next(current)
+        found = _next([_judgeable(one) for one in current])
         if not found:
             break
         faults += found
         current = tuple(corrected(one, [fault.effect for fault in found]) for one in current)
     return SetupFindings(tuple(faults), current)
+
+
+def _judgeable(recording: Recording) -> Recording:
+    """Return a recording without its magnetometer where the field is not stated: nothing tells what it should read."""
+    if "magnetometer" not in recording or recording.environment.field_known:
+        return recording
+    rest = {name: samples for name, samples in recording.samples.items() if name != "magnetometer"}
+    return replace(recording, samples=rest)
 
 
 def _next(recordings: Sequence[Recording]) -> list[SetupFault]:

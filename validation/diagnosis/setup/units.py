@@ -8,6 +8,7 @@ none: where it is near one, or near no unit's factor, nothing is said.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect
 from discsim.effects.setup import UNITS, AccelerometerUnit, ClockUnit, GyroscopeUnit, MagnetometerUnit
-from discsim.recording import Recording
+from discsim.recording import Recording, Samples
 from validation.diagnosis.setup.spin_signals import FEWEST
 
 __all__ = ["clock_unit", "sensor_units"]
@@ -75,12 +76,30 @@ def sensor_units(recordings: Sequence[Recording]) -> list[Effect]:
         ("accel.units", AccelerometerUnit, _force_ratio),
         ("gyro.units", GyroscopeUnit, _rate_ratio),
     ):
-        ratios = [value for one in recordings if (value := ratio(one)) is not None]
+        turning = recordings if id == "mag.units" else [_where_it_turns(one) for one in recordings]
+        ratios = [value for one in turning if (value := ratio(one)) is not None]
         if ratios:
             unit = _nearest(float(np.median(ratios)), UNITS[kind])
             if unit is not None:
                 found.append(effect(id, written_in=unit))
     return found
+
+
+def _where_it_turns(recording: Recording) -> Recording:
+    """Return the seconds of a recording in which the field changes most: a whole log rests before and after a spin."""
+    field = recording.get("magnetometer")
+    if field is None or len(field) < FEWEST:
+        return recording
+    second = np.floor(field.t[1:]).astype(np.int64)
+    seconds, place, count = np.unique(second, return_inverse=True, return_counts=True)
+    steps = np.nan_to_num(np.sum(np.diff(field.value, axis=0) ** 2, axis=1))
+    size = np.sqrt(np.bincount(place, steps) / count)
+    chosen = seconds[size >= 0.5 * np.max(size)]
+    samples = {}
+    for name, one in recording.samples.items():
+        there = np.isin(np.floor(one.t), chosen)
+        samples[name] = Samples(one.t[there], one.value[there]) if np.count_nonzero(there) >= FEWEST else one
+    return replace(recording, samples=samples)
 
 
 def _nearest(ratio: float, units: Mapping[str, float]) -> str | None:

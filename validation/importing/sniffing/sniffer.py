@@ -11,6 +11,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.errors import InputError
+from discsim.files import model_names
 from discsim.recording import SENSORS, Plant
 from validation.importing.raw_table import REPAIRS, Layout, RepairList, read_raw
 from validation.importing.sniffing.archive import MAX_FILES
@@ -178,7 +179,8 @@ def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) 
         raw,
         None,
         f"no sensor of motion found in the columns {columns}{also}; expected three columns each of a gyroscope, "
-        "accelerometer or magnetometer; a map of your own can say which they are (--map FILE)",
+        "accelerometer or magnetometer; a map says which they are, and reads tracks and positions too: --map FILE of "
+        f"your own, or a shipped one ({', '.join(model_names('imports'))})",
     )
 
 
