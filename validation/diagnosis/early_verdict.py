@@ -29,6 +29,7 @@ from validation.diagnosis.relaxed import (
     loose_jumps,
     loose_parameters,
 )
+from validation.diagnosis.spin_rates import RatesApart, rates_apart
 from validation.diagnosis.trajectory_pieces import Chain, readings_of
 
 __all__ = [
@@ -43,10 +44,11 @@ __all__ = [
 ]
 
 #: what is looked at of each recording, s: two pieces of a flight, a short run on a rig. A free spin has too much that
-#: nobody knows: its beginning follows anything, or nothing before it is fitted whole
-LOOK = {"flight": 1.0, "spin_down": 10.0, "rate_table": 30.0}
-#: most steps of one look
-_STEPS = 8
+#: nobody knows: its beginning follows anything, or nothing before it is fitted whole; it is looked at for the figures
+#: of the answer alone, once spin rates are apart
+LOOK = {"flight": 1.0, "free_spin": 0.3, "spin_down": 10.0, "rate_table": 30.0}
+#: most steps of one look, and of one that serves for figures alone
+_STEPS, _STEPS_OF_FIGURES = 8, 2
 #: a robust root mean square of what is left of a sensor, in its noise, above which a look does not follow it: sound
 #: recordings and such with any one effect of the catalogue leave 0.9 to 5 (56 concealed effects of ordinary size in
 #: flights and on rigs, but for lost samples of an accelerometer, which another clock reconciles), noise that is three
@@ -91,13 +93,15 @@ class Contradiction:
     """Sensors that no motion follows together.
 
     ``whole`` is the look at all of them; ``together`` the largest sets that one motion follows; ``against`` maps a
-    sensor to those that it contradicts, ``lost`` holds sensors that no motion follows even alone.
+    sensor to those that it contradicts, ``lost`` holds sensors that no motion follows even alone. ``rates`` is the
+    contradiction between spin rates, where that alone decided.
     """
 
     whole: Look
     together: tuple[tuple[str, ...], ...]
     against: Mapping[str, tuple[str, ...]]
     lost: tuple[str, ...] = ()
+    rates: RatesApart | None = None
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -111,6 +115,8 @@ class Contradiction:
             + ", ".join(f"{self.whole.level(s):.3g} times the noise of the {_said(s)}" for s in self.whole.sensors)
             + "."
         ]
+        if self.rates is not None:
+            said = [_said_of_rates(self.rates)]
         if self.lost:
             said.append(
                 f"Nor does one follow the {_listed(self.lost)}, each alone: wrong columns or units, something else "
@@ -144,6 +150,14 @@ def _said(sensor: str) -> str:
     return {"gps": "GPS", "rate_reference": "rate reference"}.get(sensor, sensor)
 
 
+def _said_of_rates(rates: RatesApart) -> str:
+    return (
+        f"The {_listed(rates.sensors)} tell different spin rates: they are {rates.times:.3g} times as far apart as "
+        f"ordinary errors of sensors leave them (median of {rates.recordings} recordings), and no clock, delay or lost "
+        "sample does that."
+    )
+
+
 def _listed(sensors: Sequence[str]) -> str:
     words = [_said(sensor) for sensor in sensors]
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
@@ -154,11 +168,17 @@ def _listed(sensors: Sequence[str]) -> str:
 def contradiction_in(recordings: Sequence[Recording], known: Sequence[Parameter]) -> Contradiction | None:
     """Return which sensors contradict which, or None where some motion follows them, or may with a sensor's delay.
 
-    ``known`` are the stated numbers that may move. Of free spins nothing is said here (`contradiction_after`).
+    ``known`` are the stated numbers that may move. Of free spins only their rates are asked here, what follows their
+    readings later (`contradiction_after`).
     """
-    if recordings[0].plant not in LOOK:
-        return None
     sensors = [name for name in SENSORS if any(name in one for one in recordings)]
+    if recordings[0].plant == "free_spin":
+        apart_by = rates_apart(recordings)
+        figures = None if apart_by is None else look_at(recordings, known, sensors, FEW)
+        if apart_by is None or figures is None:
+            return None
+        pairs = {s: tuple(o for o in apart_by.sensors if o != s) for s in apart_by.sensors}
+        return Contradiction(figures, (), pairs, rates=apart_by)
     whole = look_at(recordings, known, sensors, FEW)
     if whole is None or whole.follows:
         return None
@@ -265,9 +285,9 @@ def look_at(
     noise = true_noise([readings for chain in chains for readings in chain.readings])
     fit = Fit(tuple(chains), parameters, np.array([q.stated for q in parameters]), loose_jumps(plant), noise)
     count = sum(int(np.count_nonzero(r.good)) for chain in chains for r in chain.readings)
-    fit = refit(fit, iterations=_STEPS, tolerance=1e-3 * count)
+    fit = refit(fit, iterations=_STEPS_OF_FIGURES if plant == "free_spin" else _STEPS, tolerance=1e-3 * count)
     look = Look(tuple(name for name in SENSORS if name in there), tuple(places), fit, noise, tuple(left_of(fit, noise)))
-    if look.follows or len(there) == 1:
+    if look.follows or len(there) == 1 or plant == "free_spin":
         return look
     # where no path is there, the attitude at the start may be any about the field
     fit = from_other_starts(fit)

@@ -28,24 +28,31 @@ def exchanged(recordings, sensor):
     ]
 
 
+@pytest.fixture(scope="module")
+def mixed(sound):
+    return exchanged(sound, "magnetometer")
+
+
+@pytest.fixture(scope="module")
+def contradiction(mixed):
+    return contradiction_in(mixed, ())
+
+
 def test_sound_throws_are_followed_and_nothing_is_said(sound):
     assert contradiction_in(sound, ()) is None
 
 
-def test_a_magnetometer_of_another_throw_contradicts_the_rest(sound):
-    found = contradiction_in(exchanged(sound, "magnetometer"), ())
-    assert found is not None
-    assert "magnetometer" in found.blamed
-    assert any("magnetometer" in one and "contradict" in one for one in found.sentences)
+def test_a_magnetometer_of_another_throw_contradicts_the_rest(contradiction):
+    assert contradiction is not None
+    assert "magnetometer" in contradiction.blamed
+    assert any("magnetometer" in one and "contradict" in one for one in contradiction.sentences)
 
 
-def test_the_outcome_is_unexplained_located_by_sensor_and_finite(sound):
-    mixed = exchanged(sound, "magnetometer")
-    found = contradiction_in(mixed, ())
-    answer = contradicted_outcome(found, mixed, ["mixed"], ["01", "02"], 0).diagnosis.to_json()
+def test_the_outcome_is_unexplained_located_by_sensor_and_finite(mixed, contradiction):
+    answer = contradicted_outcome(contradiction, mixed, ["mixed"], ["01", "02"], 0).diagnosis.to_json()
     assert answer["verdict"] == "unexplained"
     assert answer["effects"] == []
-    assert {place["sensor"] for place in answer["located"]} == set(found.blamed)
+    assert {place["sensor"] for place in answer["located"]} == set(contradiction.blamed)
     assert answer["fit"]["final"]["chi2_per_sample"] > ASTRAY
     json.dumps(answer, allow_nan=False)
 
