@@ -58,8 +58,8 @@ def write_raw_page(
             file = Path(place) / f"{number}.png"
             _draw(file, read, zero, (throw.start - margin, throw.end + margin), [throw], number)
             close.append((f"Throw {number}: {throw.text}. The shaded rows are taken by --throw {number}.", file))
-        text = [] if traces else ["It holds no sensor whose traces are drawn; `view` shows a path."]
-        sections = [Section("The whole log", text, figures=traces)]
+        said = [] if traces else ["It holds no sensor whose traces are drawn; `view` shows a path."]
+        sections = [Section("The whole log", said, figures=traces)]
         if decisions:
             sections.append(
                 Section(
