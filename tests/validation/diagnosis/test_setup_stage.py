@@ -112,11 +112,26 @@ def test_a_unit_that_is_not_the_columns_is_found_and_taken_back(plant, fault, so
         ("spin_down", effect("mag.axes", axes="x y -z")),
         ("spin_down", effect("accel.axes", axes="y x z")),
         ("spin_down", effect("gyro.axes", axes="-x -y -z")),
+        ("free_spin", effect("mag.axes", axes="x z y")),
     ],
     ids=lambda item: item if isinstance(item, str) else called(item),
 )
-def test_on_a_rig_the_fault_is_found_or_stands_among_its_twins(plant, fault, sound):
+def test_on_a_rig_and_in_a_free_spin_the_fault_is_found_or_stands_among_its_twins(plant, fault, sound):
     assert right(found(sound[plant], fault), fault)
+
+
+def test_without_a_rate_reference_a_flipped_magnetometer_is_a_gyroscope_flipped_about_z(sound):
+    """Nothing tells which way the disc turns: either sensor may be the wrong one, and both are given."""
+    bare = [without(one, "rate_reference") for one in sound["spin_down"]]
+    (one,) = found(bare, effect("mag.axes", axes="x -y z"))
+    both = {(item.id, item.setting["axes"]) for item in (one.effect, *one.twins)}
+    assert {("mag.axes", "x -y z"), ("gyro.axes", "x y -z")} <= both
+    assert "these recordings cannot tell that from" in one.sentence
+
+
+def without(recording: Recording, sensor: str) -> Recording:
+    kept = {name: samples for name, samples in recording.samples.items() if name != sensor}
+    return replace(recording, samples=kept)
 
 
 def test_a_field_that_dips_less_is_found_with_its_size_and_direction():
