@@ -331,7 +331,7 @@ def test_a_log_that_mostly_rests_is_not_taken_for_one_in_g_and_one_in_g_is():
     log = rolled(seconds=20.0, rate_deg_s=3200.0, rest=19.0)
     assert find_setup_faults([log]).faults == ()
     faults = find_setup_faults([scaled(log, "accelerometer", 1 / G)]).faults
-    assert [(fault.id, fault.effect.settings) for fault in faults] == [("accel.units", {"written_in": "g"})]
+    assert [(fault.id, fault.effect.value.written_in) for fault in faults] == [("accel.units", "g")]
 
 
 @practice

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from discsim.errors import InputError
 from discsim.recording import Samples
 from estimators.rate import YawRate
+from validation.cli import main
 from validation.real_recordings import road
 from validation.real_recordings.__main__ import app
 from validation.real_recordings.agreement import LOWERED, Attempt, agreement, attempts, mean_between
@@ -313,6 +314,17 @@ def test_a_log_that_cannot_be_imported_is_walked_no_further(tmp_path):
     assert list(found.said) == ["import"]
     assert found.said["import"].status == 2
     assert "refused: " in road_section([found])[2]
+
+
+@real
+def test_a_track_alone_is_imported_with_its_page(tmp_path, monkeypatch):
+    raw = str(REAL / "shotshaper-dd2-drone-tracked-throws" / "throw1.tsv")
+    monkeypatch.setattr("sys.argv", ["discsim", "import", raw, "--map", "shotshaper", "--out", str(tmp_path / "track")])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert not stop.value.code
+    assert (tmp_path / "track" / "raw.html").is_file()
+    assert (tmp_path / "track" / "recording.toml").is_file()
 
 
 @real

@@ -95,7 +95,7 @@ def board_of(fit: Fit, trials: Sequence[Trial], noise: NoiseModel, jumps: Jumps)
     grams = np.stack([r.gram for r in reduced])
     if not np.all(np.isfinite(grams)):
         raise InputError(
-            "diagnose: the best fit of the plant leaves the numbers: the body does not move as it does on that plant "
+            "diagnose: no motion of this plant follows the readings, its fit leaves the numbers "
             "(a free spin turns by itself, driven by nothing); expected the part of the log in which it does: "
             "discsim import RAW --throw N or --rows A:B takes it out"
         )

@@ -227,7 +227,7 @@ def _estimated(one: Answers) -> str:
         return f"no method knows the rate half of the time{also}"
     name, figures = best
     rate, sd = np.degrees([figures["median_rate_rad_s"], figures["median_sd_rad_s"]])
-    return f"{name}: {rate:.0f} ± {sd:.2g} deg/s{also}"
+    return f"{name}: {round(rate)} ± {sd:.2g} deg/s{also}"
 
 
 def _best(one: Answers) -> tuple[str, Mapping[str, Any]] | None:
@@ -253,12 +253,12 @@ def _failed(said: Said | None) -> str:
     if said.status is None:
         return f"**no answer within {PATIENCE:.0f} s**"
     line = next((line for line in said.text.splitlines() if line.startswith("discsim: ")), "")
-    sentence = line.removeprefix("discsim: ").rpartition("/")[2]
+    sentence = line.removeprefix("discsim: ").rpartition("/")[2].removeprefix("recording: ")
     return f"**fault of the program**: {sentence}" if said.crashed else f"refused: {sentence}"
 
 
 def _judged(one: Answers) -> str:
-    """Say whether it is right by what is known: no fault, a rate that is the known one, a verdict that may be."""
+    """Say whether it is right by what is known: no fault, the known median rate if there is one, a possible verdict."""
     wrong = [step for step, said in one.said.items() if said.crashed]
     if one.log.rate_deg_s is not None and one.estimate is not None:
         best, (rate, within) = _best(one), one.log.rate_deg_s
@@ -267,4 +267,6 @@ def _judged(one: Answers) -> str:
     verdict = "refused" if one.diagnosis is None else str(one.diagnosis["verdict"])
     if "diagnose" in one.said and verdict not in one.log.verdicts:
         wrong.append("diagnose")
-    return f"**no: {', '.join(dict.fromkeys(wrong))}**" if wrong else "yes"
+    if wrong:
+        return f"**no: {', '.join(dict.fromkeys(wrong))}**"
+    return "no fault; no rate is known" if one.log.rate_deg_s is None else "yes"

@@ -24,7 +24,7 @@ BINS = 1650
 #: Throws drawn by themselves; a figure is below 300 kB, so the page stays below 5 MB whatever the log's length.
 CLOSE_UPS = 12
 _COLOURS = ("#d55e00", "#0072b2", "#009e73")
-_UNITS = {"uT": "uT", "m_s2": "m/s^2", "rad_s": "deg/s"}
+_UNITS = {"uT": "uT", "m_s2": "m/s^2", "rad_s": "deg/s", "m": "m"}
 
 
 def envelope(t: FloatArray, value: FloatArray, bins: int = BINS) -> tuple[FloatArray, FloatArray]:
@@ -47,19 +47,15 @@ def write_raw_page(
     zero = min(float(found.time[0]) for found in read.readings.values())
     end = max(float(found.time[-1]) for found in read.readings.values()) - zero
     with tempfile.TemporaryDirectory() as place:
-        traces: list[tuple[str, Path]] = []
-        close: list[tuple[str, Path]] = []
-        if _drawable(read):
-            whole = Path(place) / "whole.png"
-            _draw(whole, read, zero, (0.0, end), throws)
-            traces.append(("All traces, in body axes and SI units.", whole))
+        whole = Path(place) / "whole.png"
+        _draw(whole, read, zero, (0.0, end), throws)
+        close = []
         for number, throw in enumerate(throws[:CLOSE_UPS], start=1):
             margin = max(0.3, 0.3 * (throw.end - throw.start))
             file = Path(place) / f"{number}.png"
             _draw(file, read, zero, (throw.start - margin, throw.end + margin), [throw], number)
             close.append((f"Throw {number}: {throw.text}. The shaded rows are taken by --throw {number}.", file))
-        said = [] if traces else ["It holds no sensor whose traces are drawn; `view` shows a path."]
-        sections = [Section("The whole log", said, figures=traces)]
+        sections = [Section("The whole log", figures=[("All traces, in body axes and SI units.", whole)])]
         if decisions:
             sections.append(
                 Section(
@@ -105,10 +101,6 @@ def _numbered(text: str) -> list[list[str]]:
     return [[str(k), line] for k, line in enumerate(text.splitlines(), start=1)]
 
 
-def _drawable(read: RawReadings) -> list[str]:
-    return [sensor for sensor in read.readings if SENSORS[sensor].unit in _UNITS]
-
-
 def _draw(
     path: Path,
     read: RawReadings,
@@ -117,7 +109,7 @@ def _draw(
     throws: Sequence[Stretch],
     first: int = 1,
 ) -> None:
-    shown = _drawable(read)
+    shown = list(read.readings)
     figure, axes = new_figure(len(shown), 1, width=11.0, height=2.2 * len(shown) + 0.6, sharex=True, squeeze=False)
     for panel, sensor in zip(axes[:, 0], shown, strict=True):
         found = read.readings[sensor]
@@ -137,6 +129,8 @@ def _traces(panel: Axes, sensor: str, t: FloatArray, value: FloatArray) -> None:
     columns = value if value.ndim == 2 else value[:, None]
     shown = np.degrees(columns) if unit == "rad_s" else columns
     for k in range(shown.shape[1]):
-        panel.plot(*envelope(t, shown[:, k]), color=_COLOURS[k % 3], lw=0.8, label="xyz"[k % 3])
-    panel.set_ylabel(f"{sensor}, {_UNITS[unit]}")
+        panel.plot(
+            *envelope(t, shown[:, k]), color=_COLOURS[k % 3], lw=0.8, label=SENSORS[sensor].columns[k].partition("_")[0]
+        )
+    panel.set_ylabel(f"{sensor}, {_UNITS.get(unit, 'm and m/s')}")
     panel.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=7)
