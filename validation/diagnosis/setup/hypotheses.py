@@ -16,13 +16,14 @@ from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect
+from discsim.effects.setup import axes_of
 from discsim.recording import Recording
 from discsim.written import corrected
 from validation.diagnosis.setup.relations import Columns, misfit, wanted_force
 from validation.diagnosis.setup.rotation import board_turns, spin_axis
 from validation.diagnosis.setup.spin_signals import SpinSignals, spin_signals
 
-__all__ = ["PERMUTATIONS", "Hypothesis", "Ranking", "axes_text", "board_effect", "chosen", "hypotheses", "pairs"]
+__all__ = ["PERMUTATIONS", "Hypothesis", "Ranking", "board_effect", "chosen", "hypotheses", "pairs"]
 
 #: sensors that sit on the board
 BOARD = ("magnetometer", "gyroscope", "accelerometer")
@@ -61,12 +62,6 @@ def changes(matrix: FloatArray) -> float:
     return {0: 0.0, 2: 1.5, 3: 2.5}[moved] + {0: 0.0, 1: 1.0, 2: 1.8, 3: 2.0}[reversed_]
 
 
-def axes_text(matrix: FloatArray, names: Sequence[str] = ("x", "y", "z")) -> str:
-    """Return what written columns hold, as in ``"x -y z"``, of a matrix (3, 3) that takes them to true axes."""
-    rows = np.argmax(np.abs(matrix), axis=0)
-    return " ".join(("-" if matrix[row, column] < 0 else "") + names[row] for column, row in enumerate(rows))
-
-
 #: all signed permutations of three axes, likely mistakes first
 PERMUTATIONS = _permutations()
 
@@ -76,7 +71,8 @@ class Hypothesis:
     """A supposed fault: ``kind`` (axes, board, offset, field; "" for none), its sensor, columns, and what it costs.
 
     ``costs`` (k,) are those of all relations by recording, ``weight`` how many independent statements they are,
-    ``size`` how unlikely the mistake is before looking.
+    ``worst`` the cost per statement of the relation that holds worst, ``size`` how unlikely the mistake is before
+    looking.
     """
 
     kind: str
@@ -84,6 +80,7 @@ class Hypothesis:
     columns: Columns
     costs: FloatArray
     weight: float
+    worst: float
     size: float = 0.0
 
     @property
@@ -162,7 +159,7 @@ def hypotheses(recordings: Sequence[Recording], price: float = 0.0) -> Ranking:
         base = _base(some, {}, None)
     else:
         upright = _to_z(main)
-        base = _base(some, {"magnetometer": upright}, effect("mag.axes", axes=axes_text(upright)))
+        base = _base(some, {"magnetometer": upright}, effect("mag.axes", axes=axes_of(upright.T)))
     found: list[Hypothesis] = []
     as_written = None
     if base.signals and not base.axes:

@@ -85,18 +85,23 @@ class Misfit:
         return self.weight * float(np.log1p(self.ratio))
 
 
-def misfit(signals: Sequence[SpinSignals], columns: Columns) -> tuple[FloatArray, float]:
-    """Return the costs (k,) of recordings, each summed over its relations, and the sum of all weights."""
+def misfit(signals: Sequence[SpinSignals], columns: Columns) -> tuple[FloatArray, float, float]:
+    """Return the costs (k,) of recordings, the sum of all weights, and the cost per weight of the worst relation."""
     found = [misfits(one, columns) for one in signals]
     costs = np.array([sum(item.cost for item in own) for own in found])
-    return costs, sum(item.weight for own in found for item in own)
+    everything = [item for own in found for item in own]
+    of: dict[str, list[Misfit]] = {}
+    for item in everything:
+        of.setdefault(item.relation, []).append(item)
+    each = [sum(one.cost for one in own) / sum(one.weight for one in own) for own in of.values()]
+    return costs, sum(item.weight for item in everything), max(each, default=0.0)
 
 
 def misfits(signals: SpinSignals, columns: Columns) -> list[Misfit]:
     """Return the relations that a recording allows, each with how far a hypothesis is from it."""
     M = columns.of("magnetometer")
     across = M[:2, :2]
-    mirrored = float(np.linalg.det(across)) < 0
+    mirrored = signals.measured and float(np.linalg.det(across)) < 0
     angle = complex(across[0, 0], across[1, 0])
     # psi of the true columns is that of the written ones, backwards where they are mirrored, less an angle
     rate = -signals.rate if mirrored else signals.rate

@@ -35,18 +35,18 @@ def clock_unit(recordings: Sequence[Recording]) -> Effect | None:
 
     Where the rates were taken from the stamps themselves, the fixes' positions over their velocities tell.
     """
-    ratios = [
+    spacing = [
         samples.interval * one.sheets[name].rate_hz
         for one in recordings
         for name, samples in one.samples.items()
         if len(samples) > FEWEST
     ]
-    ratios += [ratio for one in recordings if (ratio := _path_ratio(one)) is not None]
-    ratios = [ratio for ratio in ratios if np.isfinite(ratio) and ratio > 0]
+    taken = [ratio for one in recordings if (ratio := _path_ratio(one)) is not None]
     for unit, factor in UNITS[ClockUnit].items():
-        near = [abs(ratio / factor - 1.0) < _STAMPS for ratio in ratios]
-        usual = [abs(np.log(ratio)) < np.log(NEAR) for ratio in ratios]
-        if factor > 1.0 and any(near) and all(a or b for a, b in zip(near, usual, strict=True)) and near[-1]:
+        # rates that were taken from the stamps themselves are right in any unit; velocities are not
+        by_stamps, by_path = (all(abs(one / factor - 1.0) < _STAMPS for one in some) for some in (spacing, taken))
+        usual = all(1.0 / NEAR < one < NEAR for one in spacing)
+        if factor > 1.0 and ((by_path and (by_stamps or usual)) if taken else (by_stamps and bool(spacing))):
             return effect("clock.units", written_in=unit)
     return None
 
