@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[2]
 MAPS = sorted(path.stem for path in (ROOT / "models" / "imports").glob("*.toml"))
 ROTATING = [name for name in MAPS if LOGGERS[name].methods]
 
-#: Maps of which `diagnose` is to be run: each takes a minute or so. A free spin without [disc] cannot be diagnosed yet.
+#: Maps of which `diagnose` is run: none yet, as free spins of twenty seconds take minutes.
 DIAGNOSED: tuple[str, ...] = ()
 
 

@@ -86,13 +86,17 @@ class Misfit:
 
 
 def misfit(signals: Sequence[SpinSignals], columns: Columns) -> tuple[FloatArray, float, float]:
-    """Return the costs (k,) of recordings, the sum of all weights, and the cost per weight of the worst relation."""
+    """Return the costs (k,) of recordings, the sum of all weights, and the cost per weight of the worst relation.
+
+    The slope of a slow run-down is mostly noise: ramps count among the costs, and never as the worst.
+    """
     found = [misfits(one, columns) for one in signals]
     costs = np.array([sum(item.cost for item in own) for own in found])
     everything = [item for own in found for item in own]
     of: dict[str, list[Misfit]] = {}
     for item in everything:
-        of.setdefault(item.relation, []).append(item)
+        if item.relation != "ramps":
+            of.setdefault(item.relation, []).append(item)
     each = [sum(one.cost for one in own) / sum(one.weight for one in own) for own in of.values()]
     return costs, sum(item.weight for item in everything), max(each, default=0.0)
 
