@@ -475,7 +475,9 @@ def _peaks(tau: FloatArray, z: ComplexArray, interval: float, count: int = 3) ->
     power = np.where(left > 1e-3 * n, (value.real**2 + value.imag**2) / np.maximum(left, 1e-9 * n), 0.0)
     if count == 1:
         highest = np.argmax(power, axis=1)
-        return [[(float(frequency[i]), float(row[i]))] for i, row in zip(highest, power, strict=True) if row[i] > 0]
+        # nothing turns in a row without power
+        tops = zip(highest, power, strict=True)
+        return [[(float(frequency[i]), float(row[i]))] if row[i] > 0 else [] for i, row in tops]
     found = []
     for row in power:
         candidates = np.flatnonzero((row >= np.roll(row, 1)) & (row >= np.roll(row, -1)))

@@ -86,10 +86,10 @@ def made(**sheet: float) -> Recording:
 
 def test_a_log_says_what_its_gyroscope_lacks():
     (bare,) = check("log", made(), stamps=False)
-    assert bare.clipped == 0
+    assert bare.clipped == 100  # a quarter of the readings stand at one extreme
     assert "no time stamps: a step is assumed" in bare.lacks
     assert "noise not stated" in bare.lacks
-    assert "range not stated: clipping cannot be told" in bare.lacks
+    assert "range not stated: clipping is told by the readings alone" in bare.lacks
     assert any("(+2.0," in text for text in bare.lacks)
     (stated,) = check("log", made(noise_rms=1e-3, range=15.0))
     assert stated.clipped == 100
@@ -147,7 +147,8 @@ def test_each_row_tells_its_own_length_by_the_field():
     wobble = 3.0 * np.exp(1j * (DISC.Izz / DISC.Ixx - 1.0) * angle)
     rate = np.column_stack((wobble.real, wobble.imag, np.full(240, 55.0)))
     sheet = SensorSheet(100.0, position=np.array([0.02, 0.0, 0.0]))
-    force = np.column_stack((np.full(240, -(55.0**2) * 0.02), np.zeros(240), np.zeros(240)))
+    alive = 1e-6 * np.sin(np.arange(240.0))  # readings that are all the same are those of a dead sensor
+    force = np.column_stack((-(55.0**2) * 0.02 + alive, alive, alive))
     sheets = {"magnetometer": SensorSheet(100.0), "accelerometer": sheet, "gyroscope": SensorSheet(100.0)}
     samples = {name: Samples(filed, value) for name, value in zip(sheets, (field, force, rate), strict=True)}
     found = rows_of(Recording("free_spin", "throw", AIR, DISC, None, None, sheets, samples))

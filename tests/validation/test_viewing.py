@@ -136,7 +136,9 @@ def test_a_measured_flight_is_drawn_level_on_its_track_and_says_what_is_unknown(
     track = np.column_stack((10 * t, 0 * t, -2 - t))
     track[7, 2] = np.nan
     gps = np.column_stack((track + 1.0, np.zeros((t.size, 3))))
-    gyroscope = Samples(np.linspace(0.0, 2.0, 201), np.tile([0.0, 0.0, -12.0], (201, 1)))
+    # readings that are all the same are those of a dead sensor
+    alive = 1e-10 * np.sin(np.arange(201.0))
+    gyroscope = Samples(np.linspace(0.0, 2.0, 201), np.tile([0.0, 0.0, -12.0], (201, 1)) + alive[:, None])
     samples = {"gps": Samples(t, gps), "track": Samples(t, track), "gyroscope": gyroscope}
     replay = replay_recording(write(tmp_path / "seen", "flight", samples))
     np.testing.assert_allclose(replay.position_at(np.array([0.35, 1.0])), [[3.5, 0, -2.35], [10, 0, -3]], atol=1e-9)

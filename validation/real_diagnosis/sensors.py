@@ -201,7 +201,7 @@ def _checked(log: str, recording: Recording, sensor: str, rest: tuple[float, flo
     if sheet.noise_rms is None:
         lacks.append("noise not stated")
     if sheet.range is None:
-        lacks.append("range not stated: clipping cannot be told")
+        lacks.append("range not stated: clipping is told by the readings alone")
     elif clipped:
         lacks.append(f"{clipped} readings at the range")
     lacks += _of_its_kind(recording, sensor, samples, sheet, rest)
