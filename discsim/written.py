@@ -32,10 +32,10 @@ from discsim.effects.setup import (
 )
 from discsim.recording import Recording, Samples, SensorSheet
 
-__all__ = ["as_written", "corrected"]
+__all__ = ["PREFIX", "as_written", "corrected"]
 
 #: sensor -> prefix of its effects
-_PREFIX: Mapping[str, str] = MappingProxyType(
+PREFIX: Mapping[str, str] = MappingProxyType(
     {"magnetometer": "mag", "accelerometer": "accel", "gyroscope": "gyro", "gps": "gps"}
 )
 #: share of one axis in another below which it is the rounding of a rotation matrix (1e-16) and no reading: of a whole
@@ -84,7 +84,7 @@ def corrected(recording: Recording, effects: Sequence[Effect]) -> Recording:
 
 
 def _offset(sensor: str, values: _Values) -> float:
-    offset: TimeOffset = values.get(f"{_PREFIX.get(sensor)}.time_offset", TimeOffset())
+    offset: TimeOffset = values.get(f"{PREFIX.get(sensor)}.time_offset", TimeOffset())
     return offset.offset_s
 
 
@@ -95,13 +95,13 @@ def _ticks(values: _Values) -> float:
 
 
 def _unit(sensor: str, values: _Values) -> float:
-    unit: MagnetometerUnit | AccelerometerUnit | GyroscopeUnit | None = values.get(f"{_PREFIX.get(sensor)}.units")
+    unit: MagnetometerUnit | AccelerometerUnit | GyroscopeUnit | None = values.get(f"{PREFIX.get(sensor)}.units")
     return 1.0 if unit is None else written_per_si(unit)
 
 
 def _permuted(sensor: str, value: FloatArray, values: _Values, *, back: bool = False) -> FloatArray:
     """Return readings (n, 3), or (n, 6) of a gps, along other axes; a gap goes with its axis."""
-    axes: Axes | GpsAxes | None = values.get(f"{_PREFIX.get(sensor)}.axes")
+    axes: Axes | GpsAxes | None = values.get(f"{PREFIX.get(sensor)}.axes")
     if axes is None:
         return value
     P = permutation(axes).T if back else permutation(axes)

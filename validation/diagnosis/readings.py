@@ -18,6 +18,7 @@ from discsim.effects.sensors import CrossAxis, Scale, sensitivity
 from discsim.effects.setup import BoardRotation, SiteField, field_there, on_board
 from discsim.motion import State
 from discsim.recording import Recording
+from discsim.written import PREFIX
 from validation.diagnosis.rows import row_of, user_effects_on
 
 __all__ = ["CLOCKS", "Values", "delay", "is_motion", "predicted", "to_body", "value"]
@@ -26,8 +27,6 @@ __all__ = ["CLOCKS", "Values", "delay", "is_motion", "predicted", "to_body", "va
 #: a law's are called TERM.PLACE, as in 0.power_r
 Values: TypeAlias = Mapping[tuple[str, str], float]
 
-#: sensor -> prefix of its effects
-PREFIX = {"magnetometer": "mag", "accelerometer": "accel", "gyroscope": "gyro", "gps": "gps"}
 #: the effects that only move the instants at which samples were taken
 CLOCKS = (
     "clock.rate",

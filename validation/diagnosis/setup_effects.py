@@ -13,9 +13,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import Effect, effect, row
+from discsim.effects.catalogue import BOARD, Effect, effect, row
 from discsim.model_file import ModelEffect
 from discsim.recording import Recording
+from discsim.written import PREFIX
 from validation.diagnosis.answer import (
     SMALLEST_P_VALUE,
     Confusion,
@@ -37,9 +38,7 @@ __all__ = ["free_parameters", "with_setup"]
 _SIGMA = {"time_offset": 0.01, "rotation": 0.2, "field": 0.2}
 #: a number whose error is this share of that was not determined by the recordings
 _UNDETERMINED = 0.3
-#: sensors that share the axes of the board
-_BOARD = ("magnetometer", "gyroscope", "accelerometer")
-_PREFIX = {"mag": "magnetometer", "accel": "accelerometer", "gyro": "gyroscope", "gps": "gps"}
+_SENSORS = {prefix: sensor for sensor, prefix in PREFIX.items()}
 
 
 def free_parameters(findings: SetupFindings) -> tuple[Parameter, ...]:
@@ -166,9 +165,9 @@ def _excess(fault: Effect, written: Sequence[Recording], meant: Sequence[Recordi
     total = 0.0
     for before, after in zip(written, meant, strict=True):
         for sensor, samples in before.samples.items():
-            if prefix in _PREFIX and sensor != _PREFIX[prefix]:
+            if prefix in _SENSORS and sensor != _SENSORS[prefix]:
                 continue
-            if fault.id == "board.rotation" and sensor not in _BOARD:
+            if fault.id == "board.rotation" and sensor not in BOARD:
                 continue
             if fault.id == "site.field":
                 if sensor == "magnetometer":
@@ -199,7 +198,7 @@ def _variance(fit: Fit, sensor: str) -> float:
 
 
 def _located(named: NamedEffect, fault: SetupFault, share: float, written: Sequence[Recording]) -> Located:
-    sensor = _PREFIX.get(named.id.partition(".")[0], "all")
+    sensor = _SENSORS.get(named.id.partition(".")[0], "all")
     end = max(float(samples.t[-1]) for one in written for samples in one.samples.values())
     return Located("all", sensor, "all", 0.0, end, float(np.clip(share, 0.0, 1.0)), said(fault.effect))
 

@@ -16,7 +16,7 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect
 from discsim.effects.setup import axes_of
 from discsim.recording import Recording
-from discsim.written import corrected
+from discsim.written import PREFIX, corrected
 from validation.diagnosis.setup.hypotheses import Hypothesis, board_effect, chosen, hypotheses, pairs
 from validation.diagnosis.setup.proof import left_by_short_fit
 from validation.diagnosis.setup.remedy import MapAxes, remedy
@@ -36,7 +36,6 @@ WORST = 2.1
 TWIN = 8.0
 #: most faults of one setup that are looked for, and most twins that are told
 MOST, MOST_TWINS = 3, 8
-_PREFIX = {"magnetometer": "mag", "accelerometer": "accel", "gyroscope": "gyro", "gps": "gps"}
 
 
 @dataclass(frozen=True)
@@ -188,10 +187,10 @@ def _effect(item: Hypothesis, stated: FloatArray) -> Effect:
     """Return a hypothesis as an effect of the catalogue; ``stated`` (3,) is the stated field, uT."""
     if item.kind == "axes":
         if item.sensor != "gps":
-            return effect(f"{_PREFIX[item.sensor]}.axes", axes=axes_of(item.columns.of(item.sensor).T))
+            return effect(f"{PREFIX[item.sensor]}.axes", axes=axes_of(item.columns.of(item.sensor).T))
         return effect("gps.axes", axes=axes_of(item.columns.of("gps").T, "gps"))
     if item.kind == "offset":
-        return effect(f"{_PREFIX[item.sensor]}.time_offset", offset_s=item.columns.offset[item.sensor])
+        return effect(f"{PREFIX[item.sensor]}.time_offset", offset_s=item.columns.offset[item.sensor])
     if item.kind == "board":
         return board_effect(next(iter(item.columns.axes.values())))
     assert item.columns.site is not None

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import Effect, effect
+from discsim.effects.catalogue import RIGS, Effect, effect
 from discsim.effects.setup import axes_of
 from discsim.recording import Recording
 from discsim.written import corrected
@@ -191,10 +191,10 @@ def pairs(base: _Base) -> list[tuple[Hypothesis, Hypothesis, Hypothesis]]:
     found = []
     for first, second in combinations(each, 2):
         for one, other in product(each[first], each[second]):
+            # the signals are those of the base: what it supposes is taken off again
             axes = {
-                name: matrix @ base.axes.get(name, np.eye(3)).T
+                item.sensor: item.columns.of(item.sensor) @ base.axes.get(item.sensor, np.eye(3)).T
                 for item in (one, other)
-                for name, matrix in ((item.sensor, item.columns.of(item.sensor)),)
             }
             both = Hypothesis("axes", "", Columns(axes), *misfit(base.signals, Columns(axes)), one.size + other.size)
             found.append((both, one, other))
@@ -225,7 +225,7 @@ def _one_sensor(base: _Base, *, alone: bool = True) -> Iterator[Hypothesis]:
 
 def _shifting(base: _Base) -> list[str]:
     """Return the sensors whose phase is seen: on a rig, where nothing precesses, only that of the field."""
-    rig = base.signals[0].recording.plant in ("rate_table", "spin_down")
+    rig = base.signals[0].recording.plant in RIGS
     return [name for name in (BOARD[:1] if rig else BOARD) if any(name in one.recording for one in base.signals)]
 
 
@@ -245,10 +245,10 @@ def _offsets(base: _Base) -> Iterator[Hypothesis]:
 
 def _rivals(base: _Base) -> Iterator[Hypothesis]:
     """Return physics that is no fault of the setup, so that what it explains is not taken for one: lags and clocks."""
+    if base.signals[0].recording.plant in RIGS:
+        return
     fastest = max(float(np.nanmax(np.abs(one.rate))) for one in base.signals)
     longest = max(float(one.grid[-1]) for one in base.signals)
-    if base.signals[0].recording.plant in ("rate_table", "spin_down"):
-        return
     for sensor in _shifting(base):
         step = PHASE_STEP / (fastest * longest)
         count = int(MOST_CLOCK / step)

@@ -26,6 +26,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects.catalogue import RIGS
 from validation.diagnosis.setup.spin_signals import STEP, ComplexArray, Locked, SpinSignals
 
 __all__ = ["Columns", "Misfit", "misfit", "misfits", "wanted_force"]
@@ -143,7 +144,7 @@ def misfits(signals: SpinSignals, columns: Columns) -> list[Misfit]:
             found.append(Misfit("lift", ("accelerometer",), max(lift / _LIFT, 0.0) ** 2, 2.0))
     if signals.path is not None:
         found += _of_path(signals, columns.of("gps"))
-    if signals.recording.plant in ("rate_table", "spin_down"):
+    if signals.recording.plant in RIGS:
         found += _of_rig(signals, columns, rate, along)
     return found
 

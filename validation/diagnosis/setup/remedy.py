@@ -10,13 +10,14 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect
 from discsim.effects.setup import board_axes, permutation
+from discsim.written import PREFIX
 
 __all__ = ["remedy"]
 
 #: a map's axes: for each body axis the sensor's column and its sign, None where it was not seen
 MapAxes: TypeAlias = tuple[tuple[int, float] | None, ...]
 
-_SENSORS = {"mag": "magnetometer", "accel": "accelerometer", "gyro": "gyroscope", "gps": "gps"}
+_SENSORS = {prefix: sensor for sensor, prefix in PREFIX.items()}
 #: units as a map spells them, where it has another word
 _MAP_UNITS = {"mG": "mgauss", "G": "gauss"}
 #: a rotation within this of right angles (root sum of squares) is one that a map's axes can write

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects.catalogue import RIGS
 from discsim.recording import Recording
 from validation.diagnosis.starts import field_spin, local_cubics, path_fixes
 from validation.diagnosis.turning import rate_of
@@ -232,7 +233,7 @@ def _phase(recording: Recording) -> tuple[str, Callable[[FloatArray], FloatArray
     A magnetometer does where the field is stated: against its size iron is told from what turns.
     """
     if "magnetometer" in recording and recording.environment.field_known:
-        spin = field_spin(recording, steady=recording.plant in ("rate_table", "spin_down"))
+        spin = field_spin(recording, steady=recording.plant in RIGS)
         return None if spin is None else ("magnetometer", spin.phase_at, float(spin.grid[0]), float(spin.grid[-1]))
     known = rate_of(recording)
     if known is None and recording.command is not None:
