@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import cho_solve, solve_triangular
 
 from discsim.arrays import BoolArray, FloatArray
 from discsim.frames import euler_angles
@@ -205,17 +206,29 @@ def normal_matrix(linear: Linear, noise: NoiseModel) -> FloatArray:
     if u == d:
         A = whitened(linear, noise, np.hstack([linear.local, linear.shared, linear.residual[:, None]]))
         return np.asarray(A.T @ A)
-    # with jumps the full rows are long and mostly empty: piece by piece, then chained
+    # with jumps the full rows are long and mostly empty: what later pieces say of a state is summed backwards, and a
+    # jump meets the unknowns before it through the state that it moves
     rows = whitened(linear, noise, np.hstack([linear.own, linear.residual[:, None]]), linear.piece)
-    width = linear.moves.shape[2] + 1
+    k, width = linear.moves.shape[0], linear.moves.shape[2] + 1
     p = width - 1 - u
     G = np.zeros((width, width))
-    T = np.zeros((d + p + 1, width))
-    T[d:, u:] = np.eye(p + 1)
-    for i in range(linear.moves.shape[0]):
+    later = np.zeros((d + p + 1, d + p + 1))
+    passing = np.eye(d + p + 1)
+    for i in reversed(range(k)):
+        if i + 1 < k:
+            passing[:d, :-1] = linear.passes[i]
+            later = passing.T @ later @ passing
         mine = rows[linear.piece == i]
-        T[:d, :-1] = linear.moves[i]
-        G += T.T @ (mine.T @ mine) @ T
+        later += mine.T @ mine
+        unknown = np.flatnonzero(linear.jump_piece == i)
+        moved = np.arange(d) if i == 0 else linear.jump_kind[unknown]
+        told = later[moved]
+        places = np.r_[: unknown[-1] + 1 if unknown.size else 0, u : width - 1]
+        G[unknown[:, None], places] = told[:, :d] @ linear.moves[i][:, places]
+        G[unknown, u:] += told[:, d:]
+    G[u:, u:] = later[d:, d:]
+    G[:u, :u] = np.tril(G[:u, :u]) + np.tril(G[:u, :u], -1).T
+    G[u:, :u] = G[:u, u:].T
     if linear.whole.size:
         # readings that hang on several pieces come in whole channels
         spread = linear.piece < 0
@@ -261,7 +274,7 @@ def reduce(linear: Linear, current: Chain, noise: NoiseModel, jumps: Jumps, hold
     H[np.arange(u), np.arange(u)] += 1e-12
     L = np.linalg.cholesky(H)
     cross = G[:u, u:] * scale[:, None]
-    half = np.linalg.solve(L, cross)
+    half = solve_triangular(L, cross, lower=True, check_finite=False)
     gram = G[u:, u:] - half.T @ half
     return Reduced(gram, (L, scale), cross, linear.residual.size)
 
@@ -270,7 +283,7 @@ def local_step(reduced: Reduced, shared: FloatArray) -> FloatArray:
     """Return the step of the local unknowns that goes with a step of the shared ones (p,)."""
     L, scale = reduced.factor
     right = reduced.cross[:, -1] - reduced.cross[:, :-1] @ shared
-    return np.asarray(scale * np.linalg.solve(L.T, np.linalg.solve(L, right)))
+    return np.asarray(scale * cho_solve((L, True), right, check_finite=False))
 
 
 def shared_step(
@@ -366,18 +379,20 @@ def refit(
     tolerance: float = 0.05,
     bounds: Mapping[tuple[str, str], tuple[float, float]] | None = None,
     moved_on: bool = True,
+    bar: float = np.inf,
 ) -> Fit:
     """Go on from where a fit stands by Gauss-Newton steps, halved where they do not improve.
 
     Stops when the gain, expected or found, is below ``tolerance`` of chi-squared. ``moved_on`` is false where only the
-    noise has changed since the last linearisation.
+    noise has changed since the last linearisation. A fit that after its first steps expects to stay above ``bar`` is
+    of no use to the caller, and is left where it stands.
     """
     linears = linearised(fit) if moved_on else fit.linears
     fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
-    fit, settled = _gone_on(fit, iterations, tolerance, bounds or {}, _FREE)
+    fit, settled = _gone_on(fit, iterations, tolerance, bounds or {}, _FREE, bar)
     if not settled and iterations >= _LONG and open_gaps(fit) and fit.chains[0].recording.plant == "free_spin":
         # free steps hop about where the readings say little: short ones, and what held them back is not known
-        fit, _ = _gone_on(fit, iterations, tolerance, bounds or {}, _FIRST_HOLD)
+        fit, _ = _gone_on(fit, _HELD * iterations, tolerance, bounds or {}, _FIRST_HOLD, bar)
         _, (_, covariance, _) = _solved(fit, np.full(len(fit.chains), _FREE))
         fit = replace(fit, covariance=covariance)
     return fit
@@ -400,6 +415,7 @@ def _gone_on(
     tolerance: float,
     bounds: Mapping[tuple[str, str], tuple[float, float]],
     first: float,
+    bar: float = np.inf,
 ) -> tuple[Fit, bool]:
     """Return a fit after up to so many steps, and whether no more are wanted. ``first`` is how hard they are held.
 
@@ -408,9 +424,11 @@ def _gone_on(
     hold = np.full(len(fit.chains), first)
     closed: Fit | None = None
     settled, stuck = False, 0
-    for _ in range(iterations):
+    for done in range(iterations):
         reduced, (step, covariance, expected) = _solved(fit, hold)
         fit = replace(fit, covariance=covariance)
+        if done >= _LOOKED and expected > bar:
+            return fit, True
         closed = _better_closed(closed, fit)
         least = max(tolerance, 1e-7 * fit.merit)
         if fit.merit - expected < least and not open_gaps(fit):
@@ -437,6 +455,10 @@ def _better_closed(known: Fit | None, fit: Fit) -> Fit | None:
     return fit
 
 
+#: steps after which what a fit expects of the next is believed to be no better than where it will end
+_LOOKED = 3
+#: held steps, which are short, as a multiple of free ones
+_HELD = 3
 #: so many held steps in turn of which no share served every recording lead nowhere
 _STUCK = 4
 #: tries at a step, and what a step that leads astray is shortened by

@@ -36,7 +36,7 @@ from validation.diagnosis.readings import to_body
 from validation.diagnosis.relaxed import NO_JUMPS
 from validation.diagnosis.rest import remainders
 from validation.diagnosis.selection import BOUNDS, ENTRY, PER_PARAMETER, Hypothesis, Tied, noise_of, scored, tied_fit
-from validation.diagnosis.trajectory_pieces import Chain, Column, IntArray, Linear, moved, recut, undone
+from validation.diagnosis.trajectory_pieces import Chain, Column, IntArray, Linear, moved, recut
 
 __all__ = ["FoundLaw", "Term", "find_law"]
 
@@ -176,17 +176,17 @@ def _weighed(linear: Linear, first: int, targets: Sequence[int], weights: FloatA
     weighs, ``weights`` (m, k) its value in each piece.
     """
     local, (k, d) = linear.unknowns, linear.moves.shape[:2]
-    own = linear.own[:, [d + first + j for j in targets]] * weights[:, linear.piece].T
+    places = [d + first + j for j in targets]
+    own = linear.own[:, places] * weights[:, linear.piece].T
+    passes = linear.passes[:, :, places] * weights.T[: k - 1, None, :]
     moves = np.zeros((k, d, len(targets)))
     for i in range(k - 1):
-        before, after = linear.moves[i], linear.moves[i + 1]
-        Phi = undone(before[:, :d].T, after[:, :d].T).T
-        constants = after[:, local + first :] - Phi @ before[:, local + first :]
-        moves[i + 1] = Phi @ moves[i] + constants[:, targets] * weights[:, i]
+        moves[i + 1] = linear.passes[i, :, :d] @ moves[i] + passes[i]
     return replace(
         linear,
         own=np.hstack([linear.own[:, : d + first], own]),
         moves=np.concatenate([linear.moves[:, :, : local + first], moves], axis=2),
+        passes=np.concatenate([linear.passes[:, :, : d + first], passes], axis=2),
     )
 
 
@@ -353,11 +353,12 @@ def _axes(chain: Chain, sensor: str) -> tuple[str, ...]:
 
 def _widened(linear: Linear, columns: FloatArray) -> Linear:
     """Return a linearisation with more shared columns (n, c), of the readings alone."""
-    k, d = linear.moves.shape[:2]
+    more = columns.shape[1]
     return replace(
         linear,
         own=np.hstack([linear.own, columns]),
-        moves=np.concatenate([linear.moves, np.zeros((k, d, columns.shape[1]))], axis=2),
+        moves=np.concatenate([linear.moves, np.zeros((*linear.moves.shape[:2], more))], axis=2),
+        passes=np.concatenate([linear.passes, np.zeros((*linear.passes.shape[:2], more))], axis=2),
     )
 
 

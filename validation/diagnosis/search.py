@@ -53,6 +53,8 @@ REFITTED, REFITTED_AT_MOST = 4, 9
 _NEAR = 1.2
 #: most steps of the baseline's fit: a free spin's is slow, and what it has left to gain is no candidate's
 _BASE_ITERATIONS = {"flight": 8, "free_spin": 16, "spin_down": 8, "rate_table": 8}
+#: a refit that will leave this many times the chi-squared of the best one so far is given up
+_HOPELESS = 10.0
 #: a gain below this may be due to where the fits started
 _DOUBTFUL = 200.0
 #: a fit whose chi-squared per reading, in the noise of the relaxed fit, is above this is far from the data
@@ -250,6 +252,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     fits: list[tuple[float, Tied, Fit, float]] = []
     seen: set[tuple[str, frozenset[int] | None]] = set()
     near_data = chi2_now < _NEAR * current.fit.count
+    best_chi2 = chi2_now
     for proposal, fit, cost in worth:
         key = (proposal.trial.id, proposal.trial.recordings)
         if key in seen:
@@ -266,6 +269,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
             found.own,
             noise if far else current.fit.noise,
             {**values_of_fit(current), **proposal.start, **_wobbles(fit)},
+            bar=_HOPELESS * best_chi2 if far else np.inf,
         )
         refitted = replace(refitted, score=refitted.score + found.cost + cost)
         gain, chi2 = _consider(found, (current.score, chi2_now), refitted, proposal.trial)
@@ -273,6 +277,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
             # far from the data chi-squared says more than a likelihood that has swallowed the mismatch as noise
             merit = (chi2 + cost if far else refitted.score) + RIVAL * refitted.hypothesis.size
             fits.append((merit, refitted, fit, cost))
+            best_chi2 = min(best_chi2, chi2)
             near_data |= chi2 < _NEAR * refitted.fit.count
     if not fits:
         return None

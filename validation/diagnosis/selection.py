@@ -124,10 +124,12 @@ def tied_fit(
     *,
     iterations: int = 8,
     polish: int = 2,
+    bar: float = np.inf,
 ) -> Tied:
     """Fit a hypothesis with pieces that hang together, from the chains of a loose fit.
 
-    ``start`` gives first values of parameters by (key, recordings). The noise is estimated anew from the residuals.
+    ``start`` gives first values of parameters by (key, recordings). The noise is estimated anew from the residuals. A
+    fit whose chi-squared in ``noise`` will stay above ``bar`` is given up after a few steps.
     """
     parameters = fitted_parameters(hypothesis, own)
     at = np.array([start.get((q.key, q.recordings), q.stated) for q in parameters])
@@ -136,13 +138,13 @@ def tied_fit(
     if plant in ("rate_table", "spin_down") and any(q.group in CLOCKS for q in parameters):
         fit = replace(fit, at=_longer_and_longer(fit))
     begun = fit
-    fit = refit(fit, iterations=iterations, bounds=BOUNDS)
+    fit = refit(fit, iterations=iterations, bounds=BOUNDS, bar=bar)
     if not np.isfinite(fit.merit):
         # algebra from far away may offer numbers under which no motion lasts
         effects = {trial.id for trial in hypothesis.trials}
         plain = np.array([v if q.group in effects else q.stated for q, v in zip(parameters, at, strict=True)])
-        fit = refit(replace(begun, at=plain), iterations=iterations, bounds=BOUNDS)
-    for _ in range(polish):
+        fit = refit(replace(begun, at=plain), iterations=iterations, bounds=BOUNDS, bar=bar)
+    for _ in range(polish if fit.merit < bar else 0):
         fit = replace(fit, noise=noise_of(fit))
         fit = refit(fit, iterations=2, bounds=BOUNDS, moved_on=False)
     return scored(hypothesis, fit)

@@ -77,10 +77,14 @@ STEPS = {
     "spin_down": np.array([1e-5, 1e-4]),
     "rate_table": np.array([1e-5]),
 }
+#: longest step of a free spin, s: the moments of the air change within 20 ms of release
+_FREE_STEP = 0.005
 #: half the difference in time by which a reading's slope is taken, s
 _TIME_STEP = 2e-4
 #: neighbours simulated at a time, to bound memory
 _BATCH = 16
+#: instants of several pieces that are read together
+_INSTANTS = 256
 #: nodes and weights of a first-order lag: an integral over the past with weight exp(-s)
 _LAG_NODES, _LAG_WEIGHTS = np.polynomial.laguerre.laggauss(8)
 #: a lagged sensor has forgotten its start after this many time constants
@@ -176,6 +180,8 @@ class Linear:
         Current size of each allowed jump, its direction within the state (-1 for the first state) and its piece.
     moves : (k, d, l + p) array
         How the states of the pieces follow the unknowns.
+    passes : (k - 1, d, d + p) array
+        How the state of each next piece follows that of the one before and the shared parameters.
     closing : (k, d) array
         How they move to close the jumps that are not allowed.
     gaps : (k - 1, d) array
@@ -195,6 +201,7 @@ class Linear:
     jump_kind: IntArray
     jump_piece: IntArray
     moves: FloatArray
+    passes: FloatArray
     closing: FloatArray
     gaps: FloatArray
     shifts: FloatArray
@@ -231,10 +238,13 @@ class Linear:
         moves = np.zeros((*self.moves.shape[:2], u + width))
         moves[:, :, :u] = self.moves[:, :, :u]
         moves[:, :, [u + j for j in places]] = self.moves[:, :, u:]
+        passes = np.zeros((*self.passes.shape[:2], kept + width))
+        passes[:, :, :kept] = self.passes[:, :, :kept]
+        passes[:, :, [kept + j for j in places]] = self.passes[:, :, kept:]
         whole = np.zeros((self.whole.shape[0], u + width))
         whole[:, :u] = self.whole[:, :u]
         whole[:, [u + j for j in places]] = self.whole[:, u:]
-        return replace(self, own=own, moves=moves, whole=whole)
+        return replace(self, own=own, moves=moves, passes=passes, whole=whole)
 
     def after(self, local: FloatArray, shared: FloatArray) -> FloatArray:
         """Return the residuals (n,) that a step of the unknowns is expected to leave."""
@@ -430,7 +440,7 @@ class _Runner:
             largest = CORNERED if disc.aero_table is not None else UNEVEN if self.uneven else NUTATION
             h = min(STEP, largest / nutation)
         elif plant == "free_spin":
-            h = min(0.00125, 0.15 / max(min(abs(float(state[12])), FASTEST) * 2.0, 1.0))
+            h = min(_FREE_STEP, 0.15 / max(min(abs(float(state[12])), FASTEST) * 2.0, 1.0))
         elif plant == "spin_down":
             h = 0.01
         else:
@@ -561,10 +571,11 @@ def linearise(
 
     p = len(columns)
     # states of the pieces as functions of [first state | jumps | parameters]
-    allowed = np.flatnonzero(jumps)
+    allowed, forbidden = np.flatnonzero(jumps), np.flatnonzero(~jumps)
     u = d + (k - 1) * allowed.size
     S = np.zeros((k, d, u + p))
     S[0, :, :d] = np.eye(d)
+    passes = np.zeros((max(k - 1, 0), d, d + p))
     closing = np.zeros((k, d))
     gaps = np.zeros((max(k - 1, 0), d))
     flat = base_flat(recording, values, [column.key for column in columns])
@@ -575,6 +586,35 @@ def linearise(
     J = [np.zeros((s.instants.size, s.width, d + p)) for s in samples]
     ideal = [np.empty((s.instants.size, s.width)) for s in samples]
 
+    half = d + len(motion_columns)
+    widths = np.concatenate([steps, [columns[j].step for j in motion_columns]])
+    moving = np.array([*range(d), *(d + j for j in motion_columns)])
+
+    def read_all(pieces: Sequence[tuple[list[IntArray], IntArray, FloatArray]]) -> None:
+        """Read the sensors in the rows of pieces: what they show, and its slopes by state and motion."""
+        for which, (s, w, y, M) in enumerate(zip(samples, out_rows, ideal, J, strict=True)):
+            o = np.concatenate([own[which] for own, _, _ in pieces])
+            if o.size == 0:
+                continue
+            mine = np.concatenate([rows[:, b[which] : b[which + 1]] for _, b, rows in pieces], axis=1)
+            t = s.instants[o]
+            w[o] = mine[0]
+            read = np.empty((mine.shape[0], o.size, s.width))
+            for first in range(0, mine.shape[0], _BATCH):
+                part = slice(first, first + _BATCH)
+                read[part] = predicted(s.sensor, recording, values, t, mine[part])
+            for row, j in enumerate(motion_columns):
+                group, name, size, _ = columns[j]
+                if (group, name) in _ALSO_READ:  # it moves the readings of a given motion, too
+                    for place, sign in ((1 + d + row, 1.0), (1 + half + d + row, -1.0))[: 2 if central else 1]:
+                        moved_values = {**values, (group, name): _current(values, recording, group, name) + sign * size}
+                        read[place] = predicted(s.sensor, recording, moved_values, t, mine[place])
+            y[o] = read[0]
+            other, span = (read[1 + half :], 2.0 * widths) if central else (read[:1], widths)
+            slope = (read[1 : 1 + half] - other) / span[:, None, None]
+            M[o[:, None], :, moving] = np.moveaxis(slope, 0, 1)
+
+    waiting: list[tuple[list[IntArray], IntArray, FloatArray]] = []
     for i in range(k):
         start, stop = float(current.edges[i]), float(current.edges[i + 1])
         own = [np.flatnonzero(piece == i) for piece in piece_of]
@@ -611,8 +651,6 @@ def linearise(
         rows, ends = runner.run(
             np.ascontiguousarray(all_flats), np.concatenate(wobbles), np.ascontiguousarray(all_states), times, last, out
         )
-        half = d + len(motion_columns)
-        widths = np.concatenate([steps, [columns[j].step for j in motion_columns]])
         nominal_end = ends[0]
         end_tangent = difference(plant, ends[1:], np.broadcast_to(nominal_end, ends[1:].shape), d)
         if central:
@@ -621,38 +659,20 @@ def linearise(
             Phi_Psi = (end_tangent / widths[:, None]).T
         Phi, Psi = Phi_Psi[:, :d], Phi_Psi[:, d:]
 
-        for s, o, a, b, w, y, M in zip(samples, own, bounds[:-1], bounds[1:], out_rows, ideal, J, strict=True):
-            if o.size == 0:
-                continue
-            mine = rows[:, a:b]
-            t = s.instants[o]
-            w[o] = mine[0]
-            read = np.empty((mine.shape[0], o.size, s.width))
-            for first in range(0, mine.shape[0], _BATCH):
-                part = slice(first, first + _BATCH)
-                read[part] = predicted(s.sensor, recording, values, t, mine[part])
-            for row, j in enumerate(motion_columns):
-                group, name, size, _ = columns[j]
-                if (group, name) in _ALSO_READ:  # it moves the readings of a given motion, too
-                    for place, sign in ((1 + d + row, 1.0), (1 + half + d + row, -1.0))[: 2 if central else 1]:
-                        moved_values = {**values, (group, name): _current(values, recording, group, name) + sign * size}
-                        read[place] = predicted(s.sensor, recording, moved_values, t, mine[place])
-            y[o] = read[0]
-            other, span = (read[1 + half :], 2.0 * widths) if central else (read[:1], widths)
-            slope = (read[1 : 1 + half] - other) / span[:, None, None]
-            slope = np.moveaxis(slope, 0, -1)  # (m, width, half)
-            M[o[:, None], :, np.array([*range(d), *(d + j for j in motion_columns)])] = np.moveaxis(slope, 1, -1)
+        waiting.append((own, bounds, rows))
+        if i + 1 == k or sum(rows.shape[1] for *_, rows in waiting) >= _INSTANTS:
+            read_all(waiting)
+            waiting = []
 
         if i + 1 < k:
+            passes[i, :, :d], passes[i][:, d + np.array(motion_columns, dtype=int)] = Phi, Psi
             S[i + 1] = Phi @ S[i]
-            for row, j in enumerate(motion_columns):
-                S[i + 1, :, u + j] += Psi[:, row]
+            S[i + 1, :, u:] += passes[i, :, d:]
             closing[i + 1] = Phi @ closing[i]
             gap = difference(plant, current.states[i + 1], nominal_end, d)
             gaps[i] = gap
             first = d + i * allowed.size
             S[i + 1, allowed, first + np.arange(allowed.size)] += 1.0
-            forbidden = np.setdiff1d(np.arange(d), allowed)
             closing[i + 1, forbidden] -= gap[forbidden]
 
     # parameters of sensors and clocks, from the motion as it is
@@ -681,7 +701,7 @@ def linearise(
                 up = predicted(s.sensor, recording, {**here, (group, name): base + size}, s.instants, w)
                 down = predicted(s.sensor, recording, {**here, (group, name): base - size}, s.instants, w)
                 M[:, :, d + j] = (up - down) / (2.0 * size)
-    return _stack(current, samples, ideal, J, piece_of, S, closing, gaps, allowed, u)
+    return _stack(current, samples, ideal, J, piece_of, S, passes, closing, gaps, allowed, u)
 
 
 #: how the wobble of a free spin dies (1/s) and turns (rad/s), how that differs along and across the wind, and their
@@ -808,6 +828,7 @@ def _stack(
     J: Sequence[FloatArray],
     piece_of: Sequence[IntArray],
     S: FloatArray,
+    passes: FloatArray,
     closing: FloatArray,
     gaps: FloatArray,
     allowed: IntArray,
@@ -879,6 +900,7 @@ def _stack(
         kind,
         where,
         S,
+        passes,
         closing,
         gaps,
         joined(shifts),

@@ -40,6 +40,7 @@ def rows(*sizes: tuple[str, int], sd: float = 1.0, missing: tuple[int, ...] = ()
         jump_kind=np.empty(0, dtype=np.int64),
         jump_piece=np.empty(0, dtype=np.int64),
         moves=np.zeros((1, 0, 0)),
+        passes=np.zeros((0, 0, 0)),
         closing=np.zeros((1, 0)),
         gaps=np.zeros((0, 0)),
         shifts=np.zeros(at),
