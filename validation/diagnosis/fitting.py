@@ -423,7 +423,7 @@ def _gone_on(
     """
     hold = np.full(len(fit.chains), first)
     closed: Fit | None = None
-    settled, stuck = False, 0
+    settled, stuck, hops = False, 0, 0
     for done in range(iterations):
         reduced, (step, covariance, expected) = _solved(fit, hold)
         fit = replace(fit, covariance=covariance)
@@ -441,11 +441,17 @@ def _gone_on(
             better = better or going.all_by_one_share()
         else:
             better = going.all_by_one_share()
+            hops = hops + 1 if better is not None and _hopped(fit, better) else 0
         settled = better is None or (not open_gaps(fit) and fit.merit - better.merit < least)
         fit = better or fit
-        if settled or stuck == _STUCK:
+        if settled or stuck == _STUCK or hops == _HOPS:
             break
     return (closed if closed is not None and open_gaps(fit) else fit), settled
+
+
+def _hopped(fit: Fit, better: Fit) -> bool:
+    """Tell whether a free step has neither closed the pieces of a free spin nor brought it much nearer its data."""
+    return fit.chains[0].recording.plant == "free_spin" and open_gaps(better) and better.merit > _NO_NEARER * fit.merit
 
 
 def _better_closed(known: Fit | None, fit: Fit) -> Fit | None:
@@ -456,9 +462,12 @@ def _better_closed(known: Fit | None, fit: Fit) -> Fit | None:
 
 
 #: steps after which what a fit expects of the next is believed to be no better than where it will end
-_LOOKED = 3
+_LOOKED = 2
 #: held steps, which are short, as a multiple of free ones
 _HELD = 3
+#: a free step that leaves more than this share of the merit brings a free spin no nearer; after so many in turn short
+#: steps are taken (a fit that tied its pieces in free steps alone did so with at most one of them)
+_NO_NEARER, _HOPS = 0.98, 2
 #: so many held steps in turn of which no share served every recording lead nowhere
 _STUCK = 4
 #: tries at a step, and what a step that leads astray is shortened by

@@ -15,7 +15,7 @@ import numpy as np
 
 from discsim.recording import Recording
 from validation.diagnosis.board import Board, board_of, free_columns
-from validation.diagnosis.fitting import Fit, Parameter
+from validation.diagnosis.fitting import Fit, Parameter, merit_of
 from validation.diagnosis.noise import NoiseModel, chi_squared, estimate_noise, robust_noise
 from validation.diagnosis.relaxed import NO_JUMPS, relaxed, unknowns, without_outliers
 from validation.diagnosis.searches import EARLIEST, Shifted, searched
@@ -51,7 +51,7 @@ MOST_EFFECTS = 4
 REFITTED, REFITTED_AT_MOST = 4, 9
 #: chi-squared per reading, in the noise of the relaxed fit, below which a fit is near the data
 _NEAR = 1.2
-#: most steps of the baseline's fit: a free spin's is slow, and what it has left to gain is no candidate's
+#: most steps of the baseline's fit, and as many again where it comes near the data: a free spin's is slow
 _BASE_ITERATIONS = {"flight": 8, "free_spin": 16, "spin_down": 8, "rate_table": 8}
 #: a refit that will leave this many times the chi-squared of the best one so far is given up
 _HOPELESS = 10.0
@@ -133,6 +133,9 @@ def search(
     report("fitting the baseline", 2, 4)
     start = {**_start(board, Hypothesis(), own), **_wobbles(loose)}
     base = tied_fit(loose, Hypothesis(), own, noise, start, iterations=_BASE_ITERATIONS[plant])
+    if chi2_in(base, noise) < FAR * base.fit.count:
+        # beside the data what the baseline has left to gain would pass for what an effect gains
+        base = tied_fit(base.fit, Hypothesis(), own, base.fit.noise, values_of_fit(base), iterations=_BASE_ITERATIONS[plant])
     found = Search(tuple(as_stated or recordings), own, loose, noise, trials, base, base)
     found.outliers = left_out
     report("refitting candidates", 3, 4)
@@ -233,7 +236,8 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     here: list[Offer] = []
     if far or step == 0:
         ranked = one_per_effect(proposals(board, found.trials, current.hypothesis, found.own))
-        there += [(p, found.loose, 0.0) for p in ranked]
+        # beside the data a refit goes on from the present fit: from the pieces it would have to be tied again
+        there += [(p, found.loose, 0.0) if far else (_from_here(p, current), current.fit, 0.0) for p in ranked]
     if not far or step > 0:
         near = board_of(current.fit, found.trials, current.fit.noise, NO_JUMPS[found.recordings[0].plant])
         here += [
@@ -252,7 +256,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     fits: list[tuple[float, Tied, Fit, float]] = []
     seen: set[tuple[str, frozenset[int] | None]] = set()
     near_data = chi2_now < _NEAR * current.fit.count
-    best_chi2 = chi2_now
+    best_chi2, merit_now = chi2_now, merit_of(current.fit, current.fit.linears)
     for proposal, fit, cost in worth:
         key = (proposal.trial.id, proposal.trial.recordings)
         if key in seen:
@@ -269,7 +273,8 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
             found.own,
             noise if far else current.fit.noise,
             {**values_of_fit(current), **proposal.start, **_wobbles(fit)},
-            bar=_HOPELESS * best_chi2 if far else np.inf,
+            # beside the data it must gain half its price, as algebra said it would
+            bar=_HOPELESS * best_chi2 if far else merit_now - 0.5 * price(proposal.trial),
         )
         refitted = replace(refitted, score=refitted.score + found.cost + cost)
         gain, chi2 = _consider(found, (current.score, chi2_now), refitted, proposal.trial)

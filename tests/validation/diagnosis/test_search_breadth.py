@@ -19,17 +19,21 @@ RANKED = [Trial(id, ()) for id, row in CATALOGUE.items() if id.startswith(("mag.
 RIGHT = RANKED[6]
 
 
-def step(monkeypatch: pytest.MonkeyPatch, *, far: bool, right: Trial) -> tuple[str, list[str]]:
-    """Return what one step of the search adds, and what it refitted, where fits are not made but told."""
+def step(monkeypatch: pytest.MonkeyPatch, *, far: bool, right: Trial) -> tuple[str, list[str], list[float]]:
+    """Return what one step of the search adds, and what it refitted, where fits are not made but told.
+
+    Beside it the chi-squared per reading at which each was to be given up.
+    """
     recordings = coasts(seconds=1.0)
     fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), NO_JUMPS["spin_down"], {})
     linears = linearised(fit)
     fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
     base = Tied(Hypothesis(), fit, 1e6)
-    refitted = []
+    refitted, bars = [], []
 
-    def told(fit: Fit, hypothesis: Hypothesis, *others: object) -> Tied:
+    def told(fit: Fit, hypothesis: Hypothesis, *others: object, bar: float) -> Tied:
         refitted.append(hypothesis.trials[-1].id)
+        bars.append(bar / fit.count)
         return Tied(hypothesis, fit, 0.0 if hypothesis.trials[-1] == right else 5e5)
 
     def chi2(tied: Tied, noise: object) -> float:
@@ -48,21 +52,25 @@ def step(monkeypatch: pytest.MonkeyPatch, *, far: bool, right: Trial) -> tuple[s
     found = searching.Search(tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base)
     best = searching._next(found, None, base, 0)  # type: ignore[arg-type]
     assert best is not None
-    return best.hypothesis.trials[-1].id, refitted
+    return best.hypothesis.trials[-1].id, refitted, bars
 
 
 def test_far_from_the_data_more_is_refitted_until_something_comes_near(monkeypatch):
-    best, refitted = step(monkeypatch, far=True, right=RIGHT)
+    best, refitted, bars = step(monkeypatch, far=True, right=RIGHT)
     assert best == RIGHT.id
     assert refitted == [trial.id for trial in RANKED[:7]]
+    # ten times what was left before the first, and by the best of the others since
+    np.testing.assert_allclose(bars, [200.0, *6 * [180.0]])
 
 
 def test_what_comes_near_the_data_early_ends_the_search_at_four(monkeypatch):
-    best, refitted = step(monkeypatch, far=True, right=RANKED[1])
+    best, refitted, _ = step(monkeypatch, far=True, right=RANKED[1])
     assert best == RANKED[1].id
     assert len(refitted) == 4
 
 
 def test_near_the_data_four_are_refitted(monkeypatch):
-    _, refitted = step(monkeypatch, far=False, right=RIGHT)
+    _, refitted, bars = step(monkeypatch, far=False, right=RIGHT)
     assert len(refitted) == 4
+    # what has not come under this after its first steps cannot gain half of what an effect must
+    assert max(bars) < 1.1

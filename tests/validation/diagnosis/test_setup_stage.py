@@ -147,12 +147,12 @@ def test_a_field_that_dips_less_is_found_with_its_size_and_direction():
 
 
 def mended_map(advice: str) -> str:
-    """Return the csv map with the lines that an advice says to write into it: ``[table] key = value, key = value``."""
+    """Return the csv map with the lines that an advice says to write into it: ``[table] key = value and key = value``."""
     text = MAP.read_text()
     _, _, lines = advice.partition("write into the import map: ")
     for line in lines.split("; "):
         table, _, keys = line.partition("] ")
-        for key in re.split(r", (?=mirrored)", keys):
+        for key in re.split(r" and (?=mirrored)", keys):
             name = key.partition(" = ")[0]
             head, mark, tail = text.partition(f"{table}]\n")
             assert mark, line

@@ -63,5 +63,5 @@ def _axes_line(sensor: str, matrix: FloatArray, axes: Mapping[str, MapAxes] | No
         matrix = matrix @ own
     columns = np.argmax(np.abs(matrix), axis=1)
     names = [("-" if matrix[body, column] < 0 else "") + "xyz"[column] for body, column in enumerate(columns)]
-    mirrored = ", mirrored = true" if float(np.linalg.det(matrix)) < 0 else ""
+    mirrored = " and mirrored = true" if float(np.linalg.det(matrix)) < 0 else ""
     return f"[sensors.{sensor}] axes = {names}{mirrored}".replace("'", '"')
