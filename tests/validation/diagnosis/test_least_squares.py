@@ -248,3 +248,12 @@ def test_a_fit_that_ends_with_its_pieces_apart_goes_back_to_where_they_hung_toge
     assert not open_gaps(again)
     for before, after in zip(fit.chains, again.chains, strict=True):
         np.testing.assert_array_equal(after.states, before.states)
+
+
+def test_a_fit_that_will_stay_above_a_bar_is_left_where_it_stands():
+    fit = white(loose())
+    whole = refit(fit)
+    assert refit(fit, bar=2.0 * whole.merit).merit == whole.merit
+    given_up = refit(fit, bar=0.5 * whole.merit)
+    assert given_up.iterations < whole.iterations
+    assert given_up.merit > 0.5 * whole.merit
