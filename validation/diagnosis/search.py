@@ -135,7 +135,9 @@ def search(
     base = tied_fit(loose, Hypothesis(), own, noise, start, iterations=_BASE_ITERATIONS[plant])
     if chi2_in(base, noise) < FAR * base.fit.count:
         # beside the data what the baseline has left to gain would pass for what an effect gains
-        base = tied_fit(base.fit, Hypothesis(), own, base.fit.noise, values_of_fit(base), iterations=_BASE_ITERATIONS[plant])
+        base = tied_fit(
+            base.fit, Hypothesis(), own, base.fit.noise, values_of_fit(base), iterations=_BASE_ITERATIONS[plant]
+        )
     found = Search(tuple(as_stated or recordings), own, loose, noise, trials, base, base)
     found.outliers = left_out
     report("refitting candidates", 3, 4)

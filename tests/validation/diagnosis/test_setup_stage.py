@@ -147,7 +147,7 @@ def test_a_field_that_dips_less_is_found_with_its_size_and_direction():
 
 
 def mended_map(advice: str) -> str:
-    """Return the csv map with the lines that an advice says to write into it: ``[table] key = value and key = value``."""
+    """Return the csv map with what an advice says to write into it: ``[table] key = value and key = value``."""
     text = MAP.read_text()
     _, _, lines = advice.partition("write into the import map: ")
     for line in lines.split("; "):
