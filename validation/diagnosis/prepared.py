@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import BoolArray, FloatArray
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from validation.diagnosis.starts import FEWEST
@@ -96,24 +96,24 @@ def _shortened(samples: Samples, sheet: SensorSheet, longest: float) -> tuple[Sa
     interval = own.interval
     step = max(1, int(1.0 / (interval * FASTEST) + 1e-6)) if np.isfinite(interval) else 1
     value = _table(own).copy()[::step]
-    for axis in range(value.shape[1]):
-        if _stands(value[:, axis], sheet):
-            value[:, axis] = np.nan
+    value[:, _standing(value, sheet)] = np.nan
     if not np.any(np.isfinite(value)):
         return None, 1
     return Samples(own.t[::step], value.reshape(-1, *own.value.shape[1:])), step
 
 
-def _stands(value: FloatArray, sheet: SensorSheet) -> bool:
-    """Tell whether readings (n,) of an axis are one and the same number where noise would have moved them.
+def _standing(value: FloatArray, sheet: SensorSheet) -> BoolArray:
+    """Tell of which axes (k,) readings (n, k) are one and the same number where noise would have moved them.
 
-    Steps of resolution that are coarser than the noise, and sensors without noise, may stand still on a steady motion.
+    Steps of resolution that are coarser than the noise, and sensors without noise, may stand still on a steady motion;
+    what stands at its range all along says that the motion was beyond it.
     """
-    some = value[np.isfinite(value)]
-    coarse = sheet.noise_rms == 0.0 or (sheet.resolution or 0.0) > (sheet.noise_rms or 0.0)
-    # what stands at its range all along says that the motion was beyond it
-    clipped = some.size > 0 and bool(sheet.clipped(some[:1])[0])
-    return bool(some.size >= FEWEST and np.all(some == some[0]) and not coarse and not clipped)
+    known = np.isfinite(value)
+    if sheet.noise_rms == 0.0 or (sheet.resolution or 0.0) > (sheet.noise_rms or 0.0):
+        return np.zeros(value.shape[1], dtype=np.bool_)
+    top, bottom = np.where(known, value, -np.inf).max(axis=0), np.where(known, value, np.inf).min(axis=0)
+    clipped = np.any(sheet.clipped(value) & known, axis=0)
+    return np.asarray((np.sum(known, axis=0) >= FEWEST) & (top == bottom) & ~clipped)
 
 
 def _absent(recordings: Sequence[Recording], names: Sequence[str]) -> Iterator[str]:
@@ -133,10 +133,11 @@ def _notes(recording: Recording, sensor: str, samples: Samples, left: Samples | 
         dead = "holds no reading" if not np.any(finite) else "stands still at one value"
         yield f"the {sensor} {dead}: it is left out, and nothing is said of it."
         return
+    standing = _standing(value, sheet)
     for axis, column in enumerate(columns):
         if not np.any(finite[:, axis]):
             yield f"{column} of the {sensor} holds no reading: nothing is said of that axis."
-        elif _stands(value[:, axis], sheet):
+        elif standing[axis]:
             yield f"{column} of the {sensor} stands still at {value[finite[:, axis], axis][0]:g}: it is left out."
     if float(samples.t[-1]) > LONGEST[recording.plant]:
         yield (

@@ -205,6 +205,8 @@ def _of_gyroscope(
     known = np.isfinite(axial)
     if np.count_nonzero(known) < 0.5 * known.size:  # clipped: the sign alone
         column = int(np.argmax(np.abs(matrix[2])))
+        if signals.gyro_sign[column] == 0.0:  # not even that
+            return found
         axial = np.where(known, axial, matrix[2, column] * signals.gyro_sign[column] * np.abs(expected))
     return found + _judged("spin rate", both, axial - expected, _SPIN + _SPIN_SHARE * np.abs(rate))
 
