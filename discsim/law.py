@@ -32,7 +32,6 @@ __all__ = ["LAW_WIDTH", "SYMBOLS", "WRENCH_TARGETS", "Law", "law_wrench"]
 SYMBOLS = ("t", "h", "V", "alpha", "p_H", "q_H", "r", "x", "y", "z")
 #: what a law about motion may give: force and moment of the H frame, whose z axis is that of the body
 WRENCH_TARGETS = ("force_x_N", "force_y_N", "force_z_N", "moment_x_N_m", "moment_y_N_m", "moment_z_N_m")
-_SENSOR_ONLY = ("x", "y", "z")
 _FUNCTIONS = ("sign", "exp", "cos", "sin")
 _COUNT = len(SYMBOLS)
 #: a row of a law's numbers: place of its target, coefficient, of each symbol the power of its magnitude and its sign

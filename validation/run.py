@@ -9,6 +9,7 @@ import time
 from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypeVar
@@ -70,9 +71,9 @@ class Run:
     seed: int | None
     inputs: list[Path] = field(default_factory=list)
 
-    @property
+    @cached_property
     def rng(self) -> np.random.Generator:
-        """A fresh generator from the run's seed."""
+        """The run's generator, from its seed."""
         return np.random.default_rng(self.seed)
 
     def write_json(self, name: str, content: Any) -> None:

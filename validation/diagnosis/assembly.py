@@ -40,8 +40,8 @@ from validation.diagnosis.noise import NoiseModel, chi_squared
 from validation.diagnosis.places import located_effect, located_rest
 from validation.diagnosis.rest import remainders
 from validation.diagnosis.rows import user_effect
-from validation.diagnosis.search import FAR, Search, chi2_in, tried_without
-from validation.diagnosis.selection import Hypothesis, Tied, fitted_parameters
+from validation.diagnosis.search import FAR, Considered, Search, chi2_in, tried_without
+from validation.diagnosis.selection import Hypothesis, Tied, fitted_parameters, price
 from validation.diagnosis.trajectory_pieces import Linear
 from validation.diagnosis.trials import Trial, parameters_of
 
@@ -334,6 +334,13 @@ def _next_recordings(found: Search, verdict: Verdict, effects: Sequence[NamedEff
     return tuple(dict.fromkeys(told))
 
 
+def reason_for(considered: Considered, named: Sequence[Trial]) -> str:
+    """Return why a trial that was refitted is ``named``, or is not."""
+    if any(considered.trial.id == trial.id for trial in named):
+        return "named"
+    return "worth less than its price" if considered.gain <= price(considered.trial) else "another explains more"
+
+
 def assemble(
     found: Search,
     datasets: Sequence[str],
@@ -375,9 +382,7 @@ def assemble(
             float(c.gain),
             c.values,
             None if c.trial.recordings is None else tuple(names[i] for i in sorted(c.trial.recordings)),
-            "named"
-            if any(c.trial.id == t.id for t in trials)
-            else ("worth less than its price" if c.gain < 25 else "another explains more"),
+            reason_for(c, trials),
         )
         for c in sorted(found.considered, key=lambda c: -c.gain)
         if np.isfinite(c.gain) and all(np.isfinite(v) for v in c.values.values())

@@ -6,6 +6,7 @@ and what is left, small matrices over the shared parameters, answers every quest
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
@@ -43,7 +44,8 @@ __all__ = [
     "values_of",
 ]
 
-THREADS = 2
+#: recordings that are worked on at once, on as many threads as there are cores
+THREADS = len(os.sched_getaffinity(0))
 
 
 @dataclass(frozen=True)

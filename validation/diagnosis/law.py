@@ -45,8 +45,8 @@ _RIG_POWERS = (-1.0, 0.0, 0.5, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0)
 _AIR_POWERS = {"V": (0.0, 1.0, 2.0, 3.0), "r": (0.0, 1.0, 2.0), "alpha": (0.0, 1.0, 2.0)}
 #: half the differences in force and moment, N and N m; in an exponent
 _FORCE_STEP, _MOMENT_STEP, _RIG_STEP, _POWER_STEP = 2e-2, 2e-4, 2e-5, 1e-3
-#: an exponent is sought within this of where it starts, and one less certain than the second stays where it starts
-_POWER_SIGMA, _UNCERTAIN = 3.0, 0.5
+#: an exponent is sought within this of where it starts
+_POWER_SIGMA = 3.0
 #: candidates that are fitted, sums of exponents beyond which no physics goes
 _FITTED, _HIGHEST = 2, 5.0
 #: share of the best candidate's gain below which another is not fitted
@@ -444,22 +444,6 @@ def _asked_of_sensors(fit: Fit, own: Sequence[Parameter], terms: Sequence[Sensor
         chosen = [(columns[j], Parameter("term", columns[j].name, 0.0, 1.0)) for j in place]
         gains.append(base - board.ask([*taken, *chosen]).chi2)
     return gains
-
-
-def _without(chain: Chain, linear: Linear, term: SensorTerm, shape: float, coefficients: FloatArray) -> Chain:
-    """Return a chain whose readings are freed of a term; coefficients (axes, size)."""
-    changed = []
-    for readings in chain.readings:
-        if readings.sensor == term.sensor:
-            value = readings.value.copy()
-            for channel in linear.channels:
-                if channel.sensor == term.sensor:
-                    axis = readings.axes.index(channel.axis)
-                    basis = next(b for rows, _, b in _seen(linear, chain, term, shape) if rows == channel.rows)
-                    value[channel.index, axis] -= basis @ coefficients[axis]
-            readings = replace(readings, value=value)
-        changed.append(readings)
-    return replace(chain, readings=tuple(changed))
 
 
 def _fitted_sensor(start: Fit, own: Sequence[Parameter], own_at: FloatArray, term: SensorTerm) -> Tied | None:

@@ -7,14 +7,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeAlias
 
-__all__ = ["Progress", "shown", "silent"]
+__all__ = ["Progress", "shown"]
 
 #: called with what is being done, how much of it is done, and how much there is: ("screening", 3, 44)
 Progress: TypeAlias = Callable[[str, int, int], None]
-
-
-def silent(stage: str, done: int, total: int) -> None:
-    """Show nothing."""
 
 
 @contextmanager

@@ -46,7 +46,7 @@ _MEANINGS: Mapping[str, str] = MappingProxyType(
     {
         "consistent": "Nothing was added to the model. Parameters with a stated uncertainty moved within it.",
         "recalibrated": "Nothing was added to the model, but a stated value is off by more than its sigma allows.",
-        "explained": "With this in the model the rest is noise, also in recordings that took no part in the choice.",
+        "explained": "With this in the model the rest is noise.",
         "unexplained": "A significant mismatch remains. Nothing is named, because no known cause removes all of it.",
     }
 )

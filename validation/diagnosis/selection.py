@@ -91,11 +91,6 @@ class Tied:
     score: float
     residuals: tuple[FloatArray, ...] = field(default_factory=tuple)
 
-    @property
-    def rival_score(self) -> float:
-        """Score that charges for parameters, to compare hypotheses of different size."""
-        return self.score + RIVAL * self.hypothesis.size
-
 
 def price(trial: Trial) -> float:
     """Return what a trial must gain to be believed."""

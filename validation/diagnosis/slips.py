@@ -7,7 +7,6 @@ spins, a lost sample is a step in the phase of the readings; elsewhere only a mo
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -177,8 +176,3 @@ def repaired(recording: Recording, sensor: str, lost: FloatArray) -> Recording:
     samples = recording.samples[sensor]
     moved = Samples(samples.t + lost / recording.sheets[sensor].rate_hz, samples.value)
     return replace(recording, samples={**recording.samples, sensor: moved})
-
-
-def longest_run(lost: FloatArray) -> int:
-    """Return the most samples lost in a row."""
-    return max((int(b - a) for a, b in pairwise(lost)), default=0)

@@ -1,0 +1,30 @@
+"""Why a candidate that was refitted is not among the named effects."""
+
+from __future__ import annotations
+
+import pytest
+
+from validation.diagnosis.assembly import reason_for
+from validation.diagnosis.search import Considered
+from validation.diagnosis.selection import price
+from validation.diagnosis.trials import Trial
+
+BIAS, IMPULSE = Trial("gyro.bias", ()), Trial("event.impulse", ())
+
+
+def considered(trial: Trial, gain: float) -> Considered:
+    return Considered(trial, gain, gain, {})
+
+
+@pytest.mark.parametrize("trial", [BIAS, IMPULSE], ids=lambda trial: trial.id)
+def test_a_candidate_is_dear_or_beaten_by_its_own_price(trial):
+    assert reason_for(considered(trial, price(trial) - 1.0), []) == "worth less than its price"
+    assert reason_for(considered(trial, price(trial) + 1.0), []) == "another explains more"
+
+
+def test_an_event_costs_more_than_a_bias():
+    assert price(IMPULSE) > price(BIAS) > 25.0
+
+
+def test_what_is_named_has_no_reason_against_it():
+    assert reason_for(considered(BIAS, 100.0), [BIAS]) == "named"
