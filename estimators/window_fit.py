@@ -170,9 +170,10 @@ def _linear_start(
     """Write tone and mean by least squares: two equations."""
     n = tau.size
     overlap, mean, product = 0j, 0j, 0j
+    cosine, sine = np.empty(n), np.empty(n)
+    turns(rate * tau + 0.5 * chirp * tau**2, cosine, sine)
     for k in range(n):
-        phase = rate * tau[k] + 0.5 * chirp * tau[k] ** 2
-        tone = complex(cos(phase), -sin(phase))
+        tone = complex(cosine[k], -sine[k])
         overlap += tone
         mean += z[k]
         product += tone * z[k]
