@@ -49,6 +49,7 @@ LARGEST_MISFIT = 0.05
 #: along the axis, and the mean of two such across it).
 CORRECTION_SD = 0.042
 
+
 @dataclass(frozen=True)
 class LikelihoodSettings:
     """Settings of `likelihood`.

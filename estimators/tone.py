@@ -60,7 +60,9 @@ def turns(angle: FloatArray, cosine: FloatArray, sine: FloatArray) -> None:
     """
     for k in range(angle.size):
         quarter = floor(angle[k] * 0.6366197723675814 + 0.5)
-        r = ((angle[k] - quarter * 1.5707962512969970703) - quarter * 7.5497894158615963534e-8) - quarter * 5.3903028581581190529e-15
+        r = (
+            (angle[k] - quarter * 1.5707962512969970703) - quarter * 7.5497894158615963534e-8
+        ) - quarter * 5.3903028581581190529e-15
         s = r * r
         p = 1.58962301576546568060e-10 * s - 2.50507477628578072866e-8
         p = (p * s + 2.75573136213857245213e-6) * s - 1.98412698295895385996e-4

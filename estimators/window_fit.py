@@ -7,7 +7,7 @@ fit is kept unless another rate explains the data nearly as well.
 
 from __future__ import annotations
 
-from math import ceil, cos, floor, log, log2, pi, sin, sqrt
+from math import ceil, cos, log, log2, pi, sin, sqrt
 
 import numpy as np
 
@@ -85,8 +85,9 @@ def _transform(
 ) -> None:
     """Write the sums of z exp(-i w t) at the FFT's frequencies w = 2 pi k/(size interval), (size,), into ``total``.
 
-    t >= 0 (n,) are time stamps. Each is rounded to the grid and the rest d expanded, ``exp(-i w d) = sum (-i w d)^j/j!``:
-    one FFT per term, as many as leave less than a thousandth at half the sampling rate; one on an even grid.
+    t >= 0 (n,) are time stamps. Each is rounded to the grid and the rest d expanded,
+    ``exp(-i w d) = sum (-i w d)^j/j!``: one FFT per term, as many as leave less than a thousandth at half the sampling
+    rate; one on an even grid.
     """
     n = t.size
     slots = np.empty(n, dtype=np.int64)
@@ -139,7 +140,7 @@ def _powers_of(tone: ComplexArray, value: ComplexArray, mean: complex, n: int, s
 
 @compiled
 def _peaks(power: FloatArray, size: int, unit: float, rates: FloatArray) -> int:
-    """Write the frequencies, rad/s, of the highest local maxima, those above a tenth of the highest; return how many."""
+    """Write the frequencies, rad/s, of the highest local maxima above a tenth of the highest; return how many."""
     heights = np.full(_PEAKS, -1.0)
     places = np.zeros(_PEAKS, dtype=np.int64)
     for k in range(size):
@@ -248,7 +249,7 @@ def _chirped(
     """
     n = tau.size
     spacing = 4.0 / half**2
-    steps = int(ceil(min(150.0, 24 * spacing) / spacing))
+    steps = ceil(min(150.0, 24 * spacing) / spacing)
     rows = np.empty((2 * steps, 3))
     count = 0
     turned = np.empty(n, dtype=np.complex128)
