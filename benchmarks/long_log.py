@@ -131,7 +131,7 @@ def error(rates: Path) -> str:
             row = squares.setdefault(method, [0.0, 0.0, 0.0])
             row[0] += 1
             if rate:
-                truth = float(spin_rate(np.float64(t)))
+                truth = float(spin_rate(np.array(float(t))))
                 row[1] += 1
                 row[2] += ((abs(float(rate)) - truth) / float(sd)) ** 2
     return "; ".join(

@@ -63,7 +63,7 @@ def _compile(function: F, nogil: bool = False, forceinline: bool = False, reorde
     config: Any = numba.core.config
     before = config.CACHE_DIR
     config.CACHE_DIR = str(_cache_folder())
-    how = {"error_model": "numpy", "nogil": nogil, "forceinline": forceinline}
+    how: dict[str, Any] = {"error_model": "numpy", "nogil": nogil, "forceinline": forceinline}
     how["fastmath"] = {"reassoc", "nsz", "contract"} if reorder else False
     try:
         try:

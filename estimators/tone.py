@@ -199,7 +199,7 @@ def _assemble(
     for i in range(m):
         for j in range(i):
             normal[j, i] = normal[i, j]
-    return cost
+    return float(cost)
 
 
 @compiled

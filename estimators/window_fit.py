@@ -436,7 +436,7 @@ def search_windows(
                 power = np.empty(size)
             _transform(tau - tau[0], u, interval, size, wheel, work[:size], tone)
             _transform(tau - tau[0], z, interval, size, wheel, work[:size], work[size:])
-            mean = np.mean(z)
+            mean = np.sum(z) / n
             _powers_of(tone, work[size:], mean, n, size, power)
             count = _peaks(power, size, 1.0 / (size * interval), rates)
             starts = np.zeros((count + known, 2))
@@ -502,7 +502,7 @@ def turn_windows(
         x = tau / half
         z = m[lo:hi, 0] + 1j * m[lo:hi, 1]
         u = np.ones(n, dtype=np.complex128)
-        mean_z = np.mean(m[lo:hi, 2])
+        mean_z = float(np.mean(m[lo:hi, 2]))
         _linear_start(tau, z, half, start[index, 2], start[index, 4], powers, parameters)
         variance, steps, along = 0.0, 0, 0.0
         for _ in range(3):
