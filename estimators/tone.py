@@ -304,7 +304,8 @@ def fit_tone(
     if not cholesky_inverse(normal, covariance):
         return 0.0, -1
     spread = cost - weight * (parameters[powers + 3] ** 2 + parameters[powers + 4] ** 2)
-    return spread / freedom, steps
+    # of readings that are all alike rounding alone is left, of either sign
+    return max(0.0, spread / freedom), steps
 
 
 @compiled
