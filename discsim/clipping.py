@@ -12,6 +12,7 @@ limit are equal to the last digit, time after time, and nothing lies beyond them
 
 from __future__ import annotations
 
+import weakref
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -81,11 +82,33 @@ class Limits(NamedTuple):
         return float(np.nanmax(sizes)) if np.any(np.isfinite(sizes)) else float("nan")
 
 
+#: What `clipped` told of the last read-only arrays: a dozen callers ask the same of the same readings.
+_KNOWN: dict[int, tuple[weakref.ref[FloatArray], tuple[float | None, float | None], BoolArray]] = {}
+#: sensors of a recording, as read, made usable, and corrected
+_MOST_KNOWN = 16
+
+
 def clipped(value: FloatArray, stated_range: float | None, resolution: float | None) -> BoolArray:
     """Tell which of a sensor's readings, (n, k) or (n,), stand at its limit, stated or found.
 
     A whole sensor's readings are wanted: what its other axes and times show of its noise is part of the judgement.
     """
+    if value.flags.writeable or value.base is not None:
+        return _clipped(value, stated_range, resolution)
+    known = _KNOWN.get(id(value))
+    if known is not None and known[0]() is value and known[1] == (stated_range, resolution):
+        return known[2]
+    found = _clipped(value, stated_range, resolution)
+    found.flags.writeable = False
+    for key in [key for key, (array, _, _) in _KNOWN.items() if array() is None]:
+        del _KNOWN[key]
+    while len(_KNOWN) >= _MOST_KNOWN:
+        del _KNOWN[next(iter(_KNOWN))]
+    _KNOWN[id(value)] = (weakref.ref(value), (stated_range, resolution), found)
+    return found
+
+
+def _clipped(value: FloatArray, stated_range: float | None, resolution: float | None) -> BoolArray:
     table = value if value.ndim == 2 else value[:, None]
     step = resolution or step_of(table)
     found = at_range(table, stated_range, step)

@@ -6,13 +6,14 @@ import codecs
 import hashlib
 import os
 import tempfile
+from collections.abc import Iterable
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
 from discsim.errors import InputError
 
-__all__ = ["digest", "model_file", "model_names", "read_text", "write_bytes", "write_text"]
+__all__ = ["digest", "model_file", "model_names", "read_text", "write_bytes", "write_pieces", "write_text"]
 
 
 def read_text(path: Path) -> str:
@@ -33,11 +34,20 @@ def read_text(path: Path) -> str:
 
 def write_bytes(path: Path, content: bytes) -> None:
     """Write ``path`` through a temporary file beside it and one rename."""
+    _write(path, (content,))
+
+
+def write_pieces(path: Path, pieces: Iterable[str]) -> None:
+    """Write UTF-8 text with LF line ends as `write_text` does, a piece at a time: no more of it is held."""
+    _write(path, (piece.encode("utf-8") for piece in pieces))
+
+
+def _write(path: Path, pieces: Iterable[bytes]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
+            stream.writelines(pieces)
         umask = os.umask(0)
         os.umask(umask)
         os.chmod(temporary, 0o666 & ~umask)

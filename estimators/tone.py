@@ -8,13 +8,13 @@ The batch and the streaming estimator call the same functions, so they give the 
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
+from math import cos, floor, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discsim.arrays import FloatArray
-from discsim.compiled import compiled
+from discsim.compiled import compiled, compiled_sums
 
 __all__ = ["ComplexArray", "field_shape", "fit_tone"]
 
@@ -52,54 +52,154 @@ def cholesky_inverse(matrix: FloatArray, inverse: FloatArray) -> bool:
 
 
 @compiled
+def turns(angle: FloatArray, cosine: FloatArray, sine: FloatArray) -> None:
+    """Write cosine and sine of angles (n,), |angle| < 1e6 rad, to 1e-16: a loop that compilers do four at a time.
+
+    Quarter turns are taken off in three parts of pi/2 (Cody and Waite), then Taylor's series as economised in Moshier's
+    Cephes (sin.c) hold to 45 degrees.
+    """
+    for k in range(angle.size):
+        quarter = floor(angle[k] * 0.6366197723675814 + 0.5)
+        r = (
+            (angle[k] - quarter * 1.5707962512969970703) - quarter * 7.5497894158615963534e-8
+        ) - quarter * 5.3903028581581190529e-15
+        s = r * r
+        p = 1.58962301576546568060e-10 * s - 2.50507477628578072866e-8
+        p = (p * s + 2.75573136213857245213e-6) * s - 1.98412698295895385996e-4
+        p = (p * s + 8.33333333332211858878e-3) * s - 1.66666666666666307295e-1
+        y = r + r * s * p
+        q = -1.13585365213876817300e-11 * s + 2.08757008419747316778e-9
+        q = (q * s - 2.75573141792967388112e-7) * s + 2.48015872888517045348e-5
+        q = (q * s - 1.38888888888730564116e-3) * s + 4.16666666666665929218e-2
+        x = 1.0 - 0.5 * s + s * s * q
+        place = quarter - 4.0 * floor(0.25 * quarter)
+        odd = place == 1.0 or place == 3.0
+        c, d = (y, x) if odd else (x, y)
+        cosine[k] = -c if place == 1.0 or place == 2.0 else c
+        sine[k] = -d if place >= 2.0 else d
+
+
+#: Readings whose columns are held at once: 11 arrays of 256 numbers, 22 kB, stay in a core's first cache.
+BLOCK = 256
+
+
+@compiled_sums
+def _add_block(
+    x: FloatArray, z: FloatArray, u: FloatArray, parameters: FloatArray, p: int, sums: FloatArray, work: FloatArray
+) -> None:
+    """Add the sums of a block of readings, of which `_assemble` makes the normal equations, to ``sums``.
+
+    ``z`` and ``u`` (2, n) are real and imaginary parts, ``work`` (11, `BLOCK`) is overwritten. Columns are G x^j, H, 1,
+    i, A F and i A F with F = conj(E), H = E + c F and G = i A (E - c F): ``sums`` (9, 9) are moments with x^j of
+    conj(G) times G, H, 1, i, A F, i A F and the residual, and last the sums without G.
+    """
+    n = x.size
+    A, bx, by, cx, cy = parameters[p], parameters[p + 1], parameters[p + 2], parameters[p + 3], parameters[p + 4]
+    phase, power = work[0, :n], work[1, :n]
+    for k in range(n):
+        phase[k] = parameters[p - 1]
+    for j in range(p - 2, -1, -1):
+        for k in range(n):
+            phase[k] = phase[k] * x[k] + parameters[j]
+    turns(phase, work[2, :n], work[3, :n])
+    gx, gy, gg, gh, gf, gif, gr = work[4], work[5], work[6], work[7], work[8], work[9], work[10]
+    cost = sx = sy = hh = hx = hy = hf = hif = hr = fx = fy = ff = fr = fir = 0.0
+    for k in range(n):
+        ex = work[2, k] * u[0, k] - work[3, k] * u[1, k]
+        ey = work[2, k] * u[1, k] + work[3, k] * u[0, k]
+        # c F = c conj(E)
+        tx, ty = cx * ex + cy * ey, cy * ex - cx * ey
+        Hx, Hy = ex + tx, ey + ty
+        Gx, Gy = -A * (ey - ty), A * (ex - tx)
+        Fx, Fy = A * ex, -A * ey
+        rx, ry = z[0, k] - bx - A * Hx, z[1, k] - by - A * Hy
+        gx[k], gy[k] = Gx, Gy
+        gg[k] = Gx * Gx + Gy * Gy
+        gh[k] = Gx * Hx + Gy * Hy
+        gf[k] = Gx * Fx + Gy * Fy
+        gif[k] = Gy * Fx - Gx * Fy
+        gr[k] = Gx * rx + Gy * ry
+        power[k] = 1.0
+        cost += rx * rx + ry * ry
+        sx += rx
+        sy += ry
+        hh += Hx * Hx + Hy * Hy
+        hx += Hx
+        hy += Hy
+        hf += Hx * Fx + Hy * Fy
+        hif += Hy * Fx - Hx * Fy
+        hr += Hx * rx + Hy * ry
+        fx += Fx
+        fy += Fy
+        ff += Fx * Fx + Fy * Fy
+        fr += Fx * rx + Fy * ry
+        fir += Fx * ry - Fy * rx
+    for j in range(p):
+        a = b = c = d = e = f = g = 0.0
+        for k in range(n):
+            w = power[k]
+            g += w * gg[k]
+            a += w * gh[k]
+            b += w * gx[k]
+            c += w * gy[k]
+            d += w * gf[k]
+            e += w * gif[k]
+            f += w * gr[k]
+            power[k] = w * x[k]
+        for i, value in enumerate((g, a, b, c, d, e, f)):
+            sums[i, j] += value
+    for j in range(p, 2 * p - 1):
+        g = 0.0
+        for k in range(n):
+            g += power[k] * gg[k]
+            power[k] *= x[k]
+        sums[0, j] += g
+    for i, value in enumerate((cost, sx, sy, hh, hx, hy, hf, hif, hr)):
+        sums[7, i] += value
+    for i, value in enumerate((fx, fy, ff, fr, fir)):
+        sums[8, i] += value
+
+
+@compiled
 def _assemble(
     x: FloatArray,
-    z: ComplexArray,
-    u: ComplexArray,
+    z: FloatArray,
+    u: FloatArray,
     parameters: FloatArray,
-    powers: int,
+    p: int,
     ellipse_weight: float,
     normal: FloatArray,
     right: FloatArray,
+    work: FloatArray,
 ) -> float:
-    """Fill the normal equations at ``parameters``; return the sum of squares with the prior's share."""
-    m = parameters.size
-    normal[:] = 0.0
-    right[:] = 0.0
-    row = np.empty(m, dtype=np.complex128)
-    amplitude = parameters[powers]
-    b = complex(parameters[powers + 1], parameters[powers + 2])
-    c = complex(parameters[powers + 3], parameters[powers + 4])
-    cost = 0.0
-    for k in range(z.size):
-        phase = 0.0
-        for j in range(powers - 1, -1, -1):
-            phase = phase * x[k] + parameters[j]
-        E = u[k] * complex(cos(phase), sin(phase))
-        F = E.conjugate()
-        residual = z[k] - b - amplitude * (E + c * F)
-        cost += residual.real**2 + residual.imag**2
-        value = 1j * amplitude * (E - c * F)
-        for j in range(powers):
-            row[j] = value
-            value = value * x[k]
-        row[powers] = E + c * F
-        row[powers + 1] = 1.0
-        row[powers + 2] = 1j
-        row[powers + 3] = amplitude * F
-        row[powers + 4] = 1j * amplitude * F
-        for i in range(m):
-            right[i] += row[i].real * residual.real + row[i].imag * residual.imag
-            for j in range(i + 1):
-                normal[i, j] += row[i].real * row[j].real + row[i].imag * row[j].imag
-    for i in (powers + 3, powers + 4):
+    """Fill the normal equations at ``parameters``, p of them of the phase; return the cost with the prior's share."""
+    n, m = x.size, parameters.size
+    sums = np.zeros((9, 9))
+    for start in range(0, n, BLOCK):
+        stop = min(start + BLOCK, n)
+        _add_block(x[start:stop], z[:, start:stop], u[:, start:stop], parameters, p, sums, work)
+    for i in range(p):
+        for j in range(i + 1):
+            normal[i, j] = sums[0, i + j]
+        for column in range(5):
+            normal[p + column, i] = sums[1 + column, i]
+        right[i] = sums[6, i]
+    cost, sx, sy = sums[7, 0], sums[7, 1], sums[7, 2]
+    hh, hx, hy, hf, hif, hr = sums[7, 3], sums[7, 4], sums[7, 5], sums[7, 6], sums[7, 7], sums[7, 8]
+    fx, fy, ff, fr, fir = sums[8, 0], sums[8, 1], sums[8, 2], sums[8, 3], sums[8, 4]
+    normal[p, p], normal[p + 1, p], normal[p + 2, p], normal[p + 3, p], normal[p + 4, p] = hh, hx, hy, hf, hif
+    normal[p + 1, p + 1], normal[p + 2, p + 1], normal[p + 3, p + 1], normal[p + 4, p + 1] = n, 0.0, fx, -fy
+    normal[p + 2, p + 2], normal[p + 3, p + 2], normal[p + 4, p + 2] = n, fy, fx
+    normal[p + 3, p + 3], normal[p + 4, p + 3], normal[p + 4, p + 4] = ff, 0.0, ff
+    right[p], right[p + 1], right[p + 2], right[p + 3], right[p + 4] = hr, sx, sy, fr, fir
+    for i in (p + 3, p + 4):
         normal[i, i] += ellipse_weight
         right[i] -= ellipse_weight * parameters[i]
         cost += ellipse_weight * parameters[i] ** 2
     for i in range(m):
         for j in range(i):
             normal[j, i] = normal[i, j]
-    return cost
+    return float(cost)
 
 
 @compiled
@@ -140,6 +240,10 @@ def fit_tone(
     """
     m = parameters.size
     n = z.size
+    parts, shape, work = np.empty((2, n)), np.empty((2, n)), np.empty((11, BLOCK))
+    for k in range(n):
+        parts[0, k], parts[1, k] = z[k].real, z[k].imag
+        shape[0, k], shape[1, k] = u[k].real, u[k].imag
     freedom = max(1, 2 * n - (m - 2))
     normal = np.empty((m, m))
     right = np.empty(m)
@@ -150,10 +254,10 @@ def fit_tone(
     weight = 0.0
     if noise > 0.0:
         weight = (noise / ellipse_sd) ** 2
-    cost = _assemble(x, z, u, parameters, powers, weight, normal, right)
+    cost = _assemble(x, parts, shape, parameters, powers, weight, normal, right, work)
     if noise <= 0.0:
         weight = cost / freedom / ellipse_sd**2
-        cost = _assemble(x, z, u, parameters, powers, weight, normal, right)
+        cost = _assemble(x, parts, shape, parameters, powers, weight, normal, right, work)
     damping = 0.0
     steps = 0
     while steps < iterations:
@@ -174,7 +278,7 @@ def fit_tone(
                 step += covariance[i, j] * right[j]
             trial[i] = parameters[i] + step
             decrement += step * right[i]
-        trial_cost = _assemble(x, z, u, trial, powers, weight, trial_normal, trial_right)
+        trial_cost = _assemble(x, parts, shape, trial, powers, weight, trial_normal, trial_right, work)
         if trial_cost <= cost * (1 + 1e-12):
             parameters[:] = trial
             normal[:] = trial_normal
@@ -200,7 +304,8 @@ def fit_tone(
     if not cholesky_inverse(normal, covariance):
         return 0.0, -1
     spread = cost - weight * (parameters[powers + 3] ** 2 + parameters[powers + 4] ** 2)
-    return spread / freedom, steps
+    # of readings that are all alike rounding alone is left, of either sign
+    return max(0.0, spread / freedom), steps
 
 
 @compiled

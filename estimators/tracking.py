@@ -12,20 +12,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
-from math import cos, sin, sqrt
-from typing import Any
+from math import sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from discsim.arrays import BoolArray, FloatArray
-from discsim.compiled import compiled
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples
 from estimators.likelihood import LEAST, LikelihoodSettings, ToneFit, fit_windows, span_of, usable_field, window_centres
 from estimators.precession import STRENGTH_SD, AxialField, axial_field, transverse_gyroscope, transverse_rates
 from estimators.rate import YawRate
-from estimators.spin_spline import IndexArray, SpinSpline
+from estimators.spin_spline import SpinSpline
+from estimators.turning_field import add_normal_equations, integrate
 from estimators.usable import remembered, unclipped
 
 __all__ = [
@@ -139,64 +139,6 @@ class Track:
     gyroscope_gain: complex = 0j
 
 
-@compiled
-def _integrate(
-    times: FloatArray,
-    substeps: int,
-    r: FloatArray,
-    body_re: FloatArray,
-    body_im: FloatArray,
-    despun_re: FloatArray,
-    despun_im: FloatArray,
-    attitude: FloatArray,
-    psi_at: FloatArray,
-    axes: FloatArray,
-    psi_middle: FloatArray,
-) -> None:
-    """Integrate the attitude from rates at the middle of equal sub-steps between ``times`` (n,).
-
-    Written: ``attitude`` (n, 3, 3) C_BN, the identity at the first time; ``psi_at`` (n,) the angle turned;
-    ``axes`` (k, 3, 3), whose rows are the axes of the frame that does not spin, in N, at the middle of each sub-step,
-    and ``psi_middle`` (k,). Transverse rates (k,) are the sum of those given in the body and in the frame that does
-    not spin.
-    """
-    D = np.eye(3)
-    psi = 0.0
-    attitude[0] = D
-    psi_at[0] = 0.0
-    for k in range(times.size - 1):
-        h = (times[k + 1] - times[k]) / substeps
-        for j in range(substeps):
-            s = k * substeps + j
-            middle = psi + 0.5 * h * r[s]
-            p, q = body_re[s], body_im[s]
-            # C3(psi)^T takes body components to the frame that does not spin
-            a = cos(middle) * p - sin(middle) * q + despun_re[s]
-            b = sin(middle) * p + cos(middle) * q + despun_im[s]
-            # exp(-[v x]) with v = (a, b, 0) h/2 twice, so that the axes are there at the middle too
-            x, y = 0.5 * h * a, 0.5 * h * b
-            angle = sqrt(x * x + y * y)
-            f1 = sin(angle) / angle if angle > 1e-9 else 1.0
-            f2 = (1.0 - cos(angle)) / (angle * angle) if angle > 1e-4 else 0.5
-            for half in range(2):
-                for i in range(3):
-                    d0, d1, d2 = D[0, i], D[1, i], D[2, i]
-                    dot = x * d0 + y * d1
-                    D[0, i] = d0 - f1 * y * d2 + f2 * (x * dot - angle * angle * d0)
-                    D[1, i] = d1 + f1 * x * d2 + f2 * (y * dot - angle * angle * d1)
-                    D[2, i] = d2 - f1 * (x * d1 - y * d0) - f2 * angle * angle * d2
-                if half == 0:
-                    axes[s] = D
-                    psi_middle[s] = middle
-            psi += h * r[s]
-        c, si = cos(psi), sin(psi)
-        for i in range(3):
-            attitude[k + 1, 0, i] = c * D[0, i] + si * D[1, i]
-            attitude[k + 1, 1, i] = -si * D[0, i] + c * D[1, i]
-            attitude[k + 1, 2, i] = D[2, i]
-        psi_at[k + 1] = psi
-
-
 def _segments(t: FloatArray, settings: TrackingSettings) -> list[tuple[float, float]]:
     """Cut start..stop into pieces of at most ``segment`` that share ``overlap`` with their neighbours."""
     start, stop = float(t[0]), float(t[-1])
@@ -206,6 +148,21 @@ def _segments(t: FloatArray, settings: TrackingSettings) -> list[tuple[float, fl
         (start + i * (length - settings.overlap), start + i * (length - settings.overlap) + length)
         for i in range(count)
     ]
+
+
+class _Turned(NamedTuple):
+    """What the model makes of the field, at times t (n,) and in the middle of sub-steps (k,).
+
+    ``residual`` (n, 3) uT, ``psi`` (n,) the angle turned, ``field`` (n, 3) in B before the irons, ``attitude``
+    (n, 3, 3), ``axes`` (k, 3, 3) of the frame that does not spin, ``psi_middle`` (k,).
+    """
+
+    residual: FloatArray
+    psi: FloatArray
+    field: FloatArray
+    attitude: FloatArray
+    axes: FloatArray
+    psi_middle: FloatArray
 
 
 class _Problem:
@@ -316,8 +273,8 @@ class _Problem:
 
     # -------------------------------------------------------------------------------- model
 
-    def evaluate(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the magnetometer's residual (n, 3), its derivative (n, 3, size) and the angle turned (n,)."""
+    def evaluate(self, x: FloatArray) -> _Turned:
+        """Return what the model makes of the field at the parameters x."""
         spin, transverse, vector, iron, soft = self.parts[:5]
         c = x[spin]
         r = np.einsum("ki,ki->k", self.weights, c[self.first[:, None] + np.arange(4)])
@@ -332,48 +289,36 @@ class _Problem:
         n, k = self.t.size, self.middle.size
         C, psi = np.empty((n, 3, 3)), np.empty(n)
         axes, psi_middle = np.empty((k, 3, 3)), np.empty(k)
-        _integrate(
+        integrate(
             self.t, self.substeps, r, np.ascontiguousarray(w.real), np.ascontiguousarray(w.imag),
             np.ascontiguousarray(unread.real), np.ascontiguousarray(unread.imag), C, psi, axes, psi_middle,
         )  # fmt: skip
-        m0 = x[vector]
-        M = np.eye(3) + _symmetric(x[soft])
-        turned = C @ m0
-        residual = self.m - turned @ M.T - x[iron]
-        MC = M @ C
-        J = np.zeros((n, 3, self.size))
-        # rotation vectors in N per unit of each parameter, summed up to each time
-        if self.despun:
-            weight = _accumulate(self.first, self.weights * self.h[:, None], self.interval, n, self.spline.size)
-            theta = weight[:, :, None] * C[:, None, 2, :]
-        else:
-            moment = self.weights[:, :, None] * (self.h[:, None] * axes[:, 2, :])[:, None, :]
-            theta = _accumulate(self.first, moment, self.interval, n, self.spline.size)
-        # theta @ skew = m0 x theta, by which the field turns in N
-        skew = np.array([[0.0, m0[2], -m0[1]], [-m0[2], 0.0, m0[0]], [m0[1], -m0[0], 0.0]])
-        J[:, :, spin] = MC @ np.swapaxes(theta @ skew, 1, 2)
-        if self.slow is not None:
-            for i in range(2):
-                moment = self.slow_weights[:, :, None] * (self.h[:, None] * axes[:, i, :])[:, None, :]
-                theta = _accumulate(self.slow_first, moment, self.interval, n, self.slow.size)
-                first = transverse.start + self.read + i * self.slow.size
-                J[:, :, first : first + self.slow.size] = MC @ np.swapaxes(theta @ skew, 1, 2)
+        turned = C @ x[vector]
+        residual = self.m - turned @ (np.eye(3) + _symmetric(x[soft])).T - x[iron]
+        return _Turned(residual, psi, turned, C, axes, psi_middle)
+
+    def add_field(
+        self, x: FloatArray, at: _Turned, scale: FloatArray, information: FloatArray, right: FloatArray
+    ) -> None:
+        """Add the magnetometer's normal equations at x, each reading (n,) times ``scale``."""
+        _, transverse, vector, _, soft = self.parts[:5]
+        n, k = self.t.size, self.middle.size
+        total = np.zeros((n, self.read, 3))
         if self.read:
-            cm, sm = np.cos(psi_middle)[:, None], np.sin(psi_middle)[:, None]
-            ex = cm * axes[:, 0] + sm * axes[:, 1]
-            ey = -sm * axes[:, 0] + cm * axes[:, 1]
+            cm, sm = np.cos(at.psi_middle)[:, None], np.sin(at.psi_middle)[:, None]
+            ex = cm * at.axes[:, 0] + sm * at.axes[:, 1]
+            ey = -sm * at.axes[:, 0] + cm * at.axes[:, 1]
             read = self.w - complex(*x[transverse][:2])
             p, q = read.real[:, None], read.imag[:, None]
             moment = np.stack([-ex, -ey, p * ex + q * ey, p * ey - q * ex], 1) * self.h[:, None, None]
-            total = np.zeros((n, 4, 3))
             total[1:] = np.cumsum(np.add.reduceat(moment, np.arange(0, k, self.substeps), axis=0), axis=0)
-            J[:, :, transverse.start : transverse.start + 4] = MC @ np.swapaxes(total @ skew, 1, 2)
-        J[:, :, vector] = MC
-        J[:, :, iron] = np.eye(3)
-        for column, (i, j) in enumerate(_SOFT):
-            J[:, i, soft.start + column] = turned[:, j]
-            J[:, j, soft.start + column] = turned[:, i]
-        return residual, J, psi
+        none = self.slow is None
+        add_normal_equations(
+            self.substeps, self.h, at.axes, at.attitude, np.eye(3) + _symmetric(x[soft]), x[vector], at.field,
+            at.residual, scale, self.despun, self.first, self.weights, self.spline.size,
+            self.first if none else self.slow_first, self.weights if none else self.slow_weights,
+            0 if self.slow is None else self.slow.size, total, information, right,
+        )  # fmt: skip
 
     def evaluate_rows(self, x: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
         """Return the whitened residual and derivative of each other sensor's rows."""
@@ -407,19 +352,8 @@ class _Problem:
         return out
 
 
-_SOFT = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-
-
 def _symmetric(s: FloatArray) -> FloatArray:
     return np.array([[s[0], s[1], s[2]], [s[1], s[3], s[4]], [s[2], s[4], s[5]]])
-
-
-def _accumulate(first: IndexArray, moment: FloatArray, interval: IndexArray, n: int, size: int) -> FloatArray:
-    """Sum ``moment`` (k, 4, ...) of four coefficients from ``first`` (k,) on, up to each of n times: (n, size, ...)."""
-    total = np.zeros((n, size, *moment.shape[2:]))
-    for i in range(4):
-        np.add.at(total, (interval + 1, first + i), moment[:, i])
-    return np.asarray(np.cumsum(total, axis=0))
 
 
 # ---------------------------------------------------------------------------------------------- solution
@@ -451,12 +385,11 @@ _CHANGE = 5.0 * (0.33 / 18.0 / 5.0) ** 2
 def _linearise(
     problem: _Problem, x: FloatArray, noise: float, weights: FloatArray, precision: FloatArray, mean: FloatArray
 ) -> tuple[_Linear, FloatArray, FloatArray]:
-    residual, J, psi = problem.evaluate(x)
-    scaled = weights[:, None] / noise
-    flat = (J * scaled[:, :, None]).reshape(-1, problem.size)
-    error = (residual * scaled).ravel()
-    information = flat.T @ flat + precision
-    right = flat.T @ error - precision @ (x - mean)
+    at = problem.evaluate(x)
+    error = (at.residual * (weights[:, None] / noise)).ravel()
+    information = precision.copy()
+    right = -precision @ (x - mean)
+    problem.add_field(x, at, weights / noise, information, right)
     cost = float(error @ error + (x - mean) @ precision @ (x - mean))
     for row_error, row_J in problem.evaluate_rows(x):
         # a reading far outside its calibration's reach must not bend the track: Huber's weight at four sigma
@@ -477,7 +410,7 @@ def _linearise(
         cost += gap**2
     if not (np.isfinite(cost) and np.all(np.isfinite(information))):
         raise np.linalg.LinAlgError("the fit has left the numbers")
-    return _Linear(information, right, cost), residual, psi
+    return _Linear(information, right, cost), at.residual, at.psi
 
 
 def _with_roughness(
@@ -665,7 +598,7 @@ def track_spin(
     x = _start(problem, start_rate, axial)
     precession = settings.precession
     weights = np.ones(t.size)
-    residual, _, _ = problem.evaluate(x)
+    residual = problem.evaluate(x).residual
     floor = 0.7 * noise if noise else 1e-6
     sigma = max(float(np.sqrt(np.mean(residual**2))), floor)
     roughness = 100.0
@@ -744,14 +677,15 @@ def _start(problem: _Problem, start_rate: FloatArray, axial: AxialField | None) 
     x[problem.parts[0]] = np.linalg.solve(B.T @ B + 1e-4 * rows.T @ rows, B.T @ start_rate)
     for part, row in zip(problem.parts[5:], problem.rows, strict=True):
         x[part] = row.calibration
-    residual, J, _ = problem.evaluate(x)  # the field is zero: residual = m, derivative by field = C
+    at = problem.evaluate(x)  # the field is zero: residual = m, derivative by field = C
     vector, iron = problem.parts[2], problem.parts[3]
-    columns = np.concatenate([J[:, :, vector], J[:, :, iron]], axis=2).reshape(-1, 6)
+    steady = np.broadcast_to(np.eye(3), at.attitude.shape)
+    columns = np.concatenate([at.attitude, steady], axis=2).reshape(-1, 6)
     # along z field and hard iron are nearly the same column: draw the latter to its first guess
     guess = np.array([0.0, 0.0, 0.0, 0.0, 0.0, axial.offset if axial is not None else 0.0])
     weight = np.diag([1e-9, 1e-9, 1e-9, 1e-6, 1e-6, 10.0])
     x[vector.start : iron.stop] = np.linalg.solve(
-        columns.T @ columns + weight, columns.T @ residual.ravel() + weight @ guess
+        columns.T @ columns + weight, columns.T @ at.residual.ravel() + weight @ guess
     )
     return x
 

@@ -15,8 +15,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
+from discsim.arrays import FloatArray
 from discsim.files import write_bytes
 from estimators.rate import YawRate
+from estimators.spin_spline import IndexArray
 
 __all__ = ["COLOURS", "STYLE", "colour", "draw_differences", "draw_rates", "new_figure", "save_figure", "symmetric_log"]
 
@@ -113,14 +115,17 @@ def draw_rates(axes: Axes, rates: Sequence[YawRate]) -> None:
         if not known.any():
             axes.plot([], [], color=shade, label=f"{rate.method} (unknown throughout)")
             continue
-        axes.fill_between(rate.t, value - sd, value + sd, where=known.tolist(), color=shade, alpha=0.2, lw=0)
         isolated = known & ~np.append(known[1:], False) & ~np.append(False, known[:-1])
-        axes.plot(rate.t, value, color=shade, label=rate.method, **look)
-        axes.plot(rate.t[isolated], value[isolated], ".", color=shade, ms=3)
+        _band(axes, rate.t, value, sd, shade)
+        chosen = _outline(rate.t, value)
+        axes.plot(rate.t[chosen], value[chosen], color=shade, label=rate.method, **look)
+        lone = chosen[isolated[chosen]]
+        axes.plot(rate.t[lone], value[lone], ".", color=shade, ms=3)
         if rate.lower is not None and rate.upper is not None:
             for number, bound in enumerate((rate.lower, rate.upper)):
                 label = f"{rate.method}, worst case (11)" if number == 0 else None
-                axes.plot(rate.t, np.degrees(bound), color=shade, lw=0.7, ls=":", label=label)
+                at = _outline(rate.t, bound)
+                axes.plot(rate.t[at], np.degrees(bound[at]), color=shade, lw=0.7, ls=":", label=label)
     shown = np.concatenate([np.degrees(np.abs(r.rate) if signless else r.rate) for r in rates] or [np.zeros(0)])
     shown = shown[np.isfinite(shown)]
     if shown.size:
@@ -143,12 +148,45 @@ def draw_differences(axes: Axes, rates: Sequence[YawRate], reference: YawRate) -
         signless = not (rate.signed and reference.signed)
         value = np.degrees(np.abs(rate.rate) - np.abs(middle) if signless else rate.rate - middle)
         shade, sd = colour(rate.method, names), np.degrees(rate.sd)
-        known = np.isfinite(value)
-        axes.fill_between(rate.t, value - sd, value + sd, where=known.tolist(), color=shade, alpha=0.2, lw=0)
-        axes.plot(rate.t, value, color=shade, lw=0.9)
+        _band(axes, rate.t, value, sd, shade)
+        chosen = _outline(rate.t, value)
+        axes.plot(rate.t[chosen], value[chosen], color=shade, lw=0.9)
     symmetric_log(axes, linear=10.0, limit=300.0)
     axes.set_xlabel("time (s)")
     axes.set_ylabel(f"rate less {reference.method} (deg/s)")
+
+
+#: Columns of pixels of the widest figure: 10 inches of 150 dots. Of more readings than four to a column (first, least,
+#: greatest and last draw the same line) only those are drawn.
+_COLUMNS = 1500
+
+
+def _outline(t: FloatArray, value: FloatArray) -> IndexArray:
+    """Return which of values (n,) over t to draw: of each column of pixels the first, least, greatest and last known.
+
+    One unknown value of a column that has any stays, so that a gap does. All where they are few.
+    """
+    if t.size <= 4 * _COLUMNS:
+        return np.arange(t.size)
+    column = np.minimum(((t - t[0]) / (t[-1] - t[0]) * _COLUMNS).astype(np.int64), _COLUMNS - 1)
+    known = np.isfinite(value)
+    first = np.flatnonzero(np.diff(column, prepend=-1))
+    last = np.append(first[1:], t.size) - 1
+    kept = [first, last]
+    for worst, pick in ((np.inf, np.minimum), (-np.inf, np.maximum)):
+        best = np.repeat(pick.reduceat(np.where(known, value, worst), first), last - first + 1)
+        same = np.flatnonzero(known & (value == best))
+        kept.append(same[np.unique(column[same], return_index=True)[1]])
+    gaps = np.flatnonzero(~known)
+    kept.append(gaps[np.unique(column[gaps], return_index=True)[1]])
+    return np.unique(np.concatenate(kept))
+
+
+def _band(axes: Axes, t: FloatArray, value: FloatArray, sd: FloatArray, shade: str) -> None:
+    """Fill one standard deviation on either side of values (n,), of each column of pixels the outermost."""
+    chosen = np.union1d(_outline(t, value - sd), _outline(t, value + sd))
+    t, value, sd = t[chosen], value[chosen], sd[chosen]
+    axes.fill_between(t, value - sd, value + sd, where=np.isfinite(value).tolist(), color=shade, alpha=0.2, lw=0)
 
 
 def _scatter(rate: YawRate) -> float:

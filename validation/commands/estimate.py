@@ -10,7 +10,7 @@ import typer
 from validation.options import DateOption, OutOption, PlaceOption
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from discsim.recording import Recording
     from estimators.methods import Options
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from validation.comparison import Disagreement
 
 __all__ = ["all_notes", "command", "estimate_all", "rate_csv", "summary"]
+
+#: rows of rate.csv put into words at once: their text, a few MB, is all that is held of it
+_ROWS = 50_000
 
 
 def command(
@@ -54,7 +57,7 @@ def command(
 
     import numpy as np
 
-    from discsim.files import write_text
+    from discsim.files import write_pieces
     from discsim.recording import read_recording
     from estimators.accelerometer import AccelerometerErrors
     from estimators.fft import FftSettings
@@ -78,7 +81,7 @@ def command(
     notes += all_notes(data)
     found = disagreements(rates)
     with start_run(out, inputs=[recording]) as run:
-        write_text(out / "rate.csv", rate_csv(rates))
+        write_pieces(out / "rate.csv", rate_csv(rates))
         run.write_json("estimate.json", summary(data, method, rates, left_out, found, notes))
         draw(rates, data.name, out / "rate.png")
     _print(rates, left_out, found, notes)
@@ -137,14 +140,16 @@ def all_notes(recording: Recording) -> list[str]:
     return [*sound.notes, *(line for notes in about for line in notes(data))]
 
 
-def rate_csv(rates: Sequence[YawRate]) -> str:
-    """Return the text of rate.csv: method by method in time order, cells empty where a value is unknown."""
-    lines = ["time_s,method,rate_rad_s,sd_rad_s"]
+def rate_csv(rates: Sequence[YawRate]) -> Iterator[str]:
+    """Yield the text of rate.csv in pieces: method by method in time order, cells empty where a value is unknown."""
+    yield "time_s,method,rate_rad_s,sd_rad_s\n"
     for rate in rates:
-        for t, value, sd in zip(rate.t.tolist(), rate.rate.tolist(), rate.sd.tolist(), strict=True):
-            known = "," if value != value else f"{value:.9g},{sd:.4g}"  # value != value: NaN
-            lines.append(f"{t:.9g},{rate.method},{known}")
-    return "\n".join([*lines, ""])
+        known, unknown = f"%.9g,{rate.method},%.9g,%.4g\n", f"%.9g,{rate.method},,\n"
+        for first in range(0, len(rate), _ROWS):
+            part = slice(first, first + _ROWS)
+            rows = zip(rate.t[part].tolist(), rate.rate[part].tolist(), rate.sd[part].tolist(), strict=True)
+            # row[1] != row[1]: NaN
+            yield "".join([unknown % row[0] if row[1] != row[1] else known % row for row in rows])
 
 
 def summary(

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
+from scipy.linalg import solveh_banded
 from scipy.ndimage import median_filter
 
 from discsim.arrays import BoolArray, FloatArray
@@ -363,21 +364,31 @@ def _conic(t: FloatArray, z: ComplexArray, knots: float, scale: float) -> tuple[
     count = max(1, round((t[-1] - t[0]) / knots))
     place = np.clip((t - t[0]) / max(t[-1] - t[0], 1e-9) * count, 0, count - 1e-9)
     k = place.astype(int)
-    hats = np.zeros((t.size, count + 1))
-    rows = np.arange(t.size)
-    hats[rows, k], hats[rows, k + 1] = 1 - (place - k), place - k
-    A = np.column_stack([2 * x, 2 * y, -(x * x - y * y), -2 * x * y, hats])
+    share = place - k
+    A = np.column_stack([2 * x, 2 * y, -(x * x - y * y), -2 * x * y])
     target = x * x + y * y
     # priors: 15 uT of hard iron, 0.1 of ellipse; the readings' own scatter about the conic is a few per cent
-    prior = np.zeros(A.shape[1])
-    prior[:4] = 0.05 / np.array([15.0 / scale, 15.0 / scale, 0.15, 0.15])
-    prior[4:] = 1e-3
+    prior = 0.05 / np.array([15.0 / scale, 15.0 / scale, 0.15, 0.15])
     weight = np.ones(t.size)
-    solution = np.zeros(A.shape[1])
+    solution: FloatArray = np.zeros(4)
+
+    def on_knots(value: FloatArray) -> FloatArray:
+        """Return the sums of values (n,) over the hat function of each knot."""
+        sums = np.bincount(k, value * (1 - share), count + 1) + np.bincount(k + 1, value * share, count + 1)
+        return np.asarray(sums, dtype=float)
+
     for _ in range(4):
-        normal = (A * weight[:, None]).T @ A + np.diag(prior**2)
-        solution = np.linalg.solve(normal, (A * weight[:, None]).T @ target)
-        misfit = np.abs(target - A @ solution)
+        # the hats meet their neighbours alone: their equations have three diagonals, and four columns beside
+        band = np.zeros((2, count + 1))
+        band[1] = np.bincount(k, weight * (1 - share) ** 2, count + 1) + 1e-6
+        band[1] += np.bincount(k + 1, weight * share**2, count + 1)
+        band[0, 1:] = np.bincount(k, weight * share * (1 - share), count)
+        beside = np.stack([on_knots(weight * column) for column in A.T], axis=1)
+        each = solveh_banded(band, np.column_stack([beside, on_knots(weight * target)]))
+        normal = (A * weight[:, None]).T @ A + np.diag(prior**2) - beside.T @ each[:, :4]
+        solution = np.asarray(np.linalg.solve(normal, A.T @ (weight * target) - beside.T @ each[:, 4]), dtype=float)
+        level = each[:, 4] - each[:, :4] @ solution
+        misfit = np.abs(target - A @ solution - (1 - share) * level[k] - share * level[k + 1])
         spread = 3.0 * float(np.median(misfit)) + 1e-6
         weight = 1 / (1 + (misfit / spread) ** 2)
     e = float(np.clip(solution[2], -0.6, 0.6)), float(np.clip(solution[3], -0.6, 0.6))

@@ -1,0 +1,289 @@
+"""The turning field's attitude, and the normal equations of everything that moves it (compiled).
+
+A parameter of a spline turns the body while its splines act, and has turned it by the same vector ever after. So its
+row of the normal matrix needs sums while it acts, and sums backwards from the end for what came later: two parameters
+that never act together need the product of two short vectors, whatever the number of readings between.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin, sqrt
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.compiled import compiled, compiled_sums
+from estimators.spin_spline import IndexArray
+
+__all__ = ["SOFT", "add_normal_equations", "integrate"]
+
+#: rows and columns of the six parameters of soft iron
+SOFT = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+
+
+@compiled
+def integrate(
+    times: FloatArray,
+    substeps: int,
+    r: FloatArray,
+    body_re: FloatArray,
+    body_im: FloatArray,
+    despun_re: FloatArray,
+    despun_im: FloatArray,
+    attitude: FloatArray,
+    psi_at: FloatArray,
+    axes: FloatArray,
+    psi_middle: FloatArray,
+) -> None:
+    """Integrate the attitude from rates at the middle of equal sub-steps between ``times`` (n,).
+
+    Written: ``attitude`` (n, 3, 3) C_BN, the identity at the first time; ``psi_at`` (n,) the angle turned;
+    ``axes`` (k, 3, 3), whose rows are the axes of the frame that does not spin, in N, at the middle of each sub-step,
+    and ``psi_middle`` (k,). Transverse rates (k,) are the sum of those given in the body and in the frame that does
+    not spin.
+    """
+    D = np.eye(3)
+    psi = 0.0
+    attitude[0] = D
+    psi_at[0] = 0.0
+    for k in range(times.size - 1):
+        h = (times[k + 1] - times[k]) / substeps
+        for j in range(substeps):
+            s = k * substeps + j
+            middle = psi + 0.5 * h * r[s]
+            p, q = body_re[s], body_im[s]
+            # C3(psi)^T takes body components to the frame that does not spin
+            a = cos(middle) * p - sin(middle) * q + despun_re[s]
+            b = sin(middle) * p + cos(middle) * q + despun_im[s]
+            # exp(-[v x]) with v = (a, b, 0) h/2 twice, so that the axes are there at the middle too
+            x, y = 0.5 * h * a, 0.5 * h * b
+            angle = sqrt(x * x + y * y)
+            f1 = sin(angle) / angle if angle > 1e-9 else 1.0
+            f2 = (1.0 - cos(angle)) / (angle * angle) if angle > 1e-4 else 0.5
+            for half in range(2):
+                for i in range(3):
+                    d0, d1, d2 = D[0, i], D[1, i], D[2, i]
+                    dot = x * d0 + y * d1
+                    D[0, i] = d0 - f1 * y * d2 + f2 * (x * dot - angle * angle * d0)
+                    D[1, i] = d1 + f1 * x * d2 + f2 * (y * dot - angle * angle * d1)
+                    D[2, i] = d2 - f1 * (x * d1 - y * d0) - f2 * angle * angle * d2
+                if half == 0:
+                    axes[s] = D
+                    psi_middle[s] = middle
+            psi += h * r[s]
+        c, si = cos(psi), sin(psi)
+        for i in range(3):
+            attitude[k + 1, 0, i] = c * D[0, i] + si * D[1, i]
+            attitude[k + 1, 1, i] = -si * D[0, i] + c * D[1, i]
+            attitude[k + 1, 2, i] = D[2, i]
+        psi_at[k + 1] = psi
+
+
+@compiled_sums
+def _weighed(
+    scale: float,
+    C: FloatArray,
+    iron: FloatArray,
+    skew: FloatArray,
+    turned: FloatArray,
+    residual: FloatArray,
+    B: FloatArray,
+    D: FloatArray,
+) -> None:
+    """Write a reading's derivatives, weighed: ``B`` by rotations in N and, fourth, about the axis; ``D`` by the rest.
+
+    Columns of ``D`` (3, 13 + r): field, hard iron, soft iron, r left to the caller, and last the residual.
+    """  # fmt: skip
+    for a in range(3):
+        for b in range(3):
+            D[a, b] = scale * (iron[a, 0] * C[0, b] + iron[a, 1] * C[1, b] + iron[a, 2] * C[2, b])
+            D[a, 3 + b] = scale if a == b else 0.0
+        for b in range(3):
+            B[a, b] = D[a, 0] * skew[b, 0] + D[a, 1] * skew[b, 1] + D[a, 2] * skew[b, 2]
+        if B.shape[1] == 4:
+            B[a, 3] = B[a, 0] * C[2, 0] + B[a, 1] * C[2, 1] + B[a, 2] * C[2, 2]
+        D[a, D.shape[1] - 1] = scale * residual[a]
+    for column in range(6):
+        a, b = SOFT[column]
+        D[a, 6 + column] = scale * turned[b]
+        D[b, 6 + column] = scale * turned[a]
+
+
+@compiled
+def _acting(low: int, now: int, slow_low: int, slow_now: int, size: int, slow_size: int, active: IndexArray) -> int:
+    """Write which coefficients act now or did at the reading before; return how many."""
+    count = 0
+    for c in range(low, now + 4):
+        active[count] = c
+        count += 1
+    if slow_size:
+        for c in range(slow_low, slow_now + 4):
+            active[count], active[count + 1] = size + c, size + slow_size + c
+            count += 2
+    return count
+
+
+@compiled_sums
+def add_normal_equations(
+    substeps: int,
+    h: FloatArray,
+    axes: FloatArray,
+    attitude: FloatArray,
+    iron: FloatArray,
+    m0: FloatArray,
+    turned: FloatArray,
+    residual: FloatArray,
+    scale: FloatArray,
+    despun: bool,
+    first: IndexArray,
+    weights: FloatArray,
+    size: int,
+    slow_first: IndexArray,
+    slow_weights: FloatArray,
+    slow_size: int,
+    moments: FloatArray,
+    information: FloatArray,
+    right: FloatArray,
+) -> None:
+    """Add the magnetometer's part of the normal equations to ``information`` (m, m) and ``right`` (m,).
+
+    Parameters in order: the spin's spline, ``moments`` given as such, the two splines of what is not read, field (3),
+    hard iron (3), soft iron (6).
+
+    Parameters
+    ----------
+    substeps, h, axes, attitude
+        As `integrate` takes and gives them; h (k,) are the sub-steps' lengths, s.
+    iron : (3, 3) array
+        I + S of the soft iron.
+    m0, turned, residual : (3,), (n, 3), (n, 3) arrays
+        The field in N, in B, and what the model leaves of the readings.
+    scale : (n,) array
+        Each reading's weight over its standard deviation.
+    despun : bool
+        Whether the axis turns by rates of the frame that does not spin, so that the spin turns about where it is now.
+    first, weights, size : (k,), (k, 4) arrays, int
+        First coefficient and weights of the spin's spline at each sub-step, and its coefficients' number;
+        ``slow_first``, ``slow_weights`` and ``slow_size`` of the others' (none: 0).
+    moments : (n, r, 3) array
+        Rotation in N by each of r parameters up to each reading, per unit.
+    """
+    n, read = attitude.shape[0], moments.shape[1]
+    total_size, q, dense = size + 2 * slow_size, 4 if despun else 3, 13 + read
+    #: rotation by each parameter so far; its product with G, summed; those with each other; and with L
+    theta, run = np.zeros((total_size, q)), np.zeros((total_size, q))
+    pairs, cross = np.zeros((total_size, total_size)), np.zeros((total_size, dense))
+    #: sums of G = B^T B, L = B^T D and D^T D, and the first two up to where each parameter ceased to act
+    sum_g, sum_l, sum_d = np.zeros((q, q)), np.zeros((q, dense)), np.zeros((dense, dense))
+    rest_g, rest_l = np.zeros((total_size, q, q)), np.zeros((total_size, q, dense))
+    order, ended = np.empty(total_size, dtype=np.int64), 0
+    skew = np.array([[0.0, m0[2], -m0[1]], [-m0[2], 0.0, m0[0]], [m0[1], -m0[0], 0.0]])
+    B, D, G, L = np.empty((3, q)), np.zeros((3, dense)), np.empty((q, q)), np.empty((q, dense))
+    active, count = np.empty(total_size + 16, dtype=np.int64), 0
+    pulled = np.empty(q)
+    low, slow_low = int(first[0]), int(slow_first[0]) if slow_size else 0
+    for i in range(n):
+        if i > 0:
+            for s in range((i - 1) * substeps, i * substeps):
+                for j in range(4):
+                    c, w = first[s] + j, h[s] * weights[s, j]
+                    if despun:
+                        theta[c, 3] += w
+                    else:
+                        for a in range(3):
+                            theta[c, a] += w * axes[s, 2, a]
+                    if slow_size:
+                        c, w = size + slow_first[s] + j, h[s] * slow_weights[s, j]
+                        for a in range(3):
+                            theta[c, a] += w * axes[s, 0, a]
+                            theta[c + slow_size, a] += w * axes[s, 1, a]
+            now = first[i * substeps - 1]
+            slow_now = slow_first[i * substeps - 1] if slow_size else 0
+            if i == 1 or now > low or slow_now > slow_low:
+                count = _acting(low, now, slow_low, slow_now, size, slow_size, active)
+                m = 0
+                while m < count:
+                    j = active[m]
+                    if not (j < now if j < size else (j - size) % slow_size < slow_now):
+                        m += 1
+                        continue
+                    # it has ceased to act: from here on the sums of those that act count for it
+                    for other in range(count):
+                        k = active[other]
+                        if k != j:
+                            for a in range(q):
+                                pairs[max(j, k), min(j, k)] -= theta[j, a] * run[k, a]
+                    rest_g[j], rest_l[j] = sum_g, sum_l
+                    order[ended] = j
+                    ended, count = ended + 1, count - 1
+                    active[m] = active[count]
+                low, slow_low = now, slow_now
+        _weighed(scale[i], attitude[i], iron, skew, turned[i], residual[i], B, D)
+        for a in range(3):
+            for j in range(read):
+                D[a, 12 + j] = B[a, 0] * moments[i, j, 0] + B[a, 1] * moments[i, j, 1] + B[a, 2] * moments[i, j, 2]
+        for a in range(q):
+            for b in range(q):
+                G[a, b] = B[0, a] * B[0, b] + B[1, a] * B[1, b] + B[2, a] * B[2, b]
+                sum_g[a, b] += G[a, b]
+            for b in range(dense):
+                L[a, b] = B[0, a] * D[0, b] + B[1, a] * D[1, b] + B[2, a] * D[2, b]
+                sum_l[a, b] += L[a, b]
+        for a in range(dense):
+            for b in range(dense):
+                sum_d[a, b] += D[0, a] * D[0, b] + D[1, a] * D[1, b] + D[2, a] * D[2, b]
+        for m in range(count):
+            j = active[m]
+            for a in range(q):
+                value = 0.0
+                for b in range(q):
+                    value += G[a, b] * theta[j, b]
+                pulled[a] = value
+                run[j, a] += value
+                for b in range(dense):
+                    cross[j, b] += theta[j, a] * L[a, b]
+            for other in range(m + 1):
+                k = active[other]
+                value = 0.0
+                for a in range(q):
+                    value += pulled[a] * theta[k, a]
+                pairs[max(j, k), min(j, k)] += value
+    settled = ended
+    for m in range(count):
+        rest_g[active[m]], rest_l[active[m]] = sum_g, sum_l
+        order[ended] = active[m]
+        ended += 1
+    for place in range(ended):
+        k = order[place]
+        tail = np.zeros(q)
+        for a in range(q):
+            for b in range(q):
+                tail[a] += (sum_g[a, b] - rest_g[k, a, b]) * theta[k, b]
+            for b in range(dense):
+                cross[k, b] += theta[k, a] * (sum_l[a, b] - rest_l[k, a, b])
+        for a in range(q):
+            pairs[k, k] += theta[k, a] * tail[a]
+            # those that act to the end have met in all readings
+            for before in range(min(place, settled)):
+                j = order[before]
+                pairs[max(j, k), min(j, k)] += theta[j, a] * (run[k, a] + tail[a])
+    columns = np.empty(dense, dtype=np.int64)
+    for b in range(12):
+        columns[b] = total_size + read + b
+    for b in range(read):
+        columns[12 + b] = size + b
+    for j in range(total_size):
+        row = j if j < size else j + read
+        for k in range(j + 1):
+            column = k if k < size else k + read
+            information[row, column] += pairs[j, k]
+            if k < j:
+                information[column, row] += pairs[j, k]
+        for b in range(dense - 1):
+            information[row, columns[b]] += cross[j, b]
+            information[columns[b], row] += cross[j, b]
+        right[row] += cross[j, dense - 1]
+    for a in range(dense - 1):
+        for b in range(dense - 1):
+            information[columns[a], columns[b]] += sum_d[a, b]
+        right[columns[a]] += sum_d[a, dense - 1]
