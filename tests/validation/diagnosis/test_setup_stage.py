@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from discsim.effects import Effect, effect
-from discsim.recording import PLANTS, Recording, read_recording, write_recording
+from discsim.recording import PLANTS, Recording, Samples, read_recording, write_recording
 from discsim.written import as_written
 from validation.challenge.case import Case, Coast, Concealed
 from validation.challenge.cases import draw_case
@@ -118,6 +118,19 @@ def test_a_unit_that_is_not_the_columns_is_found_and_taken_back(plant, fault, so
 )
 def test_on_a_rig_and_in_a_free_spin_the_fault_is_found_or_stands_among_its_twins(plant, fault, sound):
     assert right(found(sound[plant], fault), fault)
+
+
+def test_in_a_long_log_the_fault_is_found_where_the_disc_turns(sound):
+    """Ten minutes at rest before the throw: what is judged is the stretch that turns."""
+    fault = effect("mag.axes", axes="x z y")
+    written = as_written(sound["free_spin"][0], [fault])
+    rng, samples = np.random.default_rng(0), {}
+    for name, own in written.samples.items():
+        t = np.arange(0.0, 600.0, 1.0 / 50.0)
+        rest = np.median(own.value, axis=0) * (name != "gyroscope")
+        noise = rng.normal(0.0, written.sheets[name].noise_rms or 0.01, (t.size, rest.size))
+        samples[name] = Samples(np.concatenate([t, own.t + 600.0]), np.concatenate([rest + noise, own.value]))
+    assert right(find_setup_faults([replace(written, samples=samples)]).faults, fault)
 
 
 def test_without_a_rate_reference_a_flipped_magnetometer_is_a_gyroscope_flipped_about_z(sound):

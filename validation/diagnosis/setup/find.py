@@ -15,7 +15,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect
 from discsim.effects.setup import axes_of
-from discsim.recording import Recording
+from discsim.recording import Recording, Samples
 from discsim.written import PREFIX, corrected
 from validation.diagnosis.setup.hypotheses import Hypothesis, board_effect, chosen, hypotheses, pairs
 from validation.diagnosis.setup.proof import left_by_short_fit
@@ -34,6 +34,10 @@ AGREE = 0.6
 WORST = 2.1
 #: a hypothesis that costs no more than this above the best cannot be told from it
 TWIN = 8.0
+#: longest that is judged of a recording, s: a minute of turning, or the plateaus of a rate table
+LOOK = {"flight": 60.0, "free_spin": 60.0, "spin_down": 300.0, "rate_table": 300.0}
+#: in which it turns at this share of the fastest rate or more, asked every so many s (half a turn at 6 rad/s)
+_QUARTER, _SLOT = 0.25, 0.5
 #: most faults of one setup that are looked for, and most twins that are told
 MOST, MOST_TWINS = 3, 8
 
@@ -108,11 +112,38 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
 
 
 def _judgeable(recording: Recording) -> Recording:
-    """Return a recording without its magnetometer where the field is not stated: nothing tells what it should read."""
-    if "magnetometer" not in recording or recording.environment.field_known:
-        return recording
-    rest = {name: samples for name, samples in recording.samples.items() if name != "magnetometer"}
-    return replace(recording, samples=rest)
+    """Return the part of a recording that is judged: where it turns most, if it is long.
+
+    Without its magnetometer where the field is not stated: nothing tells what it should read.
+    """
+    kept = dict(recording.samples)
+    if not recording.environment.field_known:
+        kept.pop("magnetometer", None)
+    start, stop = _busiest(kept, LOOK[recording.plant])
+    return replace(recording, samples={name: samples.between(start, stop) for name, samples in kept.items()})
+
+
+def _busiest(samples: Mapping[str, Samples], length: float) -> tuple[float, float]:
+    """Return from when to when, s, sensors turn on end in a recording longer than ``length`` s, at most that long.
+
+    The longest stretch that turns at a quarter of the fastest rate or more; all of the time of a shorter recording.
+    """
+    turning = next((samples[name] for name in ("gyroscope", "magnetometer", "accelerometer") if name in samples), None)
+    if turning is None or len(turning) < 2 or turning.t[-1] - turning.t[0] <= length:
+        return -np.inf, np.inf
+    slot = ((turning.t - turning.t[0]) / _SLOT).astype(int)
+    count = np.maximum(np.bincount(slot), 1)
+    value = np.nan_to_num(turning.value)
+    square = np.bincount(slot, np.sum(value**2, axis=1)) / count
+    if turning is not samples.get("gyroscope"):
+        # what turns scatters about its mean
+        mean = np.stack([np.bincount(slot, column) for column in value.T], axis=1) / count[:, None]
+        square = np.maximum(square - np.sum(mean**2, axis=1), 0.0)
+    fast = np.concatenate([[False], square > _QUARTER**2 * np.max(square), [False]])
+    starts, stops = np.flatnonzero(~fast[:-1] & fast[1:]), np.flatnonzero(fast[:-1] & ~fast[1:])
+    longest = int(np.argmax(stops - starts))
+    first = float(turning.t[0]) + _SLOT * float(starts[longest])
+    return first, first + min(length, _SLOT * float(stops[longest] - starts[longest]))
 
 
 def _next(recordings: Sequence[Recording]) -> list[SetupFault]:
