@@ -13,10 +13,12 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from types import MappingProxyType
 
 import numpy as np
 
 from discsim.recording import SENSORS, Recording
+from discsim.written import PREFIX
 from validation.diagnosis.fitting import Fit, Parameter, refit
 from validation.diagnosis.followed import left_of, left_when_shifted, true_noise
 from validation.diagnosis.noise import GroupNoise
@@ -29,6 +31,7 @@ from validation.diagnosis.relaxed import (
     loose_jumps,
     loose_parameters,
 )
+from validation.diagnosis.selection import BOUNDS
 from validation.diagnosis.spin_rates import RatesApart, rates_apart
 from validation.diagnosis.trajectory_pieces import Chain, readings_of
 
@@ -196,7 +199,7 @@ def contradiction_in(recordings: Sequence[Recording], known: Sequence[Parameter]
         look = look_at(recordings, known, others, _AGAIN)
         if look is None or not look.follows:
             continue
-        if _reconciled(recordings, look, sensor):
+        if _reconciled(recordings, look, sensor) or _follows_lagging(recordings, known, sensors, sensor):
             return None
         apart[sensor] = others
     if apart:
@@ -211,6 +214,24 @@ def _follows(recordings: Sequence[Recording], known: Sequence[Parameter], sensor
     """Tell whether a motion follows some of the sensors, or none of them has a reading."""
     look = look_at(recordings, known, sensors, _AGAIN)
     return look is None or look.follows
+
+
+#: where the time constant of a lag starts, s, its one sigma, and half the width of its differences: a low-pass of 20 Hz
+_LAG, _LAG_SIGMA, _LAG_STEP = 8e-3, 0.05, 1e-4
+
+
+def _follows_lagging(
+    recordings: Sequence[Recording], known: Sequence[Parameter], sensors: Sequence[str], lagging: str
+) -> bool:
+    """Tell whether a motion follows all sensors where one of them may lag.
+
+    A gyroscope's noise is so low that the others' motion, however right, does not tell its readings to within it.
+    """
+    if lagging not in PREFIX:
+        return False
+    lag = Parameter(f"{PREFIX[lagging]}.lag", "tau_s", 0.0, _LAG_STEP, _LAG_SIGMA)
+    look = look_at(recordings, known, sensors, _AGAIN, {lag: _LAG})
+    return look is not None and look.follows
 
 
 def contradiction_after(fit: Fit) -> Contradiction | None:
@@ -258,9 +279,16 @@ def _reconciled(recordings: Sequence[Recording], look: Look, sensor: str) -> boo
 
 
 def look_at(
-    recordings: Sequence[Recording], known: Sequence[Parameter], sensors: Collection[str], few: int
+    recordings: Sequence[Recording],
+    known: Sequence[Parameter],
+    sensors: Collection[str],
+    few: int,
+    free: Mapping[Parameter, float] = MappingProxyType({}),
 ) -> Look | None:
-    """Fit the beginnings of a ``few`` recordings to some of their sensors; None where no readings are there."""
+    """Fit the beginnings of a ``few`` recordings to some of their sensors; None where no readings are there.
+
+    ``free`` are parameters that may move beside the ordinary ones, and where they start.
+    """
     plant = recordings[0].plant
     chains: list[Chain] = []
     places: list[int] = []
@@ -282,11 +310,14 @@ def look_at(
         else replace(q, recordings=frozenset(places.index(i) for i in q.recordings if i in places))
         for q in stated
     ]
-    parameters = (*stated, *loose_parameters([chain.recording for chain in chains], there), *free_clocks(there))
+    usual = (*stated, *loose_parameters([chain.recording for chain in chains], there), *free_clocks(there))
+    parameters = (*usual, *free)
     noise = true_noise([readings for chain in chains for readings in chain.readings])
-    fit = Fit(tuple(chains), parameters, np.array([q.stated for q in parameters]), loose_jumps(plant), noise)
+    start = np.array([*(q.stated for q in usual), *free.values()])
+    fit = Fit(tuple(chains), parameters, start, loose_jumps(plant), noise)
     count = sum(int(np.count_nonzero(r.good)) for chain in chains for r in chain.readings)
-    fit = refit(fit, iterations=_STEPS_OF_FIGURES if plant == "free_spin" else _STEPS, tolerance=1e-3 * count)
+    steps = _STEPS_OF_FIGURES if plant == "free_spin" else _STEPS
+    fit = refit(fit, iterations=steps, tolerance=1e-3 * count, bounds=BOUNDS)
     look = Look(tuple(name for name in SENSORS if name in there), tuple(places), fit, noise, tuple(left_of(fit, noise)))
     if look.follows or len(there) == 1 or plant == "free_spin":
         return look
