@@ -55,6 +55,9 @@ _NEAR = 1.2
 _BASE_ITERATIONS = {"flight": 8, "free_spin": 16, "spin_down": 8, "rate_table": 8}
 #: a refit that will leave this many times the chi-squared of the best one so far is given up
 _HOPELESS = 10.0
+#: what it counts that an effect physics gives a sign came out with it, in twice the log likelihood: a lag and an offset
+#: of time are one to first order, and of fits that tie to within what a few readings at the start weigh the lag is named
+_RIGHT_SIGN = 4.0
 #: a gain below this may be due to where the fits started
 _DOUBTFUL = 200.0
 #: a fit whose chi-squared per reading, in the noise of the relaxed fit, is above this is far from the data
@@ -283,6 +286,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
         if gain > price(proposal.trial) and _possible(refitted):
             # far from the data chi-squared says more than a likelihood that has swallowed the mismatch as noise
             merit = (chi2 + cost if far else refitted.score) + RIVAL * refitted.hypothesis.size
+            merit -= _RIGHT_SIGN * any(q.key in ONE_SIDED for q in parameters_of(proposal.trial))
             fits.append((merit, refitted, fit, cost))
             best_chi2 = min(best_chi2, chi2)
             near_data |= chi2 < _NEAR * refitted.fit.count
