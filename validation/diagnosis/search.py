@@ -55,8 +55,8 @@ _NEAR = 1.2
 _BASE_ITERATIONS = {"flight": 8, "free_spin": 16, "spin_down": 8, "rate_table": 8}
 #: a refit that will leave this many times the chi-squared of the best one so far is given up
 _HOPELESS = 10.0
-#: what it counts, in twice the log likelihood, that an effect came out with the sign that physics gives it: a lag and an
-#: offset of time are one to first order; of fits that tie to within what a few readings weigh the lag is named
+#: what it counts, in twice the log likelihood, that an effect came out with the sign that physics gives it: a lag and
+#: an offset of time are one to first order; of fits that tie to within what a few readings weigh the lag is named
 _RIGHT_SIGN = 4.0
 #: a gain below this may be due to where the fits started
 _DOUBTFUL = 200.0
