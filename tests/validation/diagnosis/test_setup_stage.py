@@ -120,6 +120,13 @@ def test_on_a_rig_and_in_a_free_spin_the_fault_is_found_or_stands_among_its_twin
     assert right(found(sound[plant], fault), fault)
 
 
+def test_reversed_columns_of_a_magnetometer_are_named_before_a_field_that_points_the_other_way(sound):
+    fault = effect("mag.axes", axes="-x -y -z")
+    (one,) = found(sound["flight"], fault)
+    assert one.effect == fault
+    assert {twin.id for twin in one.twins} <= {"site.field"}
+
+
 def test_in_a_long_log_the_fault_is_found_where_the_disc_turns(sound):
     """Ten minutes at rest before the throw: what is judged is the stretch that turns."""
     fault = effect("mag.axes", axes="x z y")

@@ -179,14 +179,22 @@ def _told_apart(
 ) -> tuple[Hypothesis, list[Hypothesis]]:
     """Return the best of hypotheses that cost the same, and those that cannot be told from it.
 
-    In a flight the air tells them apart.
+    In a flight the air tells them apart. A magnetometer with all columns reversed is a field of the other direction:
+    of those two the columns are named.
     """
+    tied = sorted(tied, key=lambda item: _turned_round(item, site))
     if len(tied) == 1 or recordings[0].plant != "flight":
         return tied[0], list(tied[1:])
     some = chosen(recordings)
     left = [left_by_short_fit([corrected(one, [_effect(item, site)]) for one in some]) for item in tied[:_FITTED]]
-    best = int(np.argmin(left))
-    return tied[best], [tied[k] for k in range(len(left)) if k != best and left[k] < _REFUTED * left[best]]
+    alike = [k for k in range(len(left)) if left[k] < _REFUTED * min(left)]
+    best = min(alike, key=lambda k: (_turned_round(tied[k], site), left[k]))
+    return tied[best], [tied[k] for k in alike if k != best]
+
+
+def _turned_round(item: Hypothesis, stated: FloatArray) -> bool:
+    """Tell whether a hypothesis is a field that points the other way than the stated one: no place on a map has it."""
+    return item.columns.site is not None and float(item.columns.site @ stated) < 0.0
 
 
 def _agrees(item: Hypothesis) -> bool:
