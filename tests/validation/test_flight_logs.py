@@ -192,7 +192,7 @@ def damaged() -> dict[str, tuple[bytes, str]]:
     nested = ulog({"sensor_combined": ("sensor_combined inner;", [(BOOT, bytes(8))])})
     return {
         "head.ulg": (b"ULog\x01\x12\x35\x01\0\0", "is a damaged PX4 ULog (Invalid file format (Header too short))"),
-        "zeros.ulg": (b"ULog\x01\x12\x35" + bytes(100), "is a PX4 ULog without readings of motion"),
+        "zeros.ulg": (b"ULog\x01\x12\x35" + bytes(100), "is a damaged PX4 ULog without readings of motion"),
         "empty.ulg": (empty, "expected one of the topics sensor_accel, sensor_combined"),
         "new.ulg": (b"ULog\x01\x12\x35\x01" + bytes(8) + message("B", b"\xff" * 40), "is a damaged PX4 ULog (Unknown"),
         "nested.ulg": (nested, "is a damaged PX4 ULog (maximum recursion depth"),

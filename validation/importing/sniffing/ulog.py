@@ -87,10 +87,10 @@ def write_tables(raw: Path, folder: Path) -> None:
         lines += [f"{t:.0f},{x:.9g},{y:.9g},{z:.9g}" for t, (x, y, z) in zip(table.stamp, table.value, strict=True)]
         (folder / f"{sensor}.csv").write_text("\n".join([*lines, ""]), encoding="utf-8")
     if not any(folder.iterdir()):
+        kind = "a damaged PX4 ULog" if log.file_corruption else "a PX4 ULog"
+        topics = ", ".join(_TOPICS)
         raise InputError.at(
-            raw,
-            None,
-            f"is a PX4 ULog without readings of motion in it; expected one of the topics {', '.join(_TOPICS)}",
+            raw, None, f"is {kind} without readings of motion in it; expected one of the topics {topics}"
         )
 
 
