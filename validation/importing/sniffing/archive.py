@@ -1,4 +1,4 @@
-"""A raw file, folder or zip as a file or folder. Takes a path; gives one whose files can be read, within limits."""
+"""A raw file, folder, zip or flight log as files of text. Takes a path; gives one that can be read, within limits."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
 from discsim.errors import InputError
+from validation.importing.sniffing.ulog import MAGIC, write_tables
 
 __all__ = ["MAX_BYTES", "MAX_FILES", "opened"]
 
@@ -25,21 +26,36 @@ _CHUNK = 1 << 20
 
 @contextmanager
 def opened(raw: Path) -> Iterator[Path]:
-    """Give ``raw`` itself, or where it is a zip a folder of that name with its files, which is gone afterwards.
+    """Give ``raw`` itself, or a folder of that name with the files of a zip or the tables of a ULog, gone afterwards.
 
     Raises `InputError` for no such file, a damaged zip, one with a password, one with paths that lead out of it or
-    links, and one above the limits.
+    links, one above the limits, and a ULog that cannot be read.
     """
     if not raw.exists():
         raise InputError.at(raw, None, "no such file or folder; expected what a logger wrote")
-    if not raw.is_file() or raw.suffix.lower() != ".zip":
-        yield raw
-        return
     with tempfile.TemporaryDirectory(prefix="discsim-") as place:
-        folder = Path(place) / raw.stem
-        folder.mkdir()
-        _unpack(raw, folder)
-        yield _inner(folder, raw)
+        logged = raw
+        if raw.is_file() and raw.suffix.lower() == ".zip":
+            folder = Path(place) / raw.stem
+            folder.mkdir()
+            _unpack(raw, folder)
+            logged = _inner(folder, raw)
+        if _is_ulog(logged):
+            tables = Path(place) / "tables" / logged.name
+            tables.mkdir(parents=True)
+            write_tables(logged, tables)
+            logged = tables
+        yield logged
+
+
+def _is_ulog(path: Path) -> bool:
+    if not path.is_file():
+        return False
+    try:
+        with path.open("rb") as stream:
+            return stream.read(len(MAGIC)) == MAGIC
+    except OSError:
+        return False  # the reader of text says why
 
 
 def _unpack(raw: Path, folder: Path) -> None:

@@ -54,7 +54,7 @@ def clocks_of(numbers: Numbers) -> list[Clock]:
 
 
 def seconds(clock: Clock, numbers: Numbers) -> FloatArray:
-    """Return the time of each row, (n,) s from an origin of its own."""
+    """Return the time of each row, (n,) s from an origin that tables with the same clock share."""
     if clock.column is None:
         assert clock.step is not None
         count = np.array([row.number for row in numbers.table.rows], dtype=float)
@@ -64,7 +64,7 @@ def seconds(clock: Clock, numbers: Numbers) -> FloatArray:
     k = numbers.table.columns.index(clock.column)
     if clock.unit == "iso":
         return _stamps(numbers.cells(k))
-    return (numbers.values[:, k] - np.nanmin(numbers.values[:, k])) * SCALES[clock.unit]
+    return numbers.values[:, k] * SCALES[clock.unit]
 
 
 def _rank(numbers: Numbers, k: int, clock: Clock) -> int:

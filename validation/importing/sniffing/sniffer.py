@@ -39,6 +39,8 @@ ORDER = ("gyroscope", "accelerometer", "magnetometer")
 TELLING = 0.35
 #: A column that stands this far back (gravity taken off, worked out, in the earth's axes) is no sensor's reading.
 NO_READING = 9
+#: What a sentence of NMEA 0183 begins with: the constellation's two letters and the sentence's three.
+_SENTENCE = re.compile(r"\$G[A-Z](GGA|RMC|GLL|GNS|GSA|GSV|VTG|ZDA)$")
 
 
 @dataclass(frozen=True)
@@ -173,6 +175,9 @@ def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) 
     rows = max(len(file.numbers.table.rows) for file in files)
     if rows < FEWEST_ROWS:
         return InputError.at(raw, None, f"{rows} rows of numbers in it; expected a log of {FEWEST_ROWS} at least")
+    if all(_SENTENCE.match(file.numbers.table.rows[0].cells[0]) for file in files):
+        what = "holds NMEA sentences of a satellite receiver: positions, and no sensor of motion"
+        return InputError.at(raw, None, f"{what}; `gpsbabel -i nmea -f FILE -o unicsv -F track.csv` writes them as CSV")
     columns = ", ".join(f"'{name}'" for name in files[0].numbers.table.columns[:12])
     also = f" ({len(failures)} other files there are no tables)" if failures else ""
     return InputError.at(

@@ -6,6 +6,7 @@ import codecs
 from pathlib import Path
 
 from discsim.errors import InputError
+from validation.importing.sniffing.ulog import MAGIC
 
 __all__ = ["encoding_of", "lines_of"]
 
@@ -21,12 +22,13 @@ SIGNATURES = (
     (b"\x1f\x8b", "a gzip archive; unpack it first"),
     (b"\x89HDF", "an HDF5 file; write its tables as CSV"),
     (b"SQLite format 3", "an SQLite data base; write its tables as CSV"),
-    (b"ULog\x01\x12\x35", "a PX4 ULog; `ulog2csv FILE` (pip install pyulog) writes a folder that can be imported"),
+    (MAGIC, "a PX4 ULog among other files; import that file itself"),
     (
         b"\xa3\x95\x80",
         "an ArduPilot log; `mavlogdump.py --format csv --types IMU FILE` (pip install pymavlink) writes CSV",
     ),
     (b"\x89MCAP", "an MCAP log; write its topics as CSV"),
+    (b"\xb5\x62", "a u-blox UBX log; write its messages as CSV (pip install pyubx2 reads them)"),
 )
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8"),
