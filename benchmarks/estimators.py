@@ -48,8 +48,8 @@ from estimators.precession import phase_rate  # noqa: E402
 from estimators.rate import YawRate  # noqa: E402
 from estimators.streaming import StreamingRate  # noqa: E402
 from estimators.tracking import TrackingSettings, track_bound, tracking  # noqa: E402
-from validation.figures import new_figure, save_figure  # noqa: E402
-from validation.run import package_version  # noqa: E402
+from validation.reporting.figures import new_figure, save_figure  # noqa: E402
+from validation.reporting.run import package_version  # noqa: E402
 
 PAGE = ROOT / "docs" / "estimator-accuracy.md"
 IMAGES = ROOT / "docs" / "images"

@@ -26,7 +26,7 @@ from discsim.effects.sensors import PositionOffset  # noqa: E402
 from discsim.rig import turn_table  # noqa: E402
 from discsim.sensors import Accelerometer  # noqa: E402
 from estimators.accelerometer import accelerometer  # noqa: E402
-from validation.rate_table import errors_within  # noqa: E402
+from validation.scenarios.rate_table import errors_within  # noqa: E402
 from validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, segments  # noqa: E402
 from validation.sweeps.plan import Plan, plan_file, read_plan  # noqa: E402
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from discsim.shipped import load_disc, load_throw
 from discsim.trajectory import Flight, predict, predict_many, release_state
-from validation.engine_comparison import DISCS, compare_engines, strong_throw
+from validation.scenarios.engine_comparison import DISCS, compare_engines, strong_throw
 
 DISC, ENVIRONMENT = load_disc("driver")
 THROW = load_throw("driver")

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from page_table import with_table
 
-from validation.challenge.case import MASKS
-from validation.challenge.sizes import HIDING
+from validation.challenge.cases.case import MASKS
+from validation.challenge.cases.sizes import HIDING
 
 PAGE = Path(__file__).parents[1] / "docs" / "challenge.md"
 

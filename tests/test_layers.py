@@ -86,6 +86,26 @@ def test_the_diagnosis_reaches_no_code_that_conceals():
     assert not {name for name in reached if name.startswith("validation.challenge")}
 
 
+@pytest.mark.parametrize(
+    ("below", "above"),
+    [
+        ("validation.identification", ("diagnosis", "challenge", "studies", "experiments", "commands", "yaw_damping")),
+        ("validation.diagnosis", ("challenge", "studies", "experiments", "commands", "sweeps")),
+        ("validation.yaw_damping", ("diagnosis", "challenge", "studies", "commands")),
+    ],
+)
+def test_no_arrow_runs_up_between_rooms(below, above):
+    places = [(".".join(path.relative_to(ROOT).with_suffix("").parts), path) for _, path in SOURCES]
+    found = {
+        target
+        for module, path in places
+        if module.startswith(f"{below}.")
+        for target in imported(path.read_text(encoding="utf-8"), module, path.name == "__init__.py")
+    }
+    assert any(target.startswith(f"{below}.") for target in found)
+    assert not [target for target in found if target.startswith(tuple(f"validation.{room}." for room in above))]
+
+
 def test_every_package_is_looked_at():
     assert {package for package, _ in SOURCES} == set(MAY_IMPORT)
 
@@ -98,7 +118,7 @@ def test_models_holds_no_python():
     ("package", "text"),
     [
         ("discsim", "import estimators"),
-        ("discsim", "from validation.run import start_run"),
+        ("discsim", "from validation.reporting.run import start_run"),
         ("discsim", "def f():\n    from estimators.rate import YawRate"),
         ("discsim", "import_module('validation.cli')"),
         ("discsim", "from .. import validation"),
@@ -120,7 +140,10 @@ def test_an_import_that_points_the_wrong_way_is_found(package, text):
     [
         ("discsim", "import numpy\nfrom discsim.arrays import readonly\nfrom .arrays import readonly"),
         ("estimators", "from discsim.recording import Recording\nfrom estimators import YawRate\nfrom . import rate"),
-        ("validation", "import discsim.engine\nfrom estimators import fft\nfrom validation.run import start_run"),
+        (
+            "validation",
+            "import discsim.engine\nfrom estimators import fft\nfrom validation.reporting.run import start_run",
+        ),
     ],
 )
 def test_an_import_that_points_the_right_way_is_allowed(package, text):

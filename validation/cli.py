@@ -13,7 +13,7 @@ import traceback
 import typer
 
 from discsim.errors import InputError
-from validation.run import package_version
+from validation.reporting.run import package_version
 
 __all__ = ["app", "main"]
 

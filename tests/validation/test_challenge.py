@@ -15,15 +15,15 @@ from scipy.stats import binom
 from discsim.effects.catalogue import effect
 from discsim.errors import InputError
 from validation.challenge.blind import Request, diagnose_blind, open_answers, seal_answers
-from validation.challenge.case import Concealed
-from validation.challenge.cases import draw_case
-from validation.challenge.conceal import Answer
-from validation.challenge.page import GOALS, goals_met
-from validation.challenge.result import Scored, rates_of, read_result
+from validation.challenge.cases.case import Concealed
+from validation.challenge.cases.conceal import Answer
+from validation.challenge.cases.detection_limit import noncentrality, strength
+from validation.challenge.cases.draw import draw_case
+from validation.challenge.report.page import GOALS, goals_met
 from validation.challenge.run import challenge
-from validation.challenge.scoring import CaseScore, clustered_rate, confusion, rate, score_case, summary
-from validation.challenge.strength import noncentrality, strength
-from validation.run import start_run
+from validation.challenge.scores.result import Scored, rates_of, read_result
+from validation.challenge.scores.scoring import CaseScore, clustered_rate, confusion, rate, score_case, summary
+from validation.reporting.run import start_run
 
 #: two throws are enough to be diagnosed by what only counts files
 WIND = Request(8, "flight", ("air.wind",))

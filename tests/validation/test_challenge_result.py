@@ -13,16 +13,16 @@ import pytest
 
 from discsim.errors import InputError
 from validation.challenge.blind import Request
-from validation.challenge.conceal import Answer
-from validation.challenge.detection import Sized, allowed, detections, fit_curve, has_curve
-from validation.challenge.document import main as write_document
-from validation.challenge.document import masks_text, plain_command, pooled, with_part
+from validation.challenge.cases.conceal import Answer
 from validation.challenge.masks import challenge_masks, masked_results
-from validation.challenge.page import fault_of, goals_met
-from validation.challenge.result import Scored, rates_of, read_result, times
+from validation.challenge.report.document import main as write_document
+from validation.challenge.report.document import masks_text, plain_command, pooled, with_part
+from validation.challenge.report.page import fault_of, goals_met
 from validation.challenge.run import challenge
-from validation.challenge.scoring import score_case
-from validation.run import start_run
+from validation.challenge.scores.detection import Sized, allowed, detections, fit_curve, has_curve
+from validation.challenge.scores.result import Scored, rates_of, read_result, times
+from validation.challenge.scores.scoring import score_case
+from validation.reporting.run import start_run
 
 #: a "diagnosis" that finds nothing in anything
 BLIND = """

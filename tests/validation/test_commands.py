@@ -16,9 +16,9 @@ from discsim.model_file import Model, ModelEffect, write_model
 from discsim.recording import read_recording
 from discsim.shipped import load_disc
 from discsim.written import as_written
-from validation import headless
 from validation.cli import main
-from validation.scores import at_most
+from validation.experiments import validation_run as headless
+from validation.reporting.scores import at_most
 
 
 def run(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:

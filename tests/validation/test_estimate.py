@@ -13,7 +13,7 @@ from discsim.errors import InputError
 from discsim.recording import Recording, Samples, SensorSheet, write_recording
 from estimators import YawRate
 from validation.commands.estimate import command
-from validation.comparison import compare
+from validation.scenarios.method_disagreement import compare
 
 
 @pytest.fixture

@@ -16,11 +16,11 @@ from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
 from discsim.trajectory import predict
 from validation.commands.fit import command, notes
-from validation.fitting import fit_yaw_damping, observe, paper_table
-from validation.fitting.observations import SHARED_S, Throw, misplaced
-from validation.fitting.paper_table import RATES_DEG_S, SPEEDS_M_S, damping_by_26, table_csv
-from validation.fitting.whiteness import whiteness
-from validation.throws import FULL_SET
+from validation.scenarios.throws import FULL_SET
+from validation.yaw_damping import fit_yaw_damping, observe, paper_table
+from validation.yaw_damping.observations import SHARED_S, Throw, misplaced
+from validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S, damping_by_26, table_csv
+from validation.yaw_damping.whiteness import whiteness
 
 DISC, AIR = load_disc("driver")
 TRUE_CNR = -0.0036

@@ -10,10 +10,10 @@ import pytest
 
 from discsim.frames import body_to_ned
 from discsim.shipped import load_disc
-from validation.golf_throws.page import write_page
-from validation.golf_throws.prediction import INPUTS, THROWS, predict_throw
-from validation.golf_throws.prediction import drawn as drawn_inputs
 from validation.importing import find_map, read_map
+from validation.studies.golf_throws.page import write_page
+from validation.studies.golf_throws.prediction import INPUTS, THROWS, predict_throw
+from validation.studies.golf_throws.prediction import drawn as drawn_inputs
 
 RECORDINGS = Path(os.environ.get("DISCSIM_RECORDINGS") or Path(__file__).parents[3] / "shared" / "recordings") / "real"
 FOLDER = RECORDINGS / "shotshaper-dd2-drone-tracked-throws"
@@ -70,7 +70,7 @@ class TestThrows:
             assert np.linalg.norm(throw.nominal[k] - throw.track[k]) < 2.0
 
     def test_the_same_seed_gives_the_same_page(self, tmp_path, monkeypatch):
-        monkeypatch.setattr("validation.golf_throws.page.DRAWS", 33)
+        monkeypatch.setattr("validation.studies.golf_throws.page.DRAWS", 33)
         texts = []
         for folder in ("a", "b"):
             write_page(RECORDINGS, tmp_path / folder / "golf-throws.md", seed=3)

@@ -15,8 +15,9 @@ from discsim.errors import InputError
 from discsim.recording import Samples
 from discsim.rig import default_profile
 from estimators.rate import YawRate
-from validation.options import parse_vector
-from validation.rate_table import (
+from validation.reporting.options import parse_vector
+from validation.reporting.scores import Score
+from validation.scenarios.rate_table import (
     MARGIN_S,
     Plateau,
     RateTableRun,
@@ -28,7 +29,6 @@ from validation.rate_table import (
     run_rate_table,
     write_plateaus,
 )
-from validation.scores import Score
 
 # one ramp of 1000 deg/s^2, which the window can follow
 PROFILE = default_profile((0, 1500, 2500, 5000), hold=2.2, ramp=1.0)

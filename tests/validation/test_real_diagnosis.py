@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 from discsim.model_file import Model
 from discsim.recording import Recording, Samples, SensorSheet
 from discsim.shipped import load_disc
-from validation.golf_throws.prediction import drawn
 from validation.importing import find_map, read_map
-from validation.real_diagnosis.flatball import decay, restamped, rows_of, wobble_rate
-from validation.real_diagnosis.golf_causes import CAUSES, NONE, Cause, Throw, fit_cause, known
-from validation.real_diagnosis.golf_flight import flown
-from validation.real_diagnosis.sensors import (
+from validation.studies.golf_throws.prediction import drawn
+from validation.studies.real_diagnosis.flatball import decay, restamped, rows_of, wobble_rate
+from validation.studies.real_diagnosis.golf_causes import CAUSES, NONE, Cause, Throw, fit_cause, known
+from validation.studies.real_diagnosis.golf_flight import flown
+from validation.studies.real_diagnosis.sensors import (
     against_cameras,
     check,
     field_in_body,

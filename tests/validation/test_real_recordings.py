@@ -17,15 +17,15 @@ from discsim.errors import InputError
 from discsim.recording import Samples
 from estimators.rate import YawRate
 from validation.cli import main
-from validation.real_recordings import road
-from validation.real_recordings.__main__ import app
-from validation.real_recordings.agreement import LOWERED, Attempt, agreement, attempts, mean_between
-from validation.real_recordings.findings import SHIFTS, shifted_rms, turns_of
-from validation.real_recordings.optical import HALF, optical_rate
-from validation.real_recordings.page import write_page
-from validation.real_recordings.road import LOGS, Answers, Log, Said, road_section
-from validation.real_recordings.sources import SOURCES, find_recordings, load
-from validation.real_recordings.turns import field_phase, phase_rate, turned, turned_by_rate
+from validation.studies.real_recordings import road
+from validation.studies.real_recordings.__main__ import app
+from validation.studies.real_recordings.agreement import LOWERED, Attempt, agreement, attempts, mean_between
+from validation.studies.real_recordings.findings import SHIFTS, shifted_rms, turns_of
+from validation.studies.real_recordings.optical import HALF, optical_rate
+from validation.studies.real_recordings.page import write_page
+from validation.studies.real_recordings.road import LOGS, Answers, Log, Said, road_section
+from validation.studies.real_recordings.sources import SOURCES, find_recordings, load
+from validation.studies.real_recordings.turns import field_phase, phase_rate, turned, turned_by_rate
 
 RECORDINGS = Path(os.environ.get("DISCSIM_RECORDINGS") or Path(__file__).parents[2].parent / "shared" / "recordings")
 REAL = RECORDINGS / "real"

@@ -12,12 +12,12 @@ from discsim.effects.setup import axes_of, permutation
 from discsim.errors import InputError
 from discsim.recording import PLANTS, Plant
 from discsim.written import corrected
-from validation.challenge.case import Case, Coast, Concealed, Turning
-from validation.challenge.cases import draw_case
-from validation.challenge.conceal import Answer, read_answer, recordings
-from validation.challenge.setups import draw_fault, equivalents, possible_faults
-from validation.challenge.sizes import HIDING, ordinary
-from validation.challenge.strength import sizes
+from validation.challenge.cases.case import Case, Coast, Concealed, Turning
+from validation.challenge.cases.conceal import Answer, read_answer, recordings
+from validation.challenge.cases.detection_limit import sizes
+from validation.challenge.cases.draw import draw_case
+from validation.challenge.cases.setups import draw_fault, equivalents, possible_faults
+from validation.challenge.cases.sizes import HIDING, ordinary
 
 CASES = {plant: draw_case(3, plant, kind="nothing") for plant in PLANTS}
 

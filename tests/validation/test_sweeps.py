@@ -22,7 +22,7 @@ from discsim.sensors import Accelerometer, Instruments, Magnetometer, Noise, Sam
 from discsim.shipped import load_disc, load_throw
 from estimators.accelerometer import accelerometer
 from estimators.fft import FftSettings, fft
-from validation.rate_table import errors_within
+from validation.scenarios.rate_table import errors_within
 from validation.sweeps import chunks as chunks_module
 from validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, segments
 from validation.sweeps.figures import draw_sweep

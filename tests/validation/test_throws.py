@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from discsim.frames import C3, attitude_matrix
 from discsim.shipped import load_disc, load_throw
 from estimators.rate import YawRate
-from validation.throws import (
+from validation.scenarios.throws import (
     EDGE_S,
     FULL_SET,
     MOUNT_ERROR,

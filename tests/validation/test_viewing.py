@@ -26,13 +26,14 @@ from discsim.recording import Recording, Samples, SensorSheet, write_recording
 from discsim.rig import turn_table
 from discsim.shipped import load_disc, load_throw
 from estimators.rate import YawRate
-from validation import offscreen, viewing
-from validation import replay as replays
 from validation.cli import main
-from validation.offscreen import opengl
-from validation.replay import Replay, replay_motion, replay_recording
-from validation.truth import write_flight_truth, write_rate_truth
-from validation.viewing import Look, Scene, draw_stills, draw_whole, frame_times, show, write_gif, write_mp4
+from validation.reporting.truth import write_flight_truth, write_rate_truth
+from validation.viewing import offscreen
+from validation.viewing import replay as replays
+from validation.viewing import scene as viewing
+from validation.viewing.offscreen import opengl
+from validation.viewing.replay import Replay, replay_motion, replay_recording
+from validation.viewing.scene import Look, Scene, draw_stills, draw_whole, frame_times, show, write_gif, write_mp4
 
 DRIVER, FIELD = load_disc("driver")
 ULTRASTAR, _ = load_disc("ultrastar")

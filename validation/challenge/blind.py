@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 from discsim.errors import InputError
 from discsim.files import digest, write_text
 from discsim.recording import Plant
-from validation.challenge.case import Kind, Mask
-from validation.challenge.cases import draw_case
-from validation.challenge.conceal import Answer, read_answer, write_recordings
+from validation.challenge.cases.case import Kind, Mask
+from validation.challenge.cases.conceal import Answer, read_answer, write_recordings
+from validation.challenge.cases.draw import draw_case
 
 __all__ = ["DIAGNOSE", "Request", "diagnose_blind", "open_answers", "seal_answers"]
 
@@ -31,7 +31,7 @@ PATIENCE_S = 1800.0
 
 
 class Request(NamedTuple):
-    """What a case is drawn from; see `validation.challenge.cases.draw_case`."""
+    """What a case is drawn from; see `validation.challenge.cases.draw.draw_case`."""
 
     seed: int
     plant: Plant | None = None

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from validation.challenge.blind import Request
-from validation.challenge.case import MASKS, Mask
-from validation.challenge.page import percent
-from validation.challenge.result import RESULT, Result, Scored, rates_of, read_result, times
+from validation.challenge.cases.case import MASKS, Mask
+from validation.challenge.report.page import percent
 from validation.challenge.run import challenge
-from validation.report import Section, write_report
-from validation.run import Run
+from validation.challenge.scores.result import RESULT, Result, Scored, rates_of, read_result, times
+from validation.reporting.html import Section, write_report
+from validation.reporting.run import Run
 
 __all__ = ["MASK_HEADER", "challenge_masks", "mask_row", "masked_results"]
 

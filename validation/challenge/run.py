@@ -12,19 +12,19 @@ from typing import Any
 import discsim
 from discsim.files import digest, model_file, model_names
 from validation.challenge.blind import DIAGNOSE, Request, diagnose_blind, open_answers, seal_answers
-from validation.challenge.detection import detections, fit_curve
-from validation.challenge.page import write_page
-from validation.challenge.result import RESULT, Scored, rates_of, times
-from validation.challenge.strength import sizes
-from validation.run import Run, package_version, source_digest
-from validation.sweeps.execution import Task, claim, discard, run_tasks
+from validation.challenge.cases.detection_limit import sizes
+from validation.challenge.report.page import write_page
+from validation.challenge.scores.detection import detections, fit_curve
+from validation.challenge.scores.result import RESULT, Scored, rates_of, times
+from validation.reporting.run import Run, package_version, source_digest
+from validation.tasks import Task, claim, discard, run_tasks
 
 __all__ = ["challenge", "limit_of"]
 
 #: folder of what is done, in --out
 CHECKPOINTS = "checkpoints"
 #: what is done with finished cases: a change of it is no reason to do them again
-_AFTERWARDS = ("detection.py", "document.py", "figures.py", "masks.py", "page.py", "result.py", "run.py", "scoring.py")
+_AFTERWARDS = ("masks.py", "report", "run.py", "scores")
 
 
 def challenge(
@@ -101,9 +101,11 @@ def challenge(
 def code_digest() -> str:
     """Return the SHA-256 of simulation, diagnosis, concealment and discs: a result of other code is no result of it."""
     here = Path(__file__).parents[1]
-    afterwards = {here / "challenge" / name for name in _AFTERWARDS}
-    folders = (Path(discsim.__file__).parent, here / "diagnosis", here / "challenge")
-    code = source_digest(*folders, here / "throws.py", here / "commands" / "diagnose.py", without=afterwards)
+    places = [here / "challenge" / name for name in _AFTERWARDS]
+    afterwards = {file for place in places for file in (place.rglob("*.py") if place.is_dir() else [place])}
+    folders = (Path(discsim.__file__).parent, *(here / name for name in ("identification", "diagnosis", "challenge")))
+    files = (here / "scenarios" / "throws.py", here / "commands" / "diagnose.py")
+    code = source_digest(*folders, *files, without=afterwards)
     discs = [digest(model_file(f"discs/{name}.toml")) for name in model_names("discs")]
     return hashlib.sha256("".join((code, *discs)).encode()).hexdigest()
 

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from validation.options import OutOption, SeedOption
+from validation.reporting.options import OutOption, SeedOption
 
 if TYPE_CHECKING:
     from discsim.recording import Plant
-    from validation.challenge.case import Kind, Mask
-    from validation.challenge.result import Scored
+    from validation.challenge.cases.case import Kind, Mask
+    from validation.challenge.scores.result import Scored
 
 __all__ = ["command"]
 
@@ -89,12 +89,12 @@ def command(
     """
     from discsim.errors import InputError
     from validation.challenge.blind import Request
-    from validation.challenge.detection import detections, fit_curve
     from validation.challenge.masks import challenge_masks
-    from validation.challenge.page import goals_met
-    from validation.challenge.result import rates_of, times
+    from validation.challenge.report.page import goals_met
     from validation.challenge.run import challenge
-    from validation.run import start_run
+    from validation.challenge.scores.detection import detections, fit_curve
+    from validation.challenge.scores.result import rates_of, times
+    from validation.reporting.run import start_run
 
     if scheduler is not None and workers is not None:
         raise InputError("--workers counts local processes, and --scheduler uses none; expected one of the two")

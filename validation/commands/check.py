@@ -29,7 +29,7 @@ def command(
     from validation.checking import check_recording
     from validation.checking.table import print_checks
     from validation.diagnosis.setup import find_setup_faults
-    from validation.run import start_run
+    from validation.reporting.run import start_run
 
     dataset = read_dataset(recordings)
     faults = find_setup_faults(dataset).faults

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from validation.options import DateOption, OutOption, PlaceOption, SeedOption
+from validation.reporting.options import DateOption, OutOption, PlaceOption, SeedOption
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from validation.diagnosis.answer import Outcome
+    from validation.diagnosis.result import Outcome
 
 __all__ = ["command", "write_outcome"]
 
@@ -53,11 +53,11 @@ def command(
 
     from discsim.effects.own import load_user_effects
     from validation.diagnosis.datasets import need_field, read_datasets
-    from validation.diagnosis.plans import read_plans
-    from validation.diagnosis.progress import shown
-    from validation.diagnosis.report import verdict_sentence
-    from validation.options import at_place
-    from validation.run import start_run
+    from validation.diagnosis.design.plans import read_plans
+    from validation.diagnosis.report.page import verdict_sentence
+    from validation.reporting.options import at_place
+    from validation.reporting.progress import shown
+    from validation.reporting.run import start_run
 
     diagnose = import_module("validation.diagnosis").diagnose
     files = user_effects or []
@@ -88,8 +88,8 @@ def write_outcome(outcome: Outcome, out: Path, settings: Mapping[str, str]) -> N
     """Write all files of a diagnosis into ``out``, each whole or not at all, ``diagnosis.json`` last."""
     from discsim.files import write_text
     from discsim.model_file import write_model
-    from validation.diagnosis.report import draw_figures, write_diagnosis_report
-    from validation.run import json_text
+    from validation.diagnosis.report.page import draw_figures, write_diagnosis_report
+    from validation.reporting.run import json_text
 
     figures = draw_figures(outcome, out)
     write_diagnosis_report(out / "report.html", outcome, figures, settings)

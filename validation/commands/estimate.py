@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from validation.options import DateOption, OutOption, PlaceOption
+from validation.reporting.options import DateOption, OutOption, PlaceOption
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from discsim.recording import Recording
     from estimators.methods import Options
     from estimators.rate import YawRate
-    from validation.comparison import Disagreement
+    from validation.scenarios.method_disagreement import Disagreement
 
 __all__ = ["all_notes", "command", "estimate_all", "rate_csv", "summary"]
 
@@ -62,10 +62,10 @@ def command(
     from estimators.accelerometer import AccelerometerErrors
     from estimators.fft import FftSettings
     from estimators.methods import Options
-    from validation.comparison import disagreements
     from validation.diagnosis.setup import find_setup_faults
-    from validation.options import at_place
-    from validation.run import start_run
+    from validation.reporting.options import at_place
+    from validation.reporting.run import start_run
+    from validation.scenarios.method_disagreement import disagreements
 
     zeros = max(0, 2**14 - window) if pad is None else pad
     options = Options(
@@ -91,7 +91,7 @@ def draw(rates: Sequence[YawRate], name: str, path: Path) -> None:
     """Draw the rates, and below them their differences from the most preferred method that knows the rate."""
     import numpy as np
 
-    from validation.figures import draw_differences, draw_rates, new_figure, save_figure
+    from validation.reporting.figures import draw_differences, draw_rates, new_figure, save_figure
 
     knowing = [rate for rate in rates if np.isfinite(rate.rate).any()]
     if len(knowing) < 2:

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from validation.options import OutOption
+from validation.reporting.options import OutOption
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from validation.fitting import Compared, Fit
+    from validation.yaw_damping import Compared, Fit
 
 __all__ = ["command"]
 
@@ -40,19 +40,11 @@ def command(
     from discsim.model_file import write_model
     from discsim.recording import read_dataset
     from estimators.methods import METHODS
-    from validation.fitting import (
-        SOURCES,
-        Compared,
-        Source,
-        compare_sources,
-        fit_yaw_damping,
-        observe,
-        paper_table,
-    )
-    from validation.fitting.figures import draw_fit, draw_sources, draw_surface
-    from validation.fitting.model import fitted_model, tabulated_model
-    from validation.fitting.paper_table import table_csv
-    from validation.run import start_run
+    from validation.reporting.run import start_run
+    from validation.yaw_damping import SOURCES, Compared, Source, compare_sources, fit_yaw_damping, observe, paper_table
+    from validation.yaw_damping.figures import draw_fit, draw_sources, draw_surface
+    from validation.yaw_damping.model import fitted_model, tabulated_model
+    from validation.yaw_damping.paper_table import table_csv
 
     if method != "best" and method not in METHODS:
         raise InputError(f"--method {method}: unknown; expected one of best, {', '.join(METHODS)}")

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from validation.options import (
+from validation.reporting.options import (
     EffectOption,
     ModelOption,
     OutOption,
@@ -75,8 +75,8 @@ def command(
     from discsim.sensors import Instruments, record
     from discsim.shipped import load_throw
     from discsim.trajectory import predict
-    from validation.run import start_run
-    from validation.truth import write_flight_truth
+    from validation.reporting.run import start_run
+    from validation.reporting.truth import write_flight_truth
 
     if engine is Engine.trajectory and ground is Ground.skip:
         raise InputError("--engine trajectory knows no contact with the ground; expected --ground stop with it")

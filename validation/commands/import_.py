@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from validation.options import DateOption, OutOption, PlaceOption
+from validation.reporting.options import DateOption, OutOption, PlaceOption
 
 if TYPE_CHECKING:
     from validation.importing import Imported, ImportMap
     from validation.importing.sniffing import Proposal, Stretch
-    from validation.run import Run
+    from validation.reporting.run import Run
 
 __all__ = ["command"]
 
@@ -61,8 +61,8 @@ def command(
     from validation.importing import find_map, parse_rows, read_map, read_readings
     from validation.importing.sniffing import opened, recognised, sniff, stretches, write_raw_page
     from validation.importing.sniffing.chosen import chosen_recordings
-    from validation.options import at_place
-    from validation.run import start_run
+    from validation.reporting.options import at_place
+    from validation.reporting.run import start_run
 
     if sum((rows is not None, throw is not None, all_throws)) > 1:
         raise InputError("--rows, --throw and --all-throws: expected one of them at most")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from validation.options import (
+from validation.reporting.options import (
     EffectOption,
     ModelOption,
     OutOption,
@@ -21,7 +21,7 @@ from validation.options import (
 )
 
 if TYPE_CHECKING:
-    from validation.rate_table import Plateau
+    from validation.scenarios.rate_table import Plateau
 
 __all__ = ["command"]
 
@@ -53,10 +53,16 @@ def command(
     from discsim.model_file import read_model
     from discsim.recording import write_recording
     from discsim.rig import default_profile, read_profile
-    from validation.rate_table import plateau_table, plateaus, rate_table_checks, run_rate_table, write_plateaus
-    from validation.rate_table_figures import draw_methods, draw_waveform
-    from validation.run import start_run
-    from validation.truth import write_rate_truth
+    from validation.reporting.run import start_run
+    from validation.reporting.truth import write_rate_truth
+    from validation.scenarios.rate_table import (
+        plateau_table,
+        plateaus,
+        rate_table_checks,
+        run_rate_table,
+        write_plateaus,
+    )
+    from validation.scenarios.rate_table_figures import draw_methods, draw_waveform
 
     knots = default_profile() if profile is None else read_profile(profile)
     offset = parse_vector(mount, "--mount", "m", 0.05)

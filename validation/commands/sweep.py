@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from validation.options import OutOption
+from validation.reporting.options import OutOption
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from validation.run import Run
-    from validation.sweeps.execution import Progress
+    from validation.reporting.run import Run
+    from validation.tasks import Progress
 
 __all__ = ["command"]
 
@@ -47,12 +47,12 @@ def command(
     import numpy as np
 
     from discsim.errors import InputError
-    from validation.run import package_version, start_run
+    from validation.reporting.run import package_version, start_run
     from validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, truth_tasks
-    from validation.sweeps.execution import Task, claim, discard, run_tasks
     from validation.sweeps.figures import draw_sweep
     from validation.sweeps.plan import plan_file, read_plan
     from validation.sweeps.result import labelled, write_netcdf
+    from validation.tasks import Task, claim, discard, run_tasks
 
     if scheduler is not None and workers is not None:
         raise InputError("--workers counts local processes, and --scheduler uses none; expected one of the two")

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from discsim.errors import InputError
-from validation.options import OutOption, SeedOption
+from validation.reporting.options import OutOption, SeedOption
 
 __all__ = ["command"]
 
@@ -25,9 +25,9 @@ def command(
 
     Example: discsim validate --quick --junit scores.xml --out validation-report
     """
-    from validation.headless import validate
-    from validation.run import start_run
-    from validation.scores import all_ok
+    from validation.experiments.validation_run import validate
+    from validation.reporting.run import start_run
+    from validation.reporting.scores import all_ok
 
     if junit is not None and (junit.is_dir() or junit.parent.is_file()):
         raise InputError(f"--junit {junit}: is no place for a file; expected the name of one")

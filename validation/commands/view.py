@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from discsim.errors import InputError
-from validation.options import ModelOption, WithOption, all_effects, disc_to_fly, laws_upon
+from validation.reporting.options import ModelOption, WithOption, all_effects, disc_to_fly, laws_upon
 
 if TYPE_CHECKING:
-    from validation.replay import Replay
-    from validation.viewing import Look
+    from validation.viewing.replay import Replay
+    from validation.viewing.scene import Look
 
 __all__ = ["command"]
 
@@ -66,13 +66,13 @@ def command(
     times = _seconds(at, ",", "--at") if at is not None else None
     cut = _seconds(span, ":", "--span") if span is not None else None
 
-    from validation.offscreen import opengl
+    from validation.viewing.offscreen import opengl
 
     if video is not None:
         opengl()  # MuJoCo, imported from here on, gives no clear error for a MUJOCO_GL that it does not know
 
-    from validation.run import start_run
-    from validation.viewing import Look, draw_stills, draw_whole, show, write_picture
+    from validation.reporting.run import start_run
+    from validation.viewing.scene import Look, draw_stills, draw_whole, show, write_picture
 
     replay = _replay(recording, disc, model, throw or "driver", own or [])
     if cut is not None:
@@ -103,7 +103,7 @@ def _replay(recording: Path | None, disc: str | None, model: Path | None, throw:
     from discsim.effects.own import load_user_effects
     from discsim.engine import fly
     from discsim.shipped import load_throw
-    from validation.replay import replay_motion, replay_recording
+    from validation.viewing.replay import replay_motion, replay_recording
 
     if recording is not None:
         return replay_recording(recording)
@@ -115,7 +115,7 @@ def _replay(recording: Path | None, disc: str | None, model: Path | None, throw:
 
 
 def _draw_video(file: Path, replay: Replay, look: Look, fps: float, speed: float) -> None:
-    from validation.viewing import frame_times, write_video
+    from validation.viewing.scene import frame_times, write_video
 
     times = frame_times(file, replay, fps, speed)
     if not sys.stderr.isatty():

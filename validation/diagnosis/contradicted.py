@@ -9,8 +9,8 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.model_file import Model
 from discsim.recording import Recording
-from validation.diagnosis.answer import Diagnosis, FitFigures, Located, Outcome, Residuals
-from validation.diagnosis.early_verdict import Contradiction, Look
+from validation.diagnosis.consistency.early_verdict import Contradiction, Look
+from validation.diagnosis.result import Diagnosis, FitFigures, Located, Outcome, Residuals
 
 __all__ = ["contradicted_outcome"]
 

@@ -14,7 +14,7 @@ import numpy as np
 from discsim.disc import Disc
 from discsim.errors import InputError
 from discsim.recording import Recording
-from validation.diagnosis.turning import angle_turned, rate_of
+from validation.diagnosis.consistency.turning import angle_turned, rate_of
 
 __all__ = ["with_inertia"]
 

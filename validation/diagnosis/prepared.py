@@ -10,7 +10,7 @@ import numpy as np
 from discsim.arrays import BoolArray, FloatArray
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
-from validation.diagnosis.starts import FEWEST
+from validation.identification.initial.smoothing import FEWEST
 
 __all__ = ["prepared"]
 

@@ -17,7 +17,7 @@ from discsim.effects.catalogue import BOARD, Effect, effect, row
 from discsim.model_file import ModelEffect
 from discsim.recording import Recording
 from discsim.written import PREFIX
-from validation.diagnosis.answer import (
+from validation.diagnosis.result import (
     SMALLEST_P_VALUE,
     Confusion,
     Diagnosis,
@@ -28,8 +28,9 @@ from validation.diagnosis.answer import (
     Outcome,
     ParameterValue,
 )
-from validation.diagnosis.fitting import Fit, Parameter
 from validation.diagnosis.setup import SetupFault, SetupFindings, said
+from validation.identification.gauss_newton import Fit
+from validation.identification.parameters import Parameter
 
 __all__ = ["free_parameters", "with_setup"]
 

@@ -13,7 +13,7 @@ from matplotlib.colors import Normalize
 from matplotlib.ticker import LogLocator, NullLocator
 
 from discsim.arrays import FloatArray
-from validation.figures import colour, new_figure, save_figure
+from validation.reporting.figures import colour, new_figure, save_figure
 from validation.sweeps.chunks import Sweep
 from validation.sweeps.mounts import closed_form
 

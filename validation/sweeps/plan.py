@@ -284,7 +284,7 @@ def read_plan(path: Path, *, count: int | None = None, seed: int | None = None) 
 
 
 def _level(profile: Samples) -> bool:
-    from validation.rate_table import plateaus
+    from validation.scenarios.rate_table import plateaus
 
     return bool(plateaus(profile))
 

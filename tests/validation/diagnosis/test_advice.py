@@ -12,14 +12,15 @@ from made import FIELD, RIG, coasting, coasts, tables, throws
 from discsim.effects import effect
 from discsim.errors import InputError
 from discsim.rig import spin_down
-from validation.diagnosis.advice import ENOUGH, advise, confusions, expected_evidence, in_words
-from validation.diagnosis.answer import Advice, Separation
-from validation.diagnosis.assembly import assemble
-from validation.diagnosis.plans import LEAN, Plan, plans_about, read_plans
-from validation.diagnosis.relaxed import relaxed
-from validation.diagnosis.search import Rival, Search, search, values_of_fit
-from validation.diagnosis.selection import Hypothesis, tied_fit
-from validation.diagnosis.trials import Trial, trials_for
+from validation.diagnosis.assemble import assemble
+from validation.diagnosis.design.next_recording import ENOUGH, advise, confusions, expected_evidence, in_words
+from validation.diagnosis.design.plans import LEAN, Plan, plans_about, read_plans
+from validation.diagnosis.relaxed_fit import relaxed
+from validation.diagnosis.result import Advice, Separation
+from validation.diagnosis.selection.candidates import Trial, trials_for
+from validation.diagnosis.selection.constrained_fit import tied_fit
+from validation.diagnosis.selection.hypothesis import Hypothesis
+from validation.diagnosis.selection.stepwise import Rival, Search, search, values_of_fit
 
 STRETCHED = effect("accel.scale", sx=0.02, sy=0.02, sz=0.0)
 

@@ -15,8 +15,8 @@ from made import MODULE, throws
 from discsim.effects import Effect, effect
 from discsim.recording import Recording, Samples
 from validation.diagnosis import diagnose
-from validation.diagnosis.agreement import Agreement, agreement_of, written_ratios
-from validation.diagnosis.agreement_tables import tables_of
+from validation.diagnosis.consistency.spin_agreement import Agreement, agreement_of, written_ratios
+from validation.diagnosis.report.consistency_tables import tables_of
 from validation.importing import find_map, import_recording, read_map
 
 #: a gyroscope that shows the spin, which an MPU-9250 does not

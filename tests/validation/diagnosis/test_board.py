@@ -12,12 +12,14 @@ from made import RIG, coasts
 
 from discsim.arrays import FloatArray
 from discsim.effects import effect
-from validation.diagnosis.board import Board, board_of, column_of, free_columns
-from validation.diagnosis.fitting import Fit, Parameter, linearised, refit, unknown_prior
-from validation.diagnosis.noise import stated_noise, whitened
-from validation.diagnosis.relaxed import NO_JUMPS, first_chain
-from validation.diagnosis.trajectory_pieces import Column
-from validation.diagnosis.trials import trials_for
+from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain
+from validation.diagnosis.selection.candidates import trials_for
+from validation.diagnosis.selection.screening import Board, board_of, column_of, free_columns
+from validation.identification.gauss_newton import Fit, linearised, refit
+from validation.identification.noise import stated_noise, whitened
+from validation.identification.normal_equations import unknown_prior
+from validation.identification.parameters import Parameter
+from validation.identification.propagation import Column
 
 VISCOUS = Parameter("rig", "viscous", RIG.viscous, 1e-8, 2e-7)
 TORQUE = 1.5e-4

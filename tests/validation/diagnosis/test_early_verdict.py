@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from tests.validation.diagnosis.made import throws
+from validation.diagnosis.consistency.early_verdict import ASTRAY, RECONCILED, contradiction_in
+from validation.diagnosis.consistency.followed import left_of, left_when_shifted, true_noise
 from validation.diagnosis.contradicted import contradicted_outcome
-from validation.diagnosis.early_verdict import ASTRAY, RECONCILED, contradiction_in
-from validation.diagnosis.followed import left_of, left_when_shifted, true_noise
-from validation.diagnosis.relaxed import part_of, relaxed
-from validation.diagnosis.trajectory_pieces import readings_of
+from validation.diagnosis.relaxed_fit import part_of, relaxed
+from validation.identification.observations import readings_of
 
 
 @pytest.fixture(scope="module")

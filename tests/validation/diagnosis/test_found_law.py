@@ -15,12 +15,20 @@ from discsim.recording import Recording, Samples
 from discsim.rig import turn_table
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
-from validation.challenge.physics import OffCatalogue, PowerLawTorque, RotatingMagnet, Warming, coast, haunted
-from validation.diagnosis.law import FoundLaw, find_law
-from validation.diagnosis.noise import estimate_noise
-from validation.diagnosis.relaxed import relaxed
-from validation.diagnosis.selection import Hypothesis, tied_fit
-from validation.diagnosis.stated import stated_parameters
+from validation.challenge.cases.off_catalogue import (
+    OffCatalogue,
+    PowerLawTorque,
+    RotatingMagnet,
+    Warming,
+    coast,
+    haunted,
+)
+from validation.diagnosis.relaxed_fit import relaxed
+from validation.diagnosis.selection.constrained_fit import tied_fit
+from validation.diagnosis.selection.hypothesis import Hypothesis
+from validation.diagnosis.unknown_law.find import FoundLaw, find_law
+from validation.identification.noise import estimate_noise
+from validation.identification.stated_parameters import stated_parameters
 
 MODULE = Instruments.from_parts("mpu9250")
 FIELD = Environment(magnetic_field=np.array([30.1, -4.3, 39.2]), gravity=9.8)

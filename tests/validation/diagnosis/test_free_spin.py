@@ -15,13 +15,16 @@ from discsim.engine import fly
 from discsim.recording import Recording
 from discsim.sensors import record
 from discsim.shipped import load_disc
-from validation.diagnosis.fitting import Fit, Jumps, Parameter, _Going, linearised, linearised_columns, reduce
-from validation.diagnosis.noise import estimate_noise, stated_noise, whitened
-from validation.diagnosis.readings import predicted
-from validation.diagnosis.relaxed import NO_JUMPS, first_chain, relaxed, unknowns
-from validation.diagnosis.search import _possible
-from validation.diagnosis.selection import Hypothesis, Tied, tied_fit
-from validation.diagnosis.trajectory_pieces import WOBBLE, Column
+from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain, relaxed, unknowns
+from validation.diagnosis.selection.constrained_fit import Tied, tied_fit
+from validation.diagnosis.selection.hypothesis import Hypothesis
+from validation.diagnosis.selection.stepwise import _possible
+from validation.identification.gauss_newton import Fit, _Going, linearised, linearised_columns
+from validation.identification.noise import estimate_noise, stated_noise, whitened
+from validation.identification.normal_equations import reduce
+from validation.identification.parameters import Jumps, Parameter
+from validation.identification.propagation import WOBBLE, Column
+from validation.identification.sensor_model import predicted
 
 #: numbers of a gyroscope's and a magnetometer's module without a path
 BLIND = MODULE.without("gps").fitted("gyroscope", range=104.72)

@@ -12,27 +12,13 @@ from scipy.optimize import lsq_linear
 
 from discsim.arrays import FloatArray
 from discsim.effects import effect
-from validation.diagnosis.fitting import (
-    Fit,
-    Jumps,
-    Parameter,
-    _Going,
-    linearised,
-    local_step,
-    merit_of,
-    normal_matrix,
-    open_gaps,
-    reduce,
-    refit,
-    release_rows,
-    residuals_after,
-    shared_step,
-    unknown_prior,
-    values_of,
-)
-from validation.diagnosis.noise import stated_noise, whitened
-from validation.diagnosis.relaxed import NO_JUMPS, first_chain, loose_jumps
-from validation.diagnosis.trajectory_pieces import Chain, chain, shifted, stepped
+from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain, loose_jumps
+from validation.identification.gauss_newton import Fit, _Going, linearised, merit_of, open_gaps, refit, residuals_after
+from validation.identification.noise import stated_noise, whitened
+from validation.identification.normal_equations import local_step, normal_matrix, reduce, shared_step, unknown_prior
+from validation.identification.parameters import Jumps, Parameter, values_of
+from validation.identification.release_prior import release_rows
+from validation.identification.segments import Chain, chain, shifted, stepped
 
 FRICTION = Parameter("rig.coulomb_friction", "torque_N_m", 0.0, 1e-6)
 VISCOUS = Parameter("rig", "viscous", RIG.viscous, 1e-8, 2e-7)

@@ -8,7 +8,8 @@ from scipy.signal import lfilter
 from scipy.stats import multivariate_normal
 
 from discsim.arrays import FloatArray
-from validation.diagnosis.noise import (
+from validation.identification.linearisation import Channel, Linear
+from validation.identification.noise import (
     GroupNoise,
     estimate_noise,
     likeliest_noise,
@@ -16,7 +17,6 @@ from validation.diagnosis.noise import (
     stated_noise,
     whitened,
 )
-from validation.diagnosis.trajectory_pieces import Channel, Linear
 
 
 def rows(*sizes: tuple[str, int], sd: float = 1.0, missing: tuple[int, ...] = ()) -> Linear:

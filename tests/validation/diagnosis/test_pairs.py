@@ -10,15 +10,17 @@ import pytest
 from made import throws
 
 from discsim.effects import Effect, effect
-from validation.diagnosis import search as searching
-from validation.diagnosis.advice import confusions
-from validation.diagnosis.board import board_of
-from validation.diagnosis.noise import estimate_noise
-from validation.diagnosis.relaxed import NO_JUMPS, relaxed, unknowns
-from validation.diagnosis.search import Rival
-from validation.diagnosis.selection import Hypothesis, Pair, Proposal, Tied, fitted_parameters, pairs
-from validation.diagnosis.stated import stated_parameters
-from validation.diagnosis.trials import Trial, trials_for
+from validation.diagnosis.design.next_recording import confusions
+from validation.diagnosis.relaxed_fit import NO_JUMPS, relaxed, unknowns
+from validation.diagnosis.selection import stepwise as searching
+from validation.diagnosis.selection.candidates import Trial, trials_for
+from validation.diagnosis.selection.constrained_fit import Tied
+from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
+from validation.diagnosis.selection.proposals import Pair, Proposal, pairs
+from validation.diagnosis.selection.screening import board_of
+from validation.diagnosis.selection.stepwise import Rival
+from validation.identification.noise import estimate_noise
+from validation.identification.stated_parameters import stated_parameters
 
 YAW, CLOCK = effect("aero.yaw_reynolds", exponent=0.3), effect("mag.clock_rate", ratio=0.9996)
 

@@ -34,20 +34,12 @@ from discsim.recording import Recording, Samples
 from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, record
 from discsim.trajectory import predict
-from validation.diagnosis.readings import predicted
-from validation.diagnosis.trajectory_pieces import (
-    STEPS,
-    WOBBLE,
-    Chain,
-    Column,
-    Linear,
-    chain,
-    linearise,
-    readings_of,
-    recut,
-    shifted,
-    shown,
-)
+from validation.identification.linearisation import Linear, linearise
+from validation.identification.observations import readings_of
+from validation.identification.prediction import shown
+from validation.identification.propagation import WOBBLE, Column
+from validation.identification.segments import STEPS, Chain, chain, recut, shifted
+from validation.identification.sensor_model import predicted
 
 #: sizes that show well within half a second of flight
 IN_THE_AIR = (

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from validation.diagnosis.assembly import reason_for
-from validation.diagnosis.search import Considered
-from validation.diagnosis.selection import price
-from validation.diagnosis.trials import Trial
+from validation.diagnosis.assemble import reason_for
+from validation.diagnosis.selection.candidates import Trial
+from validation.diagnosis.selection.evidence import price
+from validation.diagnosis.selection.stepwise import Considered
 
 BIAS, IMPULSE = Trial("gyro.bias", ()), Trial("event.impulse", ())
 

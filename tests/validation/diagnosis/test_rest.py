@@ -7,8 +7,8 @@ import pytest
 from test_noise import coloured, rows
 
 from discsim.arrays import FloatArray
-from validation.diagnosis.noise import estimate_noise
-from validation.diagnosis.rest import Remainder, remainders
+from validation.identification.noise import estimate_noise
+from validation.identification.residual_tests import Remainder, remainders
 
 N, AXES, RECORDINGS = 600, 3, 4
 

@@ -7,12 +7,15 @@ import pytest
 from made import coasts
 
 from discsim.effects.catalogue import CATALOGUE
-from validation.diagnosis import search as searching
-from validation.diagnosis.fitting import Fit, linearised, merit_of
-from validation.diagnosis.noise import stated_noise
-from validation.diagnosis.relaxed import NO_JUMPS, first_chain
-from validation.diagnosis.selection import Hypothesis, Proposal, Tied, price
-from validation.diagnosis.trials import Trial
+from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain
+from validation.diagnosis.selection import stepwise as searching
+from validation.diagnosis.selection.candidates import Trial
+from validation.diagnosis.selection.constrained_fit import Tied
+from validation.diagnosis.selection.evidence import price
+from validation.diagnosis.selection.hypothesis import Hypothesis
+from validation.diagnosis.selection.proposals import Proposal
+from validation.identification.gauss_newton import Fit, linearised, merit_of
+from validation.identification.noise import stated_noise
 
 #: what algebra ranks, best first; none but the seventh comes near the data
 RANKED = [Trial(id, ()) for id, row in CATALOGUE.items() if id.startswith(("mag.", "gyro.")) and not row.event]

@@ -16,14 +16,20 @@ from discsim.recording import Recording, Samples
 from discsim.rig import turn_table
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
-from validation.diagnosis.fitting import Fit
-from validation.diagnosis.noise import estimate_noise
-from validation.diagnosis.plateau import equal_beyond_chance, plateau_of
-from validation.diagnosis.relaxed import NO_JUMPS, first_chain, relaxed
-from validation.diagnosis.searches import Asked, asked_of, dropped_accelerometer, events, gusts, ripple, saturation
-from validation.diagnosis.selection import Hypothesis, tied_fit
-from validation.diagnosis.slips import likeliest_counts, phase_counts
-from validation.diagnosis.trajectory_pieces import shown
+from validation.diagnosis.detectors.dropped_samples import dropped_accelerometer
+from validation.diagnosis.detectors.events import events
+from validation.diagnosis.detectors.gusts import gusts
+from validation.diagnosis.detectors.local_problem import Asked, asked_of
+from validation.diagnosis.detectors.sample_alignment import likeliest_counts, phase_counts
+from validation.diagnosis.detectors.saturation import saturation
+from validation.diagnosis.detectors.speed_ripple import ripple
+from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain, relaxed
+from validation.diagnosis.selection.constrained_fit import tied_fit
+from validation.diagnosis.selection.hypothesis import Hypothesis
+from validation.identification.clipping import equal_beyond_chance, plateau_of
+from validation.identification.gauss_newton import Fit
+from validation.identification.noise import estimate_noise
+from validation.identification.prediction import shown
 
 DRIVER, FIELD = load_disc("driver")
 MODULE = Instruments.from_parts("mpu9250", "neo_m8n")

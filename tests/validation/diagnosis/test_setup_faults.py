@@ -9,8 +9,8 @@ import pytest
 from made import tables, throws
 
 from discsim.effects import CATALOGUE, Effect, effect
-from validation.diagnosis.search import search
-from validation.diagnosis.trials import available, parameters_of, trials_for
+from validation.diagnosis.selection.candidates import available, parameters_of, trials_for
+from validation.diagnosis.selection.stepwise import search
 
 
 def test_a_setting_is_no_trial_of_the_search_and_a_size_is():

@@ -12,9 +12,9 @@ import pytest
 from discsim.effects import Effect, effect
 from discsim.recording import PLANTS, Recording, Samples, read_recording, write_recording
 from discsim.written import as_written
-from validation.challenge.case import Case, Coast, Concealed
-from validation.challenge.cases import draw_case
-from validation.challenge.conceal import recordings
+from validation.challenge.cases.case import Case, Coast, Concealed
+from validation.challenge.cases.conceal import recordings
+from validation.challenge.cases.draw import draw_case
 from validation.commands.import_ import command as import_
 from validation.diagnosis.setup import SetupFault, find_setup_faults
 

@@ -7,8 +7,8 @@ import pytest
 
 from discsim.recording import Samples
 from tests.validation.diagnosis.made import throws
-from validation.diagnosis.early_verdict import contradiction_in
-from validation.diagnosis.spin_rates import APART, rates_apart
+from validation.diagnosis.consistency.early_verdict import contradiction_in
+from validation.diagnosis.consistency.spin_rates import APART, rates_apart
 
 
 @pytest.fixture(scope="module")

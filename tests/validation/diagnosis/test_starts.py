@@ -27,7 +27,8 @@ from discsim.recording import Recording, Samples, SensorSheet, read_dataset
 from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
-from validation.diagnosis.starts import Starts, flight_starts, rig_starts, spin_starts
+from validation.identification.initial.flight import Starts, flight_starts, spin_starts
+from validation.identification.initial.spin_phase import rig_starts
 
 DRIVER, FIELD = load_disc("driver")
 MODULE = Instruments.from_parts("mpu9250", "neo_m8n")

@@ -27,14 +27,17 @@ from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc, load_throw
 from discsim.trajectory import predict
 from validation.cli import main
-from validation.diagnosis.answer import Diagnosis
-from validation.diagnosis.diagnosing import diagnose
-from validation.diagnosis.fitting import mapped
-from validation.diagnosis.readings import is_motion, predicted, value
-from validation.diagnosis.relaxed import first_chain
-from validation.diagnosis.rows import competing, row_of, rows
-from validation.diagnosis.trajectory_pieces import Column, chain, linearise, shown
-from validation.diagnosis.trials import available, parameters_of, trials_for
+from validation.diagnosis.pipeline import diagnose
+from validation.diagnosis.relaxed_fit import first_chain
+from validation.diagnosis.result import Diagnosis
+from validation.diagnosis.selection.candidates import available, parameters_of, trials_for
+from validation.identification.competing_effects import competing, row_of, rows
+from validation.identification.gauss_newton import mapped
+from validation.identification.linearisation import linearise
+from validation.identification.prediction import shown
+from validation.identification.propagation import Column
+from validation.identification.segments import chain
+from validation.identification.sensor_model import is_motion, predicted, value
 
 FIELD, RIG = Environment(air_density=None), Rig(1e-3, 8e-5)
 MODULE = Instruments.from_parts("mpu9250")

@@ -2,7 +2,7 @@
 
 A board upside down on a disc that spins the other way reads the same as a sound one in every relation between its
 sensors; the air knows the difference, for a disc has a top. So a second or so of a flight is followed under each
-hypothesis, loosely (`validation.diagnosis.relaxed`), and the one that leaves least is taken.
+hypothesis, loosely (`validation.diagnosis.relaxed_fit`), and the one that leaves least is taken.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.recording import Recording
-from validation.diagnosis.fitting import Fit, linearised, refit
-from validation.diagnosis.noise import stated_noise
-from validation.diagnosis.relaxed import beginning, first_chain, loose_jumps, ordinary, unknowns
-from validation.diagnosis.stated import stated_parameters
+from validation.diagnosis.relaxed_fit import beginning, first_chain, loose_jumps, ordinary, unknowns
+from validation.identification.gauss_newton import Fit, linearised, refit
+from validation.identification.noise import stated_noise
+from validation.identification.stated_parameters import stated_parameters
 
 __all__ = ["left_by_short_fit"]
 

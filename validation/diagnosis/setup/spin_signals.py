@@ -16,8 +16,9 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import RIGS
 from discsim.recording import Recording
-from validation.diagnosis.starts import field_spin, local_cubics, path_fixes
-from validation.diagnosis.turning import rate_of
+from validation.diagnosis.consistency.turning import rate_of
+from validation.identification.initial.path import local_cubics, path_fixes
+from validation.identification.initial.spin_phase import field_spin
 
 __all__ = ["ComplexArray", "FlightPath", "Locked", "SpinSignals", "averages", "spin_signals", "turning_line", "usable"]
 

@@ -11,11 +11,11 @@ from matplotlib.axes import Axes
 
 from discsim.arrays import FloatArray
 from discsim.recording import SENSORS
-from validation.figures import new_figure, save_figure
 from validation.importing.conversion import RawReadings
 from validation.importing.sniffing.decision import Decision
 from validation.importing.sniffing.stretches import Stretch
-from validation.report import Section, write_report
+from validation.reporting.figures import new_figure, save_figure
+from validation.reporting.html import Section, write_report
 
 __all__ = ["envelope", "write_raw_page"]
 

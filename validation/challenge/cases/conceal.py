@@ -1,0 +1,258 @@
+"""Conceal: simulate a case in MuJoCo, write plain recordings, and seal the answer away from them.
+
+``python -m validation.challenge.cases.conceal --seed 1 --cases 3 --out DIR`` writes ``DIR/<case>/<01..>/``
+(recordings), ``DIR/answers/<case>.toml`` (answers) and ``DIR/sealed.json`` (digests of both,
+published before anybody diagnoses).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from discsim.disc import Release
+from discsim.effects.catalogue import Effect
+from discsim.engine import follow
+from discsim.errors import InputError
+from discsim.files import digest, write_text
+from discsim.motion import Motion
+from discsim.recording import PLANTS, Plant, Recording, toml_lines, write_recording
+from discsim.rig import turn_table
+from discsim.sensors import record
+from discsim.toml_table import read_toml
+from validation.challenge.cases.case import Case, Coast, Kind, Mask, Run, Turning
+from validation.challenge.cases.draw import draw_case
+from validation.challenge.cases.off_catalogue import HiddenDisc, coast, haunted
+from validation.challenge.cases.setups import equivalents
+
+__all__ = ["Answer", "conceal", "read_answer", "recordings", "seal", "write_recordings"]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was concealed.
+
+    ``verdict`` is one of the contract's, ``effects`` the ids; ``recordings`` (folder names) those an event is in, None
+    where no event is hidden. ``parameters`` holds the sizes by name, ``moved`` the true values of stated coefficients
+    that have a sigma, ``law`` the physics of no catalogue in words. ``setting`` is that of the fault of a setup, by
+    name; ``equivalents`` are the faults (id, axes) that no recording of the case can tell from it.
+    """
+
+    seed: int
+    plant: Plant
+    kind: Kind
+    verdict: str
+    effects: tuple[str, ...] = ()
+    recordings: tuple[str, ...] | None = None
+    parameters: dict[str, float] = field(default_factory=dict)
+    moved: dict[str, float] = field(default_factory=dict)
+    law: str | None = None
+    setting: dict[str, str] = field(default_factory=dict)
+    equivalents: tuple[tuple[str, str], ...] = ()
+
+    @classmethod
+    def of(cls, case: Case) -> Answer:
+        """Return the answer of a case."""
+        parameters: dict[str, float] = {}
+        for item in case.concealed:
+            none = item.effect.row.sizes
+            parameters.update({name: size for name, size in item.effect.sizes.items() if size != none[name]})
+        if case.secret is not None:
+            numbers = {name: value for name, value in vars(case.secret).items() if isinstance(value, float)}
+            parameters.update(numbers)
+        setting = {name: text for item in case.concealed for name, text in item.effect.setting.items()}
+        alike = tuple(one for item in case.concealed for one in equivalents(case, item.effect))
+        only = tuple(f"{item.recording + 1:02d}" for item in case.concealed if item.recording is not None)
+        return cls(
+            case.seed,
+            case.plant,
+            case.kind,
+            case.verdict,
+            tuple(item.effect.id for item in case.concealed),
+            only or None,
+            parameters,
+            dict(case.moved),
+            case.secret.law if case.secret is not None else None,
+            setting,
+            alike,
+        )
+
+    @property
+    def text(self) -> str:
+        """The answer as TOML."""
+        top: dict[str, Any] = {"verdict": self.verdict, "effects": list(self.effects)}
+        if self.recordings is not None:
+            top["recordings"] = list(self.recordings)
+        if self.law is not None:
+            top["law"] = self.law
+        lines = toml_lines({**top, "plant": self.plant, "kind": self.kind})
+        lines.append(f"seed = {self.seed}")
+        for name, given in (("parameters", self.parameters), ("moved", self.moved), ("setting", self.setting)):
+            if given:
+                lines += ["", f"[{name}]", *toml_lines(given)]
+        for id, axes in self.equivalents:
+            lines += ["", "[[equivalents]]", *toml_lines({"id": id, "axes": axes})]
+        return "\n".join([*lines, ""])
+
+
+def read_answer(path: Path) -> Answer:
+    """Read an answer; raises `InputError` naming file, line and what was expected."""
+    table = read_toml(path)
+    verdict, plant, kind = (table.text(name) for name in ("verdict", "plant", "kind"))
+    seed = table.raw("seed")
+    effects, only = table.raw("effects"), table.raw("recordings")
+    numbers = {}
+    for name in ("parameters", "moved"):
+        part = table.table(name)
+        numbers[name] = {key: float(part.raw(key)) for key in part} if part is not None else {}
+    law = table.text("law", required=False)
+    texts = table.table("setting")
+    setting = {name: str(texts.raw(name)) for name in texts} if texts is not None else {}
+    alike = tuple((str(one.text("id")), str(one.text("axes"))) for one in table.tables("equivalents"))
+    table.finish()
+    assert verdict is not None
+    return Answer(
+        int(seed),
+        plant,  # type: ignore[arg-type]
+        kind,  # type: ignore[arg-type]
+        verdict,
+        tuple(effects),
+        None if only is None else tuple(only),
+        numbers["parameters"],
+        numbers["moved"],
+        law,
+        setting,
+        alike,
+    )
+
+
+# ---------------------------------------------------------------------------------------------- simulation
+
+
+def recordings(case: Case) -> list[Recording]:
+    """Simulate every run of a case and return what its instruments recorded and what is stated."""
+    made = []
+    for number, run in enumerate(case.runs):
+        effects = [item.effect for item in case.concealed if item.recording in (None, number)]
+        motion = _motion(case, run, effects, number)
+        stated = replace(case.environment, air_density=case.environment.air_density if case.plant == "flight" else None)
+        motion = replace(motion, environment=stated)
+        instruments = haunted(case.instruments, case.secret).with_effects(effects)
+        taken = record(
+            motion,
+            instruments,
+            np.random.default_rng([case.seed, 1, number]),
+            plant=case.plant,
+            name=f"concealed-{number + 1:02d}",
+            disc=_stated_disc(case),
+            rig=case.stated_rig,
+            release=case.stated_releases[number] if case.stated_releases else None,
+            command=run.profile if isinstance(run, Turning) else None,
+        )
+        sheets = {name: case.sheets_of.sensors[name].sheet for name in taken.samples}
+        made.append(replace(taken, sheets=sheets))
+    return made
+
+
+def _stated_disc(case: Case) -> Any:
+    if case.plant == "free_spin" and case.stated_disc is not None:
+        return replace(case.stated_disc, aero=None, aero_table=None, yaw_damping_table=None, sigma={})
+    return case.stated_disc
+
+
+def _motion(case: Case, run: Run, effects: Sequence[Effect], number: int) -> Motion:
+    if isinstance(run, Turning):
+        return turn_table(run.profile, case.environment, effects, yaw=run.yaw)
+    if isinstance(run, Coast):
+        assert case.rig is not None
+        return coast(case.rig, case.environment, run.rate, run.duration, effects, case.secret, yaw=run.yaw)
+    return _flight(case, run, effects, number)
+
+
+def _flight(case: Case, release: Release, effects: Sequence[Effect], number: int) -> Motion:
+    """Fly one throw.
+
+    Wind and density do not go through the catalogue's formulas: a steady wind is a flight in still air seen by
+    somebody who moves (Galileo), other air is another stated density.
+    """
+    environment, rest, drift = case.environment, [], np.zeros(3)
+    for item in effects:
+        if item.id == "air.wind":
+            drift = np.array([item.value.w_north_m_s, item.value.w_east_m_s, 0.0])
+        elif item.id == "air.density":
+            assert environment.air_density is not None
+            environment = replace(environment, air_density=environment.air_density * item.value.ratio)
+        else:
+            rest.append(item)
+    assert case.disc is not None
+    assert release.velocity is not None
+    flying = HiddenDisc(case.disc, environment, rest, case.secret, number)
+    motion = follow(flying, replace(release, velocity=release.velocity - drift), duration=case.longest)
+    if not np.any(drift):
+        return motion
+    return replace(
+        motion, position=motion.position + np.outer(motion.t - motion.start, drift), velocity=motion.velocity + drift
+    )
+
+
+# ---------------------------------------------------------------------------------------------- writing
+
+
+def write_recordings(case: Case, folder: Path) -> None:
+    """Write a case's recordings into ``folder``, numbered from 01."""
+    for number, recording in enumerate(recordings(case), start=1):
+        write_recording(recording, folder / f"{number:02d}")
+
+
+def conceal(case: Case, folder: Path, answer: Path) -> dict[str, str]:
+    """Write a case's recordings into ``folder`` and its answer to the file ``answer``; return the digests of both."""
+    write_recordings(case, folder)
+    write_text(answer, Answer.of(case).text)
+    return {"recordings": digest(folder), "answer": digest(answer)}
+
+
+def seal(
+    out: Path,
+    seed: int,
+    cases: int,
+    plant: Plant | None = None,
+    effects: Sequence[str] = (),
+    kind: Kind | None = None,
+    mask: Mask | None = None,
+) -> dict[str, dict[str, str]]:
+    """Conceal the cases of ``cases`` seeds from ``seed`` on in ``out``; return (and write) the digests by case."""
+    digests = {}
+    for number in range(seed, seed + cases):
+        case = draw_case(number, plant, effects, kind, mask)
+        name = f"case-{number:05d}"
+        digests[name] = conceal(case, out / name, out / "answers" / f"{name}.toml")
+        print(f"{name}: {case.plant}, {len(case.runs)} recordings", flush=True)
+        write_text(out / "sealed.json", json.dumps(digests, indent=2) + "\n")
+    return digests
+
+
+def main() -> None:
+    """Conceal cases from the command line."""
+    parser = argparse.ArgumentParser(prog="python -m validation.challenge.cases.conceal", description=__doc__)
+    parser.add_argument("--seed", type=int, default=0, help="seed of the first case; case k has seed + k")
+    parser.add_argument("--cases", type=int, default=1)
+    parser.add_argument("--plant", choices=PLANTS)
+    parser.add_argument("--effects", nargs="*", default=[], help="ids of the catalogue, or one off-catalogue name")
+    parser.add_argument("--kind", choices=get_args(Kind))
+    parser.add_argument("--mask", choices=get_args(Mask))
+    parser.add_argument("--out", type=Path, required=True)
+    given = parser.parse_args()
+    try:
+        seal(given.out, given.seed, given.cases, given.plant, given.effects, given.kind, given.mask)
+    except InputError as error:
+        parser.error(str(error))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,326 @@
+"""How much of a concealed effect the recordings of its case can show, computed without any diagnosis.
+
+The difference that an effect makes to noise-free readings, in standard deviations of the noise, less what the unknowns
+of the recordings take in (release states, yaw phases, coefficients within their stated sigma), is the gain in chi2
+that its true model brings on average: Fisher's information times the size squared. The detection limit is the size at
+which this gain is `THRESHOLD`. Motions come from the standalone model and from the rigs; nothing is fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from math import pi, sqrt
+from typing import TypeAlias
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+from scipy.interpolate import BSpline
+
+from discsim.arrays import BoolArray, FloatArray
+from discsim.disc import Disc, Release, Rig
+from discsim.effects.catalogue import Effect, effect
+from discsim.frames import body_to_ned
+from discsim.motion import Motion, State
+from discsim.rig import spin_down, turn_table
+from discsim.sensors import Instruments, Noise, record
+from discsim.trajectory import predict
+from validation.challenge.cases.case import Case, Coast, Concealed, Run, Turning
+from validation.challenge.cases.sizes import HIDING
+
+__all__ = ["THRESHOLD", "sizes", "strength"]
+
+#: gain in chi2 that chance does not bring among fifty hypotheses of one to three parameters: 25 + 2 ln(n) and more
+THRESHOLD = 40.0
+#: steps of the unknowns of a release: m, m/s, rad, rad/s; small enough to be linear, large beside rounding
+_POSITION, _VELOCITY, _ANGLE, _RATE = 1e-3, 1e-4, 1e-5, 1e-4
+#: knots of what is unknown but smooth in a free spin, s
+_KNOTS_S = 0.3
+#: readings by sensor: times (n,), values (n, k)
+Readings: TypeAlias = Mapping[str, tuple[FloatArray, FloatArray]]
+
+
+def strength(case: Case) -> float | None:
+    """Return the least concealed effect's size in units of its detection limit; None where none is concealed."""
+    return min(sizes(case).values(), default=None)
+
+
+def sizes(case: Case) -> dict[str, float]:
+    """Return each concealed effect's size in units of its detection limit, by id; faults of the setup have none."""
+    return {
+        item.effect.id: sqrt(max(noncentrality(case, item), 0.0) / THRESHOLD)
+        for item in case.concealed
+        if not item.effect.row.setup
+    }
+
+
+def noncentrality(case: Case, item: Concealed) -> float:
+    """Return the mean gain in chi2 of one concealed effect, all unknowns fitted with it and without."""
+    small, share = _small(item.effect, case)
+    shared = _Shared(len(case.stated_disc.sigma) if case.stated_disc is not None else len(_rig_sigma(case)))
+    gain = 0.0
+    for number, run in enumerate(case.runs):
+        if item.recording in (None, number):
+            sheet = _Sheet.of(case, readings(case, run, []))
+            signature = sheet.column(readings(case, run, [small]), share)
+        else:
+            continue
+        basis = _orthonormal(_unknowns(case, run, sheet))
+        signature -= basis @ (basis.T @ signature)
+        gain += float(signature @ signature)
+        uncertain = _uncertain(case, run)
+        if uncertain:
+            columns = np.column_stack([sheet.column(made, step) for made, step in uncertain])
+            shared.add(columns - basis @ (basis.T @ columns), signature)
+    return gain - shared.taken_in()
+
+
+class _Shared:
+    """Parameters that all recordings share, each known to one of its sigmas beforehand."""
+
+    def __init__(self, count: int) -> None:
+        self.information, self.right = np.eye(count), np.zeros(count)
+
+    def add(self, columns: FloatArray, signature: FloatArray) -> None:
+        self.information += columns.T @ columns
+        self.right += columns.T @ signature
+
+    def taken_in(self) -> float:
+        """What of the gain these parameters can bring, too."""
+        if not self.right.size:
+            return 0.0
+        return float(self.right @ np.linalg.solve(self.information, self.right))
+
+
+def _orthonormal(columns: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of the columns' span; directions that nothing shows are left out."""
+    norms = np.linalg.norm(columns, axis=0)
+    if not np.any(norms > 0):  # without a magnetometer no yaw shows
+        return np.empty((len(columns), 0))
+    u, s, _ = np.linalg.svd(columns[:, norms > 0] / norms[norms > 0], full_matrices=False)
+    return np.asarray(u[:, s > 1e-7 * s[0]])
+
+
+def _small(item: Effect, case: Case) -> tuple[Effect, float]:
+    """Return the effect at a size where readings are linear in it, and the share of its size that this is."""
+    hiding = HIDING[item.id]
+    values = item.value._asdict()
+    if item.id.endswith("dropped_samples"):
+        # what the losses do on average: a clock that runs slow by the share that is lost
+        return effect(item.id.replace("dropped_samples", "clock_rate"), ratio=1.0 - 1e-5), 1e-5 / values["fraction"]
+    if item.id == "accel.saturation":
+        return item, 1.0  # a clipped reading is not linear in the limit
+    size = float(np.linalg.norm([values[name] - hiding.about for name in hiding.sized]))
+    share = min(1.0, 0.1 * hiding.limits(case.plant)[0] / size)
+    small = {name: hiding.about + share * (values[name] - hiding.about) for name in hiding.sized}
+    return effect(item.id, **{**values, **small}), share
+
+
+# ---------------------------------------------------------------------------------------------- readings
+
+
+def readings(
+    case: Case, run: Run, effects: Sequence[Effect], disc: Disc | None = None, rig: Rig | None = None
+) -> Readings:
+    """Return the noise-free readings of one run."""
+    return _measured(case, _motion(case, run, effects, disc or case.stated_disc, rig or case.stated_rig), effects)
+
+
+def _motion(case: Case, run: Run, effects: Sequence[Effect], disc: Disc | None, rig: Rig | None) -> Motion:
+    if isinstance(run, Turning):
+        return turn_table(run.profile, case.environment, effects, yaw=run.yaw, timestep=4e-3)
+    if isinstance(run, Coast):
+        assert rig is not None
+        return spin_down(rig, case.environment, run.rate, run.duration, effects, yaw=run.yaw, timestep=4e-3)
+    assert disc is not None
+    return predict(disc, case.environment, run, effects, duration=case.longest).motion()
+
+
+def _measured(case: Case, motion: Motion, effects: Sequence[Effect]) -> Readings:
+    quiet: Instruments = case.sheets_of
+    for name, sensor in quiet.sensors.items():
+        names = {item.name for item in fields(sensor)}
+        still = {item: Noise() for item in ("noise", "position_noise", "velocity_noise") if item in names}
+        quiet = quiet.fitted(name, **still, **({"resolution": 0.0} if "resolution" in names else {}))
+    if "track" in quiet.sensors:
+        quiet = quiet.fitted("track", unseen=0.0)
+    rng = np.random.default_rng(0)  # draws nothing: there is no noise
+    taken = record(motion, quiet.with_effects(effects), rng, plant=case.plant, name="quiet")
+    made = {}
+    for name, samples in taken.samples.items():
+        value = samples.value if samples.value.ndim == 2 else samples.value[:, None]
+        made[name] = (samples.t, value)
+    return made
+
+
+@dataclass(frozen=True)
+class _Sheet:
+    """The readings of a baseline, which of them count, and their noise."""
+
+    case: Case
+    base: Readings
+    kept: Mapping[str, BoolArray]
+
+    @classmethod
+    def of(cls, case: Case, base: Readings) -> _Sheet:
+        kept = {}
+        for name, (_, value) in base.items():
+            limit = getattr(case.sheets_of.sensors[name], "range", np.inf)
+            kept[name] = np.isfinite(value) & (np.abs(value) < 0.999 * limit)
+        return cls(case, base, kept)
+
+    def column(self, made: Readings, step: float) -> FloatArray:
+        """Return the difference from the baseline per ``step``, in standard deviations, as one vector."""
+        parts = []
+        for name, (t, value) in self.base.items():
+            other_t, other = made[name]
+            _, mine, theirs = np.intersect1d(_ticks(t), _ticks(other_t), return_indices=True)
+            change = np.zeros(value.shape)
+            change[mine] = other[theirs] - value[mine]
+            parts.append(self.weighed(name, change) / step)
+        return np.concatenate(parts)
+
+    def weighed(self, name: str, change: FloatArray) -> FloatArray:
+        """Return changes (n, k) of a sensor's readings in standard deviations, what does not count left out, (m,)."""
+        change = np.where(self.kept[name], change, 0.0)
+        return np.asarray((self._averaged(name, change) / self._noise(name)).ravel())
+
+    def _noise(self, name: str) -> FloatArray:
+        sensor = self.case.sheets_of.sensors[name]
+        if name == "gps":
+            return np.repeat([sensor.position_noise.white, sensor.velocity_noise.white], 3)  # type: ignore[union-attr]
+        rounding = getattr(sensor, "resolution", 0.0) / sqrt(12.0)
+        noise = np.hypot(sensor.noise.white, rounding)  # type: ignore[union-attr]
+        if self._per_turn(name):
+            noise = noise / sqrt(self._block(name))
+        return np.atleast_1d(noise)
+
+    def _per_turn(self, name: str) -> bool:
+        return self.case.plant == "free_spin" and name == "accelerometer"
+
+    def _block(self, name: str) -> int:
+        """Samples per turn."""
+        run = self.case.runs[0]
+        assert isinstance(run, Release)
+        assert run.body_rate is not None
+        turn_s = 2 * pi / abs(float(run.body_rate[2]))
+        return max(round(self.case.sheets_of.sensors[name].sampling.rate_hz * turn_s), 1)
+
+    def _averaged(self, name: str, change: FloatArray) -> FloatArray:
+        """Return what counts of a sensor: of a free spin's accelerometer only the means over turns of x and y."""
+        if not self._per_turn(name):
+            return change
+        block = self._block(name)
+        whole = len(change) // block
+        return np.asarray(change[: whole * block, :2].reshape(whole, block, 2).mean(axis=1))
+
+
+def _ticks(t: FloatArray) -> FloatArray:
+    return np.round(t * 1e6)
+
+
+# ---------------------------------------------------------------------------------------------- unknowns
+
+
+def _unknowns(case: Case, run: Run, sheet: _Sheet) -> FloatArray:
+    """Return how readings change with each unknown of one recording, (n, unknowns), in standard deviations."""
+    if case.plant == "free_spin":
+        assert isinstance(run, Release)
+        return _smooth_unknowns(case, run, sheet)
+    moved: list[tuple[Run, float]] = []
+    if isinstance(run, Turning | Coast):
+        moved.append((replace(run, yaw=run.yaw + _ANGLE), _ANGLE))
+        if isinstance(run, Coast):
+            moved.append((replace(run, rate=run.rate + _RATE), _RATE))
+        return np.column_stack([sheet.column(readings(case, other, []), step) for other, step in moved])
+    assert run.position is not None
+    assert run.velocity is not None
+    assert run.body_rate is not None
+    for axis in np.eye(3):
+        moved.append((replace(run, position=run.position + _POSITION * axis), _POSITION))
+        moved.append((replace(run, velocity=run.velocity + _VELOCITY * axis), _VELOCITY))
+        moved.append((replace(run, body_rate=run.body_rate + _RATE * axis), _RATE))
+    moved.append((replace(run, roll=(run.roll or 0.0) + _ANGLE), _ANGLE))
+    moved.append((replace(run, pitch=(run.pitch or 0.0) + _ANGLE), _ANGLE))
+    moved.append((replace(run, yaw=(run.yaw or 0.0) + _ANGLE), _ANGLE))
+    return np.column_stack([sheet.column(readings(case, other, []), step) for other, step in moved])
+
+
+def _smooth_unknowns(case: Case, run: Release, sheet: _Sheet) -> FloatArray:
+    """Return how readings of a free spin change if its attitude turns by every smooth function of time, or wobbles.
+
+    This is more than unknown air moments and an unknown spin decay can do, so the limit errs on the large side.
+    """
+    motion = _motion(case, run, [], case.stated_disc, None)
+    return np.concatenate([_turned(case, motion, name, sheet) for name in sheet.base])
+
+
+def _turned(case: Case, motion: Motion, name: str, sheet: _Sheet) -> FloatArray:
+    """Return how one sensor's readings change, (n, functions), as the attitude turns by a small angle in N.
+
+    For a turn ``phi`` a vector b of N changes by -C_BN (phi x b) in B and the body rate by C_BN dphi/dt.
+    """
+    state = motion.at(sheet.base[name][0])
+    field_ned = motion.environment.magnetic_field
+    columns = []
+    for angle, speed, push in _turns(case, motion, state):
+        rate = state.in_body(speed)
+        if name == "magnetometer":
+            change = -state.in_body(np.cross(angle, field_ned))
+        elif name == "gyroscope":
+            change = rate
+        else:
+            d = case.sheets_of.sensors[name].position  # type: ignore[union-attr]
+            turning = state.in_body(push) - np.cross(state.rate, rate)
+            w = state.rate
+            change = np.cross(rate, np.cross(w, d)) + np.cross(w, np.cross(rate, d)) + np.cross(turning, d)
+        columns.append(sheet.weighed(name, change))
+    return np.column_stack(columns)
+
+
+def _turns(case: Case, motion: Motion, state: State) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Yield small turns in N (n, 3) with two derivatives: cubic splines along each axis, and a wobble that changes."""
+    assert case.stated_disc is not None
+    t = state.t
+    count = max(round((motion.end - motion.start) / _KNOTS_S), 2)
+    apart = (motion.end - motion.start) / count
+    knots = motion.start + apart * np.arange(-3, count + 4)
+    for k in range(len(knots) - 4):
+        bump = BSpline.basis_element(knots[k : k + 5], extrapolate=False)
+        shape = [np.nan_to_num(form(t)) for form in (bump, bump.derivative(1), bump.derivative(2))]
+        for axis in np.eye(3):
+            angle, speed, push = (np.outer(part, axis) for part in shape)
+            yield angle, speed, push
+    z = body_to_ned(state.attitude)[..., 2]
+    first = np.array([1.0, 0.0, 0.0]) - z[:, :1] * z
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    pace = case.stated_disc.Izz / case.stated_disc.Ixx * motion.rate[:, 2]
+    phase = np.interp(t, motion.t, cumulative_trapezoid(pace, motion.t, initial=0))
+    now = np.interp(t, motion.t, pace)[:, None]
+    for growth in (np.ones_like(t), t / motion.end):
+        for shift in (0.0, pi / 2):
+            way = growth[:, None] * (
+                np.cos(phase + shift)[:, None] * first + np.sin(phase + shift)[:, None] * np.cross(z, first)
+            )
+            yield way, now * np.cross(z, way), -(now**2) * way
+
+
+def _rig_sigma(case: Case) -> Mapping[str, object]:
+    return case.stated_rig.sigma if case.stated_rig is not None else {}
+
+
+def _uncertain(case: Case, run: Run) -> list[tuple[Readings, float]]:
+    """Return readings with each parameter that has a stated sigma moved, and the step in sigmas."""
+    step = 0.01
+    made: list[tuple[Readings, float]] = []
+    if isinstance(run, Coast) and case.stated_rig is not None and case.stated_rig.sigma:
+        sigma = case.stated_rig.sigma["viscous_N_m_s"]
+        rig = replace(case.stated_rig, viscous=case.stated_rig.viscous + step * float(sigma))
+        made.append((readings(case, run, [], rig=rig), step))
+    disc = case.stated_disc
+    if isinstance(run, Release) and disc is not None and disc.sigma and disc.aero is not None:
+        for name, sigma in disc.sigma.items():
+            value = getattr(disc.aero, name) + step * float(sigma)
+            moved = replace(disc, aero=disc.aero._replace(**{name: value}))
+            made.append((readings(case, run, [], disc=moved), step))
+    return made

@@ -1,0 +1,1 @@
+"""Page, figures and document of the blind test."""

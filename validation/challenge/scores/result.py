@@ -1,0 +1,166 @@
+"""What a challenge leaves of each case once its answer is opened, and the file that keeps it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from discsim.errors import InputError
+from validation.challenge.cases.conceal import Answer
+from validation.challenge.scores.scoring import CaseScore, Rate, score_case, summary
+
+__all__ = ["RESULT", "Result", "Scored", "Times", "rates_of", "read_result", "times"]
+
+#: the file of a challenge's result
+RESULT = "challenge.json"
+
+
+@dataclass(frozen=True)
+class Scored:
+    """One case, opened: its answer, the diagnosis (None where there is none), its score, time and detection limit.
+
+    ``sizes`` holds each concealed effect of the catalogue in units of the smallest that can be seen, by id;
+    ``reproduce`` is the command that does this case alone.
+    """
+
+    answer: Answer
+    diagnosis: dict[str, Any] | None
+    score: CaseScore
+    error: str | None
+    seconds: float
+    recordings_sha256: str
+    sizes: Mapping[str, float] = field(default_factory=dict)
+    reproduce: str = ""
+
+    @property
+    def strength(self) -> float | None:
+        """The least of the concealed sizes in units of its limit; None where nothing of the catalogue is concealed."""
+        return min(self.sizes.values(), default=None)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the entry of ``challenge.json``."""
+        answer = self.answer
+        return {
+            "seed": answer.seed,
+            "reproduce": self.reproduce,
+            "answer": {
+                "verdict": answer.verdict,
+                "effects": list(answer.effects),
+                "recordings": "all" if answer.recordings is None else list(answer.recordings),
+                "parameters": answer.parameters,
+                "moved": answer.moved,
+                "law": answer.law,
+                "setting": answer.setting,
+                "equivalents": [list(one) for one in answer.equivalents],
+                "plant": answer.plant,
+                "kind": answer.kind,
+            },
+            "diagnosis": self.diagnosis,
+            "right": self.score.right,
+            "score": self.score.to_json(),
+            "size_over_limit": self.strength,
+            "sizes_over_limit": dict(self.sizes),
+            "error": self.error,
+            "seconds": self.seconds,
+            "recordings_sha256": self.recordings_sha256,
+        }
+
+    @classmethod
+    def from_json(cls, entry: Mapping[str, Any]) -> Scored:
+        """Return the case of an entry of ``challenge.json``, scored anew."""
+        told = dict(entry["answer"])
+        only, alike = told.pop("recordings"), told.pop("equivalents", ())
+        answer = Answer(
+            seed=entry["seed"],
+            effects=tuple(told.pop("effects")),
+            recordings=None if only == "all" else tuple(only),
+            equivalents=tuple((id, axes) for id, axes in alike),
+            **told,
+        )
+        return cls.opened(
+            answer,
+            entry["diagnosis"],
+            error=entry["error"],
+            seconds=entry["seconds"],
+            recordings_sha256=entry["recordings_sha256"],
+            sizes=entry["sizes_over_limit"],
+            reproduce=entry["reproduce"],
+        )
+
+    @classmethod
+    def opened(cls, answer: Answer, diagnosis: dict[str, Any] | None, *, error: str | None, **told: Any) -> Scored:
+        """Return the scored case; a diagnosis that breaks its contract is no answer, and the ``error`` says why.
+
+        ``told`` are the other fields.
+        """
+        try:
+            return cls(answer, diagnosis, score_case(answer, diagnosis), error, **told)
+        except InputError as fault:
+            return cls(answer, None, score_case(answer, None), str(fault), **told)
+
+
+class Times(NamedTuple):
+    """Seconds of wall clock that diagnoses took: the median, what nine in ten do not exceed, the longest."""
+
+    median: float
+    most: float
+    longest: float
+
+    @property
+    def text(self) -> str:
+        """The three in words."""
+        return f"{self.median:.0f} s (median), nine in ten within {self.most:.0f} s, longest {self.longest:.0f} s"
+
+    def to_json(self) -> dict[str, float]:
+        """Return the entry of ``challenge.json``."""
+        return {"median_s": self.median, "nine_in_ten_s": self.most, "longest_s": self.longest}
+
+
+def times(scored: Sequence[Scored]) -> Times:
+    """Return how long the diagnoses took, with an answer or without; NaN of none."""
+    seconds = [item.seconds for item in scored]
+    if not seconds:
+        return Times(float("nan"), float("nan"), float("nan"))
+    return Times(*(float(np.quantile(seconds, share)) for share in (0.5, 0.9, 1.0)))
+
+
+def rates_of(scored: Sequence[Scored]) -> dict[str, Rate]:
+    """Return the shares that the challenge is judged by."""
+    return summary([(item.answer, item.diagnosis, item.score) for item in scored], [item.strength for item in scored])
+
+
+class Result(NamedTuple):
+    """A finished challenge: the command that gave it, version and code, what was put over every case, the cases."""
+
+    command: str
+    version: str
+    code: str
+    mask: str | None
+    scored: list[Scored]
+
+    @property
+    def seeds(self) -> tuple[int, int]:
+        """First and last seed."""
+        numbers = [item.answer.seed for item in self.scored]
+        return min(numbers), max(numbers)
+
+
+def read_result(folder: Path) -> Result:
+    """Read what `validation.challenge.run.challenge` left in a folder; raises `InputError` where it is not there."""
+    file = folder / RESULT
+    try:
+        kept = json.loads(file.read_text("utf-8"))
+        scored = [Scored.from_json(entry) for entry in kept["cases"]]
+        return Result(kept["made_by"], kept["version"], kept["code_sha256"], kept["mask"], scored)
+    except FileNotFoundError:
+        raise InputError(f"{file}: is not there; expected the folder of a finished discsim challenge") from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"{file}: cannot be read ({type(error).__name__}: {error}); expected what discsim challenge of this "
+            "version wrote (the same command writes it again from its checkpoints)"
+        ) from None

@@ -1,0 +1,313 @@
+"""From what a search found to the answer: verdict, effects with evidence, places, noise, held-out figures, model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+from scipy.stats import chi2 as chi2_law
+
+from discsim.disc import Aero, aero_key
+from discsim.effects.catalogue import effect as catalogued
+from discsim.model_file import Model, ModelEffect
+from validation.diagnosis.design.next_recording import confusions, in_words
+from validation.diagnosis.held_out import heldout_chi2, heldout_gain
+from validation.diagnosis.localisation import located_effect, located_rest
+from validation.diagnosis.report.wording import telling_apart
+from validation.diagnosis.result import (
+    SMALLEST_P_VALUE,
+    Advice,
+    Candidate,
+    Confusion,
+    Diagnosis,
+    Evidence,
+    FitFigures,
+    HeldOut,
+    Law,
+    NamedEffect,
+    NoiseNote,
+    Outcome,
+    Outlier,
+    ParameterValue,
+    Residuals,
+    Verdict,
+)
+from validation.diagnosis.selection.candidates import Trial, parameters_of
+from validation.diagnosis.selection.evidence import price
+from validation.diagnosis.selection.stepwise import Considered, Search, chi2_in, tried_without
+from validation.diagnosis.unknown_law.find import FoundLaw
+from validation.diagnosis.verdict import RECALIBRATED_NAMES, recalibrations, standard_errors, verdict_of
+from validation.identification.competing_effects import user_effect
+from validation.identification.linearisation import Linear
+from validation.identification.noise import NoiseModel, chi_squared
+from validation.identification.residual_tests import remainders
+
+__all__ = ["assemble"]
+
+#: a parameter whose error is this share of the room it was given is not determined by the data
+_UNDETERMINED = 0.2
+_NO_ADVICE: Mapping[tuple[str, str], Advice] = MappingProxyType({})
+
+
+def _named(found: Search, trial: Trial, names: Sequence[str], advice: Mapping[tuple[str, str], Advice]) -> NamedEffect:
+    final = found.final
+    errors = standard_errors(final)
+    values = {}
+    width = {q.key: q.sigma for q in parameters_of(trial)}
+    for q, value, error in zip(final.fit.parameters, final.fit.at, errors, strict=True):
+        if q.group != trial.id or q.recordings != trial.recordings:
+            continue
+        room = width.get(q.key, np.inf)
+        known = np.isfinite(error) and not (np.isfinite(room) and error > _UNDETERMINED * room)
+        values[q.name] = ParameterValue(float(value), float(error) if known else None)
+    values.update({name: ParameterValue(value, sd) for name, value, sd in trial.told})
+    for name, value in trial.shapes.items():
+        values.setdefault(name, ParameterValue(float(value), None))
+    less = tried_without(found, trial)
+    gain = max(less.score - final.score, 0.0)
+    k = len(parameters_of(trial))
+    bic = gain - k * float(np.log(max(final.fit.count, 2)))
+    p = float(max(chi2_law.sf(gain, max(k, 1)), SMALLEST_P_VALUE))
+    held = heldout_gain(found, trial)
+    confused = []
+    for rival in confusions(found, trial):
+        rival_bic = gain - rival.worse - len(parameters_of(rival.trial)) * float(np.log(max(final.fit.count, 2)))
+        told = advice.get((trial.name, rival.trial.name))
+        confused.append(Confusion(rival.trial.id, float(rival_bic), in_words(trial.id, told), told))
+    where = None if trial.recordings is None else tuple(names[i] for i in sorted(trial.recordings))
+    return NamedEffect(trial.id, values, Evidence(bic, held, p), where, tuple(confused))
+
+
+def _noise_notes(linears: Sequence[Linear], found: NoiseModel) -> list[NoiseNote]:
+    """Return the sensors whose noise is not as stated: that of the fit which leaves the least beside noise."""
+    notes = []
+    for group, noise in found.items():
+        channel = next((linear, c) for linear in linears for c in linear.channels if c.group == group)
+        stated = float(channel[0].sd[channel[1].rows][0])
+        interval = float(np.median(np.diff(channel[0].t[channel[1].rows]))) if channel[1].index.size > 1 else 0.0
+        n = sum(c.index.size for linear in linears for c in linear.channels if c.group == group)
+        surprising = abs(noise.sd / stated - 1.0) > max(0.1, 5.0 / np.sqrt(2.0 * n)) if np.isfinite(stated) else True
+        if surprising or noise.correlation > 0.15:
+            slow = noise.memory(interval)
+            notes.append(NoiseNote(group, stated if np.isfinite(stated) else None, float(noise.sd), slow))
+    return notes
+
+
+def _noise_beside(found: Search) -> list[NoiseNote]:
+    """Return the sensors whose noise is not as stated where nothing explains the mismatch.
+
+    The relaxed fit follows the data; a sensor that it leaves more than noise on says nothing of its noise.
+    """
+    linears = found.loose.linears
+    left = remainders(linears, [linear.residual for linear in linears], found.loose_noise)
+    spoilt = {item.group for item in left}
+    return _noise_notes(linears, {group: noise for group, noise in found.loose_noise.items() if group not in spoilt})
+
+
+def _with_law(found: Search, law: FoundLaw) -> tuple[FitFigures, FitFigures, tuple[HeldOut, ...]]:
+    """Return the figures of the baseline and of the fit with a law, and what recordings gain that were set aside."""
+    reference = {group: noise._replace(correlation=0.0) for group, noise in law.tied.fit.noise.items()}
+    rows = [linear.raw.size for linear in law.tied.fit.linears]
+    before, after = chi2_in(found.base, reference), chi2_in(law.tied, reference)
+    held = tuple(
+        HeldOut(str(i), old / rows[i], new / rows[i], law.heldout[i]) for i, (old, new) in sorted(law.chi2.items())
+    )
+    sides = [sum(pair[side] for pair in law.chi2.values()) / sum(rows) if held else None for side in (0, 1)]
+    return (
+        FitFigures(before / found.base.fit.count, sides[0]),
+        FitFigures(after / law.tied.fit.count, sides[1]),
+        held,
+    )
+
+
+def _leaves(law: FoundLaw, names: Sequence[str]) -> str:
+    """Return in words what is left once a law is in."""
+    left = remainders(law.tied.fit.linears, law.tied.residuals, law.tied.fit.noise)
+    if not left:
+        return "With it nothing but noise is left."
+    places = []
+    for item in left:
+        where = item.group.replace("gps.", "gps ")
+        if item.recording is not None:
+            where = f"{where} {item.axis} in {names[item.recording]} from {item.from_s:.2f} to {item.to_s:.2f} s"
+        places.append(where)
+    listed = "; ".join(dict.fromkeys(places[:3]))
+    more = f" and {len(left) - 3} more places" if len(left) > 3 else ""
+    return f"It explains {100.0 * law.share:.0f} % of the excess, and more than noise is left: {listed}{more}."
+
+
+def _figures(found: Search, unexplained: bool) -> tuple[FitFigures, FitFigures, tuple[HeldOut, ...]]:
+    final, board = found.final, found.board
+    assert board is not None
+    white = {group: noise._replace(correlation=0.0) for group, noise in final.fit.noise.items()}
+    reference = white if not unexplained else {g: n._replace(correlation=0.0) for g, n in found.loose_noise.items()}
+    n = final.fit.count
+    base = chi2_in(found.base, reference) / found.base.fit.count
+    last = chi2_in(found.base if unexplained else final, reference) / n
+    if board.recordings < 2 or unexplained:
+        return FitFigures(base, None), FitFigures(last, None), ()
+    held = []
+    before = after = 0.0
+    for i in range(board.recordings):
+        rows = board.linears[i].raw.size
+        new = max(heldout_chi2(found, final.hypothesis, i), 0.0)
+        old = chi_squared(found.base.fit.linears[i], reference, found.base.residuals[i])
+        before, after = before + old, after + new
+        held.append(HeldOut(str(i), old / rows, new / rows, 0.5 * (old - new)))
+    return FitFigures(base, before / n), FitFigures(last, after / n), tuple(held)
+
+
+def _residuals(found: Search, names: Sequence[str], unexplained: bool) -> list[Residuals]:
+    shown = []
+    after_fit = found.final
+    noise = found.loose_noise if unexplained else after_fit.fit.noise
+    for i, name in enumerate(names):
+        before_linear, after_linear = found.base.fit.linears[i], after_fit.fit.linears[i]
+        for channel in after_linear.channels:
+            other = next(
+                (c for c in before_linear.channels if (c.sensor, c.axis) == (channel.sensor, channel.axis)), None
+            )
+            if other is None:
+                continue
+            sd = noise[channel.group].sd if channel.group in noise else 1.0
+            count = int(max(channel.index[-1], other.index[-1])) + 1
+            before, after, t = np.full(count, np.nan), np.full(count, np.nan), np.full(count, np.nan)
+            before[other.index] = found.base.residuals[i][other.rows] / sd
+            after[channel.index] = after_fit.residuals[i][channel.rows] / sd
+            t[other.index], t[channel.index] = before_linear.t[other.rows], after_linear.t[channel.rows]
+            some = np.isfinite(t)
+            shown.append(Residuals(name, channel.sensor, channel.axis, t[some], before[some], after[some]))
+    return shown
+
+
+def _model(found: Search, effects: Sequence[NamedEffect], law: Law | None) -> Model:
+    """Return the improved model: stated numbers as the final fit has them, effects, laws."""
+    first = found.recordings[0]
+    environment, disc, rig = first.environment, first.disc, first.rig
+    values = {
+        q.key: (float(v), float(e))
+        for q, v, e in zip(found.final.fit.parameters, found.final.fit.at, standard_errors(found.final), strict=True)
+        if q.recordings is None
+    }
+    if disc is not None and disc.aero is not None:
+        aero = {name: values["aero", name][0] for name in Aero._fields if ("aero", name) in values}
+        sigma = dict(disc.sigma)
+        sigma.update({aero_key(name): values["aero", name][1] for name in aero})
+        places = {"mass": "mass", "Ixx": "Ixx", "Izz": "Izz", "d": "diameter"}
+        fields = {places[name]: values["disc", name][0] for name in places if ("disc", name) in values}
+        disc = replace(disc, aero=disc.aero._replace(**aero), sigma=sigma, **fields)  # type: ignore[arg-type]
+    if rig is not None:
+        fields = {name: values["rig", name][0] for name in ("Izz", "viscous") if ("rig", name) in values}
+        keys = {name: RECALIBRATED_NAMES["rig", name] for name in fields}
+        rig = replace(rig, **fields, sigma={**rig.sigma, **{keys[n]: values["rig", n][1] for n in fields}})
+    if ("environment", "air_density") in values:
+        environment = replace(environment, air_density=values["environment", "air_density"][0])
+    carried = []
+    for effect in effects:
+        sizes = {name: item.value for name, item in effect.parameters.items()}
+        sds = {name: item.sd for name, item in effect.parameters.items() if item.sd is not None}
+        own = user_effect(effect.id)
+        sized = catalogued(effect.id, **sizes, **effect.setting) if own is None else own.sized(sizes)
+        carried.append(ModelEffect(sized, sds, effect.recordings))
+    return Model(
+        environment,
+        disc,
+        rig,
+        tuple(carried),
+        () if law is None else tuple(one.for_model() for one in (law, *law.also)),
+    )
+
+
+def _next_recordings(found: Search, verdict: Verdict, effects: Sequence[NamedEffect]) -> tuple[str, ...]:
+    """Return what to record next, as sentences; what needs no further recording is said, too."""
+    told = [telling_apart(effect.id, other) for effect in effects for other in effect.confused_with]
+    if verdict == "explained" and not told:
+        told.append("Nothing more is needed to tell what is named from the other effects that were tried.")
+    elif verdict == "unexplained":
+        told.append("Recordings that reach further in what the mismatch grows with: they settle the form of a law.")
+    elif not told:
+        told.append("Nothing more is needed: no effect is in doubt.")
+    if len(found.recordings) == 1:
+        told.append("A second recording, unlike the first: with one alone nothing can be set aside to test the answer.")
+    return tuple(dict.fromkeys(told))
+
+
+def reason_for(considered: Considered, named: Sequence[Trial]) -> str:
+    """Return why a trial that was refitted is ``named``, or is not."""
+    if any(considered.trial.id == trial.id for trial in named):
+        return "named"
+    return "worth less than its price" if considered.gain <= price(considered.trial) else "another explains more"
+
+
+def assemble(
+    found: Search,
+    datasets: Sequence[str],
+    names: Sequence[str],
+    seed: int,
+    law: FoundLaw | None = None,
+    advice: Mapping[tuple[str, str], Advice] = _NO_ADVICE,
+) -> Outcome:
+    """Return the outcome of a search; a law stands for all that was left out.
+
+    ``advice`` is that of `validation.diagnosis.design.next_recording.advise`.
+    """
+    verdict, unexplained = verdict_of(found)
+    if law is not None:
+        verdict, unexplained = "unexplained", True
+    written = None
+    best = found.at_base() if unexplained else found
+    if law is not None:
+        written = replace(law.law, also=law.also, leaves=_leaves(law, names))
+        best = replace(found, final=law.tied)
+    trials = found.final.hypothesis.trials if verdict == "explained" else ()
+    effects = tuple(_named(found, trial, names, advice) for trial in trials)
+    located = [place for trial in trials for place in located_effect(found, trial, names)]
+    moved = recalibrations(best)
+    if verdict == "unexplained":
+        # what is missing, or put into a law that only resembles it, moves them by more than any noise
+        moved = {name: replace(item, sd=None) for name, item in moved.items()}
+    if verdict == "recalibrated":
+        located += [
+            replace(place, text=f"{place.text}; a stated number is off") for place in located_rest(found, names)[:1]
+        ]
+    if unexplained:
+        located = located_rest(found, names)
+    base, final, held = _figures(found, unexplained) if law is None else _with_law(found, law)
+    held = tuple(replace(item, recording=names[int(item.recording)]) for item in held)
+    candidates = tuple(
+        Candidate(
+            c.trial.id,
+            float(c.gain),
+            c.values,
+            None if c.trial.recordings is None else tuple(names[i] for i in sorted(c.trial.recordings)),
+            reason_for(c, trials),
+        )
+        for c in sorted(found.considered, key=lambda c: -c.gain)
+        if np.isfinite(c.gain) and all(np.isfinite(v) for v in c.values.values())
+    )
+    diagnosis = Diagnosis(
+        tuple(datasets),
+        found.recordings[0].plant,
+        seed,
+        verdict,
+        base,
+        final,
+        tuple(located),
+        effects,
+        moved,
+        written,
+        tuple(
+            _noise_beside(found)
+            if unexplained and law is None
+            else _noise_notes(best.final.fit.linears, best.final.fit.noise)
+        ),
+        held,
+        tuple(Outlier(names[i], s, a, t, d) for i, s, a, t, d in found.outliers),
+        _next_recordings(found, verdict, effects),
+        tuple(found.warnings),
+    )
+    model = _model(best, effects, written)
+    shown = _residuals(best, names, unexplained and law is None)
+    return Outcome(diagnosis, model, tuple(shown), candidates)

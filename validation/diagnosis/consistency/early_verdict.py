@@ -1,0 +1,328 @@
+"""An early end where no motion of the plant follows the readings: which sensors contradict which.
+
+A search among effects is of use beside a fit that follows the data. Where not even short beginnings of recordings are
+followed, with all that a relaxed fit sets free and free clocks besides, nothing that comes after would help: it would
+only take minutes. Here each sensor is left out in turn, then each is looked at alone and in pairs, and what can be
+followed together and what cannot is the answer.
+
+All limits are counts (recordings, seconds of them, steps): the same recordings give the same answer on any machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from types import MappingProxyType
+
+import numpy as np
+
+from discsim.recording import SENSORS, Recording
+from discsim.written import PREFIX
+from validation.diagnosis.consistency.followed import left_of, left_when_shifted, true_noise
+from validation.diagnosis.consistency.spin_rates import RatesApart, rates_apart
+from validation.diagnosis.relaxed_fit import (
+    FEW,
+    beginning,
+    first_chain,
+    free_clocks,
+    from_other_starts,
+    loose_jumps,
+    loose_parameters,
+)
+from validation.diagnosis.selection.evidence import BOUNDS
+from validation.identification.gauss_newton import Fit, refit
+from validation.identification.noise import GroupNoise
+from validation.identification.observations import readings_of
+from validation.identification.parameters import Parameter
+from validation.identification.segments import Chain
+
+__all__ = [
+    "ASTRAY",
+    "LOOK",
+    "RECONCILED",
+    "Contradiction",
+    "Look",
+    "contradiction_after",
+    "contradiction_in",
+    "look_at",
+]
+
+#: what is looked at of each recording, s: two pieces of a flight, a short run on a rig. A free spin has too much that
+#: nobody knows: its beginning follows anything, or nothing before it is fitted whole; it is looked at for the figures
+#: of the answer alone, once spin rates are apart
+LOOK = {"flight": 1.0, "free_spin": 0.3, "spin_down": 10.0, "rate_table": 30.0}
+#: most steps of one look, and of one that serves for figures alone
+_STEPS, _STEPS_OF_FIGURES = 8, 2
+#: a robust root mean square of what is left of a sensor, in its noise, above which a look does not follow it. Of 44
+#: sound flights and runs (``python -m validation.challenge.cases.conceal --seed 70000 --cases 40``, and flights with
+#: ``--effects`` of each clock, lag and loss of samples) the median recording leaves 0.7 to 6.3 (physics of no
+#: catalogue), and up to 15 to 31 where three or five samples in a hundred were lost, which a shift reconciles: none is
+#: contradicted. Noise that is three times what is stated leaves 3, sensors of different throws or runs 17 and more
+ASTRAY = 12.0
+#: what a sensor may leave of the motion that others tell when it is late, lags or lost samples: with one sample in
+#: twenty lost 1.7 (magnetometer) and 4 (accelerometer), while sensors of another throw or run leave 9 to 40
+RECONCILED = 6.0
+#: two sensors of a free spin that are both astray, one of them by this much, follow no motion: sensors of other throws
+#: leave 300 and more, a clock or lost samples of one sensor below it
+LOST = 100.0
+#: recordings that are looked at again without some of their sensors
+_AGAIN = 2
+
+
+@dataclass(frozen=True)
+class Look:
+    """A fit of the beginnings of a few recordings to some of their sensors, and what it leaves of each.
+
+    ``places`` are the recordings' numbers; ``left`` is by recording and sensor, in ``noise`` that no misfit inflates.
+    """
+
+    sensors: tuple[str, ...]
+    places: tuple[int, ...]
+    fit: Fit
+    noise: Mapping[str, GroupNoise]
+    left: tuple[Mapping[str, float], ...]
+
+    def level(self, sensor: str) -> float:
+        """Return what is left of a sensor in the median recording that has it; 0 where none has."""
+        return float(np.median([one[sensor] for one in self.left if sensor in one] or [0.0]))
+
+    @property
+    def follows(self) -> bool:
+        """Whether the sensors are followed, all of them in half of the recordings or more."""
+        lost = [any(level > ASTRAY for level in one.values()) for one in self.left]
+        return 2 * sum(lost) <= len(lost)
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """Sensors that no motion follows together.
+
+    ``whole`` is the look at all of them; ``together`` the largest sets that one motion follows; ``against`` maps a
+    sensor to those that it contradicts, ``lost`` holds sensors that no motion follows even alone. ``rates`` is the
+    contradiction between spin rates, where that alone decided.
+    """
+
+    whole: Look
+    together: tuple[tuple[str, ...], ...]
+    against: Mapping[str, tuple[str, ...]]
+    lost: tuple[str, ...] = ()
+    rates: RatesApart | None = None
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What there is to say, in words."""
+        recording = self.whole.fit.chains[0].recording
+        length = float(np.median([chain.edges[-1] for chain in self.whole.fit.chains]))
+        motion = {"flight": "flight", "free_spin": "free spin", "spin_down": "run", "rate_table": "run of the table"}
+        said = [
+            f"No motion of a {recording.plant} follows the first {length:.2g} s of these recordings, whatever the "
+            f"ordinary errors of the sensors are: the best {motion[recording.plant]} leaves "
+            + ", ".join(f"{self.whole.level(s):.3g} times the noise of the {_said(s)}" for s in self.whole.sensors)
+            + "."
+        ]
+        if self.rates is not None:
+            said = [_said_of_rates(self.rates)]
+        if self.lost:
+            said.append(
+                f"Nor does one follow the {_listed(self.lost)}, each alone: wrong columns or units, something else "
+                "that was recorded, or another kind of motion than stated (plant in recording.toml)."
+            )
+        told: set[frozenset[str]] = set()
+        for sensor, others in self.against.items():
+            pair = frozenset((sensor, *others))
+            if others and pair not in told:
+                told.add(pair)
+                verb = "contradicts" if len(others) > 1 or len(self.whole.sensors) > 2 else "and"
+                said.append(
+                    f"The {_said(sensor)} {verb} the {_listed(others)}"
+                    + (": no motion follows them together." if verb != "and" else " contradict each other.")
+                )
+        for some in self.together:
+            if len(some) > 1:
+                said.append(f"One motion follows the {_listed(some)} together.")
+        said.append(
+            "Compare columns, axes, units and times of these sensors, and whether they belong to the same throw."
+        )
+        return tuple(said)
+
+    @property
+    def blamed(self) -> tuple[str, ...]:
+        """The sensors to look at first: those that contradict others, or follow nothing."""
+        return tuple(dict.fromkeys([*self.lost, *self.against])) or self.whole.sensors
+
+
+def _said(sensor: str) -> str:
+    return {"gps": "GPS", "rate_reference": "rate reference"}.get(sensor, sensor)
+
+
+def _said_of_rates(rates: RatesApart) -> str:
+    return (
+        f"The {_listed(rates.sensors)} tell different spin rates: they are {rates.times:.3g} times as far apart as "
+        f"ordinary errors of sensors leave them (median of {rates.recordings} recordings), and no clock, delay or lost "
+        "sample does that."
+    )
+
+
+def _listed(sensors: Sequence[str]) -> str:
+    words = [_said(sensor) for sensor in sensors]
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+# far from the data a motion may run beyond all numbers: such a step is not finite, and is not taken
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")
+def contradiction_in(recordings: Sequence[Recording], known: Sequence[Parameter]) -> Contradiction | None:
+    """Return which sensors contradict which, or None where some motion follows them, or may with a sensor's delay.
+
+    ``known`` are the stated numbers that may move. Of free spins only their rates are asked here, what follows their
+    readings later (`contradiction_after`).
+    """
+    sensors = [name for name in SENSORS if any(name in one for one in recordings)]
+    if recordings[0].plant == "free_spin":
+        apart_by = rates_apart(recordings)
+        figures = None if apart_by is None else look_at(recordings, known, sensors, FEW)
+        if apart_by is None or figures is None:
+            return None
+        pairs = {s: tuple(o for o in apart_by.sensors if o != s) for s in apart_by.sensors}
+        return Contradiction(figures, (), pairs, rates=apart_by)
+    whole = look_at(recordings, known, sensors, FEW)
+    if whole is None or whole.follows:
+        return None
+    sensors = [name for name in sensors if name in whole.sensors]
+    if len(sensors) == 1:
+        return Contradiction(whole, (), {}, tuple(sensors))
+    lost = tuple(sensor for sensor in sensors if not _follows(recordings, known, (sensor,)))
+    if len(lost) >= len(sensors) - 1:
+        # one sensor alone may want a start that only another tells; all but one do not
+        return Contradiction(whole, (), {}, lost)
+    apart: dict[str, tuple[str, ...]] = {}
+    for sensor in sensors:
+        others = tuple(other for other in sensors if other != sensor)
+        look = look_at(recordings, known, others, _AGAIN)
+        if look is None or not look.follows:
+            continue
+        if _reconciled(recordings, look, sensor) or _follows_lagging(recordings, known, sensors, sensor):
+            return None
+        apart[sensor] = others
+    if apart:
+        # each of several may be left out: it is they that contradict one another
+        guilty = tuple(apart)
+        against = {s: tuple(o for o in guilty if o != s) if len(guilty) > 1 else apart[s] for s in guilty}
+        return Contradiction(whole, tuple(apart.values()), against)
+    return _by_pairs(recordings, known, whole, sensors)
+
+
+def _follows(recordings: Sequence[Recording], known: Sequence[Parameter], sensors: Sequence[str]) -> bool:
+    """Tell whether a motion follows some of the sensors, or none of them has a reading."""
+    look = look_at(recordings, known, sensors, _AGAIN)
+    return look is None or look.follows
+
+
+#: where the time constant of a lag starts, s, its one sigma, and half the width of its differences: a low-pass of 20 Hz
+_LAG, _LAG_SIGMA, _LAG_STEP = 8e-3, 0.05, 1e-4
+
+
+def _follows_lagging(
+    recordings: Sequence[Recording], known: Sequence[Parameter], sensors: Sequence[str], lagging: str
+) -> bool:
+    """Tell whether a motion follows all sensors where one of them may lag.
+
+    A gyroscope's noise is so low that the others' motion, however right, does not tell its readings to within it.
+    """
+    if lagging not in PREFIX:
+        return False
+    lag = Parameter(f"{PREFIX[lagging]}.lag", "tau_s", 0.0, _LAG_STEP, _LAG_SIGMA)
+    look = look_at(recordings, known, sensors, _AGAIN, {lag: _LAG})
+    return look is not None and look.follows
+
+
+def contradiction_after(fit: Fit) -> Contradiction | None:
+    """Return that no motion follows free spins, of which a relaxed fit to all of their readings is ``fit``, or None.
+
+    One sensor alone may be late, lag or have lost samples: where that would reconcile it, a search finds what it is.
+    """
+    if fit.chains[0].recording.plant != "free_spin":
+        return None
+    noise = true_noise([readings for chain in fit.chains for readings in chain.readings])
+    sensors = tuple(name for name in SENSORS if any(r.sensor == name for r in fit.chains[0].readings))
+    look = Look(sensors, tuple(range(len(fit.chains))), fit, noise, tuple(left_of(fit, noise)))
+    if look.follows:
+        return None
+    astray = [sensor for sensor in look.sensors if look.level(sensor) > ASTRAY]
+    if len(astray) < 2 or max(map(look.level, astray)) < LOST:
+        return None
+    return Contradiction(look, (), {}, ())
+
+
+def _by_pairs(
+    recordings: Sequence[Recording], known: Sequence[Parameter], whole: Look, sensors: Sequence[str]
+) -> Contradiction:
+    """Return what contradicts what among sensors of which none alone is to blame: each pair is looked at."""
+    against: dict[str, tuple[str, ...]] = {}
+    together = []
+    for pair in combinations(sensors, 2):
+        if _follows(recordings, known, pair):
+            together.append(pair)
+        else:
+            for sensor, other in (pair, pair[::-1]):
+                against[sensor] = (*against.get(sensor, ()), other)
+    return Contradiction(whole, tuple(together), against)
+
+
+def _reconciled(recordings: Sequence[Recording], look: Look, sensor: str) -> bool:
+    """Tell whether a motion that others tell is that of a sensor, too, if it is late, lags or lost samples."""
+    found = []
+    for i, chain in enumerate(look.fit.chains):
+        readings = next((r for r in readings_of(recordings[look.places[i]]) if r.sensor == sensor), None)
+        if readings is not None:
+            found.append(left_when_shifted(chain, look.fit.values(i), readings, true_noise([readings])))
+    levels = [level for level in found if np.isfinite(level)]
+    return not levels or float(np.median(levels)) <= RECONCILED
+
+
+def look_at(
+    recordings: Sequence[Recording],
+    known: Sequence[Parameter],
+    sensors: Collection[str],
+    few: int,
+    free: Mapping[Parameter, float] = MappingProxyType({}),
+) -> Look | None:
+    """Fit the beginnings of a ``few`` recordings to some of their sensors; None where no readings are there.
+
+    ``free`` are parameters that may move beside the ordinary ones, and where they start.
+    """
+    plant = recordings[0].plant
+    chains: list[Chain] = []
+    places: list[int] = []
+    for i, one in enumerate(recordings):
+        samples = {name: own for name, own in one.samples.items() if name in sensors}
+        if len(chains) == few or not samples:
+            continue
+        chain = beginning(first_chain(replace(one, samples=samples)), LOOK[plant])
+        if any(np.any(readings.good) for readings in chain.readings):
+            chains.append(chain)
+            places.append(i)
+    if not chains:
+        return None
+    there = {readings.sensor for chain in chains for readings in chain.readings}
+    stated = [q for q in known if any(q.acts_in(i) for i in places)]
+    stated = [
+        q
+        if q.recordings is None
+        else replace(q, recordings=frozenset(places.index(i) for i in q.recordings if i in places))
+        for q in stated
+    ]
+    usual = (*stated, *loose_parameters([chain.recording for chain in chains], there), *free_clocks(there))
+    parameters = (*usual, *free)
+    noise = true_noise([readings for chain in chains for readings in chain.readings])
+    start = np.array([*(q.stated for q in usual), *free.values()])
+    fit = Fit(tuple(chains), parameters, start, loose_jumps(plant), noise)
+    count = sum(int(np.count_nonzero(r.good)) for chain in chains for r in chain.readings)
+    steps = _STEPS_OF_FIGURES if plant == "free_spin" else _STEPS
+    fit = refit(fit, iterations=steps, tolerance=1e-3 * count, bounds=BOUNDS)
+    look = Look(tuple(name for name in SENSORS if name in there), tuple(places), fit, noise, tuple(left_of(fit, noise)))
+    if look.follows or len(there) == 1 or plant == "free_spin":
+        return look
+    # where no path is there, the attitude at the start may be any about the field
+    fit = from_other_starts(fit)
+    return replace(look, fit=fit, left=tuple(left_of(fit, noise)))

@@ -1,0 +1,153 @@
+"""An accelerometer that forgets slowly: what the throw has left in it, dying away while the disc already flies.
+
+A low-pass of time constant tau hides what turns with the spin and keeps the acceleration of the hand: what it reads
+beyond the pull towards the axis falls off as exp(-t/tau), the same in every recording of one sensor (accel.lag).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.recording import Recording
+from validation.diagnosis.consistency.turning import pull_of
+
+__all__ = ["SettleProof", "Settling", "settling_of"]
+
+#: time constants that are tried, s
+_TAUS = np.geomspace(0.02, 0.6, 240)
+#: an accelerometer settles slowly where an exponential leaves less than this share of the squares in most recordings
+_LEFT = 0.15
+#: fewest readings of a recording
+_FEWEST = 40
+
+
+@dataclass(frozen=True)
+class _Start:
+    """What an accelerometer reads beyond the pull towards the axis: t (n,) s and x + i y (n,)."""
+
+    name: str
+    t: FloatArray
+    beyond: np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
+
+    def left(self, tau: float | None) -> float:
+        """Return the squares left by an exponential of a time constant, and a constant; of None by the constant."""
+        columns = [np.ones(self.t.size)] if tau is None else [np.ones(self.t.size), np.exp(-self.t / tau)]
+        Q, _ = np.linalg.qr(np.column_stack(columns).astype(complex))
+        return float(np.sum(np.abs(self.beyond - Q @ (Q.conj().T @ self.beyond)) ** 2))
+
+
+@dataclass(frozen=True)
+class SettleProof:
+    """A recording's own time constant, that of the others, and what that leaves of this one, rms m/s^2 of an axis."""
+
+    recording: str
+    own: float
+    own_sd: float
+    others: float
+    before: float
+    after: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return {
+            "recording": self.recording,
+            "tau_s": self.own,
+            "tau_sd_s": self.own_sd,
+            "tau_of_others_s": self.others,
+            "left_m_s2_before": self.before,
+            "left_m_s2_after": self.after,
+        }
+
+
+@dataclass(frozen=True)
+class Settling:
+    """The time constant of all recordings, with an error from their scatter, and what it leaves of each."""
+
+    tau_s: float
+    sd_s: float
+    proofs: tuple[SettleProof, ...]
+
+    @property
+    def sentences(self) -> list[str]:
+        """What there is to say, in words."""
+        proofs = "; ".join(
+            f"{proof.recording}: own {1e3 * proof.own:.0f} ± {1e3 * proof.own_sd:.0f} ms, with that of the others "
+            f"{proof.before:.2f} m/s² become {proof.after:.2f}"
+            for proof in self.proofs
+        )
+        return [
+            f"At first the accelerometer contradicts the gyroscope: what it reads beyond the pull towards the axis "
+            f"dies away with a time constant of {1e3 * self.tau_s:.0f} ± {1e3 * self.sd_s:.0f} ms, as behind a "
+            f"low-pass (accel.lag) that still holds the acceleration of the hand, and that hides what turns with "
+            f"the spin ({proofs})."
+        ]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return {
+            "id": "accel.lag",
+            "tau_s": self.tau_s,
+            "sd_s": self.sd_s,
+            "heldout": [proof.to_json() for proof in self.proofs],
+        }
+
+
+def settling_of(recordings: Sequence[Recording], names: Sequence[str]) -> Settling | None:
+    """Return how slowly the accelerometer settles, None where it does not show that, or in one recording alone."""
+    starts = [
+        start
+        for recording, name in zip(recordings, names, strict=True)
+        if (start := _start(recording, name)) is not None
+    ]
+    if len(starts) < 2:
+        return None
+    squares = {start.name: np.array([start.left(float(tau)) for tau in _TAUS]) for start in starts}
+    constant = {start.name: start.left(None) for start in starts}
+    proofs = []
+    for start in starts:
+        own = squares[start.name]
+        # every recording weighs alike, however hard it was thrown
+        others = np.sum([np.log(squares[other.name]) for other in starts if other is not start], axis=0)
+        place = int(np.argmin(others))
+        best, sd = _lowest(own, start.t.size)
+        numbers = 2.0 * start.t.size
+        proofs.append(
+            SettleProof(
+                start.name,
+                best,
+                sd,
+                float(_TAUS[place]),
+                float(np.sqrt(constant[start.name] / numbers)),
+                float(np.sqrt(own[place] / numbers)),
+            )
+        )
+    if np.median([(proof.after / proof.before) ** 2 for proof in proofs]) > _LEFT:
+        return None
+    tau = float(_TAUS[int(np.argmin(np.sum([np.log(own) for own in squares.values()], axis=0)))])
+    return Settling(tau, float(np.std([proof.own for proof in proofs], ddof=1) / np.sqrt(len(proofs))), tuple(proofs))
+
+
+def _lowest(squares: FloatArray, readings: int) -> tuple[float, float]:
+    """Return the time constant of least squares and its error, by where they have grown as noise would let them."""
+    best = int(np.argmin(squares))
+    allowed = squares[best] * (1.0 + 1.0 / max(2 * readings - 5, 1))
+    inside = np.flatnonzero(squares <= allowed)
+    low, high = max(int(inside[0]) - 1, 0), min(int(inside[-1]) + 1, squares.size - 1)
+    return float(_TAUS[best]), float(0.5 * (_TAUS[high] - _TAUS[low]))
+
+
+def _start(recording: Recording, name: str) -> _Start | None:
+    found = pull_of(recording)
+    if found is None or recording.plant not in ("flight", "free_spin"):
+        return None
+    t, felt, pull = found
+    good = np.all(np.isfinite(felt), axis=1)
+    if np.count_nonzero(good) < _FEWEST:
+        return None
+    beyond = felt[good] - pull[good]
+    return _Start(name, t[good] - t[good][0], beyond[:, 0] + 1j * beyond[:, 1])

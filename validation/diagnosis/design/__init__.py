@@ -1,0 +1,1 @@
+"""Experiment design: the next recordings, and which effects they would tell apart."""

@@ -1,0 +1,69 @@
+"""Searches for effects that one linear question about whole recordings does not find: events, gusts, ripples, slips.
+
+Each returns proposals with values to start from; fits with all parameters free decide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from validation.diagnosis.detectors.dropped_samples import Shifted, dropped_accelerometer, dropped_magnetometer
+from validation.diagnosis.detectors.events import events
+from validation.diagnosis.detectors.gusts import gusts
+from validation.diagnosis.detectors.local_problem import asked_of
+from validation.diagnosis.detectors.saturation import saturation
+from validation.diagnosis.detectors.speed_ripple import ripple
+from validation.diagnosis.selection.constrained_fit import Tied
+from validation.diagnosis.selection.proposals import Proposal
+from validation.identification.gauss_newton import Fit
+from validation.identification.noise import NoiseModel
+from validation.identification.parameters import Parameter
+from validation.identification.propagation import WOBBLE
+
+__all__ = ["searched"]
+
+
+# ------------------------------------------------------------------------------- questions to one recording
+
+
+# ---------------------------------------------------------------------------------------------------- events
+
+
+# ----------------------------------------------------------------------------------------------------- gusts
+
+
+# ----------------------------------------------------------------------------------------------- lost samples
+
+
+# ------------------------------------------------------------------------------------------------- saturation
+
+
+# ------------------------------------------------------------------------------------------------ speed ripple
+
+
+# ---------------------------------------------------------------------------------------------------- all of it
+
+
+def searched(
+    loose: Fit, tied: Tied, own: Sequence[Parameter], noise: NoiseModel, least: float = 25.0
+) -> list[Proposal | Shifted]:
+    """Return what all searches propose upon a hypothesis, best first.
+
+    ``loose`` is the relaxed fit with its ``noise``, ``tied`` the fit under the hypothesis so far, ``own`` the stated
+    parameters and each recording's unknowns. Without a hypothesis what is missing may have bent the tied fit, and
+    events are looked for from the relaxed one.
+    """
+    taken = tied.hypothesis.trials
+    fit, level = (loose, noise) if not taken else (tied.fit, tied.fit.noise)
+    found: list[Proposal | Shifted] = []
+    if loose.chains[0].recording.plant != "rate_table":
+        asked = asked_of(fit, level, own, tied.hypothesis)
+        found += events(asked, least)
+        found += gusts(asked, least)
+    found += ripple(tied.fit, tied.fit.noise, taken, least)
+    known = [q for q in own if q.key not in WOBBLE]
+    found += dropped_magnetometer(loose, known, taken)
+    found += saturation(tied.fit, tied.fit.noise, taken)
+    if loose.chains[0].recording.plant != "free_spin":  # there an accelerometer counts by its means over turns
+        found += dropped_accelerometer(loose, noise, taken)
+    return sorted(found, key=lambda p: p.proposal.gain if isinstance(p, Shifted) else p.gain, reverse=True)

@@ -1,0 +1,163 @@
+"""The linear problem about a fit in which detectors ask their questions, event by event."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from validation.diagnosis.relaxed_fit import NO_JUMPS
+from validation.diagnosis.selection.candidates import Trial
+from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
+from validation.diagnosis.selection.proposals import Proposal
+from validation.identification.gauss_newton import Fit, linearised
+from validation.identification.linearisation import IntArray, Linear
+from validation.identification.noise import NoiseModel, whitened
+from validation.identification.normal_equations import reduce, unknown_prior
+from validation.identification.parameters import Parameter
+from validation.identification.segments import Chain, recut
+
+__all__ = ["WIND", "Asked", "Ground", "asked_of", "gain_of", "peaks"]
+
+#: spacing of the boundaries at which a jump is asked for, s
+_FINE = 0.1
+
+
+WIND = (("air.wind", "w_north_m_s"), ("air.wind", "w_east_m_s"))
+
+
+@dataclass(frozen=True)
+class Ground:
+    """One recording, linearised: what any further column would explain once all its unknowns have had their say.
+
+    ``white`` (n, m) are whitened columns of the first state and the parameters, ``left`` (n,) the whitened residual;
+    ``inverse`` (m, m) and ``right`` (m,) the normal equations with what is known from elsewhere.
+    """
+
+    chain: Chain
+    linear: Linear
+    noise: NoiseModel
+    piece: IntArray
+    white: FloatArray
+    left: FloatArray
+    inverse: FloatArray
+    right: FloatArray
+
+    def whiten(self, columns: FloatArray) -> FloatArray:
+        """Return columns (n, c) whitened as the residual is."""
+        return whitened(self.linear, self.noise, columns)
+
+    def explained(self, own: FloatArray, cross: FloatArray, pull: FloatArray) -> tuple[float, FloatArray]:
+        """Return gain and values (c,) of columns with products own (c, c), cross (m, c) and pull (c,)."""
+        H = own - cross.T @ self.inverse @ cross
+        b = pull - cross.T @ self.inverse @ self.right
+        size = np.sqrt(np.maximum(np.diag(own), 0.0))
+        scale = np.divide(1.0, size, out=np.zeros_like(size), where=size > 1e-100)
+        w, V = np.linalg.eigh(H * np.outer(scale, scale))
+        # what is left of a column once the unknowns have had their say may be nothing
+        kept = w > 1e-6
+        if not np.any(kept):
+            return 0.0, np.zeros(b.size)
+        value = scale * (V[:, kept] @ ((V[:, kept].T @ (scale * b)) / w[kept]))
+        return float(b @ value), np.asarray(value)
+
+    def ask(self, columns: FloatArray) -> tuple[float, FloatArray]:
+        """Return gain and values (c,) of whitened columns (n, c)."""
+        return self.explained(columns.T @ columns, self.white.T @ columns, columns.T @ self.left)
+
+
+def _fine_edges(chain: Chain) -> FloatArray:
+    """Return boundaries about `_FINE` apart, those of the chain among them."""
+    parts = [
+        np.linspace(a, b, max(1, round((b - a) / _FINE)) + 1)[:-1]
+        for a, b in zip(chain.edges[:-1], chain.edges[1:], strict=True)
+    ]
+    return np.concatenate([*parts, chain.edges[-1:]])
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A fit made ready for questions: each recording's ground, and where the columns of a steady wind are in it."""
+
+    fit: Fit
+    taken: tuple[Trial, ...]
+    grounds: Mapping[int, Ground]
+    wind: tuple[int, ...]
+
+    def has(self, id: str, recording: int) -> bool:
+        """Tell whether an effect already acts in a recording."""
+        return any(t.id == id and (t.recordings is None or recording in t.recordings) for t in self.taken)
+
+
+def asked_of(fit: Fit, noise: NoiseModel, own: Sequence[Parameter], hypothesis: Hypothesis) -> Asked:
+    """Return a fit, relaxed or tied, ready for questions: cut finely, hanging together, under a hypothesis.
+
+    Parameters of the fit that the hypothesis does not have are taken back to where they stand without it.
+    """
+    plant = fit.chains[0].recording.plant
+    free = fitted_parameters(hypothesis, own)
+    wind: tuple[int, ...] = ()
+    if plant == "flight":
+        # a wind without a prior would swallow a gust: where none is supposed, it is there for its columns alone
+        keys = [q.key for q in free if q.recordings is None]
+        free = (*free, *(Parameter(*key, 0.0, 0.05, 1e-9) for key in WIND if key not in keys))
+        wind = tuple(next(j for j, q in enumerate(free) if q.key == key and q.recordings is None) for key in WIND)
+    mine = {(q.key, q.recordings) for q in free}
+    every = (*free, *(q for q in fit.parameters if (q.key, q.recordings) not in mine))
+    place = {(q.key, q.recordings): number for q, number in zip(fit.parameters, fit.at, strict=True)}
+    at = np.array([place.get((q.key, q.recordings), q.stated) for q in every])
+    tied = replace(fit, parameters=every, at=at, jumps=NO_JUMPS[plant], noise=noise)
+    if plant != "free_spin":  # its pieces are short, and what it does not model wanders by the piece
+        chains = tuple(recut(chain, tied.values(i), _fine_edges(chain)) for i, chain in enumerate(tied.chains))
+        tied = replace(tied, chains=chains)
+    return Asked(tied, hypothesis.trials, _grounds(tied, len(free)), wind)
+
+
+def _grounds(fit: Fit, f: int) -> dict[int, Ground]:
+    """Return the grounds of all recordings; the first ``f`` parameters are free, the others taken back."""
+    parameters, noise, at = fit.parameters[:f], fit.noise, fit.at
+    linears = linearised(fit)
+    away = np.concatenate([np.zeros(f), at[f:] - np.array([q.stated for q in fit.parameters[f:]])])
+    grams = []
+    for linear, chain in zip(linears, fit.chains, strict=True):
+        G = reduce(linear, chain, noise, fit.jumps).gram
+        back = G[:-1, -1] + G[:-1, :-1] @ away
+        grams.append((G[:f, :f], back[:f]))
+    total = np.sum([g for g, _ in grams], axis=0)
+    pulled = np.sum([b for _, b in grams], axis=0)
+    prior = np.array([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for q in parameters])
+    off = prior * (np.array([q.stated for q in parameters]) - at[:f])
+    found = {}
+    for i, (linear, chain) in enumerate(zip(linears, fit.chains, strict=True)):
+        residual = linear.residual + linear.shared @ away
+        own = linear.unknowns
+        columns = np.hstack([linear.local, linear.shared[:, :f], residual[:, None]])
+        white = whitened(linear, noise, columns)
+        A, e = white[:, :-1], white[:, -1]
+        H, right = A.T @ A, A.T @ e
+        known, pull, _ = unknown_prior(linear, chain, fit.jumps)
+        H[:own, :own] += known
+        right[:own] += pull
+        H[own:, own:] += total - grams[i][0] + np.diag(prior)
+        right[own:] += pulled - grams[i][1] + off
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
+        w, V = np.linalg.eigh(H * np.outer(scale, scale))
+        kept = w > 1e-11 * w[-1]
+        inverse = ((V[:, kept] / w[kept]) @ V[:, kept].T) * np.outer(scale, scale)
+        piece = np.clip(np.searchsorted(chain.edges, linear.t, side="right") - 1, 0, len(chain.states) - 1)
+        found[i] = Ground(chain, linear, noise, np.where(linear.piece < 0, piece, linear.piece), A, e, inverse, right)
+    return found
+
+
+def peaks(gain: FloatArray, count: int) -> list[int]:
+    """Return the places of the highest local maxima."""
+    padded = np.concatenate([[-np.inf], gain, [-np.inf]])
+    tops = np.flatnonzero((gain >= padded[:-2]) & (gain >= padded[2:]))
+    return [int(j) for j in tops[np.argsort(gain[tops])[::-1][:count]]]
+
+
+def gain_of(proposal: Proposal) -> float:
+    """Return what a proposal is expected to gain, to sort by."""
+    return proposal.gain

@@ -1,0 +1,269 @@
+"""Where the mismatch is: which recordings, sensors, axes and times carry it, and what state it grows with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from validation.diagnosis.result import Located
+from validation.diagnosis.selection.candidates import Trial
+from validation.diagnosis.selection.hypothesis import fitted_parameters
+from validation.diagnosis.selection.stepwise import Search
+from validation.identification.competing_effects import row_of, user_effect
+from validation.identification.linearisation import Linear
+from validation.identification.normal_equations import local_step
+
+__all__ = ["located_effect", "located_rest"]
+
+#: effect -> (the state that its trace grows with, what an experimenter sees)
+_TRACES: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        "air.wind": ("time aloft", "velocity drifts along a fixed compass direction whatever the heading of the throw"),
+        "air.wind_shear": (
+            "height",
+            "velocity drifts along a fixed compass direction, more so the higher the disc flies",
+        ),
+        "air.gust": ("time", "velocity and lift change for a moment and come back"),
+        "air.density": ("speed", "all forces and moments of the air are off by one and the same factor"),
+        "air.ground_effect": ("nearness of the ground", "the lift is off just above the ground"),
+        "aero.spin_side_force": ("advance ratio (spin over speed)", "a sideways force that changes side with the spin"),
+        "aero.spin_lift": ("advance ratio (spin over speed)", "lift that spin adds, whichever way it turns"),
+        "aero.spin_drag": ("advance ratio (spin over speed)", "drag that spin adds"),
+        "aero.spin_pitching_moment": ("advance ratio (spin over speed)", "a pitching moment that spin adds"),
+        "aero.stall": ("angle of attack", "lift is lost above an angle of attack"),
+        "aero.yaw_reynolds": ("speed", "the spin decays by a coefficient that changes with speed"),
+        "aero.yaw_quadratic": (
+            "advance ratio (spin over speed)",
+            "the spin decays faster than in proportion to itself",
+        ),
+        "aero.yaw_alpha": ("angle of attack", "the spin decays faster at high angles of attack"),
+        "body.mass_imbalance": ("spin", "sensor and air act off the centre of mass: a trace that turns with the disc"),
+        "body.inertia_asymmetry": ("wobble", "the wobble pulses at twice the spin"),
+        "event.impulse": ("an instant", "the velocity jumps at one instant: a touch"),
+        "event.spin_step": ("an instant", "the spin jumps at one instant"),
+        "rig.coulomb_friction": ("slowness", "a torque that does not get smaller as the rig slows down"),
+        "rig.quadratic_drag": ("spin", "a torque that grows with the square of the spin"),
+        "rig.axis_tilt": ("spin phase", "gravity and field seem to turn with the table"),
+        "rig.speed_ripple": ("angle turned", "the rate pulses with the angle turned"),
+        "mag.hard_iron": ("nothing: it is constant", "a constant field in body axes"),
+        "mag.soft_iron": ("field in body axes", "the field is bent: the circle of the readings is an ellipse"),
+        "mag.lag": ("spin", "readings are late and too small, more so the faster the disc spins"),
+        "mag.stray_field": ("nearness of the ground", "a foreign field fixed to the ground, stronger near it"),
+        "mag.clock_rate": ("time", "its spin phase runs away from that of the other sensors"),
+        "mag.dropped_samples": ("time, in steps", "its spin phase steps ahead each time a sample is lost"),
+        "accel.lag": ("spin", "readings are late and too small, more so the faster the disc spins"),
+        "accel.clock_rate": ("time", "its spin phase runs away from that of the other sensors"),
+        "accel.dropped_samples": ("time, in steps", "its spin phase steps ahead each time a sample is lost"),
+        "accel.position_offset": ("square of the spin", "a reading that grows with the square of the spin"),
+        "accel.bias": ("nothing: it is constant", "a constant reading in body axes"),
+        "accel.bias_drift": ("time", "a reading that grows with time"),
+        "accel.scale": ("specific force", "readings are off in proportion to themselves"),
+        "accel.cross_axis": ("specific force on another axis", "one axis shows a share of another"),
+        "accel.saturation": ("specific force", "readings stop below the stated range"),
+        "gyro.lag": ("spin", "readings are late and too small, more so the faster the disc spins"),
+        "gyro.clock_rate": ("time", "its phase runs away from that of the other sensors"),
+        "gyro.bias": ("nothing: it is constant", "a constant reading in body axes"),
+        "gyro.scale": ("rate", "readings are off in proportion to themselves"),
+        "gyro.g_sensitivity": ("specific force", "readings grow with the specific force"),
+        "gps.clock_rate": ("time", "fixes run away from the motion that the other sensors show"),
+        "gps.latency": ("speed", "fixes show where the disc was a moment before"),
+        "clock.rate": ("time", "all rates and times are off by one and the same factor"),
+        "mag.axes": ("nothing: it is constant", "the magnetometer's columns hold other axes than stated"),
+        "accel.axes": ("nothing: it is constant", "the accelerometer's columns hold other axes than stated"),
+        "gyro.axes": ("nothing: it is constant", "the gyroscope's columns hold other axes than stated"),
+        "gps.axes": ("nothing: it is constant", "the GPS's columns hold other directions than stated"),
+        "mag.units": ("field", "fields are off by the factor between two units"),
+        "accel.units": ("specific force", "specific forces are off by the factor between two units"),
+        "gyro.units": ("rate", "rates are off by the factor between two units"),
+        "mag.time_offset": ("spin", "readings are early or late by one and the same time, all of their size there"),
+        "accel.time_offset": ("spin", "readings are early or late by one and the same time, all of their size there"),
+        "gyro.time_offset": ("rate of change", "readings are early or late by one and the same time"),
+        "board.rotation": ("the vector itself", "all sensors of the board show what is along other axes of the disc"),
+        "site.field": ("nothing: it is constant", "the field points elsewhere, or is of another size, than stated"),
+        "clock.units": ("time", "times are off by the factor between two units"),
+    }
+)
+
+#: share of the excess that is worth a line
+_WORTH = 0.05
+
+
+def excess_of(
+    before: Sequence[FloatArray], after: Sequence[FloatArray], linears: Sequence[Linear], sd: Mapping[str, float]
+) -> dict[tuple[int, str, str], FloatArray]:
+    """Return, by (recording, sensor, axis), how much larger the squared residuals (n,) are before than after."""
+    found = {}
+    for index, (linear, a, b) in enumerate(zip(linears, before, after, strict=True)):
+        for channel in linear.channels:
+            x, y = a[channel.rows] / sd[channel.group], b[channel.rows] / sd[channel.group]
+            found[index, channel.sensor, channel.axis] = x**2 - y**2
+    return found
+
+
+def without(found: Search, trial: Trial) -> list[FloatArray]:
+    """Return the residuals (n,) of each recording if an effect of the final hypothesis were left out.
+
+    What the recordings' own unknowns and the other effects can take over, they do, to first order.
+    """
+    board = found.board
+    assert board is not None
+    final = found.final
+    kept = board.columns_of(fitted_parameters(final.hypothesis.without(trial), found.own))
+    whole = board.columns_of(final.fit.parameters)
+    stood = {(q.key, q.recordings): at - q.stated for q, at in zip(final.fit.parameters, final.fit.at, strict=True)}
+    value = board.ask(kept).value
+    residuals = []
+    for i, linear in enumerate(board.linears):
+        step = np.zeros(len(board.columns))
+        for column, q in whole:
+            if q.acts_in(i):
+                step[board.place[column]] -= stood[q.key, q.recordings]
+        for (column, q), v in zip(kept, value, strict=True):
+            if q.acts_in(i):
+                step[board.place[column]] += v
+        residuals.append(linear.after(local_step(board.reduced[i], step), step))
+    return residuals
+
+
+def located_effect(found: Search, trial: Trial, names: Sequence[str]) -> list[Located]:
+    """Return where an effect shows: for an event its instant, for a sensor's fault the sensor and axis."""
+    sd = {group: noise.sd for group, noise in found.final.fit.noise.items()}
+    assert found.board is not None
+    excess = excess_of(without(found, trial), found.final.residuals, found.board.linears, sd)
+    row, own = row_of(trial.id), user_effect(trial.id)
+    assert row is not None
+    grows, text = _TRACES[trial.id] if own is None else (None, own.text)
+    mine = {key: value for key, value in excess.items() if trial.recordings is None or key[0] in trial.recordings}
+    total = sum(max(float(np.sum(value)), 0.0) for value in mine.values())
+    traced = total > 0
+    if not traced:
+        mine, total = {key: np.ones(1) for key in mine}, float(len(mine))
+    by_axis: dict[tuple[str, str], float] = {}
+    for (_, sensor, axis), value in mine.items():
+        by_axis[sensor, axis] = by_axis.get((sensor, axis), 0.0) + max(float(np.sum(value)), 0.0)
+    order = sorted(by_axis, key=lambda key: (key[0] != row.acts_on, -by_axis[key]))
+    places: list[Located] = []
+    event = row.event
+    for sensor, axis in order[:4]:
+        share = by_axis[sensor, axis] / total
+        if places and share < _WORTH:
+            continue
+        start, stop = 0.0, max(recording.end for recording in found.recordings)
+        if traced:
+            start, stop = _span({k: v for k, v in mine.items() if k[1:] == (sensor, axis)}, found.board.linears)
+        if event:
+            instant = _instant(found, trial)
+            width = 0.03 if trial.id.startswith("event.") else 2.0 * _width(found, trial)
+            start, stop = max(instant - width, 0.0), instant + width
+        where = "all" if trial.recordings is None else ", ".join(names[i] for i in sorted(trial.recordings))
+        said = f"{text} (at {_instant(found, trial):.3f} s)" if event else text
+        places.append(Located(where, sensor, axis, start, stop, min(max(share, 0.0), 1.0), said, grows))
+    return places
+
+
+def _value(found: Search, trial: Trial, name: str) -> float:
+    for q, at in zip(found.final.fit.parameters, found.final.fit.at, strict=True):
+        if q.key == (trial.id, name) and q.recordings == trial.recordings:
+            return float(at)
+    return float(trial.shapes.get(name, 0.0))
+
+
+def _instant(found: Search, trial: Trial) -> float:
+    return _value(found, trial, "t_s")
+
+
+def _width(found: Search, trial: Trial) -> float:
+    return abs(_value(found, trial, "width_s"))
+
+
+def located_rest(found: Search, names: Sequence[str]) -> list[Located]:
+    """Return where the baseline fails when nothing explains it: sensors and axes, and what the excess grows with."""
+    noise = {group: found.loose_noise[group].sd for group in found.loose_noise}
+    linears = found.base.fit.linears
+    zero = [np.zeros_like(residual) for residual in found.base.residuals]
+    excess = {key: value - 1.0 for key, value in excess_of(found.base.residuals, zero, linears, noise).items()}
+    total = sum(max(float(np.sum(value)), 0.0) for value in excess.values())
+    if total <= 0:
+        return []
+    by_axis: dict[tuple[str, str], dict[int, float]] = {}
+    for (index, sensor, axis), value in excess.items():
+        by_axis.setdefault((sensor, axis), {})[index] = max(float(np.sum(value)), 0.0)
+    places: list[Located] = []
+    for (sensor, axis), shares in sorted(by_axis.items(), key=lambda item: -sum(item[1].values()))[:4]:
+        amount = sum(shares.values())
+        if places and amount < _WORTH * total:
+            continue
+        worst = max(shares, key=lambda index: shares[index])
+        alone = len(shares) > 1 and shares[worst] > 0.8 * amount
+        where = names[worst] if alone else "all"
+        chosen = {
+            key: value for key, value in excess.items() if key[1:] == (sensor, axis) and (not alone or key[0] == worst)
+        }
+        start, stop = _span(chosen, linears)
+        grows = _grows_with(found, chosen, linears)
+        text = f"the baseline leaves more than noise on {sensor} {axis}" + (f", growing with {grows}" if grows else "")
+        places.append(Located(where, sensor, axis, start, stop, min(amount / total, 1.0), text, grows))
+    return places
+
+
+def _span(excess: Mapping[tuple[int, str, str], FloatArray], linears: Sequence[Linear]) -> tuple[float, float]:
+    """Return when the excess is gathered: from 2 % of it to 98 %."""
+    times = []
+    for index, sensor, axis in excess:
+        channel = next(c for c in linears[index].channels if (c.sensor, c.axis) == (sensor, axis))
+        times.append(linears[index].t[channel.rows])
+    t, v = np.concatenate(times), np.maximum(np.concatenate([*excess.values()]), 0.0)
+    order = np.argsort(t)
+    gathered = np.cumsum(v[order])
+    if gathered[-1] <= 0:
+        return float(t.min()), float(t.max())
+    start, stop = np.searchsorted(gathered, [0.02 * gathered[-1], 0.98 * gathered[-1]])
+    return float(t[order][start]), float(t[order][min(stop, t.size - 1)])
+
+
+def _grows_with(
+    found: Search, excess: Mapping[tuple[int, str, str], FloatArray], linears: Sequence[Linear]
+) -> str | None:
+    """Return the state with which the excess, piece by piece, goes up most plainly."""
+    plant = found.recordings[0].plant
+    rows: list[list[float]] = []
+    amounts: list[float] = []
+    for (index, sensor, axis), value in excess.items():
+        linear, chain = linears[index], found.loose.chains[index]
+        channel = next(c for c in linear.channels if (c.sensor, c.axis) == (sensor, axis))
+        piece = np.searchsorted(chain.edges, linear.t[channel.rows], side="right") - 1
+        for i in range(len(chain.states)):
+            mine = value[piece == i]
+            if mine.size == 0:
+                continue
+            state = chain.states[i]
+            amounts.append(float(np.mean(mine)))
+            if plant == "flight":
+                speed = float(np.linalg.norm(state[3:6]))
+                rows.append([float(chain.edges[i]), abs(state[12]), speed, -state[2], abs(state[12]) / max(speed, 0.1)])
+            elif plant == "free_spin":
+                rows.append([float(chain.edges[i]), abs(state[12]), float(np.hypot(state[10], state[11]))])
+            else:
+                rate = abs(state[1]) if plant == "spin_down" else float(i)
+                rows.append([float(chain.edges[i]), rate])
+    names = {
+        "flight": ["time", "spin", "speed", "height", "advance ratio (spin over speed)"],
+        "free_spin": ["time", "spin", "wobble"],
+        "spin_down": ["time", "spin"],
+        "rate_table": ["time", "time"],
+    }[plant]
+    table = np.array(rows)
+    if len(amounts) < 8:
+        return None
+    rank = np.argsort(np.argsort(amounts)).astype(float)
+    best, strength = None, 0.4
+    for name, column in zip(names, table.T, strict=True):
+        if np.ptp(column) == 0:
+            continue
+        r = float(np.corrcoef(np.argsort(np.argsort(column)), rank)[0, 1])
+        if r > strength:
+            best, strength = name, r
+    return best

@@ -1,0 +1,101 @@
+"""One call from data sets to an outcome."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from discsim.effects.own import UserEffect
+from discsim.recording import Recording
+from validation.diagnosis.assemble import assemble
+from validation.diagnosis.consistency.early_verdict import contradiction_after, contradiction_in
+from validation.diagnosis.consistency.spin_agreement import agreement_of
+from validation.diagnosis.contradicted import contradicted_outcome
+from validation.diagnosis.datasets import recording_names
+from validation.diagnosis.design.next_recording import advise
+from validation.diagnosis.design.plans import Plan
+from validation.diagnosis.inertia import with_inertia
+from validation.diagnosis.prepared import prepared
+from validation.diagnosis.relaxed_fit import relaxed
+from validation.diagnosis.result import Outcome
+from validation.diagnosis.selection.stepwise import Search, search
+from validation.diagnosis.setup import find_setup_faults
+from validation.diagnosis.setup_effects import free_parameters, with_setup
+from validation.diagnosis.unknown_law.find import find_law
+from validation.diagnosis.verdict import verdict_of
+from validation.identification.competing_effects import competing, row_of
+from validation.identification.stated_parameters import stated_parameters
+
+__all__ = ["diagnose"]
+
+
+def _silent(stage: str, done: int, total: int) -> None:
+    del stage, done, total
+
+
+#: so many effects on the motion may be a bad copy of something that is none of them
+_STACK = 2
+
+
+def _stacked(found: Search) -> bool:
+    """Tell whether several effects on the motion were found, so that one law is worth comparing with them."""
+    rows = [row_of(trial.id) for trial in found.final.hypothesis.trials if not trial.id.startswith("event.")]
+    return sum(row is not None and row.acts_on == "motion" for row in rows) >= _STACK
+
+
+def diagnose(
+    datasets: Sequence[Sequence[Recording]],
+    names: Sequence[str],
+    *,
+    progress: Callable[[str, int, int], None] = _silent,
+    seed: int = 0,
+    user_effects: Sequence[UserEffect] = (),
+    plans: Sequence[Plan] | None = None,
+) -> Outcome:
+    """Tell whether the baseline explains recordings of one plant, and if not what was left out.
+
+    ``datasets`` are sets of recordings that share their hardware, ``names`` what to call the sets; ``progress`` is
+    called with a stage, steps done and steps in all. ``user_effects`` compete with the catalogue's. ``plans`` are the
+    recordings that could be made where effects cannot be told apart, by default such as are made easily.
+    """
+    recordings = [recording for dataset in datasets for recording in dataset]
+    called = [name for group in recording_names(datasets, names) for name in group]
+    progress("checking the setup", 0, 5)
+    setup = find_setup_faults(recordings)
+    meant, warnings = prepared(list(setup.recordings), called)
+    fitted, notes = with_inertia(meant)
+    free = free_parameters(setup)
+    with competing(user_effects):
+        known = (*stated_parameters(fitted), *free)
+        progress("asking whether sensors contradict one another", 0, 5)
+        contradiction = contradiction_in(fitted, known)
+        if contradiction is None:
+            progress("following the data", 1, 5)
+            followed = relaxed(fitted, known)
+            contradiction = contradiction_after(followed)
+        if contradiction is not None:
+            outcome = contradicted_outcome(contradiction, meant, names, called, seed)
+            outcome = with_setup(outcome, setup, recordings, None)
+            return _with_notes(outcome, [*warnings, *notes], meant, called)
+        found = search(fitted, progress, meant, followed, free)
+        law = None
+        verdict, unexplained = verdict_of(found)
+        if unexplained or _stacked(found):
+            progress("looking for a law", 4, 5)
+            law = find_law(found.loose, found.final, found.own, found.loose_noise, fitted)
+        advice = {}
+        if verdict == "explained" and law is None:
+            progress("asking what to record next", 4, 5)
+            advice = advise(found, called, plans)
+        outcome = assemble(found, names, called, seed, law, advice)
+    outcome = with_setup(outcome, setup, recordings, found.final.fit)
+    return _with_notes(outcome, [*warnings, *notes], meant, called)
+
+
+def _with_notes(
+    outcome: Outcome, warnings: Sequence[str], recordings: Sequence[Recording], names: Sequence[str]
+) -> Outcome:
+    """Return an outcome with what the reader must know of the recordings (called ``names``) and their sensors."""
+    said = (*outcome.diagnosis.warnings, *warnings)
+    agreement = agreement_of(recordings, names)
+    return replace(outcome, diagnosis=replace(outcome.diagnosis, warnings=said, agreement=agreement))

@@ -1,0 +1,499 @@
+"""The relaxed fit: motion that follows the data whatever physics is missing.
+
+Pieces may jump and the sensors may be wrong by anything ordinary, each within a wide prior, so that the fit stays
+beside the truth under any hidden effect. What is learned there is not the effect but a point about which the questions
+that decide, asked by algebra, are nearly linear.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.effects.catalogue import CATALOGUE
+from discsim.frames import conjugate, multiply
+from discsim.recording import Recording
+from validation.diagnosis.consistency.spin_agreement import written_ratios
+from validation.identification.gauss_newton import Fit, linearised, merit_of, refit
+from validation.identification.initial.flight import flight_starts, spin_starts
+from validation.identification.initial.spin_phase import rig_starts
+from validation.identification.linearisation import Linear
+from validation.identification.noise import channel_of, estimate_noise, stated_noise, whitened
+from validation.identification.observations import Readings
+from validation.identification.parameters import Jumps, Parameter
+from validation.identification.prediction import shown
+from validation.identification.propagation import WOBBLE
+from validation.identification.segments import Chain, chain
+from validation.identification.sensor_model import delay
+
+__all__ = [
+    "NO_JUMPS",
+    "PIECE",
+    "beginning",
+    "first_chain",
+    "from_other_starts",
+    "loose_jumps",
+    "relaxed",
+    "without_outliers",
+]
+
+#: length of a piece, s
+PIECE = {"flight": 0.5, "free_spin": 0.2, "spin_down": 0.5, "rate_table": 1.0}
+
+#: one-sigma jumps between pieces of a relaxed fit: m, m/s, rad, rad/s; rad and rad/s on a rig
+_LOOSE = {
+    "flight": np.repeat([0.1, 0.5, 0.05, 0.3], 3),
+    "spin_down": np.array([0.5, 0.5]),
+    "rate_table": np.array([0.5]),
+}
+#: how the slopes of what a free spin does not model change from piece to piece, rad/s^3 and 1/s^2, and how much faster
+#: stiffer air turns the wobble, rad/s, and how its stiffness bends, 1/rad; for good
+_WANDER = np.array([0, 0, 300.0, 300.0, 0, 0.02, 0, 0, 0, 0, 0, 0, 0.5, 0.5, 0.5])
+NO_JUMPS = {
+    "flight": Jumps(np.zeros(12)),
+    "free_spin": Jumps(_WANDER),
+    "spin_down": Jumps(np.zeros(2)),
+    "rate_table": Jumps(np.zeros(1)),
+}
+
+#: ordinary errors that a relaxed fit allows for: (effect, parameter, one sigma)
+_ORDINARY = (
+    *(("mag.hard_iron", f"b{a}_uT", 10.0) for a in "xyz"),
+    *(("mag.soft_iron", name, 0.1) for name in ("sxx", "sxy", "sxz", "syy", "syz", "szz")),
+    *(("accel.bias", f"b{a}_m_s2", 1.0) for a in "xyz"),
+    *(("accel.position_offset", f"d{a}_m", 0.003) for a in "xy"),
+    *(("accel.scale", f"s{a}", 0.05) for a in "xyz"),
+    *(("gyro.bias", f"b{a}_rad_s", 0.1) for a in "xyz"),
+    *(("gyro.scale", f"s{a}", 0.05) for a in "xyz"),
+    ("air.wind", "w_north_m_s", 3.0),
+    ("air.wind", "w_east_m_s", 3.0),
+    ("air.density", "ratio", 0.1),
+    ("aero.yaw_quadratic", "CNrr", 1e-3),
+    ("body.inertia_asymmetry", "dIyy_kg_m2", 2e-5),
+    ("body.mass_imbalance", "ex_m", 1e-3),
+    ("body.mass_imbalance", "ey_m", 1e-3),
+    ("rig.coulomb_friction", "torque_N_m", 3e-4),
+    ("rig.quadratic_drag", "coefficient_N_m_s2", 3e-6),
+)
+
+
+def loose_jumps(plant: str) -> Jumps:
+    """Return the jumps of a relaxed fit."""
+    if plant == "free_spin":
+        sd = _WANDER.copy()
+        sd[6:9], sd[9:12] = 0.05, 0.3
+        return Jumps(sd)
+    return Jumps(_LOOSE[plant])
+
+
+def edges_of(recording: Recording) -> FloatArray:
+    """Return the boundaries of a recording's pieces, s."""
+    length = PIECE[recording.plant]
+    end = max(recording.end, 1e-3) + 1e-6
+    if recording.plant == "free_spin":
+        # just after release the moments of the air change fast
+        first = np.concatenate([np.arange(0.0, 0.2, 0.025), np.arange(0.2, 0.4, 0.05), np.arange(0.4, 0.8, 0.1)])
+        if end < 0.9:
+            return np.append(first[first < end - 0.02], end)
+        return np.concatenate([first, np.linspace(0.8, end, max(1, round((end - 0.8) / length)) + 1)])
+    count = max(1, round(recording.end / length))
+    return np.linspace(0.0, end, count + 1)
+
+
+def chain_in_true_time(recording: Recording, ratio: float) -> Chain:
+    """Return the first chain of a recording all of whose times are written as ``ratio`` times the true ones."""
+    first = first_chain(recording)
+    states = first.states.copy()
+    states[:, 4] *= ratio
+    states[:, 12] *= ratio
+    return replace(first, edges=first.edges / ratio, states=states)
+
+
+def first_chain(recording: Recording, ratio: float = 1.0, edges: FloatArray | None = None) -> Chain:
+    """Return a recording's chain of pieces with starts from the data; ``ratio`` is that of the magnetometer's clock.
+
+    Starts stand in the time that the magnetometer writes. ``edges`` (k + 1,) are the boundaries of the pieces, s, where
+    they are not those that `edges_of` a recording takes.
+    """
+    edges = edges_of(recording) if edges is None else edges
+    states = np.zeros((edges.size - 1, 13))
+    if recording.plant in ("flight", "free_spin"):
+        written = np.minimum(edges[:-1] * ratio, recording.end)
+        starts = (flight_starts if recording.plant == "flight" else spin_starts)(recording, written)
+        states[:, 6:10], states[:, 10:13] = starts.attitude, starts.rate
+        states[:, 12] *= ratio
+        if recording.plant == "flight":
+            states[:, :3], states[:, 3:6] = starts.position, starts.velocity
+        else:
+            r = starts.rate[:, 2]
+            states[:, 4] = np.gradient(r, edges[:-1]) / r if r.size > 1 else 0.0
+    else:
+        psi, r = rig_starts(recording, edges[:-1])
+        states[:, 0], states[:, 1] = psi, r
+        if recording.plant == "rate_table":
+            states[:, 1] = psi - psi[0]
+    return chain(recording, edges, states)
+
+
+def ordinary(sensors: set[str], plant: str) -> tuple[Parameter, ...]:
+    """Return the parameters that a relaxed fit sets free within a prior, of the sensors that are there."""
+    chosen = []
+    for id, name, sigma in _ORDINARY:
+        row = CATALOGUE[id]
+        if plant in row.plants and (row.acts_on == "motion" or row.acts_on in sensors):
+            size = row.scale[row.parameters.index(name)]
+            chosen.append(Parameter(id, name, float(getattr(row.baseline, name)), 0.1 * size, sigma))
+    return tuple(chosen)
+
+
+def unknowns(recordings: Sequence[Recording]) -> tuple[Parameter, ...]:
+    """Return what each recording leaves open beside its states: how the wobble of a free spin dies and turns."""
+    if recordings[0].plant != "free_spin":
+        return ()
+    sigmas = (5.0, 5.0, 10.0, 10.0, 2.0, 2.0, 2.0, 2.0, 5.0, 10.0)
+    return tuple(
+        Parameter(group, name, 0.0, 1e-3, sigma, frozenset([i]))
+        for i in range(len(recordings))
+        for (group, name), sigma in zip(WOBBLE, sigmas, strict=True)
+    )
+
+
+def loose_parameters(recordings: Sequence[Recording], sensors: set[str]) -> tuple[Parameter, ...]:
+    """Return all that a relaxed fit of recordings with some sensors sets free beside stated numbers."""
+    return (*unknowns(recordings), *ordinary(sensors, recordings[0].plant))
+
+
+# far from the data a motion may run beyond all numbers: such a step is not finite, and is not taken
+@np.errstate(over="ignore", invalid="ignore")
+def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), iterations: int = 12) -> Fit:
+    """Fit recordings of one plant so loosely that any effect of ordinary size finds room."""
+    plant = recordings[0].plant
+    ratio = _wrong_time(recordings)
+    chains = tuple(first_chain(one) if ratio == 1.0 else chain_in_true_time(one, ratio) for one in recordings)
+    sensors = {readings.sensor for one in chains for readings in one.readings}
+    clock = () if ratio == 1.0 else (Parameter("clock.rate", "ratio", 1.0, 1e-6, _TIME_SIGMA),)
+    parameters = (*known, *loose_parameters(recordings, sensors), *clock)
+    at = np.array([ratio if q.group == "clock.rate" else q.stated for q in parameters])
+    fit = Fit(chains, parameters, at, loose_jumps(plant), {})
+    bare = linearised(fit, ())
+    fit = replace(fit, noise=stated_noise(bare))
+    fit = refit(fit, iterations=iterations, tolerance=1e-4 * sum(linear.raw.size for linear in bare))
+    fit = from_other_starts(fit)
+    if plant in ("spin_down", "rate_table"):
+        fit = _with_own_clock(fit)
+    if ratio == 1.0:
+        fit = _with_clocks(_led_by_others(fit))
+    chains = tuple(within_range(chain, linear) for chain, linear in zip(fit.chains, fit.linears, strict=True))
+    fit = replace(fit, chains=chains)
+    linears = linearised(fit)
+    return replace(fit, linears=linears, merit=merit_of(fit, linears))
+
+
+#: how far a clock may be from right where sensors say that the written time is wrong altogether
+_TIME_SIGMA = 0.3
+#: a clock less wrong than this is found by `_with_clocks`, and may be a sensor's own
+_LEAST_WRONG = 0.03
+
+
+def _wrong_time(recordings: Sequence[Recording]) -> float:
+    """Return the ratio of written to true time where most recordings say that it is far from 1, else 1."""
+    if recordings[0].plant not in ("flight", "free_spin"):
+        return 1.0
+    ratio = float(np.median(written_ratios(recordings)))
+    return ratio if abs(ratio - 1.0) > _LEAST_WRONG else 1.0
+
+
+#: a relaxed fit of a recording whose chi-squared per reading is above this started wrong
+_ASTRAY = 8.0
+
+
+def _astray(fit: Fit) -> list[int]:
+    """Return the recordings whose fit is far from their data while others' is not, worst first."""
+    chi2 = [
+        float(np.sum(np.minimum(whitened(linear, fit.noise, linear.residual[:, None])[:, 0] ** 2, 1e4)))
+        / max(linear.raw.size, 1)
+        for linear in fit.linears
+    ]
+    return [i for i in np.argsort(chi2)[::-1].tolist() if chi2[i] > _ASTRAY]
+
+
+def from_other_starts(fit: Fit) -> Fit:
+    """Try other attitudes at release for recordings whose fit went astray, each by itself."""
+    plant = fit.chains[0].recording.plant
+    if plant not in ("flight", "free_spin"):
+        return fit
+    better = dict[int, Chain]()
+    for i in _astray(fit)[:FEW]:
+        recording = fit.chains[i].recording
+        ratio = fit.values(i).get(("clock.rate", "ratio"), 1.0)
+        first = (
+            first_chain(recording, edges=fit.chains[i].edges) if ratio == 1.0 else chain_in_true_time(recording, ratio)
+        )
+        starts = (flight_starts if plant == "flight" else spin_starts)(recording, np.zeros(1))
+        alone = part_of(fit, [i])
+        alone = replace(alone, merit=merit_of(alone, alone.linears))
+        for other in starts.ambiguous[:3]:
+            turned = multiply(other, conjugate(first.states[0, 6:10]))
+            states = first.states[: len(fit.chains[i].states)].copy()
+            states[:, 6:10] = multiply(np.broadcast_to(turned, (len(states), 4)), states[:, 6:10])
+            trial = replace(alone, chains=(replace(fit.chains[i], states=states),))
+            trial = refit(trial, iterations=6, tolerance=1e-3 * fit.count)
+            if trial.merit < _RESCUED * alone.merit:
+                alone, better[i] = trial, trial.chains[0]
+    if not better:
+        return fit
+    together = replace(fit, chains=tuple(better.get(i, one) for i, one in enumerate(fit.chains)))
+    together = refit(together, iterations=6, tolerance=1e-3 * fit.count)
+    return together if together.merit < fit.merit else fit
+
+
+#: so many recordings tell whether something that all share reconciles them
+FEW = 3
+#: another start, or a free clock, is taken up where it leaves less than this share of what was left
+_RESCUED = 0.8
+
+
+def part_of(fit: Fit, chosen: Sequence[int]) -> Fit:
+    """Return a fit of some of its recordings alone, with the parameters that act in them where they stand."""
+    place = {i: k for k, i in enumerate(chosen)}
+    kept = [
+        (
+            j,
+            q
+            if q.recordings is None
+            else replace(q, recordings=frozenset(place[i] for i in q.recordings if i in place)),
+        )
+        for j, q in enumerate(fit.parameters)
+        if any(q.acts_in(i) for i in chosen)
+    ]
+    columns = [j for j, _ in kept]
+    return replace(
+        fit,
+        chains=tuple(fit.chains[i] for i in chosen),
+        parameters=tuple(q for _, q in kept),
+        at=fit.at[columns],
+        linears=tuple(fit.linears[i] for i in chosen) if fit.linears else (),
+        merit=np.inf,
+        covariance=np.empty((0, 0)),
+    )
+
+
+#: sensors without which the motion of a flight can still be followed, with the effect that is their clock
+_LED = {"accelerometer": ("accel.clock_rate", "ratio"), "gyroscope": ("gyro.clock_rate", "ratio")}
+#: clocks that are tried on a motion that the other sensors tell
+_CLOCKS_TRIED = 1.0 + 1e-4 * np.arange(-300, 301)
+
+
+def _led_by_others(fit: Fit) -> Fit:
+    """Follow flights that went astray without one sensor: its clock may be wrong, or samples of it lost.
+
+    Its clock is read off the motion that the others tell. Where that reconciles it, all are fitted together; where it
+    does not, the motion is left as the others tell it, for a search to find what the sensor has.
+    """
+    there = {readings.sensor for one in fit.chains for readings in one.readings}
+    if fit.chains[0].recording.plant != "flight" or not _astray(fit):
+        return fit
+    few = 1e-4 * fit.count
+    for sensor, clock in _LED.items():
+        if sensor not in there or not (there - {sensor}) & {"magnetometer", "gyroscope"}:
+            continue
+        some = part_of(fit, _astray(fit)[:FEW])
+        if len(some.chains) < len(fit.chains) and _astray(_without(some, sensor, few)):
+            continue
+        led = _without(fit, sensor, few)
+        if _astray(led):
+            continue
+        ratio = _clock_read(led, [one.readings for one in fit.chains], sensor, clock)
+        chains = tuple(
+            replace(new, recording=old.recording, readings=old.readings)
+            for new, old in zip(led.chains, fit.chains, strict=True)
+        )
+        free = Parameter(*clock, 1.0, 1e-6, _CLOCK_SIGMA)
+        both = replace(led, chains=chains, parameters=(*fit.parameters, free), at=np.append(led.at, ratio))
+        both = refit(both, iterations=12, tolerance=few)
+        if not _astray(both):
+            return both
+        kept = replace(led, chains=chains)
+        linears = linearised(kept)
+        level = estimate_noise(linears, [linear.residual for linear in linears], coloured=False)[sensor]
+        kept = replace(kept, linears=linears, noise={**kept.noise, sensor: level})
+        return replace(kept, merit=merit_of(kept, linears))
+    return fit
+
+
+#: a gyroscope on a rig whose residual is this many times its stated noise may have a clock far from right
+_LOST = 10.0
+#: a clock is taken up where it leaves less than this share of what was left of its sensor
+_RECONCILED = 0.2
+
+
+def _with_own_clock(fit: Fit) -> Fit:
+    """Fit again with a free clock of the gyroscope on a rig where the motion contradicts it and a clock reconciles it.
+
+    A rig's motion is told by others. Half a second off, a sensor's own readings would pass for noise that is slow. An
+    accelerometer is left to the search for lost samples, which look like a slow clock.
+    """
+    sensor, clock = "gyroscope", _LED["gyroscope"]
+    before = _misfit(fit, sensor)
+    if not before > _LOST:
+        return fit
+    ratio = _clock_read(fit, [one.readings for one in fit.chains], sensor, clock)
+    free = Parameter(*clock, 1.0, 1e-6, _CLOCK_SIGMA)
+    timed = replace(fit, parameters=(*fit.parameters, free), at=np.append(fit.at, ratio))
+    timed = refit(timed, iterations=8, tolerance=1e-4 * fit.count)
+    return timed if _misfit(timed, sensor) < _RECONCILED * before else fit
+
+
+def _misfit(fit: Fit, sensor: str) -> float:
+    """Return what a fit leaves of a sensor, root mean square in stated deviations; NaN where nothing is stated."""
+    left = [
+        linear.residual[c.rows] / linear.sd[c.rows]
+        for linear in fit.linears
+        for c in linear.channels
+        if c.sensor == sensor
+    ]
+    return float(np.sqrt(np.mean(np.concatenate(left) ** 2))) if left else np.nan
+
+
+def _silenced(recording: Recording, sensor: str) -> Chain:
+    """Return a recording's first chain as if it had not a sensor."""
+    samples = {name: own for name, own in recording.samples.items() if name != sensor}
+    return first_chain(replace(recording, samples=samples), edges=edges_of(recording))
+
+
+def _without(fit: Fit, sensor: str, tolerance: float) -> Fit:
+    """Return a fit from the start to recordings as if they had not a sensor."""
+    chains = tuple(_silenced(one.recording, sensor) for one in fit.chains)
+    at = np.array([q.stated for q in fit.parameters])
+    return refit(replace(fit, chains=chains, at=at), iterations=12, tolerance=tolerance)
+
+
+def _clock_read(led: Fit, readings: Sequence[Sequence[Readings]], sensor: str, clock: tuple[str, str]) -> float:
+    """Return the clock by which a sensor's readings fit a motion best."""
+    misfit = np.zeros(_CLOCKS_TRIED.size)
+    for i, (one, own) in enumerate(zip(led.chains, readings, strict=True)):
+        told = next((r for r in own if r.sensor == sensor), None)
+        if told is None:
+            continue
+        end = one.edges[-1]
+        for k, ratio in enumerate(_CLOCKS_TRIED):
+            values = {**led.values(i), clock: float(ratio)}
+            at = told.t - delay(values, sensor, told.t)
+            inside = (at > 0.0) & (at < end)
+            left = np.where(told.good, told.value, np.nan)[inside] - shown(one, values, sensor, at[inside])
+            left = left[:, np.isfinite(left).any(axis=0)]
+            misfit[k] += float(np.nanmean(np.abs(left - np.nanmedian(left, axis=0)))) if left.size else 0.0
+    return float(_CLOCKS_TRIED[int(np.argmin(misfit))])
+
+
+#: how far clocks may be wrong where a fit went astray, and how long its first look is, s
+_CLOCK_SIGMA, _FIRST_LOOK = 0.02, 1.3
+
+
+def free_clocks(sensors: set[str]) -> tuple[Parameter, ...]:
+    """Return the clocks of sensors on board, free within a few per cent."""
+    return tuple(
+        Parameter(f"{prefix}.clock_rate", "ratio", 1.0, 1e-6, _CLOCK_SIGMA)
+        for sensor, prefix in (("magnetometer", "mag"), ("accelerometer", "accel"), ("gyroscope", "gyro"))
+        if sensor in sensors
+    )
+
+
+def _with_clocks(fit: Fit) -> Fit:
+    """Fit again with free clocks where recordings went astray: their phases may have run away from one another.
+
+    A first look at the beginning, where no phase is off by a turn, gives the clocks; then all of it.
+    """
+    plant = fit.chains[0].recording.plant
+    if plant not in ("flight", "free_spin") or not _astray(fit):
+        return fit
+    clocks = free_clocks({readings.sensor for one in fit.chains for readings in one.readings})
+    parameters = (*fit.parameters, *clocks)
+    at = np.array([q.stated for q in parameters])
+    free = replace(fit, parameters=parameters, at=at)
+    some = part_of(free, _astray(fit)[:FEW])
+    if len(some.chains) < len(fit.chains) and len(_astray(_first_look(some))) == len(some.chains):
+        return fit
+    look = _first_look(free)
+    if len(_astray(look)) == len(look.chains):
+        return fit
+    ratio = look.values(0).get(("mag.clock_rate", "ratio"), 1.0)
+    chains = tuple(first_chain(one.recording, ratio) for one in fit.chains)
+    # what the first look says of the rest is little: only the clocks are taken over
+    known = {q.key for q in clocks}
+    at = np.array([v if q.key in known else q.stated for q, v in zip(parameters, look.at, strict=True)])
+    whole = refit(replace(fit, chains=chains, parameters=parameters, at=at), iterations=12, tolerance=1e-4 * fit.count)
+    return whole if whole.merit < _RESCUED * fit.merit else fit
+
+
+def _first_look(fit: Fit) -> Fit:
+    """Return a fit to the beginnings of recordings alone, from the start."""
+    short = tuple(beginning(first_chain(one.recording), _FIRST_LOOK) for one in fit.chains)
+    return refit(replace(fit, chains=short), iterations=10)
+
+
+def beginning(current: Chain, length: float) -> Chain:
+    """Return the pieces of a chain's first ``length`` s and the readings within them."""
+    count = min(max(1, int(np.searchsorted(current.edges, length))), len(current.states))
+    end = float(current.edges[count])
+    readings = tuple(replace(r, good=r.good & (r.t < end - 0.03)[:, None]) for r in current.readings)
+    return replace(current, edges=current.edges[: count + 1], states=current.states[:count], readings=readings)
+
+
+#: a reading this many standard deviations off, alone among its neighbours, is left out and listed
+_OUTLIER, _NEIGHBOUR = 9.0, 4.5
+#: larger shares of a sensor's readings than this are not outliers
+_MOST = 0.03
+
+
+def without_outliers(fit: Fit) -> tuple[Fit, list[tuple[int, str, str, float, float]]]:
+    """Leave out single readings far from everything else, as bad GPS fixes are, and fit again.
+
+    Returns the fit and what was left out: (recording, sensor, axis, time s, standard deviations).
+    """
+    found: list[tuple[int, str, str, float, float]] = []
+    chains = []
+    for index, (current, linear) in enumerate(zip(fit.chains, fit.linears, strict=True)):
+        kept = {readings.sensor: readings.good.copy() for readings in current.readings}
+        for channel in linear.channels:
+            x = linear.residual[channel.rows]
+            if x.size < 8:
+                continue
+            sd = max(1.4826 * float(np.median(np.abs(x))), 1e-12)
+            z = np.abs(x) / sd
+            padded = np.concatenate([[0.0], z, [0.0]])
+            alone = (z > _OUTLIER) & (np.maximum(padded[:-2], padded[2:]) < np.maximum(_NEIGHBOUR, 0.2 * z))
+            if not 0 < np.count_nonzero(alone) <= max(2, _MOST * x.size):
+                continue
+            readings = next(r for r in current.readings if r.sensor == channel.sensor)
+            axis = readings.axes.index(channel.axis)
+            for k in np.flatnonzero(alone):
+                kept[channel.sensor][channel.index[k], axis] = False
+                found.append((index, channel.sensor, channel.axis, float(linear.t[channel.rows][k]), float(z[k])))
+        chains.append(replace(current, readings=tuple(replace(r, good=kept[r.sensor]) for r in current.readings)))
+    if not found:
+        return fit, found
+    return refit(replace(fit, chains=tuple(chains)), iterations=4, tolerance=1e-4 * fit.count), found
+
+
+def within_range(current: Chain, linear: Linear) -> Chain:
+    """Return the chain without readings whose noise a range may have cut off, by what the fit expects of them.
+
+    Leaving out readings by their own value would bias what remains.
+    """
+    kept = []
+    for readings in current.readings:
+        limit = readings.limit
+        good = readings.good.copy()
+        if limit is not None:
+            for axis, name in enumerate(readings.axes):
+                channel = channel_of(linear, readings.sensor, name)
+                if channel is not None:
+                    expected = readings.value[channel.index, axis] - linear.raw[channel.rows]
+                    near = np.abs(expected) > limit - 6.0 * np.nan_to_num(linear.sd[channel.rows])
+                    good[channel.index[near], axis] = False
+        kept.append(replace(readings, good=good))
+    return replace(current, readings=tuple(kept))

@@ -1,0 +1,113 @@
+"""Which sensors agree, as tables for a reader: caption, header, rows of cells."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+from validation.diagnosis.consistency.settling import SettleProof
+from validation.diagnosis.consistency.spin_agreement import Agreement, Cause, RowProof
+from validation.diagnosis.report.wording import plus_minus
+
+__all__ = ["Table", "tables_of"]
+
+Table: TypeAlias = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
+
+
+def tables_of(found: Agreement) -> list[Table]:
+    """Return the comparisons, the single causes, and what each leaves of recordings that took no part."""
+    tables = [_comparisons(found)]
+    if any(not item.agrees for item in found.comparisons) and found.causes:
+        tables.append(_causes(found.causes))
+        if found.causes[0].proofs:
+            tables.append(_proofs(found.causes[0]))
+    if found.row_proofs:
+        tables.append(_rows(found.row_proofs))
+    if found.settling is not None:
+        tables.append(_settling(found.settling.proofs))
+    return tables
+
+
+def _comparisons(found: Agreement) -> Table:
+    reference = found.reference.replace("_", " ")
+    rows: list[tuple[str, ...]] = [
+        (
+            item.recording,
+            f"{item.signal} ({item.sensor})",
+            plus_minus(item.ratio, item.sd),
+            "the written time" if item.timed else "no time",
+            "agrees" if item.agrees else "contradicts",
+        )
+        for item in found.comparisons
+    ]
+    return "The spin about z by each sensor", ("recording", "signal", f"over the {reference}'s", "rests on", ""), rows
+
+
+def _number(value: float) -> str:
+    return f"{value:.2f}" if value < 99.5 else f"{value:,.0f}"
+
+
+def _causes(causes: tuple[Cause, ...]) -> Table:
+    rows: list[tuple[str, ...]] = [
+        (
+            cause.id,
+            f"{cause.parameter} = {plus_minus(cause.value, cause.sd)}",
+            _number(cause.before),
+            _number(cause.after),
+            _number(cause.heldout_after) if cause.proofs else "",
+        )
+        for cause in causes
+    ]
+    header = ("single cause", "size", "χ² before", "χ² after", "χ² after, each recording set aside in turn")
+    return "What single causes reconcile", header, rows
+
+
+def _proofs(cause: Cause) -> Table:
+    rows: list[tuple[str, ...]] = [
+        (
+            proof.recording,
+            plus_minus(proof.own, proof.own_sd),
+            plus_minus(proof.others, proof.others_sd),
+            f"{_number(proof.before)} → {_number(proof.after)}",
+            ""
+            if proof.field_before is None or proof.field_after is None
+            else f"{proof.field_before:.1f} → {proof.field_after:.1f} µT",
+        )
+        for proof in cause.proofs
+    ]
+    header = ("recording set aside", "asks for", "value of the others", "χ² with that", "what the field leaves")
+    return f"{cause.id} on recordings that took no part", header, rows
+
+
+def _rows(proofs: tuple[RowProof, ...]) -> Table:
+    rows: list[tuple[str, ...]] = [
+        (
+            proof.recording,
+            f"{1e3 * proof.tick_s:.3f} ms",
+            *(f"{left:.1f} µT" for left in proof.left[:3]),
+            "" if proof.wobble is None else f"{proof.wobble:.2f}",
+        )
+        for proof in proofs
+    ]
+    header = (
+        "recording set aside",
+        "tick of the others",
+        "field leaves as written",
+        "with even rows",
+        "with counted rows",
+        "correlation with the wobble",
+    )
+    return "Rows counted in ticks, on recordings that took no part", header, rows
+
+
+def _settling(proofs: tuple[SettleProof, ...]) -> Table:
+    rows: list[tuple[str, ...]] = [
+        (
+            proof.recording,
+            f"{plus_minus(1e3 * proof.own, 1e3 * proof.own_sd)} ms",
+            f"{1e3 * proof.others:.0f} ms",
+            f"{proof.before:.2f} → {proof.after:.2f} m/s²",
+        )
+        for proof in proofs
+    ]
+    header = ("recording set aside", "own time constant", "that of the others", "accelerometer beyond the pull")
+    return "The accelerometer's start, on recordings that took no part", header, rows

@@ -1,0 +1,1 @@
+"""Which effects explain the recordings: candidates, score tests, stepwise selection by likelihood."""

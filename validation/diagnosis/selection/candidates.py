@@ -1,0 +1,133 @@
+"""Candidate effects as trials: which numbers of an effect a linear question can free, and at which shapes.
+
+Parameters that enter a reading in proportion are freed; those that shape it (an exponent, a height, an instant) are
+tried at some values first and freed once the effect is taken up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from discsim.recording import Recording
+from validation.identification.competing_effects import row_of, rows
+from validation.identification.parameters import Parameter
+from validation.identification.propagation import Column
+
+__all__ = ["Trial", "parameters_of", "trials_for"]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An effect as a hypothesis: free columns, and the recordings it acts in (None: all).
+
+    ``told`` are parameters (name, value, sd) that a search has found and that no fit moves.
+    """
+
+    id: str
+    columns: tuple[Column, ...]
+    recordings: frozenset[int] | None = None
+    told: tuple[tuple[str, float, float], ...] = ()
+
+    @property
+    def name(self) -> str:
+        """A name that tells its recordings, too."""
+        return self.id if self.recordings is None else f"{self.id}@{','.join(map(str, sorted(self.recordings)))}"
+
+    @property
+    def shapes(self) -> dict[str, float]:
+        """Values of the parameters that shape the effect."""
+        return dict(self.columns[0].given) if self.columns else {}
+
+
+#: effect -> parameters that shape it, each with the values tried first
+_SHAPES: dict[str, tuple[tuple[str, tuple[float, ...]], ...]] = {
+    "air.wind_shear": (("exponent", (0.12, 0.25, 0.5, 1.0)),),
+    "aero.stall": (("alpha_stall_rad", (0.03, 0.06, 0.1, 0.14, 0.18, 0.22, 0.28)),),
+    "mag.stray_field": (("height_m", (0.3, 0.6, 1.2, 2.5, 6.0)),),
+}
+#: effects that a linear question about the whole recording does not find: searched for on their own
+SEARCHED = (
+    "air.gust",
+    "event.impulse",
+    "event.spin_step",
+    "rig.speed_ripple",
+    "mag.dropped_samples",
+    "accel.dropped_samples",
+    "accel.saturation",
+)
+#: a parameter is held this many steps wide, so that one without a trace in the readings stays where it is
+_LOOSE = 1e5
+#: a free spin's accelerometer counts by its means over turns alone, which these do not move
+_UNSEEN_IN_FREE_SPIN = ("accel.lag", "accel.clock_rate", "accel.dropped_samples", "accel.time_offset")
+#: share of an effect's scale that a difference is taken over
+_STEP = 0.1
+
+
+def _step(id: str, name: str) -> float:
+    if (id, name) == ("rig.speed_ripple", "order"):
+        return 1e-6  # times the angle turned, hundreds of turns, this is what moves the phase
+    row = row_of(id)
+    assert row is not None
+    return _STEP * row.scale[row.parameters.index(name)]
+
+
+def available(recordings: Sequence[Recording]) -> list[str]:
+    """Return the ids of effects that can act on these recordings and have a size that a fit can move."""
+    plant = recordings[0].plant
+    sensors = {sensor for recording in recordings for sensor in recording.samples}
+    found = []
+    for row in rows():
+        if plant not in row.plants:
+            continue
+        if plant == "free_spin" and row.id in _UNSEEN_IN_FREE_SPIN:
+            continue
+        if not row.settings and row.acts_with(sensors):
+            found.append(row.id)
+    return found
+
+
+def trials_for(recordings: Sequence[Recording]) -> tuple[Trial, ...]:
+    """Return the trials of all effects that enter linearly, at each of their shapes."""
+    trials = []
+    for id in available(recordings):
+        if id in SEARCHED:
+            continue
+        row = row_of(id)
+        assert row is not None
+        if id == "gyro.g_sensitivity" and "accelerometer" not in recordings[0].sheets:
+            continue
+        shapes: list[tuple[tuple[str, float], ...]] = [()]
+        shaped = _SHAPES.get(id, ())
+        for name, values in shaped:
+            shapes = [(*shape, (name, value)) for shape in shapes for value in values]
+        free = [name for name in row.parameters if name not in {name for name, _ in shaped}]
+        for shape in shapes:
+            trials.append(Trial(id, tuple(Column(id, name, _step(id, name), shape) for name in free)))
+    return tuple(trials)
+
+
+#: a shape is uncertain by about this much before it is fitted: keeps first steps short
+_SHAPE_SIGMA = {
+    ("air.wind_shear", "exponent"): 0.5,
+    ("aero.stall", "alpha_stall_rad"): 0.1,
+    ("mag.stray_field", "height_m"): 20.0,
+    ("air.gust", "t_s"): 1.0,
+    ("air.gust", "width_s"): 1.0,
+}
+
+
+def parameters_of(trial: Trial, *, shaped: bool = True) -> tuple[Parameter, ...]:
+    """Return the parameters of a trial for a fit, its shapes among them where ``shaped``."""
+    row = row_of(trial.id)
+    assert row is not None
+    baseline = row.sizes
+    found = [
+        Parameter(c.group, c.name, float(baseline[c.name]), c.step, _LOOSE * c.step, trial.recordings)
+        for c in trial.columns
+    ]
+    if shaped:
+        for name, value in trial.shapes.items():
+            sigma = _SHAPE_SIGMA.get((trial.id, name), float("inf"))
+            found.append(Parameter(trial.id, name, value, _step(trial.id, name), sigma, trial.recordings))
+    return tuple(found)

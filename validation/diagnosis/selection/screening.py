@@ -1,0 +1,118 @@
+"""All questions of one linearisation: what any set of parameters, in any recordings, would explain.
+
+The columns of every candidate are taken once, each recording's own unknowns eliminated, and what remains are small
+matrices: a hypothesis is a choice of rows and columns of them, and costs a few microseconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.errors import InputError
+from validation.diagnosis.selection.candidates import Trial, parameters_of
+from validation.identification.gauss_newton import Fit, linearised_columns, mapped
+from validation.identification.linearisation import Linear
+from validation.identification.noise import NoiseModel
+from validation.identification.normal_equations import Reduced, reduce
+from validation.identification.parameters import Jumps, Parameter
+from validation.identification.propagation import WOBBLE, Column
+
+__all__ = ["Answer", "Board", "board_of"]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a choice of columns explains: chi-squared left, priors included, and the values of the free columns."""
+
+    chi2: float
+    value: FloatArray
+    covariance: FloatArray
+
+
+@dataclass(frozen=True)
+class Board:
+    """Reduced normal matrices of all recordings over [columns | residual], taken to the baseline of every column."""
+
+    columns: tuple[Column, ...]
+    grams: FloatArray
+    place: Mapping[Column, int]
+    linears: tuple[Linear, ...]
+    reduced: tuple[Reduced, ...]
+
+    @property
+    def recordings(self) -> int:
+        """Number of recordings."""
+        return int(self.grams.shape[0])
+
+    def columns_of(self, parameters: Sequence[Parameter]) -> list[tuple[Column, Parameter]]:
+        """Return the columns of parameters, those that have one here, to `ask` with."""
+        found = [(column_of(q), q) for q in parameters]
+        return [(column, q) for column, q in found if column in self.place]
+
+    def ask(self, parameters: Sequence[tuple[Column, Parameter]], only: Sequence[int] | None = None) -> Answer:
+        """Free some columns, each in its recordings and with its prior; all others stay at their baseline.
+
+        ``only`` are the recordings that take part; by default all. Values are measured from the baseline.
+        """
+        some = range(self.recordings) if only is None else only
+        free = np.array([self.place[column] for column, _ in parameters], dtype=int)
+        f = free.size
+        if f == 0:
+            return Answer(float(sum(self.grams[i, -1, -1] for i in some)), np.empty(0), np.empty((0, 0)))
+        H, right, chi2 = np.zeros((f, f)), np.zeros(f), 0.0
+        for i in some:
+            G = self.grams[i]
+            active = np.array([q.acts_in(i) for _, q in parameters], dtype=float)
+            H += G[np.ix_(free, free)] * np.outer(active, active)
+            right += G[free, -1] * active
+            chi2 += float(G[-1, -1])
+        H = H + np.diag([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for _, q in parameters])
+        # what nothing shows stays at its baseline
+        scale = np.where(np.diag(H) > 0.0, 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300)), 0.0)
+        w, V = np.linalg.eigh(H * np.outer(scale, scale))
+        kept = w > 1e-9 * max(float(w[-1]), 1e-300)
+        covariance = ((V[:, kept] / w[kept]) @ V[:, kept].T) * np.outer(scale, scale)
+        value = covariance @ right
+        return Answer(chi2 - float(value @ right), value, covariance)
+
+
+def column_of(q: Parameter) -> Column:
+    """Return the column of a parameter; one that differs from recording to recording has a column for each."""
+    if q.recordings is not None and q.key in WOBBLE:
+        return Column(q.group, q.name, q.step, (("recording", float(min(q.recordings))),))
+    return Column(q.group, q.name, q.step)
+
+
+def board_of(fit: Fit, trials: Sequence[Trial], noise: NoiseModel, jumps: Jumps) -> Board:
+    """Take the columns of trials and of a fit's own parameters where the fit stands, to the baseline of each."""
+    columns = tuple(
+        dict.fromkeys((*map(column_of, fit.parameters), *(column for trial in trials for column in trial.columns)))
+    )
+    place = {column: k for k, column in enumerate(columns)}
+    linears = linearised_columns(replace(fit, jumps=jumps), columns)
+    reduced = mapped(lambda linear, chain: reduce(linear, chain, noise, jumps), linears, fit.chains)
+    grams = np.stack([r.gram for r in reduced])
+    if not np.all(np.isfinite(grams)):
+        raise InputError(
+            "diagnose: no motion of this plant follows the readings, its fit leaves the numbers "
+            "(a free spin turns by itself, driven by nothing); expected the part of the log in which it does: "
+            "discsim import RAW --throw N or --rows A:B takes it out"
+        )
+    for i, G in enumerate(grams):
+        away = np.zeros(len(columns))
+        for q, number in zip(fit.parameters, fit.at, strict=True):
+            if q.acts_in(i):
+                away[place[column_of(q)]] = number - q.stated
+        e, chi2 = G[:-1, -1].copy(), float(G[-1, -1])
+        G[-1, -1] = chi2 + float(2.0 * away @ e + away @ G[:-1, :-1] @ away)
+        G[:-1, -1] = G[-1, :-1] = e + G[:-1, :-1] @ away
+    return Board(columns, grams, place, linears, tuple(reduced))
+
+
+def free_columns(trial: Trial) -> list[tuple[Column, Parameter]]:
+    """Return the columns that a trial frees, with their parameters."""
+    return list(zip(trial.columns, parameters_of(trial, shaped=False), strict=True))

@@ -1,0 +1,265 @@
+"""None of these: the force, moment or sensor term that no effect of the catalogue accounts for, as a formula.
+
+One linearisation with a constant force and moment in each direction answers, piece by piece, what any function of the
+state would explain: its value in a piece weighs that piece's part of the column. The best few are then fitted by output
+error, their exponents free, and believed only where recordings that took no part are explained by them, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.recording import Recording
+from validation.diagnosis.relaxed_fit import NO_JUMPS
+from validation.diagnosis.result import Law
+from validation.diagnosis.selection.constrained_fit import Tied, tied_fit
+from validation.diagnosis.selection.evidence import ENTRY, PER_PARAMETER
+from validation.diagnosis.selection.hypothesis import Hypothesis
+from validation.diagnosis.unknown_law.formula import as_laws, as_sensor_laws
+from validation.diagnosis.unknown_law.motion_law import candidate_laws, fitted_law, reference_of, state_of
+from validation.diagnosis.unknown_law.sensor_law import asked_of_sensors, fitted_sensor_law, sensor_library
+from validation.diagnosis.unknown_law.terms import FITTED, SensorTerm, Term, library
+from validation.identification.gauss_newton import Fit, mapped, refit
+from validation.identification.noise import GroupNoise, NoiseModel, chi_squared, log_likelihood, whitened
+from validation.identification.normal_equations import local_step, reduce, shared_step
+from validation.identification.parameters import Parameter
+from validation.identification.residual_tests import remainders
+
+__all__ = ["FoundLaw", "find_law"]
+
+#: share of the best candidate's gain below which another is not fitted
+_WORTH = 0.7
+#: share of the excess that a law must explain, and twice the log likelihood it must gain on held-out recordings
+_SHARE, _HELD_OUT = 0.5, 12.0
+#: share of the excess beyond which no other candidate is fitted
+_ALL = 0.98
+
+
+@dataclass(frozen=True)
+class FoundLaw:
+    """A law that holds on recordings that took no part.
+
+    ``gain`` is twice the log likelihood gained over the fit without any effect, ``heldout`` the log likelihood gained
+    by recording while it took no part, ``chi2`` its chi-squared there before and after in the noise of the fit with the
+    law, ``share`` the part of the excess of chi2 that it explains. ``tied`` is that fit. ``reference`` says
+    the same law in another way: its value at an ordinary state, which is known better than its coefficients, whose
+    errors hang together with those of the exponents.
+    """
+
+    law: Law
+    gain: float
+    heldout: Mapping[int, float]
+    share: float
+    reference: str
+    tied: Tied
+    also: tuple[Law, ...] = field(default_factory=tuple)
+    chi2: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+
+
+# ------------------------------------------------------------------------------------------------- screening
+
+
+# ----------------------------------------------------------------------------------------------- about a sensor
+
+
+# --------------------------------------------------------------------------------------------------- fitting
+
+
+def _held_out(before: Fit, after: Fit) -> tuple[dict[int, float], dict[int, tuple[float, float]]]:
+    """Return what each recording gains in log likelihood while it took no part in either fit, and its chi-squared then.
+
+    The shared parameters are those of the other recordings, by one step of the fit without it; the recording's own
+    unknowns follow. chi-squared is in the levels of noise of the fit after.
+    """
+    count = len(before.chains)
+    if count < 2:
+        return {}, {}
+    levelled = {group: noise._replace(correlation=0.0) for group, noise in after.noise.items()}
+    sides, squares = [], []
+    for fit in (before, after):
+        linears = fit.linears
+        reduced = mapped(lambda linear, chain, f=fit: reduce(linear, chain, f.noise, f.jumps), linears, fit.chains)
+        levels, squared = [], []
+        for i in range(count):
+            others = np.sum([r.gram for j, r in enumerate(reduced) if j != i], axis=0)
+            step, _, _ = shared_step(others, fit.parameters, fit.at)
+            acting = np.array([q.acts_in(i) for q in fit.parameters], dtype=bool)
+            step = np.where(acting, step, 0.0)
+            left = linears[i].after(local_step(reduced[i], step), step)
+            levels.append(log_likelihood(linears[i], fit.noise, left))
+            squared.append(chi_squared(linears[i], levelled, left))
+        sides.append(levels)
+        squares.append(squared)
+    gains = {i: 0.5 * (sides[0][i] - sides[1][i]) for i in range(count)}
+    return gains, {i: (squares[0][i], squares[1][i]) for i in range(count)}
+
+
+# --------------------------------------------------------------------------------------------------- a formula
+
+
+# ----------------------------------------------------------------------------------------------------- finding
+
+
+def _own_at(loose: Fit, own: Sequence[Parameter]) -> FloatArray:
+    """Return where own parameters start: those that stand for a recording alone, where the loose fit has them."""
+    known = {(q.key, q.recordings): number for q, number in zip(loose.parameters, loose.at, strict=True)}
+    return np.array([known.get((q.key, q.recordings), q.stated) if q.recordings else q.stated for q in own])
+
+
+def _white(noise: NoiseModel) -> dict[str, GroupNoise]:
+    return {group: GroupNoise(item.sd, min(item.correlation, 0.9)) for group, item in noise.items()}
+
+
+def _beside(loose: Fit, own: Sequence[Parameter], own_at: FloatArray, noise: NoiseModel) -> Fit:
+    """Return a fit without errors of the sensors whose motion stays beside the data, to ask from.
+
+    In the air its pieces jump as those of the loose fit do, for what hides turns a whole flight too far from a line; a
+    rig's hang together.
+    """
+    plant = loose.chains[0].recording.plant
+    fit = refit(Fit(loose.chains, tuple(own), own_at, loose.jumps, _white(noise)), iterations=5)
+    levels: dict[str, list[float]] = {}
+    for linear in fit.linears:
+        for channel in linear.channels:
+            levels.setdefault(channel.group, []).append(_quick(linear.residual[channel.rows]))
+    quick = {group: float(np.sqrt(np.mean(np.square(found)))) for group, found in levels.items()}
+    sure = {
+        g: GroupNoise(min(item.sd, max(quick[g], 0.1 * item.sd)), item.correlation)
+        for g, item in fit.noise.items()
+        if g in quick
+    }
+    return replace(fit, noise=sure, jumps=fit.jumps if plant == "flight" else NO_JUMPS[plant])
+
+
+def _quick(e: FloatArray) -> float:
+    """Return the noise that differences of neighbours show, whatever drifts below it."""
+    return float(np.sqrt(0.5 * np.mean(np.diff(e) ** 2))) if e.size > 1 else 0.0
+
+
+def find_law(
+    loose: Fit, best: Tied, own: Sequence[Parameter], noise: NoiseModel, recordings: Sequence[Recording]
+) -> FoundLaw | None:
+    """Return the law that explains what the catalogue does not, or None where none holds on held-out recordings.
+
+    ``loose`` is the relaxed fit, ``best`` the best fit with effects of the catalogue (or without any), ``own`` the
+    parameters that the recordings leave open without any effect, ``noise`` that of the relaxed fit.
+    """
+    plant = recordings[0].plant
+    if plant == "free_spin":
+        return None  # what a free spin does not model takes up any further moment
+    base = best if not best.hypothesis.trials else tied_fit(loose, Hypothesis(), own, noise, {}, iterations=6, polish=1)
+    own_at = _own_at(loose, own)
+    start = _beside(loose, own, own_at, noise)
+    states = [state_of(chain, start.values(i)) for i, chain in enumerate(start.chains)]
+    at = reference_of(states)
+    motion = library(plant)
+    about = sensor_library(start)
+    ranked: list[tuple[float, float, Term | SensorTerm]] = []
+    if motion:
+        ranked += candidate_laws(start, own, motion, at)
+    ranked += [(gain, 0.0, term) for gain, term in zip(asked_of_sensors(start, own, about), about, strict=True)]
+    ranked.sort(key=lambda item: -item[0])
+    found: tuple[Tied, Term | SensorTerm] | None = None
+    for _, coefficient, term in _spread(ranked):
+        tied: Tied | None
+        if isinstance(term, SensorTerm):
+            tied = fitted_sensor_law(start, own, own_at, term)
+        else:
+            tied = fitted_law(start, own, own_at, [term], [coefficient], at)
+        if tied is None:
+            continue
+        if found is None or _priced(tied) < _priced(found[0]):
+            found = tied, term
+        if _share(base.fit, tied.fit, start.noise) > _ALL:
+            break
+    if found is None:
+        return None
+    tied, term = found
+    if isinstance(term, SensorTerm):
+        return _believed(tied, term, base, best, at, start.noise)
+    return _believed(*_more_terms(start, own, own_at, tied, term, at), base, best, at, start.noise)
+
+
+def _more_terms(
+    start: Fit, own: Sequence[Parameter], own_at: FloatArray, tied: Tied, first: Term, at: Mapping[str, float]
+) -> tuple[Tied, tuple[Term, ...]]:
+    """Return the fit of a law with one more term where the first leaves more than noise, and its terms.
+
+    The further term is asked for beside the first from where the motion is beside the data, and must gain its price and
+    held-out likelihood over the law without it.
+    """
+    terms: tuple[Term, ...] = (first,)
+    if not remainders(tied.fit.linears, tied.residuals, tied.fit.noise):
+        return tied, terms
+    plant = start.chains[0].recording.plant
+    held = tuple(q for q in tied.fit.parameters if q.group == "law")
+    beside = Fit(start.chains, (*own, *held), tied.fit.at, start.jumps, start.noise, tied.fit.fixed)
+    beside = refit(beside, iterations=3)
+    coefficient = float(tied.fit.at[[q.name for q in tied.fit.parameters].index("0.coefficient")])
+    powers = {q.name: float(v) for q, v in zip(tied.fit.parameters, tied.fit.at, strict=True) if q.group == "law"}
+    settled = replace(first, powers=tuple((s, powers.get(f"0.power_{s}", n)) for s, n in first.powers))
+    others = [term for term in library(plant) if _key(term) != _key(first)]
+    best, chosen = tied, terms
+    for _, further, term in _spread(candidate_laws(beside, (*own, *held), others, at)):
+        assert isinstance(term, Term)
+        both = fitted_law(start, own, own_at, [settled, term], [coefficient, further], at)
+        if _priced(both) + ENTRY > _priced(best):
+            continue
+        gains, _ = _held_out(tied.fit, both.fit)
+        if gains and (2.0 * sum(gains.values()) < _HELD_OUT or np.mean(np.array([*gains.values()]) > 0.0) < 0.5):
+            continue
+        best, chosen = both, (settled, term)
+    return best, chosen
+
+
+def _key(term: Term | SensorTerm) -> tuple[object, ...]:
+    if isinstance(term, SensorTerm):
+        return term.sensor, term.kind
+    return term.target, frozenset(symbol for symbol, _ in term.powers), bool(term.decay)
+
+
+def _spread(ranked: Sequence[tuple[float, float, Term | SensorTerm]]) -> list[tuple[float, float, Term | SensorTerm]]:
+    """Return the best few of a ranking, one of each set of symbols: the exponents are the fit's business."""
+    chosen: dict[tuple[object, ...], tuple[float, float, Term | SensorTerm]] = {}
+    for item in ranked:
+        if item[0] > max(ENTRY, _WORTH * ranked[0][0]):
+            chosen.setdefault(_key(item[2]), item)
+    return list(chosen.values())[:FITTED]
+
+
+def _share(base: Fit, fit: Fit, noise: NoiseModel) -> float:
+    """Return the part of the excess of chi2 over the number of readings that a fit takes away."""
+    before, after = (
+        sum(float(np.sum(whitened(linear, noise, linear.residual[:, None]) ** 2)) for linear in one.linears)
+        for one in (base, fit)
+    )
+    return (before - after) / max(before - base.count, 1.0)
+
+
+def _priced(tied: Tied) -> float:
+    """Return a fit's score with what the numbers of its law cost: of laws that do as well the simpler one is taken."""
+    return tied.score + PER_PARAMETER * sum(q.group in ("law", "term") for q in tied.fit.parameters)
+
+
+def _believed(
+    tied: Tied, terms: tuple[Term, ...] | SensorTerm, base: Tied, best: Tied, at: Mapping[str, float], noise: NoiseModel
+) -> FoundLaw | None:
+    """Return the law if it gains what it costs, explains most of the excess, and recordings that took no part."""
+    if _priced(tied) + ENTRY > min(base.score, best.score):
+        return None
+    share = _share(base.fit, tied.fit, noise)
+    heldout, chi2 = _held_out(base.fit, tied.fit)
+    if heldout and (2.0 * sum(heldout.values()) < _HELD_OUT or np.mean(np.array([*heldout.values()]) > 0.0) < 0.5):
+        return None
+    if share < _SHARE:
+        return None
+    total = sum(heldout.values()) if heldout else None
+    if isinstance(terms, SensorTerm):
+        laws, reference = as_sensor_laws(terms, tied.fit, total)
+    else:
+        laws, reference = as_laws(terms, tied.fit, at, total)
+    return FoundLaw(laws[0], base.score - tied.score, heldout, share, reference, tied, laws[1:], chi2)

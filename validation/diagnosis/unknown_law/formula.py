@@ -1,0 +1,122 @@
+"""A fitted law in words and as a formula."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import exp, log
+
+import numpy as np
+
+from validation.diagnosis.result import Law, ParameterValue
+from validation.diagnosis.selection.evidence import PER_PARAMETER
+from validation.diagnosis.unknown_law.terms import SensorTerm, Term
+from validation.identification.gauss_newton import Fit
+
+__all__ = ["as_laws", "as_sensor_laws"]
+
+
+def as_sensor_laws(term: SensorTerm, fit: Fit, heldout: float | None) -> tuple[tuple[Law, ...], str]:
+    """Return a sensor term as laws, that of the strongest axis first, and its shape in words."""
+    C, place = fit.covariance, {q.name: j for j, q in enumerate(fit.parameters) if q.group == "term"}
+    s = place["shape"]
+    shape, shape_sd = float(fit.at[s]), float(np.sqrt(C[s, s]))
+    axes = list(dict.fromkeys(name.partition(".")[0] for name in place if name != "shape"))
+    ranked = []
+    for axis in axes:
+        js = [place[f"{axis}.{j}"] for j in range(term.size)]
+        values, block = fit.at[js], C[np.ix_(js, js)]
+        if not np.any(np.diag(block) > 0):
+            continue
+        z2 = float(values @ np.linalg.pinv(block) @ values)
+        sds = np.sqrt(np.diag(block))
+        if term.kind == "turning":
+            text = "a * cos(k * psi) + b * sin(k * psi)"
+            coefficients = {
+                "a": ParameterValue(float(values[0]), float(sds[0])),
+                "b": ParameterValue(float(values[1]), float(sds[1])),
+                "k": ParameterValue(shape, shape_sd),
+            }
+        elif term.kind == "warming":
+            text = "c - c * exp(-t/tau)"
+            coefficients = {
+                "c": ParameterValue(float(values[0]), float(sds[0])),
+                "tau": ParameterValue(shape, shape_sd),
+            }
+        else:
+            symbol = {"drift": "t", "rate": "r", "reading": axis.partition("_")[0]}[term.kind]
+            scale = term.unit**-shape
+            c = float(values[0])
+            row = np.array([scale, -c * scale * log(term.unit)])
+            pair = C[np.ix_([js[0], s], [js[0], s])]
+            text = f"c * |{symbol}|^n" + (f" * sign({symbol})" if symbol != "t" else "")
+            coefficients = {
+                "c": ParameterValue(c * scale, float(np.sqrt(row @ pair @ row))),
+                "n": ParameterValue(shape, shape_sd),
+            }
+        ranked.append((z2, Law(text, f"{term.sensor}.{axis}", coefficients, heldout)))
+    ranked.sort(key=lambda item: -item[0])
+    laws = tuple(law for z2, law in ranked if z2 > PER_PARAMETER * 4.0 or law is ranked[0][1])
+    return laws, f"{term.kind} of the {term.sensor}, {shape:.4g} ± {shape_sd:.2g}"
+
+
+def _factor(symbol: str, power: str) -> str:
+    return f"|{symbol}|^{power}"
+
+
+def as_laws(
+    terms: Sequence[Term], fit: Fit, at: Mapping[str, float], heldout: float | None
+) -> tuple[tuple[Law, ...], str]:
+    """Return a fit's terms as laws, one for each target, and as values at the reference state."""
+    by_target: dict[str, list[int]] = {}
+    for i, term in enumerate(terms):
+        by_target.setdefault(term.target, []).append(i)
+    found = [_as_law({i: terms[i] for i in mine}, fit, at, heldout) for mine in by_target.values()]
+    return tuple(law for law, _ in found), "; ".join(note for _, note in found)
+
+
+def _as_law(terms: Mapping[int, Term], fit: Fit, at: Mapping[str, float], heldout: float | None) -> tuple[Law, str]:
+    """Return a fit's terms about one target, by their number, as a law of plain SI coefficients, and as values.
+
+    The coefficient of |x|^n is that at x = 1, far from where a disc ever is; its standard deviation holds the
+    exponent's share, ln(x / 1) times its own.
+    """
+    place = {q.name: j for j, q in enumerate(fit.parameters) if q.group == "law"}
+    C = fit.covariance
+    coefficients, parts, notes = {}, [], []
+    for i, term in terms.items():
+        mark = "" if len(terms) == 1 else str(i + 1)
+        j = place[f"{i}.coefficient"]
+        c = float(fit.at[j])
+        row = np.zeros(len(fit.parameters))
+        row[j] = 1.0 / c if c else 0.0
+        logarithm, factors, where = 0.0, [], []
+        for symbol, n in term.powers:
+            name = f"{i}.power_{symbol}"
+            own = "n" if len(term.powers) == 1 else f"n_{symbol}"
+            if name in place:
+                power = float(fit.at[place[name]])
+                row[place[name]] -= log(at[symbol])
+                coefficients[own + mark] = ParameterValue(power, float(np.sqrt(C[place[name], place[name]])))
+                factors.append(_factor(symbol, own + mark))
+            else:
+                power = n
+                factors.append(_factor(symbol, f"{n:g}"))
+            logarithm -= power * log(at[symbol])
+            where.append(f"|{symbol}| = {at[symbol]:g}")
+        factors += [f"sign({symbol})" for symbol in term.odd]
+        if term.decay:
+            name = f"{i}.decay"
+            decay = float(fit.at[place[name]])
+            sd = float(np.sqrt(C[place[name], place[name]]))
+            coefficients["tau" + mark] = ParameterValue(1.0 / decay, sd / decay**2)
+            factors.append(f"exp(-t/tau{mark})")
+        scale = exp(logarithm)
+        sd = abs(c) * scale * float(np.sqrt(max(float(row @ C @ row), 0.0)))
+        coefficients["c" + mark] = ParameterValue(c * scale, sd)
+        parts.append(" * ".join(["c" + mark, *factors]))
+        notes.append(
+            f"{c:.4g} ± {float(np.sqrt(C[j, j])):.2g} {'N' if term.target.endswith('_N') else 'N m'}"
+            + (f" at {', '.join(where)}" if where else "")
+        )
+    target = next(iter(terms.values())).target
+    return Law(" + ".join(parts), target, coefficients, heldout), "; ".join(notes)

@@ -1,0 +1,199 @@
+"""Laws on the motion: terms of force and moment, asked by algebra and fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.law import WRENCH_TARGETS
+from validation.diagnosis.relaxed_fit import NO_JUMPS
+from validation.diagnosis.selection.constrained_fit import Tied, noise_of, scored
+from validation.diagnosis.selection.evidence import BOUNDS
+from validation.diagnosis.selection.hypothesis import Hypothesis
+from validation.diagnosis.selection.screening import Answer, Board, column_of
+from validation.diagnosis.selection.to_stated import to_baseline
+from validation.diagnosis.unknown_law.terms import Term
+from validation.identification.gauss_newton import Fit, linearised_columns, mapped, refit
+from validation.identification.linearisation import Linear
+from validation.identification.normal_equations import reduce
+from validation.identification.parameters import Parameter
+from validation.identification.propagation import Column
+from validation.identification.segments import Chain, recut
+from validation.identification.sensor_model import to_body
+
+__all__ = ["candidate_laws", "fitted_law"]
+
+#: half the differences in force and moment, N and N m; in an exponent
+_FORCE_STEP, _MOMENT_STEP, _RIG_STEP, _POWER_STEP = 2e-2, 2e-4, 2e-5, 1e-3
+
+
+#: an exponent is sought within this of where it starts
+_POWER_SIGMA = 3.0
+
+
+def state_of(chain: Chain, values: Mapping[tuple[str, str], float]) -> dict[str, FloatArray]:
+    """Return the symbols of a law, each (k,), in the middle of every piece."""
+    middle = 0.5 * (chain.edges[1:] + chain.edges[:-1])
+    there = recut(chain, values, np.append(middle, chain.edges[-1])).states
+    zero = np.zeros(middle.size)
+    if chain.recording.plant != "flight":
+        return {"t": middle, "r": there[:, 1], "h": zero, "V": zero, "alpha": zero, "p_H": zero, "q_H": zero}
+    rows = np.zeros((middle.size, 19))
+    rows[:, 9:13] = there[:, 6:10]
+    wind = np.array(chain.recording.environment.wind, dtype=float)
+    wind[:2] += [values.get(("air.wind", f"w_{way}_m_s"), 0.0) for way in ("north", "east")]
+    u, v, w = to_body(rows, there[:, 3:6] - wind).T
+    return {
+        "t": middle,
+        "h": np.maximum(-there[:, 2], 0.02),
+        "V": np.sqrt(u * u + v * v + w * w),
+        "alpha": np.arctan2(w, np.hypot(u, v)),
+        "r": there[:, 12],
+    }
+
+
+def reference_of(states: Sequence[Mapping[str, FloatArray]]) -> dict[str, float]:
+    """Return an ordinary size of each symbol: its root mean square over all recordings."""
+    sizes = {}
+    for symbol in states[0]:
+        size = float(np.sqrt(np.mean(np.concatenate([state[symbol] for state in states]) ** 2)))
+        sizes[symbol] = float(f"{size:.2g}") if size > 0 else 1.0
+    return sizes
+
+
+def _step(target: str, plant: str) -> float:
+    if plant != "flight":
+        return _RIG_STEP
+    return _FORCE_STEP if target.endswith("_N") else _MOMENT_STEP
+
+
+def _constant(target: str, plant: str, term: int = 0) -> Column:
+    """Return the column of a constant force or moment."""
+    return Column(
+        "law",
+        f"{term}.coefficient",
+        _step(target, plant),
+        ((f"{term}.target", float(WRENCH_TARGETS.index(target))),),
+    )
+
+
+def _weighed(linear: Linear, first: int, targets: Sequence[int], weights: FloatArray) -> Linear:
+    """Return a linearisation with terms for its last columns, made of those of constants.
+
+    ``first`` is the place of the first constant among the shared columns, ``targets`` (m,) which of them a term
+    weighs, ``weights`` (m, k) its value in each piece.
+    """
+    local, (k, d) = linear.unknowns, linear.moves.shape[:2]
+    places = [d + first + j for j in targets]
+    own = linear.own[:, places] * weights[:, linear.piece].T
+    passes = linear.passes[:, :, places] * weights.T[: k - 1, None, :]
+    moves = np.zeros((k, d, len(targets)))
+    for i in range(k - 1):
+        moves[i + 1] = linear.passes[i, :, :d] @ moves[i] + passes[i]
+    return replace(
+        linear,
+        own=np.hstack([linear.own[:, : d + first], own]),
+        moves=np.concatenate([linear.moves[:, :, : local + first], moves], axis=2),
+        passes=np.concatenate([linear.passes[:, :, : d + first], passes], axis=2),
+    )
+
+
+def board_of_terms(
+    fit: Fit, terms: Sequence[Term], states: Sequence[Mapping[str, FloatArray]], at: Mapping[str, float]
+) -> Board:
+    """Return the board of a fit's own parameters and terms, its pieces jumping as they may."""
+    plant, jumps = fit.chains[0].recording.plant, fit.jumps
+    targets = list(dict.fromkeys(term.target for term in terms))
+    place_of = [targets.index(term.target) for term in terms]
+    taken = len({int(q.name.partition(".")[0]) for q in fit.parameters if q.group == "law"})
+    own = [column_of(q) for q in fit.parameters]
+    bare = linearised_columns(fit, [*own, *(_constant(target, plant, taken) for target in targets)])
+    linears = [
+        _weighed(linear, len(own), place_of, np.array([term.weight(state, at) for term in terms]))
+        for linear, state in zip(bare, states, strict=True)
+    ]
+    reduced = mapped(lambda linear, chain: reduce(linear, chain, fit.noise, jumps), linears, fit.chains)
+    columns = (*own, *(Column("law", f"{j}.candidate", 1.0) for j in range(len(terms))))
+    grams = to_baseline(np.stack([r.gram for r in reduced]), fit)
+    return Board(columns, grams, {column: j for j, column in enumerate(columns)}, tuple(linears), tuple(reduced))
+
+
+def _asked(board: Board, own: Sequence[Parameter], terms: int) -> Iterator[tuple[float, float]]:
+    """Yield what each term would gain in chi2, and its coefficient."""
+    taken = [(column_of(q), q) for q in own]
+    base = board.ask(taken).chi2
+    for j in range(terms):
+        column = Column("law", f"{j}.candidate", 1.0)
+        answer: Answer = board.ask([*taken, (column, Parameter("law", column.name, 0.0, 1.0))])
+        yield base - answer.chi2, float(answer.value[-1])
+
+
+def _parameters(
+    terms: Sequence[Term], coefficients: Sequence[float], plant: str
+) -> tuple[tuple[Parameter, ...], FloatArray]:
+    """Return the parameters of terms for a fit and where they start, (p,)."""
+    found, start = [], []
+    for i, (term, coefficient) in enumerate(zip(terms, coefficients, strict=True)):
+        size = max(abs(coefficient), 1e-3 * _step(term.target, plant))
+        found.append(Parameter("law", f"{i}.coefficient", 0.0, 0.02 * size, 1e4 * size))
+        start.append(coefficient)
+        for symbol, n in term.powers:
+            found.append(Parameter("law", f"{i}.power_{symbol}", n, _POWER_STEP, _POWER_SIGMA))
+            start.append(n)
+        if term.decay:
+            found.append(Parameter("law", f"{i}.decay", term.decay, 0.01 * term.decay, 2.0 * term.decay))
+            start.append(term.decay)
+    return tuple(found), np.array(start)
+
+
+def _fixed(terms: Sequence[Term], at: Mapping[str, float]) -> dict[tuple[str, str], float]:
+    """Return the numbers of terms that a fit leaves alone."""
+    fixed = {}
+    for i, term in enumerate(terms):
+        fixed["law", f"{i}.target"] = float(WRENCH_TARGETS.index(term.target))
+        fixed |= {("law", f"{i}.odd_{symbol}"): 1.0 for symbol in term.odd}
+        fixed |= {("law", f"{i}.at_{symbol}"): at[symbol] for symbol, _ in term.powers}
+    return fixed
+
+
+def fitted_law(
+    start: Fit,
+    own: Sequence[Parameter],
+    own_at: FloatArray,
+    terms: Sequence[Term],
+    coefficients: Sequence[float],
+    at: Mapping[str, float],
+    *,
+    iterations: int = 8,
+) -> Tied:
+    """Fit terms and own parameters by output error, pieces hanging together."""
+    plant = start.chains[0].recording.plant
+    parameters, first = _parameters(terms, coefficients, plant)
+    fit = Fit(
+        start.chains,
+        (*own, *parameters),
+        np.concatenate([own_at, first]),
+        NO_JUMPS[plant],
+        start.noise,
+        _fixed(terms, at),
+    )
+    bounds = dict(BOUNDS)
+    bounds |= {q.key: (-4.0, 8.0) for q in parameters if ".power_" in q.name}
+    bounds |= {q.key: (0.01 * q.stated, 50.0 * q.stated) for q in parameters if q.name.endswith(".decay")}
+    fit = refit(fit, iterations=iterations, bounds=bounds)
+    for _ in range(2):
+        fit = refit(replace(fit, noise=noise_of(fit)), iterations=3, bounds=bounds)
+    return scored(Hypothesis(), fit)
+
+
+def candidate_laws(
+    fit: Fit, own: Sequence[Parameter], terms: Sequence[Term], at: Mapping[str, float]
+) -> list[tuple[float, float, Term]]:
+    """Return gain, coefficient and term, best first, the best few of each target."""
+    states = [state_of(chain, fit.values(i)) for i, chain in enumerate(fit.chains)]
+    board = board_of_terms(fit, terms, states, at)
+    found = [(gain, c, term) for (gain, c), term in zip(_asked(board, own, len(terms)), terms, strict=True)]
+    return sorted(found, key=lambda item: -item[0])

@@ -1,0 +1,254 @@
+"""Laws on a sensor: warming, drift, rate, reading and turning terms, asked by algebra and fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
+
+from discsim.arrays import FloatArray
+from validation.diagnosis.relaxed_fit import NO_JUMPS
+from validation.diagnosis.selection.constrained_fit import Tied, noise_of, scored
+from validation.diagnosis.selection.hypothesis import Hypothesis
+from validation.diagnosis.selection.screening import Board, column_of
+from validation.diagnosis.selection.to_stated import to_baseline
+from validation.diagnosis.unknown_law.terms import SENSORS, SHAPES, SensorTerm
+from validation.identification.gauss_newton import Fit, linearised, mapped
+from validation.identification.linearisation import IntArray, Linear, moved
+from validation.identification.noise import whitened
+from validation.identification.normal_equations import local_step, reduce, shared_step
+from validation.identification.parameters import Parameter
+from validation.identification.propagation import Column
+from validation.identification.segments import Chain
+
+__all__ = ["asked_of_sensors", "fitted_sensor_law"]
+
+#: half the difference by which the slope in a shape is taken, as a share of it
+_SHAPE_STEP = 1e-4
+
+
+#: orders of the spin that are looked at, peaks of the spectrum that are tried
+_ORDERS, _PEAKS = (0.15, 4.0), 3
+
+
+@dataclass(frozen=True)
+class Turned:
+    """Spin and the angle turned since the recording began, as functions of time."""
+
+    rate: CubicSpline | CubicHermiteSpline
+    angle: CubicSpline | CubicHermiteSpline
+
+
+def turned(chain: Chain) -> Turned:
+    """Return how a chain turns, from the states at the starts of its pieces."""
+    plant, t, states = chain.recording.plant, chain.edges[:-1], chain.states
+    if plant == "rate_table":
+        command = chain.recording.command
+        assert command is not None
+        # piecewise linear, so its integral is exact on its knots and parabolas between
+        grid = np.union1d(np.linspace(0.0, chain.edges[-1], 20 * t.size), np.clip(command.t, 0.0, chain.edges[-1]))
+        r = np.interp(grid, command.t, command.value)
+        psi = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(grid) * (r[1:] + r[:-1]))])
+        rate = CubicHermiteSpline(grid, r, np.gradient(r, grid))
+        return Turned(rate, CubicHermiteSpline(grid, psi, r))
+    r = states[:, 1] if plant == "spin_down" else states[:, 12]
+    if t.size < 3:
+        t, r = np.append(t, chain.edges[-1]), np.append(r, r[-1])
+    rate = CubicSpline(t, r)
+    return Turned(rate, rate.antiderivative())
+
+
+def _seen(linear: Linear, chain: Chain, term: SensorTerm, shape: float) -> list[tuple[slice, int, FloatArray]]:
+    """Return rows, axis and basis (n, size) of a term on each of its sensor's axes."""
+    spin = turned(chain)
+    found = []
+    axes = next((readings.axes for readings in chain.readings if readings.sensor == term.sensor), ())
+    for channel in linear.channels:
+        if channel.sensor == term.sensor:
+            t = linear.t[channel.rows]
+            x = _reading(linear, chain, channel.rows, channel.index, term.sensor, axes.index(channel.axis))
+            basis = term.basis(t, spin.rate(t), spin.angle(t), x, shape)
+            found.append((channel.rows, axes.index(channel.axis), basis))
+    return found
+
+
+def _reading(linear: Linear, chain: Chain, rows: slice, index: IntArray, sensor: str, axis: int) -> FloatArray:
+    """Return what the model expects an axis to read, (n,), the closing of gaps included."""
+    readings = next(r for r in chain.readings if r.sensor == sensor)
+    return np.asarray(readings.value[index, axis] - linear.residual[rows])
+
+
+def _columns_of(linear: Linear, chain: Chain, term: SensorTerm, shape: float) -> FloatArray:
+    """Return the columns (n, axes size) of a sensor term's coefficients."""
+    axes = len(_axes(chain, term.sensor))
+    columns = np.zeros((linear.raw.size, axes * term.size))
+    for rows, axis, basis in _seen(linear, chain, term, shape):
+        columns[rows, axis * term.size : (axis + 1) * term.size] = basis
+    return columns
+
+
+def _axes(chain: Chain, sensor: str) -> tuple[str, ...]:
+    return next((readings.axes for readings in chain.readings if readings.sensor == sensor), ())
+
+
+def _widened(linear: Linear, columns: FloatArray) -> Linear:
+    """Return a linearisation with more shared columns (n, c), of the readings alone."""
+    more = columns.shape[1]
+    return replace(
+        linear,
+        own=np.hstack([linear.own, columns]),
+        moves=np.concatenate([linear.moves, np.zeros((*linear.moves.shape[:2], more))], axis=2),
+        passes=np.concatenate([linear.passes, np.zeros((*linear.passes.shape[:2], more))], axis=2),
+    )
+
+
+def orders(fit: Fit, sensor: str) -> list[float]:
+    """Return the orders of the spin at which a sensor's residuals of a loose fit have their highest lines."""
+    length = 0.0
+    parts = []
+    for linear, chain in zip(fit.linears, fit.chains, strict=True):
+        spin = turned(chain)
+        for channel in linear.channels:
+            if channel.sensor == sensor:
+                psi = spin.angle(linear.t[channel.rows])
+                e = linear.residual[channel.rows]
+                parts.append((psi, e - e.mean()))
+                length = max(length, float(np.ptp(psi)))
+    if length < 20.0:
+        return []
+    step = 1.0 / length
+    tried = np.arange(_ORDERS[0], _ORDERS[1], step)
+    power = np.zeros(tried.size)
+    for psi, e in parts:
+        turning, by = np.exp(-1j * tried[0] * psi), np.exp(-1j * step * psi)
+        for j in range(tried.size):
+            power[j] += abs(np.sum(e * turning)) ** 2 / e.size
+            turning = turning * by
+    found: list[float] = []
+    for j in np.argsort(power)[::-1]:
+        if all(abs(tried[j] - other) > 12.0 * step for other in found):
+            found.append(float(tried[j]))
+        if len(found) == _PEAKS:
+            break
+    return found
+
+
+def sensor_library(fit: Fit) -> list[SensorTerm]:
+    """Return the terms about sensors that are asked for first."""
+    terms = []
+    length = 0.5 * max(float(chain.edges[-1]) for chain in fit.chains)
+    spin = max(float(np.max(np.abs(turned(chain).rate(chain.edges[:-1])))) for chain in fit.chains)
+    for sensor in SENSORS:
+        values = [r.value[r.good] for chain in fit.chains for r in chain.readings if r.sensor == sensor]
+        if not values or not any(v.size for v in values):
+            continue
+        units = {"drift": length, "rate": spin, "reading": float(np.std(np.concatenate(values)))}
+        for kind in SENSORS[sensor]:
+            shapes = orders(fit, sensor) if kind == "turning" else SHAPES[kind]
+            unit = float(f"{max(units.get(kind, 1.0), 1e-6):.1g}")
+            terms += [SensorTerm(sensor, kind, shape, unit) for shape in shapes]
+    return terms
+
+
+def asked_of_sensors(fit: Fit, own: Sequence[Parameter], terms: Sequence[SensorTerm]) -> list[float]:
+    """Return what each sensor term would gain in chi2, pieces jumping as they may."""
+    if not terms:
+        return []
+    bare, jumps = linearised(fit), fit.jumps
+    wide, places, at = [], [], len(fit.parameters)
+    for term in terms:
+        width = max(len(_axes(chain, term.sensor)) for chain in fit.chains) * term.size
+        places.append(range(at, at + width))
+        at += width
+    for linear, chain in zip(bare, fit.chains, strict=True):
+        parts = [
+            _columns_of(linear, chain, term, term.shape)
+            if _axes(chain, term.sensor)
+            else np.zeros((linear.raw.size, len(place)))
+            for term, place in zip(terms, places, strict=True)
+        ]
+        wide.append(_widened(linear, np.hstack(parts)))
+    reduced = mapped(lambda linear, chain: reduce(linear, chain, fit.noise, jumps), wide, fit.chains)
+    columns = (*map(column_of, fit.parameters), *(Column("term", str(j), 1.0) for j in range(at - len(fit.parameters))))
+    board = Board(
+        columns,
+        to_baseline(np.stack([r.gram for r in reduced]), fit),
+        {column: j for j, column in enumerate(columns)},
+        tuple(wide),
+        tuple(reduced),
+    )
+    taken = [(column_of(q), q) for q in own]
+    base = board.ask(taken).chi2
+    gains = []
+    for place in places:
+        chosen = [(columns[j], Parameter("term", columns[j].name, 0.0, 1.0)) for j in place]
+        gains.append(base - board.ask([*taken, *chosen]).chi2)
+    return gains
+
+
+def fitted_sensor_law(start: Fit, own: Sequence[Parameter], own_at: FloatArray, term: SensorTerm) -> Tied | None:
+    """Fit a sensor term and own parameters by output error, pieces hanging together.
+
+    The chains keep their readings; what the term takes off them is part of the residual.
+    """
+    plant = start.chains[0].recording.plant
+    axes = max((_axes(chain, term.sensor) for chain in start.chains), key=len)
+    names = [(axis, j) for axis in axes for j in range(term.size)]
+    noise, chains, shape = start.noise, start.chains, term.shape
+    at = np.concatenate([own_at, np.zeros(len(names)), [shape]])
+    parameters = (
+        *own,
+        *(Parameter("term", f"{axis}.{j}", 0.0, 1.0) for axis, j in names),
+        Parameter("term", "shape", shape, _SHAPE_STEP * shape, 0.3 * shape if term.kind != "turning" else 0.01),
+    )
+    p = len(own)
+    fit = Fit(chains, parameters, at, NO_JUMPS[plant], noise)
+    for round in range(12):
+        bare = linearised(replace(fit, parameters=tuple(own), at=fit.at[:p]))
+        linears = []
+        shape, c = float(fit.at[-1]), fit.at[p:-1]
+        for linear, chain in zip(bare, fit.chains, strict=True):
+            if not _axes(chain, term.sensor):
+                linears.append(_widened(linear, np.zeros((linear.raw.size, len(names) + 1))))
+                continue
+            here = _columns_of(linear, chain, term, shape)
+            h = _SHAPE_STEP * shape
+            slope = (_columns_of(linear, chain, term, shape + h) - _columns_of(linear, chain, term, shape - h)) @ c
+            less = replace(linear, raw=linear.raw - here @ c)
+            linears.append(_widened(less, np.hstack([here, slope[:, None] / (2.0 * h)])))
+        fit = replace(fit, linears=tuple(linears))
+        merit = sum(_squares(fit, i) for i in range(len(linears)))
+        reduced = mapped(lambda linear, chain, f=fit: reduce(linear, chain, f.noise, f.jumps), linears, fit.chains)
+        gram = np.sum([r.gram for r in reduced], axis=0)
+        free = [*range(p + len(names))] if not np.any(c) else [*range(len(parameters))]
+        some = [*free, len(parameters)]
+        step, covariance, expected = shared_step(gram[np.ix_(some, some)], [parameters[j] for j in free], fit.at[free])
+        full = np.zeros(len(parameters))
+        full[free] = step
+        if len(free) == len(parameters):
+            # a shape moves by a third of itself at most, an order of the spin by less than its line is wide
+            full[-1] = float(np.clip(full[-1], -0.3 * shape, 0.3 * shape))
+            fit = replace(fit, covariance=covariance)
+        if round > 2 and fit.merit - merit < 1e-3 * abs(fit.merit - expected) + 0.05 and merit - expected < 0.5:
+            break
+        if round == 11 or not np.all(np.isfinite(full)):
+            break
+        fit = replace(
+            fit,
+            merit=merit,
+            noise=noise_of(fit) if round > 3 else fit.noise,
+            chains=tuple(
+                moved(chain, linear, local_step(r, full), full)
+                for chain, linear, r in zip(fit.chains, linears, reduced, strict=True)
+            ),
+            at=fit.at + full,
+        )
+    return scored(Hypothesis(), fit) if np.all(np.isfinite(fit.at)) and fit.covariance.size else None
+
+
+def _squares(fit: Fit, i: int) -> float:
+    linear = fit.linears[i]
+    white = whitened(linear, fit.noise, linear.residual[:, None])
+    return float(np.sum(white**2))

@@ -1,0 +1,1 @@
+"""Experiments on our own truth whose outcome is a judgement."""

@@ -1,6 +1,0 @@
-"""Three drone-tracked golf throws against flights predicted from their measured release (docs/golf-throws.md)."""
-
-from validation.golf_throws.page import write_page
-from validation.golf_throws.prediction import Prediction, predict_throw
-
-__all__ = ["Prediction", "predict_throw", "write_page"]

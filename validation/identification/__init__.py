@@ -1,0 +1,1 @@
+"""System identification: multiple shooting, linearisation, Gauss-Newton, noise and residual tests."""

@@ -1,0 +1,378 @@
+"""Weighted least squares over all recordings: states and jumps of each, parameters they share.
+
+Local unknowns are eliminated recording by recording (Schur complement), so the cost grows linearly with their number,
+and what is left, small matrices over the shared parameters, answers every question about subsets of them by algebra.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from discsim.arrays import BoolArray, FloatArray
+from validation.identification.linearisation import Linear, linearise, moved
+from validation.identification.noise import NoiseModel, chi_squared
+from validation.identification.normal_equations import WOBBLE_REACH, Reduced, local_step, reduce, shared_step
+from validation.identification.parameters import Jumps, Parameter, values_of
+from validation.identification.propagation import WOBBLE, Column
+from validation.identification.release_prior import release_rows
+from validation.identification.segments import STEPS, Chain, stepped
+from validation.identification.sensor_model import Values
+
+__all__ = ["Fit", "linearised_columns", "refit"]
+
+#: recordings that are worked on at once, on as many threads as there are cores
+THREADS = len(os.sched_getaffinity(0))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Where a fit stands: the chains, the shared parameters and their values (p,), the last linearisations.
+
+    ``fixed`` are values that take part without being fitted.
+    """
+
+    chains: tuple[Chain, ...]
+    parameters: tuple[Parameter, ...]
+    at: FloatArray
+    jumps: Jumps
+    noise: NoiseModel
+    fixed: Values = field(default_factory=dict)
+    linears: tuple[Linear, ...] = ()
+    merit: float = np.inf
+    covariance: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    iterations: int = 0
+
+    def values(self, recording: int) -> dict[tuple[str, str], float]:
+        """Return the values that hold in a recording."""
+        return values_of(self.parameters, self.at, recording, self.fixed)
+
+    @property
+    def count(self) -> int:
+        """Number of scalar readings that take part."""
+        return sum(linear.residual.size for linear in self.linears)
+
+
+# ---------------------------------------------------------------------------------------- one recording
+
+
+# ------------------------------------------------------------------------------------------ all recordings
+
+
+def mapped(function: Callable[..., Any], *arguments: Sequence[Any]) -> list[Any]:
+    """Map over recordings, on as many threads as there are cores, each in the context of the call."""
+    with ThreadPoolExecutor(THREADS) as pool:
+        tasks = [pool.submit(copy_context().run, function, *each) for each in zip(*arguments, strict=True)]
+        return [task.result() for task in tasks]
+
+
+def linearised(
+    fit: Fit, parameters: Sequence[Parameter] | None = None, only: Sequence[int] | None = None
+) -> tuple[Linear, ...]:
+    """Linearise all chains where they stand, or ``only`` some; the shared columns are those of ``parameters``."""
+    chosen = fit.parameters if parameters is None else parameters
+
+    def one(index: int) -> Linear:
+        columns = [Column(q.group, q.name, q.step if q.acts_in(index) else 0.0) for q in chosen]
+        active = [column for column in columns if column.step > 0]
+        linear = linearise(fit.chains[index], fit.values(index), active, fit.jumps.allowed, central=False)
+        if len(active) < len(columns):
+            linear = linear.spread([j for j, column in enumerate(columns) if column.step > 0], len(columns))
+        return linear
+
+    return tuple(mapped(one, range(len(fit.chains)) if only is None else only))
+
+
+def linearised_columns(fit: Fit, columns: Sequence[Column]) -> tuple[Linear, ...]:
+    """Linearise all chains where they stand, with any columns; one that is another recording's own is zero."""
+
+    def one(index: int) -> Linear:
+        active = [j for j, c in enumerate(columns) if dict(c.given).get("recording", index) == index]
+        linear = linearise(fit.chains[index], fit.values(index), [columns[j] for j in active], fit.jumps.allowed)
+        return linear.spread(active, len(columns)) if len(active) < len(columns) else linear
+
+    return tuple(mapped(one, range(len(fit.chains))))
+
+
+def merit_of(fit: Fit, linears: Sequence[Linear]) -> float:
+    """Return chi-squared with priors where a fit stands: what jumps may not close is charged, too."""
+    chi2 = sum(chi_squared(linear, fit.noise, linear.residual) for linear in linears)
+    return chi2 + penalty_of(fit, linears)
+
+
+def penalty_of(fit: Fit, linears: Sequence[Linear]) -> float:
+    """Return what a fit is charged beside its readings: its jumps, its distance from what is stated."""
+    total = 0.0
+    for current, linear in zip(fit.chains, linears, strict=True):
+        some = linear.jump_kind >= 0
+        total += float(np.sum((linear.jump[some] / fit.jumps.sd[linear.jump_kind[some]]) ** 2))
+        stated, _ = release_rows(current)
+        total += float(stated @ stated)
+    for q, number in zip(fit.parameters, fit.at, strict=True):
+        if np.isfinite(q.sigma):
+            total += ((number - q.stated) / q.sigma) ** 2
+    return total
+
+
+def refit(
+    fit: Fit,
+    *,
+    iterations: int = 8,
+    tolerance: float = 0.05,
+    bounds: Mapping[tuple[str, str], tuple[float, float]] | None = None,
+    moved_on: bool = True,
+    bar: float = np.inf,
+) -> Fit:
+    """Go on from where a fit stands by Gauss-Newton steps, halved where they do not improve.
+
+    Stops when the gain, expected or found, is below ``tolerance`` of chi-squared. ``moved_on`` is false where only the
+    noise has changed since the last linearisation. A fit that after its first steps expects to stay above ``bar`` is
+    of no use to the caller, and is left where it stands.
+    """
+    linears = linearised(fit) if moved_on else fit.linears
+    fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
+    fit, settled = _gone_on(fit, iterations, tolerance, bounds or {}, _FREE, bar)
+    if not settled and iterations >= _LONG and open_gaps(fit) and fit.chains[0].recording.plant == "free_spin":
+        # free steps hop about where the readings say little: short ones, and what held them back is not known
+        fit, _ = _gone_on(fit, _HELD * iterations, tolerance, bounds or {}, _FIRST_HOLD, bar)
+        _, (_, covariance, _) = _solved(fit, np.full(len(fit.chains), _FREE))
+        fit = replace(fit, covariance=covariance)
+    return fit
+
+
+def _solved(fit: Fit, hold: FloatArray) -> tuple[list[Reduced], tuple[FloatArray, FloatArray, float]]:
+    """Return what each recording says where a fit stands, and `shared_step` from all of it, held by ``hold`` (c,)."""
+    reduced = mapped(_reduced(fit), fit.linears, fit.chains, list(hold))
+    gram = np.sum([r.gram for r in reduced], axis=0)
+    return reduced, shared_step(gram, fit.parameters, fit.at, _reach(fit, hold))
+
+
+#: steps of a fit that is to end where it is best, not only to follow a change of the noise
+_LONG = 5
+
+
+def _gone_on(
+    fit: Fit,
+    iterations: int,
+    tolerance: float,
+    bounds: Mapping[tuple[str, str], tuple[float, float]],
+    first: float,
+    bar: float = np.inf,
+) -> tuple[Fit, bool]:
+    """Return a fit after up to so many steps, and whether no more are wanted. ``first`` is how hard they are held.
+
+    Where the steps end with pieces that do not hang together though they did on the way, the best such fit counts.
+    """
+    hold = np.full(len(fit.chains), first)
+    closed: Fit | None = None
+    settled, stuck, hops = False, 0, 0
+    for done in range(iterations):
+        reduced, (step, covariance, expected) = _solved(fit, hold)
+        fit = replace(fit, covariance=covariance)
+        if done >= _LOOKED and expected > bar:
+            return fit, True
+        closed = _better_closed(closed, fit)
+        least = max(tolerance, 1e-7 * fit.merit)
+        if fit.merit - expected < least and not open_gaps(fit):
+            return fit, True
+        going = _Going(fit, reduced, step, bounds)
+        if first > _FREE:
+            better, rose = going.each_its_share()
+            hold = np.where(rose, np.clip(_TIGHTER * hold, _LEAST_HOLD, _MOST_HOLD), _LOOSER * hold)
+            stuck = stuck + 1 if better is None else 0
+            better = better or going.all_by_one_share()
+        else:
+            better = going.all_by_one_share()
+            hops = hops + 1 if better is not None and _hopped(fit, better) else 0
+        settled = better is None or (not open_gaps(fit) and fit.merit - better.merit < least)
+        fit = better or fit
+        if settled or stuck == _STUCK or hops == _HOPS:
+            break
+    return (closed if closed is not None and open_gaps(fit) else fit), settled
+
+
+def _hopped(fit: Fit, better: Fit) -> bool:
+    """Tell whether a free step has neither closed the pieces of a free spin nor brought it much nearer its data."""
+    return fit.chains[0].recording.plant == "free_spin" and open_gaps(better) and better.merit > _NO_NEARER * fit.merit
+
+
+def _better_closed(known: Fit | None, fit: Fit) -> Fit | None:
+    """Return the better one of two fits whose pieces hang together; ``fit`` may be one whose pieces do not."""
+    if open_gaps(fit) or (known is not None and known.merit <= fit.merit):
+        return known
+    return fit
+
+
+#: steps after which what a fit expects of the next is believed to be no better than where it will end
+_LOOKED = 2
+#: held steps, which are short, as a multiple of free ones
+_HELD = 3
+#: a free step that leaves more than this share of the merit brings a free spin no nearer; after so many in turn short
+#: steps are taken (a fit that tied its pieces in free steps alone did so with at most one of them)
+_NO_NEARER, _HOPS = 0.98, 2
+#: so many held steps in turn of which no share served every recording lead nowhere
+_STUCK = 4
+#: tries at a step, and what a step that leads astray is shortened by
+_TRIES, _SHORTER = 5, 0.4
+#: a recording whose chi-squared per reading is above this is far from its data
+_FAR = 3.0
+#: by how much chi-squared may rise while pieces hang together to first order only
+_RISE = 1.3
+#: a rise by more than this is a step that went too far
+_ROSE = 1.02
+
+
+@dataclass(frozen=True)
+class _Going:
+    """A step from where a fit stands, and how much of it is taken."""
+
+    fit: Fit
+    reduced: Sequence[Reduced]
+    step: FloatArray
+    bounds: Mapping[tuple[str, str], tuple[float, float]]
+
+    def _bounded(self, at: FloatArray) -> FloatArray:
+        """Return parameters (p,) within their bounds."""
+        if not self.bounds:
+            return at
+        return np.array(
+            [
+                np.clip(a, *self.bounds.get(q.key, (-np.inf, np.inf)))
+                for a, q in zip(at, self.fit.parameters, strict=True)
+            ]
+        )
+
+    def all_by_one_share(self) -> Fit | None:
+        """Return the fit after the largest share of the step that improves it, the same for all; None if none does."""
+        fit, share = self.fit, 1.0
+        for _ in range(_TRIES):
+            at = self._bounded(fit.at + share * self.step)
+            taken = at - fit.at
+            chains = tuple(
+                moved(chain, linear, local_step(r, taken), taken)
+                if share == 1.0
+                else _part(chain, linear, local_step(r, self.step), self.step, share)
+                for chain, linear, r in zip(fit.chains, fit.linears, self.reduced, strict=True)
+            )
+            trial = replace(fit, chains=chains, at=at)
+            if _finite(chains):
+                new = linearised(trial)
+                merit = merit_of(trial, new)
+                # while gaps are open the merit is that of the closed chain to first order only: too good
+                bar = fit.merit * (1.0 + 1e-9) if not open_gaps(fit) else 1.5 * fit.merit + 10.0 * fit.count
+                if np.isfinite(merit) and merit < bar:
+                    return replace(trial, linears=new, merit=merit, iterations=fit.iterations + 1)
+            share *= _SHORTER
+        return None
+
+    def each_its_share(self) -> tuple[Fit | None, BoolArray]:
+        """Return the fit after a step of which each recording takes as much as leads it nearer, what they share whole.
+
+        What recordings share changes little here, and their own unknowns far from linearly. None where no share serves.
+        Beside it which of them (c,) the whole step led astray, or nearly.
+        """
+        fit, count = self.fit, len(self.fit.chains)
+        own = [np.array([q.recordings == frozenset([i]) for q in fit.parameters], dtype=bool) for i in range(count)]
+        shares, again = np.ones(count), list(range(count))
+        at, chains, new = fit.at, list(fit.chains), list(fit.linears)
+        for _ in range(_TRIES):
+            wanted = self.step.copy()
+            for i in range(count):
+                wanted[own[i]] *= shares[i]
+            at = self._bounded(fit.at + wanted)
+            taken = at - fit.at
+            for i in again:
+                linear, r, share = fit.linears[i], self.reduced[i], shares[i]
+                # a share of the way at once, and all that what is shared asks for
+                still = local_step(r, np.zeros_like(taken))
+                local = share * still + (local_step(r, taken) - still)
+                tangents = linear.moves @ np.concatenate([local, taken]) + share * linear.closing
+                chains[i] = stepped(fit.chains[i], tangents)
+            if not _finite(chains):
+                shares[again] *= _SHORTER
+                continue
+            trial = replace(fit, chains=tuple(chains), at=at)
+            for i, linear in zip(again, linearised(trial, only=again), strict=True):
+                new[i] = linear
+            again = [i for i in again if not self._nearer(i, trial, new[i])]
+            if not again:
+                new_fit = replace(trial, linears=tuple(new), merit=merit_of(trial, new), iterations=fit.iterations + 1)
+                rose = [
+                    self._own_merit(i, new_fit, new[i]) > _ROSE * self._own_merit(i, fit, fit.linears[i])
+                    for i in range(count)
+                ]
+                return new_fit, (shares < 1.0) | np.array(rose)
+            shares[again] *= _SHORTER
+        return None, shares < 1.0
+
+    def _nearer(self, i: int, trial: Fit, new: Linear) -> bool:
+        """Tell whether a step has not led a recording astray."""
+        was, now = (self._own_merit(i, fit, linear) for fit, linear in ((self.fit, self.fit.linears[i]), (trial, new)))
+        if not np.isfinite(now):
+            return False
+        count = new.residual.size
+        bar = _RISE * was if was < _FAR * count else 1.5 * was + 10.0 * count
+        return bool(now < bar)
+
+    def _own_merit(self, i: int, fit: Fit, linear: Linear) -> float:
+        """Return the chi-squared of one recording, its jumps included."""
+        one = replace(fit, chains=(fit.chains[i],), parameters=(), at=np.empty(0))
+        return merit_of(one, (linear,))
+
+
+def _finite(chains: Sequence[Chain]) -> bool:
+    """Tell whether all states are numbers."""
+    return all(bool(np.all(np.isfinite(chain.states))) for chain in chains)
+
+
+#: how hard steps are held to that: not at all, at first, at least after a step that went too far, and at most; what it
+#: is multiplied by after a step that went too far, and after one that did not
+_FREE, _FIRST_HOLD, _LEAST_HOLD, _MOST_HOLD = 0.0, 0.3, 0.1, 3.0
+_TIGHTER, _LOOSER = 5.0, 0.7
+
+
+def _reach(fit: Fit, hold: FloatArray) -> FloatArray | None:
+    """Return how far one step takes each parameter (p,) of which the readings say little; None where steps are free.
+
+    ``hold`` (c,) is how hard each recording's own are held to it. Where a fit ends does not depend on it.
+    """
+    if not np.any(hold):
+        return None
+    reach = np.full(len(fit.parameters), np.inf)
+    for j, q in enumerate(fit.parameters):
+        if q.key in WOBBLE and q.recordings is not None:
+            reach[j] = WOBBLE_REACH * q.sigma / np.sqrt(np.max(hold[list(q.recordings)]))
+    return reach
+
+
+#: gaps of a chain below this share of the steps of its differences are closed
+_CLOSED = 20.0
+
+
+def open_gaps(fit: Fit) -> bool:
+    """Tell whether pieces that may not jump still do."""
+    forbidden = ~fit.jumps.allowed
+    steps = STEPS[fit.chains[0].recording.plant]
+    return any(bool(np.any(np.abs(linear.gaps[:, forbidden]) > _CLOSED * steps[forbidden])) for linear in fit.linears)
+
+
+def _reduced(fit: Fit) -> Callable[[Linear, Chain, float], Reduced]:
+    """Return `reduce` with the noise and the jumps of a fit."""
+    return lambda linear, chain, hold: reduce(linear, chain, fit.noise, fit.jumps, hold)
+
+
+def _part(chain: Chain, linear: Linear, local: FloatArray, shared: FloatArray, share: float) -> Chain:
+    """Return the chain after a share of a step, the closing of gaps included."""
+    tangents = share * (linear.moves @ np.concatenate([local, shared]) + linear.closing)
+    return stepped(chain, tangents)
+
+
+def residuals_after(fit: Fit, reduced: Sequence[Reduced], step: FloatArray) -> list[FloatArray]:
+    """Return the residuals (n,) of each recording that a step of the shared parameters is expected to leave."""
+    return [linear.after(local_step(r, step), step) for linear, r in zip(fit.linears, reduced, strict=True)]

@@ -1,0 +1,240 @@
+"""Where a fit of short pieces starts: path, attitude and body rates at given instants, from the data alone.
+
+Three steps, each with a fall-back where a sensor is missing. The angle turned about the spin axis, psi, comes from the
+field in the disc's plane (`phase_spin`): hard iron and the ellipse of soft iron are taken out by a conic through the
+readings. In the frame S, which does not spin (B turned back by psi), everything is slow: the transverse rates
+of the gyroscope make the relative attitude D of S, and field and specific force are smoothed there. They are compared
+with the field and with the path's acceleration less gravity in N (Wahba's problem), locally in time, so that sensors
+whose clocks differ by some per cent still agree within each comparison.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.errors import InputError
+from discsim.frames import body_to_ned, turn
+from discsim.recording import Recording
+from discsim.trajectory import predict
+from validation.identification.initial.attitude import (
+    VECTOR_SIGMA,
+    Attitude,
+    field_in_start,
+    frame_of,
+    other_attitudes,
+    states_from,
+    turned_to_ned,
+    windowed,
+)
+from validation.identification.initial.path import (
+    Felt,
+    compared,
+    dead_reckoning,
+    felt_by,
+    in_ned,
+    integrated,
+    path_fixes,
+    path_states,
+)
+from validation.identification.initial.smoothing import GRID, ComplexArray
+
+__all__ = ["Starts", "flight_starts", "spin_starts"]
+
+
+#: sensors that fly with the disc
+ON_BOARD = ("magnetometer", "gyroscope", "accelerometer")
+#: how much higher a predicted start is flown than it was thrown, m
+HIGH = 1e4
+
+
+class Starts(NamedTuple):
+    """States at instants, for a fit to start from.
+
+    ``t`` (k,) s in written time; ``position`` (k, 3) m and ``velocity`` (k, 3) m/s in N; ``attitude`` (k, 4)
+    quaternions of C_NB; ``rate`` (k, 3) rad/s in B; ``ambiguous`` holds other attitudes (4,) worth trying at t[0].
+    """
+
+    t: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    attitude: FloatArray
+    rate: FloatArray
+    ambiguous: tuple[FloatArray, ...]
+
+
+# ---------------------------------------------------------------------------------------------- the three plants
+
+
+def flight_starts(recording: Recording, t: FloatArray) -> Starts:
+    """Return states at instants t (k,) s of a flight; always finite.
+
+    Without GPS and track the path is dead reckoning from the stated release, or from a guess. Without path or
+    accelerometer the attitude's turn about the field is the one that keeps the disc most level, unless the release
+    states it; the others are in ``ambiguous``. With no sensor on board at all, the flight that the baseline predicts
+    from a stated release is the start.
+    """
+    t = np.asarray(t, dtype=float)
+    if not any(sensor in recording for sensor in ON_BOARD):
+        predicted = _predicted(recording, t)
+        if predicted is not None:
+            return predicted
+    frame = frame_of(recording)
+    grid = _even(t, recording)
+    fixes = path_fixes(recording)
+    felt = felt_by(recording, frame)
+    pair = None if fixes is None else compared(fixes, felt, grid, recording.environment.gravity)
+    normals = None if fixes is None or pair is None else _normals(recording, path_states(fixes, None, grid)[1], pair[0])
+    if fixes is not None and felt is not None and pair is not None and normals is not None:
+        slip = _slip(frame, recording.environment.magnetic_field, grid, pair, normals)
+        if slip is not None:
+            felt = _turned_about_axis(felt, frame, -np.interp(felt.grid, grid, slip))
+            pair = compared(fixes, felt, grid, recording.environment.gravity)
+    G, certain = turned_to_ned(recording, frame, grid, pair, normals)
+    attitude, rate = states_from(recording, frame, grid, G, t)
+    if felt is not None:
+        felt = in_ned(felt, grid, G, recording.environment.gravity)
+    if fixes is not None:
+        position, velocity = path_states(fixes, felt, t)
+    else:
+        position, velocity = dead_reckoning(recording, felt, t)
+    return _finite(
+        Starts(t, position, velocity, attitude, rate, () if certain else other_attitudes(recording, attitude[0]))
+    )
+
+
+def _predicted(recording: Recording, t: FloatArray) -> Starts | None:
+    """Return the states (k,) of the flight from a stated release, or None where that does not say enough to fly."""
+    release, disc = recording.release, recording.disc
+    if release is None or release.position is None or disc is None:
+        return None
+    # the ground is no end to a start: flown high above it, where the baseline's air is the same
+    high = np.array([0.0, 0.0, -HIGH])
+    try:
+        aloft = replace(release, position=release.position + high)
+        flight = predict(disc, recording.environment, aloft, duration=float(np.max(t, initial=0.0)) + GRID)
+    except InputError:
+        return None
+    at = flight.at(np.maximum(t, 0.0))
+    return Starts(t, at.position - high, at.velocity, at.attitude, at.rate, ())
+
+
+def spin_starts(recording: Recording, t: FloatArray) -> Starts:
+    """Return attitudes and rates at instants t (k,) s of a free spin; position and velocity are zero.
+
+    The field alone cannot tell a turn about itself: the attitude given is the one that starts most level.
+    """
+    t = np.asarray(t, dtype=float)
+    frame = frame_of(recording)
+    grid = _even(t, recording)
+    G, _ = turned_to_ned(recording, frame, grid, None, None)
+    attitude, rate = states_from(recording, frame, grid, G, t)
+    nothing = np.zeros((t.size, 3))
+    return _finite(Starts(t, nothing, nothing.copy(), attitude, rate, other_attitudes(recording, attitude[0])))
+
+
+# ---------------------------------------------------------------------------------------------- readings
+
+
+def _even(t: FloatArray, recording: Recording) -> FloatArray:
+    start = min(0.0, float(np.min(t, initial=0.0)))
+    stop = max(recording.end, float(np.max(t, initial=0.0)), start + GRID)
+    return np.linspace(start, stop, int(np.ceil((stop - start) / GRID)) + 1)
+
+
+# ---------------------------------------------------------------------------------------------- spin
+
+
+# ---------------------------------------------------------------------------------------------- the slow frame
+
+
+# ---------------------------------------------------------------------------------------------- attitude
+
+
+def _slip(
+    frame: Attitude,
+    field: FloatArray,
+    grid: FloatArray,
+    pair: tuple[FloatArray, FloatArray | None],
+    normals: FloatArray,
+) -> FloatArray | None:
+    """Return by how much (n,) rad the accelerometer's phase runs ahead of the magnetometer's, or None where it is not.
+
+    Where clocks differ, or readings were lost, one slips against the other. The angle from field to force in the
+    disc's plane, which path and lift foretell, shows it; what changes by less than half a radian is left alone, for
+    wind and iron make as much.
+    """
+    force, felt = pair
+    if frame.field is None or felt is None or grid.size < 5:
+        return None
+    m = field_in_start(frame.field, frame, grid, VECTOR_SIGMA)
+    axis = body_to_ned(frame.D_at(grid))[:, :, 2]
+    a, b = _from_to(m, felt, axis), _from_to(np.broadcast_to(field, m.shape), force, normals)
+    product, level = a * np.conj(b), np.abs(a * b)
+    # a steady slip first: 7 rad/s are 2 % of the fastest spin, or 10 % of readings lost at an ordinary one
+    trial = np.linspace(-7.0, 7.0, 281)
+    sums = np.abs(np.exp(-1j * trial[:, None] * grid) @ product)
+    steady = float(trial[np.argmax(sums)]) * grid
+    rest = windowed(product * np.exp(-1j * steady), 0.5)
+    if np.median(np.abs(rest)) < 0.7 * np.median(windowed(level, 0.5)):
+        return None
+    angle = np.asarray(steady + np.unwrap(np.angle(np.where(np.abs(rest) > 0, rest, 1.0))))
+    # by whole turns nearest to none at the start, where no time has passed to slip in
+    angle -= 2 * np.pi * np.rint(angle[0] / (2 * np.pi))
+    return angle if float(np.ptp(angle)) > 0.5 else None
+
+
+def _turned_about_axis(felt: Felt, frame: Attitude, angle: FloatArray) -> Felt:
+    """Return a force felt turned about the spin axis by an angle (n,) rad on its grid."""
+    axis = body_to_ned(frame.D_at(felt.grid))[:, :, 2]
+    return integrated(felt.grid, np.einsum("nij,nj->ni", body_to_ned(turn(angle[:, None] * axis)), felt.force))
+
+
+def _from_to(m: FloatArray, f: FloatArray, axis: FloatArray) -> ComplexArray:
+    """Return the components of f (n, 3) along and to the right of m across the axis, as one complex number (n,)."""
+    z = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9)
+    x = m - np.sum(m * z, axis=1, keepdims=True) * z
+    x = x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-9)
+    return np.asarray(np.sum(x * f, axis=1) + 1j * np.sum(np.cross(z, x) * f, axis=1))
+
+
+def _normals(recording: Recording, velocity: FloatArray, force: FloatArray) -> FloatArray | None:
+    """Return the spin axis in N (n, 3), as long as the lift's share of the specific force (n, 3), from a path alone.
+
+    Lift is across the airspeed, in its plane with the axis, and its size tells the angle of attack, (20), (21). Lift
+    is taken to point away from z_B. None where the disc's aerodynamics are unknown.
+    """
+    disc, density = recording.disc, recording.environment.air_density
+    if disc is None or disc.aero is None or density is None:
+        return None
+    relative = velocity - recording.environment.wind
+    speed = np.maximum(np.linalg.norm(relative, axis=1, keepdims=True), 1.0)
+    along = relative / speed
+    across = force - np.sum(force * along, axis=1, keepdims=True) * along
+    lift = np.linalg.norm(across, axis=1, keepdims=True)
+    alpha = np.linspace(-0.3, 0.6, 181)
+    CL = disc.aero.CL0 + disc.aero.CLa * alpha
+    if disc.aero_table is not None:
+        CL = np.interp(alpha, disc.aero_table.alpha, disc.aero_table.CL)
+    needed = lift * disc.mass / (0.5 * density * speed**2 * disc.area)
+    found = alpha[np.argmin(np.abs(CL[None, :] - needed), axis=1)][:, None]
+    z = -np.cos(found) * across / np.maximum(lift, 1e-6) + np.sin(found) * along
+    return np.asarray(z * np.minimum(lift, 20.0))
+
+
+# ---------------------------------------------------------------------------------------------- path
+
+
+def _finite(starts: Starts) -> Starts:
+    """Return the starts with anything that is not finite replaced by what a level, resting disc has."""
+    level = np.array([1.0, 0.0, 0.0, 0.0])
+    lost = np.asarray(~np.all(np.isfinite(starts.attitude), axis=1))
+    return starts._replace(
+        position=np.nan_to_num(starts.position, nan=0.0, posinf=0.0, neginf=0.0),
+        velocity=np.nan_to_num(starts.velocity, nan=0.0, posinf=0.0, neginf=0.0),
+        attitude=np.where(lost[:, None], level, starts.attitude),
+        rate=np.nan_to_num(starts.rate, nan=0.0, posinf=0.0, neginf=0.0),
+    )

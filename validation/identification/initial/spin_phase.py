@@ -1,0 +1,296 @@
+"""The phase of the spin from the field in the disc's plane: conic fit, phase smoothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.linalg import solveh_banded
+from scipy.ndimage import median_filter
+
+from discsim.arrays import FloatArray
+from discsim.recording import Recording
+from validation.identification.initial.smoothing import (
+    FEWEST,
+    SLOW,
+    ComplexArray,
+    integral_of,
+    median_of,
+    readings_for,
+    smoothed,
+)
+
+__all__ = ["Spin", "centripetal_rate", "expected_rate", "field_spin", "gaussian_kernel", "phase_spin", "rig_starts"]
+
+#: of the smoothing of the spin's phase, s (one sigma)
+PHASE_SIGMA = 0.05
+
+
+#: of the smoothing of the spin rate given, s: lost readings make steps of phase that are no rate
+RATE_SIGMA = 0.15
+
+
+class Spin(NamedTuple):
+    """Angle turned by the field in the disc's plane, and what belongs to it.
+
+    ``grid`` (n,) s; ``phase`` and ``rate`` (n,) of the turning vector, rad and rad/s; ``turning`` (n,) the rate
+    between readings that were not lost silently, rad/s; ``amplitude`` (n,) its length;
+    ``plane`` (m,) the readings' complex x + i y with iron removed, at the times ``t`` (m,).
+    """
+
+    grid: FloatArray
+    phase: FloatArray
+    rate: FloatArray
+    turning: FloatArray
+    amplitude: FloatArray
+    t: FloatArray
+    plane: ComplexArray
+
+    def phase_at(self, t: FloatArray) -> FloatArray:
+        """Return the phase (k,) at t (k,), which runs on at the last rate outside."""
+        return _curve(self.grid, self.phase, self.rate, t)
+
+
+def rig_starts(recording: Recording, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the yaw angle psi (k,) rad, unwrapped, and the rate r (k,) rad/s, at instants t (k,) s of a rig run.
+
+    The axis points straight down. Without magnetometer psi counts from zero at the recording's start.
+    """
+    t = np.asarray(t, dtype=float)
+    expected = expected_rate(recording)
+    spin = phase_spin(recording, "magnetometer", expected, steady=True)
+    if spin is None:
+        grid = np.arange(0.0, max(recording.end, float(np.max(t, initial=0.0))) + 0.02, 0.01)
+        r = np.zeros(grid.size) if expected is None else expected(grid)
+        psi = integral_of(grid, r)
+        return np.interp(t, grid, psi), np.interp(t, grid, r)
+    north, east, _ = recording.environment.magnetic_field
+    # m_B = C3(psi) B: the complex field in B is that in N times exp(-i psi)
+    psi = np.arctan2(east, north) - spin.phase_at(t)
+    return psi, -np.interp(t, spin.grid, spin.turning)
+
+
+def field_spin(recording: Recording, *, steady: bool) -> Spin | None:
+    """Return the spin as the magnetometer alone shows it; None where there are too few readings.
+
+    ``steady`` tells that the axis stands still, so that the field's length across it is constant.
+    """
+    return phase_spin(replace(recording, samples={"magnetometer": recording.samples["magnetometer"]}), steady=steady)
+
+
+def _curve(grid: FloatArray, value: FloatArray, slope: FloatArray, t: FloatArray) -> FloatArray:
+    inside = np.clip(t, grid[0], grid[-1])
+    ends = np.where(t < grid[0], slope[0], slope[-1])
+    return np.asarray(CubicHermiteSpline(grid, value, slope)(inside) + ends * (t - inside))
+
+
+def expected_rate(recording: Recording) -> Callable[[FloatArray], FloatArray] | None:
+    """Return the spin rate as a function of time from a sensor that shows it directly, or None.
+
+    A rate reference, an unclipped gyroscope, a command; each is trusted to a few per cent only.
+    """
+    for sensor, column in (("rate_reference", 0), ("gyroscope", 2)):
+        samples = recording.get(sensor)
+        readings = readings_for(recording, sensor, column)
+        if samples is None or readings is None or readings.t.size < 0.9 * len(samples):
+            continue
+        return _line(readings.t, readings.value)
+    if recording.command is not None:
+        return _line(recording.command.t, recording.command.value)
+    return None
+
+
+def _line(t: FloatArray, value: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    return lambda at: np.asarray(np.interp(at, t, value))
+
+
+def centripetal_rate(recording: Recording) -> Callable[[FloatArray], FloatArray] | None:
+    """Return the spin rate without its sign from the accelerometer's mean reading towards the axis, (12)."""
+    readings = readings_for(recording, "accelerometer", slice(0, 2))
+    position = recording.sheets["accelerometer"].position if readings is not None else None
+    if readings is None or position is None or np.hypot(*position[:2]) < 1e-3:
+        return None
+    radius = float(np.hypot(*position[:2]))
+    inward = -(readings.value @ position[:2]) / radius
+    grid = np.arange(readings.t[0], readings.t[-1] + 0.05, 0.05)
+    mean = smoothed(readings.t, inward, grid, 0.1)
+    r = np.sqrt(np.maximum(mean, 0.0) / radius)
+    return _line(grid, r)
+
+
+def _conic(t: FloatArray, z: ComplexArray, knots: float, scale: float) -> tuple[ComplexArray, complex]:
+    """Remove hard iron and the ellipse of soft iron from x + i y; return what is left (n,) and the centre.
+
+    The conic ``z^T Q z - 2 b^T z = c(t)`` is linear in Q (trace 2), b and c; c changes slowly as the axis tilts.
+    """
+    x, y = z.real / scale, z.imag / scale
+    count = max(1, round((t[-1] - t[0]) / knots))
+    place = np.clip((t - t[0]) / max(t[-1] - t[0], 1e-9) * count, 0, count - 1e-9)
+    k = place.astype(int)
+    share = place - k
+    A = np.column_stack([2 * x, 2 * y, -(x * x - y * y), -2 * x * y])
+    target = x * x + y * y
+    # priors: 15 uT of hard iron, 0.1 of ellipse; the readings' own scatter about the conic is a few per cent
+    prior = 0.05 / np.array([15.0 / scale, 15.0 / scale, 0.15, 0.15])
+    weight = np.ones(t.size)
+    solution: FloatArray = np.zeros(4)
+
+    def on_knots(value: FloatArray) -> FloatArray:
+        """Return the sums of values (n,) over the hat function of each knot."""
+        sums = np.bincount(k, value * (1 - share), count + 1) + np.bincount(k + 1, value * share, count + 1)
+        return np.asarray(sums, dtype=float)
+
+    for _ in range(4):
+        # the hats meet their neighbours alone: their equations have three diagonals, and four columns beside
+        band = np.zeros((2, count + 1))
+        band[1] = np.bincount(k, weight * (1 - share) ** 2, count + 1) + 1e-6
+        band[1] += np.bincount(k + 1, weight * share**2, count + 1)
+        band[0, 1:] = np.bincount(k, weight * share * (1 - share), count)
+        beside = np.stack([on_knots(weight * column) for column in A.T], axis=1)
+        each = solveh_banded(band, np.column_stack([beside, on_knots(weight * target)]))
+        normal = (A * weight[:, None]).T @ A + np.diag(prior**2) - beside.T @ each[:, :4]
+        solution = np.asarray(np.linalg.solve(normal, A.T @ (weight * target) - beside.T @ each[:, 4]), dtype=float)
+        level = each[:, 4] - each[:, :4] @ solution
+        misfit = np.abs(target - A @ solution - (1 - share) * level[k] - share * level[k + 1])
+        spread = 3.0 * float(np.median(misfit)) + 1e-6
+        weight = 1 / (1 + (misfit / spread) ** 2)
+    e = float(np.clip(solution[2], -0.6, 0.6)), float(np.clip(solution[3], -0.6, 0.6))
+    Q = np.array([[1 + e[0], e[1]], [e[1], 1 - e[0]]])
+    if np.linalg.det(Q) < 0.2:
+        Q = np.eye(2)
+    centre = np.linalg.solve(Q, solution[:2]) * scale
+    values, vectors = np.linalg.eigh(Q / sqrt(np.linalg.det(Q)))
+    root = vectors @ np.diag(np.sqrt(values)) @ vectors.T
+    X, Y = z.real - centre[0], z.imag - centre[1]
+    return (root[0, 0] * X + root[0, 1] * Y) + 1j * (root[1, 0] * X + root[1, 1] * Y), complex(*centre)
+
+
+def gaussian_kernel(sigma: float, step: float) -> FloatArray:
+    """Return a Gaussian (2 half + 1,) of height 1 on a grid, out to 3.5 sigma; both in s."""
+    half = max(1, int(np.ceil(3.5 * sigma / step)))
+    return np.asarray(np.exp(-0.5 * (np.arange(-half, half + 1) * step / sigma) ** 2))
+
+
+def _spread(grid: FloatArray, t: FloatArray, value: ComplexArray, sigma: float) -> tuple[ComplexArray, FloatArray]:
+    """Return Gaussian sums of value (n,) and of its weight on an even grid."""
+    step = grid[1] - grid[0]
+    slot = np.clip(np.rint((t - grid[0]) / step).astype(int), 0, grid.size - 1)
+    sums = np.bincount(slot, value.real, grid.size) + 1j * np.bincount(slot, value.imag, grid.size)
+    kernel = gaussian_kernel(sigma, step)
+    if kernel.size > grid.size:
+        kernel = kernel[(kernel.size - grid.size) // 2 :][: grid.size - (1 - grid.size % 2)]
+    return (
+        np.asarray(np.convolve(sums, kernel, "same")),
+        np.asarray(np.convolve(np.bincount(slot, minlength=grid.size).astype(float), kernel, "same")),
+    )
+
+
+def phase_spin(
+    recording: Recording,
+    sensor: str = "magnetometer",
+    expected: Callable[[FloatArray], FloatArray] | None = None,
+    *,
+    steady: bool,
+) -> Spin | None:
+    """Follow the phase of a vector that is fixed, or slow, in N: the field, or else the specific force.
+
+    ``steady`` tells that the axis stands still, so that the vector's length across it is constant.
+    """
+    readings = readings_for(recording, sensor, slice(0, 2))
+    if readings is None or readings.t[-1] <= readings.t[0]:
+        return None
+    t, z = readings.t, readings.value[:, 0] + 1j * readings.value[:, 1]
+    step = float(np.median(np.diff(t)))
+    grid = t[0] + step * np.arange(int(np.ceil((t[-1] - t[0]) / step - 1e-6)) + 1)
+    if grid.size < FEWEST:
+        return None
+    field = float(np.linalg.norm(recording.environment.magnetic_field)) if sensor == "magnetometer" else 10.0
+    rough = -expected(grid) if expected is not None else _rough_rate(grid, t, z - np.mean(z), step)
+    typical = float(np.median(np.abs(rough)))
+    if sensor == "magnetometer":
+        knots = t[-1] - t[0] if steady else max(0.5, 4 * np.pi / max(typical, 0.1))
+        plane, _ = _conic(t, z, knots, field)
+    else:
+        # a straight line for what stands still in B: it changes as the spin decays
+        coarse = np.arange(grid[0], grid[-1] + 0.05, 0.05)
+        still = smoothed(t, z, coarse, 0.3)
+        plane = z - np.interp(t, coarse, still.real) - 1j * np.interp(t, coarse, still.imag)
+    rate = rough if expected is not None else _rough_rate(grid, t, plane, step)
+    # the rate's course where another reading shows it better than the phase of a force that may vanish
+    shape = rough if expected is not None and sensor == "accelerometer" else None
+    if expected is None and (centripetal := centripetal_rate(recording)) is not None:
+        own = centripetal(grid)
+        if sensor == "magnetometer":
+            rate = _unfolded(rate, own, step)
+        else:
+            # the specific force across the axis may vanish: the shape of the rate is the centripetal one's
+            ratio = rate / np.maximum(own, 1e-3)
+            sign = np.sign(np.median(ratio)) or 1.0
+            rate = own * sign * float(np.clip(np.median(np.abs(ratio)), 0.8, 1.25))
+            shape = rate
+    smooth = np.zeros(grid.size, dtype=complex)
+    phase = np.zeros(grid.size)
+    weight = np.ones(grid.size)
+    # a force across the axis passes through zero and points the other way after: its square has no sign
+    order, sigmas = (1, (3.0, 1.0, 1.0)) if sensor == "magnetometer" else (2, (2.0, 4.0, 6.0))
+    for sigma in sigmas:
+        turned = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)])
+        base = plane * np.exp(-1j * _curve(grid, turned, rate, t))
+        smooth, weight = _spread(grid, t, base**order, max(sigma * PHASE_SIGMA, 1.5 * step))
+        delta = np.unwrap(np.angle(np.where(np.abs(smooth) > 0, smooth, 1.0))) / order
+        phase = turned + delta
+        rate = rate + np.gradient(delta, step)
+    amplitude = (np.abs(smooth) / np.maximum(weight, 1e-9)) ** (1 / order)
+    if shape is not None and np.all(np.abs(shape) > SLOW):
+        rate = shape * _weighted_median(rate / shape, amplitude)
+        turned = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)])
+        phase = turned + _weighted_median(phase - turned, amplitude)
+        return Spin(grid, phase, rate, rate, amplitude, t, plane)
+    return Spin(grid, phase, rate, _without_steps(grid, rate, t, plane, step), amplitude, t, plane)
+
+
+def _weighted_median(value: FloatArray, weight: FloatArray) -> float:
+    order = np.argsort(value)
+    heavy = np.cumsum(weight[order])
+    return float(value[order[min(int(np.searchsorted(heavy, 0.5 * heavy[-1])), value.size - 1)]])
+
+
+def _without_steps(grid: FloatArray, rate: FloatArray, t: FloatArray, z: ComplexArray, step: float) -> FloatArray:
+    """Return the turning rate (n,) less the steps of phase where readings were lost and the clock did not show it."""
+    gap = np.diff(t)
+    middle = 0.5 * (t[1:] + t[:-1])
+    usual = median_filter(np.angle(z[1:] * np.conj(z[:-1])) / gap, size=41, mode="nearest")
+    odd = np.angle(z[1:] * np.conj(z[:-1]) * np.exp(-1j * usual * gap))
+    lost = np.abs(odd) > np.maximum(0.5 * np.abs(usual) * step, 8 * median_of(odd) + 1e-9)
+    if np.count_nonzero(lost) < 0.005 * lost.size or median_of(rate) * step < 0.15:
+        return rate
+    return smoothed(middle[~lost], (usual + odd / gap)[~lost], grid, RATE_SIGMA)
+
+
+def _rough_rate(grid: FloatArray, t: FloatArray, z: ComplexArray, step: float) -> FloatArray:
+    """Return the turning rate (n,) on the grid from the mean phase step of neighbours."""
+    gap = np.diff(t)
+    near = gap < 1.5 * step
+    if np.count_nonzero(near) < 4:
+        return np.zeros(grid.size)
+    sums, _ = _spread(grid, 0.5 * (t[1:] + t[:-1])[near], (z[1:] * np.conj(z[:-1]))[near], 0.15)
+    return np.asarray(np.angle(sums) / step)
+
+
+def _unfolded(rate: FloatArray, expected: FloatArray, step: float) -> FloatArray:
+    """Return the rate, by whole turns per sample nearest to what the accelerometer expects, of either sign.
+
+    Only where the expectation is beyond the fold: a quarter less than half a turn per sample.
+    """
+    if float(np.median(expected)) * step < 0.75 * np.pi:
+        return rate
+    fold = 2 * np.pi / step
+    both = []
+    for sign in (1.0, -1.0):
+        shifted = rate + fold * np.rint((sign * expected - rate) / fold)
+        both.append((float(np.median(np.abs(shifted - sign * expected))), shifted))
+    return min(both, key=lambda pair: pair[0])[1]

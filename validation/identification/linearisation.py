@@ -1,0 +1,461 @@
+"""A recording as a chain of short pieces of motion, and how its readings depend on every unknown: one linearisation.
+
+One long simulation from the release has many wrong minima: a spin phase that is off by a turn is one. Here each piece
+of half a second starts from a state of its own, so that it stays beside the data whatever physics is missing. The
+unknowns of a recording are the first state and the jumps between pieces; where jumps are not allowed, the step of a
+fit closes them (multiple shooting; Bock, "Recent advances in parameter identification", 1983).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from discsim.arrays import BoolArray, FloatArray
+from discsim.effects.catalogue import CATALOGUE
+from discsim.parameters import parameter_index, parameters
+from discsim.recording import Recording
+from validation.identification.competing_effects import row_of
+from validation.identification.dynamics import (
+    ROW,
+)
+from validation.identification.observations import group_of
+from validation.identification.prediction import Sampled
+from validation.identification.propagation import FLAT_ENVIRONMENT, WOBBLE, Column, base_flat, place_in_flat, runner_of
+from validation.identification.segments import STEPS, Chain, difference, shifted, stepped
+from validation.identification.sensor_model import CLOCKS, Values, is_motion, predicted, value
+
+__all__ = ["Channel", "Linear", "linearise", "moved"]
+
+IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
+
+#: neighbours simulated at a time, to bound memory
+_BATCH = 16
+#: instants of several pieces that are read together
+_INSTANTS = 256
+#: a lagged sensor has forgotten its start after this many time constants
+_FORGOTTEN = 8.0
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One axis of one sensor in a linearisation: where its rows are, and their place among the sensor's samples."""
+
+    sensor: str
+    axis: str
+    group: str
+    rows: slice
+    index: IntArray
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Residuals of a recording and how they depend on its unknowns: ``residual - J du``.
+
+    The unknowns are the local ones, the first state and the allowed jumps (l,), and the shared ones (p,). Each row is
+    kept by the state of its own piece (compact); `local` and `shared` chain the pieces on demand.
+
+    Attributes
+    ----------
+    raw : (n,) array
+        Measured minus predicted where the chain stands, rows by channel.
+    own : (n, d + p) array
+        Derivatives of the prediction by the state of the row's piece and by the parameters within it.
+    piece : (n,) int array
+        The piece of each row; -1 for a reading that hangs on several, as with a lag or where it is a mean.
+    whole : (m, l + p) array
+        Derivatives of those by the unknowns themselves, in their order.
+    t, sd : (n,) arrays
+        Written times, stated noise.
+    channels : tuple of Channel
+    jump, jump_kind, jump_piece : (l,) arrays
+        Current size of each allowed jump, its direction within the state (-1 for the first state) and its piece.
+    moves : (k, d, l + p) array
+        How the states of the pieces follow the unknowns.
+    passes : (k - 1, d, d + p) array
+        How the state of each next piece follows that of the one before and the shared parameters.
+    closing : (k, d) array
+        How they move to close the jumps that are not allowed.
+    gaps : (k - 1, d) array
+        All jumps as they stand.
+    shifts : (n,) array
+        What the closing adds to the prediction.
+    """
+
+    raw: FloatArray
+    own: FloatArray
+    piece: IntArray
+    whole: FloatArray
+    t: FloatArray
+    sd: FloatArray
+    channels: tuple[Channel, ...]
+    jump: FloatArray
+    jump_kind: IntArray
+    jump_piece: IntArray
+    moves: FloatArray
+    passes: FloatArray
+    closing: FloatArray
+    gaps: FloatArray
+    shifts: FloatArray
+
+    @property
+    def unknowns(self) -> int:
+        """Number of local unknowns, l."""
+        return self.jump.size
+
+    @property
+    def residual(self) -> FloatArray:
+        """Measured minus predicted (n,) once the jumps that are not allowed are closed."""
+        return self.raw - self.shifts
+
+    @cached_property
+    def _full(self) -> FloatArray:
+        d, width = self.moves.shape[1:]
+        full = np.empty((self.raw.size, width))
+        for i in range(self.moves.shape[0]):
+            rows = np.flatnonzero(self.piece == i)
+            full[rows] = self.own[rows, :d] @ self.moves[i]
+        full[:, self.unknowns :] += self.own[:, d:]
+        if self.whole.size:
+            full[self.piece < 0] = self.whole
+        return full
+
+    def spread(self, places: Sequence[int], width: int) -> Linear:
+        """Return the linearisation with its shared columns at ``places`` of ``width``, the others zero."""
+        u, n = self.unknowns, self.raw.size
+        kept = self.own.shape[1] - len(places)
+        own = np.zeros((n, kept + width))
+        own[:, :kept] = self.own[:, :kept]
+        own[:, [kept + j for j in places]] = self.own[:, kept:]
+        moves = np.zeros((*self.moves.shape[:2], u + width))
+        moves[:, :, :u] = self.moves[:, :, :u]
+        moves[:, :, [u + j for j in places]] = self.moves[:, :, u:]
+        passes = np.zeros((*self.passes.shape[:2], kept + width))
+        passes[:, :, :kept] = self.passes[:, :, :kept]
+        passes[:, :, [kept + j for j in places]] = self.passes[:, :, kept:]
+        whole = np.zeros((self.whole.shape[0], u + width))
+        whole[:, :u] = self.whole[:, :u]
+        whole[:, [u + j for j in places]] = self.whole[:, u:]
+        return replace(self, own=own, moves=moves, passes=passes, whole=whole)
+
+    def after(self, local: FloatArray, shared: FloatArray) -> FloatArray:
+        """Return the residuals (n,) that a step of the unknowns is expected to leave."""
+        d = self.moves.shape[1]
+        step = np.concatenate([local, shared])
+        tangents = self.moves @ step
+        moved = np.einsum("nd,nd->n", self.own[:, :d], tangents[self.piece]) + self.own[:, d:] @ shared
+        if self.whole.size:
+            moved[self.piece < 0] = self.whole @ step
+        return np.asarray(self.residual - moved)
+
+    @property
+    def local(self) -> FloatArray:
+        """Derivatives of the prediction (n, l) by the local unknowns."""
+        return self._full[:, : self.unknowns]
+
+    @property
+    def shared(self) -> FloatArray:
+        """Derivatives of the prediction (n, p) by the shared parameters."""
+        return self._full[:, self.unknowns :]
+
+
+# ------------------------------------------------------------------------------------------------- readings
+
+
+# -------------------------------------------------------------------------------------------------- plants
+
+
+# ------------------------------------------------------------------------------------------ linearisation
+
+
+def linearise(
+    current: Chain,
+    values: Values,
+    columns: Sequence[Column],
+    jumps: BoolArray,
+    *,
+    central: bool = True,
+) -> Linear:
+    """Linearise the readings of a chain about its states and values.
+
+    ``columns`` are parameters with the step of their differences; ``jumps`` (d,) tells in which directions pieces may
+    jump. Columns are differences of the piece's own motion, chained over the pieces; one-sided ones, where ``central``
+    is false, cost half.
+    """
+    recording, d, k = current.recording, current.tangent, current.states.shape[0]
+    plant = recording.plant
+    runner = runner_of(recording, values, columns)
+    steps = STEPS[plant]
+
+    samples = [Sampled(current, readings, values) for readings in current.readings]
+    # the instants of all sensors, each with its neighbours in time for slopes and its past for a lag
+    motion_columns = [j for j, column in enumerate(columns) if _moves(column)]
+    sensor_columns = [j for j in range(len(columns)) if j not in motion_columns]
+    piece_of = [np.clip(np.searchsorted(current.edges, s.instants, side="right") - 1, 0, k - 1) for s in samples]
+
+    p = len(columns)
+    # states of the pieces as functions of [first state | jumps | parameters]
+    allowed, forbidden = np.flatnonzero(jumps), np.flatnonzero(~jumps)
+    u = d + (k - 1) * allowed.size
+    S = np.zeros((k, d, u + p))
+    S[0, :, :d] = np.eye(d)
+    passes = np.zeros((max(k - 1, 0), d, d + p))
+    closing = np.zeros((k, d))
+    gaps = np.zeros((max(k - 1, 0), d))
+    flat = base_flat(recording, values, [column.key for column in columns])
+    wobble = np.array([values.get(key, 0.0) for key in WOBBLE])
+
+    out_rows = [np.empty((s.instants.size, ROW)) for s in samples]
+    # per sensor: derivative of each ideal reading by the state of its piece and by the parameters within it
+    J = [np.zeros((s.instants.size, s.width, d + p)) for s in samples]
+    ideal = [np.empty((s.instants.size, s.width)) for s in samples]
+
+    half = d + len(motion_columns)
+    widths = np.concatenate([steps, [columns[j].step for j in motion_columns]])
+    moving = np.array([*range(d), *(d + j for j in motion_columns)])
+
+    def read_all(pieces: Sequence[tuple[list[IntArray], IntArray, FloatArray]]) -> None:
+        """Read the sensors in the rows of pieces: what they show, and its slopes by state and motion."""
+        for which, (s, w, y, M) in enumerate(zip(samples, out_rows, ideal, J, strict=True)):
+            o = np.concatenate([own[which] for own, _, _ in pieces])
+            if o.size == 0:
+                continue
+            mine = np.concatenate([rows[:, b[which] : b[which + 1]] for _, b, rows in pieces], axis=1)
+            t = s.instants[o]
+            w[o] = mine[0]
+            read = np.empty((mine.shape[0], o.size, s.width))
+            for first in range(0, mine.shape[0], _BATCH):
+                part = slice(first, first + _BATCH)
+                read[part] = predicted(s.sensor, recording, values, t, mine[part])
+            for row, j in enumerate(motion_columns):
+                group, name, size, _ = columns[j]
+                if (group, name) in _ALSO_READ:  # it moves the readings of a given motion, too
+                    for place, sign in ((1 + d + row, 1.0), (1 + half + d + row, -1.0))[: 2 if central else 1]:
+                        moved_values = {**values, (group, name): _current(values, recording, group, name) + sign * size}
+                        read[place] = predicted(s.sensor, recording, moved_values, t, mine[place])
+            y[o] = read[0]
+            other, span = (read[1 + half :], 2.0 * widths) if central else (read[:1], widths)
+            slope = (read[1 : 1 + half] - other) / span[:, None, None]
+            M[o[:, None], :, moving] = np.moveaxis(slope, 0, 1)
+
+    waiting: list[tuple[list[IntArray], IntArray, FloatArray]] = []
+    for i in range(k):
+        start, stop = float(current.edges[i]), float(current.edges[i + 1])
+        own = [np.flatnonzero(piece == i) for piece in piece_of]
+        instants = [s.instants[o] for s, o in zip(samples, own, strict=True)]
+        out = np.concatenate(instants) if instants else np.empty(0)
+        bounds = np.cumsum([0, *(o.size for o in own)])
+        state = current.states[i]
+        last_instant = float(out.max()) if out.size else stop
+        times, last = runner.times(start, stop, last_instant, state)
+        out = np.maximum(out, start)
+
+        # neighbours: two per direction of the state and per parameter of the motion
+        states = [state[None]]
+        flats, wobbles = [flat[None]], [wobble[None]]
+        for sign in (1.0, -1.0) if central else (1.0,):
+            states.append(shifted(plant, state, sign * np.diag(steps)))
+            flats.append(np.broadcast_to(flat, (d, flat.size)))
+            wobbles.append(np.broadcast_to(wobble, (d, len(WOBBLE))))
+            if motion_columns:
+                moved = np.repeat(flat[None], len(motion_columns), axis=0)
+                moved_wobble = np.repeat(wobble[None], len(motion_columns), axis=0)
+                for row, j in enumerate(motion_columns):
+                    group, name, size, given = columns[j]
+                    if (group, name) in WOBBLE:
+                        moved_wobble[row, WOBBLE.index((group, name))] += sign * size
+                        continue
+                    for shape, number in given:
+                        moved[row, place_in_flat(group, shape)] = number
+                    moved[row, place_in_flat(group, name)] += sign * size
+                states.append(np.repeat(state[None], len(motion_columns), axis=0))
+                flats.append(moved)
+                wobbles.append(moved_wobble)
+        all_states, all_flats = np.concatenate(states), np.concatenate(flats)
+        rows, ends = runner.run(
+            np.ascontiguousarray(all_flats), np.concatenate(wobbles), np.ascontiguousarray(all_states), times, last, out
+        )
+        nominal_end = ends[0]
+        end_tangent = difference(plant, ends[1:], np.broadcast_to(nominal_end, ends[1:].shape), d)
+        if central:
+            Phi_Psi = ((end_tangent[:half] - end_tangent[half:]) / (2.0 * widths[:, None])).T  # (d, half)
+        else:
+            Phi_Psi = (end_tangent / widths[:, None]).T
+        Phi, Psi = Phi_Psi[:, :d], Phi_Psi[:, d:]
+
+        waiting.append((own, bounds, rows))
+        if i + 1 == k or sum(rows.shape[1] for *_, rows in waiting) >= _INSTANTS:
+            read_all(waiting)
+            waiting = []
+
+        if i + 1 < k:
+            passes[i, :, :d], passes[i][:, d + np.array(motion_columns, dtype=int)] = Phi, Psi
+            S[i + 1] = Phi @ S[i]
+            S[i + 1, :, u:] += passes[i, :, d:]
+            closing[i + 1] = Phi @ closing[i]
+            gap = difference(plant, current.states[i + 1], nominal_end, d)
+            gaps[i] = gap
+            first = d + i * allowed.size
+            S[i + 1, allowed, first + np.arange(allowed.size)] += 1.0
+            closing[i + 1, forbidden] -= gap[forbidden]
+
+    # parameters of sensors and clocks, from the motion as it is
+    for s, w, M in zip(samples, out_rows, J, strict=True):
+        if not sensor_columns:
+            break
+        rate = None
+        for j in sensor_columns:
+            group, name, size, given = columns[j]
+            if not _concerns(group, s.sensor):
+                continue
+            here = {**values, **{(group, shape): number for shape, number in given}}
+            if group in CLOCKS:
+                if rate is None:
+                    rate = s.time_slope(runner, flat, wobble, values, current)
+                base = _current(values, recording, group, name)
+                plus, minus = {**here, (group, name): base + size}, {**here, (group, name): base - size}
+                moved = s.delays(plus) - s.delays(minus)
+                M[:, :, d + j] = -rate * (moved / (2.0 * size))[:, None]
+            elif name == "tau_s" and group in CATALOGUE:
+                if rate is None:
+                    rate = s.time_slope(runner, flat, wobble, values, current)
+                M[:, :, d + j] = -rate * s.lag_slope[:, None]
+            else:
+                base = _current(values, recording, group, name)
+                up = predicted(s.sensor, recording, {**here, (group, name): base + size}, s.instants, w)
+                down = predicted(s.sensor, recording, {**here, (group, name): base - size}, s.instants, w)
+                M[:, :, d + j] = (up - down) / (2.0 * size)
+    return _stack(current, samples, ideal, J, piece_of, S, passes, closing, gaps, allowed, u)
+
+
+#: parameters of the motion that also enter what a sensor reads of a given motion
+_ALSO_READ = {
+    ("body.mass_imbalance", "ex_m"),
+    ("body.mass_imbalance", "ey_m"),
+    ("environment", "gravity"),
+}
+
+
+def _current(values: Values, recording: Recording, group: str, name: str) -> float:
+    """Return the value a parameter has now: given, or as the recording states it, or the baseline."""
+    if (group, name) in values:
+        return values[group, name]
+    if row_of(group) is not None:
+        return value(values, group, name)
+    if group == "environment" and name.startswith("magnetic_"):
+        return float(recording.environment.magnetic_field[["north", "east", "down"].index(name.split("_")[1])])
+    if (group, name) in WOBBLE:
+        return 0.0
+    return float(parameters(recording.environment, recording.disc, recording.rig)[parameter_index(group, name)])
+
+
+def _moves(column: Column) -> bool:
+    """Tell whether a column is of the motion; the field of the earth is only read."""
+    if column.group == "environment":
+        return column.key in FLAT_ENVIRONMENT
+    return is_motion(column.group) or column.key in WOBBLE
+
+
+def _concerns(group: str, sensor: str) -> bool:
+    """Tell whether an effect that is not of the motion can touch a sensor."""
+    if group == "clock.rate":
+        return True
+    if group == "environment":
+        return sensor == "magnetometer"
+    row = row_of(group)
+    return row is not None and row.acts_with((sensor,))
+
+
+def _stack(
+    current: Chain,
+    samples: Sequence[Sampled],
+    ideal: Sequence[FloatArray],
+    J: Sequence[FloatArray],
+    piece_of: Sequence[IntArray],
+    S: FloatArray,
+    passes: FloatArray,
+    closing: FloatArray,
+    gaps: FloatArray,
+    allowed: IntArray,
+    u: int,
+) -> Linear:
+    """Put the rows of all sensors together, channel by channel, without those that take no part."""
+    raw, own, pieces, whole, t, sd, shifts = [], [], [], [], [], [], []
+    channels: list[Channel] = []
+    at = 0
+    d = current.tangent
+    p = S.shape[2] - u
+    for s, y, M, piece in zip(samples, ideal, J, piece_of, strict=True):
+        readings = s.readings
+        # what the closing of forbidden jumps adds
+        closed = np.einsum("mwd,md->mw", M[:, :, :d], closing[piece])
+        spread = s.nodes > 1
+        if spread:
+            full = np.empty((*M.shape[:2], u + p))
+            for i in np.unique(piece):
+                full[piece == i] = M[piece == i, :, :d] @ S[i]
+            full[:, :, u:] += M[:, :, d:]
+            M = full
+        prediction, slopes, closed = s.weighted(y), s.weighted(M), s.weighted(closed)
+        limit = readings.limit
+        for axis in range(s.width):
+            good = readings.good[:, axis]
+            if s.tau > 0:
+                good = good & (readings.t > _FORGOTTEN * s.tau)
+            if limit is not None:
+                # a clipped reading says only that the motion was beyond the range
+                margin = 6.0 * np.nan_to_num(readings.sd[axis])
+                inside = readings.clipped[:, axis] & (np.abs(prediction[:, axis]) < limit - margin)
+                good = good | (inside & np.isfinite(readings.value[:, axis]))
+            index = np.flatnonzero(good)
+            if index.size == 0:
+                continue
+            raw.append(readings.value[index, axis] - prediction[index, axis])
+            if spread:
+                whole.append(slopes[index, axis])
+                own.append(np.zeros((index.size, d + p)))
+                pieces.append(np.full(index.size, -1))
+            else:
+                own.append(slopes[index, axis])
+                pieces.append(piece[index])
+            shifts.append(closed[index, axis])
+            t.append(readings.t[index])
+            sd.append(np.full(index.size, readings.sd[axis]))
+            rows = slice(at, at + index.size)
+            channels.append(Channel(s.sensor, readings.axes[axis], group_of(s.sensor, axis), rows, index))
+            at += index.size
+    kind, where, jump = np.full(u, -1), np.zeros(u, dtype=np.int64), np.zeros(u)
+    for i in range(gaps.shape[0]):
+        place = slice(d + i * allowed.size, d + (i + 1) * allowed.size)
+        kind[place], where[place], jump[place] = allowed, i + 1, gaps[i, allowed]
+
+    def joined(parts: list[Any]) -> Any:
+        return np.concatenate(parts) if parts else np.empty(0)
+
+    rows_of = joined(own) if own else np.empty((0, d + p))
+    return Linear(
+        joined(raw),
+        rows_of,
+        joined(pieces).astype(np.int64),
+        joined(whole) if whole else np.empty((0, u + p)),
+        joined(t),
+        joined(sd),
+        tuple(channels),
+        jump,
+        kind,
+        where,
+        S,
+        passes,
+        closing,
+        gaps,
+        joined(shifts),
+    )
+
+
+def moved(current: Chain, linear: Linear, local: FloatArray, shared: FloatArray) -> Chain:
+    """Return the chain after a step of its unknowns: local (l,) and shared (p,)."""
+    return stepped(current, linear.moves @ np.concatenate([local, shared]) + linear.closing)

@@ -1,0 +1,163 @@
+"""Normal equations with each recording's own unknowns eliminated (Schur complement), and their solution."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cho_solve, solve_triangular
+
+from discsim.arrays import FloatArray
+from validation.identification.linearisation import Linear
+from validation.identification.noise import NoiseModel, whitened
+from validation.identification.parameters import Jumps, Parameter
+from validation.identification.release_prior import release_rows
+from validation.identification.segments import Chain
+
+__all__ = ["WOBBLE_REACH", "Reduced", "reduce", "unknown_prior"]
+
+#: what is known of a state without any reading: m, m/s, rad, rad/s; nuisances of a free spin; rigs
+_ANYWHERE = {
+    "flight": np.repeat([1e4, 300.0, 30.0, 1e3], 3),
+    "free_spin": np.array([100.0, 100.0, 100.0, 100.0, 3.0, 3.0, 30.0, 30.0, 30.0, 1e3, 1e3, 1e3, 0.01, 0.5, 0.5]),
+    "spin_down": np.array([1e6, 1e3]),
+    "rate_table": np.array([1e6]),
+}
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """What one recording says of the shared parameters once its own unknowns are eliminated.
+
+    ``gram`` (p + 1, p + 1) holds the reduced normal matrix over [parameters | residual]; its last entry is chi-squared
+    with the parameters where they stand. ``back`` gives the local unknowns from the shared ones.
+    """
+
+    gram: FloatArray
+    factor: Any
+    cross: FloatArray
+    rows: int
+
+
+def normal_matrix(linear: Linear, noise: NoiseModel) -> FloatArray:
+    """Return the normal matrix (l + p + 1, l + p + 1) over [local | shared | residual] of whitened rows."""
+    u, d = linear.unknowns, linear.moves.shape[1]
+    if u == d:
+        A = whitened(linear, noise, np.hstack([linear.local, linear.shared, linear.residual[:, None]]))
+        return np.asarray(A.T @ A)
+    # with jumps the full rows are long and mostly empty: what later pieces say of a state is summed backwards, and a
+    # jump meets the unknowns before it through the state that it moves
+    rows = whitened(linear, noise, np.hstack([linear.own, linear.residual[:, None]]), linear.piece)
+    k, width = linear.moves.shape[0], linear.moves.shape[2] + 1
+    p = width - 1 - u
+    G = np.zeros((width, width))
+    later = np.zeros((d + p + 1, d + p + 1))
+    passing = np.eye(d + p + 1)
+    for i in reversed(range(k)):
+        if i + 1 < k:
+            passing[:d, :-1] = linear.passes[i]
+            later = passing.T @ later @ passing
+        mine = rows[linear.piece == i]
+        later += mine.T @ mine
+        unknown = np.flatnonzero(linear.jump_piece == i)
+        moved = np.arange(d) if i == 0 else linear.jump_kind[unknown]
+        told = later[moved]
+        places = np.r_[: unknown[-1] + 1 if unknown.size else 0, u : width - 1]
+        G[unknown[:, None], places] = told[:, :d] @ linear.moves[i][:, places]
+        G[unknown, u:] += told[:, d:]
+    G[u:, u:] = later[d:, d:]
+    G[:u, :u] = np.tril(G[:u, :u]) + np.tril(G[:u, :u], -1).T
+    G[u:, :u] = G[:u, u:].T
+    if linear.whole.size:
+        # readings that hang on several pieces come in whole channels
+        spread = linear.piece < 0
+        columns = np.zeros((linear.raw.size, width))
+        columns[spread, :-1], columns[spread, -1] = linear.whole, linear.residual[spread]
+        A = whitened(linear, noise, columns)[spread]
+        G += A.T @ A
+    return G
+
+
+def unknown_prior(linear: Linear, current: Chain, jumps: Jumps) -> tuple[FloatArray, FloatArray, float]:
+    """Return what is known of a recording's own unknowns beside its readings: normal matrix (l, l), pull (l,), chi2."""
+    u = linear.unknowns
+    prior = np.zeros(u)
+    first = linear.jump_kind < 0
+    prior[first] = _ANYWHERE[current.recording.plant] ** -2.0
+    prior[~first] = jumps.sd[linear.jump_kind[~first]] ** -2.0
+    # a jump is pulled to zero from where it stands
+    H, right, chi2 = np.diag(prior), -prior * linear.jump, float(prior @ linear.jump**2)
+    stated, rows = release_rows(current)
+    if stated.size:
+        d = rows.shape[1]
+        # the first state has followed the closing of nothing: its tangents are the first columns
+        H[:d, :d] += rows.T @ rows
+        right[:d] += rows.T @ stated
+        chi2 += float(stated @ stated)
+    return H, right, chi2
+
+
+def reduce(linear: Linear, current: Chain, noise: NoiseModel, jumps: Jumps, hold: float = 0.0) -> Reduced:
+    """Eliminate the local unknowns of a recording; ``hold`` keeps its attitude from turning far in one step."""
+    u = linear.unknowns
+    G = normal_matrix(linear, noise)
+    H, right, chi2 = unknown_prior(linear, current, jumps)
+    if hold:
+        H[_TURNS, _TURNS] += hold * _ATTITUDE_REACH**-2.0
+    G[:u, :u] += H
+    G[:u, -1] += right
+    G[-1, :u] += right
+    G[-1, -1] += chi2
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(G)[:u], 1e-300))
+    H = G[:u, :u] * scale[:, None] * scale[None, :]
+    H[np.arange(u), np.arange(u)] += 1e-12
+    L = np.linalg.cholesky(H)
+    cross = G[:u, u:] * scale[:, None]
+    half = solve_triangular(L, cross, lower=True, check_finite=False)
+    gram = G[u:, u:] - half.T @ half
+    return Reduced(gram, (L, scale), cross, linear.residual.size)
+
+
+def local_step(reduced: Reduced, shared: FloatArray) -> FloatArray:
+    """Return the step of the local unknowns that goes with a step of the shared ones (p,)."""
+    L, scale = reduced.factor
+    right = reduced.cross[:, -1] - reduced.cross[:, :-1] @ shared
+    return np.asarray(scale * cho_solve((L, True), right, check_finite=False))
+
+
+def shared_step(
+    gram: FloatArray, parameters: Sequence[Parameter], at: FloatArray, reach: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray, float]:
+    """Solve for the shared parameters from a summed gram (p + 1, p + 1), each held back to its ``reach`` (p,).
+
+    Returns the step (p,), its covariance (p, p) and what chi-squared is expected to become, priors included; all NaN
+    where the fit has gone where its predictions are not finite.
+    """
+    p = len(parameters)
+    prior = np.array([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for q in parameters])
+    off = np.array([q.stated for q in parameters]) - at
+    H = gram[:p, :p] + np.diag(prior if reach is None else prior + reach**-2.0)
+    right = gram[:p, -1] + prior * off
+    if p == 0:
+        return np.empty(0), np.empty((0, 0)), float(gram[-1, -1])
+    if not np.all(np.isfinite(gram)):
+        return np.full(p, np.nan), np.full((p, p), np.nan), np.nan
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
+    scaled = H * scale[:, None] * scale[None, :]
+    w, V = np.linalg.eigh(scaled)
+    kept = w > 1e-10 * max(float(w[-1]), 1e-300)
+    inverse = (V[:, kept] / w[kept]) @ V[:, kept].T
+    covariance = inverse * scale[:, None] * scale[None, :]
+    step = covariance @ right
+    expected = float(gram[-1, -1] + prior @ off**2 - step @ right)
+    return step, covariance, expected
+
+
+#: how far one step goes where the readings of a free spin say little, beyond which its turning is far from linear:
+#: shares of the sigma of how its wobble dies and turns, and rad of its attitude, which may turn about the field
+WOBBLE_REACH, _ATTITUDE_REACH = 1.0 / 15.0, 0.02
+
+
+_TURNS = np.arange(6, 9)

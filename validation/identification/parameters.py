@@ -1,0 +1,61 @@
+"""Parameters that recordings share, and how far segments may be apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from discsim.arrays import BoolArray, FloatArray
+from validation.identification.sensor_model import Values
+
+__all__ = ["Jumps", "Parameter", "values_of"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that the recordings share.
+
+    ``stated`` is where it stands without a fit, ``sigma`` the one-sigma uncertainty with which it is stated (inf:
+    free), ``step`` half the width of its differences. ``recordings`` are those it acts in; None means all.
+    """
+
+    group: str
+    name: str
+    stated: float
+    step: float
+    sigma: float = np.inf
+    recordings: frozenset[int] | None = None
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Group and name."""
+        return self.group, self.name
+
+    def acts_in(self, recording: int) -> bool:
+        """Tell whether it acts in a recording."""
+        return self.recordings is None or recording in self.recordings
+
+
+@dataclass(frozen=True)
+class Jumps:
+    """How far pieces may jump: one-sigma size (d,) in each direction of the state, zero where they may not."""
+
+    sd: FloatArray
+
+    @property
+    def allowed(self) -> BoolArray:
+        """Directions in which pieces may jump."""
+        return np.asarray(self.sd > 0)
+
+
+def values_of(
+    parameters: Sequence[Parameter], at: FloatArray, recording: int, fixed: Values
+) -> dict[tuple[str, str], float]:
+    """Return fixed values and those of the parameters that act in a recording."""
+    values = dict(fixed)
+    for parameter, number in zip(parameters, at, strict=True):
+        if parameter.acts_in(recording):
+            values[parameter.key] = float(number)
+    return values

@@ -1,0 +1,187 @@
+"""Is what is left noise? Tests of residuals that no first-order noise could have made.
+
+A sensor whose noise is larger or slower than stated is no physics. What tells the two apart: noise with one level and
+one correlation, once whitened, is flat over frequency and the same at all times; missing physics is neither. And what
+is many times as loud as stated and hardly changes within a recording is no noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+
+from discsim.arrays import FloatArray
+from validation.identification.linearisation import Linear
+from validation.identification.noise import NoiseModel, estimate_noise, log_likelihood, whitened
+
+__all__ = ["Remainder", "remainders"]
+
+#: bands of frequency in which the whitened residuals of a group are compared
+BANDS = 24
+#: excess of a band in its own standard errors, and in share of the level, that no noise shows
+BAND_Z, BAND_SHARE = 8.0, 0.2
+#: readings in a window of time, and its excess in standard errors
+WINDOW, WINDOW_Z = 24, 9.0
+#: most that one reading's square counts in a window: two wild readings are outliers, three in a row are not
+WILD = 30.0
+#: terms of a course over time that recordings may have in common, and what it must gain in twice the log likelihood
+COURSE_TERMS, COURSE_GAIN = 5, 90.0
+#: a sensor is no longer merely noisy where its noise is more than this many times as loud as stated, and slower than
+#: this share of the longest recording
+LOUD, SLOW = 10.0, 0.1
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """Something left that is not noise: in which group, which recording (None: all), when, how strong."""
+
+    group: str
+    recording: int | None
+    kind: str
+    z: float
+    from_s: float
+    to_s: float
+    axis: str = "all"
+
+
+def remainders(linears: Sequence[Linear], residuals: Sequence[FloatArray], noise: NoiseModel) -> list[Remainder]:
+    """Return what the residuals (n,) of each recording hold beside noise, strongest first."""
+    white = [
+        whitened(linear, noise, residual[:, None])[:, 0] for linear, residual in zip(linears, residuals, strict=True)
+    ]
+    return sorted(
+        [
+            *_bands(linears, white),
+            *_windows(linears, white),
+            *_courses(linears, residuals, noise),
+            *_swallowed(linears, noise),
+        ],
+        key=lambda item: -item.z,
+    )
+
+
+def _bands(linears: Sequence[Linear], white: Sequence[FloatArray]) -> list[Remainder]:
+    """Test the flatness of each group's spectrum, pooled over axes and recordings."""
+    sums: dict[str, FloatArray] = {}
+    counts: dict[str, FloatArray] = {}
+    ends: dict[str, float] = {}
+    for linear, x in zip(linears, white, strict=True):
+        for channel in linear.channels:
+            y = x[channel.rows]
+            if y.size < 4 * BANDS or channel.index.size < 0.8 * (channel.index[-1] - channel.index[0] + 1):
+                continue
+            y = y - y.mean()
+            power = np.abs(np.fft.rfft(y)) ** 2 / y.size
+            place = np.minimum((np.arange(1, power.size) * BANDS) // power.size, BANDS - 1)
+            group = channel.group
+            sums.setdefault(group, np.zeros(BANDS))
+            counts.setdefault(group, np.zeros(BANDS))
+            np.add.at(sums[group], place, power[1:])
+            np.add.at(counts[group], place, 1.0)
+            ends[group] = max(ends.get(group, 0.0), float(linear.t[channel.rows][-1]))
+    found = []
+    for group, total in sums.items():
+        n = np.maximum(counts[group], 1.0)
+        mean = total / n
+        level = float(np.median(mean))
+        z = (mean / level - 1.0) * np.sqrt(n)
+        worst = int(np.argmax(z))
+        if z[worst] > BAND_Z and mean[worst] > (1.0 + BAND_SHARE) * level:
+            found.append(Remainder(group, None, f"band {worst}", float(z[worst]), 0.0, ends[group]))
+    return found
+
+
+def _windows(linears: Sequence[Linear], white: Sequence[FloatArray]) -> list[Remainder]:
+    """Test that the level is the same at all times."""
+    found = []
+    for index, (linear, x) in enumerate(zip(linears, white, strict=True)):
+        for channel in linear.channels:
+            y = np.minimum(x[channel.rows] ** 2, WILD)
+            if y.size < 2 * WINDOW:
+                continue
+            total = np.convolve(y, np.ones(WINDOW), mode="valid")
+            z = (total - WINDOW) / np.sqrt(2.0 * WINDOW)
+            worst = int(np.argmax(z))
+            if z[worst] > WINDOW_Z:
+                t = linear.t[channel.rows]
+                found.append(
+                    Remainder(
+                        channel.group,
+                        index,
+                        "window",
+                        float(z[worst]),
+                        float(t[worst]),
+                        float(t[worst + WINDOW - 1]),
+                        channel.axis,
+                    )
+                )
+    return found
+
+
+def _courses(linears: Sequence[Linear], residuals: Sequence[FloatArray], noise: NoiseModel) -> list[Remainder]:
+    """Test that slow noise goes its own way in each recording.
+
+    A sensor that drifts the same way in all of them leaves residuals that one recording alone cannot tell from slow
+    noise. A polynomial of the time since the start, common to all recordings for each axis, must not gain more by the
+    likelihood, noise estimated anew, than its terms do by chance.
+    """
+    found = []
+    for group, slow in noise.items():
+        channels = [[c for c in linear.channels if c.group == group] for linear in linears]
+        if slow.correlation == 0.0 or sum(bool(some) for some in channels) < 2:
+            continue
+        ends = [float(linear.t[c.rows][-1]) for linear, some in zip(linears, channels, strict=True) for c in some]
+        alone = [replace(linear, channels=tuple(some)) for linear, some in zip(linears, channels, strict=True)]
+        left, own = list(residuals), {group: slow}
+        before = sum(log_likelihood(linear, own, e) for linear, e in zip(alone, left, strict=True))
+        after, now = before, own
+        for _ in range(3):
+            left = _without_course(alone, residuals, now, max(ends))
+            now = estimate_noise(alone, left)
+            after = min(after, sum(log_likelihood(linear, now, e) for linear, e in zip(alone, left, strict=True)))
+        if before - after > COURSE_GAIN:
+            found.append(Remainder(group, None, "course", float(np.sqrt(before - after)), 0.0, max(ends)))
+    return found
+
+
+def _swallowed(linears: Sequence[Linear], noise: NoiseModel) -> list[Remainder]:
+    """Test that no noise so loud and slow was supposed that it has swallowed what is missing."""
+    found = []
+    for group, slow in noise.items():
+        if slow.correlation <= 0.0:
+            continue
+        channels = [(linear, c) for linear in linears for c in linear.channels if c.group == group and c.index.size > 1]
+        if not channels:
+            continue
+        stated = float(channels[0][0].sd[channels[0][1].rows][0])
+        times = [linear.t[c.rows] for linear, c in channels]
+        interval = float(np.median(np.diff(times[0])))
+        longest = max(float(t[-1] - t[0]) for t in times)
+        if slow.sd > LOUD * stated and slow.memory(interval) > SLOW * longest:
+            found.append(Remainder(group, None, "swallowed", slow.sd / stated, 0.0, max(float(t[-1]) for t in times)))
+    return found
+
+
+def _without_course(
+    linears: Sequence[Linear], residuals: Sequence[FloatArray], noise: NoiseModel, end: float
+) -> list[FloatArray]:
+    """Return residuals less the course that each axis has in common in all recordings, estimated in a noise."""
+    axes = list(dict.fromkeys(c.axis for linear in linears for c in linear.channels))
+    columns = []
+    for linear in linears:
+        A = np.zeros((linear.t.size, COURSE_TERMS * len(axes)))
+        for c in linear.channels:
+            k = COURSE_TERMS * axes.index(c.axis)
+            A[c.rows, k : k + COURSE_TERMS] = legvander(2.0 * linear.t[c.rows] / end - 1.0, COURSE_TERMS - 1)
+        columns.append(A)
+    width = COURSE_TERMS * len(axes)
+    H, right = np.zeros((width, width)), np.zeros(width)
+    for linear, A, e in zip(linears, columns, residuals, strict=True):
+        white = np.hstack([whitened(linear, noise, A), whitened(linear, noise, e[:, None])])
+        H += white[:, :-1].T @ white[:, :-1]
+        right += white[:, :-1].T @ white[:, -1]
+    common = np.linalg.lstsq(H, right, rcond=1e-10)[0]
+    return [e - A @ common for A, e in zip(columns, residuals, strict=True)]

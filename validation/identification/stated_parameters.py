@@ -1,0 +1,81 @@
+"""Stated numbers that may move: those of a recording's environment, disc, rig and sensors that come with a sigma."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from discsim.arrays import FloatArray
+from discsim.disc import Aero, aero_key
+from discsim.recording import Recording
+from validation.identification.parameters import Parameter
+
+__all__ = ["stated_parameters"]
+
+_DISC = {"mass_kg": "mass", "diameter_m": "d", "Ixx_kg_m2": "Ixx", "Izz_kg_m2": "Izz"}
+_RIG = {"Izz_kg_m2": "Izz", "viscous_N_m_s": "viscous"}
+
+
+def stated_parameters(recordings: Sequence[Recording]) -> tuple[Parameter, ...]:
+    """Return the numbers that are stated with an uncertainty; a sigma of zero is exact.
+
+    Recordings of one data set share their hardware; where they state different numbers, each recording's own place
+    and uncertainty hold for it alone.
+    """
+    found: dict[tuple[str, str], list[tuple[int, float, float]]] = {}
+    for index, recording in enumerate(recordings):
+        for group, name, stated, sigma in _of(recording):
+            if sigma > 0:
+                found.setdefault((group, name), []).append((index, stated, sigma))
+    parameters = []
+    for (group, name), places in found.items():
+        distinct = {(stated, sigma) for _, stated, sigma in places}
+        for stated, sigma in sorted(distinct):
+            where = frozenset(i for i, a, b in places if (a, b) == (stated, sigma))
+            recordings_of = None if len(where) == len(recordings) else where
+            parameters.append(Parameter(group, name, stated, 0.02 * sigma, sigma, recordings_of))
+    return tuple(parameters)
+
+
+def _of(recording: Recording) -> Iterator[tuple[str, str, float, float]]:
+    """Yield (group, name, stated, sigma) of one recording."""
+    environment = recording.environment
+    for key, sigma in environment.sigma.items():
+        if key == "gravity_m_s2":
+            yield "environment", "gravity", environment.gravity, float(np.max(sigma))
+        elif key == "air_density_kg_m3" and environment.air_density is not None:
+            yield "environment", "air_density", environment.air_density, float(np.max(sigma))
+        elif key.startswith("magnetic_field"):
+            for axis, each, size in zip(
+                ("north", "east", "down"), environment.magnetic_field, _three(sigma), strict=True
+            ):
+                yield "environment", f"magnetic_{axis}", float(each), float(size)
+        elif key.startswith("wind"):
+            for axis, each, size in zip(("north", "east", "down"), environment.wind, _three(sigma), strict=True):
+                yield "environment", f"wind_{axis}", float(each), float(size)
+    disc = recording.disc
+    if disc is not None and recording.plant in ("flight", "free_spin"):
+        for key, sigma in disc.sigma.items():
+            if key in _DISC:
+                place = _DISC[key]
+                value = disc.diameter if place == "d" else getattr(disc, place)
+                yield "disc", place, float(value), float(np.max(sigma))
+        if disc.aero is not None and recording.plant == "flight":
+            for name in Aero._fields:
+                if aero_key(name) in disc.sigma:
+                    yield "aero", name, float(getattr(disc.aero, name)), float(np.max(disc.sigma[aero_key(name)]))
+    rig = recording.rig
+    if rig is not None:
+        for key, sigma in rig.sigma.items():
+            if key in _RIG:
+                yield "rig", _RIG[key], float(getattr(rig, _RIG[key])), float(np.max(sigma))
+    sheet = recording.sheets.get("accelerometer")
+    if sheet is not None and "position_m" in sheet.sigma and sheet.position is not None:
+        for axis, size in zip("xyz", _three(sheet.sigma["position_m"]), strict=True):
+            yield "accel.position_offset", f"d{axis}_m", 0.0, float(size)
+
+
+def _three(sigma: ArrayLike) -> FloatArray:
+    return np.broadcast_to(np.asarray(sigma, dtype=float), 3)

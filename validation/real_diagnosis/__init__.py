@@ -1,5 +1,0 @@
-"""Measured recordings diagnosed, as a page of the documentation: ``python -m validation.real_diagnosis``."""
-
-from validation.real_diagnosis.page import write_page
-
-__all__ = ["write_page"]

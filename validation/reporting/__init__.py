@@ -1,0 +1,1 @@
+"""What commands leave behind: run folders, scores, figures, pages, progress."""

@@ -1,0 +1,50 @@
+"""Reports: one self-contained HTML page that a person reads from top to bottom."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from discsim.files import write_text
+from validation.reporting.run import package_version
+
+__all__ = ["Section", "write_page", "write_report"]
+
+_NUMBER = re.compile(r"^[-+\u2212]?\d[\d,.]*(e[-+]?\d+)?( ?%)?$")
+
+
+@dataclass(frozen=True)
+class Section:
+    """One part of a report: paragraphs, a table, figures (caption, PNG file)."""
+
+    title: str
+    text: Sequence[str] = ()
+    header: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+    figures: Sequence[tuple[str, Path]] = field(default=())
+
+    @property
+    def images(self) -> list[tuple[str, str]]:
+        """The figures with their files as base64 text."""
+        return [(caption, base64.b64encode(path.read_bytes()).decode()) for caption, path in self.figures]
+
+
+def write_report(path: Path, title: str, lead: str, sections: Sequence[Section]) -> None:
+    """Write the page to ``path``, figures embedded."""
+    write_page(path, "report.html", title=title, lead=lead, sections=sections)
+
+
+def write_page(path: Path, template: str, **content: Any) -> None:
+    """Write a page to ``path`` from one of ``validation/templates``; raises where the template lacks some content."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("validation"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    environment.tests["number_cell"] = lambda cell: bool(_NUMBER.match(str(cell)))
+    page = environment.get_template(template).render(footer=f"discsim {package_version()}", **content)
+    write_text(path, page)

@@ -1,0 +1,1 @@
+"""Runs on our own truth that others score with."""

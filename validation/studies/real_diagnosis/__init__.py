@@ -1,0 +1,5 @@
+"""Measured recordings diagnosed, as a page of the documentation: ``python -m validation.studies.real_diagnosis``."""
+
+from validation.studies.real_diagnosis.page import write_page
+
+__all__ = ["write_page"]

@@ -1,0 +1,51 @@
+"""``python -m validation.studies.real_diagnosis``: write the page on what a diagnosis says of measured recordings."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from discsim.errors import InputError
+from validation.studies.real_diagnosis.page import write_page
+from validation.studies.real_recordings.sources import find_recordings
+
+__all__ = ["app", "command"]
+
+
+def command(
+    recordings: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder of recordings with 'real' in it. Default: DISCSIM_RECORDINGS, or beside the checkout."
+        ),
+    ] = None,
+    page: Annotated[Path, typer.Option(help="The page; its figures go into a folder of its name.")] = Path(
+        "docs/real-diagnosis.md"
+    ),
+    work: Annotated[
+        Path,
+        typer.Option(help="Folder of the diagnoses. One of the same recordings, seed and code is taken as it is."),
+    ] = Path("real-diagnosis"),
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the diagnoses.")] = 0,
+) -> None:
+    """Diagnose measured recordings and write a page with tables and figures.
+
+    Example: python -m validation.studies.real_diagnosis --work real-diagnosis
+    """
+    try:
+        found = find_recordings(recordings)
+        written = write_page(found, page, work, seed, lambda text: print(text, file=sys.stderr, flush=True))
+    except InputError as error:
+        typer.echo(f"real_diagnosis: {error}", err=True)
+        raise typer.Exit(2) from None
+    typer.echo(f"{written}")
+
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+app.command()(command)
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,6 @@
+"""The methods on measured recordings, as a page: ``python -m validation.studies.real_recordings``."""
+
+from validation.studies.real_recordings.page import write_page
+from validation.studies.real_recordings.sources import SOURCES, find_recordings
+
+__all__ = ["SOURCES", "find_recordings", "write_page"]

@@ -1,0 +1,62 @@
+"""``python -m validation.studies.real_recordings``: write the page on measured recordings."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from discsim.errors import InputError
+from validation.studies.real_recordings.page import write_page
+from validation.studies.real_recordings.road import LOGS, walk
+from validation.studies.real_recordings.sources import find_recordings
+
+__all__ = ["app", "command"]
+
+
+def command(
+    recordings: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder of recordings with 'real' in it. Default: DISCSIM_RECORDINGS, or beside the checkout."
+        ),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder of the figures; the page is beside it, with .md.")] = Path(
+        "docs/real-recordings"
+    ),
+    also: Annotated[
+        list[str] | None,
+        typer.Option(help="A method to try beside the paper's; may repeat. Default: all that there are."),
+    ] = None,
+    logs: Annotated[
+        Path, typer.Option(help="Folder that keeps what the commands said of each log; a second run reads it.")
+    ] = Path("real-recordings-logs"),
+    walked: Annotated[
+        bool, typer.Option("--walk/--no-walk", help="Run import, check, estimate and diagnose on each log.")
+    ] = True,
+) -> None:
+    """Write a page: what the four commands say of each measured log, and each method against a reference sensor.
+
+    Example: python -m validation.studies.real_recordings --out docs/real-recordings
+    """
+    try:
+        real = find_recordings(recordings)
+        found = [walk(log, real, logs, _say) for log in LOGS] if walked else []
+        page = write_page(real, out, also, _say, walked=found)
+    except InputError as error:
+        typer.echo(f"real_recordings: {error}", err=True)
+        raise typer.Exit(2) from None
+    typer.echo(f"{page}")
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+app.command()(command)
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,1 @@
+"""Pictures of a flight in MuJoCo's viewer, live or offscreen."""

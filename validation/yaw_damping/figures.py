@@ -1,0 +1,90 @@
+"""Figures of a fit of C_Nr: spin with its models (Fig. 11a), the table (Fig. 11b), and the sources side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from validation.reporting.figures import COLOURS, new_figure, save_figure
+from validation.yaw_damping.compared import Compared
+from validation.yaw_damping.observations import Throw
+from validation.yaw_damping.output_error import Fit
+from validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S, PaperTable
+
+__all__ = ["draw_fit", "draw_sources", "draw_surface", "draw_surface_on"]
+
+_SHADES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#6a3d9a", "#8c6d31")
+
+
+def draw_fit(throws: Sequence[Throw], fit: Fit, paper: PaperTable, path: Path) -> None:
+    """Draw the spin of each throw with the model flight and the paper's line, and what each leaves."""
+    figure, axes = new_figure(1, 3, width=13.0, height=4.4)
+    for number, (throw, fitted, line) in enumerate(zip(throws, fit.throws, paper.slopes, strict=True)):
+        shade, first = _SHADES[number % len(_SHADES)], number == 0
+        t, r = throw.spin_t, np.degrees(np.abs(throw.spin))
+        axes[0].plot(t, r, ".", color=shade, ms=2.5, alpha=0.5, label="estimated" if first else None)
+        model = r - np.degrees(np.sign(throw.spin) * fitted.spin_residual)
+        axes[0].plot(t, model, color=shade, lw=1.2, label="model flight" if first else None)
+        ends = np.degrees(line.at(line.t))
+        axes[0].plot(line.t, ends, color=shade, lw=0.9, ls="--", label="straight line (paper)" if first else None)
+        axes[1].plot(t, r - np.degrees(line.at(t)), color=shade, lw=0.8, ls="--")
+        axes[1].plot(t, np.degrees(np.sign(throw.spin) * fitted.spin_residual), color=shade, lw=1.0)
+        speed_residual = np.linalg.norm(fitted.path_residual[:, 3:], axis=1)
+        axes[2].plot(throw.path_t, speed_residual, color=shade, lw=0.7, alpha=0.8, label=throw.recording.name)
+    axes[0].set(title="Magnitude of the spin rate", xlabel="time (s)", ylabel="rate (deg/s)")
+    axes[0].legend(fontsize=7)
+    axes[1].set(title="Estimate less model (solid), less line (dashed)", xlabel="time (s)", ylabel="difference (deg/s)")
+    axes[1].axhline(0, color=COLOURS["truth"], lw=0.6)
+    axes[2].set(title="GPS velocity less the model's, size", xlabel="time (s)", ylabel="difference (m/s)")
+    axes[2].set_ylim(bottom=0)
+    if any(throw.path_t.size for throw in throws):
+        axes[2].legend(fontsize=6, ncols=2)
+    save_figure(figure, path)
+
+
+def draw_surface(paper: PaperTable, fit: Fit | None, path: Path) -> None:
+    """Draw the paper's table over rate and speed, with the flights that it was made from."""
+    figure, axes = new_figure(width=7.5, height=4.8)
+    draw_surface_on(axes, paper, fit)
+    save_figure(figure, path)
+
+
+def draw_surface_on(axes: Axes, paper: PaperTable, fit: Fit | None) -> None:
+    """Draw the table on given axes: colours and contours of -1000 C_Nr, and flights as (V, r) lines over it."""
+    matrix = -1000.0 * paper.table.CNr
+    mesh = axes.pcolormesh(SPEEDS_M_S, RATES_DEG_S, matrix, cmap="viridis", shading="gouraud", rasterized=True)
+    lines = axes.contour(SPEEDS_M_S, RATES_DEG_S, matrix, levels=8, colors="white", linewidths=0.6)
+    axes.clabel(lines, fontsize=7, fmt="%.1f")
+    if fit is not None:
+        for number, throw in enumerate(fit.throws):
+            t = np.linspace(0.0, throw.flight.end, 100)
+            state = throw.flight.at(t)
+            speed = np.linalg.norm(state.velocity - throw.flight.environment.wind, axis=1)
+            label = "flights" if number == 0 else None
+            axes.plot(speed, np.degrees(np.abs(state.rate[:, 2])), color="#d55e00", lw=1.2, label=label)
+        axes.legend(fontsize=8, loc="lower right", frameon=True)
+    axes.grid(False)
+    axes.set(title="The paper's table (28), as -1000 CNr", xlabel="airspeed (m/s)", ylabel="spin rate (deg/s)")
+    axes.figure.colorbar(mesh, ax=axes, label="-1000 CNr")
+
+
+def draw_sources(found: Sequence[Compared], path: Path) -> None:
+    """Draw C_Nr by each source, with two standard deviations, and beside it what (26) gives from the same spin."""
+    figure, axes = new_figure(width=8.0, height=3.6)
+    known = [item for item in found if item.fit is not None]
+    for number, item in enumerate(known):
+        assert item.fit is not None
+        value, sd = 1000 * item.fit.CNr, 1000 * item.fit.sd
+        first = number == 0
+        axes.errorbar(
+            value, number, xerr=2 * sd, fmt="o", color=COLOURS["best"], capsize=3, label="output error, 2 sd" * first
+        )
+        axes.plot(1000 * item.fit.by_26, number, "x", color=COLOURS["fft"], label="straight line and (26)" * first)
+    axes.set_yticks(range(len(known)), [item.source.label for item in known])
+    axes.set_ylim(len(known) - 0.5, -0.5)
+    axes.set(title="C_Nr by source of the spin rate", xlabel="1000 CNr")
+    axes.legend(fontsize=8)
+    save_figure(figure, path)
