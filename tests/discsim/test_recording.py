@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import time
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
-from recording_folder import AERO_TABLE, CNR_TABLE, CSV, HEADER, RATE_TABLE, SPIN_DOWN, TOML, line_of, make, refusal
+from recording_folder import AERO_TABLE, CNR_TABLE, CSV, RATE_TABLE, SPIN_DOWN, TOML, line_of, make, refusal
 
 from discsim import recording as module
 from discsim.disc import Aero, AeroTable, Disc, Release, Rig, YawDampingTable
@@ -24,7 +23,6 @@ from discsim.recording import (
     Recording,
     Samples,
     SensorSheet,
-    read_csv,
     read_dataset,
     read_recording,
     write_recording,
@@ -582,22 +580,7 @@ def test_a_recording_is_not_written_over_a_file(flight, tmp_path):
     assert (tmp_path / "file").read_text() == "kept"
 
 
-# ------------------------------------------------------------------------------------------ speed, practice
-
-
-def test_an_hour_at_200_hz_is_read_in_seconds(tmp_path):
-    """A limit of 3 s for 720 000 rows; here a twentieth of both, in one of ten attempts (other work may run beside)."""
-    rows = 36_000
-    cells = np.random.default_rng(0).normal(size=(rows, 3)).tolist()
-    file = tmp_path / "magnetometer.csv"
-    file.write_text("\n".join([HEADER, *(f"{k / 200!r},{x!r},{y!r},{z!r}" for k, (x, y, z) in enumerate(cells))]))
-
-    def seconds() -> float:
-        started = time.perf_counter()
-        assert len(read_csv(file, HEADER)) == rows
-        return time.perf_counter() - started
-
-    assert any(seconds() < 3.0 * rows / 720_000 for _ in range(10))
+# ------------------------------------------------------------------------------------------------- practice
 
 
 def practice_recordings() -> list[Path]:
