@@ -149,6 +149,8 @@ def test_a_fault_of_a_sensor_must_be_located_there():
     found = named("mag.hard_iron", bx_uT=(3.0, 0.1))
     assert score_case(given, diagnosis("explained", found, located=("gps", "magnetometer"))).right_place
     assert score_case(given, diagnosis("explained", found, located=("gps",))).right_place is False
+    # a fault that all sensors show, as a turned board, is located at all of them
+    assert score_case(given, diagnosis("explained", found, located=("all",))).right_place
 
 
 def test_what_the_answer_leaves_out_stands_at_its_baseline_and_what_has_no_sd_is_not_counted():

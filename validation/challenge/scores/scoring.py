@@ -189,7 +189,8 @@ def _right_place(
             return False
         if not kind.event and not any(effect["recordings"] == "all" for effect in entries):
             return False
-        if not kind.acts_with({place["sensor"] for place in located}):
+        where = {place["sensor"] for place in located}
+        if "all" not in where and not kind.acts_with(where):
             return False
     return True
 
