@@ -28,7 +28,7 @@ from validation.identification.sensor_model import Values
 __all__ = ["Fit", "linearised_columns", "refit"]
 
 #: recordings that are worked on at once, on as many threads as there are cores
-THREADS = len(os.sched_getaffinity(0))
+THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @dataclass(frozen=True)

@@ -264,14 +264,16 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
         if proposal.trial.id == "accel.saturation":
             # readings at the limit take no part in a fit: what the motion asks for beyond it is the evidence
             cost = -proposal.gain
+        # beside the data it must gain half its price, as algebra said it would; where other readings take part that
+        # cannot be seen
+        bar = np.inf if cost else merit_now - 0.5 * price(proposal.trial)
         refitted = tied_fit(
             fit,
             current.hypothesis.plus(proposal.trial),
             found.own,
             noise if far else current.fit.noise,
             {**values_of_fit(current), **proposal.start, **_wobbles(fit)},
-            # beside the data it must gain half its price, as algebra said it would
-            bar=_HOPELESS * best_chi2 if far else merit_now - 0.5 * price(proposal.trial),
+            bar=_HOPELESS * best_chi2 if far else bar,
         )
         refitted = replace(refitted, score=refitted.score + found.cost + cost)
         gain, chi2 = _consider(found, (current.score, chi2_now), refitted, proposal.trial)
