@@ -159,13 +159,16 @@ def step_of(value: FloatArray) -> float:
     return min(found) if found else 0.0
 
 
-def constant_axes(value: FloatArray) -> BoolArray:
-    """Tell of which axes of readings (n, k) every single one is the same number: a dead axis, or one at its limit."""
+def constant_axes(value: FloatArray, least: int = LEAST) -> BoolArray:
+    """Tell of which axes of readings (n, k) every single one is the same number: a dead axis, or one at its limit.
+
+    Of fewer than ``least`` readings nothing is told.
+    """
     table = value if value.ndim == 2 else value[:, None]
     known = np.isfinite(table)
     top = np.max(np.where(known, table, -np.inf), axis=0, initial=-np.inf)
     bottom = np.min(np.where(known, table, np.inf), axis=0, initial=np.inf)
-    return np.asarray((np.count_nonzero(known, axis=0) >= LEAST) & (top == bottom))
+    return np.asarray((np.count_nonzero(known, axis=0) >= least) & (top == bottom))
 
 
 def dead_axes(value: FloatArray) -> BoolArray:

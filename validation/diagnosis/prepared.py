@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
+from discsim.clipping import constant_axes
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from validation.identification.initial.smoothing import FEWEST
@@ -108,12 +109,10 @@ def _standing(value: FloatArray, sheet: SensorSheet) -> BoolArray:
     Steps of resolution that are coarser than the noise, and sensors without noise, may stand still on a steady motion;
     what stands at its range all along says that the motion was beyond it.
     """
-    known = np.isfinite(value)
     if sheet.noise_rms == 0.0 or (sheet.resolution or 0.0) > (sheet.noise_rms or 0.0):
         return np.zeros(value.shape[1], dtype=np.bool_)
-    top, bottom = np.where(known, value, -np.inf).max(axis=0), np.where(known, value, np.inf).min(axis=0)
-    clipped = np.any(sheet.clipped(value) & known, axis=0)
-    return np.asarray((np.sum(known, axis=0) >= FEWEST) & (top == bottom) & ~clipped)
+    clipped = np.any(sheet.clipped(value) & np.isfinite(value), axis=0)
+    return np.asarray(constant_axes(value, FEWEST) & ~clipped)
 
 
 def _absent(recordings: Sequence[Recording], names: Sequence[str]) -> Iterator[str]:

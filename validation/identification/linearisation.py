@@ -126,21 +126,22 @@ class Linear:
 
     def spread(self, places: Sequence[int], width: int) -> Linear:
         """Return the linearisation with its shared columns at ``places`` of ``width``, the others zero."""
-        u, n = self.unknowns, self.raw.size
-        kept = self.own.shape[1] - len(places)
-        own = np.zeros((n, kept + width))
-        own[:, :kept] = self.own[:, :kept]
-        own[:, [kept + j for j in places]] = self.own[:, kept:]
-        moves = np.zeros((*self.moves.shape[:2], u + width))
-        moves[:, :, :u] = self.moves[:, :, :u]
-        moves[:, :, [u + j for j in places]] = self.moves[:, :, u:]
-        passes = np.zeros((*self.passes.shape[:2], kept + width))
-        passes[:, :, :kept] = self.passes[:, :, :kept]
-        passes[:, :, [kept + j for j in places]] = self.passes[:, :, kept:]
-        whole = np.zeros((self.whole.shape[0], u + width))
-        whole[:, :u] = self.whole[:, :u]
-        whole[:, [u + j for j in places]] = self.whole[:, u:]
-        return replace(self, own=own, moves=moves, passes=passes, whole=whole)
+        d, u = self.own.shape[1] - len(places), self.unknowns
+
+        def spread(columns: FloatArray, kept: int) -> FloatArray:
+            """Return columns (..., kept + p) with the shared ones, behind those that are kept, at their places."""
+            out = np.zeros((*columns.shape[:-1], kept + width))
+            out[..., :kept] = columns[..., :kept]
+            out[..., [kept + j for j in places]] = columns[..., kept:]
+            return out
+
+        return replace(
+            self,
+            own=spread(self.own, d),
+            moves=spread(self.moves, u),
+            passes=spread(self.passes, d),
+            whole=spread(self.whole, u),
+        )
 
     def after(self, local: FloatArray, shared: FloatArray) -> FloatArray:
         """Return the residuals (n,) that a step of the unknowns is expected to leave."""

@@ -266,14 +266,14 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
             cost = -proposal.gain
         # beside the data it must gain half its price, as algebra said it would; where other readings take part that
         # cannot be seen
-        bar = np.inf if cost else merit_now - 0.5 * price(proposal.trial)
+        beside = np.inf if cost else merit_now - 0.5 * price(proposal.trial)
         refitted = tied_fit(
             fit,
             current.hypothesis.plus(proposal.trial),
             found.own,
             noise if far else current.fit.noise,
             {**values_of_fit(current), **proposal.start, **_wobbles(fit)},
-            bar=_HOPELESS * best_chi2 if far else bar,
+            bar=_HOPELESS * best_chi2 if far else beside,
         )
         refitted = replace(refitted, score=refitted.score + found.cost + cost)
         gain, chi2 = _consider(found, (current.score, chi2_now), refitted, proposal.trial)

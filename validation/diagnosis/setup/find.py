@@ -119,18 +119,20 @@ def _judgeable(recording: Recording) -> Recording:
     kept = dict(recording.samples)
     if not recording.environment.field_known:
         kept.pop("magnetometer", None)
-    start, stop = _busiest(kept, LOOK[recording.plant])
-    return replace(recording, samples={name: samples.between(start, stop) for name, samples in kept.items()})
+    busiest = _busiest(kept, LOOK[recording.plant])
+    if busiest is not None:
+        kept = {name: samples.between(*busiest) for name, samples in kept.items()}
+    return replace(recording, samples=kept)
 
 
-def _busiest(samples: Mapping[str, Samples], length: float) -> tuple[float, float]:
+def _busiest(samples: Mapping[str, Samples], length: float) -> tuple[float, float] | None:
     """Return from when to when, s, sensors turn on end in a recording longer than ``length`` s, at most that long.
 
-    The longest stretch that turns at a quarter of the fastest rate or more; all of the time of a shorter recording.
+    The longest stretch that turns at a quarter of the fastest rate or more; None of a shorter recording.
     """
     turning = next((samples[name] for name in ("gyroscope", "magnetometer", "accelerometer") if name in samples), None)
     if turning is None or len(turning) < 2 or turning.t[-1] - turning.t[0] <= length:
-        return -np.inf, np.inf
+        return None
     slot = ((turning.t - turning.t[0]) / _SLOT).astype(int)
     count = np.maximum(np.bincount(slot), 1)
     value = np.nan_to_num(turning.value)
