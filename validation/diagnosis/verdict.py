@@ -12,7 +12,7 @@ from validation.diagnosis.result import (
     Verdict,
 )
 from validation.diagnosis.selection.constrained_fit import Tied
-from validation.diagnosis.selection.stepwise import FAR, Search, chi2_in
+from validation.diagnosis.selection.stepwise import Search, misses
 from validation.identification.residual_tests import remainders
 
 __all__ = ["RECALIBRATED_NAMES", "standard_errors"]
@@ -40,8 +40,7 @@ def verdict_of(found: Search) -> tuple[Verdict, bool]:
     if found.recordings[0].plant == "free_spin":
         # just after release the wobble is largest, and what the air does to it is not modelled in every detail
         left = [item for item in left if item.kind != "window" or item.from_s > _SETTLED]
-    far = chi2_in(final, found.loose_noise) > FAR * final.fit.count and found.loose.merit < 2.0 * found.loose.count
-    if left or far:
+    if left or misses(found, final):
         return "unexplained", True
     if final.hypothesis.trials:
         return "explained", False

@@ -164,15 +164,6 @@ class Linear:
         return self._full[:, self.unknowns :]
 
 
-# ------------------------------------------------------------------------------------------------- readings
-
-
-# -------------------------------------------------------------------------------------------------- plants
-
-
-# ------------------------------------------------------------------------------------------ linearisation
-
-
 def linearise(
     current: Chain,
     values: Values,
@@ -187,150 +178,200 @@ def linearise(
     jump. Columns are differences of the piece's own motion, chained over the pieces; one-sided ones, where ``central``
     is false, cost half.
     """
-    recording, d, k = current.recording, current.tangent, current.states.shape[0]
-    plant = recording.plant
-    runner = runner_of(recording, values, columns)
-    steps = STEPS[plant]
-
+    k = current.states.shape[0]
+    around = _Around(current, values, columns, central)
     samples = [Sampled(current, readings, values) for readings in current.readings]
     # the instants of all sensors, each with its neighbours in time for slopes and its past for a lag
-    motion_columns = [j for j, column in enumerate(columns) if _moves(column)]
-    sensor_columns = [j for j in range(len(columns)) if j not in motion_columns]
     piece_of = [np.clip(np.searchsorted(current.edges, s.instants, side="right") - 1, 0, k - 1) for s in samples]
+    read = _Read(around, samples)
+    ends = read.run_all(piece_of)
+    chained = _chained(current, around, ends, jumps)
+    for s, M, rows in zip(samples, read.slopes, read.rows, strict=True):
+        _add_sensor_columns(around, s, rows, M)
+    return _stack(current, samples, read, piece_of, chained)
 
-    p = len(columns)
-    # states of the pieces as functions of [first state | jumps | parameters]
+
+class _Around:
+    """The neighbours of a chain's motion: one per direction of a state and per parameter of the motion, or two.
+
+    Row 0 is the motion itself; then come ``half`` neighbours ahead and, where differences are central, as many behind.
+    """
+
+    def __init__(self, current: Chain, values: Values, columns: Sequence[Column], central: bool) -> None:
+        self.chain, self.values, self.columns, self.central = current, values, columns, central
+        self.recording = recording = current.recording
+        self.runner = runner_of(recording, values, columns)
+        self.motion = [j for j, column in enumerate(columns) if _moves(column)]
+        self.d = d = current.tangent
+        self.half = d + len(self.motion)
+        #: half the differences, and the columns of slopes that they belong to
+        self.widths = np.concatenate([STEPS[recording.plant], [columns[j].step for j in self.motion]])
+        self.places = np.array([*range(d), *(d + j for j in self.motion)])
+        self.flat = base_flat(recording, values, [column.key for column in columns])
+        self.wobble = np.array([values.get(key, 0.0) for key in WOBBLE])
+        signs = (1.0, -1.0) if central else (1.0,)
+        self.flats = np.repeat(self.flat[None], 1 + len(signs) * self.half, axis=0)
+        self.wobbles = np.repeat(self.wobble[None], 1 + len(signs) * self.half, axis=0)
+        tangents = np.zeros((1 + len(signs) * self.half, d))
+        for side, sign in enumerate(signs):
+            first = 1 + side * self.half
+            tangents[first : first + d] = sign * np.diag(STEPS[recording.plant])
+            for row, j in enumerate(self.motion, first + d):
+                self._set_parameter(row, columns[j], sign)
+        #: the states (k, c, s) that the neighbours of each piece start from
+        self.states = np.repeat(current.states[:, None], tangents.shape[0], axis=1)
+        turned = np.flatnonzero(np.any(tangents != 0.0, axis=1))
+        self.states[:, turned] = shifted(recording.plant, current.states[:, None], tangents[turned])
+
+    def _set_parameter(self, row: int, column: Column, sign: float) -> None:
+        """Move a parameter of the motion in one row of neighbours."""
+        group, name, size, given = column
+        if column.key in WOBBLE:
+            self.wobbles[row, WOBBLE.index(column.key)] += sign * size
+            return
+        for shape, number in given:
+            self.flats[row, place_in_flat(group, shape)] = number
+        self.flats[row, place_in_flat(group, name)] += sign * size
+
+    def slopes(self, values: FloatArray) -> FloatArray:
+        """Return slopes (half, ...) from what the motion and its neighbours give (c, ...)."""
+        ahead = values[1 : 1 + self.half]
+        behind, span = (values[1 + self.half :], 2.0 * self.widths) if self.central else (values[:1], self.widths)
+        return np.asarray((ahead - behind) / span.reshape(-1, *(1,) * (values.ndim - 1)))
+
+
+class _Read:
+    """What each sensor reads of a chain's motion, and its slopes by the state of its piece and by the parameters.
+
+    Attributes
+    ----------
+    rows : list of (m, 19) arrays
+        The motion at each sensor's instants.
+    ideal : list of (m, width) arrays
+        What an ideal sensor shows there.
+    slopes : list of (m, width, d + p) arrays
+    """
+
+    def __init__(self, around: _Around, samples: Sequence[Sampled]) -> None:
+        self._around, self._samples = around, samples
+        columns = around.d + len(around.columns)
+        self.rows = [np.empty((s.instants.size, ROW)) for s in samples]
+        self.ideal = [np.empty((s.instants.size, s.width)) for s in samples]
+        self.slopes = [np.zeros((s.instants.size, s.width, columns)) for s in samples]
+
+    def run_all(self, piece_of: Sequence[IntArray]) -> FloatArray:
+        """Run all pieces and read the sensors; return the states (k, c, s) at the ends of the pieces."""
+        around, edges = self._around, self._around.chain.edges
+        k = around.states.shape[0]
+        ends = np.empty(around.states.shape)
+        waiting: list[tuple[list[IntArray], FloatArray]] = []
+        for i in range(k):
+            start, stop = float(edges[i]), float(edges[i + 1])
+            own = [np.flatnonzero(piece == i) for piece in piece_of]
+            instants = [s.instants[o] for s, o in zip(self._samples, own, strict=True)]
+            out = np.concatenate(instants) if instants else np.empty(0)
+            last_instant = float(out.max()) if out.size else stop
+            times, last = around.runner.times(start, stop, last_instant, around.chain.states[i])
+            rows, ends[i] = around.runner.run(
+                around.flats, around.wobbles, around.states[i], times, last, np.maximum(out, start)
+            )
+            waiting.append((own, rows))
+            if i + 1 == k or sum(rows.shape[1] for _, rows in waiting) >= _INSTANTS:
+                self._read(waiting)
+                waiting = []
+        return ends
+
+    def _read(self, pieces: Sequence[tuple[list[IntArray], FloatArray]]) -> None:
+        """Read the sensors in the rows of pieces."""
+        around = self._around
+        bounds = [np.cumsum([0, *(o.size for o in own)]) for own, _ in pieces]
+        for which, s in enumerate(self._samples):
+            o = np.concatenate([own[which] for own, _ in pieces])
+            if o.size == 0:
+                continue
+            mine = np.concatenate(
+                [rows[:, b[which] : b[which + 1]] for b, (_, rows) in zip(bounds, pieces, strict=True)], axis=1
+            )
+            t = s.instants[o]
+            self.rows[which][o] = mine[0]
+            shown = np.empty((mine.shape[0], o.size, s.width))
+            for first in range(0, mine.shape[0], _BATCH):
+                part = slice(first, first + _BATCH)
+                shown[part] = predicted(s.sensor, around.recording, around.values, t, mine[part])
+            for row, j in enumerate(around.motion, 1 + around.d):
+                if around.columns[j].key in _ALSO_READ:  # it moves the readings of a given motion, too
+                    for place, sign in ((row, 1.0), (row + around.half, -1.0))[: 2 if around.central else 1]:
+                        shown[place] = self._also_moved(s.sensor, t, mine[place], around.columns[j], sign)
+            self.ideal[which][o] = shown[0]
+            self.slopes[which][o[:, None], :, around.places] = np.moveaxis(around.slopes(shown), 0, 1)
+
+    def _also_moved(self, sensor: str, t: FloatArray, rows: FloatArray, column: Column, sign: float) -> FloatArray:
+        """Return what a sensor reads where a parameter moves its readings beside the motion."""
+        around = self._around
+        now = _current(around.values, around.recording, *column.key)
+        moved_values = {**around.values, column.key: now + sign * column.step}
+        return predicted(sensor, around.recording, moved_values, t, rows)
+
+
+@dataclass(frozen=True)
+class _Chained:
+    """How the pieces follow the unknowns and one another; as the attributes of `Linear` of these names."""
+
+    moves: FloatArray
+    passes: FloatArray
+    closing: FloatArray
+    gaps: FloatArray
+    allowed: IntArray
+    unknowns: int
+
+
+def _chained(current: Chain, around: _Around, ends: FloatArray, jumps: BoolArray) -> _Chained:
+    """Chain the pieces: their states as functions of [first state | jumps | parameters]."""
+    plant, d, k, p = current.recording.plant, around.d, current.states.shape[0], len(around.columns)
     allowed, forbidden = np.flatnonzero(jumps), np.flatnonzero(~jumps)
     u = d + (k - 1) * allowed.size
     S = np.zeros((k, d, u + p))
     S[0, :, :d] = np.eye(d)
     passes = np.zeros((max(k - 1, 0), d, d + p))
     closing = np.zeros((k, d))
-    gaps = np.zeros((max(k - 1, 0), d))
-    flat = base_flat(recording, values, [column.key for column in columns])
-    wobble = np.array([values.get(key, 0.0) for key in WOBBLE])
+    nominal = ends[:-1, 0]
+    gaps = difference(plant, current.states[1:], nominal, d)
+    reached = difference(plant, ends[:-1], np.broadcast_to(nominal[:, None], ends[:-1].shape), d)
+    passes[:, :, around.places] = np.moveaxis(around.slopes(np.moveaxis(reached, 1, 0)), 0, 2)
+    for i in range(k - 1):
+        Phi, first = passes[i, :, :d], d + i * allowed.size
+        S[i + 1, :, :first] = Phi @ S[i, :, :first]
+        S[i + 1, :, u:] = Phi @ S[i, :, u:] + passes[i, :, d:]
+        S[i + 1, allowed, first + np.arange(allowed.size)] = 1.0
+        closing[i + 1] = Phi @ closing[i]
+        closing[i + 1, forbidden] -= gaps[i, forbidden]
+    return _Chained(S, passes, closing, gaps, allowed, u)
 
-    out_rows = [np.empty((s.instants.size, ROW)) for s in samples]
-    # per sensor: derivative of each ideal reading by the state of its piece and by the parameters within it
-    J = [np.zeros((s.instants.size, s.width, d + p)) for s in samples]
-    ideal = [np.empty((s.instants.size, s.width)) for s in samples]
 
-    half = d + len(motion_columns)
-    widths = np.concatenate([steps, [columns[j].step for j in motion_columns]])
-    moving = np.array([*range(d), *(d + j for j in motion_columns)])
-
-    def read_all(pieces: Sequence[tuple[list[IntArray], IntArray, FloatArray]]) -> None:
-        """Read the sensors in the rows of pieces: what they show, and its slopes by state and motion."""
-        for which, (s, w, y, M) in enumerate(zip(samples, out_rows, ideal, J, strict=True)):
-            o = np.concatenate([own[which] for own, _, _ in pieces])
-            if o.size == 0:
-                continue
-            mine = np.concatenate([rows[:, b[which] : b[which + 1]] for _, b, rows in pieces], axis=1)
-            t = s.instants[o]
-            w[o] = mine[0]
-            read = np.empty((mine.shape[0], o.size, s.width))
-            for first in range(0, mine.shape[0], _BATCH):
-                part = slice(first, first + _BATCH)
-                read[part] = predicted(s.sensor, recording, values, t, mine[part])
-            for row, j in enumerate(motion_columns):
-                group, name, size, _ = columns[j]
-                if (group, name) in _ALSO_READ:  # it moves the readings of a given motion, too
-                    for place, sign in ((1 + d + row, 1.0), (1 + half + d + row, -1.0))[: 2 if central else 1]:
-                        moved_values = {**values, (group, name): _current(values, recording, group, name) + sign * size}
-                        read[place] = predicted(s.sensor, recording, moved_values, t, mine[place])
-            y[o] = read[0]
-            other, span = (read[1 + half :], 2.0 * widths) if central else (read[:1], widths)
-            slope = (read[1 : 1 + half] - other) / span[:, None, None]
-            M[o[:, None], :, moving] = np.moveaxis(slope, 0, 1)
-
-    waiting: list[tuple[list[IntArray], IntArray, FloatArray]] = []
-    for i in range(k):
-        start, stop = float(current.edges[i]), float(current.edges[i + 1])
-        own = [np.flatnonzero(piece == i) for piece in piece_of]
-        instants = [s.instants[o] for s, o in zip(samples, own, strict=True)]
-        out = np.concatenate(instants) if instants else np.empty(0)
-        bounds = np.cumsum([0, *(o.size for o in own)])
-        state = current.states[i]
-        last_instant = float(out.max()) if out.size else stop
-        times, last = runner.times(start, stop, last_instant, state)
-        out = np.maximum(out, start)
-
-        # neighbours: two per direction of the state and per parameter of the motion
-        states = [state[None]]
-        flats, wobbles = [flat[None]], [wobble[None]]
-        for sign in (1.0, -1.0) if central else (1.0,):
-            states.append(shifted(plant, state, sign * np.diag(steps)))
-            flats.append(np.broadcast_to(flat, (d, flat.size)))
-            wobbles.append(np.broadcast_to(wobble, (d, len(WOBBLE))))
-            if motion_columns:
-                moved = np.repeat(flat[None], len(motion_columns), axis=0)
-                moved_wobble = np.repeat(wobble[None], len(motion_columns), axis=0)
-                for row, j in enumerate(motion_columns):
-                    group, name, size, given = columns[j]
-                    if (group, name) in WOBBLE:
-                        moved_wobble[row, WOBBLE.index((group, name))] += sign * size
-                        continue
-                    for shape, number in given:
-                        moved[row, place_in_flat(group, shape)] = number
-                    moved[row, place_in_flat(group, name)] += sign * size
-                states.append(np.repeat(state[None], len(motion_columns), axis=0))
-                flats.append(moved)
-                wobbles.append(moved_wobble)
-        all_states, all_flats = np.concatenate(states), np.concatenate(flats)
-        rows, ends = runner.run(
-            np.ascontiguousarray(all_flats), np.concatenate(wobbles), np.ascontiguousarray(all_states), times, last, out
-        )
-        nominal_end = ends[0]
-        end_tangent = difference(plant, ends[1:], np.broadcast_to(nominal_end, ends[1:].shape), d)
-        if central:
-            Phi_Psi = ((end_tangent[:half] - end_tangent[half:]) / (2.0 * widths[:, None])).T  # (d, half)
-        else:
-            Phi_Psi = (end_tangent / widths[:, None]).T
-        Phi, Psi = Phi_Psi[:, :d], Phi_Psi[:, d:]
-
-        waiting.append((own, bounds, rows))
-        if i + 1 == k or sum(rows.shape[1] for *_, rows in waiting) >= _INSTANTS:
-            read_all(waiting)
-            waiting = []
-
-        if i + 1 < k:
-            passes[i, :, :d], passes[i][:, d + np.array(motion_columns, dtype=int)] = Phi, Psi
-            S[i + 1] = Phi @ S[i]
-            S[i + 1, :, u:] += passes[i, :, d:]
-            closing[i + 1] = Phi @ closing[i]
-            gap = difference(plant, current.states[i + 1], nominal_end, d)
-            gaps[i] = gap
-            first = d + i * allowed.size
-            S[i + 1, allowed, first + np.arange(allowed.size)] += 1.0
-            closing[i + 1, forbidden] -= gap[forbidden]
-
-    # parameters of sensors and clocks, from the motion as it is
-    for s, w, M in zip(samples, out_rows, J, strict=True):
-        if not sensor_columns:
-            break
-        rate = None
-        for j in sensor_columns:
-            group, name, size, given = columns[j]
-            if not _concerns(group, s.sensor):
-                continue
-            here = {**values, **{(group, shape): number for shape, number in given}}
+def _add_sensor_columns(around: _Around, s: Sampled, rows: FloatArray, M: FloatArray) -> None:
+    """Write the slopes by parameters of sensors and clocks into M (m, width, d + p), from the motion as it is."""
+    recording, values = around.recording, around.values
+    rate: FloatArray | None = None
+    for j, (group, name, size, given) in enumerate(around.columns):
+        if j in around.motion or not _concerns(group, s.sensor):
+            continue
+        here = {**values, **{(group, shape): number for shape, number in given}}
+        place = around.d + j
+        if group in CLOCKS or (name == "tau_s" and group in CATALOGUE):
+            if rate is None:
+                rate = s.time_slope(around.runner, around.flat, around.wobble, values, around.chain)
             if group in CLOCKS:
-                if rate is None:
-                    rate = s.time_slope(runner, flat, wobble, values, current)
                 base = _current(values, recording, group, name)
                 plus, minus = {**here, (group, name): base + size}, {**here, (group, name): base - size}
-                moved = s.delays(plus) - s.delays(minus)
-                M[:, :, d + j] = -rate * (moved / (2.0 * size))[:, None]
-            elif name == "tau_s" and group in CATALOGUE:
-                if rate is None:
-                    rate = s.time_slope(runner, flat, wobble, values, current)
-                M[:, :, d + j] = -rate * s.lag_slope[:, None]
+                late = (s.delays(plus) - s.delays(minus)) / (2.0 * size)
             else:
-                base = _current(values, recording, group, name)
-                up = predicted(s.sensor, recording, {**here, (group, name): base + size}, s.instants, w)
-                down = predicted(s.sensor, recording, {**here, (group, name): base - size}, s.instants, w)
-                M[:, :, d + j] = (up - down) / (2.0 * size)
-    return _stack(current, samples, ideal, J, piece_of, S, passes, closing, gaps, allowed, u)
+                late = s.lag_slope
+            M[:, :, place] = -rate * late[:, None]
+            continue
+        base = _current(values, recording, group, name)
+        up = predicted(s.sensor, recording, {**here, (group, name): base + size}, s.instants, rows)
+        down = predicted(s.sensor, recording, {**here, (group, name): base - size}, s.instants, rows)
+        M[:, :, place] = (up - down) / (2.0 * size)
 
 
 #: parameters of the motion that also enter what a sensor reads of a given motion
@@ -372,25 +413,16 @@ def _concerns(group: str, sensor: str) -> bool:
 
 
 def _stack(
-    current: Chain,
-    samples: Sequence[Sampled],
-    ideal: Sequence[FloatArray],
-    J: Sequence[FloatArray],
-    piece_of: Sequence[IntArray],
-    S: FloatArray,
-    passes: FloatArray,
-    closing: FloatArray,
-    gaps: FloatArray,
-    allowed: IntArray,
-    u: int,
+    current: Chain, samples: Sequence[Sampled], read: _Read, piece_of: Sequence[IntArray], chained: _Chained
 ) -> Linear:
     """Put the rows of all sensors together, channel by channel, without those that take no part."""
+    S, closing, gaps, allowed, u = chained.moves, chained.closing, chained.gaps, chained.allowed, chained.unknowns
     raw, own, pieces, whole, t, sd, shifts = [], [], [], [], [], [], []
     channels: list[Channel] = []
     at = 0
     d = current.tangent
     p = S.shape[2] - u
-    for s, y, M, piece in zip(samples, ideal, J, piece_of, strict=True):
+    for s, y, M, piece in zip(samples, read.ideal, read.slopes, piece_of, strict=True):
         readings = s.readings
         # what the closing of forbidden jumps adds
         closed = np.einsum("mwd,md->mw", M[:, :, :d], closing[piece])
@@ -450,7 +482,7 @@ def _stack(
         kind,
         where,
         S,
-        passes,
+        chained.passes,
         closing,
         gaps,
         joined(shifts),

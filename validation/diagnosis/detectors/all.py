@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from validation.diagnosis.detectors.dropped_samples import Shifted, dropped_accelerometer, dropped_magnetometer
+from validation.diagnosis.detectors.dropped_samples import Shifted, Slips, dropped_accelerometer
 from validation.diagnosis.detectors.events import events
 from validation.diagnosis.detectors.gusts import gusts
 from validation.diagnosis.detectors.local_problem import asked_of
@@ -45,13 +45,13 @@ __all__ = ["searched"]
 
 
 def searched(
-    loose: Fit, tied: Tied, own: Sequence[Parameter], noise: NoiseModel, least: float = 25.0
+    loose: Fit, tied: Tied, own: Sequence[Parameter], noise: NoiseModel, slips: Slips, least: float = 25.0
 ) -> list[Proposal | Shifted]:
     """Return what all searches propose upon a hypothesis, best first.
 
     ``loose`` is the relaxed fit with its ``noise``, ``tied`` the fit under the hypothesis so far, ``own`` the stated
-    parameters and each recording's unknowns. Without a hypothesis what is missing may have bent the tied fit, and
-    events are looked for from the relaxed one.
+    parameters and each recording's unknowns, ``slips`` what a search remembers of lost samples. Without a hypothesis
+    what is missing may have bent the tied fit, and events are looked for from the relaxed one.
     """
     taken = tied.hypothesis.trials
     fit, level = (loose, noise) if not taken else (tied.fit, tied.fit.noise)
@@ -62,7 +62,7 @@ def searched(
         found += gusts(asked, least)
     found += ripple(tied.fit, tied.fit.noise, taken, least)
     known = [q for q in own if q.key not in WOBBLE]
-    found += dropped_magnetometer(loose, known, taken)
+    found += slips.found(loose, known, taken)
     found += saturation(tied.fit, tied.fit.noise, taken)
     if loose.chains[0].recording.plant != "free_spin":  # there an accelerometer counts by its means over turns
         found += dropped_accelerometer(loose, noise, taken)

@@ -17,7 +17,7 @@ from validation.identification.noise import NoiseModel
 from validation.identification.parameters import Parameter
 from validation.identification.segments import Chain, recut
 
-__all__ = ["Shifted", "dropped_accelerometer", "dropped_magnetometer"]
+__all__ = ["Shifted", "Slips", "dropped_accelerometer", "dropped_magnetometer"]
 
 #: fewest steps of the magnetometer's phase, over all recordings, that are followed up
 _FEWEST_STEPS = 3
@@ -54,9 +54,24 @@ def _losses(id: str, chains: Sequence[Chain], sensor: str) -> tuple[Trial, float
     return Trial(id, (), None, (("fraction", share, sd),)), cost
 
 
-def dropped_magnetometer(
-    fit: Fit, known: Sequence[Parameter], taken: Sequence[Trial] = (), least: float = 40.0
-) -> list[Shifted]:
+class Slips:
+    """Lost samples of the magnetometer as its phase tells them, worked out once for each relaxed fit."""
+
+    def __init__(self) -> None:
+        self._known: list[tuple[Fit, list[Shifted]]] = []
+
+    def found(self, fit: Fit, known: Sequence[Parameter], taken: Sequence[Trial]) -> list[Shifted]:
+        """Return `dropped_magnetometer` of a relaxed fit, unless it is among the effects that are ``taken`` already."""
+        if any(trial.id == "mag.dropped_samples" for trial in taken):
+            return []
+        for asked, answer in self._known:
+            if asked is fit:
+                return answer
+        self._known.append((fit, dropped_magnetometer(fit, known)))
+        return self._known[-1][1]
+
+
+def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = 40.0) -> list[Shifted]:
     """Return lost samples of the magnetometer as a proposal where its phase shows steps.
 
     The motion of a loose fit follows the magnetometer; with steps found it is fitted anew with the samples at their
@@ -64,8 +79,6 @@ def dropped_magnetometer(
     """
     chains = fit.chains
     id, sensor = "mag.dropped_samples", "magnetometer"
-    if any(trial.id == id for trial in taken):
-        return []
     counts = [
         phase_counts(chain.recording) if chain.recording.get(sensor) is not None else np.zeros(0) for chain in chains
     ]

@@ -15,7 +15,7 @@ import numpy as np
 
 from discsim.recording import Recording
 from validation.diagnosis.detectors.all import searched
-from validation.diagnosis.detectors.dropped_samples import Shifted
+from validation.diagnosis.detectors.dropped_samples import Shifted, Slips
 from validation.diagnosis.detectors.events import EARLIEST
 from validation.diagnosis.relaxed_fit import NO_JUMPS, relaxed, unknowns, without_outliers
 from validation.diagnosis.selection.candidates import Trial, parameters_of, trials_for
@@ -28,6 +28,7 @@ from validation.identification.gauss_newton import Fit, merit_of
 from validation.identification.noise import NoiseModel, chi_squared, estimate_noise, robust_noise
 from validation.identification.parameters import Parameter
 from validation.identification.propagation import WOBBLE
+from validation.identification.residual_tests import remainders
 from validation.identification.stated_parameters import stated_parameters
 
 __all__ = ["Considered", "Rival", "Search", "search"]
@@ -50,6 +51,9 @@ _HOPELESS = 10.0
 #: what it counts, in twice the log likelihood, that an effect came out with the sign that physics gives it: a lag and
 #: an offset of time are one to first order; of fits that tie to within what a few readings weigh the lag is named
 _RIGHT_SIGN = 4.0
+#: a refit which expects to stay so much worse than the fit beside it, in chi-squared in the noise of that, is no match
+#: for it: no price nor tie comes near
+_OUT_OF_REACH = 500.0
 #: a gain below this may be due to where the fits started
 _DOUBTFUL = 200.0
 #: a fit whose chi-squared per reading, in the noise of the relaxed fit, is above this is far from the data
@@ -93,6 +97,8 @@ class Search:
     #: readings that were left out: (recording, sensor, axis, time, deviations)
     outliers: list[tuple[int, str, str, float, float]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    #: what the magnetometer's phase told of lost samples, by the relaxed fit that it was asked of
+    slips: Slips = field(default_factory=Slips)
     #: what choosing the samples that were lost has cost, in twice the log likelihood
     cost: float = 0.0
 
@@ -130,9 +136,16 @@ def search(
     base = tied_fit(loose, Hypothesis(), own, noise, start, iterations=_BASE_ITERATIONS[plant])
     if chi2_in(base, noise) < FAR * base.fit.count:
         # beside the data what the baseline has left to gain would pass for what an effect gains
-        base = tied_fit(
-            base.fit, Hypothesis(), own, base.fit.noise, values_of_fit(base), iterations=_BASE_ITERATIONS[plant]
+        again = tied_fit(
+            base.fit,
+            Hypothesis(),
+            own,
+            base.fit.noise,
+            values_of_fit(base),
+            iterations=_BASE_ITERATIONS[plant],
+            bar=merit_of(base.fit, base.fit.linears),
         )
+        base = min(base, again, key=lambda one: one.score)
     found = Search(tuple(as_stated or recordings), own, loose, noise, trials, base, base)
     found.outliers = left_out
     report("refitting candidates", 3, 4)
@@ -154,6 +167,9 @@ def _grown(found: Search, board: Board) -> Tied:
                 continue
         if better is None or len(better.hypothesis.trials) > MOST_EFFECTS:
             break
+        if step == 0 and _far(found, better) and not _told(better) and _no_nearer(found, current, better):
+            # neither one effect nor two come near the data, nor does any lead there
+            return better
         again = _from_there(found, current, better)
         if again is not None:
             # it was not the effect that gained, but where its fit had started
@@ -178,7 +194,8 @@ def _settle(found: Search, final: Tied) -> None:
     for exchanges in range(_EXCHANGES + 1):
         found.final = final
         found.board = board_of(final.fit, found.trials, final.fit.noise, NO_JUMPS[found.recordings[0].plant])
-        found.rivals = _rivals(found)
+        # where the fit is far from the data nothing is named, and nothing need be told apart
+        found.rivals = {} if _lost(found, final) else _rivals(found)
         better = _exchanged(found)
         if better is None or exchanges == _EXCHANGES:
             return
@@ -218,6 +235,28 @@ def _far(found: Search, tied: Tied) -> bool:
     return chi2_in(tied, found.loose_noise) > FAR * tied.fit.count
 
 
+def _lost(found: Search, tied: Tied) -> bool:
+    """Tell whether a fit is far from the data and leaves what is no noise: no answer rests on it."""
+    return _far(found, tied) and bool(remainders(tied.fit.linears, tied.residuals, tied.fit.noise))
+
+
+#: chi-squared per reading, in the noise that it shows, up to which the relaxed fit follows the data
+_FOLLOWED = 2.0
+#: an effect that leaves more than this share of the baseline's chi-squared leads no nearer to the data: of two that
+#: are hidden the larger leaves half of it, or less
+_NO_NEARER = 0.7
+
+
+def _no_nearer(found: Search, before: Tied, after: Tied) -> bool:
+    """Tell whether one fit is not much nearer to the data than another."""
+    return chi2_in(after, found.loose_noise) > _NO_NEARER * chi2_in(before, found.loose_noise)
+
+
+def misses(found: Search, tied: Tied) -> bool:
+    """Tell whether a fit is far from data that the relaxed fit follows: whatever it holds, something is missing."""
+    return _far(found, tied) and found.loose.merit < _FOLLOWED * found.loose.count
+
+
 def _told(tied: Tied | None) -> bool:
     """Tell whether a fit's last effect was found in the readings themselves and is in its chains."""
     return tied is not None and bool(tied.hypothesis.trials[-1].told)
@@ -241,7 +280,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
             (_from_here(p, current), current.fit, 0.0)
             for p in one_per_effect(proposals(near, found.trials, current.hypothesis, found.own))
         ]
-    for item in searched(found.loose, current, found.own, _steady_noise(found)):
+    for item in searched(found.loose, current, found.own, _steady_noise(found), found.slips):
         if isinstance(item, Shifted):
             there.append((item.proposal, replace(found.loose, chains=item.chains), item.cost))
         elif current.hypothesis.trials:
@@ -249,6 +288,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
         else:
             there.append((item, found.loose, 0.0))
     # far from the data the two are asked in different noise: what they gain does not compare
+    there, here = ([offer for offer in some if _on_the_disc(found, offer[0].start)] for some in (there, here))
     worth = _in_turn(there, here) if far and step > 0 else _in_turn([*there, *here])
     fits: list[tuple[float, Tied, Fit, float]] = []
     seen: set[tuple[str, frozenset[int] | None]] = set()
@@ -304,6 +344,19 @@ def _in_turn(*offers: Sequence[Offer]) -> list[Offer]:
     return [offer for turn in zip_longest(*worth) for offer in turn if offer is not None]
 
 
+def _on_the_disc(found: Search, start: Start) -> bool:
+    """Tell whether a start has no sensor and no centre of mass off the disc.
+
+    Of recordings in which such a place hardly shows algebra asks for any number, under which no motion may last.
+    """
+    radius = _radius(found.recordings[0])
+    return all(abs(number) <= radius for (key, _), number in start.items() if key[0] in _ON_THE_DISC)
+
+
+def _radius(recording: Recording) -> float:
+    return np.inf if recording.disc is None else 0.5 * recording.disc.diameter
+
+
 def _consider(found: Search, before: tuple[float, float], refitted: Tied, trial: Trial) -> tuple[float, float]:
     """Note what a trial gains upon a fit of score and chi-squared ``before``; return gain and chi-squared left."""
     score, chi2_before = before
@@ -330,9 +383,13 @@ def _together(found: Search, board: Board) -> Tied | None:
     """
     base, noise = found.base, found.loose_noise
     before = base.score, chi2_in(base, noise)
-    for pair in pairs(board, found.trials, found.own)[:_PAIRS_REFITTED]:
+    sensible = [pair for pair in pairs(board, found.trials, found.own) if _on_the_disc(found, pair.start)]
+    for pair in sensible[:_PAIRS_REFITTED]:
         start = {**pair.start, **_wobbles(found.loose)}
-        both = tied_fit(found.loose, pair.hypothesis, found.own, noise, start)
+        # it counts only where it comes near the data
+        both = tied_fit(
+            found.loose, pair.hypothesis, found.own, noise, start, bar=_HOPELESS * FAR * found.base.fit.count
+        )
         both = replace(both, score=both.score + found.cost)
         for trial in pair.hypothesis.trials:
             _consider(found, before, both, trial)
@@ -399,7 +456,7 @@ def _possible(tied: Tied) -> bool:
     sd = np.sqrt(np.maximum(np.diag(tied.fit.covariance), 0.0))
     recording = tied.fit.chains[0].recording
     plant = recording.plant
-    radius = np.inf if recording.disc is None else 0.5 * recording.disc.diameter
+    radius = _radius(recording)
     for q, value, error in zip(tied.fit.parameters, tied.fit.at, sd, strict=True):
         if q.key in ONE_SIDED and ONE_SIDED[q.key] * value < -3.0 * error:
             return False
@@ -423,6 +480,7 @@ def _pruned(found: Search, current: Tied, kept: Trial | None = None) -> Tied:
                 found.own,
                 current.fit.noise,
                 values_of_fit(current),
+                bar=merit_of(current.fit, current.fit.linears) + _OUT_OF_REACH,
             )
             less = replace(less, score=less.score + found.cost)
             if less.score - current.score < price(trial) and (weakest is None or less.score < weakest.score):
@@ -476,6 +534,7 @@ def _rivals(found: Search) -> dict[str, list[Rival]]:
                 found.own,
                 final.fit.noise,
                 _from_here(proposal, final).start,
+                bar=merit_of(final.fit, final.fit.linears) + _OUT_OF_REACH,
             )
             other_fit = replace(other_fit, score=other_fit.score + found.cost)
             rivals[trial.name].append(Rival(scoped, other_fit.score - final.score, other_fit))

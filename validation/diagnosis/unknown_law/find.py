@@ -193,12 +193,14 @@ def _more_terms(
     held-out likelihood over the law without it.
     """
     terms: tuple[Term, ...] = (first,)
-    if not remainders(tied.fit.linears, tied.residuals, tied.fit.noise):
-        return tied, terms
+    if len(start.chains) < 2 or not remainders(tied.fit.linears, tied.residuals, tied.fit.noise):
+        return tied, terms  # and where no other recording could bear a further term out
     plant = start.chains[0].recording.plant
     held = tuple(q for q in tied.fit.parameters if q.group == "law")
     beside = Fit(start.chains, (*own, *held), tied.fit.at, start.jumps, start.noise, tied.fit.fixed)
     beside = refit(beside, iterations=3)
+    if not np.isfinite(beside.merit):
+        return tied, terms  # under this law no motion lasts: there is nothing beside it to ask
     coefficient = float(tied.fit.at[[q.name for q in tied.fit.parameters].index("0.coefficient")])
     powers = {q.name: float(v) for q, v in zip(tied.fit.parameters, tied.fit.at, strict=True) if q.group == "law"}
     settled = replace(first, powers=tuple((s, powers.get(f"0.power_{s}", n)) for s, n in first.powers))
