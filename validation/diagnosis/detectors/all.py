@@ -13,6 +13,7 @@ from validation.diagnosis.detectors.gusts import gusts
 from validation.diagnosis.detectors.local_problem import asked_of
 from validation.diagnosis.detectors.saturation import saturation
 from validation.diagnosis.detectors.speed_ripple import ripple
+from validation.diagnosis.detectors.time_offsets import time_offsets
 from validation.diagnosis.selection.constrained_fit import Tied
 from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import Fit
@@ -64,6 +65,7 @@ def searched(
     known = [q for q in own if q.key not in WOBBLE]
     found += slips.found(loose, known, taken)
     found += saturation(tied.fit, tied.fit.noise, taken)
+    found += time_offsets(tied.fit, tied.fit.noise, taken)
     if loose.chains[0].recording.plant != "free_spin":  # there an accelerometer counts by its means over turns
         found += dropped_accelerometer(loose, noise, taken)
     return sorted(found, key=lambda p: p.proposal.gain if isinstance(p, Shifted) else p.gain, reverse=True)

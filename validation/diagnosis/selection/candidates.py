@@ -14,7 +14,7 @@ from validation.identification.competing_effects import row_of, rows
 from validation.identification.parameters import Parameter
 from validation.identification.propagation import Column
 
-__all__ = ["Trial", "parameters_of", "trials_for"]
+__all__ = ["Trial", "free_trial", "parameters_of", "trials_for"]
 
 
 @dataclass(frozen=True)
@@ -93,18 +93,21 @@ def trials_for(recordings: Sequence[Recording]) -> tuple[Trial, ...]:
     for id in available(recordings):
         if id in SEARCHED:
             continue
-        row = row_of(id)
-        assert row is not None
         if id == "gyro.g_sensitivity" and "accelerometer" not in recordings[0].sheets:
             continue
         shapes: list[tuple[tuple[str, float], ...]] = [()]
-        shaped = _SHAPES.get(id, ())
-        for name, values in shaped:
+        for name, values in _SHAPES.get(id, ()):
             shapes = [(*shape, (name, value)) for shape in shapes for value in values]
-        free = [name for name in row.parameters if name not in {name for name, _ in shaped}]
-        for shape in shapes:
-            trials.append(Trial(id, tuple(Column(id, name, _step(id, name), shape) for name in free)))
+        trials += [free_trial(id, shape) for shape in shapes]
     return tuple(trials)
+
+
+def free_trial(id: str, shape: tuple[tuple[str, float], ...] = ()) -> Trial:
+    """Return the trial of an effect in all recordings with every parameter free but those of its ``shape``."""
+    row = row_of(id)
+    assert row is not None
+    free = [name for name in row.parameters if name not in {name for name, _ in shape}]
+    return Trial(id, tuple(Column(id, name, _step(id, name), shape) for name in free))
 
 
 #: a shape is uncertain by about this much before it is fitted: keeps first steps short

@@ -166,7 +166,8 @@ def hypotheses(recordings: Sequence[Recording], price: float = 0.0) -> Ranking:
         as_written = Hypothesis("", "", Columns(), *misfit(base.signals, Columns()))
         if as_written.cost < price:
             return Ranking(as_written, (), base)
-        found += [*_offsets(base), *_field(base), *_rivals(base)]
+        if any(np.any(np.isfinite(one.rate)) for one in base.signals):
+            found += [*_offsets(base), *_field(base), *_rivals(base)]
     if base.signals:
         found += list(_one_sensor(base))
     found += list(_boards(some))

@@ -148,14 +148,14 @@ def averages(t: FloatArray, value: ComplexArray | FloatArray, grid: FloatArray, 
 
 
 def spin_signals(recording: Recording) -> SpinSignals | None:
-    """Return the slow signals of a recording; None where nothing shows a spin fast enough.
+    """Return the slow signals of a recording; None where nothing shows a spin fast enough, nor is there a path.
 
     The phase is the field's; without a magnetometer the angle of what shows the rate (a reference, a command, an
-    unclipped gyroscope).
+    unclipped gyroscope). Without any a path still tells by itself which way is up, and where it starts.
     """
     found = _phase(recording)
     if found is None:
-        return None
+        return _path_alone(recording)
     source, phase, start, stop = found
     if stop - start < FEWEST * STEP + 0.2:
         return None
@@ -205,6 +205,17 @@ def spin_signals(recording: Recording) -> SpinSignals | None:
         {name: axis for name in ("magnetometer", "gyroscope") if (axis := turning_line(recording, name)) is not None},
         _reference(recording, float(grid[-1])),
     )
+
+
+def _path_alone(recording: Recording) -> SpinSignals | None:
+    """Return the signals of a recording in which no sensor shows the spin: its path; None where there is none."""
+    fixes = path_fixes(recording)
+    if fixes is None:
+        return None
+    grid = np.arange(float(fixes.t[0]) + 0.1, float(fixes.t[-1]) - 0.1, STEP)
+    path = _path(recording, grid) if grid.size >= FEWEST else None
+    silent = np.full(grid.size, np.nan)
+    return None if path is None else SpinSignals(recording, grid, silent, False, silent, silent, silent, path=path)
 
 
 def _reference(recording: Recording, end: float) -> tuple[FloatArray, FloatArray, FloatArray] | None:

@@ -1,0 +1,88 @@
+"""Offsets of time on a rig, found by shifting a sensor's readings along the motion that the others tell.
+
+Takes a fit of rigs; gives proposals of ``accel.time_offset`` and ``gyro.time_offset``, and of the lag that looks alike
+where a sensor is late. A linear question finds small offsets; a ramp and its corners are not linear over tens of
+milliseconds. In the air, where all sensors turn, phases tell the same before anything is fitted
+(`validation.diagnosis.setup`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.effects.catalogue import RIGS
+from discsim.written import PREFIX
+from validation.diagnosis.selection.candidates import Trial, free_trial
+from validation.diagnosis.selection.proposals import Proposal
+from validation.identification.gauss_newton import Fit
+from validation.identification.noise import NoiseModel
+from validation.identification.observations import group_of
+from validation.identification.prediction import shown
+from validation.identification.segments import Chain
+from validation.identification.sensor_model import delay
+
+__all__ = ["time_offsets"]
+
+#: offsets that are tried, s: up to twice the longest of a first setup, at the spacing of an ordinary sensor's samples;
+#: and the spacing of the motion that readings are compared with
+_TRIED, _GRID = np.arange(-0.3, 0.3001, 0.005), 0.002
+#: an offset smaller than this is found by a linear question
+_LEAST = 0.01
+#: a lag is looked for up to this, s: a low-pass of 1 Hz
+_LONGEST_LAG = 0.15
+
+
+def time_offsets(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: float = 25.0) -> list[Proposal]:
+    """Return offsets of time, and lags, of the sensors of a rig whose readings do not turn with the field.
+
+    What is gained is in chi-squared in ``noise``; effects that are ``taken`` already are not proposed.
+    """
+    if fit.chains[0].recording.plant not in RIGS:
+        return []
+    found = []
+    for sensor in ("accelerometer", "gyroscope"):
+        prefix = PREFIX[sensor]
+        if any(trial.id in (f"{prefix}.time_offset", f"{prefix}.lag") for trial in taken):
+            continue
+        left = sum((_left(chain, fit.values(i), sensor, noise) for i, chain in enumerate(fit.chains)), np.zeros(1))
+        best = int(np.argmin(left))
+        offset = float(_TRIED[best]) if left.size > 1 else 0.0
+        gain = float(left[int(np.argmin(np.abs(_TRIED)))] - left[best]) if offset else 0.0
+        if abs(offset) < _LEAST or gain < least:
+            continue
+        found.append(_proposal(f"{prefix}.time_offset", "offset_s", offset, gain))
+        if 0.0 < offset <= _LONGEST_LAG:
+            found.append(_proposal(f"{prefix}.lag", "tau_s", offset, gain))
+    return found
+
+
+def _proposal(id: str, name: str, value: float, gain: float) -> Proposal:
+    return Proposal(free_trial(id), gain, {((id, name), None): value})
+
+
+def _left(chain: Chain, values: dict[tuple[str, str], float], sensor: str, noise: NoiseModel) -> FloatArray:
+    """Return what a motion leaves of a sensor (tried,) at each offset, in chi-squared; (1,) without readings."""
+    readings = next((r for r in chain.readings if r.sensor == sensor), None)
+    if readings is None or readings.taken is not None:
+        return np.zeros(1)
+    good = readings.good & np.isfinite(readings.value)
+    used = np.flatnonzero(good.any(axis=1))
+    grid = np.arange(float(chain.edges[0]), float(chain.edges[-1]), _GRID)
+    if used.size == 0 or grid.size < 2:
+        return np.zeros(1)
+    sd = np.array([noise[group_of(sensor, axis)].sd for axis in range(readings.value.shape[1])])
+    told = shown(chain, values, sensor, grid) / sd
+    value = np.where(good, readings.value, np.nan)[used] / sd
+    at = (readings.t - delay(values, sensor, readings.t))[used]
+    left = np.empty(_TRIED.size)
+    for k, offset in enumerate(_TRIED):
+        there = at - offset
+        inside = (there >= grid[0]) & (there <= grid[-1])
+        shifted = np.column_stack([np.interp(there, grid, column) for column in told.T])
+        # where the motion is not known the readings count as they do on the whole
+        squares = np.nansum((value - shifted) ** 2, axis=1)
+        left[k] = float(np.sum(squares[inside])) * used.size / max(int(np.count_nonzero(inside)), 1)
+    return left
