@@ -438,9 +438,14 @@ def _first_look(fit: Fit) -> Fit:
 def beginning(current: Chain, length: float) -> Chain:
     """Return the pieces of a chain's first ``length`` s and the readings within them."""
     count = min(max(1, int(np.searchsorted(current.edges, length))), len(current.states))
-    end = float(current.edges[count])
-    readings = tuple(replace(r, good=r.good & (r.t < end - 0.03)[:, None]) for r in current.readings)
-    return replace(current, edges=current.edges[: count + 1], states=current.states[:count], readings=readings)
+    within = {r.sensor: r.t < float(current.edges[count]) - 0.03 for r in current.readings}
+    lost = {
+        sensor: counts[within[sensor]] if counts.size == within[sensor].size else counts
+        for sensor, counts in current.lost.items()
+    }
+    readings = tuple(r.at(within[r.sensor]) for r in current.readings)
+    edges, states = current.edges[: count + 1], current.states[:count]
+    return replace(current, edges=edges, states=states, readings=readings, lost=lost)
 
 
 #: a reading this many standard deviations off, alone among its neighbours, is left out and listed

@@ -25,7 +25,16 @@ from validation.identification.dynamics import (
 )
 from validation.identification.observations import group_of
 from validation.identification.prediction import Sampled
-from validation.identification.propagation import FLAT_ENVIRONMENT, WOBBLE, Column, base_flat, place_in_flat, runner_of
+from validation.identification.propagation import (
+    EVENT_REACH,
+    EVENTS,
+    FLAT_ENVIRONMENT,
+    WOBBLE,
+    Column,
+    base_flat,
+    place_in_flat,
+    runner_of,
+)
 from validation.identification.segments import STEPS, Chain, difference, shifted, stepped
 from validation.identification.sensor_model import CLOCKS, Values, is_motion, predicted, value
 
@@ -223,6 +232,21 @@ class _Around:
         turned = np.flatnonzero(np.any(tangents != 0.0, axis=1))
         self.states[:, turned] = shifted(recording.plant, current.states[:, None], tangents[turned])
 
+        self._events = {
+            row: t
+            for row, column in enumerate([columns[j] for j in self.motion], 1 + d)
+            if (t := _instant(column, values)) is not None
+        }
+
+    def acting(self, start: float, stop: float) -> IntArray:
+        """Return the neighbours (a,) that may part from the motion between two instants: an event moves nothing else.
+
+        All before where there is none.
+        """
+        still = [row for row, t in self._events.items() if not start - EVENT_REACH < t < stop + EVENT_REACH]
+        still += [row + self.half for row in still] if self.central else []
+        return np.setdiff1d(np.arange(self.flats.shape[0]), still)
+
     def _set_parameter(self, row: int, column: Column, sign: float) -> None:
         """Move a parameter of the motion in one row of neighbours."""
         group, name, size, given = column
@@ -233,10 +257,14 @@ class _Around:
             self.flats[row, place_in_flat(group, shape)] = number
         self.flats[row, place_in_flat(group, name)] += sign * size
 
-    def slopes(self, values: FloatArray) -> FloatArray:
-        """Return slopes (half, ...) from what the motion and its neighbours give (c, ...)."""
-        ahead = values[1 : 1 + self.half]
-        behind, span = (values[1 + self.half :], 2.0 * self.widths) if self.central else (values[:1], self.widths)
+    def slopes(self, values: FloatArray, acting: IntArray | None = None) -> FloatArray:
+        """Return slopes (half, ...) from what the motion and its neighbours give (c, ...), or those that are acting."""
+        half, widths = self.half, self.widths
+        if acting is not None:
+            chosen = acting[(acting > 0) & (acting <= half)]
+            half, widths = chosen.size, widths[chosen - 1]
+        ahead = values[1 : 1 + half]
+        behind, span = (values[1 + half :], 2.0 * widths) if self.central else (values[:1], widths)
         return np.asarray((ahead - behind) / span.reshape(-1, *(1,) * (values.ndim - 1)))
 
 
@@ -264,33 +292,53 @@ class _Read:
         around, edges = self._around, self._around.chain.edges
         k = around.states.shape[0]
         ends = np.empty(around.states.shape)
-        waiting: list[tuple[list[IntArray], FloatArray]] = []
+        waiting: list[tuple[list[IntArray], IntArray, FloatArray]] = []
+        acted = np.arange(around.flats.shape[0])
         for i in range(k):
             start, stop = float(edges[i]), float(edges[i + 1])
             own = [np.flatnonzero(piece == i) for piece in piece_of]
             instants = [s.instants[o] for s, o in zip(self._samples, own, strict=True)]
-            out = np.concatenate(instants) if instants else np.empty(0)
-            last_instant = float(out.max()) if out.size else stop
+            # sensors of one board share their instants: the motion at each is worked out once
+            out, place = np.unique(np.concatenate([np.empty(0), *instants]), return_inverse=True)
+            last_instant = float(out[-1]) if out.size else stop
             times, last = around.runner.times(start, stop, last_instant, around.chain.states[i])
-            rows, ends[i] = around.runner.run(
-                around.flats, around.wobbles, around.states[i], times, last, np.maximum(out, start)
+            acting = around.acting(start, float(times[-1]))
+            if not np.array_equal(acting, acted):
+                self._read(waiting, acted)
+                waiting, acted = [], acting
+            rows, there = around.runner.run(
+                around.flats[acting],
+                around.wobbles[acting],
+                around.states[i, acting],
+                times,
+                last,
+                np.maximum(out, start),
             )
-            waiting.append((own, rows))
-            if i + 1 == k or sum(rows.shape[1] for _, rows in waiting) >= _INSTANTS:
-                self._read(waiting)
+            ends[i] = there[0]
+            ends[i, acting] = there
+            waiting.append((own, place, rows))
+            if i + 1 == k or sum(rows.shape[1] for *_, rows in waiting) >= _INSTANTS:
+                self._read(waiting, acted)
                 waiting = []
         return ends
 
-    def _read(self, pieces: Sequence[tuple[list[IntArray], FloatArray]]) -> None:
-        """Read the sensors in the rows of pieces."""
+    def _read(self, pieces: Sequence[tuple[list[IntArray], IntArray, FloatArray]], acting: IntArray) -> None:
+        """Read the sensors in the rows of pieces, which are those of the neighbours that are ``acting`` there.
+
+        A piece is the readings of each sensor in it, the place of each among its instants, and its rows.
+        """
+        if not pieces:
+            return
         around = self._around
-        bounds = [np.cumsum([0, *(o.size for o in own)]) for own, _ in pieces]
+        row_of_neighbour = {int(neighbour): row for row, neighbour in enumerate(acting)}
+        bounds = [np.cumsum([0, *(o.size for o in own)]) for own, *_ in pieces]
         for which, s in enumerate(self._samples):
-            o = np.concatenate([own[which] for own, _ in pieces])
+            o = np.concatenate([own[which] for own, *_ in pieces])
             if o.size == 0:
                 continue
             mine = np.concatenate(
-                [rows[:, b[which] : b[which + 1]] for b, (_, rows) in zip(bounds, pieces, strict=True)], axis=1
+                [rows[:, place[b[which] : b[which + 1]]] for b, (_, place, rows) in zip(bounds, pieces, strict=True)],
+                axis=1,
             )
             t = s.instants[o]
             self.rows[which][o] = mine[0]
@@ -298,12 +346,14 @@ class _Read:
             for first in range(0, mine.shape[0], _BATCH):
                 part = slice(first, first + _BATCH)
                 shown[part] = predicted(s.sensor, around.recording, around.values, t, mine[part])
-            for row, j in enumerate(around.motion, 1 + around.d):
+            for neighbour, j in enumerate(around.motion, 1 + around.d):
                 if around.columns[j].key in _ALSO_READ:  # it moves the readings of a given motion, too
-                    for place, sign in ((row, 1.0), (row + around.half, -1.0))[: 2 if around.central else 1]:
-                        shown[place] = self._also_moved(s.sensor, t, mine[place], around.columns[j], sign)
+                    for other, sign in ((neighbour, 1.0), (neighbour + around.half, -1.0))[: 1 + around.central]:
+                        row = row_of_neighbour[other]
+                        shown[row] = self._also_moved(s.sensor, t, mine[row], around.columns[j], sign)
             self.ideal[which][o] = shown[0]
-            self.slopes[which][o[:, None], :, around.places] = np.moveaxis(around.slopes(shown), 0, 1)
+            slopes, ahead = around.slopes(shown, acting), acting[(acting > 0) & (acting <= around.half)]
+            self.slopes[which][o[:, None], :, around.places[ahead - 1]] = np.moveaxis(slopes, 0, 1)
 
     def _also_moved(self, sensor: str, t: FloatArray, rows: FloatArray, column: Column, sign: float) -> FloatArray:
         """Return what a sensor reads where a parameter moves its readings beside the motion."""
@@ -393,6 +443,13 @@ def _current(values: Values, recording: Recording, group: str, name: str) -> flo
     if (group, name) in WOBBLE:
         return 0.0
     return float(parameters(recording.environment, recording.disc, recording.rig)[parameter_index(group, name)])
+
+
+def _instant(column: Column, values: Values) -> float | None:
+    """Return when the event is that a column belongs to, s; None of what is no short event."""
+    if column.group not in EVENTS:
+        return None
+    return dict(column.given).get("t_s", values.get((column.group, "t_s")))
 
 
 def _moves(column: Column) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,6 +38,18 @@ class Readings:
     #: written times and weights (w, n) of the samples that each reading is a mean of; None where it is one sample
     taken: FloatArray | None = None
     weights: FloatArray | None = None
+
+    def at(self, chosen: BoolArray) -> Readings:
+        """Return some of the readings, ``chosen`` (n,)."""
+        return replace(
+            self,
+            t=self.t[chosen],
+            value=self.value[chosen],
+            good=self.good[chosen],
+            clipped=self.clipped[chosen],
+            taken=None if self.taken is None else self.taken[:, chosen],
+            weights=None if self.weights is None else self.weights[:, chosen],
+        )
 
 
 def readings_of(recording: Recording) -> tuple[Readings, ...]:

@@ -52,8 +52,8 @@ RIPPLE = 0.3
 
 
 #: longest step of a free spin, s: the moments of the air change within 20 ms of release; and in radians of nutation:
-#: over 0.2 s at 120 rad/s a wobble of 3.6 rad/s is 4e-4 rad/s off, a tenth of a good gyroscope's noise
-_FREE_STEP, _FREE_NUTATION = 0.005, 0.3
+#: over 0.2 s at 120 rad/s a wobble of 3.6 rad/s is 1.2e-4 rad/s off, a thirtieth of a good gyroscope's noise
+_FREE_STEP, _FREE_NUTATION = 0.005, 0.22
 
 
 class Column(NamedTuple):
@@ -199,8 +199,8 @@ def _knots(recording: Recording) -> FloatArray:
 
 def _events(values: Values, columns: Sequence[Column] = ()) -> tuple[tuple[float, float], ...]:
     """Return instants and widths of short events among values and among the shapes that columns are taken at."""
-    found = {values[group, "t_s"] for group in _EVENTS if (group, "t_s") in values}
-    found |= {number for column in columns if column.group in _EVENTS for name, number in column.given if name == "t_s"}
+    found = {values[group, "t_s"] for group in EVENTS if (group, "t_s") in values}
+    found |= {number for column in columns if column.group in EVENTS for name, number in column.given if name == "t_s"}
     return tuple((t, 0.01) for t in sorted(found))
 
 
@@ -211,7 +211,8 @@ def _order(values: Values, columns: Sequence[Column] = ()) -> float:
     return max(abs(order) for order in found)
 
 
-_EVENTS = ("event.impulse", "event.spin_step")
+#: short events, and how far from its instant one acts, s: six times its width of 10 ms, and what an instant is moved by
+EVENTS, EVENT_REACH = ("event.impulse", "event.spin_step"), 0.08
 
 
 _UNEVEN_BODY = (

@@ -101,6 +101,13 @@ class Search:
     slips: Slips = field(default_factory=Slips)
     #: what choosing the samples that were lost has cost, in twice the log likelihood
     cost: float = 0.0
+    _asked: tuple[Fit, Board] | None = None
+
+    def board_of(self, fit: Fit) -> Board:
+        """Return what every effect would do to a fit, in its own noise; of the last fit that was asked it is known."""
+        if self._asked is None or self._asked[0] is not fit:
+            self._asked = fit, board_of(fit, self.trials, fit.noise, NO_JUMPS[self.recordings[0].plant])
+        return self._asked[1]
 
     def at_base(self) -> Search:
         """Return the search as if nothing had been found."""
@@ -134,7 +141,7 @@ def search(
     report("fitting the baseline", 2, 4)
     start = {**_start(board, Hypothesis(), own), **_wobbles(loose)}
     base = tied_fit(loose, Hypothesis(), own, noise, start, iterations=_BASE_ITERATIONS[plant])
-    if chi2_in(base, noise) < FAR * base.fit.count:
+    if chi2_in(base, noise) < FAR * base.fit.count and base.fit.iterations >= _BASE_ITERATIONS[plant]:
         # beside the data what the baseline has left to gain would pass for what an effect gains
         again = tied_fit(
             base.fit,
@@ -193,7 +200,7 @@ def _settle(found: Search, final: Tied) -> None:
     """Take a fit as the final one, its effects exchanged for rivals that explain more for their parameters."""
     for exchanges in range(_EXCHANGES + 1):
         found.final = final
-        found.board = board_of(final.fit, found.trials, final.fit.noise, NO_JUMPS[found.recordings[0].plant])
+        found.board = found.board_of(final.fit)
         # where the fit is far from the data nothing is named, and nothing need be told apart
         found.rivals = {} if _lost(found, final) else _rivals(found)
         better = _exchanged(found)
@@ -275,7 +282,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
         # beside the data a refit goes on from the present fit: from the pieces it would have to be tied again
         there += [(p, found.loose, 0.0) if far else (_from_here(p, current), current.fit, 0.0) for p in ranked]
     if not far or step > 0:
-        near = board_of(current.fit, found.trials, current.fit.noise, NO_JUMPS[found.recordings[0].plant])
+        near = found.board_of(current.fit)
         here += [
             (_from_here(p, current), current.fit, 0.0)
             for p in one_per_effect(proposals(near, found.trials, current.hypothesis, found.own))
