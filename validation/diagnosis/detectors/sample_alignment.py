@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.compiled import compiled_nogil
 from discsim.recording import Recording, Samples
 from validation.identification.linearisation import IntArray
 from validation.identification.prediction import shown
@@ -41,21 +42,30 @@ def likeliest_counts(cost: FloatArray, gaps: IntArray, each: float = _COST) -> t
     ``gaps`` (n,) is by how many sampling intervals a sample follows the one before: more than one may be lost in a row
     only within `_IN_A_ROW` of each.
     """
+    counts = np.zeros(cost.shape[0], dtype=np.int64)
+    least = _walk(np.ascontiguousarray(cost), np.asarray(gaps, dtype=np.int64), float(each), counts)
+    return counts, float(least)
+
+
+@compiled_nogil
+def _walk(cost: FloatArray, gaps: IntArray, each: float, counts: IntArray) -> float:
+    """Write `likeliest_counts` into counts (n,) and return their cost (Viterbi)."""
     n, c = cost.shape
-    best = cost[0] + each * np.arange(c)
+    best, new = cost[0] + each * np.arange(c), np.empty(c)
     came = np.zeros((n, c), dtype=np.int64)
     for k in range(1, n):
-        reach = min(_IN_A_ROW * max(int(gaps[k]), 1), c - 1)
-        options = np.full((reach + 1, c), np.inf)
-        for j in range(reach + 1):
-            options[j, j:] = best[: c - j] + each * j
-        came[k] = np.argmin(options, axis=0)
-        best = options[came[k], np.arange(c)] + cost[k]
-    counts = np.zeros(n, dtype=np.int64)
-    counts[-1] = int(np.argmin(best))
+        reach = min(_IN_A_ROW * max(gaps[k], 1), c - 1)
+        for i in range(c):
+            least = best[i]
+            for j in range(1, min(reach, i) + 1):
+                if best[i - j] + each * j < least:
+                    least, came[k, i] = best[i - j] + each * j, j
+            new[i] = least + cost[k, i]
+        best, new = new, best
+    counts[n - 1] = np.argmin(best)
     for k in range(n - 1, 0, -1):
         counts[k - 1] = counts[k] - came[k, counts[k]]
-    return counts, float(best.min())
+    return float(best.min())
 
 
 def grid_of(samples: Samples, rate_hz: float) -> IntArray:
