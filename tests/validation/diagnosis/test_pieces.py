@@ -34,10 +34,12 @@ from discsim.recording import Recording, Samples
 from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, record
 from discsim.trajectory import predict
+from validation.diagnosis.relaxed_fit import beginning
+from validation.identification import linearisation
 from validation.identification.linearisation import Linear, linearise
 from validation.identification.observations import readings_of
 from validation.identification.prediction import shown
-from validation.identification.propagation import WOBBLE, Column
+from validation.identification.propagation import WOBBLE, Column, base_flat, runner_of
 from validation.identification.segments import STEPS, Chain, chain, recut, shifted
 from validation.identification.sensor_model import predicted
 
@@ -487,3 +489,50 @@ def test_columns_of_a_free_spin_are_those_of_the_whole_motion():
         assert_column(linear, linear.local[:, k], (moved[1] - moved[0]) / (2.0 * h), 1e-3, k)
     for j, column in enumerate(columns):
         assert_column(linear, linear.shared[:, j], slope_of(one, values, column.key, column.step), 2e-3, column)
+
+
+def test_an_event_s_columns_are_the_same_whether_or_not_quiet_pieces_are_left_out(monkeypatch: pytest.MonkeyPatch):
+    """A knock moves nothing in pieces that it does not touch: there its neighbours are not run."""
+    motion = clean()
+    one = beside(motion, recorded(motion), 4)
+    columns = [Column("event.impulse", f"dv_{axis}_m_s", 0.02, (("t_s", 0.4),)) for axis in ("north", "down")]
+    columns.append(Column("event.spin_step", "dr_rad_s", 0.02, (("t_s", 0.7),)))
+    jumps = np.zeros(12, dtype=np.bool_)
+    made = [linearise(one, {}, columns, jumps, central=central) for central in (True, False)]
+    monkeypatch.setattr(linearisation, "EVENT_REACH", 10.0)
+    for linear, central in zip(made, (True, False), strict=True):
+        every = linearise(one, {}, columns, jumps, central=central)
+        np.testing.assert_allclose(linear.own, every.own, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(linear.passes, every.passes, rtol=1e-9, atol=1e-9)
+        assert np.any(linear.own[:, 12:] != 0.0, axis=0).all()
+
+
+def test_a_look_at_the_beginning_holds_no_later_readings():
+    """Later ones, clipped, would speak in the fit, and all would cost as much as a look at everything."""
+    motion = clean()
+    whole = beside(motion, recorded(motion), 3)
+    short = beginning(replace(whole, lost={"gyroscope": np.arange(whole.readings[2].t.size, dtype=float)}), 0.3)
+    assert short.readings[2].sensor == "gyroscope"
+    for readings, before in zip(short.readings, whole.readings, strict=True):
+        assert readings.t.max() < 0.3 < before.t.max()
+        assert readings.good.shape == readings.clipped.shape == readings.value.shape
+        assert readings.value.shape[0] == readings.t.size
+    assert short.lost["gyroscope"].size == short.readings[2].t.size
+
+
+def test_a_path_alone_is_flown_in_longer_steps_and_is_the_same_path():
+    """Its steps need not follow the nutation of a body that is uneven, which no sensor shows."""
+    motion = clean()
+    values = values_of(effect("body.inertia_asymmetry", dIyy_kg_m2=2e-5))
+    whole = recorded(motion)
+    alone = replace(whole, samples={"gps": whole.samples["gps"]})
+    runners = [runner_of(one, values) for one in (whole, alone)]
+    state = beside(motion, whole, 1).states[0]
+    steps = [runner.times(0.0, 0.9, 0.9, state)[0].size for runner in runners]
+    assert steps[1] < 0.6 * steps[0]
+    paths = []
+    for runner in runners:
+        times, last = runner.times(0.0, 0.9, 0.9, state)
+        flat, wobble = base_flat(whole, values)[None], np.zeros((1, len(WOBBLE)))
+        paths.append(runner.run(flat, wobble, state[None], times, last, np.linspace(0.0, 0.9, 30))[0][0, :, :3])
+    np.testing.assert_allclose(*paths, atol=1e-4)

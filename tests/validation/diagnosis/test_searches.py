@@ -16,6 +16,7 @@ from discsim.recording import Recording, Samples
 from discsim.rig import turn_table
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
+from validation.diagnosis.detectors import dropped_samples
 from validation.diagnosis.detectors.dropped_samples import dropped_accelerometer
 from validation.diagnosis.detectors.events import events
 from validation.diagnosis.detectors.gusts import gusts
@@ -23,7 +24,9 @@ from validation.diagnosis.detectors.local_problem import Asked, asked_of
 from validation.diagnosis.detectors.sample_alignment import likeliest_counts, phase_counts
 from validation.diagnosis.detectors.saturation import saturation
 from validation.diagnosis.detectors.speed_ripple import ripple
+from validation.diagnosis.detectors.time_offsets import time_offsets
 from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain, relaxed
+from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.constrained_fit import tied_fit
 from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.identification.clipping import equal_beyond_chance, plateau_of
@@ -80,9 +83,9 @@ def shown_noise(fit: Fit):  # type: ignore[no-untyped-def]
     return estimate_noise(fit.linears, [linear.residual for linear in fit.linears])
 
 
-def table(*hidden: Effect) -> Recording:
+def table(*hidden: Effect, errors: tuple[Effect, ...] = ()) -> Recording:
     motion = turn_table(PROFILE, FIELD, hidden)
-    module = Instruments.from_parts("mpu9250").with_effects([])
+    module = Instruments.from_parts("mpu9250").with_effects(errors)
     return record(motion, module, np.random.default_rng(4), plant="rate_table", name="table", command=PROFILE)
 
 
@@ -235,3 +238,36 @@ def test_a_table_with_ripple_turns_as_in_the_engine() -> None:
     rate = shown(chain, values, "gyroscope", t)[:, 2]
     # the first piece starts from nothing turned; its steps of 0.3 rad of the ripple leave some 1e-5 of its amplitude
     assert np.max(np.abs(rate - motion.at(t).rate[:, 2])) < 1e-4 * 0.05 + 1e-6
+
+
+def offsets_found(*errors: Effect) -> dict[str, float]:
+    """Return what is proposed for a table: effect to its first value."""
+    made = relaxed([table(errors=errors)])
+    tied = tied_fit(made, Hypothesis(), (), shown_noise(made), {})
+    return {p.trial.id: next(iter(p.start.values())) for p in time_offsets(tied.fit, tied.fit.noise)}
+
+
+@pytest.mark.parametrize("offset", [-0.08, -0.03, 0.05])
+@pytest.mark.parametrize("sensor", ["accel", "gyro"])
+def test_an_offset_of_time_on_a_table_is_found_on_either_side(sensor: str, offset: float) -> None:
+    """A late sensor may lag instead: that is proposed, too, and fits decide."""
+    found = offsets_found(effect(f"{sensor}.time_offset", offset_s=offset))
+    assert found.pop(f"{sensor}.time_offset") == pytest.approx(offset, abs=0.006)
+    late = {f"{sensor}.lag"} if offset > 0.0 else set()
+    assert set(found) == late
+
+
+def test_no_offset_of_time_is_proposed_for_a_sound_table() -> None:
+    assert offsets_found() == {}
+
+
+def test_what_the_phase_tells_of_losses_is_worked_out_once_for_a_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+    monkeypatch.setattr(dropped_samples, "dropped_magnetometer", lambda fit, known: calls.append(fit) or [])
+    slips, one, other = dropped_samples.Slips(), loose(), replace(loose())
+    taken = [Trial("mag.dropped_samples", ())]
+    assert slips.found(one, (), taken) == []
+    assert calls == []
+    for fit in (one, one, other):
+        slips.found(fit, (), ())
+    assert calls == [one, other]

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from discsim.disc import Release
 from discsim.effects import Effect, effect
 from discsim.recording import PLANTS, Recording, Samples, read_recording, write_recording
 from discsim.written import as_written
@@ -147,6 +148,17 @@ def test_without_a_rate_reference_a_flipped_magnetometer_is_a_gyroscope_flipped_
     both = {(item.id, item.setting["axes"]) for item in (one.effect, *one.twins)}
     assert {("mag.axes", "x -y z"), ("gyro.axes", "x y -z")} <= both
     assert "these recordings cannot tell that from" in one.sentence
+
+
+def test_directions_of_a_path_are_found_where_no_sensor_shows_the_spin(sound):
+    """No magnetometer, and a gyroscope that clips: heights and stated releases are all there is."""
+    fault = effect("gps.axes", axes="east north up")
+    bare = [replace(one, samples={"gps": one.samples["gps"]}) for one in sound["flight"]]
+    stated = [replace(one, release=Release(velocity=one.samples["gps"].value[0, 3:])) for one in bare]
+    for some in (bare, stated):
+        assert find_setup_faults(some).faults == ()
+    (told,) = found(stated, fault)
+    assert (told.effect, told.twins) == (fault, ())
 
 
 def without(recording: Recording, sensor: str) -> Recording:
