@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import BOARD, Effect, by_id
+from discsim.effects.catalogue import Effect, by_id
+from discsim.effects.kind import BOARD
 from discsim.effects.setup import (
     AccelerometerUnit,
     Axes,

@@ -12,7 +12,8 @@ import numpy as np
 
 from discsim.arrays import FloatArray, readonly
 from discsim.disc import Disc, Release, Rig
-from discsim.effects.catalogue import BOARD, Effect, by_id
+from discsim.effects.catalogue import Effect, by_id
+from discsim.effects.kind import BOARD
 from discsim.effects.sensors import AccelerometerBias, ClockRate, CrossAxis, GSensitivity, GyroscopeBias, Scale
 from discsim.errors import InputError
 from discsim.files import model_file

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 
 import numpy as np
 
@@ -17,75 +16,6 @@ from validation.identification.linearisation import Linear
 from validation.identification.normal_equations import local_step
 
 __all__ = ["located_effect", "located_rest"]
-
-#: effect -> (the state that its trace grows with, what an experimenter sees)
-_TRACES: Mapping[str, tuple[str, str]] = MappingProxyType(
-    {
-        "air.wind": ("time aloft", "velocity drifts along a fixed compass direction whatever the heading of the throw"),
-        "air.wind_shear": (
-            "height",
-            "velocity drifts along a fixed compass direction, more so the higher the disc flies",
-        ),
-        "air.gust": ("time", "velocity and lift change for a moment and come back"),
-        "air.density": ("speed", "all forces and moments of the air are off by one and the same factor"),
-        "air.ground_effect": ("nearness of the ground", "the lift is off just above the ground"),
-        "aero.spin_side_force": ("advance ratio (spin over speed)", "a sideways force that changes side with the spin"),
-        "aero.spin_lift": ("advance ratio (spin over speed)", "lift that spin adds, whichever way it turns"),
-        "aero.spin_drag": ("advance ratio (spin over speed)", "drag that spin adds"),
-        "aero.spin_pitching_moment": ("advance ratio (spin over speed)", "a pitching moment that spin adds"),
-        "aero.stall": ("angle of attack", "lift is lost above an angle of attack"),
-        "aero.yaw_reynolds": ("speed", "the spin decays by a coefficient that changes with speed"),
-        "aero.yaw_quadratic": (
-            "advance ratio (spin over speed)",
-            "the spin decays faster than in proportion to itself",
-        ),
-        "aero.yaw_alpha": ("angle of attack", "the spin decays faster at high angles of attack"),
-        "body.mass_imbalance": ("spin", "sensor and air act off the centre of mass: a trace that turns with the disc"),
-        "body.inertia_asymmetry": ("wobble", "the wobble pulses at twice the spin"),
-        "event.impulse": ("an instant", "the velocity jumps at one instant: a touch"),
-        "event.spin_step": ("an instant", "the spin jumps at one instant"),
-        "rig.coulomb_friction": ("slowness", "a torque that does not get smaller as the rig slows down"),
-        "rig.quadratic_drag": ("spin", "a torque that grows with the square of the spin"),
-        "rig.axis_tilt": ("spin phase", "gravity and field seem to turn with the table"),
-        "rig.speed_ripple": ("angle turned", "the rate pulses with the angle turned"),
-        "mag.hard_iron": ("nothing: it is constant", "a constant field in body axes"),
-        "mag.soft_iron": ("field in body axes", "the field is bent: the circle of the readings is an ellipse"),
-        "mag.lag": ("spin", "readings are late and too small, more so the faster the disc spins"),
-        "mag.stray_field": ("nearness of the ground", "a foreign field fixed to the ground, stronger near it"),
-        "mag.clock_rate": ("time", "its spin phase runs away from that of the other sensors"),
-        "mag.dropped_samples": ("time, in steps", "its spin phase steps ahead each time a sample is lost"),
-        "accel.lag": ("spin", "readings are late and too small, more so the faster the disc spins"),
-        "accel.clock_rate": ("time", "its spin phase runs away from that of the other sensors"),
-        "accel.dropped_samples": ("time, in steps", "its spin phase steps ahead each time a sample is lost"),
-        "accel.position_offset": ("square of the spin", "a reading that grows with the square of the spin"),
-        "accel.bias": ("nothing: it is constant", "a constant reading in body axes"),
-        "accel.bias_drift": ("time", "a reading that grows with time"),
-        "accel.scale": ("specific force", "readings are off in proportion to themselves"),
-        "accel.cross_axis": ("specific force on another axis", "one axis shows a share of another"),
-        "accel.saturation": ("specific force", "readings stop below the stated range"),
-        "gyro.lag": ("spin", "readings are late and too small, more so the faster the disc spins"),
-        "gyro.clock_rate": ("time", "its phase runs away from that of the other sensors"),
-        "gyro.bias": ("nothing: it is constant", "a constant reading in body axes"),
-        "gyro.scale": ("rate", "readings are off in proportion to themselves"),
-        "gyro.g_sensitivity": ("specific force", "readings grow with the specific force"),
-        "gps.clock_rate": ("time", "fixes run away from the motion that the other sensors show"),
-        "gps.latency": ("speed", "fixes show where the disc was a moment before"),
-        "clock.rate": ("time", "all rates and times are off by one and the same factor"),
-        "mag.axes": ("nothing: it is constant", "the magnetometer's columns hold other axes than stated"),
-        "accel.axes": ("nothing: it is constant", "the accelerometer's columns hold other axes than stated"),
-        "gyro.axes": ("nothing: it is constant", "the gyroscope's columns hold other axes than stated"),
-        "gps.axes": ("nothing: it is constant", "the GPS's columns hold other directions than stated"),
-        "mag.units": ("field", "fields are off by the factor between two units"),
-        "accel.units": ("specific force", "specific forces are off by the factor between two units"),
-        "gyro.units": ("rate", "rates are off by the factor between two units"),
-        "mag.time_offset": ("spin", "readings are early or late by one and the same time, all of their size there"),
-        "accel.time_offset": ("spin", "readings are early or late by one and the same time, all of their size there"),
-        "gyro.time_offset": ("rate of change", "readings are early or late by one and the same time"),
-        "board.rotation": ("the vector itself", "all sensors of the board show what is along other axes of the disc"),
-        "site.field": ("nothing: it is constant", "the field points elsewhere, or is of another size, than stated"),
-        "clock.units": ("time", "times are off by the factor between two units"),
-    }
-)
 
 #: share of the excess that is worth a line
 _WORTH = 0.05
@@ -135,7 +65,7 @@ def located_effect(found: Search, trial: Trial, names: Sequence[str]) -> list[Lo
     excess = excess_of(without(found, trial), found.final.residuals, found.board.linears, sd)
     row, own = row_of(trial.id), user_effect(trial.id)
     assert row is not None
-    grows, text = _TRACES[trial.id] if own is None else (None, own.text)
+    grows, text = (row.grows_with, row.trace) if own is None else (None, own.text)
     mine = {key: value for key, value in excess.items() if trial.recordings is None or key[0] in trial.recordings}
     total = sum(max(float(np.sum(value)), 0.0) for value in mine.values())
     traced = total > 0

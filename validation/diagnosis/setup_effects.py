@@ -13,7 +13,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import BOARD, Effect, effect, row
+from discsim.effects.catalogue import Effect, effect, row
+from discsim.effects.kind import BOARD
 from discsim.model_file import ModelEffect
 from discsim.recording import Recording
 from discsim.written import PREFIX

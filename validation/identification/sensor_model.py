@@ -28,17 +28,7 @@ __all__ = ["CLOCKS", "Values", "delay", "is_motion", "predicted", "to_body", "va
 Values: TypeAlias = Mapping[tuple[str, str], float]
 
 #: the effects that only move the instants at which samples were taken
-CLOCKS = (
-    "clock.rate",
-    "mag.clock_rate",
-    "accel.clock_rate",
-    "gyro.clock_rate",
-    "gps.clock_rate",
-    "gps.latency",
-    "mag.time_offset",
-    "accel.time_offset",
-    "gyro.time_offset",
-)
+CLOCKS = tuple(row.id for row in CATALOGUE.values() if row.moves_time)
 _FIELD = ("magnetic_north", "magnetic_east", "magnetic_down")
 _BASELINE = {(row.id, name): none for row in CATALOGUE.values() for name, none in row.sizes.items()}
 

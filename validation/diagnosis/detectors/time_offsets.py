@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import RIGS
+from discsim.effects.kind import RIGS
 from discsim.written import PREFIX
 from validation.diagnosis.selection.candidates import Trial, free_trial
 from validation.diagnosis.selection.proposals import Proposal

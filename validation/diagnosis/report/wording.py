@@ -11,14 +11,11 @@ from collections.abc import Mapping
 from html import escape
 from math import atan2, degrees, floor, hypot, log10
 from types import MappingProxyType
-from typing import NamedTuple
 
 from discsim.effects.catalogue import CATALOGUE
 from validation.diagnosis.result import Confusion, ParameterValue
 
 __all__ = [
-    "FORMULAE",
-    "Formula",
     "everyday",
     "form",
     "found",
@@ -35,145 +32,6 @@ __all__ = [
 
 _NO_SETTING: Mapping[str, str] = MappingProxyType({})
 
-
-class Formula(NamedTuple):
-    """What an effect is called and its form as HTML, parameters in braces."""
-
-    name: str
-    form: str
-
-
-_LAG = "{tau_s} ẏ = x − y, y the reading"
-_CLOCK = "written time = {ratio} × true time, of {clock}"
-_DROPPED = "a share of {fraction} of the {sensor}'s samples is lost, the rest written as if none were"
-_AXES = "columns x, y, z hold {axes} of the body"
-_UNIT = "numbers are written in {written_in}"
-_OFFSET = "written time = true time + {offset_s}"
-
-FORMULAE: Mapping[str, Formula] = MappingProxyType(
-    {
-        "air.wind": Formula(
-            "a steady wind", "V is relative to a wind of {w_north_m_s} to the north and {w_east_m_s} to the east"
-        ),
-        "air.wind_shear": Formula(
-            "a wind that grows with height",
-            "w(h) = ({w_north_m_s} north, {w_east_m_s} east) · (h / 10 m)<sup>{exponent}</sup>",
-        ),
-        "air.gust": Formula(
-            "a gust",
-            "w(t) = ({w_north_m_s} north, {w_east_m_s} east) · exp(−½ ((t − {t_s}) / {width_s})<sup>2</sup>)",
-        ),
-        "air.density": Formula("another air density", "ρ → {ratio} · ρ"),
-        "air.ground_effect": Formula(
-            "ground effect", "C<sub>L</sub> → C<sub>L</sub> · (1 + {k} · exp(−h / 2d)), h the height"
-        ),
-        "aero.spin_side_force": Formula("a side force of the spin", "C<sub>Y</sub> = {CYr} · γ"),
-        "aero.spin_lift": Formula("lift that grows with spin", "C<sub>L</sub> += {CLr} · |γ|"),
-        "aero.spin_drag": Formula("drag that grows with spin", "C<sub>D</sub> += {CDrr} · γ<sup>2</sup>"),
-        "aero.spin_pitching_moment": Formula("a pitching moment of the spin", "C<sub>M</sub> += {CMr} · γ"),
-        "aero.stall": Formula(
-            "a stall",
-            "C<sub>L</sub> −= {k} · CLa · (α − {alpha_stall_rad}) where α is above {alpha_stall_rad}",
-        ),
-        "aero.yaw_reynolds": Formula(
-            "yaw damping that changes with airspeed", "CNr → CNr · (V / 15 m/s)<sup>{exponent}</sup>"
-        ),
-        "aero.yaw_quadratic": Formula("yaw damping that grows with spin", "C<sub>N</sub> += {CNrr} · γ |γ|"),
-        "aero.yaw_alpha": Formula(
-            "yaw damping that grows with angle of attack", "C<sub>N</sub> += {CNraa} · γ α<sup>2</sup>"
-        ),
-        "body.mass_imbalance": Formula(
-            "a centre of mass off the middle", "centre of mass at ({ex_m}, {ey_m}, 0) in body axes"
-        ),
-        "body.inertia_asymmetry": Formula("unequal transverse inertia", "Iyy = Ixx + {dIyy_kg_m2}"),
-        "event.impulse": Formula(
-            "a touch that changed the velocity",
-            "Δv = ({dv_north_m_s} north, {dv_east_m_s} east, {dv_down_m_s} down) at t = {t_s}",
-        ),
-        "event.spin_step": Formula("a kick that changed the spin", "Δr = {dr_rad_s} at t = {t_s}"),
-        "rig.coulomb_friction": Formula("dry friction in the bearing", "torque −{torque_N_m} · sign(r)"),
-        "rig.quadratic_drag": Formula("air drag on the rig", "torque −{coefficient_N_m_s2} · r |r|"),
-        "rig.axis_tilt": Formula("a tilted axis", "axis along ({tilt_north_rad} north, {tilt_east_rad} east, 1 down)"),
-        "rig.speed_ripple": Formula(
-            "a ripple of the table's speed",
-            "r = r<sub>command</sub> + {amplitude_rad_s} · sin({order} ψ + {phase_rad}), ψ the angle turned",
-        ),
-        "mag.hard_iron": Formula("a magnet on board (hard iron)", "m → m + ({bx_uT}, {by_uT}, {bz_uT}) in body axes"),
-        "mag.soft_iron": Formula(
-            "iron on board that bends the field (soft iron)",
-            "m → (I + S) m, S symmetric: xx {sxx}, xy {sxy}, xz {sxz}, yy {syy}, yz {syz}, zz {szz}",
-        ),
-        "mag.lag": Formula("a magnetometer that lags", _LAG),
-        "mag.stray_field": Formula(
-            "a stray magnetic field near the ground",
-            "m += ({bn_uT} north, {be_uT} east, {bd_uT} down) · exp(−h / {height_m})",
-        ),
-        "mag.clock_rate": Formula("a wrong clock of the magnetometer", _CLOCK.replace("{clock}", "the magnetometer")),
-        "mag.dropped_samples": Formula(
-            "lost samples of the magnetometer", _DROPPED.replace("{sensor}", "magnetometer")
-        ),
-        "accel.lag": Formula("an accelerometer that lags", _LAG),
-        "accel.clock_rate": Formula(
-            "a wrong clock of the accelerometer", _CLOCK.replace("{clock}", "the accelerometer")
-        ),
-        "accel.dropped_samples": Formula(
-            "lost samples of the accelerometer", _DROPPED.replace("{sensor}", "accelerometer")
-        ),
-        "accel.position_offset": Formula(
-            "an accelerometer that sits elsewhere than stated", "position = stated + ({dx_m}, {dy_m}, {dz_m})"
-        ),
-        "accel.bias": Formula("a bias of the accelerometer", "f → f + ({bx_m_s2}, {by_m_s2}, {bz_m_s2})"),
-        "accel.bias_drift": Formula(
-            "a drifting bias of the accelerometer", "f → f + ({bx_m_s3}, {by_m_s3}, {bz_m_s3}) · t"
-        ),
-        "accel.scale": Formula(
-            "a scale error of the accelerometer",
-            "f<sub>i</sub> → (1 + s<sub>i</sub>) f<sub>i</sub>, s = ({sx}, {sy}, {sz})",
-        ),
-        "accel.cross_axis": Formula(
-            "cross-axis sensitivity of the accelerometer",
-            "f → (I + S) f, S: xy {sxy}, xz {sxz}, yx {syx}, yz {syz}, zx {szx}, zy {szy}",
-        ),
-        "accel.saturation": Formula(
-            "an accelerometer that clips below its range", "|f<sub>i</sub>| is cut at {limit_m_s2}"
-        ),
-        "gyro.lag": Formula("a gyroscope that lags", _LAG),
-        "gyro.clock_rate": Formula("a wrong clock of the gyroscope", _CLOCK.replace("{clock}", "the gyroscope")),
-        "gyro.bias": Formula("a bias of the gyroscope", "ω → ω + ({bx_rad_s}, {by_rad_s}, {bz_rad_s})"),
-        "gyro.scale": Formula(
-            "a scale error of the gyroscope",
-            "ω<sub>i</sub> → (1 + s<sub>i</sub>) ω<sub>i</sub>, s = ({sx}, {sy}, {sz})",
-        ),
-        "gyro.g_sensitivity": Formula(
-            "a gyroscope that feels acceleration",
-            "ω<sub>i</sub> → ω<sub>i</sub> + k<sub>i</sub> f<sub>i</sub>, k = ({kx}, {ky}, {kz})",
-        ),
-        "gps.clock_rate": Formula("a wrong clock of the GPS", _CLOCK.replace("{clock}", "the GPS")),
-        "gps.latency": Formula("GPS fixes that come late", "a fix stamped t shows the state at t − {delay_s}"),
-        "clock.rate": Formula("a wrong clock of the recorder", _CLOCK.replace("{clock}", "all sensors")),
-        "mag.axes": Formula("a magnetometer whose axes are mixed up", _AXES),
-        "accel.axes": Formula("an accelerometer whose axes are mixed up", _AXES),
-        "gyro.axes": Formula("a gyroscope whose axes are mixed up", _AXES),
-        "gps.axes": Formula(
-            "a GPS in other directions than stated", "columns north, east, down, and their velocities, hold {axes}"
-        ),
-        "mag.units": Formula("a magnetometer in another unit", _UNIT),
-        "accel.units": Formula("an accelerometer in another unit", _UNIT),
-        "gyro.units": Formula("a gyroscope in another unit", _UNIT),
-        "mag.time_offset": Formula("times of the magnetometer that are shifted", _OFFSET),
-        "accel.time_offset": Formula("times of the accelerometer that are shifted", _OFFSET),
-        "gyro.time_offset": Formula("times of the gyroscope that are shifted", _OFFSET),
-        "board.rotation": Formula(
-            "a sensor board that is turned in the disc",
-            "readings = C<sup>T</sup> (true vector), C the rotation by ({rx_rad}, {ry_rad}, {rz_rad})",
-        ),
-        "site.field": Formula(
-            "another magnetic field than stated",
-            "stated field turned about down by {declination_rad}, dipped further by {inclination_rad}, times {ratio}",
-        ),
-        "clock.units": Formula("times in another unit", "times of all sensors are written in {written_in}"),
-    }
-)
 
 #: ending of a parameter's name -> unit; the first that fits holds
 _UNITS = (
@@ -193,13 +51,12 @@ _UNITS = (
     ("_m", "m"),
     ("_s", "s"),
 )
-_OTHER_UNITS = MappingProxyType({("gyro.g_sensitivity", name): "rad/s per m/s²" for name in ("kx", "ky", "kz")})
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def name_of(id: str) -> str:
     """Return what an effect is called; an effect of the user's own goes by its id."""
-    return FORMULAE[id].name if id in FORMULAE else id
+    return CATALOGUE[id].title if id in CATALOGUE else id
 
 
 def telling_apart(id: str, other: Confusion) -> str:
@@ -211,8 +68,8 @@ def telling_apart(id: str, other: Confusion) -> str:
 
 def unit(id: str, name: str) -> str:
     """Return the unit of an effect's parameter; empty where it has none."""
-    if (id, name) in _OTHER_UNITS:
-        return _OTHER_UNITS[id, name]
+    if id in CATALOGUE and name in CATALOGUE[id].units:
+        return CATALOGUE[id].units[name]
     before, per, after = name.rpartition("_per_")
     if per:
         return f"{unit(id, before)} per {unit(id, f'_{after}')}".strip()
@@ -273,12 +130,12 @@ def with_unit(id: str, name: str, item: ParameterValue) -> str:
 
 def form(id: str) -> str:
     """Return an effect's form with its symbols, as HTML; empty where the catalogue has none."""
-    return _filled(id, {}) if id in FORMULAE else ""
+    return _filled(id, {}) if id in CATALOGUE else ""
 
 
 def found(id: str, parameters: Mapping[str, ParameterValue], setting: Mapping[str, str] = _NO_SETTING) -> str:
     """Return an effect's form with the values found, as HTML; what is not among them is at its baseline."""
-    if id not in FORMULAE:
+    if id not in CATALOGUE:
         return ", ".join(f"{escape(name)} = {with_unit(id, name, item)}" for name, item in parameters.items())
     values = {name: f"{size:g}" for name, size in CATALOGUE[id].sizes.items()}
     values |= {name: f"<b>{text.replace('-', '−')}</b>" for name, text in setting.items()}
@@ -290,7 +147,7 @@ def _filled(id: str, values: Mapping[str, str]) -> str:
     return re.sub(
         r"\{(\w+)\}",
         lambda place: values.get(place[1], f"<i>{symbol(place[1])}</i>"),
-        FORMULAE[id].form,
+        CATALOGUE[id].form,
     )
 
 

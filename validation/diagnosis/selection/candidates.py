@@ -40,26 +40,8 @@ class Trial:
         return dict(self.columns[0].given) if self.columns else {}
 
 
-#: effect -> parameters that shape it, each with the values tried first
-_SHAPES: dict[str, tuple[tuple[str, tuple[float, ...]], ...]] = {
-    "air.wind_shear": (("exponent", (0.12, 0.25, 0.5, 1.0)),),
-    "aero.stall": (("alpha_stall_rad", (0.03, 0.06, 0.1, 0.14, 0.18, 0.22, 0.28)),),
-    "mag.stray_field": (("height_m", (0.3, 0.6, 1.2, 2.5, 6.0)),),
-}
-#: effects that a linear question about the whole recording does not find: searched for on their own
-SEARCHED = (
-    "air.gust",
-    "event.impulse",
-    "event.spin_step",
-    "rig.speed_ripple",
-    "mag.dropped_samples",
-    "accel.dropped_samples",
-    "accel.saturation",
-)
 #: a parameter is held this many steps wide, so that one without a trace in the readings stays where it is
 _LOOSE = 1e5
-#: a free spin's accelerometer counts by its means over turns alone, which these do not move
-_UNSEEN_IN_FREE_SPIN = ("accel.lag", "accel.clock_rate", "accel.dropped_samples", "accel.time_offset")
 #: share of an effect's scale that a difference is taken over
 _STEP = 0.1
 
@@ -78,9 +60,7 @@ def available(recordings: Sequence[Recording]) -> list[str]:
     sensors = {sensor for recording in recordings for sensor in recording.samples}
     found = []
     for row in rows():
-        if plant not in row.plants:
-            continue
-        if plant == "free_spin" and row.id in _UNSEEN_IN_FREE_SPIN:
+        if plant not in row.plants or plant in row.unseen_on:
             continue
         if not row.settings and row.acts_with(sensors):
             found.append(row.id)
@@ -91,12 +71,14 @@ def trials_for(recordings: Sequence[Recording]) -> tuple[Trial, ...]:
     """Return the trials of all effects that enter linearly, at each of their shapes."""
     trials = []
     for id in available(recordings):
-        if id in SEARCHED:
+        row = row_of(id)
+        assert row is not None
+        if row.searched:
             continue
         if id == "gyro.g_sensitivity" and "accelerometer" not in recordings[0].sheets:
             continue
         shapes: list[tuple[tuple[str, float], ...]] = [()]
-        for name, values in _SHAPES.get(id, ()):
+        for name, values in row.grid.items():
             shapes = [(*shape, (name, value)) for shape in shapes for value in values]
         trials += [free_trial(id, shape) for shape in shapes]
     return tuple(trials)
@@ -110,16 +92,6 @@ def free_trial(id: str, shape: tuple[tuple[str, float], ...] = ()) -> Trial:
     return Trial(id, tuple(Column(id, name, _step(id, name), shape) for name in free))
 
 
-#: a shape is uncertain by about this much before it is fitted: keeps first steps short
-_SHAPE_SIGMA = {
-    ("air.wind_shear", "exponent"): 0.5,
-    ("aero.stall", "alpha_stall_rad"): 0.1,
-    ("mag.stray_field", "height_m"): 20.0,
-    ("air.gust", "t_s"): 1.0,
-    ("air.gust", "width_s"): 1.0,
-}
-
-
 def parameters_of(trial: Trial, *, shaped: bool = True) -> tuple[Parameter, ...]:
     """Return the parameters of a trial for a fit, its shapes among them where ``shaped``."""
     row = row_of(trial.id)
@@ -131,6 +103,6 @@ def parameters_of(trial: Trial, *, shaped: bool = True) -> tuple[Parameter, ...]
     ]
     if shaped:
         for name, value in trial.shapes.items():
-            sigma = _SHAPE_SIGMA.get((trial.id, name), float("inf"))
+            sigma = row.grid_sigma.get(name, float("inf"))
             found.append(Parameter(trial.id, name, value, _step(trial.id, name), sigma, trial.recordings))
     return tuple(found)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from discsim.effects.catalogue import CATALOGUE
 from validation.diagnosis.selection.candidates import Trial, parameters_of
 
 __all__ = ["price"]
@@ -26,30 +27,16 @@ OTHER_DISC = 40.0
 RIVAL = 8.0
 
 
+#: within which parameters make sense, the effects' and a rig's own
 BOUNDS: Mapping[tuple[str, str], tuple[float, float]] = {
-    ("air.wind_shear", "exponent"): (-0.5, 3.0),
-    ("aero.stall", "alpha_stall_rad"): (-0.2, 0.8),
-    ("mag.stray_field", "height_m"): (0.05, 100.0),
-    ("air.gust", "width_s"): (0.03, 6.0),
-    ("air.density", "ratio"): (0.2, 5.0),
-    **{(f"{s}.lag", "tau_s"): (0.0, 0.2) for s in ("mag", "accel", "gyro")},
-    **{(f"{s}.clock_rate", "ratio"): (0.7, 1.4) for s in ("mag", "accel", "gyro", "gps")},
-    ("clock.rate", "ratio"): (0.7, 1.4),
-    ("gps.latency", "delay_s"): (0.0, 2.0),
-    **{(f"{s}.time_offset", "offset_s"): (-2.0, 2.0) for s in ("mag", "accel", "gyro")},
-    ("site.field", "ratio"): (0.2, 5.0),
+    **{(row.id, name): bounds for row in CATALOGUE.values() for name, bounds in row.bounds.items()},
     ("rig", "viscous"): (0.0, np.inf),
-    ("rig.speed_ripple", "order"): (0.02, 200.0),
-    ("accel.saturation", "limit_m_s2"): (0.5, np.inf),
 }
 
 
 #: parameters whose sign physics fixes: friction brakes, a lag is late
 ONE_SIDED: Mapping[tuple[str, str], float] = {
-    ("rig.coulomb_friction", "torque_N_m"): 1.0,
-    ("rig.quadratic_drag", "coefficient_N_m_s2"): 1.0,
-    ("gps.latency", "delay_s"): 1.0,
-    **{(f"{s}.lag", "tau_s"): 1.0 for s in ("mag", "accel", "gyro")},
+    (row.id, name): sign for row in CATALOGUE.values() for name, sign in row.sign.items()
 }
 
 

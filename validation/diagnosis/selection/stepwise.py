@@ -24,6 +24,7 @@ from validation.diagnosis.selection.evidence import ONE_SIDED, RIVAL, price
 from validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
 from validation.diagnosis.selection.proposals import Proposal, one_per_effect, pairs, proposals, start_of
 from validation.diagnosis.selection.screening import Board, board_of, free_columns
+from validation.identification.competing_effects import row_of
 from validation.identification.gauss_newton import Fit, merit_of
 from validation.identification.noise import NoiseModel, chi_squared, estimate_noise, robust_noise
 from validation.identification.parameters import Parameter
@@ -357,7 +358,13 @@ def _on_the_disc(found: Search, start: Start) -> bool:
     Of recordings in which such a place hardly shows algebra asks for any number, under which no motion may last.
     """
     radius = _radius(found.recordings[0])
-    return all(abs(number) <= radius for (key, _), number in start.items() if key[0] in _ON_THE_DISC)
+    return all(abs(number) <= radius for (key, _), number in start.items() if _is_place(key[0]))
+
+
+def _is_place(id: str) -> bool:
+    """Tell whether an effect's parameters are distances from the disc's centre or from another place on it, m."""
+    row = row_of(id)
+    return row is not None and row.on_disc
 
 
 def _radius(recording: Recording) -> float:
@@ -451,10 +458,6 @@ def _from_here(proposal: Proposal, current: Tied) -> Proposal:
     return replace(proposal, start={**values_of_fit(current), **own})
 
 
-#: effects whose parameters are distances from the disc's centre or from another place on it, m
-_ON_THE_DISC = ("accel.position_offset", "body.mass_imbalance")
-
-
 def _possible(tied: Tied) -> bool:
     """Tell whether a fit's parameters make sense.
 
@@ -469,7 +472,7 @@ def _possible(tied: Tied) -> bool:
             return False
         if q.key == ("event.spin_step", "t_s") and value < EARLIEST[plant]:
             return False
-        if q.group in _ON_THE_DISC and abs(value) - 3.0 * error > radius:
+        if _is_place(q.group) and abs(value) - 3.0 * error > radius:
             return False
     return True
 

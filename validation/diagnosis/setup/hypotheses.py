@@ -15,7 +15,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import RIGS, Effect, effect
+from discsim.effects.catalogue import Effect, effect
+from discsim.effects.kind import RIGS
 from discsim.effects.setup import axes_of
 from discsim.recording import Recording
 from discsim.written import corrected

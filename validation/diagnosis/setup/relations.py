@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import RIGS
+from discsim.effects.kind import RIGS
 from validation.diagnosis.setup.spin_signals import STEP, ComplexArray, Locked, SpinSignals
 
 __all__ = ["Columns", "Misfit", "misfit", "misfits", "wanted_force"]

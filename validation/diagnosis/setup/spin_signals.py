@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import RIGS
+from discsim.effects.kind import RIGS
 from discsim.recording import Recording
 from validation.diagnosis.consistency.turning import rate_of
 from validation.identification.initial.path import local_cubics, path_fixes

@@ -1,0 +1,91 @@
+"""What a row of the catalogue says of an effect: its type, what it acts on, how people read it, how a fit treats it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+__all__ = ["AIRBORNE", "BOARD", "EVERYWHERE", "FLIGHT", "RIGS", "Row"]
+
+FLIGHT = ("flight",)
+AIRBORNE = ("flight", "free_spin")
+RIGS = ("rate_table", "spin_down")
+EVERYWHERE = ("flight", "rate_table", "spin_down", "free_spin")
+#: the sensors that share one board
+BOARD = frozenset({"magnetometer", "accelerometer", "gyroscope"})
+
+_NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
+class Row(NamedTuple):
+    """One effect of the catalogue.
+
+    ``acts_on`` is "motion", the sensor it belongs to, "clock" for all of a recording's sensors or "board" for those
+    that share one; ``scale`` gives a small but visible size of each parameter, in its unit; an ``event`` happens in
+    one recording; a ``setup`` fault is one of what was set up or stated, and no physics.
+
+    For a reader: ``title`` is what the effect is called, ``form`` its form as HTML with parameters in braces,
+    ``grows_with`` the state that its trace grows with, ``trace`` what an experimenter sees; ``units`` are those of
+    parameters whose names do not tell.
+
+    For a fit, by a parameter's name: ``bounds`` within which it makes sense, the ``sign`` that physics gives it,
+    ``positive`` those that have no meaning at or below zero, ``grid`` the values at which a parameter that shapes the
+    effect is tried first, and ``grid_sigma`` how uncertain it is before it is fitted. An effect is ``searched`` where a
+    detector finds it and no linear question about whole recordings does; it ``moves_time`` where it moves nothing but
+    the instants at which samples were taken; its parameters are places ``on_disc``; on the plants of ``unseen_on`` no
+    reading shows it.
+    """
+
+    id: str
+    type: type[Any]
+    acts_on: str
+    plants: tuple[str, ...]
+    scale: tuple[float, ...]
+    event: bool = False
+    setup: bool = False
+    title: str = ""
+    form: str = ""
+    grows_with: str = ""
+    trace: str = ""
+    units: Mapping[str, str] = _NOTHING
+    bounds: Mapping[str, tuple[float, float]] = _NOTHING
+    sign: Mapping[str, float] = _NOTHING
+    positive: tuple[str, ...] = ()
+    grid: Mapping[str, tuple[float, ...]] = _NOTHING
+    grid_sigma: Mapping[str, float] = _NOTHING
+    searched: bool = False
+    moves_time: bool = False
+    on_disc: bool = False
+    unseen_on: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """The id as an identifier (``air_wind``)."""
+        return self.id.replace(".", "_")
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters, which are numbers, units in the name."""
+        return tuple(self.sizes)
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """Names of the settings, which are texts; no fit can move one."""
+        return tuple(name for name, none in self.baseline._asdict().items() if isinstance(none, str))
+
+    @property
+    def sizes(self) -> dict[str, float]:
+        """The parameters at the baseline, by name."""
+        return {name: none for name, none in self.baseline._asdict().items() if not isinstance(none, str)}
+
+    @property
+    def baseline(self) -> Any:
+        """The effect at its baseline: no effect."""
+        return self.type()
+
+    def acts_with(self, sensors: Collection[str]) -> bool:
+        """Tell whether it can act on a recording that has these sensors."""
+        if self.acts_on == "board":
+            return not BOARD.isdisjoint(sensors)
+        return self.acts_on in ("motion", "clock") or self.acts_on in sensors
