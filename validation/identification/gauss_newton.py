@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
-from validation.identification.linearisation import Linear, linearise, moved
+from validation.identification.linearisation import Linear, linearise, moved, reread
 from validation.identification.noise import NoiseModel, chi_squared
 from validation.identification.normal_equations import WOBBLE_REACH, Reduced, local_step, reduce, shared_step
 from validation.identification.parameters import Jumps, Parameter, values_of
@@ -87,6 +87,16 @@ def linearised(
         return linear
 
     return tuple(mapped(one, range(len(fit.chains)) if only is None else only))
+
+
+def _reread(fit: Fit) -> tuple[Linear, ...] | None:
+    """Return the linearisations of a fit with residuals where its chains stand and slopes as they were, if they can."""
+
+    def one(index: int) -> Linear | None:
+        return reread(fit.chains[index], fit.values(index), fit.linears[index])
+
+    found = mapped(one, range(len(fit.chains)))
+    return None if any(linear is None for linear in found) else tuple(found)
 
 
 def linearised_columns(fit: Fit, columns: Sequence[Column]) -> tuple[Linear, ...]:
@@ -181,7 +191,7 @@ def _gone_on(
         least = max(tolerance, 1e-7 * fit.merit)
         if fit.merit - expected < least and not open_gaps(fit):
             return fit, True
-        going = _Going(fit, reduced, step, bounds)
+        going = _Going(fit, reduced, step, bounds, expected)
         if first > _FREE:
             better, rose = going.each_its_share()
             hold = np.where(rose, np.clip(_TIGHTER * hold, _LEAST_HOLD, _MOST_HOLD), _LOOSER * hold)
@@ -224,6 +234,9 @@ _TRIES, _SHORTER = 5, 0.4
 _FAR = 3.0
 #: by how much chi-squared may rise while pieces hang together to first order only
 _RISE = 1.3
+#: a step that is expected to gain less than this, three standard deviations in all, keeps the slopes that it was worked
+#: out with, unless it misses what was expected by more than this share of it
+_CHORD, _CHORD_MISSES = 10.0, 0.1
 #: a rise by more than this is a step that went too far
 _ROSE = 1.02
 
@@ -236,6 +249,8 @@ class _Going:
     reduced: Sequence[Reduced]
     step: FloatArray
     bounds: Mapping[tuple[str, str], tuple[float, float]]
+    #: the merit that the whole step is expected to leave
+    expected: float
 
     def _bounded(self, at: FloatArray) -> FloatArray:
         """Return parameters (p,) within their bounds."""
@@ -262,7 +277,8 @@ class _Going:
             )
             trial = replace(fit, chains=chains, at=at)
             if _finite(chains):
-                new = linearised(trial)
+                short = share == 1.0 and fit.merit - self.expected < _CHORD and not open_gaps(fit)
+                new = (self._by_chord(trial) if short else None) or linearised(trial)
                 merit = merit_of(trial, new)
                 # while gaps are open the merit is that of the closed chain to first order only: too good
                 bar = fit.merit * (1.0 + 1e-9) if not open_gaps(fit) else 1.5 * fit.merit + 10.0 * fit.count
@@ -270,6 +286,17 @@ class _Going:
                     return replace(trial, linears=new, merit=merit, iterations=fit.iterations + 1)
             share *= _SHORTER
         return None
+
+    def _by_chord(self, trial: Fit) -> tuple[Linear, ...] | None:
+        """Return the linearisations after a short step with slopes as they were; None where it does not gain as much.
+
+        What is short is told by what the step gains: in standard deviations it is the root of that.
+        """
+        new = _reread(trial)
+        if new is None:
+            return None
+        missed = merit_of(trial, new) - self.expected
+        return new if missed < _CHORD_MISSES * (self.fit.merit - self.expected) else None
 
     def each_its_share(self) -> tuple[Fit | None, BoolArray]:
         """Return the fit after a step of which each recording takes as much as leads it nearer, what they share whole.

@@ -38,7 +38,7 @@ from validation.identification.propagation import (
 from validation.identification.segments import STEPS, Chain, difference, shifted, stepped
 from validation.identification.sensor_model import CLOCKS, Values, is_motion, predicted, value
 
-__all__ = ["Channel", "Linear", "linearise", "moved"]
+__all__ = ["Channel", "Linear", "linearise", "moved", "reread"]
 
 IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
@@ -203,10 +203,11 @@ def linearise(
 class _Around:
     """The neighbours of a chain's motion: one per direction of a state and per parameter of the motion, or two.
 
-    Row 0 is the motion itself; then come ``half`` neighbours ahead and, where differences are central, as many behind.
+    Row 0 is the motion itself; then come ``half`` neighbours ahead and, where differences are central, as many behind;
+    none at all where ``central`` is None.
     """
 
-    def __init__(self, current: Chain, values: Values, columns: Sequence[Column], central: bool) -> None:
+    def __init__(self, current: Chain, values: Values, columns: Sequence[Column], central: bool | None) -> None:
         self.chain, self.values, self.columns, self.central = current, values, columns, central
         self.recording = recording = current.recording
         self.runner = runner_of(recording, values, columns)
@@ -218,7 +219,7 @@ class _Around:
         self.places = np.array([*range(d), *(d + j for j in self.motion)])
         self.flat = base_flat(recording, values, [column.key for column in columns])
         self.wobble = np.array([values.get(key, 0.0) for key in WOBBLE])
-        signs = (1.0, -1.0) if central else (1.0,)
+        signs = () if central is None else (1.0, -1.0) if central else (1.0,)
         self.flats = np.repeat(self.flat[None], 1 + len(signs) * self.half, axis=0)
         self.wobbles = np.repeat(self.wobble[None], 1 + len(signs) * self.half, axis=0)
         tangents = np.zeros((1 + len(signs) * self.half, d))
@@ -227,11 +228,11 @@ class _Around:
             tangents[first : first + d] = sign * np.diag(STEPS[recording.plant])
             for row, j in enumerate(self.motion, first + d):
                 self._set_parameter(row, columns[j], sign)
-        #: the states (k, c, s) that the neighbours of each piece start from
+        #: the states (k, c, s) that the neighbours of each segment start from
         self.states = np.repeat(current.states[:, None], tangents.shape[0], axis=1)
         turned = np.flatnonzero(np.any(tangents != 0.0, axis=1))
         self.states[:, turned] = shifted(recording.plant, current.states[:, None], tangents[turned])
-
+        #: rows of the neighbours that belong to a short event, and when it is, s
         self._events = {
             row: t
             for row, column in enumerate([columns[j] for j in self.motion], 1 + d)
@@ -239,10 +240,7 @@ class _Around:
         }
 
     def acting(self, start: float, stop: float) -> IntArray:
-        """Return the neighbours (a,) that may part from the motion between two instants: an event moves nothing else.
-
-        All before where there is none.
-        """
+        """Return the neighbours (a,) that may part from the motion between two instants: an event moves no others."""
         still = [row for row, t in self._events.items() if not start - EVENT_REACH < t < stop + EVENT_REACH]
         still += [row + self.half for row in still] if self.central else []
         return np.setdiff1d(np.arange(self.flats.shape[0]), still)
@@ -266,6 +264,50 @@ class _Around:
         ahead = values[1 : 1 + half]
         behind, span = (values[1 + half :], 2.0 * widths) if self.central else (values[:1], widths)
         return np.asarray((ahead - behind) / span.reshape(-1, *(1,) * (values.ndim - 1)))
+
+
+def reread(current: Chain, values: Values, linear: Linear) -> Linear | None:
+    """Return a linearisation with the residuals where a chain stands now, and its slopes as they were (a chord).
+
+    One motion in the place of dozens, for steps within which the slopes hardly change. None where other readings take
+    part, or fall into other segments, than in ``linear``.
+    """
+    k, d = current.states.shape[0], current.tangent
+    samples = [Sampled(current, readings, values) for readings in current.readings]
+    segment_of = [np.clip(np.searchsorted(current.edges, s.instants, side="right") - 1, 0, k - 1) for s in samples]
+    read = _Read(_Around(current, values, (), None), samples)
+    ends = read.run_all(segment_of)[:, 0]
+    raw: list[FloatArray] = []
+    channels = iter(linear.channels)
+    for s, y, segment in zip(samples, read.ideal, segment_of, strict=True):
+        prediction = s.weighted(y)
+        for axis in range(s.width):
+            index = _counted(s, prediction, axis)
+            if index.size == 0:
+                continue
+            channel = next(channels, None)
+            if channel is None or not np.array_equal(channel.index, index):
+                return None
+            if not np.array_equal(linear.piece[channel.rows], segment[index] if s.nodes == 1 else -1 + 0 * index):
+                return None
+            raw.append(s.readings.value[index, axis] - prediction[index, axis])
+    if next(channels, None) is not None:
+        return None
+    gaps = difference(current.recording.plant, current.states[1:], ends[:-1], d)
+    closing, forbidden = np.zeros((k, d)), np.setdiff1d(np.arange(d), linear.jump_kind)
+    for i in range(k - 1):
+        closing[i + 1] = linear.passes[i, :, :d] @ closing[i]
+        closing[i + 1, forbidden] -= gaps[i, forbidden]
+    jump, some = np.zeros_like(linear.jump), linear.jump_kind >= 0
+    jump[some] = gaps[linear.jump_piece[some] - 1, linear.jump_kind[some]]
+    return replace(
+        linear,
+        raw=np.concatenate([np.empty(0), *raw]),
+        jump=jump,
+        closing=closing,
+        gaps=gaps,
+        shifts=np.einsum("nd,nd->n", linear.own[:, :d], closing[linear.piece]),
+    )
 
 
 class _Read:
@@ -348,7 +390,7 @@ class _Read:
                 shown[part] = predicted(s.sensor, around.recording, around.values, t, mine[part])
             for neighbour, j in enumerate(around.motion, 1 + around.d):
                 if around.columns[j].key in _ALSO_READ:  # it moves the readings of a given motion, too
-                    for other, sign in ((neighbour, 1.0), (neighbour + around.half, -1.0))[: 1 + around.central]:
+                    for other, sign in ((neighbour, 1.0), (neighbour + around.half, -1.0))[: 1 + bool(around.central)]:
                         row = row_of_neighbour[other]
                         shown[row] = self._also_moved(s.sensor, t, mine[row], around.columns[j], sign)
             self.ideal[which][o] = shown[0]
@@ -469,6 +511,20 @@ def _concerns(group: str, sensor: str) -> bool:
     return row is not None and row.acts_with((sensor,))
 
 
+def _counted(s: Sampled, prediction: FloatArray, axis: int) -> IntArray:
+    """Return the places of the readings of one axis that take part beside a prediction (n, width)."""
+    readings, limit = s.readings, s.readings.limit
+    good = readings.good[:, axis]
+    if s.tau > 0:
+        good = good & (readings.t > _FORGOTTEN * s.tau)
+    if limit is not None:
+        # a clipped reading says only that the motion was beyond the range
+        margin = 6.0 * np.nan_to_num(readings.sd[axis])
+        inside = readings.clipped[:, axis] & (np.abs(prediction[:, axis]) < limit - margin)
+        good = good | (inside & np.isfinite(readings.value[:, axis]))
+    return np.flatnonzero(good)
+
+
 def _stack(
     current: Chain, samples: Sequence[Sampled], read: _Read, piece_of: Sequence[IntArray], chained: _Chained
 ) -> Linear:
@@ -491,17 +547,8 @@ def _stack(
             full[:, :, u:] += M[:, :, d:]
             M = full
         prediction, slopes, closed = s.weighted(y), s.weighted(M), s.weighted(closed)
-        limit = readings.limit
         for axis in range(s.width):
-            good = readings.good[:, axis]
-            if s.tau > 0:
-                good = good & (readings.t > _FORGOTTEN * s.tau)
-            if limit is not None:
-                # a clipped reading says only that the motion was beyond the range
-                margin = 6.0 * np.nan_to_num(readings.sd[axis])
-                inside = readings.clipped[:, axis] & (np.abs(prediction[:, axis]) < limit - margin)
-                good = good | (inside & np.isfinite(readings.value[:, axis]))
-            index = np.flatnonzero(good)
+            index = _counted(s, prediction, axis)
             if index.size == 0:
                 continue
             raw.append(readings.value[index, axis] - prediction[index, axis])

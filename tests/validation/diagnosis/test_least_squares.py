@@ -13,6 +13,7 @@ from scipy.optimize import lsq_linear
 from discsim.arrays import FloatArray
 from discsim.effects import effect
 from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain, loose_jumps
+from validation.identification import gauss_newton
 from validation.identification.gauss_newton import Fit, _Going, linearised, merit_of, open_gaps, refit, residuals_after
 from validation.identification.noise import stated_noise, whitened
 from validation.identification.normal_equations import local_step, normal_matrix, reduce, shared_step, unknown_prior
@@ -228,7 +229,7 @@ def test_a_fit_that_ends_with_its_pieces_apart_goes_back_to_where_they_hung_toge
         trial = replace(self.fit, chains=(stepped(first, tangents), *others))
         return replace(trial, linears=linearised(trial), merit=0.9 * self.fit.merit)
 
-    assert open_gaps(apart(_Going(fit, (), np.empty(0), {})))
+    assert open_gaps(apart(_Going(fit, (), np.empty(0), {}, fit.merit)))
     monkeypatch.setattr(_Going, "all_by_one_share", apart)
     again = refit(fit, iterations=3, tolerance=-np.inf)
     assert not open_gaps(again)
@@ -244,3 +245,44 @@ def test_a_fit_that_will_stay_above_a_bar_is_left_where_it_stands():
     given_up = refit(fit, bar=0.5 * whole.merit)
     assert given_up.iterations < whole.iterations
     assert given_up.merit > whole.merit
+
+
+def test_residuals_by_a_chord_are_those_of_a_full_linearisation():
+    """Readings are predicted as they are; the slopes stay those of the point where they were worked out."""
+    fit = loose()
+    moved = replace(fit, chains=tuple(stepped(c, np.full((len(c.states), 2), 1e-4)) for c in fit.chains))
+    full = linearised(moved)
+    for linear, chord, before in zip(full, gauss_newton._reread(moved), fit.linears, strict=True):
+        np.testing.assert_allclose(chord.residual, linear.residual, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(chord.jump, linear.jump, atol=1e-12)
+        assert chord.own is before.own
+
+
+def test_there_is_no_chord_where_other_readings_take_part():
+    """A clipped reading counts where the motion would not clip: its row has no slopes."""
+    fit = loose()
+    first = fit.chains[0].readings[0]
+    good = first.good.copy()
+    good[5:8] = False
+    fewer = replace(fit.chains[0], readings=(replace(first, good=good), *fit.chains[0].readings[1:]))
+    assert gauss_newton._reread(replace(fit, chains=(fewer, *fit.chains[1:]))) is None
+
+
+def test_short_steps_by_chords_end_where_full_ones_do(monkeypatch):
+    """Within a hundredth of a standard deviation, with fewer motions run."""
+    start = replace(loose(), jumps=NO_JUMPS["spin_down"])
+    runs = []
+    run = gauss_newton.linearised
+    monkeypatch.setattr(gauss_newton, "linearised", lambda *given, **named: runs.append(1) or run(*given, **named))
+
+    def ended(chord: float) -> tuple[Fit, int]:
+        monkeypatch.setattr(gauss_newton, "_CHORD", chord)
+        runs.clear()
+        fit = refit(start, iterations=10, tolerance=1e-6)
+        return refit(replace(fit, noise=dict(fit.noise)), iterations=4, tolerance=1e-9, moved_on=False), len(runs)
+
+    (full, often), (chord, seldom) = ended(0.0), ended(10.0)
+    assert seldom < often
+    sd = np.sqrt(np.diag(full.covariance))
+    assert np.all(np.abs(full.at - chord.at) < 0.01 * sd)
+    assert chord.merit == pytest.approx(full.merit, abs=1e-3)
