@@ -3,9 +3,8 @@
 Everything here is compiled and works in any frame F whose z axis is z_B: body axes in MuJoCo, roll-pitch axes in the
 12-state model. ``p`` is the record of `discsim.parameters.PARAMETERS`.
 
-Departures from the paper, all fixed by docs/physics.md: V is the velocity relative to the air, not to the ground;
-alpha is that of the H frame (A2); (21) prints C2(-alpha) where (23) has C2(alpha), and the latter is right with (A1)
-and (A2).
+One departure from the paper, fixed by docs/physics.md: V is the velocity relative to the air, not to the ground. alpha
+is that of the H frame (A2). (21) prints the transpose of C2(-alpha), which is the C2(alpha) of (23).
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ from discsim.trajectory import predict
 from validation.commands.fit import command, notes
 from validation.scenarios.throws import FULL_SET
 from validation.yaw_damping import fit_yaw_damping, observe, paper_table
+from validation.yaw_damping.bias import paper_biases
 from validation.yaw_damping.observations import SHARED_S, Throw, misplaced
 from validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S, damping_by_26, table_csv
 from validation.yaw_damping.whiteness import whiteness
@@ -68,6 +69,13 @@ class TestOutputError:
     def test_equation_26_misses_what_the_rolling_moment_adds(self, fit):
         """physics.md: R sin(alpha) is worth 3 to 18 % of C_Nr = -0.0045, so more of a smaller one."""
         assert 0.03 < 1 - fit.by_26 / TRUE_CNR < 0.25
+
+    @pytest.mark.parametrize(("name", "low", "high"), [("driver", -0.15, -0.05), ("ultrastar", 0.01, 0.05)])
+    def test_the_sign_of_that_is_the_rolling_moment_s(self, name, low, high):
+        """CRr is 0.0035 and -0.003; the throw is nose up, so alpha > 0 for most of the flight."""
+        disc, air = load_disc(name)
+        (found,) = paper_biases(disc, air, [FULL_SET[0]])
+        assert low < found.rolling < high
 
     def test_what_a_right_model_leaves_is_white_and_as_large_as_stated(self, fit):
         assert fit.path_whiteness.p > 0.001
