@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discsim.disc import Release
+from discsim.disc import Release, RollingTable
 from discsim.errors import InputError
 from discsim.model_file import read_model
 from discsim.recording import Recording, read_recording, write_recording
@@ -136,8 +136,27 @@ class TestOutputError:
         with pytest.raises(InputError, match="velocity_ned_m_s"):
             fit_yaw_damping([observe(without_gps(recordings[0]), "likelihood")])
 
+    def test_a_disc_whose_rolling_moment_is_a_table_gives_its_CNr(self):
+        """C_Rr(alpha, gamma) of (16); with the driver's CRr gamma in its place the path is over twice as far off."""
+        angles, ratio = np.radians([-8.0, 0.0, 5.0, 15.0, 40.0]), np.array([0.2, 0.4, 0.8, 1.5])
+        table = RollingTable(angles, ratio, 0.02 * np.outer(np.sin(3.0 * (angles - 0.1)), ratio**2))
+        disc = replace(DISC, rolling_table=table)
+        motion = predict(disc, AIR, FULL_SET[0].release).motion()
+        recording = record(motion, MODULE, np.random.default_rng(4), plant="flight", name="rolling", disc=disc)
+        assert disc.aero is not None
+        fit = fit_yaw_damping([observe(recording)])
+        assert abs(fit.CNr - disc.aero.CNr) < 3 * fit.sd
+        assert fit.path_scale < 1.1
+        assert fit_yaw_damping([observe(replace(recording, disc=DISC))]).path_scale > 2.0
+
     def test_throws_of_two_discs_are_refused(self, throws):
         other = replace(throws[1], recording=replace(throws[1].recording, disc=load_disc("dd2")[0]))
+        with pytest.raises(InputError, match="another disc"):
+            fit_yaw_damping([throws[0], other])
+
+    def test_throws_of_two_rolling_tables_are_refused(self, throws):
+        disc = replace(DISC, rolling_table=RollingTable(np.array([0.0, 0.1]), CRp=np.array([-0.1, -0.2])))
+        other = replace(throws[1], recording=replace(throws[1].recording, disc=disc))
         with pytest.raises(InputError, match="another disc"):
             fit_yaw_damping([throws[0], other])
 
