@@ -22,7 +22,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from discsim.engine import FlyingDisc, fly, passive_force
+from discsim.callbacks import passive_force
+from discsim.engine import FlyingDisc, fly
 from discsim.shipped import load_disc, load_throw
 
 DISC, ENVIRONMENT = load_disc("driver")
@@ -53,7 +54,7 @@ def with_callback(apply: Callable[[Any, Any], None]) -> Callable[[FlyingDisc, in
     """Return the Python loop with a passive-force callback installed."""
 
     def run(flying: FlyingDisc, steps: int) -> float:
-        with passive_force(apply):
+        with passive_force(flying.model, apply):
             return python_loop(flying, steps)
 
     return run

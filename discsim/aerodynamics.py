@@ -3,9 +3,8 @@
 Everything here is compiled and works in any frame F whose z axis is z_B: body axes in MuJoCo, roll-pitch axes in the
 12-state model. ``p`` is the record of `discsim.parameters.PARAMETERS`.
 
-Departures from the paper, all fixed by docs/physics.md: V is the velocity relative to the air, not to the ground;
-alpha is that of the H frame (A2); (21) prints C2(-alpha) where (23) has C2(alpha), and the latter is right with (A1)
-and (A2).
+One departure from the paper, fixed by docs/physics.md: V is the velocity relative to the air, not to the ground. alpha
+is that of the H frame (A2). (21) prints the transpose of C2(-alpha), which is the C2(alpha) of (23).
 """
 
 from __future__ import annotations
@@ -78,15 +77,34 @@ def _interpolate(x: float, nodes: FloatArray, values: FloatArray) -> float:
 @compiled
 def static_coefficients(p: Any, tables: Tables, alpha: float) -> tuple[float, float, float]:
     """C_L, C_D, C_M of a disc that does not spin: linear and quadratic forms, or the table in their place."""
-    if tables.static.shape[1] > 0:
-        nodes = tables.static[0]
+    columns = tables.static.columns
+    if columns.shape[1] > 0:
+        nodes = columns[0]
         return (
-            _interpolate(alpha, nodes, tables.static[1]),
-            _interpolate(alpha, nodes, tables.static[2]),
-            _interpolate(alpha, nodes, tables.static[3]),
+            _interpolate(alpha, nodes, columns[1]),
+            _interpolate(alpha, nodes, columns[2]),
+            _interpolate(alpha, nodes, columns[3]),
         )
     a = p.aero
     return a.CL0 + a.CLa * alpha, a.CD0 + a.CDa * (alpha - a.alpha0) ** 2, a.CM0 + a.CMa * alpha
+
+
+@compiled
+def rolling_coefficient(p: Any, tables: Tables, alpha: float, gamma: float, roll: float) -> float:
+    """C_R = C_Rr(alpha, gamma) + C_Rp(alpha) roll, Eq. (16), roll being p_H d/(2 V): derivatives, or tables."""
+    lookup = tables.static.rolling
+    angles = lookup[0, 1:]
+    if angles.size == 0:
+        return float(p.aero.CRr * gamma + p.aero.CRp * roll)
+    CRp = p.aero.CRp if np.isnan(lookup[1, 1]) else _interpolate(alpha, angles, lookup[1, 1:])
+    if lookup.shape[0] == 2:
+        return float(p.aero.CRr * gamma + CRp * roll)
+    ratios = lookup[2:, 0]
+    j = _cell(abs(gamma), ratios)
+    share = min((abs(gamma) - ratios[j]) / (ratios[j + 1] - ratios[j]), 1.0)
+    low, high = _interpolate(alpha, angles, lookup[2 + j, 1:]), _interpolate(alpha, angles, lookup[3 + j, 1:])
+    CR = low + (high - low) * share
+    return float((CR if gamma >= 0.0 else -CR) + CRp * roll)
 
 
 @compiled
@@ -143,7 +161,7 @@ def air_wrench(
     CD += spin_drag(p.aero_spin_drag, gamma)
     CM += p.aero.CMq * q_H * damping + spin_pitching_moment(p.aero_spin_pitching_moment, gamma)
     CY = spin_side_force(p.aero_spin_side_force, gamma)
-    CR = p.aero.CRr * gamma + p.aero.CRp * p_H * damping  # (16)
+    CR = rolling_coefficient(p, tables, alpha, gamma, p_H * damping)
     CN = yaw_damping(p, tables, r, V) * yaw_reynolds(p.aero_yaw_reynolds, V) * gamma  # (17)
     CN += yaw_quadratic(p.aero_yaw_quadratic, gamma) + yaw_alpha(p.aero_yaw_alpha, gamma, alpha)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 from math import pi
 from types import MappingProxyType
@@ -15,7 +15,7 @@ from discsim.errors import InputError
 from discsim.frames import attitude_matrix
 from discsim.toml_table import TomlTable
 
-__all__ = ["RELEASE_HEIGHT", "Aero", "AeroTable", "Disc", "Release", "Rig", "YawDampingTable"]
+__all__ = ["RELEASE_HEIGHT", "Aero", "AeroTable", "Disc", "Release", "Rig", "RollingTable", "YawDampingTable"]
 
 #: a disc is left to itself this high above the ground where a release states no position, m
 RELEASE_HEIGHT = 1.3
@@ -62,6 +62,49 @@ class AeroTable:
 
 
 @dataclass(frozen=True)
+class RollingTable:
+    """The rolling moment of (16) at nodes of alpha (na,) rad: C_Rr(alpha, gamma) and C_Rp(alpha), one of them or both.
+
+    ``advance_ratio`` (ng,) are the nodes of |gamma|, above zero, and ``CR`` (na, ng) is the coefficient of a disc that
+    does not roll, for r > 0. By symmetry it is zero at gamma = 0 and turns its sign with r. ``CRp`` (na,) takes the
+    place of that of `Aero`. Linear between the nodes, constant outside.
+    """
+
+    alpha: FloatArray
+    advance_ratio: FloatArray | None = None
+    CR: FloatArray | None = None
+    CRp: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("alpha", "advance_ratio", "CR", "CRp"):
+            if getattr(self, name) is None:
+                continue
+            object.__setattr__(self, name, readonly(getattr(self, name)))
+            if not np.all(np.isfinite(getattr(self, name))):
+                raise ValueError(f"CR table: {name} has a number that is not finite, expected finite ones")
+        if self.alpha.size < 2 or np.any(np.diff(self.alpha) <= 0):
+            raise ValueError("CR table: expected alpha_rad to ascend, at least 2 of them")
+        if (self.advance_ratio is None) != (self.CR is None):
+            raise ValueError("CR table: expected advance_ratio and CR, both or neither")
+        if self.CR is None and self.CRp is None:
+            raise ValueError("CR table: neither CR nor CRp; expected advance_ratio and CR, or CRp, or all three")
+        if self.CRp is not None and self.CRp.shape != self.alpha.shape:
+            raise ValueError(f"CR table: {self.CRp.size} values of CRp, expected one per alpha_rad ({self.alpha.size})")
+        if self.CR is None or self.advance_ratio is None:
+            return
+        if self.CR.shape != (self.alpha.size, self.advance_ratio.size):
+            raise ValueError(
+                f"CR table: CR is {' x '.join(map(str, self.CR.shape))}, expected angles x advance ratios = "
+                f"{self.alpha.size} x {self.advance_ratio.size}"
+            )
+        if self.advance_ratio[0] <= 0 or np.any(np.diff(self.advance_ratio) <= 0):
+            raise ValueError(
+                "CR table: expected advance_ratio to ascend from above zero (at zero C_R is zero by symmetry: leave "
+                "that node out; of a spin r < 0 the table holds mirrored)"
+            )
+
+
+@dataclass(frozen=True)
 class YawDampingTable:
     """C_Nr over spin rate and airspeed, (27)-(28): rate (nr,) rad/s, speed (nv,) m/s, CNr (nr, nv).
 
@@ -98,6 +141,7 @@ class Disc:
     aero_table: AeroTable | None = None
     yaw_damping_table: YawDampingTable | None = None
     sigma: Mapping[str, float | FloatArray] = field(default_factory=dict)
+    rolling_table: RollingTable | None = None
 
     def __post_init__(self) -> None:
         for name in ("mass", "diameter", "Ixx", "Izz"):
@@ -117,17 +161,22 @@ class Disc:
 
     @classmethod
     def from_toml(cls, table: TomlTable, *, aero_required: bool) -> Disc:
-        """Read a ``[disc]`` table with its sub-tables ``aero``, ``aero_table``, ``aero_sigma``, ``CNr_table``."""
+        """Read a ``[disc]`` table with its sub-tables ``aero``, ``aero_sigma`` and those of coefficients."""
         mass = table.need("mass", "kg", positive=True)
         diameter = table.need("diameter", "m", positive=True)
         Ixx = table.need("Ixx", "kg_m2", positive=True)
         Izz = table.need("Izz", "kg_m2", positive=True)
         lookup = _aero_table(table.table("aero_table"))
         damping = _yaw_damping_table(table.table("CNr_table"))
-        aero, sigma = _aero(table, lookup is not None, damping is not None, aero_required)
+        rolling = _rolling_table(table.table("CR_table"))
+        tabulated = set(STATIC) if lookup is not None else set()
+        tabulated |= {"CNr"} if damping is not None else set()
+        tabulated |= {"CRr"} if rolling is not None and rolling.CR is not None else set()
+        tabulated |= {"CRp"} if rolling is not None and rolling.CRp is not None else set()
+        aero, sigma = _aero(table, tabulated, aero_required)
         table.finish()
         try:
-            return cls(mass, diameter, Ixx, Izz, aero, lookup, damping, {**table.sigma, **sigma})
+            return cls(mass, diameter, Ixx, Izz, aero, lookup, damping, {**table.sigma, **sigma}, rolling)
         except ValueError as error:
             raise table.error(None, str(error)) from None
 
@@ -137,9 +186,7 @@ def aero_key(name: str) -> str:
     return "alpha0_rad" if name == "alpha0" else name
 
 
-def _aero(
-    table: TomlTable, tabulated: bool, damping_tabulated: bool, required: bool
-) -> tuple[Aero | None, dict[str, float]]:
+def _aero(table: TomlTable, tabulated: Set[str], required: bool) -> tuple[Aero | None, dict[str, float]]:
     stated = table.table("aero", required=required)
     sigma_table = table.table("aero_sigma")
     sigma: dict[str, float] = {}
@@ -148,9 +195,8 @@ def _aero(
     if stated is not None:
         values = {}
         for name in Aero._fields:
-            optional = (tabulated and name in STATIC) or (damping_tabulated and name == "CNr")
             unit = "rad" if name == "alpha0" else ""
-            values[name] = stated.number(name, unit, required=not optional)
+            values[name] = stated.number(name, unit, required=name not in tabulated)
         stated.finish()
         aero = Aero(**{name: 0.0 if value is None else value for name, value in values.items()})
         sigma.update({key: float(value) for key, value in stated.sigma.items()})
@@ -190,6 +236,20 @@ def _aero_table(table: TomlTable | None) -> AeroTable | None:
     assert CM is not None
     try:
         return AeroTable(alpha, CL, CD, CM)
+    except ValueError as error:
+        raise table.error(None, str(error)) from None
+
+
+def _rolling_table(table: TomlTable | None) -> RollingTable | None:
+    if table is None:
+        return None
+    alpha = table.numbers("alpha_rad")
+    ratio, CRp = table.numbers("advance_ratio", required=False), table.numbers("CRp", required=False)
+    CR = table.numbers("CR", required=False, dimensions=2)
+    table.finish()
+    assert alpha is not None
+    try:
+        return RollingTable(alpha, ratio, CR, CRp)
     except ValueError as error:
         raise table.error(None, str(error)) from None
 

@@ -1,13 +1,13 @@
 """The truth: a spinning disc in MuJoCo with our air on it.
 
-MuJoCo integrates the full spinning body (RK4); the air enters through ``mjcb_passive``, one slot for the whole
-process, which is on loan inside `passive_force` and never left in. On a free joint force is in world axes and acts at
-the body's origin, the geometric centre here; moment is in body axes about it.
+MuJoCo integrates the full spinning body (RK4); the air enters through ``mjcb_passive``, one slot for the whole process,
+which all flights share inside `passive_force` and never leave anything in. On a free joint force is in world axes and
+acts at the body's origin, the geometric centre here; moment is in body axes about it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal
 
@@ -17,6 +17,7 @@ from scipy.optimize import brentq
 
 from discsim.aerodynamics import air_wrench, outside_table, wind
 from discsim.arrays import FloatArray, readonly
+from discsim.callbacks import check_lent, compile_model, own_warnings, passive_force
 from discsim.compiled import compiled
 from discsim.disc import RELEASE_HEIGHT, Disc, Release
 from discsim.effects.body import centre_of_mass, transverse_inertia
@@ -31,33 +32,7 @@ from discsim.motion import Motion
 from discsim.own_wrench import own_wrench
 from discsim.parameters import PARAMETERS, Tables, flight_parameters, tables
 
-__all__ = ["RELEASE_HEIGHT", "FlyingDisc", "check_model", "fly", "follow", "passive_force"]
-
-PassiveForce = Callable[[Any, Any], None]
-
-
-@contextmanager
-def passive_force(apply: PassiveForce) -> Iterator[None]:
-    """Let ``apply(model, data)`` add to ``data.qfrc_passive`` inside the block, then restore what was there.
-
-    The callback fires for every model that is stepped meanwhile; ``apply`` must ignore those that are not its own.
-    Raises RuntimeError where a model is compiled inside the block: MuJoCo steps the half-built model through the
-    callback, cannot hand it to Python, and says only "Python exception raised".
-    """
-    previous = mujoco.get_mjcb_passive()
-    mujoco.set_mjcb_passive(apply)
-    try:
-        yield
-    except ValueError as error:
-        if "Python exception raised" in str(error):
-            raise RuntimeError(
-                "a MuJoCo model was compiled while a passive-force callback was installed, which MuJoCo cannot do; "
-                "compile every model before entering the block"
-            ) from error
-        raise
-    finally:
-        mujoco.set_mjcb_passive(previous)
-
+__all__ = ["RELEASE_HEIGHT", "FlyingDisc", "check_model", "fly", "follow"]
 
 #: MuJoCo's warnings of a state that is not finite, or beyond all bounds
 _DIVERGED = [
@@ -71,23 +46,16 @@ _DIVERGED = [
 
 
 def check_state(data: Any) -> None:
-    """Raise `InputError` where a motion has diverged: MuJoCo itself would start it anew without a word."""
+    """Raise `InputError` where a motion has diverged: MuJoCo itself would start it anew without a word.
+
+    Raises RuntimeError where the step's passive force was taken out of its slot.
+    """
+    check_lent()
     if data.warning.number[_DIVERGED].any():
         raise InputError(
             f"at {data.time:.4f} s the motion is no longer finite; expected rates and speeds that a step can follow "
             "(lower them, or take a smaller step)"
         )
-
-
-@contextmanager
-def own_warnings() -> Iterator[None]:
-    """Keep MuJoCo's warnings off the console and out of a log file in the working folder; `check_state` raises them."""
-    previous = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda message: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(previous)
 
 
 def without_reset(spec: Any) -> Any:
@@ -198,8 +166,6 @@ class FlyingDisc:
         contacts: bool = False,
         law: Law | Sequence[Law] | None = None,
     ) -> None:
-        if mujoco.get_mjcb_passive() is not None:
-            raise RuntimeError("a passive-force callback is installed; build every disc before entering its block")
         self.disc = disc
         self.environment = environment
         self.parameters = flight_parameters(disc, environment, effects)
@@ -207,7 +173,7 @@ class FlyingDisc:
         record = self.parameters.view(PARAMETERS)[0]
         self.centre_of_mass = readonly(centre_of_mass(record["body_mass_imbalance"]))
         try:
-            self.model = self.specification(timestep, contacts).compile()
+            self.model = compile_model(self.specification(timestep, contacts))
         except ValueError as error:
             raise InputError(f"no rigid body has these inertias or masses: {str(error).splitlines()[0]}") from None
         self.data = mujoco.MjData(self.model)
@@ -263,9 +229,12 @@ class FlyingDisc:
 
     @contextmanager
     def air(self) -> Iterator[None]:
-        """Install the callback for the block; raises `InputError` where the model's settings would spoil the flight."""
+        """Install the callback for the block; raises `InputError` where the model's settings would spoil the flight.
+
+        Blocks of several discs may be open at once, nested or in several threads: each disc flies in its own air.
+        """
         check_model(self.model)
-        with passive_force(self.apply):
+        with passive_force(self.model, self.apply):
             yield
 
 

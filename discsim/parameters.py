@@ -20,7 +20,7 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.law import LAW_WIDTH, WRENCH_TARGETS, Law
 
-__all__ = ["PARAMETERS", "Tables", "flight_parameters", "parameter_index", "parameters", "tables"]
+__all__ = ["PARAMETERS", "AngleTables", "Tables", "flight_parameters", "parameter_index", "parameters", "tables"]
 
 IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
@@ -103,16 +103,28 @@ def flight_parameters(disc: Disc, environment: Environment, effects: Sequence[Ef
     return parameters(environment, disc, effects=effects)
 
 
+class AngleTables(NamedTuple):
+    """Coefficients tabulated over the angle of attack, rad, each empty where the linear form holds.
+
+    columns is (4, n): alpha, C_L, C_D, C_M. rolling (2 + ng, 1 + na) are the tables of the rolling moment (16) in one
+    array, for each array that is passed costs a step of the truth a microsecond: behind the first column stand alpha,
+    C_Rp (NaN where it is no table) and C_Rr at each of the advance ratios of that column, which start with zero.
+    """
+
+    columns: FloatArray
+    rolling: FloatArray
+
+
 class Tables(NamedTuple):
     """What compiled code needs beside the flat parameters: tabulated coefficients, empty where the linear forms hold.
 
-    static is (4, n): alpha, C_L, C_D, C_M. rate (nr,) rad/s and speed (nv,) m/s are the knots of C_Nr, and spline
+    static are those over the angle of attack. rate (nr,) rad/s and speed (nv,) m/s are the knots of C_Nr, and spline
     (nr - 1, nv - 1, 4, 4) its bicubic coefficients, highest powers first. law (terms, LAW_WIDTH) are the rows of a
     `discsim.law.Law`. own_calls (m,) int64 are the addresses of the user's own effects on motion, and own_sizes (m, k)
     their parameters, for `discsim.own_wrench`.
     """
 
-    static: FloatArray
+    static: AngleTables
     rate: FloatArray
     speed: FloatArray
     spline: FloatArray
@@ -121,12 +133,24 @@ class Tables(NamedTuple):
     own_sizes: FloatArray
 
 
+def _angle_tables(disc: Disc | None) -> AngleTables:
+    columns, rolling = np.empty((4, 0)), np.full((2, 1), np.nan)
+    if disc is not None and (lookup := disc.aero_table) is not None:
+        columns = np.stack([lookup.alpha, lookup.CL, lookup.CD, lookup.CM])
+    if disc is not None and (table := disc.rolling_table) is not None:
+        rows = [table.alpha, np.full(table.alpha.size, np.nan) if table.CRp is None else table.CRp]
+        heads = [np.nan, np.nan]
+        if table.CR is not None and table.advance_ratio is not None:
+            rows += [np.zeros(table.alpha.size), *table.CR.T]
+            heads += [0.0, *table.advance_ratio]
+        rolling = np.column_stack([heads, rows])
+    return AngleTables(columns, np.ascontiguousarray(rolling))
+
+
 def tables(disc: Disc | None, law: Law | Sequence[Law] | None = None, effects: Sequence[Effect] = ()) -> Tables:
     """Return the tables of a disc, of a law or laws about motion (not of those about a sensor), and of own effects."""
-    static = np.empty((4, 0))
+    static = _angle_tables(disc)
     rate, speed, spline = np.empty(0), np.empty(0), np.empty((0, 0, 4, 4))
-    if disc is not None and (lookup := disc.aero_table) is not None:
-        static = np.stack([lookup.alpha, lookup.CL, lookup.CD, lookup.CM])
     if disc is not None and (damping := disc.yaw_damping_table) is not None:
         rate, speed = np.array(damping.rate), np.array(damping.speed)
         along_rate = CubicSpline(rate, damping.CNr, axis=0).c  # (4, nr - 1, nv)

@@ -527,6 +527,9 @@ def disc_toml(disc: Disc) -> list[str]:
         lines += _table(
             "disc.aero_table", {"alpha_rad": table.alpha, "CL": table.CL, "CD": table.CD, "CM": table.CM}, {}
         )
+    if (rolling := disc.rolling_table) is not None:
+        columns = {"advance_ratio": rolling.advance_ratio, "CR": rolling.CR, "CRp": rolling.CRp}
+        lines += _table("disc.CR_table", {"alpha_rad": rolling.alpha, **columns}, {})
     if (damping := disc.yaw_damping_table) is not None:
         lines += _table(
             "disc.CNr_table",

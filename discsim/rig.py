@@ -14,12 +14,13 @@ import mujoco
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.callbacks import compile_model, own_warnings, passive_force
 from discsim.compiled import compiled
 from discsim.disc import Rig
 from discsim.effects.catalogue import Effect
 from discsim.effects.events import spin_step
 from discsim.effects.rig import SpeedRipple, axis, coulomb_friction, quadratic_drag, speed_ripple
-from discsim.engine import check_model, check_state, own_warnings, passive_force, without_reset
+from discsim.engine import check_model, check_state, without_reset
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import model_file, read_text
@@ -97,15 +98,13 @@ class _Hinge:
     """The compiled rate-table model and the log of its states."""
 
     def __init__(self, environment: Environment, flat: FloatArray, inertia: float, yaw: float) -> None:
-        if mujoco.get_mjcb_passive() is not None:
-            raise RuntimeError("a passive-force callback is installed; build every rig before entering its block")
         spec = without_reset(mujoco.MjSpec.from_file(str(model_file("rate_table.xml"))))
         spec.option.gravity = [0.0, 0.0, -environment.gravity]
         spec.option.magnetic = flip_yz(environment.magnetic_field)
         spec.body("table").inertia = [inertia, inertia, inertia]
         self.tilt = _tilt(flat)
         spec.body("axis").quat = [self.tilt[0], *flip_yz(self.tilt[1:])]
-        self.model = spec.compile()
+        self.model = compile_model(spec)
         self.data = mujoco.MjData(self.model)
         check_model(self.model)
         self.environment = environment
@@ -181,14 +180,14 @@ def turn_table(
     views = (data.qpos, data.qvel, data.qfrc_passive)
 
     def drive(stepped_model: Any, stepped_data: Any) -> None:
-        if stepped_model is model and stepped_data is data:
+        if stepped_data is data:
             drive_force(flat, segment, data.time, *views)
 
     data.qvel[0] = profile.value[0]
     if profile.value[0] != 0.0:  # it turns already, ripple and all
         data.qvel[0] += speed_ripple(SpeedRipple(*flat.view(PARAMETERS)[0]["rig_speed_ripple"]), 0.0, 0.0)[0]
     slopes = np.diff(profile.value) / np.diff(profile.t)
-    with own_warnings(), passive_force(drive):
+    with own_warnings(), passive_force(model, drive):
         for k, slope in enumerate(progress(slopes.tolist())):
             if k and profile.value[k] == 0.0 and slope != 0.0:  # it starts to turn, ripple and all
                 turned = float(data.qpos[0]) - yaw
@@ -222,11 +221,11 @@ def spin_down(
     views = (data.qvel, data.qfrc_passive)
 
     def brake(stepped_model: Any, stepped_data: Any) -> None:
-        if stepped_model is model and stepped_data is data:
+        if stepped_data is data:
             bearing_force(flat, lookup, data.time, *views)
 
     data.qvel[0] = rate
-    with own_warnings(), passive_force(brake):
+    with own_warnings(), passive_force(model, brake):
         hinge.note()
         hinge.run(duration, timestep)
     return hinge.motion()

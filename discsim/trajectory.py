@@ -309,9 +309,10 @@ def _between(node: float, start: float, end: float) -> bool:
 def _kink(p: Any, tables: Tables, start: float, end: float) -> float:
     """Angle of attack, the first one after start, at which the coefficients have a kink before end; NaN: nowhere."""
     nearest = np.nan
-    for node in tables.static[0]:
-        if _between(node, start, end) and not abs(node - start) >= abs(nearest - start):
-            nearest = node
+    for nodes in (tables.static.columns[0], tables.static.rolling[0, 1:]):
+        for node in nodes:
+            if _between(node, start, end) and not abs(node - start) >= abs(nearest - start):
+                nearest = node
     node = p.aero_stall.alpha_stall_rad
     if p.aero_stall.k != 0.0 and _between(node, start, end) and not abs(node - start) >= abs(nearest - start):
         nearest = node
@@ -432,7 +433,8 @@ def integrate(
     K, F = np.empty((_EXTENDED, WIDTH)), np.empty((_POWER, WIDTH))
     y, new, work = state.copy(), np.empty(WIDTH), np.empty(WIDTH)
     t, h, n, ended = t_start, FIRST_STEP, 0, _LEFT
-    kinked = tables.static.shape[1] > 0 or p.aero_stall.k != 0.0
+    tabulated = tables.static.columns.shape[1] > 0 or tables.static.rolling.shape[1] > 1
+    kinked = tabulated or p.aero_stall.k != 0.0
     alpha, alpha_new, tries = 0.0, 0.0, 0
     shortest, chatter = SHORTEST_STEP, np.inf
     times[0], states[0] = t, y

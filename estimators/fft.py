@@ -13,6 +13,7 @@ from discsim.compiled import compiled
 from discsim.errors import InputError
 from discsim.recording import Samples
 from estimators.fft_fast import dirichlet, highest, spectra, transform_at
+from estimators.precession import AxialField, axial_field
 from estimators.rate import YawRate
 from estimators.spin_spline import IndexArray
 from estimators.tone import ComplexArray
@@ -24,6 +25,16 @@ CHUNK = 512
 
 #: Windows transformed at once: their coarse spectra, 1 MB at n = 128, stay in a core's cache.
 BLOCK = 64
+
+#: Windows that the hard iron along the axis is found from, at most.
+AXIAL_WINDOWS = 100
+
+#: Strength of the field, uT, that is taken where neither it nor the field along the axis is known: the Earth's is 25 to
+#: 65 uT.
+USUAL_STRENGTH = 50.0
+
+#: Parts of a window that noise is looked for in, and the fewest samples of one, for five parameters.
+NOISE_PARTS, NOISE_LEAST = 4, 8
 
 #: Below this share of the window's variance the line is smeared by a change of rate of more than about four bins
 #: over the window; its spectrum then has several peaks of one height and the highest says little.
@@ -51,6 +62,9 @@ class FftSettings:
         horizontal field it removes most of the error below about 2000 deg/s.
     false_alarm : float
         Chance that white noise alone passes for a line in one window.
+    precession_sd : float
+        Rate, along the field, of the turning of a disc's axis in flight, rad/s rms. Of 42 throws of three discs, drawn
+        at random (15 to 27 m/s, 2800 to 6400 deg/s, any heading), it is 0.077 rad/s rms, along and across the field.
     """
 
     window: int = 128
@@ -60,6 +74,7 @@ class FftSettings:
     stamp: Literal["centre", "unshifted"] = "centre"
     remove_mean: bool = False
     false_alarm: float = 1e-4
+    precession_sd: float = 0.08
 
     def __post_init__(self) -> None:
         if self.window < 8:
@@ -74,12 +89,20 @@ class FftSettings:
             raise InputError(f"fft stamp: got '{self.stamp}', expected 'centre' or 'unshifted'")
         if not 0 < self.false_alarm < 1:
             raise InputError(f"fft false alarm level: got {self.false_alarm:g}, expected between 0 and 1")
+        if not self.precession_sd >= 0:
+            raise InputError(f"fft precession: got {self.precession_sd:g} rad/s, expected none or more")
 
 
-def fft(magnetometer: Samples, settings: FftSettings | None = None) -> YawRate:
+def fft(
+    magnetometer: Samples,
+    settings: FftSettings | None = None,
+    *,
+    strength: float | None = None,
+    fixed_axis: bool = False,
+) -> YawRate:
     """Spin rate from the peak of the padded spectrum of each window, (P-1) to (P-7).
 
-    ``magnetometer.value`` is (m, 3) in any unit; of x and y the axis with the larger variance in the window is used.
+    ``magnetometer.value`` is (m, 3) in uT; of x and y the axis with the larger variance in the window is used.
     The rate has no sign. (PE1) runs to n + k, one element more than the n + k amplitudes it is matched with: here the
     frequencies are ``[0 .. n + k - 1] / (n + k)`` times the sampling rate, of which a real signal needs the first
     half. The sampling rate is that of the window's own time stamps.
@@ -93,11 +116,22 @@ def fft(magnetometer: Samples, settings: FftSettings | None = None) -> YawRate:
       mean by more than white noise does with the chance ``false_alarm`` (`_false_alarm`);
     - leakage moves the peak by a quarter of a bin (sampling rate / n) or more: it is no longer known whose it is.
 
-    The standard deviation has five parts, in quadrature: noise by the Cramer-Rao bound with the noise left in the
-    window; the grid's step / sqrt(12); leakage of the negative frequency and of the offset (`_leakage`); a smeared
-    line; a change of angular acceleration inside the window, from the estimates half a window before and after. In
-    flight the field's phase also precesses, which moves every estimate of this kind by up to 5 to 15 deg/s: that is
-    not in it.
+    The standard deviation has six parts, in quadrature: noise by the Cramer-Rao bound of one real axis with the noise
+    left in the window; the grid's step / sqrt(12); leakage of the negative frequency and of the offset (`_leakage`); a
+    smeared line; a change of angular acceleration inside the window, from the estimates half a window before and after;
+    and precession, by which the field's phase in flight turns at another rate than the disc: see `_precession`. That
+    part is ``precession_sd`` of the result. It does not average out: it may keep its sign for a whole flight.
+
+    Parameters
+    ----------
+    magnetometer : Samples
+        (m, 3) uT in B; z serves the precession's part alone.
+    settings : FftSettings or None
+        The paper's if None.
+    strength : float or None
+        Of the field at the place, uT, where it is stated: it tells the hard iron along z.
+    fixed_axis : bool
+        True on a rig: there is no precession.
 
     Raises
     ------
@@ -119,7 +153,8 @@ def fft(magnetometer: Samples, settings: FftSettings | None = None) -> YawRate:
             f"rate ({np.degrees(nyquist):.0f} deg/s)"
         )
     starts = np.arange(0, t.size - n + 1, settings.step)
-    rate, sd = np.full(starts.size, np.nan), np.full(starts.size, np.nan)
+    rate, sd, amplitude, axial = (np.full(starts.size, np.nan) for _ in range(4))
+    along_axis = sliding_window_view(magnetometer.value[:, 2], n)
     stamps, field = sliding_window_view(t, n), np.ascontiguousarray(magnetometer.value[:, :2])
     whole = np.concatenate([[0], np.cumsum(~np.isfinite(field).all(axis=1))])  # gaps before each sample
     for first in range(0, starts.size, CHUNK):
@@ -137,14 +172,22 @@ def fft(magnetometer: Samples, settings: FftSettings | None = None) -> YawRate:
         if not known.any():
             continue
         omega = 2 * np.pi * peak[known] / total  # (PE2), rad per sample
-        spread, certain = _uncertainty(still[known], mean[known], line[known], omega, settings)
+        spread, size, certain = _uncertainty(still[known], mean[known], line[known], omega, settings)
         slots = (first + np.flatnonzero(usable))[known]
         rate[slots] = np.where(certain, omega / spacing[known], np.nan)
         sd[slots] = np.where(certain, spread / spacing[known], np.nan)
+        amplitude[slots] = np.where(certain, size, np.nan)
+        axial[slots] = _mean_known(along_axis[starts[slots]])
     centre = (t[starts] + t[starts + n - 1]) / 2
     half = (n - 1) * magnetometer.interval / 2
     sd = np.hypot(sd, _uneven_acceleration(centre, rate, sd, half))
-    return YawRate("fft", centre if settings.stamp == "centre" else t[starts + n - 1], rate, sd)
+    precession = np.where(np.isnan(rate), np.nan, 0.0)
+    if not fixed_axis:
+        some = slice(None, None, max(1, round(n / 25 / settings.step), starts.size // AXIAL_WINDOWS))
+        iron = axial_field(amplitude[some], axial[some], strength)  # windows as far apart as those of `likelihood`
+        precession = _precession(amplitude, axial, iron, strength) * settings.precession_sd
+    when = centre if settings.stamp == "centre" else t[starts + n - 1]
+    return YawRate("fft", when, rate, np.hypot(sd, precession), precession_sd=precession)
 
 
 def _evenly_spaced(t: FloatArray, interval: FloatArray) -> BoolArray:
@@ -200,8 +243,12 @@ def _spectral_peak(
 
 def _uncertainty(
     still: FloatArray, mean: FloatArray, line: ComplexArray, omega: FloatArray, settings: FftSettings
-) -> tuple[FloatArray, BoolArray]:
-    """Return one sigma of the rate, rad per sample, and whether the line at ``omega`` (rad per sample) is certain.
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Return one sigma of the rate, rad per sample, the amplitude, and whether the line at ``omega`` is certain.
+
+    ``omega`` is in rad per sample. The noise of one real axis: of ``A cos(omega k + phase)`` in white noise of
+    deviation s the Fisher information of omega is ``A^2/s^2 sum(k^2 sin^2)``, half that of a complex tone with s on
+    each of its two axes, so ``var(omega) >= 24 s^2 / (A^2 n (n^2 - 1))``.
 
     ``line`` is the transform of ``still`` there, ``sum(x cos) - i sum(x sin)`` with angles counted from the centre.
     """
@@ -217,13 +264,89 @@ def _uncertainty(
     amplitude = np.maximum(np.hypot(even, odd), np.finfo(float).tiny)
 
     bin_width = 2 * np.pi / n
-    noise = np.sqrt(12 * residual / (n - 4) / (n * (n**2 - 1))) / amplitude
+    variance = np.empty(omega.size)
+    _noise_variance(still, omega, variance)
+    noise = np.sqrt(24 * variance / (n * (n**2 - 1))) / amplitude
     grid = 2 * np.pi / total / np.sqrt(12)
     shown = offset - mean if settings.remove_mean else offset
     leakage = _leakage(omega / bin_width, 2 * shown / amplitude, n) * bin_width
     smear = np.where(share < COHERENT_SHARE, COHERENT_SHARE / np.maximum(share, 1e-3), 0.0) * bin_width
     certain = (_false_alarm(share, n, settings) < settings.false_alarm) & (leakage < bin_width / 4)
-    return np.sqrt(noise**2 + grid**2 + leakage**2 + smear**2), certain
+    return np.sqrt(noise**2 + grid**2 + leakage**2 + smear**2), amplitude, certain
+
+
+@compiled
+def _noise_variance(still: FloatArray, omega: FloatArray, variance: FloatArray) -> None:
+    """Fill ``variance`` (w,) with that of the noise in windows (w, n) that hold a line at ``omega`` rad per sample.
+
+    A spin that decays by 250 deg/s^2, as in flight, leaves the line of a whole window by 50 deg of phase at its ends,
+    which hardly moves the peak but is no noise. So an offset and a line whose amplitude and phase may change linearly
+    are fitted to each of `NOISE_PARTS` parts of the window, and what they leave is counted. About a part's centre
+    1, cos and tau sin are even, sin and tau cos odd: of those two sets only members of one share anything.
+    """
+    n = still.shape[1]
+    parts = max(1, min(NOISE_PARTS, n // NOISE_LEAST))
+    even, odd, shown_even, shown_odd = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
+    for i in range(omega.size):
+        squares, freedom = 0.0, 0
+        for part in range(parts):
+            first, after = part * n // parts, (part + 1) * n // parts
+            count = after - first
+            even[:], odd[:], shown_even[:], shown_odd[:] = 0.0, 0.0, 0.0, 0.0
+            start = -(count - 1) / 2
+            turned, turn = np.exp(1j * omega[i] * start), np.exp(1j * omega[i])
+            for k in range(count):
+                tau, x = 2 * (start + k) / count, still[i, first + k]
+                c, s = turned.real, turned.imag
+                e2, o1 = tau * s, tau * c
+                even[0, 0] += 1.0
+                even[1, 0] += c
+                even[2, 0] += e2
+                even[1, 1] += c * c
+                even[2, 1] += c * e2
+                even[2, 2] += e2 * e2
+                odd[0, 0] += s * s
+                odd[1, 0] += s * o1
+                odd[1, 1] += o1 * o1
+                shown_even[0] += x
+                shown_even[1] += x * c
+                shown_even[2] += x * e2
+                shown_odd[0] += x * s
+                shown_odd[1] += x * o1
+                squares += x * x
+                turned *= turn
+            explained_even, rank_even = _explained(even, shown_even, 3)
+            explained_odd, rank_odd = _explained(odd, shown_odd, 2)
+            squares -= explained_even + explained_odd
+            freedom += count - rank_even - rank_odd
+        variance[i] = max(squares, 0.0) / freedom
+
+
+@compiled
+def _explained(gram: FloatArray, shown: FloatArray, size: int) -> tuple[float, int]:
+    """Return the sum of squares that columns explain, and how many count; both arguments are overwritten.
+
+    ``gram`` has their products in its lower triangle, ``shown`` theirs with the readings. A column that is one of those
+    before but for 1e-9 of its square, as where a part holds little of a turn, does not count.
+    """
+    total, rank = 0.0, 0
+    for c in range(size):
+        whole = gram[c, c]
+        for before in range(c):
+            gram[c, c] -= gram[c, before] ** 2
+            shown[c] -= gram[c, before] * shown[before]
+        if gram[c, c] <= 1e-9 * whole:
+            gram[c:, c], shown[c] = 0.0, 0.0
+            continue
+        pivot = np.sqrt(gram[c, c])
+        shown[c] /= pivot
+        for later in range(c + 1, size):
+            for before in range(c):
+                gram[later, c] -= gram[later, before] * gram[c, before]
+            gram[later, c] /= pivot
+        total += shown[c] ** 2
+        rank += 1
+    return total, rank
 
 
 def _leakage(order: FloatArray, offset: FloatArray, n: int) -> FloatArray:
@@ -272,3 +395,23 @@ def _uneven_acceleration(t: FloatArray, rate: FloatArray, sd: FloatArray, half: 
     if not known.any():
         return np.zeros(t.size)
     return np.asarray(0.3 * np.sqrt(np.maximum(0.0, np.interp(t, t[known], second[known]))))
+
+
+def _mean_known(windows: FloatArray) -> FloatArray:
+    """Return the means (w,) of windows (w, n) over what is known; NaN where nothing is."""
+    known = np.isfinite(windows)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where(known, windows, 0.0).sum(axis=1) / known.sum(axis=1))
+
+
+def _precession(amplitude: FloatArray, axial: FloatArray, iron: AxialField, strength: float | None) -> FloatArray:
+    """Return what an axis that turns at an unseen 1 rad/s along the field moves the phase's rate by, (w,) rad/s.
+
+    The phase turns at ``-r + m_z (p m_x + q m_y)/(m_x^2 + m_y^2)`` (`estimators.precession`): the part along the field
+    of the axis's turning, times the field along the disc's axis over that across it. ``amplitude`` (w,) uT is the
+    latter and ``axial`` (w,) the former with its hard iron; where that is unknown the field has its ``strength``, or a
+    usual one.
+    """
+    rest = np.sqrt(np.maximum((strength or USUAL_STRENGTH) ** 2 - amplitude**2, 0.0))
+    along = np.where(np.isfinite(axial), np.hypot(axial - iron.offset, iron.sd), rest)
+    return np.asarray(along / amplitude)

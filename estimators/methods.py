@@ -75,7 +75,12 @@ class Method(NamedTuple):
 
 def _fft(recording: Recording, options: Options) -> YawRate:
     field = unclipped(recording, "magnetometer")
-    found = fft(recording.need("magnetometer") if field is None else field, options.fft)
+    found = fft(
+        recording.need("magnetometer") if field is None else field,
+        options.fft,
+        strength=recording.environment.field_strength,
+        fixed_axis=recording.plant in ("rate_table", "spin_down"),
+    )
     length = options.fft.window * recording.need("magnetometer").interval
     late = length / 2 if options.fft.stamp == "unshifted" else 0.0
     fits = ~_tumbling(recording, found.t - late, length)

@@ -25,6 +25,9 @@ class YawRate:
         Rate about +z_B and its one-sigma uncertainty, rad/s; NaN (both) where the data cannot tell.
     signed : bool
         False where the method cannot tell the direction of spin and gives the magnitude.
+    precession_sd : (n,) array or None
+        The part of ``sd`` that an unseen precession of the axis makes, rad/s, where a method tells it apart. It does
+        not average out: it may keep its sign for a whole flight.
     lower, upper : (n,) array or None
         Worst-case bounds, rad/s, where the method has them (Eq. 11).
     """
@@ -34,11 +37,12 @@ class YawRate:
     rate: FloatArray
     sd: FloatArray
     signed: bool = False
+    precession_sd: FloatArray | None = None
     lower: FloatArray | None = None
     upper: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        for name in ("t", "rate", "sd", "lower", "upper"):
+        for name in ("t", "rate", "sd", "precession_sd", "lower", "upper"):
             value = getattr(self, name)
             if value is None:
                 continue

@@ -38,7 +38,7 @@ AHEAD = 3
 #: a scheduler that is there answers, and has its first worker, within this, s
 PATIENCE_S = 20
 
-#: MuJoCo keeps one force callback for the whole process, so a worker with several threads takes one task at a time
+#: a flight's force callback is Python, which threads can only take in turns: a worker takes one task at a time
 _one_at_a_time = threading.Lock()
 
 

@@ -14,7 +14,7 @@ from discsim.aerodynamics import advance_ratio, air_wrench, static_coefficients,
 from discsim.disc import Aero, AeroTable, Disc, YawDampingTable
 from discsim.engine import fly
 from discsim.errors import InputError
-from discsim.frames import C3
+from discsim.frames import C2, C3
 from discsim.parameters import PARAMETERS, parameters, tables
 from discsim.shipped import load_disc
 
@@ -46,6 +46,12 @@ def test_force_and_moment_are_those_of_the_physics_reference(u, v, w, p, q, r):
     scale = np.linalg.norm(plain_force)
     np.testing.assert_allclose(force, plain_force, rtol=ROUNDING, atol=ROUNDING * scale)
     np.testing.assert_allclose(moment, plain_moment, rtol=ROUNDING, atol=ROUNDING * scale * DRIVER.diameter)
+
+
+@given(alpha=st.floats(-np.pi, np.pi))
+def test_the_matrix_that_21_prints_is_that_of_23(alpha):
+    """(21) has the transpose of C2(-alpha), (23) C2(alpha)."""
+    np.testing.assert_allclose(C2(-alpha).T, C2(alpha), rtol=0, atol=1e-16)
 
 
 @given(u=speeds, v=speeds, w=speeds, p=tilts, q=tilts, r=spins, turn=st.floats(-np.pi, np.pi))

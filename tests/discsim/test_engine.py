@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from discsim.disc import Aero, Disc, Release
 from discsim.effects import Effect, effect
-from discsim.engine import FlyingDisc, check_model, fly, passive_force
+from discsim.engine import FlyingDisc, check_model, fly
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.frames import C3, body_to_ned, rotation_error, to_body
@@ -486,121 +486,6 @@ class TestRefusals:
     def test_a_throw_starts_above_the_ground(self):
         with pytest.raises(InputError, match="expected above the ground"):
             fly(DRIVER, FIELD, throw(height=0.0))
-
-
-OTHER_MODEL = "<mujoco><worldbody><body><freejoint/><geom size='0.1'/></body></worldbody></mujoco>"
-
-
-class TestCallbackOnLoan:
-    @pytest.fixture(autouse=True)
-    def _left_as_found(self):
-        assert mujoco.get_mjcb_passive() is None
-        yield
-        left = mujoco.get_mjcb_passive()
-        mujoco.set_mjcb_passive(None)
-        assert left is None
-
-    def test_the_previous_callback_is_back_after_the_block(self):
-        def previous(model, data): ...
-
-        flying = FlyingDisc(DRIVER, FIELD)
-        mujoco.set_mjcb_passive(previous)
-        try:
-            with flying.air():
-                assert mujoco.get_mjcb_passive() == flying.apply
-            assert mujoco.get_mjcb_passive() is previous
-        finally:
-            mujoco.set_mjcb_passive(None)
-
-    def test_blocks_nest(self):
-        one, two = FlyingDisc(DRIVER, FIELD), FlyingDisc(DRIVER, FIELD)
-        with one.air():
-            with two.air():
-                assert mujoco.get_mjcb_passive() == two.apply
-            assert mujoco.get_mjcb_passive() == one.apply
-
-    def test_an_exception_in_the_block_leaves_nothing_behind(self):
-        flying = FlyingDisc(DRIVER, FIELD)
-        with pytest.raises(ZeroDivisionError), flying.air():
-            _ = 1 / 0
-
-    def test_an_exception_in_the_callback_comes_out_as_itself_and_leaves_nothing_behind(self):
-        flying = FlyingDisc(DRIVER, FIELD)
-        flying.release(throw())
-
-        def broken(model, data):
-            raise KeyError("a broken force")
-
-        with pytest.raises(KeyError, match="a broken force"), passive_force(broken):
-            mujoco.mj_step(flying.model, flying.data)
-        mujoco.mj_step(flying.model, flying.data)  # and MuJoCo still works
-
-    def test_a_foreign_model_stepped_meanwhile_feels_nothing(self):
-        flying = FlyingDisc(DRIVER, FIELD)
-        foreign = mujoco.MjModel.from_xml_string(OTHER_MODEL)
-        alone, beside = mujoco.MjData(foreign), mujoco.MjData(foreign)
-        for data in (alone, beside):
-            data.qvel[:] = [10.0, 0, 0, 0, 0, 50.0]
-        for _ in range(5):
-            mujoco.mj_step(foreign, alone)
-        with flying.air():
-            for _ in range(5):
-                mujoco.mj_step(foreign, beside)
-        np.testing.assert_array_equal(beside.qpos, alone.qpos)
-        assert np.all(beside.qfrc_passive == 0.0)
-
-    def test_two_discs_in_turn_do_not_disturb_each_other(self):
-        """A second disc of the same parameters is a foreign model too."""
-        one, two = FlyingDisc(DRIVER, FIELD), FlyingDisc(DRIVER, FIELD)
-        for flying in (one, two):
-            flying.release(throw())
-        with one.air():
-            mujoco.mj_step(one.model, one.data)
-            mujoco.mj_step(two.model, two.data)
-        assert np.any(one.data.qfrc_passive != 0.0)
-        assert np.all(two.data.qfrc_passive == 0.0)
-
-    def test_a_second_data_of_the_same_model_flies_too(self):
-        flying = FlyingDisc(DRIVER, FIELD)
-        flying.release(throw())
-        copy = mujoco.MjData(flying.model)
-        copy.qpos[:], copy.qvel[:] = flying.data.qpos, flying.data.qvel
-        with flying.air():
-            for _ in range(3):
-                mujoco.mj_step(flying.model, flying.data)
-                mujoco.mj_step(flying.model, copy)
-        np.testing.assert_array_equal(copy.qpos, flying.data.qpos)
-
-    @pytest.mark.parametrize("compile_model", [mujoco.MjModel.from_xml_string, None], ids=["from_xml", "spec"])
-    def test_a_model_compiled_inside_the_block_is_a_clear_error(self, compile_model):
-        flying = FlyingDisc(DRIVER, FIELD)
-        compile_model = compile_model or (lambda text: mujoco.MjSpec.from_string(text).compile())
-        with pytest.raises(RuntimeError, match="compile every model before entering the block"), flying.air():
-            compile_model(OTHER_MODEL)
-
-    def test_a_disc_built_inside_a_block_is_a_clear_error(self):
-        flying = FlyingDisc(DRIVER, FIELD)
-        with pytest.raises(RuntimeError, match="build every disc before entering"), flying.air():
-            FlyingDisc(DRIVER, FIELD)
-
-    def test_other_value_errors_in_the_block_are_left_alone(self):
-        flying = FlyingDisc(DRIVER, FIELD)
-        with pytest.raises(ValueError, match="something else"), flying.air():
-            raise ValueError("something else")
-
-    def test_a_flight_that_fails_leaves_nothing_behind(self):
-        with pytest.raises(InputError):
-            fly(DRIVER, FIELD, throw(height=-1.0))
-
-    def test_the_force_is_added_to_what_is_there(self):
-        """``+=``: four evaluations a step start from MuJoCo's own passive forces, zero here."""
-        flying = FlyingDisc(DRIVER, FIELD)
-        flying.release(throw())
-        with flying.air():
-            mujoco.mj_forward(flying.model, flying.data)
-            once = flying.data.qfrc_passive.copy()
-            flying.apply(flying.model, flying.data)
-        np.testing.assert_allclose(flying.data.qfrc_passive, 2 * once, rtol=1e-15)
 
 
 def test_the_model_is_the_disc_that_was_asked_for():

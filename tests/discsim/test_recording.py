@@ -14,7 +14,7 @@ from hypothesis.extra import numpy as npst
 from recording_folder import AERO_TABLE, CNR_TABLE, CSV, RATE_TABLE, SPIN_DOWN, TOML, line_of, make, refusal
 
 from discsim import recording as module
-from discsim.disc import Aero, AeroTable, Disc, Release, Rig, YawDampingTable
+from discsim.disc import Aero, AeroTable, Disc, Release, Rig, RollingTable, YawDampingTable
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.recording import (
@@ -384,7 +384,18 @@ def discs(draw: st.DrawFn) -> Disc:
         table,
         damping,
         draw(maybe_sigma(keys)),
+        draw(st.none() | rolling_tables()),
     )
+
+
+@st.composite
+def rolling_tables(draw: st.DrawFn) -> RollingTable:
+    alpha = np.sort(draw(npst.arrays(np.float64, st.integers(2, 5), elements=reals, unique=True)))
+    ratio = np.cumsum(draw(npst.arrays(np.float64, st.integers(1, 4), elements=st.floats(0.01, 1.0))))
+    CR = draw(st.none() | npst.arrays(np.float64, (alpha.size, ratio.size), elements=reals))
+    columns = npst.arrays(np.float64, alpha.size, elements=reals)
+    CRp = draw(columns if CR is None else st.none() | columns)
+    return RollingTable(alpha, None if CR is None else ratio, CR, CRp)
 
 
 @st.composite

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 import pytest
 from flights import FIELD
@@ -12,7 +11,6 @@ from turning import field_at
 
 from discsim.disc import Rig
 from discsim.effects import CATALOGUE, Effect, effect
-from discsim.engine import passive_force
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.frames import body_to_ned
@@ -104,12 +102,6 @@ class TestTable:
     def test_what_is_no_profile_is_refused(self, profile, message):
         with pytest.raises(InputError, match=message):
             turn_table(profile, FIELD)
-
-    def test_no_callback_is_left_behind_and_none_is_overrun(self):
-        assert mujoco.get_mjcb_passive() is None
-        with passive_force(lambda model, data: None), pytest.raises(RuntimeError, match="build every rig before"):
-            turn_table(self.profile, FIELD)
-        assert mujoco.get_mjcb_passive() is None
 
 
 class TestTilt:

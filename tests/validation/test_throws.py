@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 
 from discsim.frames import C3, attitude_matrix
 from discsim.shipped import load_disc, load_throw
+from estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors
 from estimators.rate import YawRate
 from validation.scenarios.throws import (
+    ACCELEROMETER_PERCENT,
     EDGE_S,
     FULL_SET,
     MOUNT_ERROR,
@@ -167,6 +169,21 @@ class TestFlown:
         np.testing.assert_array_equal(changed.error("accelerometer"), result.error("accelerometer"))
         inner = (rate.t >= EDGE_S) & (rate.t <= result.motion.end - EDGE_S)
         assert changed.error("accelerometer").size == inner.sum() > 100
+
+
+def test_the_accelerometer_s_limit_is_its_worst_case():
+    """(9) alone, with (13) at the driver's spin, and with the zero-g offset at the slowest spin of the set."""
+    worst, d, slowest = AccelerometerErrors(), 0.0161, min(abs(throw.spin_deg_s) for throw in FULL_SET)
+
+    def too_small(spin_deg_s: float, *, scale: float, cross: float, bias: float) -> float:
+        felt = (1 - scale) * (d - MOUNT_ERROR) - cross * MOUNT_ERROR
+        square = felt / d - (cross * STANDARD_GRAVITY + bias) / (d * np.radians(spin_deg_s) ** 2)
+        return float(100 * (1 - np.sqrt(square)))
+
+    by_13 = {"scale": worst.nonlinearity, "cross": worst.cross_axis}
+    assert too_small(4200.0, scale=0.0, cross=0.0, bias=0.0) == pytest.approx(3.2, abs=0.05)
+    assert too_small(4200.0, **by_13, bias=0.0) == pytest.approx(3.6, abs=0.05)
+    assert too_small(slowest, **by_13, bias=worst.bias) == pytest.approx(ACCELEROMETER_PERCENT, abs=0.05)
 
 
 class TestEachCheckCanFail:

@@ -179,11 +179,15 @@ def _figures(rate: YawRate) -> dict[str, Any]:
     known = np.isfinite(rate.rate)
     median = float(np.median(rate.rate[known])) if known.any() else float("nan")
     sd = float(np.median(rate.sd[known])) if known.any() else float("nan")
+    part: dict[str, float] = {}
+    if rate.precession_sd is not None and np.any(rate.precession_sd[known] > 0):
+        part["median_precession_sd_rad_s"] = float(np.median(rate.precession_sd[known]))
     return {
         "count": len(rate),
         "share_unknown": float(1 - known.mean()) if len(rate) else float("nan"),
         "median_rate_rad_s": median,
         "median_sd_rad_s": sd,
+        **part,
         "signed": rate.signed,
     }
 

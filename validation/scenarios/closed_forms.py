@@ -57,7 +57,7 @@ def closed_form_checks(disc: Disc, environment: Environment) -> list[Score]:
     run = spin_down(rig, environment, 60.0, 20.0)
     decay = float(np.max(np.abs(run.rate[:, 2] / (60.0 * np.exp(-rig.viscous / rig.Izz * run.t)) - 1)))
 
-    plain = replace(disc, aero=disc.aero._replace(CRr=0.0, CRp=0.0))
+    plain = replace(disc, aero=disc.aero._replace(CRr=0.0, CRp=0.0), rolling_table=None)
     throw = Release(np.array([0, 0, -1.3]), np.array([23.6, 0, -4.2]), -0.2, 0.14, 0.0, np.array([0, 0, 73.0]))
     recovered = yaw_damping_from_motion(fly(plain, environment, throw), plain) / disc.aero.CNr
     flight = fly(disc, environment, throw)

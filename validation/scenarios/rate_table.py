@@ -95,7 +95,7 @@ def run_rate_table(
     wide = record(motion, wide_module, noise_wide, plant="rate_table", name=f"{name}-adxrs649", command=profile)
 
     rates = {
-        "fft": fft(recording.need("magnetometer")),
+        "fft": fft(recording.need("magnetometer"), fixed_axis=True),
         "accelerometer": accelerometer(recording.need("accelerometer"), recording.sheets["accelerometer"]),
         "gyroscope": gyroscope(recording.need("gyroscope"), recording.sheets["gyroscope"]),
         "adxrs649": replace(gyroscope(wide.need("gyroscope"), wide.sheets["gyroscope"]), method="adxrs649"),
@@ -248,7 +248,7 @@ def _envelope_checks(run: RateTableRun, rate: float) -> list[Score]:
 
 def fft_delay(run: RateTableRun) -> float:
     """Return by how much the unshifted estimate lags on ramps, s: its error over the slope, median."""
-    late = fft(run.recording.need("magnetometer"), FftSettings(stamp="unshifted"))
+    late = fft(run.recording.need("magnetometer"), FftSettings(stamp="unshifted"), fixed_axis=True)
     delays = []
     knots = list(zip(run.profile.t.tolist(), run.profile.value.tolist(), strict=True))
     for (t0, r0), (t1, r1) in pairwise(knots):

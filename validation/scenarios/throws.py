@@ -20,10 +20,14 @@ from estimators.methods import estimate
 from estimators.rate import YawRate
 from validation.reporting.scores import Score, at_most, score
 
-__all__ = ["FULL_SET", "QUICK_SET", "Throw", "ThrowResult", "fly_throws", "throw_checks"]
+__all__ = ["ACCELEROMETER_PERCENT", "FULL_SET", "QUICK_SET", "Throw", "ThrowResult", "fly_throws", "throw_checks"]
 
 #: installation error of the accelerometer on the throws: the smaller of the paper's two, along x and y, m
 MOUNT_ERROR = 0.001
+#: what an accelerometer so mounted may err by, % of the spin at release. 1 mm nearer to the axis than the 16.1 mm that
+#: are stated is worth 3.2 % (9), with the scale and cross-axis of (13) 3.6 % at 4200 deg/s; on the slowest throw, 2800
+#: deg/s, all at their worst with the zero-g offset of 60 mg make 4.5 %. The worst of 40 specimens drawn had 4.2 %.
+ACCELEROMETER_PERCENT = 4.5
 #: the methods that are scored: the paper's two, the gyroscope it compares them with, and the best there is
 SCORED = ("fft", "accelerometer", "gyroscope", "best")
 #: estimates nearer than this to release or touch-down are not scored: half the paper's window, s
@@ -121,7 +125,7 @@ def throw_checks(results: Sequence[ThrowResult]) -> list[Score]:
     """Score the methods on the throws.
 
     The limits of the paper's methods are what its own figures allow: precession turns the magnetometer's phase by 5
-    to 15 deg/s beside the spin, and 1 mm of mount error along x and y is worth up to 6.4 % of the rate.
+    to 15 deg/s beside the spin, and the accelerometer may err by `ACCELEROMETER_PERCENT`.
     """
     fft = [np.degrees(rms(result.error("fft"))) for result in results]
     known = np.min([_share_known(result.error("fft")) for result in results])
@@ -135,7 +139,9 @@ def throw_checks(results: Sequence[ThrowResult]) -> list[Score]:
     return [
         at_most("throws: worst rms error of fft", np.max(fft), "deg/s", 20.0),
         score("throws: smallest share of a flight that fft knows", known, "1", 1.0, 0.02),
-        at_most("throws: worst rms error of accelerometer, 1 mm off", np.max(accelerometer), "%", 6.4),
+        at_most(
+            "throws: worst rms error of accelerometer, 1 mm off", np.max(accelerometer), "%", ACCELEROMETER_PERCENT
+        ),
         at_most("throws: worst rms error of best", np.max(best), "deg/s", 0.5),
         at_most("throws: share of gyroscope values beyond its range", beyond, "1", 0.0),
     ]

@@ -170,7 +170,8 @@ class _Bench:
             seen = module.sensors["magnetometer"]
             assert isinstance(seen, Magnetometer)
             assert self.seen is not None
-            return fft(self.seen.measure(seen, streams["magnetometer"]), self.options.fft)
+            shown = self.seen.measure(seen, streams["magnetometer"])
+            return fft(shown, self.options.fft, fixed_axis=self.plan.plant != "flight")
         return estimate(self.recording(module, number), name, self.options)
 
     def recording(self, module: Instruments, number: int) -> Recording:

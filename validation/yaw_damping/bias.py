@@ -47,7 +47,7 @@ class Bias:
 def paper_biases(disc: Disc, environment: Environment, throws: Sequence[Throw]) -> list[Bias]:
     """Fly each throw and return what the paper's way errs by."""
     assert disc.aero is not None
-    plain = replace(disc, aero=disc.aero._replace(CRr=0.0, CRp=0.0))
+    plain = replace(disc, aero=disc.aero._replace(CRr=0.0, CRp=0.0), rolling_table=None)
     found = []
     for throw in throws:
         motion = predict(disc, environment, throw.release).motion()

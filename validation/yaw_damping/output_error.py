@@ -171,8 +171,9 @@ def _shared(throws: Sequence[Throw]) -> list[Shared]:
 
 
 def _comparable(disc: Disc) -> tuple[object, ...]:
-    table = None if disc.aero_table is None else tuple(map(tuple, vars(disc.aero_table).values()))
-    return (disc.mass, disc.diameter, disc.Ixx, disc.Izz, disc.aero and disc.aero._replace(CNr=0.0), table)
+    given = [vars(table) for table in (disc.aero_table, disc.rolling_table) if table is not None]
+    tabulated = [(name, None if value is None else value.tolist()) for table in given for name, value in table.items()]
+    return (disc.mass, disc.diameter, disc.Ixx, disc.Izz, disc.aero and disc.aero._replace(CNr=0.0), tabulated)
 
 
 def _stated_keys() -> Iterator[tuple[str, str, str, int]]:

@@ -162,7 +162,9 @@ def recordings(case: Case) -> list[Recording]:
 
 def _stated_disc(case: Case) -> Any:
     if case.plant == "free_spin" and case.stated_disc is not None:
-        return replace(case.stated_disc, aero=None, aero_table=None, yaw_damping_table=None, sigma={})
+        return replace(
+            case.stated_disc, aero=None, aero_table=None, yaw_damping_table=None, rolling_table=None, sigma={}
+        )
     return case.stated_disc
 
 

@@ -17,12 +17,13 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray
+from discsim.callbacks import compile_model, own_warnings, passive_force
 from discsim.compiled import compiled
 from discsim.disc import Disc, Rig
 from discsim.effects.catalogue import Effect, by_id
 from discsim.effects.events import spin_step
 from discsim.effects.rig import axis
-from discsim.engine import FlyingDisc, check_model, check_state, own_warnings, passive_force
+from discsim.engine import FlyingDisc, check_model, check_state
 from discsim.environment import Environment
 from discsim.frames import flip_yz, multiply, turn
 from discsim.motion import Motion
@@ -408,14 +409,14 @@ def coast(
         across = np.hypot(n, e)
         tilt = turn(np.array([-e, n, 0.0]) * np.arctan2(across, d) / across)
         spec.body("axis").quat = [tilt[0], *flip_yz(tilt[1:])]
-    model = spec.compile()
+    model = compile_model(spec)
     data = mujoco.MjData(model)
     check_model(model)
     data.qpos[0], data.qvel[0] = yaw, rate
     kick = given.get("event.spin_step")
 
     def hidden(stepped_model: Any, stepped_data: Any) -> None:
-        if stepped_model is not model or stepped_data is not data:
+        if stepped_data is not data:
             return
         r = float(data.qvel[0])
         torque = rig.Izz * spin_step(kick, data.time, r) if kick is not None else 0.0
@@ -427,7 +428,7 @@ def coast(
 
     steps = round(duration / model.opt.timestep)
     log = np.empty((steps + 1, 4))
-    with own_warnings(), passive_force(hidden):
+    with own_warnings(), passive_force(model, hidden):
         for k in range(steps + 1):
             if k:
                 mujoco.mj_step(model, data)
