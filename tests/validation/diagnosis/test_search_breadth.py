@@ -9,7 +9,7 @@ from made import coasts
 from discsim.effects.catalogue import CATALOGUE
 from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain
 from validation.diagnosis.selection import stepwise as searching
-from validation.diagnosis.selection.candidates import Trial
+from validation.diagnosis.selection.candidates import Trial, free_trial
 from validation.diagnosis.selection.constrained_fit import Tied
 from validation.diagnosis.selection.evidence import price
 from validation.diagnosis.selection.hypothesis import Hypothesis
@@ -81,3 +81,39 @@ def test_near_the_data_four_are_refitted(monkeypatch):
     # half of what an effect must gain, as algebra said of each
     half = [0.5 * price(trial) for trial in RANKED[:4]]
     np.testing.assert_allclose(bars, np.array(half) / COUNT)
+
+
+def exchanged(monkeypatch: pytest.MonkeyPatch, without_scale: float) -> set[str] | None:
+    """Return what an offset, a scale and a turned board give way to, where a place could be in place of the board.
+
+    ``without_scale`` is the score of the offset and the place alone; that of the three is 40, with the place 42.
+    """
+    recordings = coasts(seconds=1.0)
+    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), NO_JUMPS["spin_down"], {})
+    linears = linearised(fit)
+    fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
+    offset, scale, board, place = map(
+        free_trial, ("accel.time_offset", "accel.scale", "board.rotation", "accel.position_offset")
+    )
+
+    def told(fit: Fit, hypothesis: Hypothesis, *others: object, bar: float) -> Tied:
+        return Tied(hypothesis, fit, without_scale if set(hypothesis.trials) == {offset, place} else 1e4)
+
+    monkeypatch.setattr(searching, "tied_fit", told)
+    monkeypatch.setattr(searching, "_possible", lambda _: True)
+    final = Tied(Hypothesis((offset, scale, board)), fit, 40.0)
+    base = Tied(Hypothesis(), fit, 1e6)
+    found = searching.Search(tuple(recordings), (), fit, fit.noise, (), base, final)
+    with_place = Tied(Hypothesis((offset, scale, place)), fit, 42.0)
+    found.rivals = {board.name: [searching.Rival(place, 2.0, with_place)]}
+    better = searching._exchanged(found)
+    return None if better is None else {trial.id for trial in better.hypothesis.trials}
+
+
+def test_a_rival_that_makes_another_effect_superfluous_takes_the_place_of_both(monkeypatch):
+    assert exchanged(monkeypatch, without_scale=45.0) == {"accel.time_offset", "accel.position_offset"}
+
+
+def test_a_rival_that_explains_no_more_than_the_named_effects_does_not(monkeypatch):
+    """Three parameters fewer are worth 24; what they explained beyond that is missed."""
+    assert exchanged(monkeypatch, without_scale=90.0) is None

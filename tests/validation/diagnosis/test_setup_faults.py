@@ -55,3 +55,16 @@ def test_a_small_fault_on_a_rate_table_is_named_alone_with_its_size(fault: Effec
         value, error = found[name]
         assert error < largest
         assert value == pytest.approx(fault.sizes[name], abs=4.0 * error)
+
+
+def test_an_offset_of_time_beside_a_place_is_not_told_as_a_turned_board_and_a_scale():
+    """Those two together do to an accelerometer what its place does: with the place in, one of them is superfluous."""
+    errors = [
+        effect("accel.time_offset", offset_s=-0.018),
+        effect("accel.position_offset", dx_m=4e-5, dy_m=-3.6e-4),
+    ]
+    final = search(tables(errors=errors)).final
+    assert {trial.id for trial in final.hypothesis.trials} == {error.id for error in errors}
+    found = {q.name: v for q, v in zip(final.fit.parameters, final.fit.at, strict=True)}
+    assert found["offset_s"] == pytest.approx(-0.018, abs=5e-4)
+    assert found["dy_m"] == pytest.approx(-3.6e-4, abs=3e-5)

@@ -554,13 +554,22 @@ def _rivals(found: Search) -> dict[str, list[Rival]]:
 def _exchanged(found: Search) -> Tied | None:
     """Return the fit with a rival in the place of a named effect where that explains more for its parameters.
 
-    An effect that was taken up while another was missing may have been the one that bends most, not the right one.
+    An effect that was taken up while another was missing may have been the one that bends most, not the right one; and
+    with the right one in its place others may be superfluous, which together with it stood in for that.
     """
     better = []
+    size = found.final.hypothesis.size
     for trial in found.final.hypothesis.trials:
         for rival in found.rivals.get(trial.name, []):
+            if not _possible(rival.tied):
+                continue
             more = len(parameters_of(rival.trial)) - len(parameters_of(trial))
             merit = rival.worse + RIVAL * more
-            if merit < -(_SIMPLER if more < 0 else _BETTER) and _possible(rival.tied):
+            if merit < -(_SIMPLER if more < 0 else _BETTER):
                 better.append((merit, rival.tied))
+            elif size > 1 and rival.worse < _BETTER:
+                fewer = _pruned(found, rival.tied, kept=rival.trial)
+                merit = fewer.score - found.final.score + RIVAL * (fewer.hypothesis.size - size)
+                if len(fewer.hypothesis.trials) < len(found.final.hypothesis.trials) and merit < -_SIMPLER:
+                    better.append((merit, fewer))
     return min(better, key=lambda item: item[0])[1] if better else None
