@@ -113,11 +113,32 @@ def reduce(linear: Linear, current: Chain, noise: NoiseModel, jumps: Jumps, hold
     scale = 1.0 / np.sqrt(np.maximum(np.diag(G)[:u], 1e-300))
     H = G[:u, :u] * scale[:, None] * scale[None, :]
     H[np.arange(u), np.arange(u)] += 1e-12
-    L = np.linalg.cholesky(H)
+    L = _factor(H)
     cross = G[:u, u:] * scale[:, None]
     half = solve_triangular(L, cross, lower=True, check_finite=False)
     gram = G[u:, u:] - half.T @ half
     return Reduced(gram, (L, scale), cross, linear.residual.size)
+
+
+#: smallest eigenvalue, as a share of the largest, that a matrix of sums of squares may have come to by rounding
+_ROUNDING = 1e-12
+
+
+def _factor(H: FloatArray) -> FloatArray:
+    """Return the lower triangular root of a symmetric matrix (l, l) of sums of squares; NaN where it is not finite.
+
+    Sums over segments whose motion grows without bounds lose the last digits of what came before: eigenvalues that are
+    negative by rounding stand for nothing that is known.
+    """
+    if not np.all(np.isfinite(H)):
+        return np.full(H.shape, np.nan)
+    try:
+        return np.asarray(np.linalg.cholesky(H))
+    except np.linalg.LinAlgError:
+        w, V = np.linalg.eigh(H)
+        root = V * np.sqrt(np.maximum(w, _ROUNDING * max(float(w[-1]), 1e-300)))
+        upper: FloatArray = np.linalg.qr(root.T)[1]
+        return np.asarray(upper.T)
 
 
 def local_step(reduced: Reduced, shared: FloatArray) -> FloatArray:

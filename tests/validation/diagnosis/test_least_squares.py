@@ -13,7 +13,7 @@ from scipy.optimize import lsq_linear
 from discsim.arrays import FloatArray
 from discsim.effects import effect
 from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain, loose_jumps
-from validation.identification import gauss_newton
+from validation.identification import gauss_newton, normal_equations
 from validation.identification.gauss_newton import Fit, _Going, linearised, merit_of, open_gaps, refit, residuals_after
 from validation.identification.noise import stated_noise, whitened
 from validation.identification.normal_equations import local_step, normal_matrix, reduce, shared_step, unknown_prior
@@ -133,6 +133,20 @@ def test_a_step_from_predictions_that_are_not_finite_is_no_number():
     assert np.isnan(step).all()
     assert np.isnan(covariance).all()
     assert np.isnan(expected)
+
+
+def test_sums_that_rounding_has_made_indefinite_still_have_a_root():
+    """As those of segments whose motion grows without bounds: what is lost counts as not known."""
+    columns = np.random.default_rng(1).standard_normal((5, 3))
+    H = columns @ columns.T - 1e-10 * np.eye(5)
+    with pytest.raises(np.linalg.LinAlgError):
+        np.linalg.cholesky(H)
+    L = normal_equations._factor(H)
+    assert np.array_equal(L, np.tril(L))
+    np.testing.assert_allclose(L @ L.T, H, atol=1e-9)
+    sound = H + np.eye(5)
+    np.testing.assert_array_equal(normal_equations._factor(sound), np.linalg.cholesky(sound))
+    assert np.all(np.isnan(normal_equations._factor(np.full((2, 2), np.inf))))
 
 
 def test_values_hold_in_the_recordings_of_their_parameter():

@@ -213,3 +213,20 @@ def test_the_line_that_an_advice_gives_mends_the_import(fault, sound, tmp_path):
         assert len(own) == len(meant)
         np.testing.assert_allclose(own.value, meant.value, rtol=1e-6, atol=1e-6)
         np.testing.assert_allclose(own.t - own.t[0], meant.t - meant.t[0], atol=2e-6)
+
+
+def test_a_noisy_field_that_hardly_turns_says_nothing_of_units(sound):
+    """From reading to reading noise points anywhere, which is no fast spin that an accelerometer should feel."""
+    rng, made = np.random.default_rng(3), []
+    for one in sound["free_spin"]:
+        still = {
+            "magnetometer": one.environment.magnetic_field,
+            "accelerometer": np.array([0.0, 0.0, -one.environment.gravity]),
+            "gyroscope": np.array([0.0, 0.0, 2.0]),
+        }
+        samples = {}
+        for name, value in still.items():
+            t = one.samples[name].t
+            samples[name] = Samples(t, value + rng.normal(0.0, 0.5, (t.size, 3)))
+        made.append(replace(one, samples=samples))
+    assert find_setup_faults(made).faults == ()

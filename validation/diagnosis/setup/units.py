@@ -17,7 +17,7 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect
 from discsim.effects.setup import UNITS, AccelerometerUnit, ClockUnit, GyroscopeUnit, MagnetometerUnit
 from discsim.recording import Recording, Samples
-from validation.diagnosis.setup.spin_signals import FEWEST
+from validation.diagnosis.setup.spin_signals import FEWEST, PURE, turning_axis
 
 __all__ = ["clock_unit", "sensor_units"]
 
@@ -134,13 +134,16 @@ def _field_ratio(recording: Recording) -> float | None:
 
 
 def _spin_of(recording: Recording) -> float | None:
-    """Return the size of the spin, rad/s, that anything but gyroscope and accelerometer shows."""
+    """Return the size of the spin, rad/s, that anything but gyroscope and accelerometer shows; None for no spin."""
     for samples in (recording.get("rate_reference"), recording.command):
         if samples is not None:
             return float(np.sqrt(np.nanmean(samples.value**2)))
     samples = recording.get("magnetometer")
     if samples is None or len(samples) < FEWEST:
         return None
+    turned = turning_axis(samples.t, samples.value)
+    if turned is None or turned[1] < PURE:
+        return None  # from one noisy reading to the next a field that hardly turns points anywhere
     d = np.diff(samples.value, axis=0)
     gap = np.diff(samples.t)
     usual = float(np.median(gap))
