@@ -60,7 +60,10 @@ def _named(found: Search, trial: Trial, names: Sequence[str], advice: Mapping[tu
         if q.group != trial.id or q.recordings != trial.recordings:
             continue
         room = width.get(q.key, np.inf)
-        known = np.isfinite(error) and not (np.isfinite(room) and error > _UNDETERMINED * room)
+        known = np.isfinite(error) and error <= _UNDETERMINED * room
+        if not known and abs(value - q.stated) < 3.0 * error:
+            # where nothing shows it, a fit leaves it anywhere within its prior: the baseline says as much
+            value = q.stated
         values[q.name] = ParameterValue(float(value), float(error) if known else None)
     values.update({name: ParameterValue(value, sd) for name, value, sd in trial.told})
     for name, value in trial.shapes.items():

@@ -70,8 +70,8 @@ def assert_found(diagnosis: Diagnosis, hidden: Effect, recordings: Sequence[str]
     assert found.recordings == (None if recordings is None else tuple(recordings))
     for name, size in hidden.value._asdict().items():
         item = found.parameters[name]
-        if item.sd is None:
-            assert size == 0.0
+        if item.sd is None:  # nothing shows it: it stands where the baseline has it
+            assert item.value == size == hidden.row.sizes[name]
             continue
         assert abs(item.value - size) < max(3.0 * item.sd, 0.05 * abs(size)), (name, size, item)
     assert found.evidence.delta_bic > 0.0
@@ -280,3 +280,12 @@ def test_a_practice_set_is_answered_as_its_key_says(name: str, count: int):
         found = diagnosis.effects[0].parameters[number]
         assert found.sd is not None
         assert abs(found.value - size) < max(3.0 * found.sd, 0.05 * abs(size))
+
+
+def test_a_place_along_a_table_s_axis_is_said_to_be_unknown():
+    """No pull nor ramp shows it: what the fit leaves there is its start, not a measurement."""
+    hidden = effect("accel.position_offset", dx_m=0.002, dy_m=-0.001)
+    diagnosis = answer_of(tables(errors=[hidden]))
+    assert diagnosis.verdict == "explained"
+    assert diagnosis.effects[0].parameters["dz_m"].sd is None
+    assert_found(diagnosis, hidden)
