@@ -6,7 +6,7 @@ rotation, a field) stays free about its first value in every fit, so that it get
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -83,6 +83,10 @@ def with_setup(outcome: Outcome, findings: SetupFindings, written: Sequence[Reco
     total = sum(excess) / max(fit.count, 1)
     held = diagnosis.baseline.heldout_chi2_per_sample
     baseline = FitFigures(diagnosis.baseline.chi2_per_sample + total, None if held is None else held + total)
+    turned = next((Rotation.from_rotvec(_numbers(f.effect.value)) for f in findings.faults if f.id == _TURNED), None)
+    if turned is not None:
+        outcome = _on_board_axes(outcome, turned.as_matrix(), fit)
+        diagnosis = outcome.diagnosis
     changed = replace(
         diagnosis,
         verdict="explained",
@@ -100,6 +104,44 @@ def with_setup(outcome: Outcome, findings: SetupFindings, written: Sequence[Reco
         for one in named
     )
     return replace(outcome, diagnosis=changed, model=replace(outcome.model, effects=(*outcome.model.effects, *carried)))
+
+
+_TURNED = "board.rotation"
+
+
+def _on_board_axes(outcome: Outcome, C: FloatArray, fit: Fit) -> Outcome:
+    """Return an outcome whose vectors of a sensor are along the axes of a turned board, as they are in its readings.
+
+    The fit had readings C (C^T w + b) of a board that is turned by C: what it found is C b.
+    """
+
+    def turned(id: str, parameters: Mapping[str, ParameterValue]) -> dict[str, ParameterValue]:
+        names = list(parameters)
+        vector = [name[:2] for name in names] == ["bx", "by", "bz"]
+        if not vector or not row(id).acts_with(BOARD) or row(id).acts_on == "motion":
+            return dict(parameters)
+        value = C.T @ np.array([item.value for item in parameters.values()])
+        places = {q.name: k for k, q in enumerate(fit.parameters) if q.group == id}
+        known = fit.covariance.shape[0] == len(fit.parameters) and set(names) <= set(places)
+        if known and all(item.sd is not None for item in parameters.values()):
+            at = [places[name] for name in names]
+            sd = np.sqrt(np.diag(C.T @ fit.covariance[np.ix_(at, at)] @ C)).tolist()
+        else:
+            sd = [None] * 3
+        return {n: ParameterValue(v, one) for n, v, one in zip(names, value.tolist(), sd, strict=True)}
+
+    effects = tuple(replace(one, parameters=turned(one.id, one.parameters)) for one in outcome.diagnosis.effects)
+    known = {(one.id, one.recordings): one.parameters for one in effects}
+
+    def carried(one: ModelEffect) -> ModelEffect:
+        parameters = known.get((one.effect.id, one.recordings))
+        if parameters is None:
+            return one
+        size = effect(one.effect.id, **{name: item.value for name, item in parameters.items()}, **one.effect.setting)
+        return ModelEffect(size, {n: i.sd for n, i in parameters.items() if i.sd is not None}, one.recordings)
+
+    model = replace(outcome.model, effects=tuple(map(carried, outcome.model.effects)))
+    return replace(outcome, diagnosis=replace(outcome.diagnosis, effects=effects), model=model)
 
 
 @dataclass(frozen=True)

@@ -289,3 +289,14 @@ def test_a_place_along_a_table_s_axis_is_said_to_be_unknown():
     assert diagnosis.verdict == "explained"
     assert diagnosis.effects[0].parameters["dz_m"].sd is None
     assert_found(diagnosis, hidden)
+
+
+def test_a_bias_beside_a_board_that_is_turned_far_is_along_the_axes_of_the_board():
+    """The readings are turned back before the fit, which finds the bias along the disc's axes."""
+    hidden = [
+        effect("board.rotation", rx_rad=1.1, ry_rad=-0.6, rz_rad=0.9),
+        effect("gyro.bias", bx_rad_s=0.05, by_rad_s=-0.08, bz_rad_s=0.03),
+    ]
+    diagnosis = answer_of(tables(errors=hidden))
+    assert {item.id for item in diagnosis.effects} == {item.id for item in hidden}
+    assert_found(diagnosis, hidden[1])

@@ -59,9 +59,19 @@ def _faulty_setup(case: Case, effects: Sequence[str], rng: np.random.Generator) 
     if not physical and (effects or rng.random() < 0.5):
         return (fault,)
     beside = choose(case, rng, [fault], *physical)
+    while not (physical or _place_known(beside.effect.id, case)):
+        beside = choose(case, rng, [fault])
     while not ordinary(beside.effect, case.plant):
         beside = choose(case, rng, [fault], beside.effect.id)
     return fault, beside
+
+
+def _place_known(id: str, case: Case) -> bool:
+    """Tell whether the place is stated at which a gyroscope feels what it takes for a rate: the accelerometer's chip's.
+
+    Where it is not, that grows with the square of the rate by any factor, and no fit tells the sensitivity.
+    """
+    return id != "gyro.g_sensitivity" or "accelerometer" in case.instruments.sensors
 
 
 def choose(
