@@ -14,7 +14,7 @@ from discsim.errors import InputError
 from discsim.recording import Recording
 from estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors, accelerometer
 from estimators.fft import FftSettings, fft
-from estimators.fusion import accelerometer_calibrated, contradictions, fusion
+from estimators.fusion import accelerometer_calibrated, compare_sensors, contradictions, fusion
 from estimators.gyroscope import gyroscope, rate_reference
 from estimators.likelihood import likelihood
 from estimators.rate import YawRate
@@ -40,6 +40,17 @@ __all__ = [
 #: `best` takes the first method that knows the rate for at least this share of its samples.
 ENOUGH = 0.5
 
+#: The sensor whose contradiction with the magnetometer makes a method's answer doubtful.
+DOUBTED_BY = MappingProxyType(
+    {
+        "gyroscope": "gyroscope",
+        "tracking": "gyroscope",
+        "likelihood": "gyroscope",
+        "fft": "gyroscope",
+        "accelerometer": "accelerometer",
+    }
+)
+
 #: A rate above half the magnetometer's sampling rate is worth a note where this share of a sensor's readings shows it.
 FOLDED_SHARE = 0.01
 
@@ -53,6 +64,9 @@ ACROSS = 0.5
 #: Least share of the turning's square that is a steady spin about z where a spectrum shows it. A ramp from rest has
 #: 3/4, a disc that wobbles by a tenth 0.99; a body whose axis wanders, by hand or under a parachute, 0 to 1/3.
 STEADY = 0.5
+
+#: Fewest readings in a row that show a sensor's noise beside a steady change (a second difference).
+SCATTERING = 3
 
 #: A sampling rate from time stamps further than this from the sheet's is worth a note.
 RATE_TOLERANCE = 0.01
@@ -114,7 +128,14 @@ def _accelerometer(recording: Recording, options: Options) -> YawRate:
 
 
 def _gyroscope(recording: Recording, _: Options) -> YawRate:
-    return gyroscope(recording.need("gyroscope"), recording.sheets["gyroscope"])
+    found = gyroscope(recording.need("gyroscope"), recording.sheets["gyroscope"])
+    known = int(np.count_nonzero(np.isfinite(found.rate)))
+    if 0 < known < SCATTERING and recording.sheets["gyroscope"].noise_rms is None:
+        raise InputError(
+            f"the gyroscope has {known} usable readings of z, which show no noise; expected {SCATTERING} at least, or "
+            "noise_rms_rad_s in [sensors.gyroscope]"
+        )
+    return found
 
 
 def _rate_reference(recording: Recording, _: Options) -> YawRate:
@@ -217,7 +238,7 @@ def best_of(recording: Recording, options: Options | None = None) -> tuple[YawRa
             continue
         share = float(np.mean(np.isfinite(candidate.rate))) if len(candidate) else 0.0
         if share >= ENOUGH:
-            return candidate, reasons
+            return _with_contradiction(candidate, sound.recording), reasons
         if share > 0:
             reasons[name] = f"knows the rate for {100 * share:.2g} % of its times only"
             candidates.append((share, candidate))
@@ -227,7 +248,21 @@ def best_of(recording: Recording, options: Options | None = None) -> tuple[YawRa
         told = "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
         raise InputError(f"{recording.path or recording.name}: no method can be used ({told})")
     taken = max(candidates, key=lambda pair: pair[0])[1]  # of equals the first, which is the one preferred
+    taken = _with_contradiction(taken, sound.recording)
     return taken, {name: reason for name, reason in reasons.items() if name != taken.method}
+
+
+def _with_contradiction(taken: YawRate, recording: Recording) -> YawRate:
+    """Return an estimate whose standard deviation holds what its sensor and the magnetometer contradict each other by.
+
+    Which of the two is right nothing can tell then (`fusion` is silent): the rms of their difference is what either may
+    be off by. An accelerometer against the magnetometer's methods is not counted: its mount is the likelier fault.
+    """
+    sensor = DOUBTED_BY.get(taken.method)
+    if sensor is None or not contradictions(recording):
+        return taken
+    off = [one.scatter for one in compare_sensors(recording) if one.sensor == sensor and not one.agrees]
+    return replace(taken, sd=np.hypot(taken.sd, off[0])) if off else taken
 
 
 def field_notes(recording: Recording) -> list[str]:

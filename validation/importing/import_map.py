@@ -182,15 +182,14 @@ def _layout(table: TomlTable | None) -> Layout:
     if separator != "blank" and len(separator) != 1:
         raise table.error("separator", f"'separator' is '{separator}', expected one character or 'blank'")
     decimal = table.text("decimal", required=False, choices=(".", ",")) or "."
-    if decimal == separator:
-        raise table.error("decimal", f"'decimal' and 'separator' are both '{decimal}', expected two characters")
     skip_lines = table.raw("skip_lines") or 0
     if not isinstance(skip_lines, int) or isinstance(skip_lines, bool) or skip_lines < 0:
         raise table.error("skip_lines", f"'skip_lines' is {skip_lines!r}, expected a whole number from 0")
     columns = _texts(table, "columns") or ()
     comment = table.text("comment", required=False) or ""
     lists, encoding, thousands = table.flag("lists"), _encoding(table), table.text("thousands", required=False) or ""
-    if len(thousands) > 1 or (thousands and thousands in (decimal, separator)):
+    # either may be the separator as well, where numbers stand in quotes
+    if len(thousands) > 1 or (thousands and thousands == decimal):
         raise table.error("thousands", f"'thousands' is '{thousands}', expected one character of its own")
     layout = Layout(separator, decimal, skip_lines, columns, comment, lists, encoding, thousands)
     table.finish()
