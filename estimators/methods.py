@@ -51,6 +51,9 @@ DOUBTED_BY = MappingProxyType(
     }
 )
 
+#: The methods whose rate is a turning of the field over time: a wrong spacing of the rows scales it.
+BY_THE_CLOCK = ("fusion", "tracking", "likelihood", "fft", "accelerometer_calibrated")
+
 #: A rate above half the magnetometer's sampling rate is worth a note where this share of a sensor's readings shows it.
 FOLDED_SHARE = 0.01
 
@@ -177,13 +180,22 @@ def _estimate(sound: Usable, name: str, options: Options) -> YawRate:
     for sensor in METHODS[name].sensors:
         if sensor in sound.gone:
             raise InputError(f"{sensor}: {sound.gone[sensor]}")
-    found = METHODS[name].estimate(sound.recording, options)
+    found = _clocked(METHODS[name].estimate(sound.recording, options), sound.recording)
     with np.errstate(invalid="ignore"):
         possible = (np.abs(found.rate) <= FASTEST) & (found.sd <= FASTEST)
     if np.all(possible | np.isnan(found.rate)):
         return found
     rate, sd = np.where(possible, found.rate, np.nan), np.where(possible, found.sd, np.nan)
     return replace(found, rate=rate, sd=sd)
+
+
+def _clocked(found: YawRate, recording: Recording) -> YawRate:
+    """Return a rate that goes by the magnetometer's time with what its sampling rate is stated to be off by."""
+    sheet = recording.sheets.get("magnetometer")
+    off = 0.0 if sheet is None else float(np.max(sheet.sigma.get("rate_hz", 0.0)))
+    if sheet is None or found.method not in BY_THE_CLOCK or not off > 0:
+        return found
+    return replace(found, sd=np.hypot(found.sd, off / sheet.rate_hz * np.abs(found.rate)))
 
 
 def all_methods(recording: Recording, options: Options | None = None) -> tuple[list[YawRate], dict[str, str]]:
@@ -358,6 +370,13 @@ def sampling_notes(recording: Recording) -> list[str]:
     The stamps are used; `fft`, which needs an even grid, is silent where the magnetometer's is not.
     """
     notes = []
+    field = recording.sheets.get("magnetometer")
+    if field is not None and "rate_hz" in field.sigma:
+        notes.append(
+            f"the spacing of the rows is known to {100 * float(np.max(field.sigma['rate_hz'])) / field.rate_hz:.2g} % "
+            "only: rates from the field scale with it, and their standard deviations hold that; where it is known, "
+            "write it into the import map as step_s, without step_sigma_s"
+        )
     for sensor, samples in recording.samples.items():
         stated = recording.sheets[sensor].rate_hz
         if len(samples) < 2:

@@ -95,6 +95,18 @@ def test_a_rate_that_is_stated_beside_the_table_spaces_its_rows(tmp_path, name, 
     assert_allclose(recording.samples["gyroscope"].t, LOG.t, atol=1e-6)
 
 
+def test_what_a_step_may_be_off_by_comes_into_the_recording(tmp_path):
+    """By the field's turning it is known to 4 %; a map without step_sigma_s knows it."""
+    columns = [*three(named("gyro_{}_dps"), LOG.gyro / DEG), *three(named("mag_{}_uT"), LOG.mag)]
+    raw = write_table(tmp_path / "log.csv", columns)
+    recording, text = imported(raw, tmp_path)
+    sheet = recording.sheets["magnetometer"]
+    assert sheet.sigma["rate_hz"] == pytest.approx(0.04 * sheet.rate_hz, rel=0.05)
+    known = [line for line in text.splitlines() if not line.startswith("step_sigma_s")]
+    (tmp_path / "known.toml").write_text("\n".join(known), encoding="utf-8")
+    assert not import_recording(raw, read_map(tmp_path / "known.toml")).recording.sheets["magnetometer"].sigma
+
+
 def test_two_stated_rates_space_no_rows(tmp_path):
     columns = three(named("gyro_{}_dps"), LOG.gyro / DEG)
     before = "# gyro: 200 Hz\n# mag: 50 Hz\n"

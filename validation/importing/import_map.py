@@ -46,7 +46,7 @@ BODY_SENSORS = ("magnetometer", "accelerometer", "gyroscope")
 class TimeBase:
     """Time of a row: a column times ``scale`` (s), or the row's number (or its counter) times ``step`` (s).
 
-    ``iso``: the column holds dates and times, or times of the day, as ISO 8601 writes them.
+    ``iso``: the column holds dates and times, or times of the day. ``step_sigma``: what ``step`` may be off by, s.
     """
 
     column: str | None = None
@@ -54,6 +54,7 @@ class TimeBase:
     step: float | None = None
     counter: str | None = None
     iso: bool = False
+    step_sigma: float | None = None
 
 
 @dataclass(frozen=True)
@@ -213,7 +214,10 @@ def _time_base(table: TomlTable) -> TimeBase:
     if (column is None) == (step is None):
         raise table.error(None, "expected either 'column' (of time stamps) or 'step_s' (of rows at one rate) in [time]")
     table.finish()
-    return TimeBase(column, TIME_UNITS[unit], step, counter, unit == "iso")
+    sigma = table.sigma.get("step_s")
+    return TimeBase(
+        column, TIME_UNITS[unit], step, counter, unit == "iso", None if sigma is None else float(np.max(sigma))
+    )
 
 
 def _environment(table: TomlTable, *, flying: bool) -> Environment:

@@ -213,3 +213,14 @@ def test_the_line_that_an_advice_gives_mends_the_import(fault, sound, tmp_path):
         assert len(own) == len(meant)
         np.testing.assert_allclose(own.value, meant.value, rtol=1e-6, atol=1e-6)
         np.testing.assert_allclose(own.t - own.t[0], meant.t - meant.t[0], atol=2e-6)
+
+
+@pytest.mark.parametrize("axes", [[0], [0, 1, 2]], ids=["an axis that was never read", "one value throughout"])
+def test_a_dead_sensor_is_no_fault_of_axes(sound: dict[str, list[Recording]], axes: list[int]) -> None:
+    """Readings that are not there agree with any order of the axes, and with any turn of the board."""
+    recording = sound["free_spin"][0]
+    samples = recording.samples["gyroscope"]
+    value = samples.value.copy()
+    value[:, axes] = np.nan if len(axes) == 1 else 0.2
+    dead = {**recording.samples, "gyroscope": Samples(samples.t, value)}
+    assert find_setup_faults([replace(recording, samples=dead)]).faults == ()

@@ -28,21 +28,28 @@ STEP = 0.01
 ASCENDING = 0.9
 #: Steps that must be even before a column with a name that is not known is a clock's: a trend keeps that up for fewer.
 LEAST_EVEN = 100
+#: What a step without stamps may be off by: a guess by a factor of two either way (loggers write 25 to 400 rows a
+#: second), a stated rate by what oscillators in sensors are (1 % to several per cent over parts and temperature).
+OFF_GUESSED, OFF_STATED = 0.7, 0.03
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Time of a row: a column with its unit, or a step (with a counter where there is one), and why."""
+    """Time of a row: a column with its unit, or a step (with a counter where there is one), and why.
+
+    ``off`` is the share of a step without stamps that it may be off by (one sigma).
+    """
 
     column: str | None
     unit: str
     counter: str | None
     step: float | None
     decision: Decision
+    off: float = 0.0
 
-    def with_step(self, step: float, decision: Decision) -> Clock:
-        """Return the clock with another step."""
-        return replace(self, step=step, decision=decision)
+    def with_step(self, step: float, decision: Decision, off: float) -> Clock:
+        """Return the clock with another step, that may be off by that share of it."""
+        return replace(self, step=step, decision=decision, off=off)
 
 
 def clocks_of(numbers: Numbers) -> list[Clock]:
@@ -174,6 +181,7 @@ def _without(numbers: Numbers) -> Clock:
 
     The rate is the one that the lines above the table or the file's name state, or a guess.
     """
+    off = OFF_GUESSED
     step, sure, why = STEP, _sure("guess"), f"no time stamps; rows taken as {1 / STEP:.0f} a second: state step_s"
     unread = [k for k, name in enumerate(numbers.names) if is_time_name(name) and any(numbers.cells(k))]
     if unread:
@@ -181,15 +189,15 @@ def _without(numbers: Numbers) -> Clock:
         why = f"'{numbers.table.columns[unread[0]]}' tells no time here (its first cell is '{cell[:30]}'); {why[16:]}"
     stated = stated_rate((*numbers.dialect.preamble, numbers.path.stem))
     if stated is not None and SPACING[0] <= 1 / stated[0] <= SPACING[1]:
-        step, sure = float(f"{1 / stated[0]:.12g}"), _sure("likely")
+        off, step, sure = OFF_STATED, float(f"{1 / stated[0]:.12g}"), _sure("likely")
         why = f"no time stamps; '{stated[1][:60]}' says {stated[0]:.6g} rows a second"
     for k, name in enumerate(numbers.table.columns):
         value = numbers.values[:, k]
         steps = np.diff(value[np.isfinite(value)])
         if steps.size > 1 and np.mean(steps == 1) > ASCENDING and np.nanmax(value) < 1e9:
             why = f"{why}; '{name}' counts the rows"
-            return Clock(None, "s", name, step, Decision("time", f"{step} s a row", sure, why))
-    return Clock(None, "s", None, step, Decision("time", f"{step} s a row", sure, why))
+            return Clock(None, "s", name, step, Decision("time", f"{step} s a row", sure, why), off)
+    return Clock(None, "s", None, step, Decision("time", f"{step} s a row", sure, why), off)
 
 
 def _sure(sureness: Sureness) -> Sureness:
