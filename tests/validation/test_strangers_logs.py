@@ -180,6 +180,16 @@ def test_an_acceleration_without_gravity_is_no_accelerometer(tmp_path):
     assert any("without gravity" in note for note in proposal.notes)
 
 
+def test_the_accelerometer_of_a_rocket_that_coasts_keeps_its_gravity(tmp_path):
+    """It reads nothing for most of the log, in counts, and gravity on the pad."""
+    rng = np.random.default_rng(4)
+    value = np.where((LOG.t < 2)[:, None], [0.0, 300.0, 8150.0], 0.0) + 40 * rng.standard_normal(LOG.accel.shape)
+    value[(LOG.t > 2) & (LOG.t < 2.3)] += [0, 0, 30000]
+    columns = [("t_s", LOG.t), *three(named("a{}"), value.round().astype(int)), *three(named("g{}"), LOG.gyro)]
+    proposal = sniff(write_table(tmp_path / "log.csv", columns))
+    assert [sensor.sensor for sensor in proposal.sensors] == ["gyroscope", "accelerometer"]
+
+
 def test_a_throw_beyond_a_small_range_is_found(tmp_path):
     gyro = np.clip(LOG.gyro / DEG, -250, 250)
     columns = [("t_s", LOG.t), *three(named("gyro_{}_dps"), gyro), *three(named("mag_{}_uT"), LOG.mag)]

@@ -23,6 +23,7 @@ from validation.importing.sniffing.decision import Decision
 from validation.importing.sniffing.dialect import dialect_of
 from validation.importing.sniffing.groups import FEWEST_ROWS, Numbers, Triple, triples_of
 from validation.importing.sniffing.magnitudes import (
+    PER_G,
     REST,
     Unit,
     accelerometer_unit,
@@ -155,7 +156,7 @@ def _assigned(files: Sequence[_File]) -> tuple[dict[str, tuple[Triple, Decision]
             continue
         # of several the one with gravity in it, then the plainest name, then the first
         best = min(mine, key=lambda t: (sensor == "accelerometer" and _weightless(t), t.penalty, triples.index(t)))
-        if sensor == "accelerometer" and _weightless(best):
+        if sensor == "accelerometer" and _weightless(best) and (len(mine) > 1 or not _rests(best)):
             continue  # no sensor's reading, and nothing here could use it
         found[sensor] = (best, Decision(sensor, best.label, "certain", f"{best.source} says so"))
     used = [triple for triple, _ in found.values()]
@@ -173,9 +174,15 @@ def _weightless(triple: Triple) -> bool:
         return True
     count = len(value) // 16
     means = np.linalg.norm(value[: count * 16].reshape(count, 16, 3).mean(axis=1), axis=1)
+    return count > 0 and not _rests(triple) and bool(np.mean(means < nothing) > 0.2)
+
+
+def _rests(triple: Triple) -> bool:
+    """Tell whether most steady readings are gravity in a usual unit, or in counts, as on a launch pad."""
+    value = triple.values[np.isfinite(triple.values).all(axis=1)]
+    counts = PER_G if np.array_equal(value, np.round(value)) else ()
     shared = gravity_norm(value)
-    rests = any(abs(shared / one - 1) < REST for one in (G0, 1.0, 1000.0))
-    return count > 0 and not rests and bool(np.mean(means < nothing) > 0.2)
+    return any(abs(shared / one - 1) < REST for one in (G0, 1.0, 1000.0, *counts))
 
 
 def _others(found: dict[str, tuple[Triple, Decision]], left: Sequence[Triple]) -> list[str]:
