@@ -14,7 +14,7 @@ from discsim.errors import InputError
 from discsim.recording import Recording
 from estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors, accelerometer
 from estimators.fft import FftSettings, fft
-from estimators.fusion import accelerometer_calibrated, contradictions, fusion
+from estimators.fusion import accelerometer_calibrated, compare_sensors, contradictions, fusion
 from estimators.gyroscope import gyroscope, rate_reference
 from estimators.likelihood import likelihood
 from estimators.rate import YawRate
@@ -40,6 +40,20 @@ __all__ = [
 #: `best` takes the first method that knows the rate for at least this share of its samples.
 ENOUGH = 0.5
 
+#: The sensor whose contradiction with the magnetometer makes a method's answer doubtful.
+DOUBTED_BY = MappingProxyType(
+    {
+        "gyroscope": "gyroscope",
+        "tracking": "gyroscope",
+        "likelihood": "gyroscope",
+        "fft": "gyroscope",
+        "accelerometer": "accelerometer",
+    }
+)
+
+#: The methods whose rate is a turning of the field over time: a wrong spacing of the rows scales it.
+BY_THE_CLOCK = ("fusion", "tracking", "likelihood", "fft", "accelerometer_calibrated")
+
 #: A rate above half the magnetometer's sampling rate is worth a note where this share of a sensor's readings shows it.
 FOLDED_SHARE = 0.01
 
@@ -53,6 +67,9 @@ ACROSS = 0.5
 #: Least share of the turning's square that is a steady spin about z where a spectrum shows it. A ramp from rest has
 #: 3/4, a disc that wobbles by a tenth 0.99; a body whose axis wanders, by hand or under a parachute, 0 to 1/3.
 STEADY = 0.5
+
+#: Fewest readings in a row that show a sensor's noise beside a steady change (a second difference).
+SCATTERING = 3
 
 #: A sampling rate from time stamps further than this from the sheet's is worth a note.
 RATE_TOLERANCE = 0.01
@@ -119,7 +136,14 @@ def _accelerometer(recording: Recording, options: Options) -> YawRate:
 
 
 def _gyroscope(recording: Recording, _: Options) -> YawRate:
-    return gyroscope(recording.need("gyroscope"), recording.sheets["gyroscope"])
+    found = gyroscope(recording.need("gyroscope"), recording.sheets["gyroscope"])
+    known = int(np.count_nonzero(np.isfinite(found.rate)))
+    if 0 < known < SCATTERING and recording.sheets["gyroscope"].noise_rms is None:
+        raise InputError(
+            f"the gyroscope has {known} usable readings of z, which show no noise; expected {SCATTERING} at least, or "
+            "noise_rms_rad_s in [sensors.gyroscope]"
+        )
+    return found
 
 
 def _rate_reference(recording: Recording, _: Options) -> YawRate:
@@ -161,13 +185,22 @@ def _estimate(sound: Usable, name: str, options: Options) -> YawRate:
     for sensor in METHODS[name].sensors:
         if sensor in sound.gone:
             raise InputError(f"{sensor}: {sound.gone[sensor]}")
-    found = METHODS[name].estimate(sound.recording, options)
+    found = _clocked(METHODS[name].estimate(sound.recording, options), sound.recording)
     with np.errstate(invalid="ignore"):
         possible = (np.abs(found.rate) <= FASTEST) & (found.sd <= FASTEST)
     if np.all(possible | np.isnan(found.rate)):
         return found
     rate, sd = np.where(possible, found.rate, np.nan), np.where(possible, found.sd, np.nan)
     return replace(found, rate=rate, sd=sd)
+
+
+def _clocked(found: YawRate, recording: Recording) -> YawRate:
+    """Return a rate that goes by the magnetometer's time with what its sampling rate is stated to be off by."""
+    sheet = recording.sheets.get("magnetometer")
+    off = 0.0 if sheet is None else float(np.max(sheet.sigma.get("rate_hz", 0.0)))
+    if sheet is None or found.method not in BY_THE_CLOCK or not off > 0:
+        return found
+    return replace(found, sd=np.hypot(found.sd, off / sheet.rate_hz * np.abs(found.rate)))
 
 
 def all_methods(recording: Recording, options: Options | None = None) -> tuple[list[YawRate], dict[str, str]]:
@@ -222,7 +255,7 @@ def best_of(recording: Recording, options: Options | None = None) -> tuple[YawRa
             continue
         share = float(np.mean(np.isfinite(candidate.rate))) if len(candidate) else 0.0
         if share >= ENOUGH:
-            return candidate, reasons
+            return _with_contradiction(candidate, sound.recording), reasons
         if share > 0:
             reasons[name] = f"knows the rate for {100 * share:.2g} % of its times only"
             candidates.append((share, candidate))
@@ -232,7 +265,21 @@ def best_of(recording: Recording, options: Options | None = None) -> tuple[YawRa
         told = "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
         raise InputError(f"{recording.path or recording.name}: no method can be used ({told})")
     taken = max(candidates, key=lambda pair: pair[0])[1]  # of equals the first, which is the one preferred
+    taken = _with_contradiction(taken, sound.recording)
     return taken, {name: reason for name, reason in reasons.items() if name != taken.method}
+
+
+def _with_contradiction(taken: YawRate, recording: Recording) -> YawRate:
+    """Return an estimate whose standard deviation holds what its sensor and the magnetometer contradict each other by.
+
+    Which of the two is right nothing can tell then (`fusion` is silent): the rms of their difference is what either may
+    be off by. An accelerometer against the magnetometer's methods is not counted: its mount is the likelier fault.
+    """
+    sensor = DOUBTED_BY.get(taken.method)
+    if sensor is None or not contradictions(recording):
+        return taken
+    off = [one.scatter for one in compare_sensors(recording) if one.sensor == sensor and not one.agrees]
+    return replace(taken, sd=np.hypot(taken.sd, off[0])) if off else taken
 
 
 def field_notes(recording: Recording) -> list[str]:
@@ -328,6 +375,13 @@ def sampling_notes(recording: Recording) -> list[str]:
     The stamps are used; `fft`, which needs an even grid, is silent where the magnetometer's is not.
     """
     notes = []
+    field = recording.sheets.get("magnetometer")
+    if field is not None and "rate_hz" in field.sigma:
+        notes.append(
+            f"the spacing of the rows is known to {100 * float(np.max(field.sigma['rate_hz'])) / field.rate_hz:.2g} % "
+            "only: rates from the field scale with it, and their standard deviations hold that; where it is known, "
+            "write it into the import map as step_s, without step_sigma_s"
+        )
     for sensor, samples in recording.samples.items():
         stated = recording.sheets[sensor].rate_hz
         if len(samples) < 2:

@@ -139,3 +139,45 @@ def test_all_methods_say_why_the_fft_is_silent_on_a_body_that_tumbles():
     turned = Samples(steady.samples["gyroscope"].t, steady.samples["gyroscope"].value[:, [2, 0, 1]])
     _, left_out = all_methods(replace(steady, samples={**steady.samples, "gyroscope": turned}))
     assert "no steady spin about z" in left_out["fft"]
+
+
+def test_a_gyroscope_that_the_magnetometer_contradicts_is_not_stated_closer_than_they_differ():
+    """Rows 20 % further apart than their stamps say: which of the two is right nothing tells."""
+    recording = spinning(1800.0, ("magnetometer", "gyroscope"))
+    field = recording.need("magnetometer")
+    slow = replace(recording, samples={**recording.samples, "magnetometer": Samples(field.t / 1.2, field.value)})
+    alike, apart = best(recording), best(slow)
+    assert (alike.method, apart.method) == ("fusion", "gyroscope")
+    assert np.all(np.degrees(alike.sd) < 1.0)
+    assert np.all(np.degrees(apart.sd) > 0.9 * 0.2 * 1800.0)
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_a_reading_or_two_of_a_gyroscope_without_stated_noise_are_no_estimate(rows):
+    whole = spinning(1800.0, ("gyroscope",))
+    gyroscope = whole.need("gyroscope")
+    short = Samples(gyroscope.t[:rows], gyroscope.value[:rows] + np.arange(rows)[:, None])
+    bare = replace(SHEETS["gyroscope"], noise_rms=None)
+    recording = replace(whole, samples={"gyroscope": short}, sheets={"gyroscope": bare})
+    with pytest.raises(InputError, match=r"show no noise; expected 3 at least, or noise_rms_rad_s"):
+        best(recording)
+    assert best(replace(recording, sheets=SHEETS)).method == "gyroscope"
+
+
+def test_what_the_sampling_rate_is_stated_to_be_off_by_is_in_every_rate_from_the_field():
+    """2 % of the rows' spacing is 2 % of a rate that is a turning over time, and nothing of a gyroscope's."""
+    whole = spinning(1800.0, ("magnetometer", "gyroscope"))
+    sheet = replace(SHEETS["magnetometer"], sigma={"rate_hz": 2.0})
+    rates, _ = all_methods(replace(whole, sheets={**whole.sheets, "magnetometer": sheet}))
+    for found in rates:
+        by_the_clock = found.method != "gyroscope"
+        assert (np.degrees(np.nanmedian(found.sd)) > 0.02 * 1790.0) == by_the_clock, found.method
+    assert {found.method for found in rates} == {"fusion", "gyroscope", "tracking", "likelihood", "fft"}
+
+
+def test_a_sampling_rate_that_is_not_known_well_is_noted():
+    whole = spinning(1800.0, ("magnetometer",))
+    sheet = replace(SHEETS["magnetometer"], sigma={"rate_hz": 4.0})
+    (line,) = sampling_notes(replace(whole, sheets={"magnetometer": sheet}))
+    assert line.startswith("the spacing of the rows is known to 4 % only: rates from the field scale with it")
+    assert sampling_notes(whole) == []

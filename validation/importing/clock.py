@@ -17,7 +17,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 
-__all__ = ["Break", "Clock", "iso_seconds", "mended"]
+__all__ = ["Break", "Clock", "is_stamp", "iso_seconds", "mended"]
 
 #: widths of counters, in counts, and what they are called
 WIDTHS = {
@@ -45,7 +45,14 @@ SET = 3600.0
 APART = 5
 #: seconds from 1970 to 2000: stamps count from 2000, so that a double holds them to a tenth of a microsecond
 EPOCH = datetime(2000, 1, 1, tzinfo=UTC)
-_TIME_OF_DAY = re.compile(r"T?(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d+))?(?:Z|[+-]\d{2}:?\d{2})?")
+#: A time of day: the fraction stands behind a point, a comma, or (as milliseconds) behind a third colon.
+_TIME_OF_DAY = re.compile(
+    r"T?(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d+)|:(\d{1,3}))?\s*([AaPp])?(?(6)\.?[Mm]\.?)\s*(?:Z|[+-]\d{2}:?\d{2})?"
+)
+#: Minutes and seconds, as spreadsheets shorten a time of day.
+_MINUTES = re.compile(r"(\d{1,3}):(\d{2})[.,](\d+)")
+#: A date as spreadsheets and phones write it, and the time behind it: 01.06.2025, 6/1/2025 or 2025/6/1.
+_DATE = re.compile(r"(?:(\d{4})[-./](\d{1,2})[-./](\d{1,2})|(\d{1,2})[-./](\d{1,2})[-./](\d{4}|\d{2}))[T,\s]\s*(\d.*)")
 
 
 @dataclass(frozen=True)
@@ -70,18 +77,19 @@ class Clock:
 
 
 def iso_seconds(cell: str) -> float | None:
-    """Return the seconds of an ISO date and time since 2000 (UTC where no zone is given), or of a time of the day.
+    """Return the seconds of a date and time since 2000 (UTC where no zone is given), or of a time of the day.
 
-    >>> iso_seconds("2000-01-01T00:01:00.5Z"), iso_seconds("12:00:00.123")
-    (60.5, 43200.123)
+    Dates are ISO's or as spreadsheets write them. Of 01/06/2025 the day comes first, but for a time with AM or PM the
+    month; a number above twelve is the day. That matters where a log runs past midnight alone.
+
+    >>> iso_seconds("2000-01-01T00:01:00.5Z"), iso_seconds("12:00:00.123"), iso_seconds("01/01/2000 12:01:00.5 AM")
+    (60.5, 43200.123, 60.5)
     """
     text = cell.strip().strip('"')
-    match = _TIME_OF_DAY.fullmatch(text)
-    if match:
-        hours, minutes, seconds, fraction = match.groups()
-        if int(hours) > 24 or int(minutes) > 59 or int(seconds) > 60:
-            return None
-        return 3600.0 * int(hours) + 60.0 * int(minutes) + float(f"{int(seconds)}.{fraction or 0}")
+    if _TIME_OF_DAY.fullmatch(text):
+        return _time_of_day(text)
+    if minutes := _MINUTES.fullmatch(text):
+        return 60.0 * int(minutes[1]) + float(f"{minutes[2]}.{minutes[3]}") if int(minutes[2]) < 60 else None
     # the fraction is taken by itself: datetime drops what is below a microsecond
     head, dot, tail = text.replace(",", ".").partition(".")
     digits = re.match(r"\d+", tail)
@@ -89,13 +97,49 @@ def iso_seconds(cell: str) -> float | None:
     try:
         moment = datetime.fromisoformat(head + zone.replace(" ", ""))
     except ValueError:
-        return None
+        return _dated(text)
     if "T" not in head and ":" not in head:
         return None  # a day without a time, or a number such as 20250601
     if moment.tzinfo is None:
         moment = moment.replace(tzinfo=UTC)
     whole = (moment - EPOCH).total_seconds()
     return whole + (float(f"0.{digits.group()}") if dot and digits else 0.0)
+
+
+def is_stamp(cell: str) -> bool:
+    """Tell whether a cell is a date with a time, or a time of day."""
+    return ":" in cell and iso_seconds(cell) is not None
+
+
+def _time_of_day(text: str) -> float | None:
+    match = _TIME_OF_DAY.fullmatch(text)
+    if match is None:
+        return None
+    hours, minutes, seconds, fraction, thousandths, half = match.groups()
+    hour = int(hours) if half is None else int(hours) % 12 + 12 * (half in "Pp")
+    if hour > 24 or int(minutes) > 59 or int(seconds) > 60:
+        return None
+    fraction = fraction or (thousandths or "").zfill(3)
+    return 3600.0 * hour + 60.0 * int(minutes) + float(f"{int(seconds)}.{fraction}")
+
+
+def _dated(text: str) -> float | None:
+    """Return the seconds since 2000 of a date that is not written as ISO does, with a time behind it."""
+    match = _DATE.fullmatch(text)
+    time = None if match is None else _time_of_day(match[7])
+    if match is None or time is None:
+        return None
+    if match[1]:
+        year, month, day = (int(part) for part in match.groups()[:3])
+    else:
+        day, month, year = (int(part) for part in match.groups()[3:6])
+        american = re.search(r"[AaPp]\.?[Mm]\.?$", text) is not None
+        day, month = (month, day) if month > 12 or (american and day <= 12) else (day, month)
+        year += 2000 * (year < 100)
+    try:
+        return (datetime(year, month, day, tzinfo=UTC) - EPOCH).total_seconds() + time
+    except ValueError:
+        return None
 
 
 def mended(time: Sequence[float], scale: float) -> Clock:

@@ -140,7 +140,10 @@ def recording_of(read: RawReadings, rows: slice | None = None) -> Imported:
         import_map.disc,
         None,
         release,
-        {sensor: _sheet(import_map.sensors[sensor], samples[sensor], rates.get(sensor)) for sensor in samples},
+        {
+            sensor: _clocked(_sheet(import_map.sensors[sensor], samples[sensor], rates.get(sensor)), import_map)
+            for sensor in samples
+        },
         samples,
     )
     listed = (*read.repairs, *repairs.listed())
@@ -475,6 +478,14 @@ def _cut(
         if tables[sensor] is not main:
             cut[sensor] = found.select((found.time >= span.min()) & (found.time <= span.max()))
     return {sensor: cut[sensor] for sensor in readings if cut[sensor].time.size}
+
+
+def _clocked(sheet: SensorSheet, import_map: ImportMap) -> SensorSheet:
+    """Return a sheet with what its rate may be off by, where the map says that of the step between rows."""
+    time = import_map.time
+    if not time.step or not time.step_sigma:
+        return sheet
+    return replace(sheet, sigma={**sheet.sigma, "rate_hz": float(f"{sheet.rate_hz * time.step_sigma / time.step:.3g}")})
 
 
 def _sheet(sensor_map: SensorMap, samples: Samples, own_rate: float | None) -> SensorSheet:

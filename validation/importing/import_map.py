@@ -46,7 +46,7 @@ BODY_SENSORS = ("magnetometer", "accelerometer", "gyroscope")
 class TimeBase:
     """Time of a row: a column times ``scale`` (s), or the row's number (or its counter) times ``step`` (s).
 
-    ``iso``: the column holds dates and times, or times of the day, as ISO 8601 writes them.
+    ``iso``: the column holds dates and times, or times of the day. ``step_sigma``: what ``step`` may be off by, s.
     """
 
     column: str | None = None
@@ -54,6 +54,7 @@ class TimeBase:
     step: float | None = None
     counter: str | None = None
     iso: bool = False
+    step_sigma: float | None = None
 
 
 @dataclass(frozen=True)
@@ -182,15 +183,14 @@ def _layout(table: TomlTable | None) -> Layout:
     if separator != "blank" and len(separator) != 1:
         raise table.error("separator", f"'separator' is '{separator}', expected one character or 'blank'")
     decimal = table.text("decimal", required=False, choices=(".", ",")) or "."
-    if decimal == separator:
-        raise table.error("decimal", f"'decimal' and 'separator' are both '{decimal}', expected two characters")
     skip_lines = table.raw("skip_lines") or 0
     if not isinstance(skip_lines, int) or isinstance(skip_lines, bool) or skip_lines < 0:
         raise table.error("skip_lines", f"'skip_lines' is {skip_lines!r}, expected a whole number from 0")
     columns = _texts(table, "columns") or ()
     comment = table.text("comment", required=False) or ""
     lists, encoding, thousands = table.flag("lists"), _encoding(table), table.text("thousands", required=False) or ""
-    if len(thousands) > 1 or (thousands and thousands in (decimal, separator)):
+    # either may be the separator as well, where numbers stand in quotes
+    if len(thousands) > 1 or (thousands and thousands == decimal):
         raise table.error("thousands", f"'thousands' is '{thousands}', expected one character of its own")
     layout = Layout(separator, decimal, skip_lines, columns, comment, lists, encoding, thousands)
     table.finish()
@@ -214,7 +214,10 @@ def _time_base(table: TomlTable) -> TimeBase:
     if (column is None) == (step is None):
         raise table.error(None, "expected either 'column' (of time stamps) or 'step_s' (of rows at one rate) in [time]")
     table.finish()
-    return TimeBase(column, TIME_UNITS[unit], step, counter, unit == "iso")
+    sigma = table.sigma.get("step_s")
+    return TimeBase(
+        column, TIME_UNITS[unit], step, counter, unit == "iso", None if sigma is None else float(np.max(sigma))
+    )
 
 
 def _environment(table: TomlTable, *, flying: bool) -> Environment:

@@ -54,6 +54,10 @@ class RepairList:
         return sorted(self._found, key=lambda repair: (repair.file, repair.line))
 
 
+#: What Arduino's serial monitor puts before a line.
+_MONITOR = re.compile(r"^(\d\d?:\d\d:\d\d(?:\.\d+)?) -> ")
+
+
 @dataclass(frozen=True)
 class Layout:
     """How the text of a raw file is laid out.
@@ -75,7 +79,7 @@ class Layout:
     encoding : str
         Name of the text's encoding, as Python knows it.
     thousands : str
-        Mark between thousands (``1.234,56`` has ``.``); empty where there is none.
+        Mark between thousands (``1.234,56`` has ``.``); empty where there is none. A number has no zero before it.
     """
 
     separator: str = ","
@@ -89,6 +93,8 @@ class Layout:
 
     def cells(self, line: str) -> list[str]:
         """Return the cells of one line, without the blanks around them."""
+        if "-> " in line:
+            line = _MONITOR.sub(rf"\1{' ' if self.separator == 'blank' else self.separator}", line)
         if self.separator == "blank":
             return line.split()
         try:
@@ -102,7 +108,7 @@ class Layout:
 
     def _ungrouped(self, cell: str) -> str:
         mark, point = re.escape(self.thousands), re.escape(self.decimal)
-        grouped = re.fullmatch(rf"[+-]?\d{{1,3}}({mark}\d{{3}})+({point}\d*)?([eE][+-]?\d+)?", cell)
+        grouped = re.fullmatch(rf"[+-]?[1-9]\d{{0,2}}({mark}\d{{3}})+({point}\d*)?([eE][+-]?\d+)?", cell)
         return cell.replace(self.thousands, "") if grouped else cell
 
 

@@ -230,3 +230,14 @@ def test_a_noisy_field_that_hardly_turns_says_nothing_of_units(sound):
             samples[name] = Samples(t, value + rng.normal(0.0, 0.5, (t.size, 3)))
         made.append(replace(one, samples=samples))
     assert find_setup_faults(made).faults == ()
+
+
+@pytest.mark.parametrize("axes", [[0], [0, 1, 2]], ids=["an axis that was never read", "one value throughout"])
+def test_a_dead_sensor_is_no_fault_of_axes(sound: dict[str, list[Recording]], axes: list[int]) -> None:
+    """Readings that are not there agree with any order of the axes, and with any turn of the board."""
+    recording = sound["free_spin"][0]
+    samples = recording.samples["gyroscope"]
+    value = samples.value.copy()
+    value[:, axes] = np.nan if len(axes) == 1 else 0.2
+    dead = {**recording.samples, "gyroscope": Samples(samples.t, value)}
+    assert find_setup_faults([replace(recording, samples=dead)]).faults == ()

@@ -14,6 +14,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect
+from discsim.effects.kind import BOARD
 from discsim.effects.setup import axes_of
 from discsim.recording import Recording, Samples
 from discsim.written import PREFIX, corrected
@@ -114,15 +115,26 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
 def _judgeable(recording: Recording) -> Recording:
     """Return the part of a recording that is judged: where it turns most, if it is long.
 
-    Without its magnetometer where the field is not stated: nothing tells what it should read.
+    Without its magnetometer where the field is not stated: nothing tells what it should read. Without a sensor of the board of which
+    an axis was never read, or every reading is the same: what is dead agrees with any other order of the axes.
     """
-    kept = dict(recording.samples)
+    kept = {name: own for name, own in recording.samples.items() if name not in BOARD or _alive(own)}
     if not recording.environment.field_known:
         kept.pop("magnetometer", None)
     busiest = _busiest(kept, LOOK[recording.plant])
     if busiest is not None:
         kept = {name: samples.between(*busiest) for name, samples in kept.items()}
     return replace(recording, samples=kept)
+
+
+def _alive(samples: Samples) -> bool:
+    """Tell a sensor that was read on every axis and whose readings are not all the same."""
+    value = samples.value if samples.value.ndim == 2 else samples.value[:, None]
+    read = np.isfinite(value)
+    if not read.any(axis=0).all():
+        return False
+    first = value[read.argmax(axis=0), np.arange(value.shape[1])]
+    return len(samples) == 1 or bool(np.any(read & (value != first)))
 
 
 def _busiest(samples: Mapping[str, Samples], length: float) -> tuple[float, float] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import stat
 import tempfile
@@ -22,6 +23,8 @@ MAX_BYTES = 4 << 30
 #: ... and this many bytes for each packed one: numbers shrink by 3 to 20, a constant column by some hundreds.
 MAX_RATIO = 1000
 _CHUNK = 1 << 20
+#: What lies beside the folder of a log: words to read and pictures.
+_BESIDE = re.compile(r"^(readme|license|licence|notes?)\b|\.(md|pdf|png|jpe?g|html?)$", re.IGNORECASE)
 
 
 @contextmanager
@@ -45,7 +48,10 @@ def opened(raw: Path) -> Iterator[Path]:
             tables.mkdir(parents=True)
             write_tables(logged, tables)
             logged = tables
-        yield logged
+        try:
+            yield logged
+        except InputError as error:  # speaks of the archive that the user knows, not of where it was unpacked
+            raise InputError(str(error).replace(str(logged), str(raw))) from None
 
 
 def _is_ulog(path: Path) -> bool:
@@ -102,6 +108,8 @@ def _inner(folder: Path, raw: Path) -> Path:
     """Return the folder that holds the files: the only one inside, moved up under the archive's own name."""
     shutil.rmtree(folder / "__MACOSX", ignore_errors=True)
     children = [child for child in folder.iterdir() if not child.name.startswith(".")]
+    logged = [child for child in children if child.is_dir() or not _BESIDE.search(child.name)]
+    children = logged or children
     if len(children) == 1 and children[0].is_dir():
         inner = folder.parent / "inner" / folder.name
         inner.parent.mkdir()

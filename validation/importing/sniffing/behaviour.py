@@ -32,10 +32,10 @@ def by_behaviour(triples: Sequence[Triple], times: Sequence[FloatArray]) -> list
     found: list[tuple[Triple, str, Decision]] = []
     left = [k for k, triple in enumerate(triples) if _moves(triple.values)]
     for k in list(left):
-        why = _gravity(triples[k].values)
+        why = _gravity(triples[k].values) if k in left else ""
         if why and not any(sensor == "accelerometer" for _, sensor, _ in found):
             found.append((triples[k], "accelerometer", _said("accelerometer", triples[k], why)))
-            left.remove(k)
+            left = _clear_of(triples, [k], left)
     pair = _turning_pair(triples, times, left)
     if pair is not None:
         gyro, field, ratio = pair
@@ -43,13 +43,23 @@ def by_behaviour(triples: Sequence[Triple], times: Sequence[FloatArray]) -> list
         found.append((triples[gyro], "gyroscope", _said("gyroscope", triples[gyro], why)))
         why = f"it turns as {triples[gyro].label} says"
         found.append((triples[field], "magnetometer", _said("magnetometer", triples[field], why)))
-        left = [k for k in left if k not in (gyro, field)]
-    for k in left:
-        sensor, why = _alone(triples[k].values)
+        left = _clear_of(triples, [gyro, field], left)
+    for k in list(left):
+        sensor, why = _alone(triples[k].values) if k in left else ("", "")
         if sensor and not any(known == sensor for _, known, _ in found):
             said = _said(sensor, triples[k], why)
             found.append((triples[k], sensor, said._replace(sure="guess")))
+            left = _clear_of(triples, [k], left)
     return found
+
+
+def _clear_of(triples: Sequence[Triple], taken: Sequence[int], left: Sequence[int]) -> list[int]:
+    """Return those of ``left`` that share no column with the triples taken: a column is one sensor's."""
+    return [k for k in left if not any(_overlap(triples[k], triples[one]) for one in taken)]
+
+
+def _overlap(a: Triple, b: Triple) -> bool:
+    return a.numbers is b.numbers and a.where == b.where and bool(set(a.columns) & set(b.columns))
 
 
 def _said(sensor: str, triple: Triple, why: str) -> Decision:
@@ -80,6 +90,8 @@ def _turning_pair(
 ) -> tuple[int, int, float] | None:
     best = None
     for gyro, field in permutations(left, 2):
+        if _overlap(triples[gyro], triples[field]):
+            continue
         steps = steps_between(times[gyro], triples[gyro].values, times[field], triples[field].values)
         fit = best_worth(steps, WORTHS)
         if fit is not None and fit.ratio < TELLING and (best is None or fit.ratio < best[2]):

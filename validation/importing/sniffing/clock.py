@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discsim.arrays import FloatArray
-from validation.importing.clock import iso_seconds
+from validation.importing.clock import is_stamp, iso_seconds
 from validation.importing.sniffing.decision import Decision, Sureness
-from validation.importing.sniffing.dialect import is_stamp
 from validation.importing.sniffing.groups import Numbers
-from validation.importing.sniffing.names import is_time_name, sensor_of
+from validation.importing.sniffing.names import is_time_name, read_name, sensor_of
+from validation.importing.sniffing.preamble import stated_rate
 from validation.importing.sniffing.units import readings_of, split_unit
 
 __all__ = ["Clock", "clocks_of", "seconds"]
@@ -26,21 +26,30 @@ SPACING = (5e-5, 0.5)
 STEP = 0.01
 #: Share of steps that ascend in a column of time: a log has some doubled or swapped rows, never every tenth.
 ASCENDING = 0.9
+#: Steps that must be even before a column with a name that is not known is a clock's: a trend keeps that up for fewer.
+LEAST_EVEN = 100
+#: What a step without stamps may be off by: a guess by a factor of two either way (loggers write 25 to 400 rows a
+#: second), a stated rate by what oscillators in sensors are (1 % to several per cent over parts and temperature).
+OFF_GUESSED, OFF_STATED = 0.7, 0.03
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Time of a row: a column with its unit, or a step (with a counter where there is one), and why."""
+    """Time of a row: a column with its unit, or a step (with a counter where there is one), and why.
+
+    ``off`` is the share of a step without stamps that it may be off by (one sigma).
+    """
 
     column: str | None
     unit: str
     counter: str | None
     step: float | None
     decision: Decision
+    off: float = 0.0
 
-    def with_step(self, step: float, decision: Decision) -> Clock:
-        """Return the clock with another step."""
-        return replace(self, step=step, decision=decision)
+    def with_step(self, step: float, decision: Decision, off: float) -> Clock:
+        """Return the clock with another step, that may be off by that share of it."""
+        return replace(self, step=step, decision=decision, off=off)
 
 
 def clocks_of(numbers: Numbers) -> list[Clock]:
@@ -83,11 +92,13 @@ def _clock(numbers: Numbers, k: int, name: str) -> Clock | None:
         return None
     spoken = numbers.names[k]
     named = is_time_name(spoken)
-    if not named and (numbers.dialect.has_header or k > 1):
-        return None  # what has another name is another thing; without names the first two columns are tried
+    if not named and (k > 1 or (numbers.dialect.has_header and not _evenly(value, spoken))):
+        return None  # what has another name is another thing; else the first two columns are tried
     unit, sure, why_unit = _unit(value, spoken)
     if unit is None:
         return None
+    if not named and numbers.dialect.has_header:
+        sure, why_unit = "guess", f"its name says nothing known here, but it ascends as a clock does: {why_unit}"
     said = Decision("time", f"'{name}' in {unit}", sure, why_unit)
     return Clock(name, unit, None, None, said)
 
@@ -96,6 +107,16 @@ def _ascends(value: FloatArray) -> bool:
     """Tell time from readings: its own rows ascend; rows of several sensors may share a stamp."""
     steps = np.diff(value[np.isfinite(value)])
     return steps.size > 1 and bool(np.mean(steps >= 0) > ASCENDING and np.mean(steps > 0) > 0.1)
+
+
+def _evenly(value: FloatArray, name: str) -> bool:
+    """Tell a clock under a name that is not known: no sensor's, no unit, and even steps that are no count of rows."""
+    parts = read_name(name)
+    steps = np.diff(value[np.isfinite(value)])
+    if sensor_of(parts.base) is not None or readings_of(parts.unit) or steps.size < LEAST_EVEN:
+        return False
+    low, usual, high = np.percentile(steps, (5, 50, 95))
+    return bool(low > 0 and usual != 1 and high - low < 0.5 * usual)
 
 
 def _unit(value: FloatArray, name: str) -> tuple[str | None, Sureness, str]:
@@ -156,12 +177,28 @@ def _stamps(cells: list[str]) -> FloatArray:
 
 
 def _without(numbers: Numbers) -> Clock:
-    """Return the clock of a table without time stamps: rows at one rate, counted by a column where one counts."""
+    """Return the clock of a table without time stamps: rows at one rate, counted by a column where one counts.
+
+    The rate is the one that the lines above the table or the file's name state, or a guess.
+    """
+    off = OFF_GUESSED
+    step, sure, why = STEP, _sure("guess"), f"no time stamps; rows taken as {1 / STEP:.0f} a second: state step_s"
+    unread = [k for k, name in enumerate(numbers.names) if is_time_name(name) and any(numbers.cells(k))]
+    if unread:
+        cell = next(cell for cell in numbers.cells(unread[0]) if cell)
+        why = f"'{numbers.table.columns[unread[0]]}' tells no time here (its first cell is '{cell[:30]}'); {why[16:]}"
+    stated = stated_rate((*numbers.dialect.preamble, numbers.path.stem))
+    if stated is not None and SPACING[0] <= 1 / stated[0] <= SPACING[1]:
+        off, step, sure = OFF_STATED, float(f"{1 / stated[0]:.12g}"), _sure("likely")
+        why = f"no time stamps; '{stated[1][:60]}' says {stated[0]:.6g} rows a second"
     for k, name in enumerate(numbers.table.columns):
         value = numbers.values[:, k]
         steps = np.diff(value[np.isfinite(value)])
         if steps.size > 1 and np.mean(steps == 1) > ASCENDING and np.nanmax(value) < 1e9:
-            why = f"no time stamps; '{name}' counts the rows, taken as {1 / STEP:.0f} a second: state step_s"
-            return Clock(None, "s", name, STEP, Decision("time", f"counter '{name}'", "guess", why))
-    why = f"no time stamps; rows taken as {1 / STEP:.0f} a second: state step_s"
-    return Clock(None, "s", None, STEP, Decision("time", f"{STEP} s a row", "guess", why))
+            why = f"{why}; '{name}' counts the rows"
+            return Clock(None, "s", name, step, Decision("time", f"{step} s a row", sure, why), off)
+    return Clock(None, "s", None, step, Decision("time", f"{step} s a row", sure, why), off)
+
+
+def _sure(sureness: Sureness) -> Sureness:
+    return sureness

@@ -10,10 +10,11 @@ from itertools import islice, product
 from pathlib import Path
 
 from discsim.errors import InputError
+from validation.importing.clock import is_stamp
 from validation.importing.raw_table import GAPS, Layout, RepairList, read_raw
 from validation.importing.sniffing.text import encoding_of, lines_of
 
-__all__ = ["Dialect", "dialect_of", "is_stamp"]
+__all__ = ["Dialect", "dialect_of"]
 
 #: Lines looked at for separators: the first ones (after a preamble) and as many spread over the file.
 HEAD_LINES = 200
@@ -21,7 +22,6 @@ HEAD_LINES = 200
 #: z) has four of five, a logged event beside numbers two of five; a header has none.
 RECORD_SHARE = 0.4
 _COMMENTS = ("#", "%", "//", "!")
-_STAMP = re.compile(r"\d{4}-\d\d?-\d\d?[T ]\d\d?:\d\d.*|\d\d?:\d\d:\d\d([.,]\d*)?")
 _LIST = re.compile(r"\[[^\[\]]*,[^\[\]]*\]")
 
 
@@ -29,7 +29,8 @@ _LIST = re.compile(r"\[[^\[\]]*,[^\[\]]*\]")
 class Dialect:
     """A layout the reader of raw tables takes, the names it gives, units from a line of their own, and remarks.
 
-    ``record`` is the index of the first record's line; ``width`` the cells of a record.
+    ``record`` is the index of the first record's line; ``width`` the cells of a record; ``preamble`` the lines above
+    the table, names and units with them.
     """
 
     layout: Layout
@@ -39,11 +40,7 @@ class Dialect:
     record: int
     width: int
     remarks: tuple[str, ...]
-
-
-def is_stamp(cell: str) -> bool:
-    """Tell whether a cell is a date with a time, or a time of day."""
-    return _STAMP.fullmatch(cell.strip().strip('"')) is not None
+    preamble: tuple[str, ...] = ()
 
 
 def dialect_of(path: Path) -> Dialect:
@@ -55,9 +52,17 @@ def dialect_of(path: Path) -> Dialect:
     layout, width = _separators(path, [line for _, line in _sample(bare)], Layout(comment=comment, encoding=encoding))
     records = [index for index, _ in islice(_records(bare, width, layout), 2)]
     if len(records) < 2:
-        raise InputError.at(path, None, "no rows of numbers in it; expected a table that a logger wrote")
+        raise InputError.at(path, None, _no_rows(bare[0][1]))
     remarks = _remarks(layout)
-    return _named(path, lines, layout, records[0], width, remarks)
+    above = tuple(line.strip() for line in lines[: records[0]] if line.strip())
+    return replace(_named(path, lines, layout, records[0], width, remarks), preamble=above)
+
+
+def _no_rows(line: str) -> str:
+    return (
+        f"no rows of numbers in it (it begins '{line.strip()[:60]}'); expected a table that a logger wrote: "
+        "numbers alone between separators, their names in a line above"
+    )
 
 
 def _remarks(layout: Layout) -> tuple[str, ...]:
@@ -94,9 +99,10 @@ def _separators(path: Path, sample: list[str], base: Layout) -> tuple[Layout, in
     """Return the layout under which most lines are equally wide records of numbers; earlier candidates win ties."""
     lists = any(_LIST.search(line) for line in sample)
     best, best_score, width = base, 0.0, 0
+    quoted = any(re.search(r"\"[+-]?\d+,\d", line) for line in sample)  # a comma within quotes is no separator
     candidates = product((",", ";", "\t", "|", "blank"), (".", ","), ("", ",", ".", "'", "\u00a0", "\u202f", " "))
     for separator, decimal, thousands in candidates:
-        if separator == decimal or (thousands and thousands in (separator, decimal)):
+        if thousands == decimal or (separator in (decimal, thousands) and not quoted):
             continue
         if thousands and not any(re.search(rf"\d{re.escape(thousands)}\d{{3}}", line) for line in sample):
             continue
@@ -109,7 +115,7 @@ def _separators(path: Path, sample: list[str], base: Layout) -> tuple[Layout, in
         if score > best_score + 1e-9:
             best, best_score, width = layout, score, wide
     if best_score == 0.0:
-        raise InputError.at(path, None, "no rows of numbers in it; expected a table that a logger wrote")
+        raise InputError.at(path, None, _no_rows(sample[0] if sample else ""))
     return best, width
 
 

@@ -178,8 +178,9 @@ def _named(
 def _unnamed(numbers: Numbers, free: list[int], where: tuple[str, str] | None) -> list[Triple]:
     """Return consecutive columns in threes: from the first if they come out even, else from every column."""
     step = 3 if len(free) % 3 == 0 else 1
-    file = sensor_of(numbers.path.stem) or (sensor_of(where[1]) if where else None)
-    source = "the file's name" if file else ""
+    own = sensor_of(where[1]) if where is not None else None
+    file = own or sensor_of(numbers.path.stem)
+    source = f"the id {where[1]}" if where is not None and own else "the file's name" if file else ""
     sensor = file if len(free) == 3 else None
     triples = []
     for start in range(0, len(free) - 2, step):

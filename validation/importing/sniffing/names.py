@@ -23,7 +23,7 @@ class Name(NamedTuple):
 _STEMS = {
     "gyroscope": (
         "gyr giro ziro zyro jiro гиро ジャイロ 陀螺 자이로 omega rotationrate rotrate angularvel angvel angularrate "
-        "winkelgeschw drehrate vitesseangulaire"
+        "winkelgeschw drehrate vitesseangulaire vitessederotation velocidadangular velocitaangolare 각속도 角速度"
     ),
     "magnetometer": "mag compass kompass boussole bussola магн 磁 자기 manyetik hmc58 qmc58 lis3m mmc5 ak8963",
     "accelerometer": (
@@ -66,6 +66,11 @@ def _plain(text: str) -> str:
     return "".join(c for c in bare if not unicodedata.combining(c)).casefold().strip()
 
 
+#: The stems as names are after `_plain`, which takes Hangul and voiced kana apart as well.
+_PLAIN_STEMS = {sensor: tuple(map(_plain, stems.split())) for sensor, stems in _STEMS.items()}
+_PLAIN_TIME_STEMS = tuple(map(_plain, _TIME_STEMS.split()))
+
+
 def _without_axis(name: str) -> tuple[str, int | None]:
     """Return a name without its axis, and the axis: x, y, z (0, 1, 2 in brackets) at the end, in front or between."""
     patterns = (
@@ -102,7 +107,7 @@ def sensor_of(base: str) -> str | None:
     if letter in _LETTERS:
         return _LETTERS[letter]
     squeezed = "".join(words).replace("magnitude", "")
-    return next((sensor for sensor, stems in _STEMS.items() if any(stem in squeezed for stem in stems.split())), None)
+    return next((sensor for sensor, stems in _PLAIN_STEMS.items() if any(stem in squeezed for stem in stems)), None)
 
 
 def penalty_of(base: str) -> int:
@@ -116,7 +121,7 @@ def is_time_name(name: str) -> bool:
     rest, unit = split_unit(name.strip())
     plain = _plain(rest)
     return (
-        any(stem in plain for stem in _TIME_STEMS.split())
+        any(stem in plain for stem in _PLAIN_TIME_STEMS)
         or plain in _TIME_NAMES.split()
         or (unit != "" and any(r.sensor == "time" for r in readings_of(unit)) and sensor_of(rest) is None)
     )

@@ -87,9 +87,10 @@ def map_text(proposal: Proposal) -> str:
     if clock.column is not None:
         lines += [f"column = {_text(clock.column)}", f"unit = {_text(clock.unit)}"]
     else:
-        lines += [f"step_s = {clock.step}"] + [
-            f"counter = {_text(name)}" for name in [clock.counter] if name is not None
-        ]
+        lines += [f"step_s = {clock.step}"]
+        if clock.step is not None and clock.off:
+            lines.append(f"step_sigma_s = {clock.step * clock.off:.2g} # leave out where the step is known")
+        lines += [f"counter = {_text(name)}" for name in [clock.counter] if name is not None]
     lines += [
         "",
         "[environment]",

@@ -13,23 +13,29 @@ from discsim.arrays import FloatArray
 from discsim.errors import InputError
 from discsim.files import model_names
 from discsim.recording import SENSORS, Plant
+from validation.importing.import_map import G0
 from validation.importing.raw_table import REPAIRS, Layout, RepairList, read_raw
 from validation.importing.sniffing.archive import MAX_FILES
 from validation.importing.sniffing.axes import Reading3, body_axes
 from validation.importing.sniffing.behaviour import WORTHS, by_behaviour
-from validation.importing.sniffing.clock import SPACING, STEP, Clock, clocks_of, seconds
+from validation.importing.sniffing.clock import SPACING, Clock, clocks_of, seconds
 from validation.importing.sniffing.decision import Decision
 from validation.importing.sniffing.dialect import dialect_of
 from validation.importing.sniffing.groups import FEWEST_ROWS, Numbers, Triple, triples_of
 from validation.importing.sniffing.magnitudes import (
+    PER_G,
+    REST,
     Unit,
     accelerometer_unit,
+    gravity_norm,
     gyroscope_unit,
     magnetometer_unit,
     rest_norm,
 )
+from validation.importing.sniffing.preamble import stated_worths
 from validation.importing.sniffing.proposal import Proposal, ProposedSensor
 from validation.importing.sniffing.turning import Fit, best_worth, steps_between
+from validation.importing.sniffing.units import COUNTS, Reading
 
 __all__ = ["sniff"]
 
@@ -37,6 +43,9 @@ __all__ = ["sniff"]
 ORDER = ("gyroscope", "accelerometer", "magnetometer")
 #: A gyroscope's worth is taken from the field's turning where it leaves less than this of the field's changes.
 TELLING = 0.35
+#: What a step from the gyroscope's rate and the field's turning may be off by, a share (one sigma): a gyroscope's scale
+#: (3 % over parts and temperature), and what was found on four measured logs (1 to 6 %, rms 3 %).
+OFF_FITTED = 0.04
 #: A column that stands this far back (gravity taken off, worked out, in the earth's axes) is no sensor's reading.
 NO_READING = 9
 #: What a sentence of NMEA 0183 begins with: the constellation's two letters and the sentence's three.
@@ -91,7 +100,10 @@ def _read(raw: Path) -> tuple[list[_File], list[InputError]]:
             failures.append(error)
     if not files:
         names = ", ".join(path.name for path in paths[:8]) or "nothing"
-        raise InputError.at(raw, None, f"no table of numbers in the files there ({names}); expected a logger's export")
+        folders = ", ".join(sorted(path.name for path in raw.iterdir() if path.is_dir())[:8])
+        also = f"; there are folders in it ({folders}): import one of them, unpacked" if folders else ""
+        what = f"no table of numbers in the files there ({names}){also}"
+        raise InputError.at(raw, None, f"{what}; expected a logger's export")
     return files, failures
 
 
@@ -144,17 +156,33 @@ def _assigned(files: Sequence[_File]) -> tuple[dict[str, tuple[Triple, Decision]
             continue
         # of several the one with gravity in it, then the plainest name, then the first
         best = min(mine, key=lambda t: (sensor == "accelerometer" and _weightless(t), t.penalty, triples.index(t)))
-        if sensor == "accelerometer" and _weightless(best) and len(mine) > 1:
-            continue
+        if sensor == "accelerometer" and _weightless(best) and (len(mine) > 1 or not _rests(best)):
+            continue  # no sensor's reading, and nothing here could use it
         found[sensor] = (best, Decision(sensor, best.label, "certain", f"{best.source} says so"))
     used = [triple for triple, _ in found.values()]
     return found, [triple for triple in triples if triple not in used]
 
 
 def _weightless(triple: Triple) -> bool:
-    """Tell an acceleration with gravity taken off: at rest it is nothing, below a fiftieth of its largest."""
+    """Tell an acceleration with gravity taken off: at rest it is nothing, below a fiftieth of its largest.
+
+    A steady spin is as quiet as a rest, so a fifth of the windows of 16 rows will do, if none rests on gravity.
+    """
     value = triple.values[np.isfinite(triple.values).all(axis=1)]
-    return rest_norm(value) < 0.02 * float(np.linalg.norm(value, axis=1).max())
+    nothing = 0.02 * float(np.linalg.norm(value, axis=1).max())
+    if rest_norm(value) < nothing:
+        return True
+    count = len(value) // 16
+    means = np.linalg.norm(value[: count * 16].reshape(count, 16, 3).mean(axis=1), axis=1)
+    return count > 0 and not _rests(triple) and bool(np.mean(means < nothing) > 0.2)
+
+
+def _rests(triple: Triple) -> bool:
+    """Tell whether most steady readings are gravity in a usual unit, or in counts, as on a launch pad."""
+    value = triple.values[np.isfinite(triple.values).all(axis=1)]
+    counts = PER_G if np.array_equal(value, np.round(value)) else ()
+    shared = gravity_norm(value)
+    return any(abs(shared / one - 1) < REST for one in (G0, 1.0, 1000.0, *counts))
 
 
 def _others(found: dict[str, tuple[Triple, Decision]], left: Sequence[Triple]) -> list[str]:
@@ -207,15 +235,16 @@ def _one_clock(tables: Sequence[Numbers]) -> Clock:
 
 def _fitted(clock: Clock, fit: Fit | None, unit: Unit) -> tuple[Clock, float]:
     """Return a clock without stamps with the step that the gyroscope and the field's turning give, and their ratio."""
-    if fit is None or fit.ratio > TELLING or unit.decision.sure == "guess":
+    if clock.decision.sure != "guess" or fit is None or fit.ratio > TELLING or unit.decision.sure == "guess":
         return clock, 1.0
     ratio = fit.worth / unit.factor("rad_s")
-    step = float(f"{STEP * ratio:.3g}")
+    assert clock.step is not None
+    step = float(f"{clock.step * ratio:.3g}")
     if not SPACING[0] <= step <= SPACING[1]:
         return clock, 1.0
     why = f"no time stamps; with this step the field turns as fast as the gyroscope says ({unit.unit})"
     told = Decision("time", f"{step} s a row", "likely", why)
-    return clock.with_step(step, told), step / STEP
+    return clock.with_step(step, told, OFF_FITTED), step / clock.step
 
 
 # -------------------------------------------------------------------------------------------------- proposal
@@ -234,7 +263,7 @@ def _proposal(
     units: dict[str, Unit] = {}
     for sensor, (triple, _) in found.items():
         value = triple.values[np.isfinite(triple.values).all(axis=1)]
-        stated = triple.units[0] if triple.units else None
+        stated, above = _stated(sensor, triple, value)
         if sensor == "gyroscope":
             turned = fit.worth if fit is not None and fit.ratio < TELLING and clock.column is not None else None
             units[sensor] = gyroscope_unit(value, stated, turned)
@@ -243,6 +272,10 @@ def _proposal(
         else:
             counts = any("a count" in unit.decision.choice for unit in units.values())
             units[sensor] = magnetometer_unit(value, stated, counts=counts)
+        if above and stated is not None and units[sensor].scale == stated.scale:
+            text = f"{stated.scale:.6g} {stated.unit} a count"
+            why = units[sensor].decision.why.replace("the header says so", "a line above the table says so")
+            units[sensor] = units[sensor]._replace(decision=Decision(f"{sensor} unit", text, "certain", why))
     if clock.column is None and "gyroscope" in units:
         clock, slower = _fitted(clock, fit, units["gyroscope"])
         times = {sensor: slower * time for sensor, time in times.items()}
@@ -257,6 +290,15 @@ def _proposal(
     )
     name = re.sub(r"[^\w.-]+", "-", raw.resolve().stem).strip("-") or "log"
     return Proposal(name, raw, plant, layout, clock, sensors, axes.decisions, tuple(notes))
+
+
+def _stated(sensor: str, triple: Triple, value: FloatArray) -> tuple[Reading | None, bool]:
+    """Return the unit that names state, or of whole numbers the lines above the table, and whether these did."""
+    stated = triple.units[0] if triple.units else None
+    if (stated is None or stated.unit == COUNTS) and np.array_equal(value, np.round(value)):
+        worth = stated_worths(triple.numbers.dialect.preamble).get(sensor)
+        return worth or stated, worth is not None
+    return stated, False
 
 
 def _reading(t: FloatArray, value: FloatArray) -> Reading3:

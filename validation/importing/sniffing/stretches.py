@@ -78,7 +78,8 @@ def stretches(read: RawReadings) -> list[Stretch]:
     if seen is None:
         return []
     half = HALF if seen.sensor == "gyroscope" else FIELD_SPAN
-    free = (seen.rate > FAST) & seen.steady & (_slope(seen.t, seen.rate, half) < CHANGE * seen.rate)
+    # at its limit a gyroscope of a small range shows a spin, whatever that limit is: by how much the field tells
+    free = ((seen.rate > FAST) | seen.clipped) & seen.steady & (_slope(seen.t, seen.rate, half) < CHANGE * seen.rate)
     free &= ~_impacts(read, seen.t)
     zero = min(float(found.time[0]) for found in read.readings.values())
     main = next(iter(read.readings.values()))

@@ -28,6 +28,13 @@ SIGNATURES = (
         "an ArduPilot log; `mavlogdump.py --format csv --types IMU FILE` (pip install pymavlink) writes CSV",
     ),
     (b"\x89MCAP", "an MCAP log; write its topics as CSV"),
+    (
+        b"FMT,",
+        "an ArduPilot text log; `mavlogdump.py --format csv --types IMU FILE` (pip install pymavlink) writes CSV",
+    ),
+    (b'[{"', "JSON; write it as CSV (in Python: pandas.read_json(FILE).to_csv(OTHER))"),
+    (b'{"', "JSON; write it as CSV (in Python: pandas.read_json(FILE, lines=True).to_csv(OTHER))"),
+    (b"<?xml", "XML; write its readings as CSV"),
     (b"\xb5\x62", "a u-blox UBX log; write its messages as CSV (pip install pyubx2 reads them)"),
 )
 _BOMS = (

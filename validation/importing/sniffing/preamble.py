@@ -1,0 +1,59 @@
+"""What the lines above a table say. Takes lines; gives the rate of the rows, and what a sensor's count is worth."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from validation.importing.sniffing.units import COUNTS, Reading, readings_of
+
+__all__ = ["stated_rate", "stated_worths"]
+
+_NUMBER = r"(\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
+_HERTZ = re.compile(rf"{_NUMBER}\s*_?(k?)Hz(?![A-Za-z])", re.IGNORECASE)
+#: Words before a number of rows a second where the unit is not written.
+_RATE = re.compile(rf"(?:sampl\w*[ _-]*(?:rate|freq\w*)|output[ _-]*rate|\bodr\b)\W{{0,4}}{_NUMBER}", re.IGNORECASE)
+#: A frequency that stands beside these is another one.
+_OTHER = re.compile(r"baud|filter|cut-?off|bandwidth|\bd?lpf\b|cpu|clock|i2c|spi\b|mains", re.IGNORECASE)
+_COUNT = r"(?:LSB|digit|count|bit)s?"
+_WORTH = re.compile(rf"{_NUMBER}\s*([^\s\d,;:=()]+)\s*(?:/|\bper\b)\s*{_COUNT}\b", re.IGNORECASE)
+_PER_UNIT = re.compile(rf"{_NUMBER}\s*{_COUNT}\s*(?:/|\bper\b)\s*\(?([^\s\d,;:=()]+)", re.IGNORECASE)
+
+
+def stated_rate(lines: Sequence[str]) -> tuple[float, str] | None:
+    """Return the rows a second that the lines state, and the line; None where they state none, or several.
+
+    >>> stated_rate(["# Device: X, I2C 400 kHz", "# Sampling rate: 200 Hz"])
+    (200.0, '# Sampling rate: 200 Hz')
+    """
+    found = {}
+    for line in lines:
+        if _OTHER.search(line):
+            continue
+        rates = [_value(m[1]) * (1000 if m[2] else 1) for m in _HERTZ.finditer(line)]
+        rates = rates or [_value(m[1]) for m in _RATE.finditer(line)]
+        found.update({rate: line.strip() for rate in rates if rate > 0})
+    return next(iter(found.items())) if len(found) == 1 else None
+
+
+def stated_worths(lines: Sequence[str]) -> dict[str, Reading]:
+    """Return what one count of a sensor is worth, by the sensor, where the lines state it ("70 mdps/LSB").
+
+    >>> stated_worths(["# gyro: 16.4 LSB/dps"])["gyroscope"].unit
+    'deg/s'
+    """
+    found: dict[str, Reading | None] = {}
+    for line in lines:
+        worths = [(m[2], _value(m[1])) for m in _WORTH.finditer(line)]
+        worths += [(m[2], 1 / _value(m[1])) for m in _PER_UNIT.finditer(line) if _value(m[1]) > 0]
+        for spelling, worth in worths:
+            meant = readings_of(spelling)
+            if meant and meant[0].sensor not in (COUNTS, "other", "time"):
+                reading = meant[0]._replace(scale=meant[0].scale * worth)
+                same = found.setdefault(reading.sensor, reading) == reading
+                found[reading.sensor] = reading if same else None  # two parts of a kind: which is meant is open
+    return {sensor: reading for sensor, reading in found.items() if reading is not None}
+
+
+def _value(text: str) -> float:
+    return float(text.replace(",", "."))
