@@ -115,8 +115,8 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
 def _judgeable(recording: Recording) -> Recording:
     """Return the part of a recording that is judged: where it turns most, if it is long.
 
-    Without its magnetometer where the field is not stated: nothing tells what it should read. Without a sensor of the board of which
-    an axis was never read, or every reading is the same: what is dead agrees with any other order of the axes.
+    Without its magnetometer where the field is not stated: nothing tells what it should read. Without a sensor of the
+    board of which an axis was never read, or every reading is the same: what is dead agrees with any order of axes.
     """
     kept = {name: own for name, own in recording.samples.items() if name not in BOARD or _alive(own)}
     if not recording.environment.field_known:
