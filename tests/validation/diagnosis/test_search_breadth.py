@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made import coasts
+from made import coasts, throws
 
 from discsim.effects.catalogue import CATALOGUE
 from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain
@@ -117,3 +117,19 @@ def test_a_rival_that_makes_another_effect_superfluous_takes_the_place_of_both(m
 def test_a_rival_that_explains_no_more_than_the_named_effects_does_not(monkeypatch):
     """Three parameters fewer are worth 24; what they explained beyond that is missed."""
     assert exchanged(monkeypatch, without_scale=90.0) is None
+
+
+def test_a_centre_of_mass_off_the_disc_is_not_refitted_and_a_sensor_s_unknown_place_is():
+    """Where a path alone is recorded algebra asks for metres of the one; along the axis nothing shows the other."""
+    recordings = throws(seconds=0.3)
+    base = Tied(Hypothesis(), Fit((), (), np.empty(0), NO_JUMPS["flight"], {}), 0.0)
+    found = searching.Search(tuple(recordings), (), base.fit, {}, (), base, base)
+    radius = 0.5 * recordings[0].disc.diameter
+
+    def tried(id: str, name: str, value: float) -> bool:
+        return searching._on_the_disc(found, {((id, name), None): value})
+
+    assert tried("body.mass_imbalance", "ex_m", 0.9 * radius)
+    assert not tried("body.mass_imbalance", "ex_m", -1.1 * radius)
+    assert tried("accel.position_offset", "dz_m", 3.0 * radius)
+    assert tried("air.wind", "w_north_m_s", 30.0)

@@ -353,18 +353,22 @@ def _in_turn(*offers: Sequence[Offer]) -> list[Offer]:
 
 
 def _on_the_disc(found: Search, start: Start) -> bool:
-    """Tell whether a start has no sensor and no centre of mass off the disc.
+    """Tell whether a start has no centre of mass off the disc.
 
-    Of recordings in which such a place hardly shows algebra asks for any number, under which no motion may last.
+    Of recordings in which that hardly shows algebra asks for any number, under which no motion lasts. A sensor's place
+    that nothing shows, as along the axis of a table, does no harm.
     """
     radius = _radius(found.recordings[0])
-    return all(abs(number) <= radius for (key, _), number in start.items() if _is_place(key[0]))
+    return all(abs(number) <= radius for (key, _), number in start.items() if _is_place(key[0], "motion"))
 
 
-def _is_place(id: str) -> bool:
-    """Tell whether an effect's parameters are distances from the disc's centre or from another place on it, m."""
+def _is_place(id: str, acts_on: str | None = None) -> bool:
+    """Tell whether an effect's parameters are distances from the disc's centre or from another place on it, m.
+
+    With ``acts_on`` only where it acts on that.
+    """
     row = row_of(id)
-    return row is not None and row.on_disc
+    return row is not None and row.on_disc and acts_on in (None, row.acts_on)
 
 
 def _radius(recording: Recording) -> float:
