@@ -374,7 +374,7 @@ def test_a_rate_table_is_followed_within_the_stated_deviation():
         pytest.skip("no recordings: set DISCSIM_RECORDINGS to the folder that holds practice/table-b")
     recording = read_recording(folder)
     reference = recording.need("rate_reference")
-    estimate = fft(recording.need("magnetometer"), FftSettings(step=8))
+    estimate = fft(recording.need("magnetometer"), FftSettings(step=8), fixed_axis=True)
     around = [np.interp(estimate.t + shift, reference.t, reference.value) for shift in (-0.7, -0.35, 0.0, 0.35, 0.7)]
     steady_rate = (np.ptp(around, axis=0) < 0.01) & (around[2] > np.radians(900))
     known = np.isfinite(estimate.rate)

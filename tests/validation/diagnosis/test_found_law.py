@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -138,3 +139,5 @@ def test_a_side_force_in_flight_is_found_with_its_target_and_powers():
     V = np.array([15.0, 18.0, 21.0])
     state = {"V": V, "t": 1.0 + 0.0 * V, "h": 2.0 + 0.0 * V, "alpha": 0.1 + 0.0 * V, "r": 55.0 + 0.0 * V}
     np.testing.assert_allclose(found.law.for_model().evaluate(state), 3e-4 * V**2.5, rtol=0.1)
+    # one path alone takes any law, and nothing could bear it out
+    assert law_of([replace(recordings[0], samples={"gps": recordings[0].samples["gps"]})]) is None

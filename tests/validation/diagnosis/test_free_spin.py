@@ -143,4 +143,4 @@ def going(fit: Fit, too_far: float) -> _Going:
         reduce(linear, chain, fit.noise, fit.jumps) for linear, chain in zip(fit.linears, fit.chains, strict=True)
     ]
     reduced[0] = replace(reduced[0], cross=too_far * reduced[0].cross)
-    return _Going(fit, reduced, np.empty(0), {})
+    return _Going(fit, reduced, np.empty(0), {}, fit.merit)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects.kind import BOARD
 from discsim.recording import Recording
 from validation.diagnosis.relaxed_fit import NO_JUMPS
 from validation.diagnosis.result import Law
@@ -151,6 +152,8 @@ def find_law(
     plant = recordings[0].plant
     if plant == "free_spin":
         return None  # what a free spin does not model takes up any further moment
+    if len(recordings) == 1 and BOARD.isdisjoint(recordings[0].samples):
+        return None  # one path takes any law, and no other recording could bear it out
     base = best if not best.hypothesis.trials else tied_fit(loose, Hypothesis(), own, noise, {}, iterations=6, polish=1)
     own_at = _own_at(loose, own)
     start = _beside(loose, own, own_at, noise)
