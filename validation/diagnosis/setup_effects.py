@@ -6,14 +6,14 @@ rotation, a field) stays free about its first value in every fit, so that it get
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import Effect, effect, row
+from discsim.effects.catalogue import CATALOGUE, Effect, effect, row
 from discsim.effects.kind import BOARD
 from discsim.model_file import ModelEffect
 from discsim.recording import Recording
@@ -115,33 +115,40 @@ def _on_board_axes(outcome: Outcome, C: FloatArray, fit: Fit) -> Outcome:
     The fit had readings C (C^T w + b) of a board that is turned by C: what it found is C b.
     """
 
-    def turned(id: str, parameters: Mapping[str, ParameterValue]) -> dict[str, ParameterValue]:
-        names = list(parameters)
-        vector = [name[:2] for name in names] == ["bx", "by", "bz"]
-        if not vector or not row(id).acts_with(BOARD) or row(id).acts_on == "motion":
-            return dict(parameters)
-        value = C.T @ np.array([item.value for item in parameters.values()])
-        places = {q.name: k for k, q in enumerate(fit.parameters) if q.group == id}
-        known = fit.covariance.shape[0] == len(fit.parameters) and set(names) <= set(places)
-        if known and all(item.sd is not None for item in parameters.values()):
-            at = [places[name] for name in names]
-            sd = np.sqrt(np.diag(C.T @ fit.covariance[np.ix_(at, at)] @ C)).tolist()
-        else:
-            sd = [None] * 3
-        return {n: ParameterValue(v, one) for n, v, one in zip(names, value.tolist(), sd, strict=True)}
+    def turned(one: NamedEffect) -> NamedEffect:
+        names = list(one.parameters)
+        kind = CATALOGUE.get(one.id)
+        if kind is None or kind.acts_on not in BOARD or [name[:2] for name in names] != ["bx", "by", "bz"]:
+            return one
+        value = C.T @ np.array([item.value for item in one.parameters.values()])
+        covariance = _covariance_of(fit, one.id, names)
+        sd: list[float | None] = [None] * 3
+        if covariance is not None and all(item.sd is not None for item in one.parameters.values()):
+            sd = np.sqrt(np.diag(C.T @ covariance @ C)).tolist()
+        return replace(one, parameters=dict(zip(names, map(ParameterValue, value.tolist(), sd), strict=True)))
 
-    effects = tuple(replace(one, parameters=turned(one.id, one.parameters)) for one in outcome.diagnosis.effects)
-    known = {(one.id, one.recordings): one.parameters for one in effects}
+    effects = tuple(map(turned, outcome.diagnosis.effects))
+    pairs = zip(outcome.diagnosis.effects, effects, strict=True)
+    changed = {(new.id, new.recordings): new.parameters for old, new in pairs if new is not old}
 
     def carried(one: ModelEffect) -> ModelEffect:
-        parameters = known.get((one.effect.id, one.recordings))
+        parameters = changed.get((one.effect.id, one.recordings))
         if parameters is None:
             return one
-        size = effect(one.effect.id, **{name: item.value for name, item in parameters.items()}, **one.effect.setting)
+        size = effect(one.effect.id, **{name: item.value for name, item in parameters.items()})
         return ModelEffect(size, {n: i.sd for n, i in parameters.items() if i.sd is not None}, one.recordings)
 
     model = replace(outcome.model, effects=tuple(map(carried, outcome.model.effects)))
     return replace(outcome, diagnosis=replace(outcome.diagnosis, effects=effects), model=model)
+
+
+def _covariance_of(fit: Fit, id: str, names: Sequence[str]) -> FloatArray | None:
+    """Return the covariance (k, k) of an effect's parameters; None where the fit has none."""
+    places = {q.name: k for k, q in enumerate(fit.parameters) if q.group == id}
+    if fit.covariance.shape[0] != len(fit.parameters) or not set(names) <= set(places):
+        return None
+    at = [places[name] for name in names]
+    return np.asarray(fit.covariance[np.ix_(at, at)])
 
 
 @dataclass(frozen=True)
@@ -159,10 +166,10 @@ def _refined(fault: Effect, fit: Fit) -> _Refined:
         return _Refined(fault, ())
     at = [places[name] for name in names]
     moved = fit.at[at]
-    covariance = fit.covariance[np.ix_(at, at)] if fit.covariance.shape[0] == len(fit.parameters) else None
+    covariance = _covariance_of(fit, fault.id, names)
     sd = np.full(len(at), np.inf) if covariance is None else np.sqrt(np.maximum(np.diag(covariance), 0.0))
     first = np.array(_numbers(fault.value))
-    if fault.id == "board.rotation":
+    if fault.id == _TURNED:
         # the fit turned what was corrected: readings = (R_fit C)^T (vector in B)
         total = (Rotation.from_rotvec(moved) * Rotation.from_rotvec(first)).as_rotvec()
     elif fault.id == "site.field":
@@ -195,7 +202,7 @@ def _confusion(twin: Effect, fault: SetupFault, bic: float) -> Confusion:
 
 def _telling(twin: Effect, fault: Effect) -> str:
     """Return what tells two faults of a setup apart, in words."""
-    if {twin.id, fault.id} == {"board.rotation"}:
+    if {twin.id, fault.id} == {_TURNED}:
         return "note which way the disc spins, or log it lying still with its top up, where gravity shows the z axis"
     return (
         "lay the disc still with its top up, then stand it on its edge with x up, then with y up, logging all the "
@@ -211,7 +218,7 @@ def _excess(fault: Effect, written: Sequence[Recording], meant: Sequence[Recordi
         for sensor, samples in before.samples.items():
             if prefix in _SENSORS and sensor != _SENSORS[prefix]:
                 continue
-            if fault.id == "board.rotation" and sensor not in BOARD:
+            if fault.id == _TURNED and sensor not in BOARD:
                 continue
             if fault.id == "site.field":
                 if sensor == "magnetometer":

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects.kind import BOARD
 from discsim.parameters import PARAMETERS, Tables, parameter_index, parameters, tables
 from discsim.recording import Recording
 from validation.identification.competing_effects import row_of, user_effects_on
@@ -36,11 +37,6 @@ UNEVEN = 0.6
 
 #: and where coefficients come from a table, whose corners a step may not leap over
 CORNERED = 0.5
-
-
-#: and where nothing but the path is recorded, in which no nutation shows: of a disc with tables that spins at 138 rad/s
-#: and wobbles by 2 rad/s the path is 0.04 mm off after 2.5 s
-ON_PATH = 1.2
 
 
 #: a fit that has gone astray to faster spins, rad/s, is not followed with ever shorter steps
@@ -122,11 +118,6 @@ class Runner:
     #: whether the body is uneven, so that its motion follows the spin
     uneven: bool = False
 
-    @property
-    def path_alone(self) -> bool:
-        """Whether no sensor turns with the body."""
-        return not any(self.recording.get(sensor) for sensor in _ON_BODY)
-
     def times(self, start: float, stop: float, last: float, state: FloatArray) -> tuple[FloatArray, int]:
         """Return the integrator's steps from start over at least [start, last], and the place of ``stop`` in them."""
         plant = self.recording.plant
@@ -136,7 +127,8 @@ class Runner:
             spin = min(abs(float(state[12])), FASTEST)
             nutation = max(spin * disc.Izz / disc.Ixx, spin, 1.0)
             largest = CORNERED if disc.aero_table is not None else UNEVEN if self.uneven else NUTATION
-            largest = ON_PATH if self.path_alone else largest
+            # a path shows no nutation: 0.04 mm off after 2.5 s at 138 rad/s, by tables and with a wobble of 2 rad/s
+            largest = NUTATION if BOARD.isdisjoint(self.recording.samples) else largest
             h = min(STEP, largest / nutation)
         elif plant == "free_spin":
             h = min(_FREE_STEP, _FREE_NUTATION / max(min(abs(float(state[12])), FASTEST) * 2.0, 1.0))
@@ -185,10 +177,6 @@ class Runner:
         else:
             table_pieces(flats, self.knots, states, times, last, out, rows, ends)
         return rows, ends
-
-
-#: sensors that turn with the body
-_ON_BODY = ("magnetometer", "accelerometer", "gyroscope")
 
 
 def _knots(recording: Recording) -> FloatArray:
