@@ -228,6 +228,7 @@ class _Around:
             tangents[first : first + d] = sign * np.diag(STEPS[recording.plant])
             for row, j in enumerate(self.motion, first + d):
                 self._set_parameter(row, columns[j], sign)
+        self.everyone = np.arange(tangents.shape[0])
         #: the states (k, c, s) that the neighbours of each segment start from
         self.states = np.repeat(current.states[:, None], tangents.shape[0], axis=1)
         turned = np.flatnonzero(np.any(tangents != 0.0, axis=1))
@@ -241,9 +242,11 @@ class _Around:
 
     def acting(self, start: float, stop: float) -> IntArray:
         """Return the neighbours (a,) that may part from the motion between two instants: an event moves no others."""
+        if not self._events:
+            return self.everyone
         still = [row for row, t in self._events.items() if not start - EVENT_REACH < t < stop + EVENT_REACH]
         still += [row + self.half for row in still] if self.central else []
-        return np.setdiff1d(np.arange(self.flats.shape[0]), still)
+        return np.setdiff1d(self.everyone, still)
 
     def _set_parameter(self, row: int, column: Column, sign: float) -> None:
         """Move a parameter of the motion in one row of neighbours."""
@@ -294,10 +297,7 @@ def reread(current: Chain, values: Values, linear: Linear) -> Linear | None:
     if next(channels, None) is not None:
         return None
     gaps = difference(current.recording.plant, current.states[1:], ends[:-1], d)
-    closing, forbidden = np.zeros((k, d)), np.setdiff1d(np.arange(d), linear.jump_kind)
-    for i in range(k - 1):
-        closing[i + 1] = linear.passes[i, :, :d] @ closing[i]
-        closing[i + 1, forbidden] -= gaps[i, forbidden]
+    closing = _closing(linear.passes, gaps, np.setdiff1d(np.arange(d), linear.jump_kind))
     jump, some = np.zeros_like(linear.jump), linear.jump_kind >= 0
     jump[some] = gaps[linear.jump_piece[some] - 1, linear.jump_kind[some]]
     return replace(
@@ -335,7 +335,7 @@ class _Read:
         k = around.states.shape[0]
         ends = np.empty(around.states.shape)
         waiting: list[tuple[list[IntArray], IntArray, FloatArray]] = []
-        acted = np.arange(around.flats.shape[0])
+        acted, flats, wobbles = around.everyone, around.flats, around.wobbles
         for i in range(k):
             start, stop = float(edges[i]), float(edges[i + 1])
             own = [np.flatnonzero(piece == i) for piece in piece_of]
@@ -347,10 +347,10 @@ class _Read:
             acting = around.acting(start, float(times[-1]))
             if not np.array_equal(acting, acted):
                 self._read(waiting, acted)
-                waiting, acted = [], acting
+                waiting, acted, flats, wobbles = [], acting, around.flats[acting], around.wobbles[acting]
             rows, there = around.runner.run(
-                around.flats[acting],
-                around.wobbles[acting],
+                flats,
+                wobbles,
                 around.states[i, acting],
                 times,
                 last,
@@ -425,7 +425,6 @@ def _chained(current: Chain, around: _Around, ends: FloatArray, jumps: BoolArray
     S = np.zeros((k, d, u + p))
     S[0, :, :d] = np.eye(d)
     passes = np.zeros((max(k - 1, 0), d, d + p))
-    closing = np.zeros((k, d))
     nominal = ends[:-1, 0]
     gaps = difference(plant, current.states[1:], nominal, d)
     reached = difference(plant, ends[:-1], np.broadcast_to(nominal[:, None], ends[:-1].shape), d)
@@ -435,9 +434,17 @@ def _chained(current: Chain, around: _Around, ends: FloatArray, jumps: BoolArray
         S[i + 1, :, :first] = Phi @ S[i, :, :first]
         S[i + 1, :, u:] = Phi @ S[i, :, u:] + passes[i, :, d:]
         S[i + 1, allowed, first + np.arange(allowed.size)] = 1.0
-        closing[i + 1] = Phi @ closing[i]
-        closing[i + 1, forbidden] -= gaps[i, forbidden]
-    return _Chained(S, passes, closing, gaps, allowed, u)
+    return _Chained(S, passes, _closing(passes, gaps, forbidden), gaps, allowed, u)
+
+
+def _closing(passes: FloatArray, gaps: FloatArray, forbidden: IntArray) -> FloatArray:
+    """Return how the states of the pieces (k, d) move to close the jumps that are not allowed."""
+    d = gaps.shape[1]
+    closing = np.zeros((gaps.shape[0] + 1, d))
+    for i, gap in enumerate(gaps):
+        closing[i + 1] = passes[i, :, :d] @ closing[i]
+        closing[i + 1, forbidden] -= gap[forbidden]
+    return closing
 
 
 def _add_sensor_columns(around: _Around, s: Sampled, rows: FloatArray, M: FloatArray) -> None:
