@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-__all__ = ["AIRBORNE", "BOARD", "EVERYWHERE", "FLIGHT", "RIGS", "Row"]
+__all__ = ["AIRBORNE", "BOARD", "EVERYWHERE", "FLIGHT", "RIGS", "UNSEEN_IN_MEANS", "Row", "with_article"]
 
 FLIGHT = ("flight",)
 AIRBORNE = ("flight", "free_spin")
@@ -14,8 +14,15 @@ RIGS = ("rate_table", "spin_down")
 EVERYWHERE = ("flight", "rate_table", "spin_down", "free_spin")
 #: the sensors that share one board
 BOARD = frozenset({"magnetometer", "accelerometer", "gyroscope"})
+#: sensor -> plants on which it counts by its means over turns alone: what moves or loses samples does not show in them
+UNSEEN_IN_MEANS = MappingProxyType({"accelerometer": ("free_spin",)})
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
+def with_article(sensor: str) -> str:
+    """Return a sensor's name behind its article: "an accelerometer"."""
+    return f"{'an' if sensor[0] in 'aeiou' else 'a'} {sensor}"
 
 
 class Row(NamedTuple):

@@ -8,9 +8,65 @@ from __future__ import annotations
 from math import inf
 
 from discsim.effects import sensors
-from discsim.effects.kind import EVERYWHERE, FLIGHT, Row
+from discsim.effects.kind import EVERYWHERE, FLIGHT, UNSEEN_IN_MEANS, Row, with_article
 
 __all__ = ["SENSOR_ROWS"]
+
+_AWAY = "its spin phase runs away from that of the other sensors"
+
+
+def _lag(prefix: str, sensor: str) -> Row:
+    """Return the row of a sensor that lags to first order."""
+    return Row(
+        f"{prefix}.lag",
+        sensors.Lag,
+        sensor,
+        EVERYWHERE,
+        (1e-4,),
+        title=f"{with_article(sensor)} that lags",
+        form="{tau_s} ẏ = x − y, y the reading",
+        grows_with="spin",
+        trace="readings are late and too small, more so the faster the disc spins",
+        bounds={"tau_s": (0.0, 0.2)},
+        sign={"tau_s": 1.0},
+        unseen_on=UNSEEN_IN_MEANS.get(sensor, ()),
+    )
+
+
+def _clock(prefix: str, sensor: str, called: str, trace: str, scale: float = 1e-5) -> Row:
+    """Return the row of a sensor whose own clock runs at another rate."""
+    return Row(
+        f"{prefix}.clock_rate",
+        sensors.ClockRate,
+        sensor,
+        FLIGHT if sensor == "gps" else EVERYWHERE,
+        (scale,),
+        title=f"a wrong clock of {called}",
+        form=f"written time = {{ratio}} × true time, of {called}",
+        grows_with="time",
+        trace=trace,
+        bounds={"ratio": (0.7, 1.4)},
+        moves_time=True,
+        unseen_on=UNSEEN_IN_MEANS.get(sensor, ()),
+    )
+
+
+def _dropped_samples(prefix: str, sensor: str) -> Row:
+    """Return the row of a sensor that loses samples without a trace."""
+    return Row(
+        f"{prefix}.dropped_samples",
+        sensors.DroppedSamples,
+        sensor,
+        EVERYWHERE,
+        (0.001,),
+        title=f"lost samples of the {sensor}",
+        form=f"a share of {{fraction}} of the {sensor}'s samples is lost, the rest written as if none were",
+        grows_with="time, in steps",
+        trace="its spin phase steps ahead each time a sample is lost",
+        searched=True,
+        unseen_on=UNSEEN_IN_MEANS.get(sensor, ()),
+    )
+
 
 SENSOR_ROWS = (
     Row(
@@ -35,19 +91,7 @@ SENSOR_ROWS = (
         grows_with="field in body axes",
         trace="the field is bent: the circle of the readings is an ellipse",
     ),
-    Row(
-        "mag.lag",
-        sensors.Lag,
-        "magnetometer",
-        EVERYWHERE,
-        (0.0001,),
-        title="a magnetometer that lags",
-        form="{tau_s} ẏ = x − y, y the reading",
-        grows_with="spin",
-        trace="readings are late and too small, more so the faster the disc spins",
-        bounds={"tau_s": (0.0, 0.2)},
-        sign={"tau_s": 1.0},
-    ),
+    _lag("mag", "magnetometer"),
     Row(
         "mag.stray_field",
         sensors.StrayField,
@@ -62,72 +106,11 @@ SENSOR_ROWS = (
         grid={"height_m": (0.3, 0.6, 1.2, 2.5, 6.0)},
         grid_sigma={"height_m": 20.0},
     ),
-    Row(
-        "mag.clock_rate",
-        sensors.ClockRate,
-        "magnetometer",
-        EVERYWHERE,
-        (1e-05,),
-        title="a wrong clock of the magnetometer",
-        form="written time = {ratio} × true time, of the magnetometer",
-        grows_with="time",
-        trace="its spin phase runs away from that of the other sensors",
-        bounds={"ratio": (0.7, 1.4)},
-        moves_time=True,
-    ),
-    Row(
-        "mag.dropped_samples",
-        sensors.DroppedSamples,
-        "magnetometer",
-        EVERYWHERE,
-        (0.001,),
-        title="lost samples of the magnetometer",
-        form="a share of {fraction} of the magnetometer's samples is lost, the rest written as if none were",
-        grows_with="time, in steps",
-        trace="its spin phase steps ahead each time a sample is lost",
-        searched=True,
-    ),
-    Row(
-        "accel.lag",
-        sensors.Lag,
-        "accelerometer",
-        EVERYWHERE,
-        (0.0001,),
-        title="an accelerometer that lags",
-        form="{tau_s} ẏ = x − y, y the reading",
-        grows_with="spin",
-        trace="readings are late and too small, more so the faster the disc spins",
-        bounds={"tau_s": (0.0, 0.2)},
-        sign={"tau_s": 1.0},
-        unseen_on=("free_spin",),
-    ),
-    Row(
-        "accel.clock_rate",
-        sensors.ClockRate,
-        "accelerometer",
-        EVERYWHERE,
-        (1e-05,),
-        title="a wrong clock of the accelerometer",
-        form="written time = {ratio} × true time, of the accelerometer",
-        grows_with="time",
-        trace="its spin phase runs away from that of the other sensors",
-        bounds={"ratio": (0.7, 1.4)},
-        moves_time=True,
-        unseen_on=("free_spin",),
-    ),
-    Row(
-        "accel.dropped_samples",
-        sensors.DroppedSamples,
-        "accelerometer",
-        EVERYWHERE,
-        (0.001,),
-        title="lost samples of the accelerometer",
-        form="a share of {fraction} of the accelerometer's samples is lost, the rest written as if none were",
-        grows_with="time, in steps",
-        trace="its spin phase steps ahead each time a sample is lost",
-        searched=True,
-        unseen_on=("free_spin",),
-    ),
+    _clock("mag", "magnetometer", "the magnetometer", _AWAY),
+    _dropped_samples("mag", "magnetometer"),
+    _lag("accel", "accelerometer"),
+    _clock("accel", "accelerometer", "the accelerometer", _AWAY),
+    _dropped_samples("accel", "accelerometer"),
     Row(
         "accel.position_offset",
         sensors.PositionOffset,
@@ -197,32 +180,8 @@ SENSOR_ROWS = (
         bounds={"limit_m_s2": (0.5, inf)},
         searched=True,
     ),
-    Row(
-        "gyro.lag",
-        sensors.Lag,
-        "gyroscope",
-        EVERYWHERE,
-        (0.0001,),
-        title="a gyroscope that lags",
-        form="{tau_s} ẏ = x − y, y the reading",
-        grows_with="spin",
-        trace="readings are late and too small, more so the faster the disc spins",
-        bounds={"tau_s": (0.0, 0.2)},
-        sign={"tau_s": 1.0},
-    ),
-    Row(
-        "gyro.clock_rate",
-        sensors.ClockRate,
-        "gyroscope",
-        EVERYWHERE,
-        (1e-05,),
-        title="a wrong clock of the gyroscope",
-        form="written time = {ratio} × true time, of the gyroscope",
-        grows_with="time",
-        trace="its phase runs away from that of the other sensors",
-        bounds={"ratio": (0.7, 1.4)},
-        moves_time=True,
-    ),
+    _lag("gyro", "gyroscope"),
+    _clock("gyro", "gyroscope", "the gyroscope", "its phase runs away from that of the other sensors"),
     Row(
         "gyro.bias",
         sensors.GyroscopeBias,
@@ -257,19 +216,7 @@ SENSOR_ROWS = (
         trace="readings grow with the specific force",
         units={"kx": "rad/s per m/s²", "ky": "rad/s per m/s²", "kz": "rad/s per m/s²"},
     ),
-    Row(
-        "gps.clock_rate",
-        sensors.ClockRate,
-        "gps",
-        FLIGHT,
-        (0.0001,),
-        title="a wrong clock of the GPS",
-        form="written time = {ratio} × true time, of the GPS",
-        grows_with="time",
-        trace="fixes run away from the motion that the other sensors show",
-        bounds={"ratio": (0.7, 1.4)},
-        moves_time=True,
-    ),
+    _clock("gps", "gps", "the GPS", "fixes run away from the motion that the other sensors show", 1e-4),
     Row(
         "gps.latency",
         sensors.Latency,

@@ -5,48 +5,72 @@ The fields are those of `discsim.effects.kind.Row`; forms and parameters are tho
 
 from __future__ import annotations
 
+from typing import Any
+
 from discsim.effects import setup
-from discsim.effects.kind import EVERYWHERE, FLIGHT, Row
+from discsim.effects.kind import EVERYWHERE, FLIGHT, UNSEEN_IN_MEANS, Row, with_article
 
 __all__ = ["SETUP_ROWS"]
 
+_SHIFTED = "readings are early or late by one and the same time"
+_TURNED = f"{_SHIFTED}, all of their size there"
+
+
+def _axes(prefix: str, sensor: str) -> Row:
+    """Return the row of a sensor of the board whose columns are a signed permutation of the body's axes."""
+    return Row(
+        f"{prefix}.axes",
+        setup.Axes,
+        sensor,
+        EVERYWHERE,
+        (),
+        setup=True,
+        title=f"{with_article(sensor)} whose axes are mixed up",
+        form="columns x, y, z hold {axes} of the body",
+        grows_with="nothing: it is constant",
+        trace=f"the {sensor}'s columns hold other axes than stated",
+    )
+
+
+def _unit(prefix: str, sensor: str, type: type[Any], quantity: str) -> Row:
+    """Return the row of a sensor whose numbers are written in another unit."""
+    return Row(
+        f"{prefix}.units",
+        type,
+        sensor,
+        EVERYWHERE,
+        (),
+        setup=True,
+        title=f"{with_article(sensor)} in another unit",
+        form="numbers are written in {written_in}",
+        grows_with=quantity,
+        trace=f"{quantity}s are off by the factor between two units",
+    )
+
+
+def _time_offset(prefix: str, sensor: str, grows_with: str, trace: str) -> Row:
+    """Return the row of a sensor whose times are all early or late by the same."""
+    return Row(
+        f"{prefix}.time_offset",
+        setup.TimeOffset,
+        sensor,
+        EVERYWHERE,
+        (1e-4,),
+        setup=True,
+        title=f"times of the {sensor} that are shifted",
+        form="written time = true time + {offset_s}",
+        grows_with=grows_with,
+        trace=trace,
+        bounds={"offset_s": (-2.0, 2.0)},
+        moves_time=True,
+        unseen_on=UNSEEN_IN_MEANS.get(sensor, ()),
+    )
+
+
 SETUP_ROWS = (
-    Row(
-        "mag.axes",
-        setup.Axes,
-        "magnetometer",
-        EVERYWHERE,
-        (),
-        setup=True,
-        title="a magnetometer whose axes are mixed up",
-        form="columns x, y, z hold {axes} of the body",
-        grows_with="nothing: it is constant",
-        trace="the magnetometer's columns hold other axes than stated",
-    ),
-    Row(
-        "accel.axes",
-        setup.Axes,
-        "accelerometer",
-        EVERYWHERE,
-        (),
-        setup=True,
-        title="an accelerometer whose axes are mixed up",
-        form="columns x, y, z hold {axes} of the body",
-        grows_with="nothing: it is constant",
-        trace="the accelerometer's columns hold other axes than stated",
-    ),
-    Row(
-        "gyro.axes",
-        setup.Axes,
-        "gyroscope",
-        EVERYWHERE,
-        (),
-        setup=True,
-        title="a gyroscope whose axes are mixed up",
-        form="columns x, y, z hold {axes} of the body",
-        grows_with="nothing: it is constant",
-        trace="the gyroscope's columns hold other axes than stated",
-    ),
+    _axes("mag", "magnetometer"),
+    _axes("accel", "accelerometer"),
+    _axes("gyro", "gyroscope"),
     Row(
         "gps.axes",
         setup.GpsAxes,
@@ -59,85 +83,12 @@ SETUP_ROWS = (
         grows_with="nothing: it is constant",
         trace="the GPS's columns hold other directions than stated",
     ),
-    Row(
-        "mag.units",
-        setup.MagnetometerUnit,
-        "magnetometer",
-        EVERYWHERE,
-        (),
-        setup=True,
-        title="a magnetometer in another unit",
-        form="numbers are written in {written_in}",
-        grows_with="field",
-        trace="fields are off by the factor between two units",
-    ),
-    Row(
-        "accel.units",
-        setup.AccelerometerUnit,
-        "accelerometer",
-        EVERYWHERE,
-        (),
-        setup=True,
-        title="an accelerometer in another unit",
-        form="numbers are written in {written_in}",
-        grows_with="specific force",
-        trace="specific forces are off by the factor between two units",
-    ),
-    Row(
-        "gyro.units",
-        setup.GyroscopeUnit,
-        "gyroscope",
-        EVERYWHERE,
-        (),
-        setup=True,
-        title="a gyroscope in another unit",
-        form="numbers are written in {written_in}",
-        grows_with="rate",
-        trace="rates are off by the factor between two units",
-    ),
-    Row(
-        "mag.time_offset",
-        setup.TimeOffset,
-        "magnetometer",
-        EVERYWHERE,
-        (0.0001,),
-        setup=True,
-        title="times of the magnetometer that are shifted",
-        form="written time = true time + {offset_s}",
-        grows_with="spin",
-        trace="readings are early or late by one and the same time, all of their size there",
-        bounds={"offset_s": (-2.0, 2.0)},
-        moves_time=True,
-    ),
-    Row(
-        "accel.time_offset",
-        setup.TimeOffset,
-        "accelerometer",
-        EVERYWHERE,
-        (0.0001,),
-        setup=True,
-        title="times of the accelerometer that are shifted",
-        form="written time = true time + {offset_s}",
-        grows_with="spin",
-        trace="readings are early or late by one and the same time, all of their size there",
-        bounds={"offset_s": (-2.0, 2.0)},
-        moves_time=True,
-        unseen_on=("free_spin",),
-    ),
-    Row(
-        "gyro.time_offset",
-        setup.TimeOffset,
-        "gyroscope",
-        EVERYWHERE,
-        (0.0001,),
-        setup=True,
-        title="times of the gyroscope that are shifted",
-        form="written time = true time + {offset_s}",
-        grows_with="rate of change",
-        trace="readings are early or late by one and the same time",
-        bounds={"offset_s": (-2.0, 2.0)},
-        moves_time=True,
-    ),
+    _unit("mag", "magnetometer", setup.MagnetometerUnit, "field"),
+    _unit("accel", "accelerometer", setup.AccelerometerUnit, "specific force"),
+    _unit("gyro", "gyroscope", setup.GyroscopeUnit, "rate"),
+    _time_offset("mag", "magnetometer", "spin", _TURNED),
+    _time_offset("accel", "accelerometer", "spin", _TURNED),
+    _time_offset("gyro", "gyroscope", "rate of change", _SHIFTED),
     Row(
         "board.rotation",
         setup.BoardRotation,
