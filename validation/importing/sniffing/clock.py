@@ -22,6 +22,8 @@ SCALES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 EPOCH = (1e9, 3e9)
 #: Logs of motion are written at 2 Hz to 20 kHz; outside that no unit is believed.
 SPACING = (5e-5, 0.5)
+#: ... and fixes of a satellite receiver come twenty times a second to once a minute.
+SLOWEST_FIX = 60.0
 #: Loggers without time stamps write 100 rows a second more often than any other number; all rates scale with it.
 STEP = 0.01
 #: Share of steps that ascend in a column of time: a log has some doubled or swapped rows, never every tenth.
@@ -94,7 +96,7 @@ def _clock(numbers: Numbers, k: int, name: str) -> Clock | None:
     named = is_time_name(spoken)
     if not named and (k > 1 or (numbers.dialect.has_header and not _evenly(value, spoken))):
         return None  # what has another name is another thing; else the first two columns are tried
-    unit, sure, why_unit = _unit(value, spoken)
+    unit, sure, why_unit = _unit(value, spoken, SLOWEST_FIX if numbers.tells_positions else SPACING[1])
     if unit is None:
         return None
     if not named and numbers.dialect.has_header:
@@ -119,12 +121,12 @@ def _evenly(value: FloatArray, name: str) -> bool:
     return bool(low > 0 and usual != 1 and high - low < 0.5 * usual)
 
 
-def _unit(value: FloatArray, name: str) -> tuple[str | None, Sureness, str]:
-    """Return the unit of time stamps, how sure that is, and why."""
+def _unit(value: FloatArray, name: str, slowest: float) -> tuple[str | None, Sureness, str]:
+    """Return the unit of time stamps, how sure that is, and why; rows are at most ``slowest`` s apart."""
     steps = np.diff(value[np.isfinite(value)])
     step = float(np.median(steps[steps > 0]))
     largest = float(np.nanmax(value))
-    fits = [unit for unit, scale in SCALES.items() if SPACING[0] <= step * scale <= SPACING[1]]
+    fits = [unit for unit, scale in SCALES.items() if SPACING[0] <= step * scale <= slowest]
     written = _written(name)
     if written is not None:
         if written in fits:

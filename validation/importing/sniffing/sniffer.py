@@ -48,8 +48,6 @@ TELLING = 0.35
 OFF_FITTED = 0.04
 #: A column that stands this far back (gravity taken off, worked out, in the earth's axes) is no sensor's reading.
 NO_READING = 9
-#: What a sentence of NMEA 0183 begins with: the constellation's two letters and the sentence's three.
-_SENTENCE = re.compile(r"\$G[A-Z](GGA|RMC|GLL|GNS|GSA|GSV|VTG|ZDA)$")
 
 
 @dataclass(frozen=True)
@@ -69,17 +67,20 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     files, failures = _read(raw)
     layout, files, notes = _one_layout(files)
     found, left = _assigned(files)
-    clock = _one_clock([triple.numbers for triple, _ in found.values()] or [file.numbers for file in files])
+    fixes = [file.numbers for file in files if file.numbers.tells_positions]
+    clock = _one_clock([triple.numbers for triple, _ in found.values()] or fixes or [file.numbers for file in files])
+    fixes = [numbers for numbers in fixes if _on(clock, numbers)][:1]
     unknown = [triple for triple in left if triple.sensor is None and _on(clock, triple.numbers)]
     missing = [sensor for sensor in ORDER if sensor not in found]
     if unknown and missing:
         seen = by_behaviour(unknown, [seconds(clock, triple.numbers)[triple.rows] for triple in unknown])
         found |= {sensor: (triple, decision) for triple, sensor, decision in seen if sensor in missing}
     found = {s: found[s] for s in ORDER if s in found and _on(clock, found[s][0].numbers)}
-    if not found:
+    if not found and not fixes:
         raise _nothing(raw, files, failures)
     notes += _others(found, left)
-    return _proposal(raw, plant, layout, clock, found, notes)
+    proposal = _proposal(raw, plant, layout, clock, found, notes)
+    return replace(proposal, positions=fixes[0] if fixes else None)
 
 
 # --------------------------------------------------------------------------------------------------- reading
@@ -203,9 +204,6 @@ def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) 
     rows = max(len(file.numbers.table.rows) for file in files)
     if rows < FEWEST_ROWS:
         return InputError.at(raw, None, f"{rows} rows of numbers in it; expected a log of {FEWEST_ROWS} at least")
-    if all(_SENTENCE.match(file.numbers.table.rows[0].cells[0]) for file in files):
-        what = "holds NMEA sentences of a satellite receiver: positions, and no sensor of motion"
-        return InputError.at(raw, None, f"{what}; `gpsbabel -i nmea -f FILE -o unicsv -F track.csv` writes them as CSV")
     columns = ", ".join(f"'{name}'" for name in files[0].numbers.table.columns[:12])
     also = f" ({len(failures)} other files there are no tables)" if failures else ""
     return InputError.at(
@@ -289,7 +287,8 @@ def _proposal(
         for sensor, (triple, decision) in found.items()
     )
     name = re.sub(r"[^\w.-]+", "-", raw.resolve().stem).strip("-") or "log"
-    return Proposal(name, raw, plant, layout, clock, sensors, axes.decisions, tuple(notes))
+    decisions = axes.decisions if found else ()  # positions alone have no axes of a board
+    return Proposal(name, raw, plant, layout, clock, sensors, decisions, tuple(notes))
 
 
 def _stated(sensor: str, triple: Triple, value: FloatArray) -> tuple[Reading | None, bool]:

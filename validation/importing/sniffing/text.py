@@ -6,7 +6,7 @@ import codecs
 from pathlib import Path
 
 from discsim.errors import InputError
-from validation.importing.sniffing.ulog import MAGIC
+from validation.importing.logs import kind_of
 
 __all__ = ["encoding_of", "lines_of"]
 
@@ -22,12 +22,6 @@ SIGNATURES = (
     (b"\x1f\x8b", "a gzip archive; unpack it first"),
     (b"\x89HDF", "an HDF5 file; write its tables as CSV"),
     (b"SQLite format 3", "an SQLite data base; write its tables as CSV"),
-    (MAGIC, "a PX4 ULog among other files; import that file itself"),
-    (
-        b"\xa3\x95\x80",
-        "an ArduPilot log; `mavlogdump.py --format csv --types IMU FILE` (pip install pymavlink) writes CSV",
-    ),
-    (b"\x89MCAP", "an MCAP log; write its topics as CSV"),
     (
         b"FMT,",
         "an ArduPilot text log; `mavlogdump.py --format csv --types IMU FILE` (pip install pymavlink) writes CSV",
@@ -35,7 +29,6 @@ SIGNATURES = (
     (b'[{"', "JSON; write it as CSV (in Python: pandas.read_json(FILE).to_csv(OTHER))"),
     (b'{"', "JSON; write it as CSV (in Python: pandas.read_json(FILE, lines=True).to_csv(OTHER))"),
     (b"<?xml", "XML; write its readings as CSV"),
-    (b"\xb5\x62", "a u-blox UBX log; write its messages as CSV (pip install pyubx2 reads them)"),
 )
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8"),
@@ -60,6 +53,9 @@ def encoding_of(path: Path) -> str:
         raise InputError.at(path, None, f"cannot be read ({error.strerror}); expected what a logger wrote") from None
     if not content.strip():
         raise InputError.at(path, None, "the file is empty; expected rows of numbers")
+    kind = kind_of(path)
+    if kind is not None:
+        raise InputError.at(path, None, f"is {kind.name} among other files; import that file itself")
     for start, what in SIGNATURES:
         if content.startswith(start):
             raise InputError.at(path, None, f"is {what}; expected text with rows of numbers")
