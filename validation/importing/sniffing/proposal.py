@@ -25,13 +25,14 @@ MIRRORED = -0.5  # a signed permutation's determinant is 1 or -1
 
 @dataclass(frozen=True)
 class ProposedSensor:
-    """A sensor of a proposed map."""
+    """A sensor of a proposed map; ``clock`` is that of its own column of time, None where it has the file's."""
 
     sensor: str
     triple: Triple
     decision: Decision
     unit: Unit
     axes: FloatArray
+    clock: Clock | None = None
 
 
 @dataclass(frozen=True)
@@ -137,6 +138,8 @@ def _sensor(proposal: Proposal, sensor: ProposedSensor) -> list[str]:
     lines += [_remark(sensor.decision), f"columns = {_texts(triple.names)}"]
     if triple.where is not None:
         lines.append(f"where = {{ {_text(triple.where[0])} = {_text(triple.where[1])} }}")
+    if sensor.clock is not None and sensor.clock.column is not None:
+        lines.append(f"time = {_text(sensor.clock.column)} # its own stamps, in the unit of [time]")
     lines += [_remark(unit.decision), f"unit = {_text(unit.unit)}"]
     lines += [f"scale = {unit.scale!r}"] * (unit.scale != 1.0)
     named = letters(sensor.axes)
@@ -150,6 +153,8 @@ def _sensor(proposal: Proposal, sensor: ProposedSensor) -> list[str]:
 
 
 def _about(decision: Decision, sensor: str) -> bool:
+    if decision.what.endswith(" time"):
+        return decision.what == f"{sensor} time"
     return not decision.what.startswith("magnetometer") or sensor == "magnetometer"
 
 

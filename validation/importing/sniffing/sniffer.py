@@ -32,6 +32,8 @@ from validation.importing.sniffing.magnitudes import (
     magnetometer_unit,
     rest_norm,
 )
+from validation.importing.sniffing.names import sensor_of, timeless
+from validation.importing.sniffing.own_clock import OwnClocks, own_clocks
 from validation.importing.sniffing.preamble import stated_worths
 from validation.importing.sniffing.proposal import Proposal, ProposedSensor
 from validation.importing.sniffing.turning import Fit, best_worth, steps_between
@@ -79,7 +81,8 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     if not found and not fixes:
         raise _nothing(raw, files, failures)
     notes += _others(found, left)
-    proposal = _proposal(raw, plant, layout, clock, found, notes)
+    own = own_clocks(clock, {sensor: triple for sensor, (triple, _) in found.items()})
+    proposal = _proposal(raw, plant, layout, clock, own, found, [*notes, *own.notes])
     return replace(proposal, positions=fixes[0] if fixes else None)
 
 
@@ -228,7 +231,13 @@ def _one_clock(tables: Sequence[Numbers]) -> Clock:
     clocks = [clock for numbers in tables for clock in clocks_of(numbers)]
     ranks = {"certain": 0, "likely": 1, "guess": 2}
     shared = [clock for clock in clocks if sum(_on(clock, numbers) for numbers in tables) > len(tables) / 2]
-    return min(shared, key=lambda clock: (clock.column is None, ranks[clock.decision.sure], clocks.index(clock)))
+
+    def order(clock: Clock) -> tuple[bool, float, int]:
+        # a column that is one sensor's own stands behind the file's, but for one that is a guess
+        own = clock.column is not None and sensor_of(timeless(clock.column)) is not None
+        return clock.column is None, ranks[clock.decision.sure] + 1.5 * own, clocks.index(clock)
+
+    return min(shared, key=order)
 
 
 def _fitted(clock: Clock, fit: Fit | None, unit: Unit) -> tuple[Clock, float]:
@@ -253,10 +262,14 @@ def _proposal(
     plant: Plant,
     layout: Layout,
     clock: Clock,
+    own: OwnClocks,
     found: dict[str, tuple[Triple, Decision]],
     notes: list[str],
 ) -> Proposal:
-    times = {sensor: seconds(clock, triple.numbers)[triple.rows] for sensor, (triple, _) in found.items()}
+    times = {
+        sensor: seconds(own.clocks.get(sensor, clock), triple.numbers)[triple.rows]
+        for sensor, (triple, _) in found.items()
+    }
     fit = _turned(found, times)
     units: dict[str, Unit] = {}
     for sensor, (triple, _) in found.items():
@@ -283,11 +296,11 @@ def _proposal(
     }
     axes = body_axes(readings)
     sensors = tuple(
-        ProposedSensor(sensor, triple, decision, units[sensor], axes.matrix[sensor])
+        ProposedSensor(sensor, triple, decision, units[sensor], axes.matrix[sensor], own.clocks.get(sensor))
         for sensor, (triple, decision) in found.items()
     )
     name = re.sub(r"[^\w.-]+", "-", raw.resolve().stem).strip("-") or "log"
-    decisions = axes.decisions if found else ()  # positions alone have no axes of a board
+    decisions = (*own.decisions, *axes.decisions) if found else ()  # positions alone have no axes of a board
     return Proposal(name, raw, plant, layout, clock, sensors, decisions, tuple(notes))
 
 
