@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from validation.importing.sniffing.units import readings_of, split_unit
 
-__all__ = ["Name", "is_time_name", "penalty_of", "read_name", "says_nothing", "sensor_of", "timeless"]
+__all__ = ["Name", "foreign_words", "is_time_name", "penalty_of", "read_name", "says_nothing", "sensor_of", "timeless"]
 
 
 class Name(NamedTuple):
@@ -71,6 +71,22 @@ def _plain(text: str) -> str:
 #: The stems as names are after `_plain`, which takes Hangul and voiced kana apart as well.
 _PLAIN_STEMS = {sensor: tuple(map(_plain, stems.split())) for sensor, stems in _STEMS.items()}
 _PLAIN_TIME_STEMS = tuple(map(_plain, _TIME_STEMS.split()))
+
+
+#: Those that are written in no Latin letters: an encoding under which they stand in a text is the text's.
+_FOREIGN = frozenset(
+    stem for stems in (*_PLAIN_STEMS.values(), _PLAIN_TIME_STEMS) for stem in stems if not stem.isascii()
+)
+
+
+def foreign_words(text: str) -> int:
+    """Return how many signs of a text are words known here that are written in no Latin letters, each word once.
+
+    >>> foreign_words("時間, 加速度 x, 加速度 y"), foreign_words("Zeit, Beschleunigung"), foreign_words("ŽžŠÔ")
+    (4, 0, 0)
+    """
+    plain = _plain(text)
+    return sum(len(stem) for stem in _FOREIGN if stem in plain)
 
 
 def _without_axis(name: str) -> tuple[str, int | None]:

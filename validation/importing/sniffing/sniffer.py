@@ -209,6 +209,8 @@ def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) 
         return InputError.at(raw, None, f"{rows} rows of numbers in it; expected a log of {FEWEST_ROWS} at least")
     columns = ", ".join(f"'{name}'" for name in files[0].numbers.table.columns[:12])
     also = f" ({len(failures)} other files there are no tables)" if failures else ""
+    guessed = files[0].numbers.dialect.layout.encoding in ("cp1252", "latin-1") and not columns.isascii()
+    also += "; the text is no UTF-8 and its encoding could not be told (save it as UTF-8)" * guessed
     return InputError.at(
         raw,
         None,

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from discsim.errors import InputError
 from validation.importing.logs import kind_of
+from validation.importing.sniffing.names import foreign_words
 
 __all__ = ["encoding_of", "lines_of"]
 
@@ -37,6 +38,8 @@ _BOMS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
+#: Encodings of Windows in Korea, Japan, China and Taiwan, and of Cyrillic.
+FOREIGN = ("cp949", "cp932", "gb18030", "big5", "cp1251")
 _LOOKED_AT = 1 << 16
 _CONTROL = frozenset(range(1, 32)) - {9, 10, 12, 13, 27}  # what no text has: not tab, line ends, form feed, escape
 
@@ -45,7 +48,8 @@ def encoding_of(path: Path) -> str:
     """Return the encoding of a text file; raises `InputError` for an empty file and for what is no text.
 
     A log's text is ASCII but for a few signs (degree, micro, accents of a locale), so no statistics of languages are
-    needed: valid UTF-8 is UTF-8 (a Latin-1 text with an accent is not valid), all else is Windows' Latin-1.
+    needed: valid UTF-8 is UTF-8 (a Latin-1 text with an accent is not valid). Else it is in the encoding of `FOREIGN`
+    under which words for time and sensors stand in it, or in Windows' Latin-1.
     """
     try:
         content = path.read_bytes()
@@ -67,13 +71,30 @@ def encoding_of(path: Path) -> str:
         raise InputError.at(path, None, "is binary, no text; expected text with rows of numbers")
     if head.count(0):
         return _wide(path, head)
-    for encoding in ("utf-8", "cp1252"):
-        try:
-            content.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-        return encoding
-    return "latin-1"
+    if _decodes(content, "utf-8"):
+        return "utf-8"
+    return _foreign(head) or ("cp1252" if _decodes(content, "cp1252") else "latin-1")
+
+
+def _decodes(content: bytes, encoding: str) -> bool:
+    try:
+        content.decode(encoding)
+    except UnicodeDecodeError:
+        return False
+    return True
+
+
+def _foreign(head: bytes) -> str | None:
+    """Return the encoding under which most known words of other scripts stand in a text; None where none has two signs.
+
+    One sign may be there by chance. What an encoding cannot read (a damaged line holds some) counts against it.
+    """
+    found = {}
+    for encoding in FOREIGN:
+        text = head.decode(encoding, errors="replace")
+        found[encoding] = foreign_words(text) - text.count("\ufffd")
+    best = max(found, key=lambda encoding: found[encoding])
+    return best if found[best] >= 2 else None
 
 
 def _wide(path: Path, head: bytes) -> str:
