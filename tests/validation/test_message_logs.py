@@ -382,8 +382,9 @@ def test_bytes_between_messages_do_not_end_a_log(tmp_path):
 
 def empty() -> dict[str, tuple[bytes, str]]:
     """Logs without a sensor in them, and what is said."""
-    from pymavlink.dialects.v20.ardupilotmega import MAVLink_heartbeat_message
+    from pymavlink.dialects.v20.ardupilotmega import MAVLink_gps_raw_int_message, MAVLink_heartbeat_message
 
+    fixless = MAVLink_gps_raw_int_message(9, 1, *[0] * 8)
     beats = [(0.1 * k, MAVLink_heartbeat_message(1, 3, 0, 0, 4, 3)) for k in range(20)]
     battery = [(t, k.replace("imu", "battery"), "sensor_msgs/msg/BatteryState", c)
                for t, k, _, c in made.ros(made_log(), made.path())[:9]]  # fmt: skip
@@ -397,6 +398,7 @@ def empty() -> dict[str, tuple[bytes, str]]:
         "untagged.ubx": (untagged, "20 messages of inertial sensors have no time in a stated unit"),
         "begun.ubx": (b"\xb5\x62\x01\x07" + bytes(100), "is a damaged u-blox UBX log without readings of motion"),
         "beats.tlog": (made.tlog(beats), "is a MAVLink telemetry log without readings of motion in it;"),
+        "fixless.tlog": (made.tlog([(0.1 * k, fixless) for k in range(9)]), "is a MAVLink telemetry log without"),
         "formats.bin": (made.dataflash([]), "is an ArduPilot DataFlash log without readings of motion in it"),
         "battery.mcap": (made.mcap_json(battery), "is an MCAP log without readings of motion in it; expected"),
         "ros1.mcap": (made.mcap_json(made.ros(made_log(), made.path())[:50], "ros1"), "its encoding is ros1"),
@@ -406,8 +408,8 @@ def empty() -> dict[str, tuple[bytes, str]]:
     }  # fmt: skip
 
 
-EMPTY = ("sky.nmea", "unchecked.nmea", "acknowledged.ubx", "untagged.ubx", "begun.ubx", "beats.tlog", "formats.bin",
-         "battery.mcap", "ros1.mcap", "magic.mcap", "magic.tlog", "head.mcap")  # fmt: skip
+EMPTY = ("sky.nmea", "unchecked.nmea", "acknowledged.ubx", "untagged.ubx", "begun.ubx", "beats.tlog",
+         "fixless.tlog", "formats.bin", "battery.mcap", "ros1.mcap", "magic.mcap", "magic.tlog", "head.mcap")  # fmt: skip
 
 
 @needs_readers
@@ -437,6 +439,17 @@ def test_of_two_vehicles_and_of_two_sensors_one_is_taken_and_the_other_named(tmp
     assert len(recording.samples["gyroscope"]) == log.t.size
     _, said = imported(tmp_path, "flight.bin", logs()["flight.bin"][0])
     assert "gyroscope: IMU 0 is taken (2000 readings); left out: IMU 1 (250)" in said
+
+
+@needs_readers
+def test_a_board_without_a_magnetometer_has_none_and_a_rest_at_zero_stays(tmp_path):
+    log = made.slowed()
+    still = log.gyro * (log.t > 6.0)[:, None]  # an autopilot takes the bias off: at rest it writes zeros
+    content = made.tlog(made.scaled(Log(log.t, still, log.accel, 0 * log.mag)))
+    recording, said = imported(tmp_path, "flight.tlog", content)
+    assert "magnetometer: all its readings are zero; left out" in said
+    assert set(recording.samples) == {"gyroscope", "accelerometer"}
+    assert len(recording.samples["gyroscope"]) == log.t.size
 
 
 @needs_readers

@@ -50,7 +50,7 @@ def read(raw: Path) -> Log:
     content = raw.read_bytes()
     vehicles: dict[int, Rows] = defaultdict(Rows)
     counts: Counter[int] = Counter()
-    pilots: dict[int, int] = {}
+    pilots: dict[tuple[int, int], int] = {}
     wrong = total = 0
     for message in _messages(content):
         total += 1
@@ -59,18 +59,18 @@ def read(raw: Path) -> Log:
             continue
         vehicle = message.get_srcSystem()
         if message.get_type() == "HEARTBEAT":
-            # 8 is no autopilot: a gimbal or the ground station
-            pilots.setdefault(vehicle, message.autopilot) if message.autopilot != 8 else None
+            pilots.setdefault((vehicle, message.get_srcComponent()), message.autopilot)
         else:
             counts[vehicle] += _add(message, vehicles[vehicle])
     notes = [f"{wrong} of {total} messages have a wrong checksum or break off; they are left out"] * (wrong > 0)
-    if not counts:
+    telling = [vehicle for vehicle, count in counts.most_common() if count]
+    if not telling:
         return Log({}, tuple(notes), wrong > 0)
-    vehicle = counts.most_common(1)[0][0]
-    if len(counts) > 1:
-        notes.append(f"vehicle {vehicle} is taken; left out: {'; '.join(str(k) for k in counts if k != vehicle)}")
+    vehicle, *others = telling
+    if others:
+        notes.append(f"vehicle {vehicle} is taken; left out: {'; '.join(map(str, others))}")
     sources = vehicles[vehicle].sources(counts=("RAW_IMU",))
-    if "RAW_IMU" in sources and pilots.get(vehicle) == ARDUPILOT:
+    if "RAW_IMU" in sources and ARDUPILOT in (pilot for (one, _), pilot in pilots.items() if one == vehicle):
         sources["RAW_IMU"] = _milli(sources["RAW_IMU"])
     tables, said = chosen(sources)
     tables, other = _one_clock(tables)
@@ -94,29 +94,27 @@ def _messages(content: bytes) -> Iterator[Any]:
 
     known = {number for number, kind in dialect.mavlink_map.items() if kind.msgname in (*MESSAGES, "HEARTBEAT")}
     link = dialect.MAVLink(None)
-    at, broken = 0, False
+
+    def decoded(packet: bytes) -> Any:
+        number = packet[5] if packet[0] == 0xFE else int.from_bytes(packet[7:10], "little")
+        if number not in known:
+            return _Unused  # stepped over: its checksum would take most of the time
+        try:
+            return link.decode(bytearray(packet))
+        except dialect.MAVError:
+            return None
+
+    at, lost = 0, False
     while at < len(content):
         size = _size(content, at)
-        packet = content[at + STAMP : at + size]
-        if size == 0 or at + size > len(content):
-            if not broken:
-                yield None
-            broken = True
-            at += 1
-            continue
-        try:
-            number = packet[5] if packet[0] == 0xFE else int.from_bytes(packet[7:10], "little")
-            # what is not read is stepped over: its checksum would take most of the time
-            message = link.decode(bytearray(packet)) if number in known else _Unused
-        except dialect.MAVError:
-            message = None
-        if message is None and _size(content, at + size) == 0 and at + size < len(content):
-            at += 1  # the length was damaged too
-            broken = True
-            yield None
-            continue
-        at, broken = at + size, False
-        yield message
+        whole = size > 0 and at + size <= len(content)
+        message = decoded(content[at + STAMP : at + size]) if whole else None
+        if message is not None or not lost:  # a stretch of bytes that are none counts once
+            yield message
+        # of a damaged message the length may be right: then the next one follows it
+        follows = whole and (at + size == len(content) or _size(content, at + size) > 0)
+        lost = message is None and not follows
+        at += 1 if lost else size
 
 
 class _Unused:
@@ -142,7 +140,7 @@ def _add(message: Any, rows: Rows) -> int:
     for (sensor, name), worth in zip(FIELDS.items(), WORTH.get(kind, MILLI), strict=True):
         values = [worth * getattr(message, f"{axis}{name}") for axis in "xyz"]
         fresh = not updated or updated & UPDATED[sensor] == UPDATED[sensor]
-        if fresh and any(values):  # a board without a magnetometer sends zeros
+        if fresh:
             rows.add(kind, sensor, time, values)
             added += 1
     return added
@@ -159,6 +157,8 @@ def _milli(tables: Mapping[str, Table]) -> dict[str, Table]:
 
 def _one_clock(tables: dict[str, Table]) -> tuple[dict[str, Table], list[str]]:
     """Return the tables on the first one's clock: since boot or since 1970, which the size of a stamp tells."""
+    if not tables:
+        return tables, []
     first = next(iter(tables.values()))
     dated = bool(np.median(first.time) > SINCE_1970)
     other = [name for name, table in tables.items() if bool(np.median(table.time) > SINCE_1970) != dated]

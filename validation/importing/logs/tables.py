@@ -77,8 +77,11 @@ def chosen(sources: Mapping[str, Mapping[str, Table]]) -> tuple[dict[str, Table]
     notes = []
     home = ""
     for sensor in COLUMNS:
-        having = {name: tables_of[sensor] for name, tables_of in sources.items() if sensor in tables_of}
+        there = {name: tables_of[sensor] for name, tables_of in sources.items() if sensor in tables_of}
+        # a board without a sensor of this kind sends zeros; a receiver that stands is zero metres from its first fix
+        having = {name: table for name, table in there.items() if sensor == "gps" or np.any(table.value != 0)}
         if not having:
+            notes += [f"{sensor}: all its readings are zero; left out"] * bool(there)
             continue
         name = max(having, key=lambda name: (having[name].time.size, name == home))
         name = home if sensor == "accelerometer" and home in having else name
