@@ -160,7 +160,10 @@ def test_fixes_alone_show_no_spin_and_the_estimate_says_so(monkeypatch, tmp_path
     said = capsys.readouterr().err
     assert "walk.nmea: gps: NMEA sentences hold no velocity downwards; it is a gap" in said
     assert "warning" not in said
-    assert "comment: # walk.nmea: gps: NMEA" in (tmp_path / "out" / "repairs.csv").read_text()
+    repairs = (tmp_path / "out" / "repairs.csv").read_text()
+    assert "comment: # walk.nmea: gps: NMEA" in repairs
+    assert "'v_down_m_s' is empty in every row" in repairs
+    assert repairs.count("\n") == 3  # a column without a number is one line, not one for each row
     assert run(monkeypatch, "check", tmp_path / "out") == 0
     assert run(monkeypatch, "estimate", tmp_path / "out", "--out", tmp_path / "spin") == 2
     assert "no sensor that shows a spin" in capsys.readouterr().err
@@ -409,7 +412,8 @@ def empty() -> dict[str, tuple[bytes, str]]:
 
 
 EMPTY = ("sky.nmea", "unchecked.nmea", "acknowledged.ubx", "untagged.ubx", "begun.ubx", "beats.tlog",
-         "fixless.tlog", "formats.bin", "battery.mcap", "ros1.mcap", "magic.mcap", "magic.tlog", "head.mcap")  # fmt: skip
+         "fixless.tlog", "formats.bin", "battery.mcap", "ros1.mcap", "magic.mcap", "magic.tlog",
+         "head.mcap")  # fmt: skip
 
 
 @needs_readers

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
@@ -55,8 +56,6 @@ def command(
     Example: discsim import my-log.csv --throw 1 --out throw-1
     or, with a map: discsim import 2025-08-31-001-rb.csv --map flatball --rows 1590:1830 --out throw-1
     """
-    from dataclasses import replace
-
     from validation.importing import find_map, read_map
     from validation.importing.sniffing import opened, recognised, sniff
     from validation.reporting.options import at_place
@@ -73,13 +72,11 @@ def command(
         with start_run(out, None, [raw, *([known.path] if known else [])]) as run:
             if known is not None and named is None:
                 said.append(f"taken: the shipped map '{known.name}', made for these columns (--map sniff asks anew)")
-            for note in said:
-                run.step(note)
+            _tell(run, said)
             import_map = known or _proposed(run, proposal, write_map or out / "map.toml")
             proposal = None  # its table is as large as the one that is read now
             import_map = replace(import_map, environment=at_place(import_map.environment, place, date))
-            recordings, throws = _imported(run, raw.name, logged, import_map, part, decisions)
-    _say(recordings, throws, whole=part.whole)
+            _say(*_imported(run, raw.name, logged, import_map, part, decisions), whole=part.whole)
 
 
 class _Part(NamedTuple):
@@ -92,6 +89,11 @@ class _Part(NamedTuple):
     @property
     def whole(self) -> bool:
         return self.rows is None and self.throw is None and not self.every
+
+
+def _tell(run: Run, notes: list[str]) -> None:
+    for note in notes:
+        run.step(note)
 
 
 def _part(rows: str | None, throw: int | None, all_throws: bool) -> _Part:

@@ -406,8 +406,9 @@ def _readings(
         here = [row for row in here if clock.stretch[row.number] == kept_stretch]
     rows: list[RawRow] = []
     values: list[list[float]] = []
+    hollow = _hollow(table, here, dict(zip(indices, names, strict=True)), repairs)
     for row in here:
-        value = _value(table, row, sensor, names, indices, import_map, repairs)
+        value = _value(table, row, sensor, names, indices, hollow, import_map, repairs)
         if value is not None:
             rows.append(row)
             values.append(value)
@@ -422,12 +423,21 @@ def _readings(
     return Readings(np.array([rows[k].number for k in kept]), np.array([times[k] for k in kept]), read)
 
 
+def _hollow(table: RawTable, rows: list[RawRow], names: dict[int, str], repairs: RepairList) -> set[int]:
+    """Return the columns that are empty in every row, each of which is listed once."""
+    hollow = {index for index in names if rows and not any(row.cells[index] for row in rows)}
+    for index in hollow:
+        repairs.add("number", table.path, rows[0].line, f"'{names[index]}' is empty in every row", "gaps throughout")
+    return hollow
+
+
 def _value(
     table: RawTable,
     row: RawRow,
     sensor: str,
     names: list[str],
     indices: list[int],
+    hollow: set[int],
     import_map: ImportMap,
     repairs: RepairList,
 ) -> list[float] | None:
@@ -438,7 +448,7 @@ def _value(
             what = f"'{name}' is '{row.cells[index][:40]}', no number"
             repairs.add("number", table.path, row.line, what, f"row left out of {sensor}")
             return None
-        if np.isnan(reading):
+        if np.isnan(reading) and index not in hollow:
             what = f"'{row.cells[index][:40]}'" if row.cells[index] else "empty"
             repairs.add("number", table.path, row.line, f"'{name}' is {what}", "gap")
         value.append(reading)
