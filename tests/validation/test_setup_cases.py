@@ -18,7 +18,7 @@ from validation.challenge.cases.detection_limit import sizes
 from validation.challenge.cases.draw import draw_case
 from validation.challenge.cases.setups import draw_fault, equivalents, possible_faults
 from validation.challenge.cases.sizes import HIDING, ordinary
-from validation.diagnosis.setup import find_setup_faults
+from validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault
 
 CASES = {plant: draw_case(3, plant, kind="nothing") for plant in PLANTS}
 
@@ -252,3 +252,21 @@ def test_in_a_flight_the_air_tells_columns_apart_where_lost_samples_turn_the_pha
     assert [item.effect.id for item in case.concealed] == ["mag.axes", "mag.dropped_samples"]
     found = find_setup_faults(recordings(case))
     assert found.effects == (case.concealed[0].effect,)
+
+
+def test_a_fault_that_other_physics_hides_from_the_sensors_relations_is_supposed_where_it_gains_most():
+    """Stray iron at the ground spoils what the field says of a gyroscope whose columns are mixed up."""
+    case = draw_case(93002, kind="setup")
+    assert [item.effect.id for item in case.concealed] == ["gyro.axes", "mag.stray_field"]
+    findings = find_setup_faults(
+        recordings(replace(case, runs=case.runs[:4], stated_releases=case.stated_releases[:4]))
+    )
+    assert findings.faults == ()
+    supposed = with_likeliest_fault(findings)
+    assert supposed is not None
+    assert supposed.effects == (case.concealed[0].effect,)
+
+
+def test_of_sound_recordings_no_fault_is_supposed():
+    sound = tuple(recordings(brief(CASES["flight"])))
+    assert with_likeliest_fault(SetupFindings((), sound)) is None
