@@ -241,12 +241,12 @@ def _may_be_meant(item: Hypothesis, best: Hypothesis, plant: str) -> bool:
 
     Where the best leaves more than sound recordings do, something else is wrong, too: lost samples turn the phase of
     one sensor, and columns turned about the spin axis may then cost less than the true ones. In a flight the air is
-    asked about all of that sensor that come as near.
+    asked about all of that sensor that come as near; of a turned board each relation tells, and it is not asked.
     """
     if item.charged < best.charged + TWIN:
         return True
     spoilt = best.cost > SOUND * best.weight
-    alike = (item.kind, item.sensor) == (best.kind, best.sensor)
+    alike = best.kind == "axes" and (item.kind, item.sensor) == (best.kind, best.sensor)
     return plant == "flight" and spoilt and alike and item.cost < AGREE * item.weight
 
 
