@@ -13,6 +13,8 @@ from typing import TypeAlias
 
 import numpy as np
 
+from discsim.effects.catalogue import catalogued
+from discsim.effects.events import SpinStep
 from discsim.recording import Recording
 from validation.diagnosis.detectors.all import searched
 from validation.diagnosis.detectors.dropped_samples import Shifted, Slips
@@ -43,6 +45,8 @@ MOST_EFFECTS = 4
 #: how many proposals are refitted at each step, and how many while none comes near the data: far from it, or with two
 #: effects at work, algebra ranks many a wrong one before the right one
 REFITTED, REFITTED_AT_MOST = 4, 9
+#: when a kick changed the spin
+_KICK = (catalogued(SpinStep).id, "t_s")
 #: chi-squared per reading, in the noise of the relaxed fit, below which a fit is near the data
 _NEAR = 1.2
 #: most steps of the baseline's fit, and as many again where it comes near the data: a free spin's is slow
@@ -309,7 +313,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
         if len(seen) >= (REFITTED if near_data else REFITTED_AT_MOST):
             break
         seen.add(key)
-        if proposal.trial.id == "accel.saturation":
+        if (row := row_of(proposal.trial.id)) is not None and row.hides_readings:
             # readings at the limit take no part in a fit: what the motion asks for beyond it is the evidence
             cost = -proposal.gain
         # beside the data it must gain half its price, as algebra said it would; where other readings take part that
@@ -474,7 +478,7 @@ def _possible(tied: Tied) -> bool:
     for q, value, error in zip(tied.fit.parameters, tied.fit.at, sd, strict=True):
         if q.key in ONE_SIDED and ONE_SIDED[q.key] * value < -3.0 * error:
             return False
-        if q.key == ("event.spin_step", "t_s") and value < EARLIEST[plant]:
+        if q.key == _KICK and value < EARLIEST[plant]:
             return False
         if _is_place(q.group) and abs(value) - 3.0 * error > radius:
             return False
