@@ -1,4 +1,4 @@
-"""What is added to a sensor's readings before lag and noise: effects with a function of their own, laws about a sensor."""
+"""What is added to a sensor's readings before lag and noise: effects that are called by their row, laws."""
 
 from __future__ import annotations
 

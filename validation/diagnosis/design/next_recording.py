@@ -23,7 +23,7 @@ from validation.diagnosis.relaxed_fit import PIECE, unknowns
 from validation.diagnosis.result import Advice, Separation
 from validation.diagnosis.selection.candidates import Trial, parameters_of
 from validation.diagnosis.selection.evidence import BOUNDS
-from validation.diagnosis.selection.stepwise import Rival, Search
+from validation.diagnosis.selection.found import Rival, Search
 from validation.identification.competing_effects import row_of
 from validation.identification.gauss_newton import Fit, mapped
 from validation.identification.linearisation import linearise, moved

@@ -29,7 +29,7 @@ __all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said"]
 #: kinds the largest gain of a fault that is not there is 15 (lost samples of a magnetometer), the next 0.3
 PRICE = 30.0
 #: sensors agree where the cost per independent statement is below this; sound sets have 0.02 to 0.25
-AGREE = 0.6
+AGREE, SOUND = 0.6, 0.25
 #: no relation may be left to hold worse than this, cost per statement: 7 ordinary errors. A turned board that empties a
 #: gyroscope of clipped readings can hide lost samples at the price of 36 ordinary errors in another relation
 WORST = 2.1
@@ -170,7 +170,7 @@ def _next(recordings: Sequence[Recording]) -> list[SetupFault]:
         return []
     found = tuple(item for item in found if item.kind != "rival")
     if found and _agrees(found[0]) and _gains(as_written, found[0]):
-        tied = [item for item in found if item.charged < found[0].charged + TWIN]
+        tied = [item for item in found if _may_be_meant(item, found[0], recordings[0].plant)]
         best, others = _told_apart(tied, recordings, site)
         twins = [_effect(item, site) for item in sorted(others, key=lambda item: item.kind != best.kind)]
         gain = float("inf") if before is None else float(np.sum(before) - best.cost)
@@ -209,6 +209,20 @@ def _told_apart(
 def _turned_round(item: Hypothesis, stated: FloatArray) -> bool:
     """Tell whether a hypothesis is a field that points the other way than the stated one: no place on a map has it."""
     return item.columns.site is not None and float(item.columns.site @ stated) < 0.0
+
+
+def _may_be_meant(item: Hypothesis, best: Hypothesis, plant: str) -> bool:
+    """Tell whether a hypothesis is to be told from the best by more than what it costs.
+
+    Where the best leaves more than sound recordings do, something else is wrong, too: lost samples turn the phase of
+    one sensor, and columns turned about the spin axis may then cost less than the true ones. In a flight the air is
+    asked about all of that sensor that come as near.
+    """
+    if item.charged < best.charged + TWIN:
+        return True
+    spoilt = best.cost > SOUND * best.weight
+    alike = (item.kind, item.sensor) == (best.kind, best.sensor)
+    return plant == "flight" and spoilt and alike and item.cost < AGREE * item.weight
 
 
 def _agrees(item: Hypothesis) -> bool:
