@@ -60,13 +60,16 @@ def with_callback(apply: Callable[[Any, Any], None]) -> Callable[[FlyingDisc, in
     return run
 
 
-def whole_flight(steps: int) -> float:
-    """Seconds per ``steps`` steps of `fly`, which also looks for the ground and keeps every state.
+def with_air(flying: FlyingDisc, steps: int, python: bool) -> float:
+    """Seconds for the steps with our air, called by MuJoCo in C or in Python."""
+    with flying.air(python):
+        return python_loop(flying, steps)
 
-    Each state kept costs a forward evaluation for its acceleration, one more than the step's four.
-    """
+
+def whole_flight(steps: int, python: bool = False) -> float:
+    """Seconds per ``steps`` steps of `fly`, which builds the disc, looks for the ground and keeps every state."""
     start = thread_time()
-    motion = fly(DISC, ENVIRONMENT, THROW, duration=steps * 1e-3)
+    motion = fly(DISC, ENVIRONMENT, THROW, duration=steps * 1e-3, python=python)
     return (thread_time() - start) * steps / (motion.t.size - 1)
 
 
@@ -77,8 +80,10 @@ def measure(steps: int, rounds: int) -> dict[str, np.ndarray]:
         "bare loop, no callback": lambda: python_loop(flying, steps),
         "bare loop inside MuJoCo": lambda: native_loop(flying, steps),
         "empty Python callback": lambda: with_callback(nothing)(flying, steps),
-        "our air": lambda: with_callback(flying.apply)(flying, steps),
+        "our air, callback in C": lambda: with_air(flying, steps, python=False),
+        "our air, callback in Python": lambda: with_air(flying, steps, python=True),
         "fly(): air, ground, states kept": lambda: whole_flight(steps),
+        "the same, callback in Python": lambda: whole_flight(steps, python=True),
     }
     cost: dict[str, list[float]] = {name: [] for name in variants}
     for turn in range(rounds + 1):
