@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from typing import Any, Literal
 
 import mujoco
@@ -86,6 +87,12 @@ def check_model(model: Any) -> None:
         )
 
 
+@cache
+def _drawing() -> Any:
+    """Return the specification of ``models/disc.xml``, read once."""
+    return mujoco.MjSpec.from_file(str(model_file("disc.xml")))
+
+
 class FlyingDisc:
     """A disc as a MuJoCo model with its data, and its air as a callback.
 
@@ -129,7 +136,7 @@ class FlyingDisc:
 
     def specification(self, timestep: float, contacts: bool) -> Any:
         """Return the mujoco.MjSpec that is compiled; a disc with more parts adds them to the body ``disc``."""
-        spec = without_reset(mujoco.MjSpec.from_file(str(model_file("disc.xml"))))
+        spec = without_reset(_drawing().copy())
         spec.option.timestep = timestep
         spec.option.gravity = [0.0, 0.0, -self.environment.gravity]
         spec.option.magnetic = flip_yz(self.environment.magnetic_field)
