@@ -28,6 +28,8 @@ __all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said", "with_lik
 #: what a fault must gain, in twice the log likelihood of the relations between sensors; on 40 concealed sets of all
 #: kinds the largest gain of a fault that is not there is 15 (lost samples of a magnetometer), the next 0.3
 PRICE = 30.0
+#: what it must gain in a flight where a short fit bears it out
+_PRICE_IN_AIR = 15.0
 #: sensors agree where the cost per independent statement is below this; sound sets have 0.02 to 0.25
 AGREE, SOUND = 0.6, 0.25
 #: no relation may be left to hold worse than this, cost per statement: 7 ordinary errors. A turned board that empties a
@@ -187,7 +189,7 @@ def _next(recordings: Sequence[Recording]) -> list[SetupFault]:
     if found and found[0].kind == "rival" and _gains(as_written, found[0], 0.5):
         return []
     found = tuple(item for item in found if item.kind != "rival")
-    if found and _agrees(found[0]) and _gains(as_written, found[0]):
+    if found and _agrees(found[0]) and (_gains(as_written, found[0]) or _borne_out(as_written, found[0], recordings)):
         return [_fault(as_written, found, recordings)]
     if as_written is not None and _agrees(as_written):
         return []
@@ -234,6 +236,15 @@ def _told_apart(
 def _turned_round(item: Hypothesis, stated: FloatArray) -> bool:
     """Tell whether a hypothesis is a field that points the other way than the stated one: no place on a map has it."""
     return item.columns.site is not None and float(item.columns.site @ stated) < 0.0
+
+
+def _borne_out(as_written: Hypothesis | None, item: Hypothesis, recordings: Sequence[Recording]) -> bool:
+    """Tell whether the air bears out a hypothesis that gains less than its price: a short fit leaves far less."""
+    if recordings[0].plant != "flight" or not _gains(as_written, item, _PRICE_IN_AIR / PRICE):
+        return False
+    some = chosen(recordings)
+    meant = [corrected(one, [_effect(item, some[0].environment.magnetic_field)]) for one in some]
+    return _REFUTED * left_by_short_fit(meant) < left_by_short_fit(some)
 
 
 def _may_be_meant(item: Hypothesis, best: Hypothesis, plant: str) -> bool:
