@@ -21,7 +21,7 @@ _GRID = np.logspace(-10, 7, 35)
 def linearise(
     problem: Problem, x: FloatArray, noise: float, weights: FloatArray, precision: FloatArray, mean: FloatArray
 ) -> tuple[Linear, FloatArray, FloatArray]:
-    """Linearise the readings about unknowns x with their priors; beside it the residuals (n, 3) and spin phase (n,), rad."""
+    """Linearise readings about unknowns x with their priors; beside it residuals (n, 3) and spin phase (n,), rad."""
     at = problem.evaluate(x)
     error = (at.residual * (weights[:, None] / noise)).ravel()
     information = precision.copy()
