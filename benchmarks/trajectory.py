@@ -152,8 +152,8 @@ def bulk(counts: Sequence[int]) -> None:
         start, process = perf_counter(), process_time()
         predict_many(DISC, ENVIRONMENT, states[:count], threads=cores)
         print(
-            f"{count:6d} landings at 1e-8: {one:.3f} s of CPU on one thread ({one / count * 1e3:.2f} ms each), "
-            f"{process_time() - process:.3f} s on {cores}, by the clock {clock / (perf_counter() - start):.2f} times less"
+            f"{count:6d} landings at 1e-8: {one:.3f} s of CPU on one thread, {one / count * 1e3:.2f} ms each, "
+            f"{process_time() - process:.3f} s on {cores}; {clock / (perf_counter() - start):.2f} times less time"
         )
 
 
