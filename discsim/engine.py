@@ -14,7 +14,6 @@ from typing import Any, Literal
 
 import mujoco
 import numpy as np
-from scipy.optimize import brentq
 
 from discsim.aerodynamics import outside_table
 from discsim.arrays import FloatArray, readonly
@@ -44,6 +43,11 @@ DIVERGED = [
         mujoco.mjtWarning.mjWARN_BADQACC,
     )
 ]
+
+
+#: touch-down is found where the centre of mass is this near the ground, m, or in an interval this short, s: rounding of
+#: a height of some metres is 1e-15, and the stated tolerance 0.1 ms
+LANDED, SHORTEST = 1e-12, 1e-12
 
 
 def check_state(data: Any) -> None:
@@ -297,8 +301,24 @@ def touch_down(flying: FlyingDisc, before: FloatArray) -> None:
         return float(height(data.qpos, *centre))
 
     try:
-        # brentq's last call need not be its answer, so step once more to it
-        height_after(brentq(height_after, 0.0, whole, xtol=1e-9) if height_after(0.0) > 0.0 else 0.0)
+        above = height_after(0.0)
+        if above <= 0.0:
+            return
+        low, high, below, side = 0.0, whole, height_after(whole), 0
+        # regula falsi after Illinois, which keeps its bracket; the step taken last is the answer
+        while high - low > SHORTEST:
+            share = (low * below - high * above) / (below - above)
+            miss = height_after(share)
+            if abs(miss) < LANDED:
+                return
+            if miss > 0.0:
+                low, above = share, miss
+                below *= 0.5 if side > 0 else 1.0
+                side = 1
+            else:
+                high, below = share, miss
+                above *= 0.5 if side < 0 else 1.0
+                side = -1
     finally:
         model.opt.timestep = whole
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -17,6 +19,7 @@ from discsim.recording import read_recording
 from discsim.shipped import load_disc
 from discsim.written import as_written
 from validation.cli import main
+from validation.commands import COMMANDS
 from validation.experiments import validation_run as headless
 from validation.reporting.scores import at_most
 
@@ -34,6 +37,32 @@ def short_profile(tmp_path: Path) -> Path:
     path = tmp_path / "profile.csv"
     path.write_text("time_s,rate_deg_s\n0,0\n1,1500\n3.5,1500\n4.5,3000\n7,3000\n")
     return path
+
+
+def test_the_help_says_of_each_command_what_the_command_itself_says():
+    """Its first lines stand in a table, so that the commands need not be loaded to be listed."""
+    for module, line in COMMANDS.values():
+        command = import_module(f"validation.commands.{module}").command
+        assert line == command.__doc__.strip().splitlines()[0]
+
+
+def test_a_command_loads_neither_the_others_nor_what_it_does_not_need():
+    """`discsim --help` and `import discsim` need no numpy, and a flight no scipy, which takes a third of a second."""
+
+    def loaded(code: str) -> set[str]:
+        line = f"import sys\n{code}\nprint(*sys.modules)"
+        out = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True).stdout
+        return set(out.splitlines()[-1].split())
+
+    assert "numpy" not in loaded("import discsim; discsim.InputError")
+    shown = loaded(
+        "sys.argv = ['discsim', '--help']\ntry:\n import validation.cli as c; c.main()\nexcept SystemExit: pass"
+    )
+    assert "validation.commands" in shown
+    assert not shown & {"numpy", "validation.commands.fly"}
+    flown = loaded("import validation.commands.fly; import discsim.engine, discsim.sensors, discsim.many_flights")
+    assert "mujoco" in flown
+    assert not flown & {"scipy.interpolate", "scipy.optimize", "scipy.special", "matplotlib"}
 
 
 def test_a_flight_leaves_a_recording_and_its_truth_which_ends_on_the_ground(monkeypatch, tmp_path, capsys):
