@@ -251,7 +251,9 @@ def wanted_force(signals: SpinSignals, matrix: FloatArray) -> FloatArray:
 def _of_path(signals: SpinSignals, matrix: FloatArray) -> list[Misfit]:
     assert signals.path is not None
     down = (signals.path.position @ matrix.T)[:, 2]
-    found = _judged("height", ("gps",), np.maximum(down, 0.0), _HEIGHT * np.ones(1))
+    found = []
+    if signals.recording.plant == "flight":  # other logs begin anywhere, on a hill or on a roof
+        found = _judged("height", ("gps",), np.maximum(down, 0.0), _HEIGHT * np.ones(1))
     release = signals.recording.release
     if release is not None and release.velocity is not None:
         sigma = float(np.max(release.sigma.get("velocity_ned_m_s", 0.0)))
