@@ -169,9 +169,10 @@ def test_a_spin_that_a_step_in_flight_makes_too_fast_is_refused_too():
 
 
 def test_the_standalone_model_refuses_a_spin_that_its_shortest_steps_do_not_follow():
+    """They are taken whatever their error, and 1e6 rad/s grow to 6e9 on the way."""
     disc, there = load_disc("driver")
     thrown = Release(velocity=np.array([20.0, 0.0, -4.0]), body_rate=np.array([50.0, 0.0, 1e6]))
-    with pytest.raises(InputError, match=r"the disc turns at 1e\+06 rad/s; expected at most 5000 rad/s"):
+    with pytest.raises(InputError, match=r"the disc turns at .* rad/s; expected at most 5000 rad/s"):
         predict(disc, there, thrown, duration=0.1)
 
 
@@ -180,7 +181,8 @@ def test_the_standalone_model_keeps_a_wobble_at_the_fastest_spin():
     disc, there = load_disc("driver")
     thrown = Release(velocity=np.array([20.0, 0.0, -4.0]), body_rate=np.array([2.0, 0.0, FASTEST_SPIN - 1.0]))
     state = predict(disc, replace(there, air_density=1e-12), thrown, duration=0.2).motion().at(np.array([0.19]))
-    np.testing.assert_allclose(np.hypot(*state.rate[0, :2]), 2.0, rtol=1e-3)
+    # 1e-8 of 5000 rad/s may be lost in a step; a nutation of 9600 rad/s takes a step per radian, 1800 in 0.19 s
+    np.testing.assert_allclose(np.hypot(*state.rate[0, :2]), 2.0, atol=1800 * 1e-8 * FASTEST_SPIN)
 
 
 def test_a_key_finds_its_own_limit_then_its_longest_unit():
