@@ -39,6 +39,8 @@ def plain_landing(disc: Disc, environment: Environment, release: Release, durati
         lambda _, y: _derivative(disc, environment, y), (0.0, duration), start, "DOP853", events=height, rtol=_RTOL,
         atol=1e-8,
     )  # fmt: skip
+    assert flown.t_events is not None
+    assert flown.y_events is not None
     if not flown.t_events[0].size:
         return np.full(4, np.nan)
     return np.append(flown.y_events[0][0][:3], flown.t_events[0][0])
