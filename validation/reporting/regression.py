@@ -132,7 +132,7 @@ def _draw(changes: Sequence[Change], path: Path) -> None:
     axes.set_ylim(len(changes) - 0.5, -0.5)
     axes.set_xlim(-1.6, 1.6)
     axes.set_xlabel("(value - expected) / tolerance; what is beyond is drawn at the edge")
-    axes.legend(loc="upper right", fontsize=8, frameon=True)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=8)
     save_figure(figure, path)
 
 

@@ -92,7 +92,7 @@ def run_rate_table(
     kind; ``laws`` about sensors come on top. ``progress`` is `turn_table`'s. Raises `InputError` where both ``mount``
     and ``effects`` move the accelerometer.
     """
-    if mount is not None and np.any(mount) and any(item.id == "accel.position_offset" for item in effects):
+    if mount is not None and np.any(mount) and any(isinstance(item.value, PositionOffset) for item in effects):
         raise InputError("a mount error and accel.position_offset both move the accelerometer; expected one of them")
     draw_module, draw_wide, draw_yaw, noise_module, noise_wide = rng.spawn(5)
     motion = turn_table(profile, environment, effects, yaw=float(draw_yaw.uniform(0, 2 * np.pi)), progress=progress)

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made import coasts, throws
 
 from discsim.effects.catalogue import CATALOGUE
 from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain
+from validation.diagnosis.selection import exchange
+from validation.diagnosis.selection import found as finding
 from validation.diagnosis.selection import stepwise as searching
 from validation.diagnosis.selection.candidates import Trial, free_trial
 from validation.diagnosis.selection.constrained_fit import Tied
 from validation.diagnosis.selection.evidence import price
+from validation.diagnosis.selection.found import on_the_disc
 from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import Fit, linearised, merit_of
@@ -50,12 +55,12 @@ def step(monkeypatch: pytest.MonkeyPatch, *, far: bool, right: Trial) -> tuple[s
 
     monkeypatch.setattr(searching, "tied_fit", told)
     monkeypatch.setattr(searching, "chi2_in", chi2)
-    monkeypatch.setattr(searching, "board_of", lambda *_: None)
+    monkeypatch.setattr(finding, "board_of", lambda *_: None)
     monkeypatch.setattr(searching, "searched", lambda *_: [])
     monkeypatch.setattr(searching, "proposals", lambda *_: [])
     ranked = [Proposal(trial, 1e6 - rank, {}) for rank, trial in enumerate(RANKED)]
     monkeypatch.setattr(searching, "one_per_effect", lambda _: ranked)
-    found = searching.Search(tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base)
+    found = finding.Search(tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base)
     best = searching._next(found, None, base, 0)  # type: ignore[arg-type]
     assert best is not None
     return best.hypothesis.trials[-1].id, refitted, bars
@@ -83,6 +88,31 @@ def test_near_the_data_four_are_refitted(monkeypatch):
     np.testing.assert_allclose(bars, np.array(half) / COUNT)
 
 
+def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present_one_is(monkeypatch):
+    """Algebra asked for a number far off; from no effect at all the same fit comes to what it gains."""
+    recordings = coasts(seconds=1.0)
+    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), NO_JUMPS["spin_down"], {})
+    linears = linearised(fit)
+    fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
+    base = Tied(Hypothesis(), fit, 1e4)
+    tilt = free_trial("rig.axis_tilt")
+    size = (("rig.axis_tilt", "tilt_north_rad"), None)
+
+    def told(fit: Fit, hypothesis: Hypothesis, own: object, noise: object, start: dict, *, bar: float) -> Tied:
+        return Tied(hypothesis, fit, 2e4 if size in start else 0.0)
+
+    monkeypatch.setattr(searching, "tied_fit", told)
+    monkeypatch.setattr(searching, "chi2_in", lambda tied, noise: 1.1 * tied.fit.count)
+    monkeypatch.setattr(finding, "board_of", lambda *_: None)
+    monkeypatch.setattr(searching, "searched", lambda *_: [])
+    monkeypatch.setattr(searching, "proposals", lambda *_: [])
+    monkeypatch.setattr(searching, "one_per_effect", lambda _: [Proposal(tilt, 1e6, {size: 0.3})])
+    found = finding.Search(tuple(recordings), (), fit, fit.noise, (tilt,), base, base)
+    best = searching._next(found, None, base, 0)  # type: ignore[arg-type]
+    assert best is not None
+    assert best.hypothesis.trials == (tilt,)
+
+
 def exchanged(monkeypatch: pytest.MonkeyPatch, without_scale: float) -> set[str] | None:
     """Return what an offset, a scale and a turned board give way to, where a place could be in place of the board.
 
@@ -99,14 +129,14 @@ def exchanged(monkeypatch: pytest.MonkeyPatch, without_scale: float) -> set[str]
     def told(fit: Fit, hypothesis: Hypothesis, *others: object, bar: float) -> Tied:
         return Tied(hypothesis, fit, without_scale if set(hypothesis.trials) == {offset, place} else 1e4)
 
-    monkeypatch.setattr(searching, "tied_fit", told)
-    monkeypatch.setattr(searching, "_possible", lambda _: True)
+    monkeypatch.setattr(exchange, "tied_fit", told)
+    monkeypatch.setattr(exchange, "possible", lambda _: True)
     final = Tied(Hypothesis((offset, scale, board)), fit, 40.0)
     base = Tied(Hypothesis(), fit, 1e6)
-    found = searching.Search(tuple(recordings), (), fit, fit.noise, (), base, final)
+    found = finding.Search(tuple(recordings), (), fit, fit.noise, (), base, final)
     with_place = Tied(Hypothesis((offset, scale, place)), fit, 42.0)
-    found.rivals = {board.name: [searching.Rival(place, 2.0, with_place)]}
-    better = searching._exchanged(found)
+    found.rivals = {board.name: [finding.Rival(place, 2.0, with_place)]}
+    better = exchange.exchanged(found)
     return None if better is None else {trial.id for trial in better.hypothesis.trials}
 
 
@@ -119,15 +149,43 @@ def test_a_rival_that_explains_no_more_than_the_named_effects_does_not(monkeypat
     assert exchanged(monkeypatch, without_scale=90.0) is None
 
 
+def scope(monkeypatch: pytest.MonkeyPatch, everywhere: float) -> frozenset[int] | None:
+    """Return the recordings of a stall that was proposed in the second of two and scores 40 there, or None for all.
+
+    ``everywhere`` is its score in both.
+    """
+    recordings = coasts(seconds=1.0)
+    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), NO_JUMPS["spin_down"], {})
+    linears = linearised(fit)
+    fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
+    stall = replace(free_trial("aero.stall"), recordings=frozenset([1]))
+    monkeypatch.setattr(exchange, "tied_fit", lambda fit, hypothesis, *_, bar: Tied(hypothesis, fit, everywhere))
+    monkeypatch.setattr(exchange, "possible", lambda _: True)
+    monkeypatch.setattr(exchange, "lost", lambda *_: False)
+    base, final = Tied(Hypothesis(), fit, 1e6), Tied(Hypothesis((stall,)), fit, 40.0)
+    found = finding.Search(tuple(recordings), (), fit, fit.noise, (), base, final)
+    (trial,) = exchange.widened(found, final).hypothesis.trials
+    return trial.recordings
+
+
+def test_an_effect_that_one_recording_shows_is_named_in_all_where_the_others_do_not_contradict_it(monkeypatch):
+    """Of two recordings one alone is worth 2 ln 2 + 6 = 7.4: what choosing it costs."""
+    assert scope(monkeypatch, everywhere=47.3) is None
+
+
+def test_an_effect_that_the_others_contradict_stays_in_its_recording(monkeypatch):
+    assert scope(monkeypatch, everywhere=47.5) == {1}
+
+
 def test_a_centre_of_mass_off_the_disc_is_not_refitted_and_a_sensor_s_unknown_place_is():
     """Where a path alone is recorded algebra asks for metres of the one; along the axis nothing shows the other."""
     recordings = throws(seconds=0.3)
     base = Tied(Hypothesis(), Fit((), (), np.empty(0), NO_JUMPS["flight"], {}), 0.0)
-    found = searching.Search(tuple(recordings), (), base.fit, {}, (), base, base)
+    found = finding.Search(tuple(recordings), (), base.fit, {}, (), base, base)
     radius = 0.5 * recordings[0].disc.diameter
 
     def tried(id: str, name: str, value: float) -> bool:
-        return searching._on_the_disc(found, {((id, name), None): value})
+        return on_the_disc(found, {((id, name), None): value})
 
     assert tried("body.mass_imbalance", "ex_m", 0.9 * radius)
     assert not tried("body.mass_imbalance", "ex_m", -1.1 * radius)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects.events import Impulse, SpinStep
 from validation.diagnosis.detectors.local_problem import Asked, Ground, gain_of, peaks
 from validation.diagnosis.relaxed_fit import NO_JUMPS
-from validation.diagnosis.selection.candidates import Trial, available
+from validation.diagnosis.selection.candidates import Trial, detected
 from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import Fit, mapped
 from validation.identification.linearisation import linearise
@@ -20,10 +22,10 @@ from validation.identification.segments import undone
 __all__ = ["EARLIEST", "events"]
 
 #: directions of the state in which an event jumps, by plant
-_IMPULSE = (3, 4, 5)
-
-
-_SPIN = {"flight": (11,), "free_spin": (11,), "spin_down": (1,)}
+_DIRECTIONS: Mapping[type[Any], Mapping[str, tuple[int, ...]]] = {
+    Impulse: {"flight": (3, 4, 5)},
+    SpinStep: {"flight": (11,), "free_spin": (11,), "spin_down": (1,)},
+}
 
 
 #: how far about the best boundary the instant of an event is looked for, s
@@ -86,12 +88,10 @@ def events(asked: Asked, least: float = 25.0) -> list[Proposal]:
     recordings = [chain.recording for chain in asked.fit.chains]
     plant = recordings[0].plant
     first = EARLIEST[plant]
-    there = available(recordings)
-    kinds: list[tuple[str, Sequence[int], tuple[str, ...]]] = []
-    if "event.impulse" in there:
-        kinds.append(("event.impulse", _IMPULSE, ("dv_north_m_s", "dv_east_m_s", "dv_down_m_s")))
-    if "event.spin_step" in there:
-        kinds.append(("event.spin_step", _SPIN[plant], ("dr_rad_s",)))
+    kinds: list[tuple[str, Sequence[int], tuple[str, ...]]] = [
+        (row.id, _DIRECTIONS[row.type][plant], tuple(name for name in row.parameters if name != "t_s"))
+        for row in detected(recordings, "events")
+    ]
 
     def scanned(task: tuple[int, tuple[str, Sequence[int], tuple[str, ...]]]) -> FloatArray:
         i, (id, directions, _) = task

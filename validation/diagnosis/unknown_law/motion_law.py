@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects.air import Wind
 from discsim.law import WRENCH_TARGETS
 from validation.diagnosis.relaxed_fit import NO_JUMPS
 from validation.diagnosis.selection.constrained_fit import Tied, noise_of, scored
@@ -22,7 +23,7 @@ from validation.identification.normal_equations import reduce
 from validation.identification.parameters import Parameter
 from validation.identification.propagation import Column
 from validation.identification.segments import Chain, recut
-from validation.identification.sensor_model import to_body
+from validation.identification.sensor_model import sized, to_body
 
 __all__ = ["candidate_laws", "fitted_law"]
 
@@ -44,7 +45,7 @@ def state_of(chain: Chain, values: Mapping[tuple[str, str], float]) -> dict[str,
     rows = np.zeros((middle.size, 19))
     rows[:, 9:13] = there[:, 6:10]
     wind = np.array(chain.recording.environment.wind, dtype=float)
-    wind[:2] += [values.get(("air.wind", f"w_{way}_m_s"), 0.0) for way in ("north", "east")]
+    wind[:2] += sized(values, Wind)
     u, v, w = to_body(rows, there[:, 3:6] - wind).T
     return {
         "t": middle,
