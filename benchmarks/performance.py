@@ -66,11 +66,10 @@ Goals: `import discsim` and `discsim --help` 0.3 s, `discsim fly` of a 3 s throw
 
 {trajectory}
 
-The goals of 10 000 landings a second at 1 cm and 2000 at 1e-6 m on one core are missed. A looser tolerance cannot
-reach them: the nutation of a driver, r Izz/Ixx or 140 rad/s, holds the explicit pair of order 8 to steps of some 30
-ms however large an error is allowed, for beyond it is unstable, and each step costs 12 evaluations of the air of 0.1
-us and as much again for their sums. What would reach them is a model without the nutation, or flights integrated in
-step in the lanes of the vector units. Neither is there yet.
+Goals on one core: 10 000 landings a second at 1 cm, 2000 at 1e-6 m. The first is missed. A looser tolerance cannot
+reach it: above 1e-5 the table hardly changes, for the nutation, r Izz/Ixx or 140 rad/s of a driver, holds an explicit
+pair to steps of a fraction of its turn, beyond which it is unstable whatever error is allowed. What would reach it is a
+model without the nutation, or flights integrated in step in the lanes of the vector units; neither is there yet.
 
 ## A long log
 
@@ -79,7 +78,8 @@ three sensors at 1 kHz, start included.
 
 {log}
 
-Goal: an hour in 60 s and 1 GB.
+Goal: an hour in 60 s and 1 GB. It is missed: the cost per minute of log hardly changes with length, and
+[what each method costs](estimators.md) says which methods take it.
 """
 
 
