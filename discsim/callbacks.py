@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import mujoco
 
+from discsim.errors import InputError
 from discsim.native import NativeCallback, NativeForce, native_callback
 
 __all__ = ["PassiveForce", "check_lent", "compile_model", "own_warnings", "passive_force", "stepped_by_c"]
@@ -236,11 +237,15 @@ def compile_model(spec: Any) -> Any:
 
     MuJoCo's compiler steps the half-built model, which it cannot hand to a Python callback: it would only say "Python
     exception raised". A model without springs and dampers never calls it, so both are switched off until it is built.
+    Raises `InputError` where no body has the masses or inertias that were given.
     """
     flags = spec.option.disableflags
     spec.option.disableflags = flags | int(mujoco.mjtDisableBit.mjDSBL_SPRING | mujoco.mjtDisableBit.mjDSBL_DAMPER)
     try:
         model = spec.compile()
+    except ValueError as error:
+        reason = str(error).splitlines()[0].removeprefix("Error: ")
+        raise InputError(f"no rigid body has these inertias or masses: {reason}; expected those of a body") from None
     finally:
         spec.option.disableflags = flags
     model.opt.disableflags = flags

@@ -20,7 +20,7 @@ from discsim.callbacks import own_warnings, stepped_by_c
 from discsim.compiled import compiled
 from discsim.disc import Disc, Release
 from discsim.effects.catalogue import Effect
-from discsim.engine import DIVERGED, FlyingDisc, centre_state, touch_down
+from discsim.engine import DIVERGED, LARGEST_TURN, FlyingDisc, centre_state, touch_down
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.law import Law
@@ -42,7 +42,8 @@ _WHOLE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 class Ends(NamedTuple):
     """How n flights ended: the state at the end of each, and touched_down (n,).
 
-    All of a flight whose motion or whose air is not finite is NaN, as outside a C_Nr table.
+    All of a flight whose motion or whose air is not finite is NaN, as outside a C_Nr table, and so is one that turns by
+    more than `discsim.engine.LARGEST_TURN` in a step.
     """
 
     state: State
@@ -97,6 +98,11 @@ def fly_many(
             flies = np.ones(ids.size, dtype=np.bool_)
             for place, k in enumerate(ids.tolist()):
                 way = path[place]
+                with np.errstate(invalid="ignore"):
+                    too_fast = np.max(np.sum(way[:, 11:14] ** 2, axis=1)) > (LARGEST_TURN / timestep) ** 2
+                if too_fast:
+                    flies[place] = False
+                    continue
                 first = _first_below(way, *flying.centre_of_mass)
                 touched[k] = first <= length and bool(np.isfinite(way[first]).all())
                 if touched[k] or (first > length and done == steps):

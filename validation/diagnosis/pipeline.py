@@ -105,7 +105,7 @@ def diagnose(
             outcome = with_setup(outcome, setup, recordings, None)
             return _with_notes(outcome, begun.notes, meant, called)
         free = free_parameters(setup)
-        found = search(fitted, progress, meant, begun.followed, free)
+        found = search(fitted, progress, meant, begun.followed, free, setup.hints)
         law = None
         verdict, unexplained = verdict_of(found)
         if unexplained or _stacked(found):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from made import coasts, throws
 
-from discsim.effects.catalogue import CATALOGUE
+from discsim.effects.catalogue import CATALOGUE, effect
 from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain
 from validation.diagnosis.selection import exchange
 from validation.diagnosis.selection import found as finding
@@ -18,7 +19,7 @@ from validation.diagnosis.selection.constrained_fit import Tied
 from validation.diagnosis.selection.evidence import price
 from validation.diagnosis.selection.found import on_the_disc
 from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.selection.proposals import Proposal
+from validation.diagnosis.selection.proposals import Proposal, hinted
 from validation.identification.gauss_newton import Fit, linearised, merit_of
 from validation.identification.noise import stated_noise
 
@@ -29,7 +30,9 @@ RIGHT = RANKED[6]
 COUNT = 1812
 
 
-def step(monkeypatch: pytest.MonkeyPatch, *, far: bool, right: Trial) -> tuple[str, list[str], list[float]]:
+def step(
+    monkeypatch: pytest.MonkeyPatch, *, far: bool, right: Trial, hints: Sequence[Proposal] = ()
+) -> tuple[str, list[str], list[float]]:
     """Return what one step of the search adds, and what it refitted, where fits are not made but told.
 
     Beside it how much below the present fit's merit each had to come, per reading, or be given up.
@@ -55,12 +58,13 @@ def step(monkeypatch: pytest.MonkeyPatch, *, far: bool, right: Trial) -> tuple[s
 
     monkeypatch.setattr(searching, "tied_fit", told)
     monkeypatch.setattr(searching, "chi2_in", chi2)
+    monkeypatch.setattr(finding, "chi2_in", chi2)
     monkeypatch.setattr(finding, "board_of", lambda *_: None)
     monkeypatch.setattr(searching, "searched", lambda *_: [])
     monkeypatch.setattr(searching, "proposals", lambda *_: [])
     ranked = [Proposal(trial, 1e6 - rank, {}) for rank, trial in enumerate(RANKED)]
     monkeypatch.setattr(searching, "one_per_effect", lambda _: ranked)
-    found = finding.Search(tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base)
+    found = finding.Search(tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base, hints=tuple(hints))
     best = searching._next(found, None, base, 0)  # type: ignore[arg-type]
     assert best is not None
     return best.hypothesis.trials[-1].id, refitted, bars
@@ -103,6 +107,7 @@ def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present
 
     monkeypatch.setattr(searching, "tied_fit", told)
     monkeypatch.setattr(searching, "chi2_in", lambda tied, noise: 1.1 * tied.fit.count)
+    monkeypatch.setattr(finding, "chi2_in", lambda tied, noise: 1.1 * tied.fit.count)
     monkeypatch.setattr(finding, "board_of", lambda *_: None)
     monkeypatch.setattr(searching, "searched", lambda *_: [])
     monkeypatch.setattr(searching, "proposals", lambda *_: [])
@@ -111,6 +116,12 @@ def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present
     best = searching._next(found, None, base, 0)  # type: ignore[arg-type]
     assert best is not None
     assert best.hypothesis.trials == (tilt,)
+
+
+def test_far_from_the_data_what_sensors_asked_of_one_another_is_refitted_first_and_beside_it_is_not(monkeypatch):
+    hint = hinted(effect("gyro.clock_rate", ratio=1.014))
+    assert step(monkeypatch, far=True, right=RIGHT, hints=[hint])[1][0] == "gyro.clock_rate"
+    assert step(monkeypatch, far=False, right=RIGHT, hints=[hint])[1][0] == RANKED[0].id
 
 
 def exchanged(monkeypatch: pytest.MonkeyPatch, without_scale: float) -> set[str] | None:

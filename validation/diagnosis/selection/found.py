@@ -86,6 +86,8 @@ class Search:
     warnings: list[str] = field(default_factory=list)
     #: what the magnetometer's phase told of lost samples, by the relaxed fit that it was asked of
     slips: Slips = field(default_factory=Slips)
+    #: what relations between sensors had asked for before any fit, with its values to start from
+    hints: tuple[Proposal, ...] = ()
     #: what choosing the samples that were lost has cost, in twice the log likelihood
     cost: float = 0.0
     _asked: tuple[Fit, Board] | None = None

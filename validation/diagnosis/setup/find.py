@@ -15,10 +15,11 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.kind import BOARD
+from discsim.effects.sensors import ClockRate, HardIron, Lag
 from discsim.effects.setup import Axes, BoardRotation, ClockUnit, GpsAxes, SiteField, TimeOffset, axes_of
 from discsim.recording import Recording, Samples
 from discsim.written import corrected
-from validation.diagnosis.setup.hypotheses import Hypothesis, board_effect, chosen, hypotheses, pairs
+from validation.diagnosis.setup.hypotheses import Hypothesis, Ranking, board_effect, chosen, hypotheses, pairs
 from validation.diagnosis.setup.proof import left_by_short_fit
 from validation.diagnosis.setup.remedy import MapAxes, remedy
 from validation.diagnosis.setup.units import clock_unit, sensor_units
@@ -81,6 +82,8 @@ class SetupFindings:
 
     faults: tuple[SetupFault, ...]
     recordings: tuple[Recording, ...]
+    #: physics that would make the sensors agree where no fault does: a lag, a clock, iron, of about this size
+    hints: tuple[Effect, ...] = ()
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -105,13 +108,14 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
     for unit in sensor_units([_judgeable(one) for one in current]):
         faults.append(SetupFault(unit, float("inf"), None))
         current = tuple(corrected(one, [unit]) for one in current)
+    hints: tuple[Effect, ...] = ()
     for _ in range(MOST):
-        found = _next([_judgeable(one) for one in current])
+        found, hints = _next([_judgeable(one) for one in current])
         if not found:
             break
         faults += found
         current = tuple(corrected(one, [fault.effect for fault in found]) for one in current)
-    return SetupFindings(tuple(faults), current)
+    return SetupFindings(tuple(faults), current, hints)
 
 
 def with_likeliest_fault(findings: SetupFindings) -> SetupFindings | None:
@@ -180,24 +184,42 @@ def _busiest(samples: Mapping[str, Samples], length: float) -> tuple[float, floa
     return first, first + min(length, _SLOT * float(stops[longest] - starts[longest]))
 
 
-def _next(recordings: Sequence[Recording]) -> list[SetupFault]:
-    """Return the fault, or the two at once, that make the sensors agree; empty where they do, or nothing does."""
+def _next(recordings: Sequence[Recording]) -> tuple[list[SetupFault], tuple[Effect, ...]]:
+    """Return the fault, or the two at once, that make the sensors agree; none where they do, or nothing does.
+
+    Beside them where there are none the physics that would make them agree, as effects of about its size.
+    """
     ranking = hypotheses(recordings, PRICE)
     as_written, found = ranking.as_written, ranking.found
     site = recordings[0].environment.magnetic_field
     before = None if as_written is None else as_written.costs
     if found and found[0].kind == "rival" and _gains(as_written, found[0], 0.5):
-        return []
+        return [], _hints(ranking)
     found = tuple(item for item in found if item.kind != "rival")
     if found and _agrees(found[0]) and (_gains(as_written, found[0]) or _borne_out(as_written, found[0], recordings)):
-        return [_fault(as_written, found, recordings)]
+        return [_fault(as_written, found, recordings)], ()
     if as_written is not None and _agrees(as_written):
-        return []
+        return [], ()
     for both, one, other in pairs(ranking.base)[:1]:
         if _agrees(both) and _gains(as_written, both, 2.0):
             gain = float("inf") if before is None else float(np.sum(before) - both.cost)
-            return [SetupFault(_effect(item, site), gain, None) for item in (one, other)]
-    return []
+            return [SetupFault(_effect(item, site), gain, None) for item in (one, other)], ()
+    return [], _hints(ranking)
+
+
+def _hints(ranking: Ranking) -> tuple[Effect, ...]:
+    """Return the lags, clocks and iron that are worth a fault's price, best first, as effects."""
+    rivals = [item for item in ranking.found if item.kind == "rival" and _gains(ranking.as_written, item)]
+    return tuple(_physics(item) for item in rivals if item.charged < rivals[0].charged + PRICE)
+
+
+def _physics(item: Hypothesis) -> Effect:
+    """Return what is no fault of the setup as an effect of its size."""
+    ((name, size),) = item.columns.rival.items()
+    sensor, _, what = name.rpartition(".")
+    if what == "lag":
+        return effect_of(Lag(size), sensor)
+    return effect_of(ClockRate(1.0 + size), sensor) if what == "clock" else effect_of(HardIron(0.0, 0.0, size))
 
 
 def _fault(as_written: Hypothesis | None, found: Sequence[Hypothesis], recordings: Sequence[Recording]) -> SetupFault:

@@ -33,9 +33,9 @@ BOARD = ("magnetometer", "gyroscope", "accelerometer")
 MOST = 4
 #: largest offset of time that is looked for, s, and how far the phase turns between two that are tried, rad
 LATEST, PHASE_STEP = 0.15, 0.25
-#: lags that are tried as rivals, as phases, rad; and how wrong a clock may be
+#: lags that are tried as rivals, as phases, rad; and how wrong a clock may be, as far as a relaxed fit lets one go
 LAGS = np.array([0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.2, 3.3, 5.0, 8.0])
-MOST_CLOCK = 0.01
+MOST_CLOCK = 0.02
 #: a board nearer to a right angle than this (root sum of squares of the matrix) stands at it
 SNAP = 0.15
 #: what a statement costs that a hypothesis takes back (as readings that clip become gaps in a turned board): half of
