@@ -133,13 +133,16 @@ def _dispatcher(before: Any) -> Callable[..., None]:
     return _dispatch
 
 
+def _found() -> NativeCallback | None:
+    """Return the callback in C where one has been looked for already."""
+    return native_callback() if native_callback.cache_info().currsize else None
+
+
 def _act(model: Any) -> None:
     """Let the force of the last block of a model act on it, if there is one: by C where that is possible."""
     forces = _FORCES.get(id(model))
     wanted = None if forces is None else forces[-1].native
-    callback: NativeCallback | None = None
-    if wanted is not None or native_callback.cache_info().currsize:
-        callback = native_callback()
+    callback = _found() if wanted is None else native_callback()
     by_c = wanted is not None and callback is not None and callback.put(model._address, wanted)
     if callback is not None and not by_c:
         callback.remove(model._address)
@@ -195,6 +198,8 @@ def passive_force(model: Any, apply: PassiveForce, native: NativeForce | None = 
                 _FORCES[id(model)] = forces[:last] + forces[last + 1 :]
             _act(model)
             lent = _PASSIVE.give_back()
+            if not _FORCES and (callback := _found()) is not None:
+                callback.hand_on(None)
         if not lent and not failed:
             raise _PASSIVE.taken
 

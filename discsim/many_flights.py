@@ -29,9 +29,10 @@ from discsim.motion import State
 
 __all__ = ["Ends", "fly_many"]
 
-#: steps that all flights together take before the ground is looked for: what is recorded meanwhile is a few megabytes,
-#: and what a thread waits that opens a block is tenths of a second
-ROUND = 20_000
+#: steps that all flights together take before the ground is looked for, and the most that each takes: what is recorded
+#: meanwhile is a few megabytes, what a thread waits that opens a block is tenths of a second, and what is flown below
+#: the ground is a small part of a flight
+ROUND, LONGEST = 20_000, 200
 #: what is recorded: 14 numbers, which stand first in the whole state, too
 _STATE = int(mujoco.mjtState.mjSTATE_TIME | mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL)
 _WIDTH = 14
@@ -88,7 +89,7 @@ def fly_many(
             mujoco.mj_getState(flying.model, flying.data, batch.state[k], _WHOLE)
         ids, done = np.arange(count), 0
         while ids.size and done < steps:
-            length = min(max(ROUND // ids.size, 1), steps - done)
+            length = min(max(ROUND // ids.size, 1), LONGEST, steps - done)
             # each flight from where the round began, so that the state before a step is always there
             path = np.empty((ids.size, length + 1, _WIDTH))
             path[:, 0] = batch.state[ids, :_WIDTH]
