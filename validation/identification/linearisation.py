@@ -23,20 +23,21 @@ from validation.identification.competing_effects import row_of
 from validation.identification.dynamics import (
     ROW,
 )
-from validation.identification.observations import group_of
+from validation.identification.parameters import Values
+from validation.identification.plants import Plant, plant_of
 from validation.identification.prediction import Sampled
 from validation.identification.propagation import (
     EVENT_REACH,
     EVENTS,
     FLAT_ENVIRONMENT,
-    WOBBLE,
     Column,
     base_flat,
     place_in_flat,
     runner_of,
 )
-from validation.identification.segments import STEPS, Chain, difference, shifted, stepped
-from validation.identification.sensor_model import CLOCKS, Values, is_motion, predicted, value
+from validation.identification.readings import group_of
+from validation.identification.segments import Chain, stepped
+from validation.identification.sensor_model import CLOCKS, is_motion, predicted, value
 
 __all__ = ["Channel", "Linear", "linearise", "moved", "reread"]
 
@@ -209,30 +210,30 @@ class _Around:
 
     def __init__(self, current: Chain, values: Values, columns: Sequence[Column], central: bool | None) -> None:
         self.chain, self.values, self.columns, self.central = current, values, columns, central
-        self.recording = recording = current.recording
+        self.recording, self.plant = recording, plant = current.recording, current.plant
         self.runner = runner_of(recording, values, columns)
-        self.motion = [j for j, column in enumerate(columns) if _moves(column)]
-        self.d = d = current.tangent
+        self.motion = [j for j, column in enumerate(columns) if _moves(column, plant)]
+        self.d = d = plant.layout.directions
         self.half = d + len(self.motion)
         #: half the differences, and the columns of slopes that they belong to
-        self.widths = np.concatenate([STEPS[recording.plant], [columns[j].step for j in self.motion]])
+        self.widths = np.concatenate([plant.sizes.differences, [columns[j].step for j in self.motion]])
         self.places = np.array([*range(d), *(d + j for j in self.motion)])
         self.flat = base_flat(recording, values, [column.key for column in columns])
-        self.wobble = np.array([values.get(key, 0.0) for key in WOBBLE])
+        self.own = plant.own_values(values)
         signs = () if central is None else (1.0, -1.0) if central else (1.0,)
         self.flats = np.repeat(self.flat[None], 1 + len(signs) * self.half, axis=0)
-        self.wobbles = np.repeat(self.wobble[None], 1 + len(signs) * self.half, axis=0)
+        self.owns = np.repeat(self.own[None], 1 + len(signs) * self.half, axis=0)
         tangents = np.zeros((1 + len(signs) * self.half, d))
         for side, sign in enumerate(signs):
             first = 1 + side * self.half
-            tangents[first : first + d] = sign * np.diag(STEPS[recording.plant])
+            tangents[first : first + d] = sign * np.diag(plant.sizes.differences)
             for row, j in enumerate(self.motion, first + d):
                 self._set_parameter(row, columns[j], sign)
         self.everyone = np.arange(tangents.shape[0])
         #: the states (k, c, s) that the neighbours of each segment start from
         self.states = np.repeat(current.states[:, None], tangents.shape[0], axis=1)
         turned = np.flatnonzero(np.any(tangents != 0.0, axis=1))
-        self.states[:, turned] = shifted(recording.plant, current.states[:, None], tangents[turned])
+        self.states[:, turned] = plant.layout.moved(current.states[:, None], tangents[turned])
         #: rows of the neighbours that belong to a short event, and when it is, s
         self._events = {
             row: t
@@ -251,8 +252,8 @@ class _Around:
     def _set_parameter(self, row: int, column: Column, sign: float) -> None:
         """Move a parameter of the motion in one row of neighbours."""
         group, name, size, given = column
-        if column.key in WOBBLE:
-            self.wobbles[row, WOBBLE.index(column.key)] += sign * size
+        if column.key in self.plant.own_keys:
+            self.owns[row, self.plant.own_keys.index(column.key)] += sign * size
             return
         for shape, number in given:
             self.flats[row, place_in_flat(group, shape)] = number
@@ -275,7 +276,7 @@ def reread(current: Chain, values: Values, linear: Linear) -> Linear | None:
     One motion in the place of dozens, for steps within which the slopes hardly change. None where other readings take
     part, or fall into other segments, than in ``linear``.
     """
-    k, d = current.states.shape[0], current.tangent
+    k, d = current.states.shape[0], current.plant.layout.directions
     samples = [Sampled(current, readings, values) for readings in current.readings]
     segment_of = [np.clip(np.searchsorted(current.edges, s.instants, side="right") - 1, 0, k - 1) for s in samples]
     read = _Read(_Around(current, values, (), None), samples)
@@ -296,7 +297,7 @@ def reread(current: Chain, values: Values, linear: Linear) -> Linear | None:
             raw.append(s.readings.value[index, axis] - prediction[index, axis])
     if next(channels, None) is not None:
         return None
-    gaps = difference(current.recording.plant, current.states[1:], ends[:-1], d)
+    gaps = current.plant.layout.difference(current.states[1:], ends[:-1])
     closing = _closing(linear.passes, gaps, np.setdiff1d(np.arange(d), linear.jump_kind))
     jump, some = np.zeros_like(linear.jump), linear.jump_kind >= 0
     jump[some] = gaps[linear.jump_piece[some] - 1, linear.jump_kind[some]]
@@ -335,7 +336,7 @@ class _Read:
         k = around.states.shape[0]
         ends = np.empty(around.states.shape)
         waiting: list[tuple[list[IntArray], IntArray, FloatArray]] = []
-        acted, flats, wobbles = around.everyone, around.flats, around.wobbles
+        acted, flats, owns = around.everyone, around.flats, around.owns
         for i in range(k):
             start, stop = float(edges[i]), float(edges[i + 1])
             own = [np.flatnonzero(piece == i) for piece in piece_of]
@@ -347,10 +348,10 @@ class _Read:
             acting = around.acting(start, float(times[-1]))
             if not np.array_equal(acting, acted):
                 self._read(waiting, acted)
-                waiting, acted, flats, wobbles = [], acting, around.flats[acting], around.wobbles[acting]
+                waiting, acted, flats, owns = [], acting, around.flats[acting], around.owns[acting]
             rows, there = around.runner.run(
                 flats,
-                wobbles,
+                owns,
                 around.states[i, acting],
                 times,
                 last,
@@ -419,15 +420,15 @@ class _Chained:
 
 def _chained(current: Chain, around: _Around, ends: FloatArray, jumps: BoolArray) -> _Chained:
     """Chain the pieces: their states as functions of [first state | jumps | parameters]."""
-    plant, d, k, p = current.recording.plant, around.d, current.states.shape[0], len(around.columns)
+    layout, d, k, p = current.plant.layout, around.d, current.states.shape[0], len(around.columns)
     allowed, forbidden = np.flatnonzero(jumps), np.flatnonzero(~jumps)
     u = d + (k - 1) * allowed.size
     S = np.zeros((k, d, u + p))
     S[0, :, :d] = np.eye(d)
     passes = np.zeros((max(k - 1, 0), d, d + p))
     nominal = ends[:-1, 0]
-    gaps = difference(plant, current.states[1:], nominal, d)
-    reached = difference(plant, ends[:-1], np.broadcast_to(nominal[:, None], ends[:-1].shape), d)
+    gaps = layout.difference(current.states[1:], nominal)
+    reached = layout.difference(ends[:-1], np.broadcast_to(nominal[:, None], ends[:-1].shape))
     passes[:, :, around.places] = np.moveaxis(around.slopes(np.moveaxis(reached, 1, 0)), 0, 2)
     for i in range(k - 1):
         Phi, first = passes[i, :, :d], d + i * allowed.size
@@ -458,7 +459,7 @@ def _add_sensor_columns(around: _Around, s: Sampled, rows: FloatArray, M: FloatA
         place = around.d + j
         if group in CLOCKS or (name == "tau_s" and group in CATALOGUE):
             if rate is None:
-                rate = s.time_slope(around.runner, around.flat, around.wobble, values, around.chain)
+                rate = s.time_slope(around.runner, around.flat, around.own, values, around.chain)
             if group in CLOCKS:
                 base = _current(values, recording, group, name)
                 plus, minus = {**here, (group, name): base + size}, {**here, (group, name): base - size}
@@ -489,8 +490,9 @@ def _current(values: Values, recording: Recording, group: str, name: str) -> flo
         return value(values, group, name)
     if group == "environment" and name.startswith("magnetic_"):
         return float(recording.environment.magnetic_field[["north", "east", "down"].index(name.split("_")[1])])
-    if (group, name) in WOBBLE:
-        return 0.0
+    own = next((q for q in plant_of(recording).own if q.key == (group, name)), None)
+    if own is not None:
+        return own.stated
     return float(parameters(recording.environment, recording.disc, recording.rig)[parameter_index(group, name)])
 
 
@@ -501,11 +503,11 @@ def _instant(column: Column, values: Values) -> float | None:
     return dict(column.given).get("t_s", values.get((column.group, "t_s")))
 
 
-def _moves(column: Column) -> bool:
+def _moves(column: Column, plant: Plant) -> bool:
     """Tell whether a column is of the motion; the field of the earth is only read."""
     if column.group == "environment":
         return column.key in FLAT_ENVIRONMENT
-    return is_motion(column.group) or column.key in WOBBLE
+    return is_motion(column.group) or column.key in plant.own_keys
 
 
 def _concerns(group: str, sensor: str) -> bool:
@@ -540,7 +542,7 @@ def _stack(
     raw, own, pieces, whole, t, sd, shifts = [], [], [], [], [], [], []
     channels: list[Channel] = []
     at = 0
-    d = current.tangent
+    d = current.plant.layout.directions
     p = S.shape[2] - u
     for s, y, M, piece in zip(samples, read.ideal, read.slopes, piece_of, strict=True):
         readings = s.readings

@@ -7,9 +7,6 @@ fit's business.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TypeAlias
-
 import numpy as np
 
 from discsim.arrays import FloatArray
@@ -20,12 +17,11 @@ from discsim.motion import State
 from discsim.recording import Recording
 from discsim.written import PREFIX
 from validation.identification.competing_effects import row_of, user_effects_on
+from validation.identification.dynamics import to_body
+from validation.identification.parameters import Values
+from validation.identification.plants import plant_of
 
-__all__ = ["CLOCKS", "Values", "delay", "is_motion", "predicted", "to_body", "value"]
-
-#: parameters that differ from their baseline, by (group, name); groups are effect ids, or aero, disc, environment, rig;
-#: a law's are called TERM.PLACE, as in 0.power_r
-Values: TypeAlias = Mapping[tuple[str, str], float]
+__all__ = ["CLOCKS", "Values", "delay", "is_motion", "predicted", "value"]
 
 #: the effects that only move the instants at which samples were taken
 CLOCKS = tuple(row.id for row in CATALOGUE.values() if row.moves_time)
@@ -94,17 +90,6 @@ def _by_catalogue(sensor: str, recording: Recording, values: Values, t: FloatArr
     return _accelerometer(recording, values, t, rows)
 
 
-def to_body(rows: FloatArray, vector: FloatArray) -> FloatArray:
-    """Return N vectors (..., 3) in B by the attitudes in rows (..., 19)."""
-    w, x, y, z = rows[..., 9], rows[..., 10], rows[..., 11], rows[..., 12]
-    a, b, c = vector[..., 0], vector[..., 1], vector[..., 2]
-    # v' = v + 2 w (v x q) + 2 q x (q x v), the inverse turn
-    tx, ty, tz = 2 * (b * z - c * y), 2 * (c * x - a * z), 2 * (a * y - b * x)
-    return np.stack(
-        [a + w * tx + (ty * z - tz * y), b + w * ty + (tz * x - tx * z), c + w * tz + (tx * y - ty * x)], axis=-1
-    )
-
-
 def _field(recording: Recording, values: Values) -> FloatArray:
     moved = [values.get(("environment", name)) for name in _FIELD]
     stated = recording.environment.magnetic_field
@@ -144,7 +129,9 @@ def specific_force(recording: Recording, values: Values, rows: FloatArray) -> Fl
     d = place(recording, values)
     d = d - np.array([value(values, "body.mass_imbalance", "ex_m"), value(values, "body.mass_imbalance", "ey_m"), 0.0])
     gravity = values.get(("environment", "gravity"), recording.environment.gravity)
-    if recording.plant == "free_spin":  # turns with the spin, like the translation that nobody knows: left to the means
+    if not plant_of(
+        recording
+    ).path_known:  # turns with the spin, like the translation that nobody knows: left to the means
         gravity = 0.0
     f = to_body(rows, rows[..., 6:9] - np.array([0.0, 0.0, gravity]))
     w, dw = rows[..., 13:16], rows[..., 16:19]
@@ -187,7 +174,7 @@ def _felt(recording: Recording, values: Values, t: FloatArray, rows: FloatArray)
     Where the path is unknown the motion tells only the part of it that is centripetal; the accelerometer on the same
     chip has measured all of it, with errors of some per cent and so far below those of the gyroscope's faked rate.
     """
-    measured = recording.get("accelerometer") if recording.plant == "free_spin" else None
+    measured = None if plant_of(recording).path_known else recording.get("accelerometer")
     if measured is not None:
         whole = np.all(np.isfinite(measured.value), axis=1)
         if np.count_nonzero(whole) > 1:

@@ -15,6 +15,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.recording import Recording
 from validation.diagnosis.consistency.turning import pull_of
+from validation.identification.plants import plant_of
 
 __all__ = ["SettleProof", "Settling", "settling_of"]
 
@@ -143,7 +144,7 @@ def _lowest(squares: FloatArray, readings: int) -> tuple[float, float]:
 
 def _start(recording: Recording, name: str) -> _Start | None:
     found = pull_of(recording)
-    if found is None or recording.plant not in ("flight", "free_spin"):
+    if found is None or not plant_of(recording).airborne:
         return None
     t, felt, pull = found
     good = np.all(np.isfinite(felt), axis=1)

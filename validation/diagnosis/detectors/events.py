@@ -9,7 +9,6 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from validation.diagnosis.detectors.local_problem import Asked, Ground, gain_of, peaks
-from validation.diagnosis.relaxed_fit import NO_JUMPS
 from validation.diagnosis.selection.candidates import Trial, available
 from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import Fit, mapped
@@ -17,22 +16,7 @@ from validation.identification.linearisation import linearise
 from validation.identification.propagation import Column
 from validation.identification.segments import undone
 
-__all__ = ["EARLIEST", "events"]
-
-#: directions of the state in which an event jumps, by plant
-_IMPULSE = (3, 4, 5)
-
-
-_SPIN = {"flight": (11,), "free_spin": (11,), "spin_down": (1,)}
-
-
-#: how far about the best boundary the instant of an event is looked for, s
-_NEAR = {"flight": 0.09, "free_spin": 0.2, "spin_down": 0.12}
-
-
-#: an event of a free spin before this instant, s, is not told from where the spin and its decay started
-EARLIEST = {"flight": 0.0, "free_spin": 0.1, "spin_down": 0.0}
-
+__all__ = ["events"]
 
 #: how many recordings and kinds of event are followed up at a time: the strongest, the others come after them
 _FOLLOWED = 3
@@ -40,7 +24,7 @@ _FOLLOWED = 3
 
 def _jumps(ground: Ground, directions: Sequence[int]) -> FloatArray:
     """Return what a jump of the state in some directions at each boundary (k - 1,) would gain."""
-    d = ground.chain.tangent
+    d = ground.chain.plant.layout.directions
     k = len(ground.chain.states)
     moves = ground.linear.moves[:, :, :d]
     A = np.hstack([ground.white, ground.left[:, None]])
@@ -63,7 +47,7 @@ def _events_at(ground: Ground, fit: Fit, recording: int, trial: Trial, instants:
     """Return an event at each of some instants as a proposal, by its true columns."""
     columns = [Column(c.group, c.name, c.step, (("t_s", float(t)),)) for t in instants for c in trial.columns]
     values = fit.values(recording)
-    linear = linearise(ground.chain, values, columns, NO_JUMPS[ground.chain.recording.plant].allowed)
+    linear = linearise(ground.chain, values, columns, ground.chain.plant.sizes.continuous.allowed)
     white = ground.whiten(linear.shared)
     width = len(trial.columns)
     found = []
@@ -84,14 +68,16 @@ def events(asked: Asked, least: float = 25.0) -> list[Proposal]:
     instant is then read off the event's true signature, in which a pulse of 10 ms is a needle.
     """
     recordings = [chain.recording for chain in asked.fit.chains]
-    plant = recordings[0].plant
-    first = EARLIEST[plant]
+    plant = asked.fit.plant
+    layout, times = plant.layout, plant.durations
     there = available(recordings)
     kinds: list[tuple[str, Sequence[int], tuple[str, ...]]] = []
-    if "event.impulse" in there:
-        kinds.append(("event.impulse", _IMPULSE, ("dv_north_m_s", "dv_east_m_s", "dv_down_m_s")))
-    if "event.spin_step" in there:
-        kinds.append(("event.spin_step", _SPIN[plant], ("dr_rad_s",)))
+    if "event.impulse" in there and layout.velocity is not None:
+        kinds.append(
+            ("event.impulse", layout.directions_of(layout.velocity), ("dv_north_m_s", "dv_east_m_s", "dv_down_m_s"))
+        )
+    if "event.spin_step" in there and layout.spin is not None:
+        kinds.append(("event.spin_step", layout.directions_of(layout.spin), ("dr_rad_s",)))
 
     def scanned(task: tuple[int, tuple[str, Sequence[int], tuple[str, ...]]]) -> FloatArray:
         i, (id, directions, _) = task
@@ -102,15 +88,16 @@ def events(asked: Asked, least: float = 25.0) -> list[Proposal]:
         ground = asked.grounds[i]
         trial = Trial(id, tuple(Column(id, name, 0.02) for name in names))
         inner, end = ground.chain.edges[1:-1], float(ground.chain.edges[-1])
-        near = np.concatenate([inner[j] + _NEAR[plant] * np.linspace(-1.0, 1.0, 13) for j in peaks(gain, 2)])
+        near = np.concatenate([inner[j] + times.event_near * np.linspace(-1.0, 1.0, 13) for j in peaks(gain, 2)])
         near = np.unique(near.round(4))
-        near = near[(near > max(0.01, first)) & (near < end)]
+        near = near[(near > max(0.01, times.event_from)) & (near < end)]
         if near.size == 0:
             return None
         best = max(_events_at(ground, asked.fit, i, trial, near), key=gain_of)
         about = best.trial.shapes["t_s"] + np.linspace(-0.012, 0.012, 7)
         best = max(
-            [best, *_events_at(ground, asked.fit, i, trial, about[(about > first) & (about < end)])], key=gain_of
+            [best, *_events_at(ground, asked.fit, i, trial, about[(about > times.event_from) & (about < end)])],
+            key=gain_of,
         )
         return best if best.gain > least else None
 

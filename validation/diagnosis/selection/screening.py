@@ -19,7 +19,8 @@ from validation.identification.linearisation import Linear
 from validation.identification.noise import NoiseModel
 from validation.identification.normal_equations import Reduced, reduce
 from validation.identification.parameters import Jumps, Parameter
-from validation.identification.propagation import WOBBLE, Column
+from validation.identification.plants import PLANTS
+from validation.identification.propagation import Column
 
 __all__ = ["Answer", "Board", "board_of"]
 
@@ -82,7 +83,7 @@ class Board:
 
 def column_of(q: Parameter) -> Column:
     """Return the column of a parameter; one that differs from recording to recording has a column for each."""
-    if q.recordings is not None and q.key in WOBBLE:
+    if q.recordings is not None and q.group in PLANTS:
         return Column(q.group, q.name, q.step, (("recording", float(min(q.recordings))),))
     return Column(q.group, q.name, q.step)
 

@@ -16,8 +16,7 @@ import numpy as np
 from discsim.recording import Recording
 from validation.diagnosis.detectors.all import searched
 from validation.diagnosis.detectors.dropped_samples import Shifted, Slips
-from validation.diagnosis.detectors.events import EARLIEST
-from validation.diagnosis.relaxed_fit import NO_JUMPS, relaxed, unknowns, without_outliers
+from validation.diagnosis.relaxed_fit import relaxed, unknowns, without_outliers
 from validation.diagnosis.selection.candidates import Trial, parameters_of, trials_for
 from validation.diagnosis.selection.constrained_fit import Tied, tied_fit
 from validation.diagnosis.selection.evidence import ONE_SIDED, RIVAL, price
@@ -28,7 +27,7 @@ from validation.identification.competing_effects import row_of
 from validation.identification.gauss_newton import Fit, merit_of
 from validation.identification.noise import NoiseModel, chi_squared, estimate_noise, robust_noise
 from validation.identification.parameters import Parameter
-from validation.identification.propagation import WOBBLE
+from validation.identification.plants import plant_of
 from validation.identification.residual_tests import remainders
 from validation.identification.stated_parameters import stated_parameters
 
@@ -45,8 +44,6 @@ MOST_EFFECTS = 4
 REFITTED, REFITTED_AT_MOST = 4, 9
 #: chi-squared per reading, in the noise of the relaxed fit, below which a fit is near the data
 _NEAR = 1.2
-#: most steps of the baseline's fit, and as many again where it comes near the data: a free spin's is slow
-_BASE_ITERATIONS = {"flight": 8, "free_spin": 16, "spin_down": 8, "rate_table": 8}
 #: a refit that will leave this many times the chi-squared of the best one so far is given up
 _HOPELESS = 10.0
 #: what it counts, in twice the log likelihood, that an effect came out with the sign that physics gives it: a lag and
@@ -107,7 +104,7 @@ class Search:
     def board_of(self, fit: Fit) -> Board:
         """Return what every effect would do to a fit, in its own noise; of the last fit that was asked it is known."""
         if self._asked is None or self._asked[0] is not fit:
-            self._asked = fit, board_of(fit, self.trials, fit.noise, NO_JUMPS[self.recordings[0].plant])
+            self._asked = fit, board_of(fit, self.trials, fit.noise, fit.plant.sizes.continuous)
         return self._asked[1]
 
     def at_base(self) -> Search:
@@ -134,15 +131,15 @@ def search(
     report("following the data", 0, 4)
     loose, left_out = without_outliers(relaxed(recordings, known) if followed is None else followed)
     noise = estimate_noise(loose.linears, [linear.residual for linear in loose.linears])
-    plant = recordings[0].plant
+    plant = loose.plant
     given = {q.group for q in free}
     trials = tuple(trial for trial in trials_for(recordings) if trial.id not in given)
     report("asking every effect", 1, 4)
-    board = board_of(loose, trials, noise, NO_JUMPS[plant])
+    board = board_of(loose, trials, noise, plant.sizes.continuous)
     report("fitting the baseline", 2, 4)
     start = {**_start(board, Hypothesis(), own), **_wobbles(loose)}
-    base = tied_fit(loose, Hypothesis(), own, noise, start, iterations=_BASE_ITERATIONS[plant])
-    if chi2_in(base, noise) < FAR * base.fit.count and base.fit.iterations >= _BASE_ITERATIONS[plant]:
+    base = tied_fit(loose, Hypothesis(), own, noise, start, iterations=plant.base_steps)
+    if chi2_in(base, noise) < FAR * base.fit.count and base.fit.iterations >= plant.base_steps:
         # beside the data what the baseline has left to gain would pass for what an effect gains
         again = tied_fit(
             base.fit,
@@ -150,7 +147,7 @@ def search(
             own,
             base.fit.noise,
             values_of_fit(base),
-            iterations=_BASE_ITERATIONS[plant],
+            iterations=plant.base_steps,
             bar=merit_of(base.fit, base.fit.linears),
         )
         base = min(base, again, key=lambda one: one.score)
@@ -223,7 +220,7 @@ def _wobbles(fit: Fit) -> Start:
     What algebra expects of it is far from linear where turning for a second makes a radian.
     """
     parameters = zip(fit.parameters, fit.at, strict=True)
-    return {(q.key, q.recordings): float(v) for q, v in parameters if q.key in WOBBLE}
+    return {(q.key, q.recordings): float(v) for q, v in parameters if q.key in fit.plant.own_keys}
 
 
 def values_of_fit(tied: Tied) -> Start:
@@ -448,7 +445,7 @@ def _from_there(found: Search, current: Tied, better: Tied) -> Tied | None:
     None where it is, or where it gains so much that no start could.
     """
     trial = better.hypothesis.trials[-1]
-    if current.score - better.score > _DOUBTFUL or found.recordings[0].plant != "free_spin":
+    if current.score - better.score > _DOUBTFUL or not found.loose.plant.weakly_identified:
         return None
     start = values_of_fit(better)
     again = tied_fit(better.fit, current.hypothesis, found.own, better.fit.noise, start)
@@ -469,12 +466,11 @@ def _possible(tied: Tied) -> bool:
     """
     sd = np.sqrt(np.maximum(np.diag(tied.fit.covariance), 0.0))
     recording = tied.fit.chains[0].recording
-    plant = recording.plant
     radius = _radius(recording)
     for q, value, error in zip(tied.fit.parameters, tied.fit.at, sd, strict=True):
         if q.key in ONE_SIDED and ONE_SIDED[q.key] * value < -3.0 * error:
             return False
-        if q.key == ("event.spin_step", "t_s") and value < EARLIEST[plant]:
+        if q.key == ("event.spin_step", "t_s") and value < plant_of(recording).durations.event_from:
             return False
         if _is_place(q.group) and abs(value) - 3.0 * error > radius:
             return False

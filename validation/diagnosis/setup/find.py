@@ -22,6 +22,7 @@ from validation.diagnosis.setup.hypotheses import Hypothesis, board_effect, chos
 from validation.diagnosis.setup.proof import left_by_short_fit
 from validation.diagnosis.setup.remedy import MapAxes, remedy
 from validation.diagnosis.setup.units import clock_unit, sensor_units
+from validation.identification.plants import plant_of
 
 __all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said"]
 
@@ -35,9 +36,8 @@ AGREE = 0.6
 WORST = 2.1
 #: a hypothesis that costs no more than this above the best cannot be told from it
 TWIN = 8.0
-#: longest that is judged of a recording, s: a minute of turning, or the plateaus of a rate table
-LOOK = {"flight": 60.0, "free_spin": 60.0, "spin_down": 300.0, "rate_table": 300.0}
-#: in which it turns at this share of the fastest rate or more, asked every so many s (half a turn at 6 rad/s)
+#: what is judged of a long recording turns at this share of the fastest rate or more, asked every so many s (half a
+#: turn at 6 rad/s)
 _QUARTER, _SLOT = 0.25, 0.5
 #: most faults of one setup that are looked for, and most twins that are told
 MOST, MOST_TWINS = 3, 8
@@ -121,7 +121,7 @@ def _judgeable(recording: Recording) -> Recording:
     kept = {name: own for name, own in recording.samples.items() if name not in BOARD or _alive(own)}
     if not recording.environment.field_known:
         kept.pop("magnetometer", None)
-    busiest = _busiest(kept, LOOK[recording.plant])
+    busiest = _busiest(kept, plant_of(recording).durations.setup)
     if busiest is not None:
         kept = {name: samples.between(*busiest) for name, samples in kept.items()}
     return replace(recording, samples=kept)
@@ -197,7 +197,7 @@ def _told_apart(
     of those two the columns are named.
     """
     tied = sorted(tied, key=lambda item: _turned_round(item, site))
-    if len(tied) == 1 or recordings[0].plant != "flight":
+    if len(tied) == 1 or "aero" not in plant_of(recordings[0]).hardware:
         return tied[0], list(tied[1:])
     some = chosen(recordings)
     left = [left_by_short_fit([corrected(one, [_effect(item, site)]) for one in some]) for item in tied[:_FITTED]]
