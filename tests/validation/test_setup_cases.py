@@ -18,6 +18,7 @@ from validation.challenge.cases.detection_limit import sizes
 from validation.challenge.cases.draw import draw_case
 from validation.challenge.cases.setups import draw_fault, equivalents, possible_faults
 from validation.challenge.cases.sizes import HIDING, ordinary
+from validation.diagnosis.setup import find_setup_faults
 
 CASES = {plant: draw_case(3, plant, kind="nothing") for plant in PLANTS}
 
@@ -243,3 +244,11 @@ def test_no_gyroscope_that_feels_acceleration_is_drawn_where_its_place_is_not_st
     assert all("accelerometer" in case.instruments.sensors for case in felt)
     bare = [case for case in drawn if "accelerometer" not in case.instruments.sensors and len(case.concealed) > 1]
     assert bare
+
+
+def test_in_a_flight_the_air_tells_columns_apart_where_lost_samples_turn_the_phase():
+    """A magnetometer that loses 1.4 % of its samples: turned by half a turn about the spin axis it costs less."""
+    case = draw_case(92001, kind="setup")
+    assert [item.effect.id for item in case.concealed] == ["mag.axes", "mag.dropped_samples"]
+    found = find_setup_faults(recordings(case))
+    assert found.effects == (case.concealed[0].effect,)

@@ -36,7 +36,8 @@ from validation.diagnosis.result import (
 )
 from validation.diagnosis.selection.candidates import Trial, parameters_of
 from validation.diagnosis.selection.evidence import price
-from validation.diagnosis.selection.stepwise import Considered, Search, chi2_in, tried_without
+from validation.diagnosis.selection.found import Considered, Search, chi2_in
+from validation.diagnosis.selection.stepwise import tried_without
 from validation.diagnosis.unknown_law.find import FoundLaw
 from validation.diagnosis.verdict import RECALIBRATED_NAMES, recalibrations, standard_errors, verdict_of
 from validation.identification.competing_effects import user_effect

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from validation.diagnosis.selection.candidates import Trial
+from validation.diagnosis.selection.found import Search
 from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
-from validation.diagnosis.selection.stepwise import Search
 
 __all__ = ["heldout_chi2", "heldout_gain"]
 

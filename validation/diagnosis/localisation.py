@@ -9,8 +9,8 @@ import numpy as np
 from discsim.arrays import FloatArray
 from validation.diagnosis.result import Located
 from validation.diagnosis.selection.candidates import Trial
+from validation.diagnosis.selection.found import Search
 from validation.diagnosis.selection.hypothesis import fitted_parameters
-from validation.diagnosis.selection.stepwise import Search
 from validation.identification.competing_effects import row_of, user_effect
 from validation.identification.linearisation import Linear
 from validation.identification.normal_equations import local_step

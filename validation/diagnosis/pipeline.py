@@ -17,7 +17,8 @@ from validation.diagnosis.inertia import with_inertia
 from validation.diagnosis.prepared import prepared
 from validation.diagnosis.relaxed_fit import relaxed
 from validation.diagnosis.result import Outcome
-from validation.diagnosis.selection.stepwise import Search, search
+from validation.diagnosis.selection.found import Search
+from validation.diagnosis.selection.stepwise import search
 from validation.diagnosis.setup import find_setup_faults
 from validation.diagnosis.setup_effects import free_parameters, with_setup
 from validation.diagnosis.unknown_law.find import find_law

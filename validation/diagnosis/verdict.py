@@ -12,7 +12,7 @@ from validation.diagnosis.result import (
     Verdict,
 )
 from validation.diagnosis.selection.constrained_fit import Tied
-from validation.diagnosis.selection.stepwise import Search, misses
+from validation.diagnosis.selection.found import Search, misses
 from validation.identification.residual_tests import remainders
 
 __all__ = ["RECALIBRATED_NAMES", "standard_errors"]

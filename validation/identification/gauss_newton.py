@@ -74,28 +74,35 @@ def mapped(function: Callable[..., Any], *arguments: Sequence[Any]) -> list[Any]
         return [task.result() for task in tasks]
 
 
+def _spare(recordings: int) -> int:
+    """Return the threads that each of so many recordings has to itself."""
+    return max(1, THREADS // max(1, recordings))
+
+
 def linearised(
     fit: Fit, parameters: Sequence[Parameter] | None = None, only: Sequence[int] | None = None
 ) -> tuple[Linear, ...]:
     """Linearise all chains where they stand, or ``only`` some; the shared columns are those of ``parameters``."""
     chosen = fit.parameters if parameters is None else parameters
+    which = range(len(fit.chains)) if only is None else only
 
     def one(index: int) -> Linear:
         columns = [Column(q.group, q.name, q.step if q.acts_in(index) else 0.0) for q in chosen]
         active = [column for column in columns if column.step > 0]
-        linear = linearise(fit.chains[index], fit.values(index), active, fit.jumps.allowed, central=False)
+        chain, values = fit.chains[index], fit.values(index)
+        linear = linearise(chain, values, active, fit.jumps.allowed, central=False, threads=_spare(len(which)))
         if len(active) < len(columns):
             linear = linear.spread([j for j, column in enumerate(columns) if column.step > 0], len(columns))
         return linear
 
-    return tuple(mapped(one, range(len(fit.chains)) if only is None else only))
+    return tuple(mapped(one, which))
 
 
 def _reread(fit: Fit) -> tuple[Linear, ...] | None:
     """Return the linearisations of a fit with residuals where its chains stand and slopes as they were, if they can."""
 
     def one(index: int) -> Linear | None:
-        return reread(fit.chains[index], fit.values(index), fit.linears[index])
+        return reread(fit.chains[index], fit.values(index), fit.linears[index], _spare(len(fit.chains)))
 
     found = mapped(one, range(len(fit.chains)))
     return None if any(linear is None for linear in found) else tuple(found)
@@ -106,7 +113,9 @@ def linearised_columns(fit: Fit, columns: Sequence[Column]) -> tuple[Linear, ...
 
     def one(index: int) -> Linear:
         active = [j for j, c in enumerate(columns) if dict(c.given).get("recording", index) == index]
-        linear = linearise(fit.chains[index], fit.values(index), [columns[j] for j in active], fit.jumps.allowed)
+        own = [columns[j] for j in active]
+        threads = _spare(len(fit.chains))
+        linear = linearise(fit.chains[index], fit.values(index), own, fit.jumps.allowed, threads=threads)
         return linear.spread(active, len(columns)) if len(active) < len(columns) else linear
 
     return tuple(mapped(one, range(len(fit.chains))))

@@ -9,6 +9,8 @@ fit closes them (multiple shooting; Bock, "Recent advances in parameter identifi
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeAlias
@@ -47,6 +49,8 @@ IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 _BATCH = 16
 #: instants of several pieces that are read together
 _INSTANTS = 256
+#: fewest pieces that are worth a thread of their own
+_SHARE = 3
 #: a lagged sensor has forgotten its start after this many time constants
 _FORGOTTEN = 8.0
 
@@ -181,12 +185,13 @@ def linearise(
     jumps: BoolArray,
     *,
     central: bool = True,
+    threads: int = 1,
 ) -> Linear:
     """Linearise the readings of a chain about its states and values.
 
     ``columns`` are parameters with the step of their differences; ``jumps`` (d,) tells in which directions pieces may
     jump. Columns are differences of the piece's own motion, chained over the pieces; one-sided ones, where ``central``
-    is false, cost half.
+    is false, cost half. The pieces are run on so many ``threads``.
     """
     k = current.states.shape[0]
     around = _Around(current, values, columns, central)
@@ -194,7 +199,7 @@ def linearise(
     # the instants of all sensors, each with its neighbours in time for slopes and its past for a lag
     piece_of = [np.clip(np.searchsorted(current.edges, s.instants, side="right") - 1, 0, k - 1) for s in samples]
     read = _Read(around, samples)
-    ends = read.run_all(piece_of)
+    ends = read.run_all(piece_of, threads)
     chained = _chained(current, around, ends, jumps)
     for s, M, rows in zip(samples, read.slopes, read.rows, strict=True):
         _add_sensor_columns(around, s, rows, M)
@@ -270,7 +275,7 @@ class _Around:
         return np.asarray((ahead - behind) / span.reshape(-1, *(1,) * (values.ndim - 1)))
 
 
-def reread(current: Chain, values: Values, linear: Linear) -> Linear | None:
+def reread(current: Chain, values: Values, linear: Linear, threads: int = 1) -> Linear | None:
     """Return a linearisation with the residuals where a chain stands now, and its slopes as they were (a chord).
 
     One motion in the place of dozens, for steps within which the slopes hardly change. None where other readings take
@@ -280,7 +285,7 @@ def reread(current: Chain, values: Values, linear: Linear) -> Linear | None:
     samples = [Sampled(current, readings, values) for readings in current.readings]
     segment_of = [np.clip(np.searchsorted(current.edges, s.instants, side="right") - 1, 0, k - 1) for s in samples]
     read = _Read(_Around(current, values, (), None), samples)
-    ends = read.run_all(segment_of)[:, 0]
+    ends = read.run_all(segment_of, threads)[:, 0]
     raw: list[FloatArray] = []
     channels = iter(linear.channels)
     for s, y, segment in zip(samples, read.ideal, segment_of, strict=True):
@@ -330,14 +335,28 @@ class _Read:
         self.ideal = [np.empty((s.instants.size, s.width)) for s in samples]
         self.slopes = [np.zeros((s.instants.size, s.width, columns)) for s in samples]
 
-    def run_all(self, piece_of: Sequence[IntArray]) -> FloatArray:
-        """Run all pieces and read the sensors; return the states (k, c, s) at the ends of the pieces."""
+    def run_all(self, piece_of: Sequence[IntArray], threads: int) -> FloatArray:
+        """Run all pieces and read the sensors; return the states (k, c, s) at the ends of the pieces.
+
+        Each piece starts from a state of its own, so that shares of them run side by side on ``threads``.
+        """
+        ends = np.empty(self._around.states.shape)
+        shares = np.array_split(np.arange(len(ends)), max(1, min(threads, len(ends) // _SHARE)))
+        if len(shares) == 1:
+            self._run(shares[0], piece_of, ends)
+            return ends
+        with ThreadPoolExecutor(len(shares)) as pool:
+            tasks = [pool.submit(copy_context().run, self._run, share, piece_of, ends) for share in shares]
+            for task in tasks:
+                task.result()
+        return ends
+
+    def _run(self, share: IntArray, piece_of: Sequence[IntArray], ends: FloatArray) -> None:
+        """Run a share of the pieces, read the sensors there, and write the states (c, s) at its ends into ``ends``."""
         around, edges = self._around, self._around.chain.edges
-        k = around.states.shape[0]
-        ends = np.empty(around.states.shape)
         waiting: list[tuple[list[IntArray], IntArray, FloatArray]] = []
         acted, flats, owns = around.everyone, around.flats, around.owns
-        for i in range(k):
+        for i in share:
             start, stop = float(edges[i]), float(edges[i + 1])
             own = [np.flatnonzero(piece == i) for piece in piece_of]
             instants = [s.instants[o] for s, o in zip(self._samples, own, strict=True)]
@@ -360,10 +379,10 @@ class _Read:
             ends[i] = there[0]
             ends[i, acting] = there
             waiting.append((own, place, rows))
-            if i + 1 == k or sum(rows.shape[1] for *_, rows in waiting) >= _INSTANTS:
+            if sum(rows.shape[1] for *_, rows in waiting) >= _INSTANTS:
                 self._read(waiting, acted)
                 waiting = []
-        return ends
+        self._read(waiting, acted)
 
     def _read(self, pieces: Sequence[tuple[list[IntArray], IntArray, FloatArray]], acting: IntArray) -> None:
         """Read the sensors in the rows of pieces, which are those of the neighbours that are ``acting`` there.

@@ -19,8 +19,9 @@ from validation.diagnosis.relaxed_fit import relaxed
 from validation.diagnosis.result import Advice, Separation
 from validation.diagnosis.selection.candidates import Trial, trials_for
 from validation.diagnosis.selection.constrained_fit import tied_fit
+from validation.diagnosis.selection.found import Rival, Search, values_of_fit
 from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.selection.stepwise import Rival, Search, search, values_of_fit
+from validation.diagnosis.selection.stepwise import search
 from validation.identification.plants import PLANTS
 from validation.identification.plants.plan import Plan
 from validation.identification.plants.rig import LEAN

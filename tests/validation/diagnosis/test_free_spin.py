@@ -17,8 +17,8 @@ from discsim.sensors import record
 from discsim.shipped import load_disc
 from validation.diagnosis.relaxed_fit import first_chain, relaxed, unknowns
 from validation.diagnosis.selection.constrained_fit import Tied, tied_fit
+from validation.diagnosis.selection.found import possible
 from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.selection.stepwise import _possible
 from validation.identification.gauss_newton import Fit, _Going, linearised, linearised_columns
 from validation.identification.noise import estimate_noise, stated_noise, whitened
 from validation.identification.normal_equations import reduce
@@ -119,7 +119,7 @@ def test_a_knock_at_the_very_start_is_not_told_from_where_the_spin_started(insta
     q = Parameter("event.spin_step", "t_s", instant, 1e-3, recordings=frozenset([0]))
     chains = (first_chain(recording),)
     fit = Fit(chains, (q,), np.array([instant]), FREE_SPIN.sizes.continuous, {}, covariance=np.full((1, 1), 1e-6))
-    assert _possible(Tied(Hypothesis(), fit, 0.0)) is told
+    assert possible(Tied(Hypothesis(), fit, 0.0)) is told
 
 
 def test_a_recording_that_a_step_leads_astray_takes_less_of_it_and_the_other_all():

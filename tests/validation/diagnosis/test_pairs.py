@@ -15,10 +15,11 @@ from validation.diagnosis.relaxed_fit import relaxed, unknowns
 from validation.diagnosis.selection import stepwise as searching
 from validation.diagnosis.selection.candidates import Trial, trials_for
 from validation.diagnosis.selection.constrained_fit import Tied
+from validation.diagnosis.selection.exchange import exchanged, rivals_of
+from validation.diagnosis.selection.found import Rival, possible
 from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
 from validation.diagnosis.selection.proposals import Pair, Proposal, pairs
 from validation.diagnosis.selection.screening import board_of
-from validation.diagnosis.selection.stepwise import Rival
 from validation.identification.noise import estimate_noise
 from validation.identification.plants.flight import FLIGHT
 from validation.identification.stated_parameters import stated_parameters
@@ -99,16 +100,16 @@ def test_an_effect_gives_way_to_one_that_explains_as_much_with_fewer_parameters(
     sheared = as_shear()
     found = replace(windy(), final=sheared)
     found.board = board_of(sheared.fit, found.trials, sheared.fit.noise, FLIGHT.sizes.continuous)
-    found.rivals = searching._rivals(found)
+    found.rivals = rivals_of(found)
     assert next(rival.trial.id for rival in found.rivals["air.wind_shear"]) == "air.wind"
-    better = searching._exchanged(found)
+    better = exchanged(found)
     assert better is not None
     assert [trial.id for trial in better.hypothesis.trials] == ["air.wind"]
 
 
 def test_an_effect_does_not_give_way_to_one_that_needs_more_parameters_for_the_same():
     assert [trial.id for trial in windy().final.hypothesis.trials] == ["air.wind"]
-    assert searching._exchanged(windy()) is None
+    assert exchanged(windy()) is None
 
 
 def test_a_shear_that_is_known_to_have_none_is_not_confused_with_the_wind():
@@ -137,8 +138,8 @@ def test_a_sensor_far_off_the_disc_is_impossible():
         at[[q.name for q in fit.fit.parameters].index("dx_m")] = x
         return replace(fit, fit=replace(fit.fit, at=at, covariance=1e-6 * np.eye(at.size)))
 
-    assert searching._possible(with_offset(0.1))
-    assert not searching._possible(with_offset(0.2))
+    assert possible(with_offset(0.1))
+    assert not possible(with_offset(0.2))
 
 
 def test_offers_from_two_fits_come_in_turn_and_lost_samples_first():

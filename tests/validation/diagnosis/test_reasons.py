@@ -7,7 +7,7 @@ import pytest
 from validation.diagnosis.assemble import reason_for
 from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.evidence import price
-from validation.diagnosis.selection.stepwise import Considered
+from validation.diagnosis.selection.found import Considered
 
 BIAS, IMPULSE = Trial("gyro.bias", ()), Trial("event.impulse", ())
 

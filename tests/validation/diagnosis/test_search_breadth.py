@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made import coasts, throws
 
 from discsim.effects.catalogue import CATALOGUE
 from validation.diagnosis.relaxed_fit import first_chain
+from validation.diagnosis.selection import exchange
+from validation.diagnosis.selection import found as finding
 from validation.diagnosis.selection import stepwise as searching
 from validation.diagnosis.selection.candidates import Trial, free_trial
 from validation.diagnosis.selection.constrained_fit import Tied
 from validation.diagnosis.selection.evidence import price
+from validation.diagnosis.selection.found import on_the_disc
 from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import Fit, linearised, merit_of
@@ -52,12 +57,12 @@ def step(monkeypatch: pytest.MonkeyPatch, *, far: bool, right: Trial) -> tuple[s
 
     monkeypatch.setattr(searching, "tied_fit", told)
     monkeypatch.setattr(searching, "chi2_in", chi2)
-    monkeypatch.setattr(searching, "board_of", lambda *_: None)
+    monkeypatch.setattr(finding, "board_of", lambda *_: None)
     monkeypatch.setattr(searching, "searched", lambda *_: [])
     monkeypatch.setattr(searching, "proposals", lambda *_: [])
     ranked = [Proposal(trial, 1e6 - rank, {}) for rank, trial in enumerate(RANKED)]
     monkeypatch.setattr(searching, "one_per_effect", lambda _: ranked)
-    found = searching.Search(tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base)
+    found = finding.Search(tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base)
     best = searching._next(found, None, base, 0)  # type: ignore[arg-type]
     assert best is not None
     return best.hypothesis.trials[-1].id, refitted, bars
@@ -101,14 +106,14 @@ def exchanged(monkeypatch: pytest.MonkeyPatch, without_scale: float) -> set[str]
     def told(fit: Fit, hypothesis: Hypothesis, *others: object, bar: float) -> Tied:
         return Tied(hypothesis, fit, without_scale if set(hypothesis.trials) == {offset, place} else 1e4)
 
-    monkeypatch.setattr(searching, "tied_fit", told)
-    monkeypatch.setattr(searching, "_possible", lambda _: True)
+    monkeypatch.setattr(exchange, "tied_fit", told)
+    monkeypatch.setattr(exchange, "possible", lambda _: True)
     final = Tied(Hypothesis((offset, scale, board)), fit, 40.0)
     base = Tied(Hypothesis(), fit, 1e6)
-    found = searching.Search(tuple(recordings), (), fit, fit.noise, (), base, final)
+    found = finding.Search(tuple(recordings), (), fit, fit.noise, (), base, final)
     with_place = Tied(Hypothesis((offset, scale, place)), fit, 42.0)
-    found.rivals = {board.name: [searching.Rival(place, 2.0, with_place)]}
-    better = searching._exchanged(found)
+    found.rivals = {board.name: [finding.Rival(place, 2.0, with_place)]}
+    better = exchange.exchanged(found)
     return None if better is None else {trial.id for trial in better.hypothesis.trials}
 
 
@@ -121,15 +126,43 @@ def test_a_rival_that_explains_no_more_than_the_named_effects_does_not(monkeypat
     assert exchanged(monkeypatch, without_scale=90.0) is None
 
 
+def scope(monkeypatch: pytest.MonkeyPatch, everywhere: float) -> frozenset[int] | None:
+    """Return the recordings of a stall that was proposed in the second of two and scores 40 there, or None for all.
+
+    ``everywhere`` is its score in both.
+    """
+    recordings = coasts(seconds=1.0)
+    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
+    linears = linearised(fit)
+    fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
+    stall = replace(free_trial("aero.stall"), recordings=frozenset([1]))
+    monkeypatch.setattr(exchange, "tied_fit", lambda fit, hypothesis, *_, bar: Tied(hypothesis, fit, everywhere))
+    monkeypatch.setattr(exchange, "possible", lambda _: True)
+    monkeypatch.setattr(exchange, "lost", lambda *_: False)
+    base, final = Tied(Hypothesis(), fit, 1e6), Tied(Hypothesis((stall,)), fit, 40.0)
+    found = finding.Search(tuple(recordings), (), fit, fit.noise, (), base, final)
+    (trial,) = exchange.widened(found, final).hypothesis.trials
+    return trial.recordings
+
+
+def test_an_effect_that_one_recording_shows_is_named_in_all_where_the_others_do_not_contradict_it(monkeypatch):
+    """Of two recordings one alone is worth 2 ln 2 + 6 = 7.4: what choosing it costs."""
+    assert scope(monkeypatch, everywhere=47.3) is None
+
+
+def test_an_effect_that_the_others_contradict_stays_in_its_recording(monkeypatch):
+    assert scope(monkeypatch, everywhere=47.5) == {1}
+
+
 def test_a_centre_of_mass_off_the_disc_is_not_refitted_and_a_sensor_s_unknown_place_is():
     """Where a path alone is recorded algebra asks for metres of the one; along the axis nothing shows the other."""
     recordings = throws(seconds=0.3)
     base = Tied(Hypothesis(), Fit((), (), np.empty(0), FLIGHT.sizes.continuous, {}), 0.0)
-    found = searching.Search(tuple(recordings), (), base.fit, {}, (), base, base)
+    found = finding.Search(tuple(recordings), (), base.fit, {}, (), base, base)
     radius = 0.5 * recordings[0].disc.diameter
 
     def tried(id: str, name: str, value: float) -> bool:
-        return searching._on_the_disc(found, {((id, name), None): value})
+        return on_the_disc(found, {((id, name), None): value})
 
     assert tried("body.mass_imbalance", "ex_m", 0.9 * radius)
     assert not tried("body.mass_imbalance", "ex_m", -1.1 * radius)

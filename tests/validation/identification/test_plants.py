@@ -81,6 +81,24 @@ def test_a_state_that_is_moved_is_as_far_away_as_it_was_moved(plant):
     )
 
 
+@pytest.mark.parametrize("plant", PLANTS.values(), ids=list(PLANTS))
+def test_the_directions_of_a_named_part_of_a_state_move_that_part_alone(plant):
+    layout = plant.layout
+    state = np.zeros(layout.size)
+    if layout.attitude is not None:
+        state[layout.attitude] = 1.0, 0.0, 0.0, 0.0
+    for name in ("position", "velocity", "attitude", "rate", "spin", "yaw"):
+        places = getattr(layout, name)
+        if places is None:
+            continue
+        mine = np.zeros(layout.size, dtype=bool)
+        mine[places] = True
+        for direction in layout.directions_of(places):
+            moved = layout.moved(state, 0.1 * np.eye(layout.directions)[direction])
+            assert np.any(moved[mine] != state[mine])
+            np.testing.assert_array_equal(moved[~mine], state[~mine])
+
+
 # ------------------------------------------------------------------------------- another plant, in this file alone
 
 #: a pendulum of 0.6 m: angular frequency of small swings, 1/s, and damping, 1/s

@@ -21,7 +21,7 @@ from validation.diagnosis.relaxed_fit import unknowns
 from validation.diagnosis.result import Advice, Separation
 from validation.diagnosis.selection.candidates import Trial, parameters_of
 from validation.diagnosis.selection.evidence import BOUNDS
-from validation.diagnosis.selection.stepwise import Rival, Search
+from validation.diagnosis.selection.found import Rival, Search
 from validation.identification.gauss_newton import Fit, mapped
 from validation.identification.linearisation import linearise, moved
 from validation.identification.noise import NoiseModel

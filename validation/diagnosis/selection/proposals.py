@@ -54,12 +54,16 @@ def proposals(
             if _backwards(columns, answer):
                 continue
             proposal = Proposal(scoped, gain, start_of([*rest, *columns], answer, (scoped,)))
-            # one recording alone must do better than all by what choosing it costs
-            if best is None or gain > best.gain + (2.0 * np.log(board.recordings) + 6.0 if scope is not None else 0.0):
+            if best is None or gain > best.gain + (scope_price(board.recordings) if scope is not None else 0.0):
                 best = proposal
         if best is not None:
             found.append(best)
     return sorted(found, key=lambda p: RIVAL * len(parameters_of(p.trial)) - p.gain)
+
+
+def scope_price(recordings: int) -> float:
+    """Return by how much an effect must do better in one recording alone than in all: what choosing it costs."""
+    return float(2.0 * np.log(recordings) + 6.0)
 
 
 def _backwards(freed: Sequence[tuple[Column, Parameter]], answer: Answer) -> bool:

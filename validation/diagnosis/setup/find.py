@@ -22,7 +22,7 @@ from validation.diagnosis.setup.hypotheses import Hypothesis, board_effect, chos
 from validation.diagnosis.setup.proof import left_by_short_fit
 from validation.diagnosis.setup.remedy import MapAxes, remedy
 from validation.diagnosis.setup.units import clock_unit, sensor_units
-from validation.identification.plants import plant_of
+from validation.identification.plants import Plant, plant_of
 
 __all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said"]
 
@@ -30,7 +30,7 @@ __all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said"]
 #: kinds the largest gain of a fault that is not there is 15 (lost samples of a magnetometer), the next 0.3
 PRICE = 30.0
 #: sensors agree where the cost per independent statement is below this; sound sets have 0.02 to 0.25
-AGREE = 0.6
+AGREE, SOUND = 0.6, 0.25
 #: no relation may be left to hold worse than this, cost per statement: 7 ordinary errors. A turned board that empties a
 #: gyroscope of clipped readings can hide lost samples at the price of 36 ordinary errors in another relation
 WORST = 2.1
@@ -170,7 +170,7 @@ def _next(recordings: Sequence[Recording]) -> list[SetupFault]:
         return []
     found = tuple(item for item in found if item.kind != "rival")
     if found and _agrees(found[0]) and _gains(as_written, found[0]):
-        tied = [item for item in found if item.charged < found[0].charged + TWIN]
+        tied = [item for item in found if _may_be_meant(item, found[0], plant_of(recordings[0]))]
         best, others = _told_apart(tied, recordings, site)
         twins = [_effect(item, site) for item in sorted(others, key=lambda item: item.kind != best.kind)]
         gain = float("inf") if before is None else float(np.sum(before) - best.cost)
@@ -197,7 +197,7 @@ def _told_apart(
     of those two the columns are named.
     """
     tied = sorted(tied, key=lambda item: _turned_round(item, site))
-    if len(tied) == 1 or "aero" not in plant_of(recordings[0]).hardware:
+    if len(tied) == 1 or not plant_of(recordings[0]).air_modelled:
         return tied[0], list(tied[1:])
     some = chosen(recordings)
     left = [left_by_short_fit([corrected(one, [_effect(item, site)]) for one in some]) for item in tied[:_FITTED]]
@@ -209,6 +209,20 @@ def _told_apart(
 def _turned_round(item: Hypothesis, stated: FloatArray) -> bool:
     """Tell whether a hypothesis is a field that points the other way than the stated one: no place on a map has it."""
     return item.columns.site is not None and float(item.columns.site @ stated) < 0.0
+
+
+def _may_be_meant(item: Hypothesis, best: Hypothesis, plant: Plant) -> bool:
+    """Tell whether a hypothesis is to be told from the best by more than what it costs.
+
+    Where the best leaves more than sound recordings do, something else is wrong, too: lost samples turn the phase of
+    one sensor, and columns turned about the spin axis may then cost less than the true ones. In a flight the air is
+    asked about all of that sensor that come as near.
+    """
+    if item.charged < best.charged + TWIN:
+        return True
+    spoilt = best.cost > SOUND * best.weight
+    alike = (item.kind, item.sensor) == (best.kind, best.sensor)
+    return plant.air_modelled and spoilt and alike and item.cost < AGREE * item.weight
 
 
 def _agrees(item: Hypothesis) -> bool:

@@ -14,6 +14,8 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.compiled import compiled_nogil
 from discsim.disc import Release
+from discsim.effects.air import Wind
+from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.kind import BOARD
 from discsim.errors import InputError
 from discsim.frames import body_to_ned, multiply, quaternion_from_matrix, turn
@@ -170,11 +172,15 @@ def _terms() -> tuple[Term, ...]:
     return tuple(terms)
 
 
+#: an unknown steady wind
+_WIND = next(row.id for row in CATALOGUE.values() if row.type is Wind)
+
+
 def _symbols(recording: Recording, t: FloatArray, states: FloatArray, values: Values) -> dict[str, FloatArray]:
     rows = np.zeros((t.size, ROW))
     rows[:, 9:13] = states[:, _ATTITUDE]
     wind = np.array(recording.environment.wind, dtype=float)
-    wind[:2] += [values.get(("air.wind", f"w_{way}_m_s"), 0.0) for way in ("north", "east")]
+    wind[:2] += [values.get((_WIND, name), 0.0) for name in Wind._fields]
     u, v, w = to_body(rows, states[:, _VELOCITY] - wind).T
     return {
         "t": t,

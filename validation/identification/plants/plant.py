@@ -340,6 +340,11 @@ class Plant:
         """Whether its states hold a path through the air."""
         return self.layout.position is not None
 
+    @property
+    def air_modelled(self) -> bool:
+        """Whether the forces of the air act on it as its disc states them: they know a disc's top from its bottom."""
+        return "aero" in self.hardware
+
     @cached_property
     def own_keys(self) -> tuple[tuple[str, str], ...]:
         """Group and name of its own parameters."""

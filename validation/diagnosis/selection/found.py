@@ -1,0 +1,183 @@
+"""What a search has found so far, and what is asked of a fit: whether it is far from the data, and possible."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from discsim.recording import Recording
+from validation.diagnosis.detectors.dropped_samples import Slips
+from validation.diagnosis.selection.candidates import Trial
+from validation.diagnosis.selection.constrained_fit import Tied
+from validation.diagnosis.selection.evidence import ONE_SIDED
+from validation.diagnosis.selection.hypothesis import Start
+from validation.diagnosis.selection.proposals import Proposal
+from validation.diagnosis.selection.screening import Board, board_of
+from validation.identification.competing_effects import row_of
+from validation.identification.gauss_newton import Fit
+from validation.identification.noise import NoiseModel, chi_squared
+from validation.identification.parameters import Parameter
+from validation.identification.residual_tests import remainders
+
+__all__ = [
+    "FAR",
+    "Considered",
+    "Rival",
+    "Search",
+    "chi2_in",
+    "far",
+    "from_here",
+    "lost",
+    "misses",
+    "no_nearer",
+    "on_the_disc",
+    "possible",
+    "values_of_fit",
+]
+
+#: a fit whose chi-squared per reading, in the noise of the relaxed fit, is above this is far from the data
+FAR = 1.6
+
+
+@dataclass(frozen=True)
+class Considered:
+    """A trial that was refitted: what it gained when it was, by the likelihood and in chi-squared."""
+
+    trial: Trial
+    gain: float
+    chi2_gain: float
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An effect in the place of a named one: how much worse the likelihood is (twice its logarithm), and the fit."""
+
+    trial: Trial
+    worse: float
+    tied: Tied
+
+
+@dataclass
+class Search:
+    """What the search found: fits of the baseline and of the final hypothesis, and what was considered."""
+
+    recordings: tuple[Recording, ...]
+    own: tuple[Parameter, ...]
+    loose: Fit
+    loose_noise: NoiseModel
+    trials: tuple[Trial, ...]
+    base: Tied
+    final: Tied
+    steps: list[Tied] = field(default_factory=list)
+    considered: list[Considered] = field(default_factory=list)
+    rivals: dict[str, list[Rival]] = field(default_factory=dict)
+    board: Board | None = None
+    #: readings that were left out: (recording, sensor, axis, time, deviations)
+    outliers: list[tuple[int, str, str, float, float]] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    #: what the magnetometer's phase told of lost samples, by the relaxed fit that it was asked of
+    slips: Slips = field(default_factory=Slips)
+    #: what choosing the samples that were lost has cost, in twice the log likelihood
+    cost: float = 0.0
+    _asked: tuple[Fit, Board] | None = None
+
+    def board_of(self, fit: Fit) -> Board:
+        """Return what every effect would do to a fit, in its own noise; of the last fit that was asked it is known."""
+        if self._asked is None or self._asked[0] is not fit:
+            self._asked = fit, board_of(fit, self.trials, fit.noise, fit.plant.sizes.continuous)
+        return self._asked[1]
+
+    def at_base(self) -> Search:
+        """Return the search as if nothing had been found."""
+        return replace(self, final=self.base)
+
+
+def values_of_fit(tied: Tied) -> Start:
+    """Return the values of a fit's parameters as a start for another."""
+    return {(q.key, q.recordings): float(v) for q, v in zip(tied.fit.parameters, tied.fit.at, strict=True)}
+
+
+def chi2_in(tied: Tied, noise: NoiseModel) -> float:
+    """Return the chi-squared of a fit's residuals in a given noise."""
+    return sum(
+        chi_squared(linear, noise, residual) for linear, residual in zip(tied.fit.linears, tied.residuals, strict=True)
+    )
+
+
+def far(found: Search, tied: Tied) -> bool:
+    """Tell whether a fit is far from the data."""
+    return chi2_in(tied, found.loose_noise) > FAR * tied.fit.count
+
+
+def lost(found: Search, tied: Tied) -> bool:
+    """Tell whether a fit is far from the data and leaves what is no noise: no answer rests on it."""
+    return far(found, tied) and bool(remainders(tied.fit.linears, tied.residuals, tied.fit.noise))
+
+
+#: chi-squared per reading, in the noise that it shows, up to which the relaxed fit follows the data
+_FOLLOWED = 2.0
+
+
+#: an effect that leaves more than this share of the baseline's chi-squared leads no nearer to the data: of two that
+#: are hidden the larger leaves half of it, or less
+_NO_NEARER = 0.7
+
+
+def no_nearer(found: Search, before: Tied, after: Tied) -> bool:
+    """Tell whether one fit is not much nearer to the data than another."""
+    return chi2_in(after, found.loose_noise) > _NO_NEARER * chi2_in(before, found.loose_noise)
+
+
+def misses(found: Search, tied: Tied) -> bool:
+    """Tell whether a fit is far from data that the relaxed fit follows: whatever it holds, something is missing."""
+    return far(found, tied) and found.loose.merit < _FOLLOWED * found.loose.count
+
+
+def on_the_disc(found: Search, start: Start) -> bool:
+    """Tell whether a start has no centre of mass off the disc.
+
+    Of recordings in which that hardly shows algebra asks for any number, under which no motion lasts. A sensor's place
+    that nothing shows, as along the axis of a table, does no harm.
+    """
+    radius = _radius(found.recordings[0])
+    return all(abs(number) <= radius for (key, _), number in start.items() if _is_place(key[0], "motion"))
+
+
+def _is_place(id: str, acts_on: str | None = None) -> bool:
+    """Tell whether an effect's parameters are distances from the disc's centre or from another place on it, m.
+
+    With ``acts_on`` only where it acts on that.
+    """
+    row = row_of(id)
+    return row is not None and row.on_disc and acts_on in (None, row.acts_on)
+
+
+def _radius(recording: Recording) -> float:
+    return np.inf if recording.disc is None else 0.5 * recording.disc.diameter
+
+
+def possible(tied: Tied) -> bool:
+    """Tell whether a fit's parameters make sense.
+
+    Friction does not drive, an event is told from the start, neither a sensor nor the centre of mass lies off the disc.
+    """
+    sd = np.sqrt(np.maximum(np.diag(tied.fit.covariance), 0.0))
+    recording = tied.fit.chains[0].recording
+    radius = _radius(recording)
+    for q, value, error in zip(tied.fit.parameters, tied.fit.at, sd, strict=True):
+        if q.key in ONE_SIDED and ONE_SIDED[q.key] * value < -3.0 * error:
+            return False
+        if q.key == ("event.spin_step", "t_s") and value < tied.fit.plant.durations.event_from:
+            return False
+        if _is_place(q.group) and abs(value) - 3.0 * error > radius:
+            return False
+    return True
+
+
+def from_here(proposal: Proposal, current: Tied) -> Proposal:
+    """Return a proposal whose start keeps what the fit has found for everything else."""
+    own = {key: value for key, value in proposal.start.items() if key[0][0] == proposal.trial.id}
+    return replace(proposal, start={**values_of_fit(current), **own})
