@@ -12,7 +12,7 @@ from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.found import Search
 from validation.diagnosis.selection.hypothesis import fitted_parameters
 from validation.identification.competing_effects import row_of, user_effect
-from validation.identification.linearisation import Linear
+from validation.identification.linear import Linear
 from validation.identification.normal_equations import local_step
 
 __all__ = ["located_effect", "located_rest"]

@@ -18,7 +18,7 @@ from discsim.frames import conjugate, multiply
 from discsim.recording import Recording
 from validation.diagnosis.consistency.spin_agreement import written_ratios
 from validation.identification.gauss_newton import Fit, linearised, merit_of, refit
-from validation.identification.linearisation import Linear
+from validation.identification.linear import Linear
 from validation.identification.noise import channel_of, estimate_noise, stated_noise, whitened
 from validation.identification.parameters import Parameter
 from validation.identification.plants import plant_of

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
-from validation.identification.linearisation import Linear, linearise, moved, reread
+from validation.identification.linear import Linear
+from validation.identification.linearisation import linearise, moved, reread
 from validation.identification.noise import NoiseModel, chi_squared
 from validation.identification.normal_equations import OWN_REACH, Reduced, local_step, reduce, shared_step
 from validation.identification.parameters import Jumps, Parameter, Values, values_of

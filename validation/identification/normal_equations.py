@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 
 from discsim.arrays import FloatArray
-from validation.identification.linearisation import Linear
+from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel, whitened
 from validation.identification.parameters import Jumps, Parameter
 from validation.identification.release_prior import release_rows

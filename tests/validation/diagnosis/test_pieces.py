@@ -36,7 +36,8 @@ from discsim.sensors import Instruments, record
 from discsim.trajectory import predict
 from validation.diagnosis.relaxed_fit import beginning
 from validation.identification import linearisation
-from validation.identification.linearisation import Linear, linearise
+from validation.identification.linear import Linear
+from validation.identification.linearisation import linearise
 from validation.identification.observations import readings_of
 from validation.identification.plants.flight import FLIGHT
 from validation.identification.plants.free_spin import FREE_SPIN

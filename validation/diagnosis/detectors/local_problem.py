@@ -12,7 +12,7 @@ from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
 from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import Fit, linearised
-from validation.identification.linearisation import IntArray, Linear
+from validation.identification.linear import IntArray, Linear
 from validation.identification.noise import NoiseModel, whitened
 from validation.identification.normal_equations import reduce, unknown_prior
 from validation.identification.parameters import Parameter

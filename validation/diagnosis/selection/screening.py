@@ -15,7 +15,7 @@ from discsim.arrays import FloatArray
 from discsim.errors import InputError
 from validation.diagnosis.selection.candidates import Trial, parameters_of
 from validation.identification.gauss_newton import Fit, linearised_columns, mapped
-from validation.identification.linearisation import Linear
+from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel
 from validation.identification.normal_equations import Reduced, reduce
 from validation.identification.parameters import Jumps, Parameter

@@ -15,7 +15,7 @@ from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.diagnosis.selection.screening import Answer, Board, column_of
 from validation.diagnosis.selection.to_stated import to_baseline
 from validation.identification.gauss_newton import Fit, linearised_columns, mapped, refit
-from validation.identification.linearisation import Linear
+from validation.identification.linear import Linear
 from validation.identification.normal_equations import reduce
 from validation.identification.parameters import Parameter
 from validation.identification.plants import Plant

@@ -15,7 +15,8 @@ from validation.diagnosis.selection.screening import Board, column_of
 from validation.diagnosis.selection.to_stated import to_baseline
 from validation.diagnosis.unknown_law.terms import SENSORS, SHAPES, SensorTerm
 from validation.identification.gauss_newton import Fit, linearised, mapped
-from validation.identification.linearisation import IntArray, Linear, moved
+from validation.identification.linear import IntArray, Linear
+from validation.identification.linearisation import moved
 from validation.identification.noise import whitened
 from validation.identification.normal_equations import local_step, reduce, shared_step
 from validation.identification.parameters import Parameter

@@ -35,10 +35,10 @@ class Layout:
     """Where the numbers of a state stand that others ask for by name; None for what a state does not hold.
 
     A state has ``size`` numbers and moves in ``directions``: the four numbers of an attitude (quaternion from B to N)
-    by small turns in B, each other number by itself, and numbers behind the last direction not at all. ``position`` and
-    ``velocity`` are in N, m and m/s, ``rate`` in B, rad/s; ``spin`` is the rate about the spin axis, ``yaw`` a
-    rig's angle about its own, rad. ``per_time`` are
-    the numbers that are smaller by a ratio where all times are written larger by it.
+    by small turns in B, each other number by itself; without an attitude, numbers behind the last direction follow from
+    the others and do not move. ``position`` and ``velocity`` are in N, m and m/s, ``rate`` in B, rad/s; ``spin`` is the
+    rate about the spin axis, ``yaw`` a rig's angle about its own, rad. ``per_time`` are the numbers that come out
+    smaller by a ratio where all times are written larger by it.
     """
 
     size: int
@@ -50,6 +50,13 @@ class Layout:
     spin: int | None = None
     yaw: int | None = None
     per_time: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.attitude is not None and self.directions != self.size - 1:
+            raise ValueError(
+                f"a state of {self.size} numbers, an attitude among them, moves in {self.directions} directions; "
+                f"expected {self.size - 1}"
+            )
 
     def moved(self, states: FloatArray, tangents: FloatArray) -> FloatArray:
         """Return states (..., s) moved by tangents (..., d)."""

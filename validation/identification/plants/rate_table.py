@@ -57,13 +57,7 @@ def _corners(given: Given, start: float, stop: float) -> list[float]:
 
 
 def _propagate(
-    given: Given,
-    flats: FloatArray,
-    own: FloatArray,
-    states: FloatArray,
-    times: FloatArray,
-    last: int,
-    out: FloatArray,
+    given: Given, flats: FloatArray, own: FloatArray, states: FloatArray, times: FloatArray, last: int, out: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     del own
     rows, ends = rows_for(states, out)

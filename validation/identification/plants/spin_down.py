@@ -48,13 +48,7 @@ def _longest_step(given: Given, state: FloatArray, start: float, stop: float) ->
 
 
 def _propagate(
-    given: Given,
-    flats: FloatArray,
-    own: FloatArray,
-    states: FloatArray,
-    times: FloatArray,
-    last: int,
-    out: FloatArray,
+    given: Given, flats: FloatArray, own: FloatArray, states: FloatArray, times: FloatArray, last: int, out: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     del own
     rows, ends = rows_for(states, out)
