@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from discsim.effects import effect
 from discsim.effects.setup import axes_of, permutation
@@ -18,7 +19,8 @@ from validation.challenge.cases.detection_limit import sizes
 from validation.challenge.cases.draw import draw_case
 from validation.challenge.cases.setups import draw_fault, equivalents, possible_faults
 from validation.challenge.cases.sizes import HIDING, ordinary
-from validation.diagnosis.setup import find_setup_faults
+from validation.diagnosis.selection.stepwise import search
+from validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault
 
 CASES = {plant: draw_case(3, plant, kind="nothing") for plant in PLANTS}
 
@@ -252,3 +254,41 @@ def test_in_a_flight_the_air_tells_columns_apart_where_lost_samples_turn_the_pha
     assert [item.effect.id for item in case.concealed] == ["mag.axes", "mag.dropped_samples"]
     found = find_setup_faults(recordings(case))
     assert found.effects == (case.concealed[0].effect,)
+
+
+def test_a_fault_that_other_physics_hides_from_the_sensors_relations_is_supposed_where_it_gains_most():
+    """Stray iron at the ground spoils what the field says of a gyroscope whose columns are mixed up."""
+    case = draw_case(93002, kind="setup")
+    assert [item.effect.id for item in case.concealed] == ["gyro.axes", "mag.stray_field"]
+    findings = find_setup_faults(
+        recordings(replace(case, runs=case.runs[:4], stated_releases=case.stated_releases[:4]))
+    )
+    assert findings.faults == ()
+    supposed = with_likeliest_fault(findings)
+    assert supposed is not None
+    assert supposed.effects == (case.concealed[0].effect,)
+
+
+def test_of_sound_recordings_no_fault_is_supposed():
+    sound = tuple(recordings(brief(CASES["flight"])))
+    assert with_likeliest_fault(SetupFindings((), sound)) is None
+
+
+def test_a_turned_board_is_told_by_what_all_sensors_say_though_physics_spoils_the_first_look_at_the_air():
+    case = draw_case(93014, kind="setup")
+    assert [item.effect.id for item in case.concealed] == ["board.rotation", "aero.spin_drag"]
+    some = replace(case, runs=case.runs[:4], stated_releases=case.stated_releases[:4])
+    (found,) = find_setup_faults(recordings(some)).effects
+    true, told = (Rotation.from_rotvec([*one.value]) for one in (case.concealed[0].effect, found))
+    assert (true.inv() * told).magnitude() < 0.1
+
+
+@pytest.mark.parametrize("seed", [93006, 93012])
+def test_where_the_field_alone_is_read_a_tilt_of_the_axis_and_another_field_stand_beside_each_other(seed):
+    case = draw_case(seed, kind="setup")
+    assert case.concealed[1].effect.id == "rig.axis_tilt"
+    made = [corrected(one, [case.concealed[0].effect]) for one in recordings(case)]
+    found = search(made)
+    (trial,) = found.final.hypothesis.trials
+    assert trial.id == "rig.axis_tilt"
+    assert "site.field" in [rival.trial.id for rival in found.rivals["rig.axis_tilt"]]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from discsim.effects.own import UserEffect
 from discsim.recording import Recording
 from validation.diagnosis.assemble import assemble
-from validation.diagnosis.consistency.early_verdict import contradiction_after, contradiction_in
+from validation.diagnosis.consistency.early_verdict import Contradiction, contradiction_after, contradiction_in
 from validation.diagnosis.consistency.spin_agreement import agreement_of
 from validation.diagnosis.contradicted import contradicted_outcome
 from validation.diagnosis.datasets import recording_names
@@ -19,11 +19,12 @@ from validation.diagnosis.relaxed_fit import relaxed
 from validation.diagnosis.result import Outcome
 from validation.diagnosis.selection.found import Search
 from validation.diagnosis.selection.stepwise import search
-from validation.diagnosis.setup import find_setup_faults
+from validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault
 from validation.diagnosis.setup_effects import free_parameters, with_setup
 from validation.diagnosis.unknown_law.find import find_law
 from validation.diagnosis.verdict import verdict_of
 from validation.identification.competing_effects import competing, row_of
+from validation.identification.gauss_newton import Fit
 from validation.identification.plants.plan import Plan
 from validation.identification.stated_parameters import stated_parameters
 
@@ -42,6 +43,35 @@ def _stacked(found: Search) -> bool:
     """Tell whether several effects on the motion were found, so that one law is worth comparing with them."""
     rows = [row_of(trial.id) for trial in found.final.hypothesis.trials if not trial.id.startswith("event.")]
     return sum(row is not None and row.acts_on == "motion" for row in rows) >= _STACK
+
+
+@dataclass(frozen=True)
+class _Begun:
+    """Recordings before a search: as they were ``meant``, what is ``fitted``, the relaxed fit, and what must be known.
+
+    ``contradiction`` is why no search begins, where none does; ``followed`` is there where one does.
+    """
+
+    setup: SetupFindings
+    meant: list[Recording]
+    fitted: list[Recording]
+    notes: list[str]
+    followed: Fit | None
+    contradiction: Contradiction | None
+
+
+def _begun(setup: SetupFindings, called: Sequence[str], progress: Callable[[str, int, int], None]) -> _Begun:
+    """Follow recordings as a setup says that they were meant, or find that their sensors contradict one another."""
+    meant, warnings = prepared(list(setup.recordings), called)
+    fitted, notes = with_inertia(meant)
+    known = (*stated_parameters(fitted), *free_parameters(setup))
+    progress("asking whether sensors contradict one another", 0, 5)
+    followed, contradiction = None, contradiction_in(fitted, known)
+    if contradiction is None:
+        progress("following the data", 1, 5)
+        followed = relaxed(fitted, known)
+        contradiction = contradiction_after(followed)
+    return _Begun(setup, meant, fitted, [*warnings, *notes], followed, contradiction)
 
 
 def diagnose(
@@ -63,22 +93,19 @@ def diagnose(
     called = [name for group in recording_names(datasets, names) for name in group]
     progress("checking the setup", 0, 5)
     setup = find_setup_faults(recordings)
-    meant, warnings = prepared(list(setup.recordings), called)
-    fitted, notes = with_inertia(meant)
-    free = free_parameters(setup)
     with competing(user_effects):
-        known = (*stated_parameters(fitted), *free)
-        progress("asking whether sensors contradict one another", 0, 5)
-        contradiction = contradiction_in(fitted, known)
-        if contradiction is None:
-            progress("following the data", 1, 5)
-            followed = relaxed(fitted, known)
-            contradiction = contradiction_after(followed)
-        if contradiction is not None:
-            outcome = contradicted_outcome(contradiction, meant, names, called, seed)
+        begun = _begun(setup, called, progress)
+        if begun.contradiction is not None and (further := with_likeliest_fault(setup)) is not None:
+            # a fault that other physics hides from the relations between sensors is told by what follows them then
+            again = _begun(further, called, progress)
+            begun = again if again.contradiction is None else begun
+        setup, meant, fitted = begun.setup, begun.meant, begun.fitted
+        if begun.contradiction is not None:
+            outcome = contradicted_outcome(begun.contradiction, meant, names, called, seed)
             outcome = with_setup(outcome, setup, recordings, None)
-            return _with_notes(outcome, [*warnings, *notes], meant, called)
-        found = search(fitted, progress, meant, followed, free)
+            return _with_notes(outcome, begun.notes, meant, called)
+        free = free_parameters(setup)
+        found = search(fitted, progress, meant, begun.followed, free)
         law = None
         verdict, unexplained = verdict_of(found)
         if unexplained or _stacked(found):
@@ -90,7 +117,7 @@ def diagnose(
             advice = advise(found, called, plans)
         outcome = assemble(found, names, called, seed, law, advice)
     outcome = with_setup(outcome, setup, recordings, found.final.fit)
-    return _with_notes(outcome, [*warnings, *notes], meant, called)
+    return _with_notes(outcome, begun.notes, meant, called)
 
 
 def _with_notes(

@@ -90,6 +90,31 @@ def test_near_the_data_four_are_refitted(monkeypatch):
     np.testing.assert_allclose(bars, np.array(half) / COUNT)
 
 
+def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present_one_is(monkeypatch):
+    """Algebra asked for a number far off; from no effect at all the same fit comes to what it gains."""
+    recordings = coasts(seconds=1.0)
+    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
+    linears = linearised(fit)
+    fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
+    base = Tied(Hypothesis(), fit, 1e4)
+    tilt = free_trial("rig.axis_tilt")
+    size = (("rig.axis_tilt", "tilt_north_rad"), None)
+
+    def told(fit: Fit, hypothesis: Hypothesis, own: object, noise: object, start: dict, *, bar: float) -> Tied:
+        return Tied(hypothesis, fit, 2e4 if size in start else 0.0)
+
+    monkeypatch.setattr(searching, "tied_fit", told)
+    monkeypatch.setattr(searching, "chi2_in", lambda tied, noise: 1.1 * tied.fit.count)
+    monkeypatch.setattr(finding, "board_of", lambda *_: None)
+    monkeypatch.setattr(searching, "searched", lambda *_: [])
+    monkeypatch.setattr(searching, "proposals", lambda *_: [])
+    monkeypatch.setattr(searching, "one_per_effect", lambda _: [Proposal(tilt, 1e6, {size: 0.3})])
+    found = finding.Search(tuple(recordings), (), fit, fit.noise, (tilt,), base, base)
+    best = searching._next(found, None, base, 0)  # type: ignore[arg-type]
+    assert best is not None
+    assert best.hypothesis.trials == (tilt,)
+
+
 def exchanged(monkeypatch: pytest.MonkeyPatch, without_scale: float) -> set[str] | None:
     """Return what an offset, a scale and a turned board give way to, where a place could be in place of the board.
 

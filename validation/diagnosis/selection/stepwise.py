@@ -60,6 +60,9 @@ _HOPELESS = 10.0
 #: what it counts, in twice the log likelihood, that an effect came out with the sign that physics gives it: a lag and
 #: an offset of time are one to first order; of fits that tie to within what a few readings weigh the lag is named
 _RIGHT_SIGN = 4.0
+#: a fit with one more effect cannot be worse than that without: one that is, by more than rounding and a noise that was
+#: estimated anew, has gone astray
+_WORSE = 10.0
 #: a gain below this may be due to where the fits started
 _DOUBTFUL = 200.0
 
@@ -232,6 +235,8 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
             {**values_of_fit(current), **proposal.start, **_wobbles(fit)},
             bar=_HOPELESS * best_chi2 if distant else beside,
         )
+        if not distant and not cost and refitted.score > current.score + _WORSE:
+            refitted = _begun_again(found, current, proposal, beside)
         refitted = replace(refitted, score=refitted.score + found.cost + cost)
         gain, chi2 = _consider(found, (current.score, chi2_now), refitted, proposal.trial)
         if gain > price(proposal.trial) and possible(refitted):
@@ -248,6 +253,16 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     if cost > 0:
         found.loose = replace(found.loose, chains=fit.chains)
     return best
+
+
+def _begun_again(found: Search, current: Tied, proposal: Proposal, bar: float) -> Tied:
+    """Return a refit that begins where the present fit is, the further effect without a size yet.
+
+    Of a direction that hardly shows, as a tilt square to the field, algebra may ask for any number.
+    """
+    shapes = {key: number for key, number in proposal.start.items() if key[0][1] in proposal.trial.shapes}
+    start = {**values_of_fit(current), **shapes}
+    return tied_fit(current.fit, current.hypothesis.plus(proposal.trial), found.own, current.fit.noise, start, bar=bar)
 
 
 def _in_turn(*offers: Sequence[Offer]) -> list[Offer]:

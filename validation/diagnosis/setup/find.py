@@ -24,7 +24,7 @@ from validation.diagnosis.setup.remedy import MapAxes, remedy
 from validation.diagnosis.setup.units import clock_unit, sensor_units
 from validation.identification.plants import Plant, plant_of
 
-__all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said"]
+__all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said", "with_likeliest_fault"]
 
 #: what a fault must gain, in twice the log likelihood of the relations between sensors; on 40 concealed sets of all
 #: kinds the largest gain of a fault that is not there is 15 (lost samples of a magnetometer), the next 0.3
@@ -112,6 +112,24 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
     return SetupFindings(tuple(faults), current)
 
 
+def with_likeliest_fault(findings: SetupFindings) -> SetupFindings | None:
+    """Return findings with one more fault that gains most, though relations hold badly with it; None if none gains.
+
+    Physics beside a fault, as a field that changes with height, may spoil relations that the fault does not. It is a
+    supposition, for whoever can test it otherwise: by whether a motion follows the sensors then.
+    """
+    recordings = [_judgeable(one) for one in findings.recordings]
+    if len(findings.faults) == MOST or not all(one.samples for one in recordings):
+        return None
+    ranking = hypotheses(recordings, PRICE)
+    found = ranking.found
+    if not found or found[0].kind == "rival" or not _gains(ranking.as_written, found[0]):
+        return None
+    fault = _fault(ranking.as_written, tuple(item for item in found if item.kind != "rival"), recordings)
+    current = tuple(corrected(one, [fault.effect]) for one in findings.recordings)
+    return SetupFindings((*findings.faults, fault), current)
+
+
 def _judgeable(recording: Recording) -> Recording:
     """Return the part of a recording that is judged: where it turns most, if it is long.
 
@@ -170,11 +188,7 @@ def _next(recordings: Sequence[Recording]) -> list[SetupFault]:
         return []
     found = tuple(item for item in found if item.kind != "rival")
     if found and _agrees(found[0]) and _gains(as_written, found[0]):
-        tied = [item for item in found if _may_be_meant(item, found[0], plant_of(recordings[0]))]
-        best, others = _told_apart(tied, recordings, site)
-        twins = [_effect(item, site) for item in sorted(others, key=lambda item: item.kind != best.kind)]
-        gain = float("inf") if before is None else float(np.sum(before) - best.cost)
-        return [SetupFault(_effect(best, site), gain, _heldout(before, best, found), tuple(twins[:MOST_TWINS]))]
+        return [_fault(as_written, found, recordings)]
     if as_written is not None and _agrees(as_written):
         return []
     for both, one, other in pairs(ranking.base)[:1]:
@@ -182,6 +196,17 @@ def _next(recordings: Sequence[Recording]) -> list[SetupFault]:
             gain = float("inf") if before is None else float(np.sum(before) - both.cost)
             return [SetupFault(_effect(item, site), gain, None) for item in (one, other)]
     return []
+
+
+def _fault(as_written: Hypothesis | None, found: Sequence[Hypothesis], recordings: Sequence[Recording]) -> SetupFault:
+    """Return the best of hypotheses as a fault, with those that cannot be told from it."""
+    site = recordings[0].environment.magnetic_field
+    before = None if as_written is None else as_written.costs
+    tied = [item for item in found if _may_be_meant(item, found[0], plant_of(recordings[0]))]
+    best, others = _told_apart(tied, recordings, site)
+    twins = [_effect(item, site) for item in sorted(others, key=lambda item: item.kind != best.kind)]
+    gain = float("inf") if before is None else float(np.sum(before) - best.cost)
+    return SetupFault(_effect(best, site), gain, _heldout(before, best, found), tuple(twins[:MOST_TWINS]))
 
 
 #: most hypotheses that short fits are made of; a twin is refuted where it leaves this many times more
@@ -216,12 +241,12 @@ def _may_be_meant(item: Hypothesis, best: Hypothesis, plant: Plant) -> bool:
 
     Where the best leaves more than sound recordings do, something else is wrong, too: lost samples turn the phase of
     one sensor, and columns turned about the spin axis may then cost less than the true ones. In a flight the air is
-    asked about all of that sensor that come as near.
+    asked about all of that sensor that come as near; of a turned board each relation tells, and it is not asked.
     """
     if item.charged < best.charged + TWIN:
         return True
     spoilt = best.cost > SOUND * best.weight
-    alike = (item.kind, item.sensor) == (best.kind, best.sensor)
+    alike = best.kind == "axes" and (item.kind, item.sensor) == (best.kind, best.sensor)
     return plant.air_modelled and spoilt and alike and item.cost < AGREE * item.weight
 
 
