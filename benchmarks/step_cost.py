@@ -1,19 +1,22 @@
-"""What a step of the truth costs: MuJoCo's bare loop against the same loop with a callback on it.
+"""What a step of the truth costs: MuJoCo's bare loop against the same loop with our air, a flight, and many flights.
 
-Usage: ``python benchmarks/step_cost.py [--steps 4000] [--rounds 15]``
+Usage: ``python benchmarks/step_cost.py [step] [batch] [--steps 1000 2000 4000] [--rounds 15] [--flights 10 100 1000]``;
+without names, both parts.
 
 All variants step the same model from the same state, interleaved round by round so that a change of the machine's
-clock falls on all of them. Time is the thread's own CPU time, which leaves out the turns of other processes. The
-median over rounds is printed with the quartiles, and the ratio to the bare loop is the median of the rounds' ratios.
+clock falls on all of them. Time is the thread's own CPU time, which leaves out the turns of other processes; what other
+work on the machine does to caches and clock only adds, so each ratio is that of the least of all rounds, and the
+quartiles of the rounds' ratios stand beside it.
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import os
 import platform
 from collections.abc import Callable
-from time import thread_time
+from time import perf_counter, process_time, thread_time
 from typing import Any
 
 import mujoco
@@ -24,10 +27,12 @@ from rich.table import Table
 
 from discsim.callbacks import passive_force
 from discsim.engine import FlyingDisc, fly
+from discsim.many_flights import fly_many
 from discsim.shipped import load_disc, load_throw
 
 DISC, ENVIRONMENT = load_disc("driver")
 THROW = load_throw("driver")
+BARE = "bare loop, no callback"
 
 
 def nothing(model: Any, data: Any) -> None:
@@ -35,7 +40,7 @@ def nothing(model: Any, data: Any) -> None:
 
 
 def native_loop(flying: FlyingDisc, steps: int) -> float:
-    """Seconds for the steps inside one call into MuJoCo: the cost without Python's loop (no callback possible)."""
+    """Seconds for the steps inside one call into MuJoCo: the cost without Python's loop."""
     start = thread_time()
     mujoco.mj_step(flying.model, flying.data, nstep=steps)
     return thread_time() - start
@@ -50,23 +55,22 @@ def python_loop(flying: FlyingDisc, steps: int) -> float:
     return thread_time() - start
 
 
-def with_callback(apply: Callable[[Any, Any], None]) -> Callable[[FlyingDisc, int], float]:
-    """Return the Python loop with a passive-force callback installed."""
-
-    def run(flying: FlyingDisc, steps: int) -> float:
-        with passive_force(flying.model, apply):
-            return python_loop(flying, steps)
-
-    return run
+def with_nothing(flying: FlyingDisc, steps: int) -> float:
+    """Seconds for the steps with a callback in Python that does nothing."""
+    with passive_force(flying.model, nothing):
+        return python_loop(flying, steps)
 
 
-def whole_flight(steps: int) -> float:
-    """Seconds per ``steps`` steps of `fly`, which also looks for the ground and keeps every state.
+def with_air(flying: FlyingDisc, steps: int, python: bool) -> float:
+    """Seconds for the steps with our air, called by MuJoCo in C or in Python."""
+    with flying.air(python):
+        return python_loop(flying, steps)
 
-    Each state kept costs a forward evaluation for its acceleration, one more than the step's four.
-    """
+
+def whole_flight(steps: int, python: bool = False) -> float:
+    """Seconds per ``steps`` steps of `fly`, which builds the disc, looks for the ground and keeps every state."""
     start = thread_time()
-    motion = fly(DISC, ENVIRONMENT, THROW, duration=steps * 1e-3)
+    motion = fly(DISC, ENVIRONMENT, THROW, duration=steps * 1e-3, python=python)
     return (thread_time() - start) * steps / (motion.t.size - 1)
 
 
@@ -74,11 +78,13 @@ def measure(steps: int, rounds: int) -> dict[str, np.ndarray]:
     """Return microseconds per step (rounds,) of each variant."""
     flying = FlyingDisc(DISC, ENVIRONMENT)
     variants: dict[str, Callable[[], float]] = {
-        "bare loop, no callback": lambda: python_loop(flying, steps),
+        BARE: lambda: python_loop(flying, steps),
         "bare loop inside MuJoCo": lambda: native_loop(flying, steps),
-        "empty Python callback": lambda: with_callback(nothing)(flying, steps),
-        "our air": lambda: with_callback(flying.apply)(flying, steps),
+        "empty Python callback": lambda: with_nothing(flying, steps),
+        "our air, callback in C": lambda: with_air(flying, steps, python=False),
+        "our air, callback in Python": lambda: with_air(flying, steps, python=True),
         "fly(): air, ground, states kept": lambda: whole_flight(steps),
+        "the same, callback in Python": lambda: whole_flight(steps, python=True),
     }
     cost: dict[str, list[float]] = {name: [] for name in variants}
     for turn in range(rounds + 1):
@@ -90,28 +96,78 @@ def measure(steps: int, rounds: int) -> dict[str, np.ndarray]:
     return {name: np.array(values) for name, values in cost.items()}
 
 
-def main() -> None:
-    """Measure and print the table."""
-    parser = argparse.ArgumentParser(description="Cost of an RK4 step of the truth, by what hangs on it.")
-    parser.add_argument("--steps", type=int, default=4000, help="steps per measurement (default %(default)s)")
-    parser.add_argument("--rounds", type=int, default=15, help="measurements of each variant (default %(default)s)")
-    given = parser.parse_args()
-    if not 1 <= given.steps <= 6000 or given.rounds < 1:
-        parser.error("expected 1 to 6000 steps (the throw lasts 6.9 s of 1 ms) and at least one round")
-    cost = measure(given.steps, given.rounds)
-    bare = cost["bare loop, no callback"]
+def step(sizes: list[int], rounds: int) -> None:
+    """Print the cost of a step by what hangs on it, for loops of several lengths."""
     table = Table(
-        title=f"us of CPU per RK4 step of 1 ms, {given.rounds} rounds of {given.steps} steps",
+        title=f"CPU time per RK4 step of 1 ms over the bare loop's, {rounds} rounds",
         caption=f"MuJoCo {mujoco.__version__}, numba {numba.__version__}, Python {platform.python_version()}, "
         f"{platform.machine()}, {os.cpu_count()} cores",
     )
-    for heading in ("variant", "median", "quartiles", "ratio to bare", "s per simulated s"):
+    table.add_column("steps")
+    for heading in ("variant", "us", "over the bare loop", "quartiles"):
         table.add_column(heading, justify="left" if heading == "variant" else "right")
-    for name, values in cost.items():
-        low, middle, high = np.percentile(values, [25, 50, 75])
-        ratio = float(np.median(values / bare))
-        table.add_row(name, f"{middle:.2f}", f"{low:.2f} .. {high:.2f}", f"{ratio:.2f}", f"{middle * 1e-3:.4f}")
+    for steps in sizes:
+        cost = measure(steps, rounds)
+        for name, values in cost.items():
+            low, high = np.percentile(values / cost[BARE], [25, 75])
+            ratio = values.min() / cost[BARE].min()
+            shown = str(steps) if name == BARE else ""
+            table.add_row(shown, name, f"{values.min():.2f}", f"{ratio:.2f}", f"{low:.2f} .. {high:.2f}")
     Console(width=110).print(table)
+
+
+def batch(sizes: list[int]) -> None:
+    """Print how many flights at once compare with one after another.
+
+    By the clock, which other work on the machine spoils, and by the processor time of the busiest thread, with all that
+    one thread does alone, which it spoils less: on a quiet machine that thread is the clock.
+    """
+    cores = len(os.sched_getaffinity(0))
+    rng = np.random.default_rng(0)
+    fly_many(DISC, ENVIRONMENT, [THROW], duration=0.01)
+    print(f"flights until they land, by mujoco.batch on one thread and on {cores}")
+    for count in sizes:
+        releases = [dataclasses.replace(THROW, velocity=THROW.velocity * k) for k in rng.uniform(0.25, 0.35, count)]
+        clock, busiest, total = {}, {}, {}
+        for threads in (1, cores):
+            start, process, own = perf_counter(), process_time(), thread_time()
+            ends = fly_many(DISC, ENVIRONMENT, releases, threads=threads)
+            own = thread_time() - own
+            total[threads] = process_time() - process
+            busiest[threads] = max(own, (total[threads] - own) / max(threads - 1, 1))
+            clock[threads] = perf_counter() - start
+        start = thread_time()
+        some = releases[:20]
+        for release in some:
+            fly(DISC, ENVIRONMENT, release)
+        alone = (thread_time() - start) / len(some) * count
+        ratio = busiest[1] / busiest[cores]
+        print(
+            f"{count:5d} flights of {ends.state.t.mean():.2f} s: {total[1]:.2f} s of CPU on one thread "
+            f"({alone:.2f} s by fly() one after another), {total[cores]:.2f} s on {cores}, its busiest thread "
+            f"{busiest[cores]:.2f} s: {ratio:.2f} times less, {ratio / cores:.2f} of the cores; "
+            f"by the clock {clock[1] / clock[cores]:.2f}"
+        )
+
+
+def main() -> None:
+    """Run the parts."""
+    parser = argparse.ArgumentParser(description="Cost of the truth: of an RK4 step, of a flight, of many flights.")
+    parser.add_argument("parts", nargs="*", help="step, batch; none: both")
+    parser.add_argument("--steps", type=int, nargs="+", default=[1000, 2000, 4000], help="steps per measurement")
+    parser.add_argument("--rounds", type=int, default=15, help="measurements of each variant (default %(default)s)")
+    parser.add_argument("--flights", type=int, nargs="+", default=[10, 100, 1000], help="flights at once")
+    given = parser.parse_args()
+    if not all(1 <= steps <= 6000 for steps in given.steps) or given.rounds < 1 or min(given.flights) < 1:
+        parser.error("expected 1 to 6000 steps (the throw lasts 6.9 s of 1 ms), and at least one round and one flight")
+    parts: dict[str, Callable[[], None]] = {
+        "step": lambda: step(given.steps, given.rounds),
+        "batch": lambda: batch(given.flights),
+    }
+    if unknown := [name for name in given.parts if name not in parts]:
+        parser.error(f"no part '{unknown[0]}'; expected some of {', '.join(parts)}")
+    for name in given.parts or parts:
+        parts[name]()
 
 
 if __name__ == "__main__":

@@ -169,7 +169,7 @@ def air_wrench(
     L, D, Y = QA * CL, QA * CD, QA * CY  # (14)
     R, M, N = QA * d * CR, QA * d * CM, QA * d * CN
 
-    # F_H = C2(alpha) [-D, Y, -L], M_H = C2(alpha) [R, M, 0] + [0, 0, N]: (20), (23)
+    # F_H = C2(alpha) [-D, Y, -L], M_H = C2(alpha) [R, M, 0] + [0, 0, N]: (20), (21), (23)
     cos_alpha, sin_alpha = (cos_beta * u + sin_beta * v) / V, w / V
     Fx, Fy, Fz = -D * cos_alpha + L * sin_alpha, Y, -D * sin_alpha - L * cos_alpha
     Mx, My, Mz = R * cos_alpha, M, R * sin_alpha + N

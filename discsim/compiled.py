@@ -18,7 +18,7 @@ from typing import Any, TypeVar, cast
 import numba
 import numba.core.config
 
-__all__ = ["compiled", "compiled_nogil", "compiled_sums", "inlined"]
+__all__ = ["compiled", "compiled_address", "compiled_nogil", "compiled_sums", "inlined"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -57,6 +57,25 @@ def compiled_sums(function: F) -> F:
 def inlined(function: F) -> F:
     """Compile like `compiled`, into every caller: where passing the arguments costs as much as the work."""
     return _compile(function, forceinline=True)
+
+
+#: C functions stay in memory for as long as the process lives: nobody knows who still holds their address
+_C_FUNCTIONS: list[Any] = []
+
+
+def compiled_address(function: Callable[..., Any], signature: str) -> int:
+    """Return the address of ``function``, compiled at once as a C function of a signature such as "void(intp)"."""
+    config: Any = numba.core.config
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(_cache_folder())
+    try:
+        try:
+            _C_FUNCTIONS.append(numba.cfunc(signature, cache=True, error_model="numpy")(function))
+        except RuntimeError:  # nowhere to write a cache
+            _C_FUNCTIONS.append(numba.cfunc(signature, error_model="numpy")(function))
+    finally:
+        config.CACHE_DIR = before
+    return int(_C_FUNCTIONS[-1].address)
 
 
 def _compile(function: F, nogil: bool = False, forceinline: bool = False, reorder: bool = False) -> F:

@@ -9,33 +9,34 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from typing import Any, Literal
 
 import mujoco
 import numpy as np
 from scipy.optimize import brentq
 
-from discsim.aerodynamics import air_wrench, outside_table, wind
+from discsim.aerodynamics import outside_table
 from discsim.arrays import FloatArray, readonly
 from discsim.callbacks import check_lent, compile_model, own_warnings, passive_force
-from discsim.compiled import compiled
 from discsim.disc import RELEASE_HEIGHT, Disc, Release
 from discsim.effects.body import centre_of_mass, transverse_inertia
 from discsim.effects.catalogue import Effect
-from discsim.effects.events import impulse, spin_step
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import model_file
-from discsim.frames import body_to_ned, flip_yz, norm3, quaternion_from_matrix, rotate_by_quaternion
-from discsim.law import Law, law_wrench
-from discsim.motion import Motion
-from discsim.own_wrench import own_wrench
-from discsim.parameters import PARAMETERS, Tables, flight_parameters, tables
+from discsim.flight_force import LOST, native_force
+from discsim.frames import body_to_ned, flip_yz, quaternion_from_matrix
+from discsim.law import Law
+from discsim.logbook import Logbook, height
+from discsim.motion import Motion, State
+from discsim.native import call_force
+from discsim.parameters import PARAMETERS, flight_parameters, tables
 
-__all__ = ["RELEASE_HEIGHT", "FlyingDisc", "check_model", "fly", "follow"]
+__all__ = ["DIVERGED", "RELEASE_HEIGHT", "FlyingDisc", "centre_state", "check_model", "fly", "follow", "touch_down"]
 
 #: MuJoCo's warnings of a state that is not finite, or beyond all bounds
-_DIVERGED = [
+DIVERGED = [
     int(warning)
     for warning in (
         mujoco.mjtWarning.mjWARN_BADQPOS,
@@ -51,11 +52,15 @@ def check_state(data: Any) -> None:
     Raises RuntimeError where the step's passive force was taken out of its slot.
     """
     check_lent()
-    if data.warning.number[_DIVERGED].any():
-        raise InputError(
-            f"at {data.time:.4f} s the motion is no longer finite; expected rates and speeds that a step can follow "
-            "(lower them, or take a smaller step)"
-        )
+    if data.warning.number[DIVERGED].any():
+        raise _diverged(data)
+
+
+def _diverged(data: Any) -> InputError:
+    return InputError(
+        f"at {data.time:.4f} s the motion is no longer finite; expected rates and speeds that a step can follow "
+        "(lower them, or take a smaller step)"
+    )
 
 
 def without_reset(spec: Any) -> Any:
@@ -82,63 +87,10 @@ def check_model(model: Any) -> None:
         )
 
 
-@compiled
-def _flow(
-    p: Any, t: float, qpos: FloatArray, qvel: FloatArray
-) -> tuple[float, float, float, float, float, float, float]:
-    """Height of the centre of mass, its velocity relative to the air in B, and the body rates, of a free joint."""
-    # MuJoCo's axes to N and B: (x, y, z) -> (x, -y, -z)
-    qw, qx, qy, qz = qpos[3], qpos[4], -qpos[5], -qpos[6]
-    P, Q, r = qvel[3], -qvel[4], -qvel[5]
-    ex, ey, ez = centre_of_mass(p.body_mass_imbalance)
-    _, _, centre_down = rotate_by_quaternion(qw, qx, qy, qz, ex, ey, ez)
-    h = qpos[2] - centre_down
-    sn, se, sd = rotate_by_quaternion(qw, qx, qy, qz, Q * ez - r * ey, r * ex - P * ez, P * ey - Q * ex)
-    wn, we, wd = wind(p, t, h)
-    u, v, w = rotate_by_quaternion(qw, -qx, -qy, -qz, qvel[0] + sn - wn, -qvel[1] + se - we, -qvel[2] + sd - wd)
-    return h, u, v, w, P, Q, r
-
-
-@compiled
-def airspeed(flat: FloatArray, t: float, qpos: FloatArray, qvel: FloatArray) -> float:
-    """Speed of the centre of mass through the air, m/s."""
-    _, u, v, w, _, _, _ = _flow(flat.view(PARAMETERS)[0], t, qpos, qvel)
-    return float(norm3(u, v, w))
-
-
-@compiled
-def flight_force(
-    flat: FloatArray, tables: Tables, t: float, qpos: FloatArray, qvel: FloatArray, qfrc: FloatArray
-) -> bool:
-    """Add the air and the events to a free joint's forces (6,); return False where a C_Nr table does not reach."""
-    p = flat.view(PARAMETERS)[0]
-    h, u, v, w, P, Q, r = _flow(p, t, qpos, qvel)
-    Fx, Fy, Fz, Mx, My, Mz = air_wrench(p, tables, h, u, v, w, P, Q, r)
-    if tables.law.shape[0] > 0:
-        Lx, Ly, Lz, Kx, Ky, Kz = law_wrench(tables.law, t, h, u, v, w, P, Q, r)
-        Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
-    if tables.own_calls.size > 0:
-        Lx, Ly, Lz, Kx, Ky, Kz = own_wrench(tables.own_calls, tables.own_sizes, t, h, u, v, w, P, Q, r)
-        Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
-
-    # a push through the centre of mass; about the geometric centre it has a moment
-    qw, qx, qy, qz = qpos[3], qpos[4], -qpos[5], -qpos[6]
-    ex, ey, ez = centre_of_mass(p.body_mass_imbalance)
-    an, ae, ad = impulse(p.event_impulse, t)
-    bx, by, bz = rotate_by_quaternion(qw, -qx, -qy, -qz, an, ae, ad)
-    m = p.disc.mass
-    Fx, Fy, Fz = Fx + m * bx, Fy + m * by, Fz + m * bz
-    Mx, My, Mz = Mx + m * (ey * bz - ez * by), My + m * (ez * bx - ex * bz), Mz + m * (ex * by - ey * bx)
-    Mz += p.disc.Izz * spin_step(p.event_spin_step, t, r)
-
-    Fn, Fe, Fd = rotate_by_quaternion(qw, qx, qy, qz, Fx, Fy, Fz)
-    qfrc[0] += Fn
-    qfrc[1] -= Fe
-    qfrc[2] -= Fd
-    qfrc[3] += Mx
-    qfrc[4] -= My
-    qfrc[5] -= Mz
-    return not np.isnan(Mz)
+@cache
+def _drawing() -> Any:
+    """Return the specification of ``models/disc.xml``, read once."""
+    return mujoco.MjSpec.from_file(str(model_file("disc.xml")))
 
 
 class FlyingDisc:
@@ -178,11 +130,13 @@ class FlyingDisc:
             raise InputError(f"no rigid body has these inertias or masses: {str(error).splitlines()[0]}") from None
         self.data = mujoco.MjData(self.model)
         check_model(self.model)
-        self._views = (self.data.qpos, self.data.qvel, self.data.qfrc_passive)
+        self._lost = np.zeros(LOST)
+        self._native = native_force(self.parameters, self.tables, self._lost)
+        self._call, self._own = (int(self._native.record[0]), self._native.address), _addresses(self.data)
 
     def specification(self, timestep: float, contacts: bool) -> Any:
         """Return the mujoco.MjSpec that is compiled; a disc with more parts adds them to the body ``disc``."""
-        spec = without_reset(mujoco.MjSpec.from_file(str(model_file("disc.xml"))))
+        spec = without_reset(_drawing().copy())
         spec.option.timestep = timestep
         spec.option.gravity = [0.0, 0.0, -self.environment.gravity]
         spec.option.magnetic = flip_yz(self.environment.magnetic_field)
@@ -220,29 +174,42 @@ class FlyingDisc:
         """Add air and events to ``data.qfrc_passive``: the callback. A model that is not this disc's is ignored."""
         if model is not self.model:
             return
-        qpos, qvel, qfrc = self._views if data is self.data else (data.qpos, data.qvel, data.qfrc_passive)
-        if not flight_force(self.parameters, self.tables, data.time, qpos, qvel, qfrc):
-            if self.tables.rate.size == 0:
-                raise InputError(f"at {data.time:.4f} s the force of the air is no number; expected finite speeds")
-            V = airspeed(self.parameters, data.time, qpos, qvel)
-            raise outside_table(self.tables, data.time, float(qvel[5]), V)
+        function, record = self._call
+        qpos, qvel, qfrc = self._own if data is self.data else _addresses(data)
+        if not call_force(function, record, data.time, qpos, qvel, qfrc):
+            raise self.lost_air() or AssertionError
+
+    def lost_air(self) -> InputError | None:
+        """Return the error of the first force that was not finite since this was asked last; None: all were."""
+        lost, t, rate, airspeed = self._lost
+        self._lost[:] = 0.0
+        if not lost:
+            return None
+        if self.tables.rate.size == 0:
+            return InputError(f"at {t:.4f} s the force of the air is no number; expected finite speeds")
+        return outside_table(self.tables, float(t), float(rate), float(airspeed))
 
     @contextmanager
-    def air(self) -> Iterator[None]:
+    def air(self, python: bool = False) -> Iterator[None]:
         """Install the callback for the block; raises `InputError` where the model's settings would spoil the flight.
 
         Blocks of several discs may be open at once, nested or in several threads: each disc flies in its own air.
+        MuJoCo calls compiled code, and a force that is not finite is an error at the end of the block. With ``python``,
+        and in a subclass with an ``apply`` of its own, it calls `apply`, at twice the cost, and errors are raised
+        at once.
         """
         check_model(self.model)
-        with passive_force(self.model, self.apply):
+        self.lost_air()
+        by_python = python or type(self).apply is not FlyingDisc.apply
+        with passive_force(self.model, self.apply, None if by_python else self._native):
             yield
+            if (error := self.lost_air()) is not None:
+                raise error
 
 
-@compiled
-def _centre_height(qpos: FloatArray, ex: float, ey: float, ez: float) -> float:
-    """Height of the centre of mass, m."""
-    _, _, down = rotate_by_quaternion(qpos[3], qpos[4], -qpos[5], -qpos[6], ex, ey, ez)
-    return float(qpos[2] - down)
+def _addresses(data: Any) -> tuple[int, int, int]:
+    """Return where qpos, qvel and qfrc_passive of MuJoCo's data stand."""
+    return data.qpos.ctypes.data, data.qvel.ctypes.data, data.qfrc_passive.ctypes.data
 
 
 def fly(
@@ -254,73 +221,80 @@ def fly(
     timestep: float = 1e-3,
     duration: float = 30.0,
     ground: Literal["stop", "skip"] = "stop",
+    python: bool = False,
     law: Law | Sequence[Law] | None = None,
 ) -> Motion:
     """Fly a disc in MuJoCo and return its true motion.
 
     The flight ends where the centre of mass reaches the ground (found to better than 1e-7 s), or after ``duration``
     (s). With ``ground="skip"`` the rim has contact and friction with the ground, and the disc skips and slides on
-    until it rests or ``duration`` ends.
+    until it rests or ``duration`` ends. ``python`` takes the callback in Python, as `FlyingDisc.air` does; the motion
+    is the same.
     """
     flying = FlyingDisc(disc, environment, effects, timestep=timestep, contacts=ground == "skip", law=law)
-    return follow(flying, release, duration=duration, ground=ground)
+    return follow(flying, release, duration=duration, ground=ground, python=python)
 
 
 def follow(
-    flying: FlyingDisc, release: Release, *, duration: float = 30.0, ground: Literal["stop", "skip"] = "stop"
+    flying: FlyingDisc,
+    release: Release,
+    *,
+    duration: float = 30.0,
+    ground: Literal["stop", "skip"] = "stop",
+    python: bool = False,
 ) -> Motion:
     """Release a disc that is built and return the true motion of its body ``disc``; see `fly`."""
     flying.release(release)
+    log = Logbook(flying.model, flying.data, flying.centre_of_mass)
+    with own_warnings(), flying.air(python):
+        try:
+            touched = _follow(flying, log, max(1, round(duration / flying.model.opt.timestep)), ground)
+        except FloatingPointError:
+            raise flying.lost_air() or _diverged(flying.data) from None
+    return _motion(log.rows, flying, touched)
+
+
+def _follow(flying: FlyingDisc, log: Logbook, steps: int, ground: Literal["stop", "skip"]) -> bool:
+    """Step a released disc to its end, noting each state; return whether it touched down."""
     model, data = flying.model, flying.data
-    ex, ey, ez = (float(x) for x in flying.centre_of_mass)
-    steps = max(1, round(duration / model.opt.timestep))
-    width = 1 + model.nq + 2 * model.nv
-    size, rows = 1024, 0
-    log = np.empty((size, width))
-
-    def note() -> None:
-        nonlocal log, rows, size
-        if rows == size:
-            size *= 2
-            log = np.resize(log, (size, width))
-        np.concatenate(([data.time], data.qpos, data.qvel, data.qacc), out=log[rows])
-        rows += 1
-
-    touched = False
-    with own_warnings(), flying.air():
+    mujoco.mj_forward(model, data)
+    log.note()
+    for _ in range(steps):
+        # mj_step is both of these the other way round; so the state whose acceleration is noted is evaluated once
+        mujoco.mj_RungeKutta(model, data, 4)
         mujoco.mj_forward(model, data)
-        note()
-        for _ in range(steps):
-            mujoco.mj_step(model, data)
-            check_state(data)
-            if ground == "stop" and _centre_height(data.qpos, ex, ey, ez) <= 0.0:
-                _land(flying, log[rows - 1])
-                touched = True
+        below = log.note()
+        check_lent()
+        if ground == "skip" and _rests(data):
+            return False
+        if ground == "stop" and below:
+            log.strike()
+            before = log.rows[-1]
+            touch_down(flying, before)
             mujoco.mj_forward(model, data)
-            if touched and data.time - log[rows - 1, 0] < 1e-9:
-                rows -= 1  # the previous instant already is touch-down
-            note()
-            if touched or (ground == "skip" and _rests(data)):
-                break
-    return _motion(log[:rows], flying, touched)
+            if data.time - before[0] < 1e-9:
+                log.strike()  # the previous instant already is touch-down
+            log.note()
+            return True
+    return False
 
 
 def _rests(data: Any) -> bool:
     return bool(data.qpos[2] < 0.05 and np.abs(data.qvel[:3]).max() < 0.02 and np.abs(data.qvel[3:]).max() < 0.2)
 
 
-def _land(flying: FlyingDisc, before: FloatArray) -> None:
-    """Redo the last step so that it ends where the centre of mass reaches the ground."""
+def touch_down(flying: FlyingDisc, before: FloatArray) -> None:
+    """Step from a state ``before`` (time, qpos and qvel) so that the centre of mass reaches the ground."""
     model, data = flying.model, flying.data
     nq, nv = model.nq, model.nv
     whole = model.opt.timestep
     centre = tuple(float(x) for x in flying.centre_of_mass)
 
     def height_after(step: float) -> float:
-        data.time, data.qpos[:], data.qvel[:] = before[0], *np.split(before[1:-nv], [nq])
+        data.time, data.qpos[:], data.qvel[:] = before[0], before[1 : 1 + nq], before[1 + nq : 1 + nq + nv]
         model.opt.timestep = max(step, 1e-12)
         mujoco.mj_step(model, data)
-        return float(_centre_height(data.qpos, *centre))
+        return float(height(data.qpos, *centre))
 
     try:
         # brentq's last call need not be its answer, so step once more to it
@@ -330,7 +304,11 @@ def _land(flying: FlyingDisc, before: FloatArray) -> None:
 
 
 def _motion(log: FloatArray, flying: FlyingDisc, touched: bool) -> Motion:
-    """Turn MuJoCo's states of the geometric centre into N axes and the motion of the centre of mass."""
+    return Motion(*centre_state(log, flying), flying.environment, flying.centre_of_mass, touched)
+
+
+def centre_state(log: FloatArray, flying: FlyingDisc) -> State:
+    """Turn rows (n,) of a log, of the geometric centre in MuJoCo's axes, into the motion of the centre of mass in N."""
     nq, nv = flying.model.nq, flying.model.nv
     pose, speed, push = log[:, 1:8], log[:, 1 + nq : 7 + nq], log[:, 1 + nq + nv : 7 + nq + nv]
     attitude = np.column_stack((pose[:, 3], flip_yz(pose[:, 4:7])))
@@ -342,7 +320,7 @@ def _motion(log: FloatArray, flying: FlyingDisc, touched: bool) -> Motion:
     def in_ned(v: FloatArray) -> FloatArray:
         return np.asarray(np.einsum("nij,nj->ni", C_NB, np.broadcast_to(v, rate.shape)))
 
-    return Motion(
+    return State(
         t=log[:, 0],
         position=flip_yz(pose[:, :3]) + in_ned(e),
         velocity=flip_yz(speed[:, :3]) + in_ned(swing),
@@ -350,7 +328,4 @@ def _motion(log: FloatArray, flying: FlyingDisc, touched: bool) -> Motion:
         attitude=attitude,
         rate=rate,
         angular_acceleration=turning,
-        environment=flying.environment,
-        centre_of_mass=e,
-        touched_down=touched,
     )

@@ -1,4 +1,4 @@
-"""Forces and moments of the user's own, called by address from compiled code.
+"""Forces and moments of effects with a function of their own, called by address from compiled code.
 
 A function passed as an argument would compile every integrator anew for it; an address is a number, and the compiled
 engines stay what they are.
@@ -46,7 +46,7 @@ _called: Any = _call  # the context is the compiler's business
 def own_wrench(
     calls: Any, sizes: FloatArray, t: float, h: float, u: float, v: float, w: float, P: float, Q: float, r: float
 ) -> tuple[float, float, float, float, float, float]:
-    """Force (N) and moment (N m) of the user's own effects, to be added to those of the air; as for ``air_wrench``.
+    """Force (N) and moment (N m) of effects that are called, to be added to those of the air; as for ``air_wrench``.
 
     ``calls`` (m,) are their addresses, ``sizes`` (m, k) their parameters. NaN where one fails.
     """

@@ -1,7 +1,8 @@
 """All parameters of the physics in one flat array, and names for its places.
 
 Both engines, and later every fit, hand the compiled physics one float64 array. `PARAMETERS` gives its structure: the
-environment, the disc, the rig, and one group per catalogued effect on motion, all at their baseline unless changed.
+environment, the disc, the rig, and one group per catalogued effect on motion that the physics knows by name, all at
+their baseline unless changed.
 Inside compiled code ``array.view(PARAMETERS)[0]`` is a record whose fields read like the equations.
 """
 
@@ -24,7 +25,8 @@ __all__ = ["PARAMETERS", "AngleTables", "Tables", "flight_parameters", "paramete
 
 IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
-_MOTION = tuple(row for row in CATALOGUE.values() if row.acts_on == "motion")
+#: effects that the compiled physics knows by name; others are called by address
+_MOTION = tuple(row for row in CATALOGUE.values() if row.acts_on == "motion" and row.apply is None)
 
 
 def _group(names: Sequence[str]) -> np.dtype[np.void]:
@@ -70,8 +72,8 @@ def parameters(
 ) -> FloatArray:
     """Return the flat array (PARAMETERS.itemsize / 8,) of a baseline with effects on it.
 
-    Effects on sensors are passed over: they belong to the sensors. So are those of the user's own: they stand in
-    `tables`. Raises `InputError` for an effect given twice.
+    Effects on sensors are passed over: they belong to the sensors. So are those that are called by their row's
+    function: they stand in `tables`. Raises `InputError` for an effect given twice.
     """
     flat = _BASELINE.copy()
     density = environment.air_density
@@ -120,7 +122,7 @@ class Tables(NamedTuple):
 
     static are those over the angle of attack. rate (nr,) rad/s and speed (nv,) m/s are the knots of C_Nr, and spline
     (nr - 1, nv - 1, 4, 4) its bicubic coefficients, highest powers first. law (terms, LAW_WIDTH) are the rows of a
-    `discsim.law.Law`. own_calls (m,) int64 are the addresses of the user's own effects on motion, and own_sizes (m, k)
+    `discsim.law.Law`. own_calls (m,) int64 are the addresses of effects on motion that are called, and own_sizes (m, k)
     their parameters, for `discsim.own_wrench`.
     """
 
@@ -158,7 +160,7 @@ def tables(disc: Disc | None, law: Law | Sequence[Law] | None = None, effects: S
         spline = np.ascontiguousarray(np.transpose(along_both, (3, 1, 2, 0)))
     laws = [law] if isinstance(law, Law) else law or ()
     rows = np.concatenate([np.empty((0, LAW_WIDTH)), *(each.rows for each in laws if each.target in WRENCH_TARGETS)])
-    own = [(item.own.address, item.value) for item in effects if item.own is not None and item.row.acts_on == "motion"]
+    own = [(one.address, item.value) for item in effects if item.row.acts_on == "motion" and (one := item.applied)]
     sizes = np.zeros((len(own), max((len(value) for _, value in own), default=0)))
     for place, (_, value) in zip(sizes, own, strict=True):
         place[: len(value)] = value

@@ -128,7 +128,8 @@ def envelope(
     ``towards_axis`` is the measured component towards the axis of spin (a_M,x of the paper), (n,) m/s^2. The square of
     the rate is (a - e_n) / (distance - e_d) of (9), monotone in each error, so its extremes stand at corners of the
     error box. Both e_n and e_d hold S_Ax: its two signs are tried one after the other, everything else is at its worst
-    for the bound in question. For a level rate table (origin = 0) S_Ax leaves e_n and this is exactly (11).
+    for the bound in question. For a level rate table (origin = 0) S_Ax leaves e_n, which is (10), and this is exactly
+    (11).
 
     A negative smallest square gives 0. Both are NaN where even the largest is negative or the sample is NaN; the upper
     bound is infinite where the errors may place the sensor on the axis.

@@ -1,31 +1,74 @@
 """The catalogue: one row per effect that a baseline leaves out.
 
 Engines, sensors, model files, documentation and diagnosis all know the effects through these rows: a new row is a new
-term, a new hypothesis and a new line of the docs. Forms and parameters are those of docs/physics.md.
+term, a new hypothesis and a new line of the docs. Rows are the ``ROWS`` of each module of this folder whose name ends
+in ``_rows``: a new effect is one such file (docs/architecture.md). docs/effects.md is made from them.
 """
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from math import isfinite
+from pkgutil import iter_modules
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from discsim.effects import setup
+from discsim.effects.applied import Applied, applied_row
 from discsim.effects.kind import Row
-from discsim.effects.motion_rows import MOTION_ROWS
-from discsim.effects.sensor_rows import SENSOR_ROWS
-from discsim.effects.setup_rows import SETUP_ROWS
 from discsim.errors import InputError
 
 if TYPE_CHECKING:
     from discsim.effects.own import UserEffect
 
-__all__ = ["CATALOGUE", "Effect", "Row", "effect", "row"]
+__all__ = ["CATALOGUE", "Effect", "Row", "catalogued", "effect", "effect_of", "row"]
 
-CATALOGUE: Mapping[str, Row] = MappingProxyType({row.id: row for row in (*MOTION_ROWS, *SENSOR_ROWS, *SETUP_ROWS)})
+#: what comes first, in this order; modules of single effects follow by name
+_FIRST = ("motion_rows", "sensor_rows", "setup_rows")
+
+
+def _rows() -> Iterator[Row]:
+    names = {module.name for module in iter_modules(import_module(__package__).__path__)}
+    others = sorted(name for name in names if name.endswith("_rows") and name not in _FIRST)
+    for name in (*_FIRST, *others):
+        yield from import_module(f"{__package__}.{name}").ROWS
+
+
+def _checked(rows: Sequence[Row]) -> dict[str, Row]:
+    """Return rows by id; raises `ValueError` where two share an id, or a type on what it acts on."""
+    by_id = {row.id: row for row in rows}
+    if len(by_id) < len(rows) or len({(row.type, row.acts_on) for row in rows}) < len(rows):
+        raise ValueError("two rows of the catalogue have the same id, or the same type on the same sensor")
+    return by_id
+
+
+CATALOGUE: Mapping[str, Row] = MappingProxyType(_checked(tuple(_rows())))
+_APPLIED: Mapping[str, Applied] = MappingProxyType(
+    {row.id: applied_row(row) for row in CATALOGUE.values() if row.apply is not None}
+)
+_BY_TYPE: Mapping[tuple[type[Any], str], Row] = MappingProxyType(
+    {(row.type, row.acts_on): row for row in CATALOGUE.values()}
+)
+
+
+def catalogued(kind: type[Any], acts_on: str | None = None) -> Row:
+    """Return the row of an effect by its type; ``acts_on`` tells the sensor where several have one like it.
+
+    Ids are for files and people; code that speaks of one effect names its type. Raises `KeyError` where there is none.
+
+    >>> from discsim.effects.sensors import Lag
+    >>> catalogued(Lag, "gyroscope").id
+    'gyro.lag'
+    """
+    if acts_on is not None:
+        return _BY_TYPE[kind, acts_on]
+    found = [row for row in CATALOGUE.values() if row.type is kind]
+    if len(found) != 1:
+        raise KeyError(f"{kind.__name__} is the type of {len(found)} effects; expected what it acts on beside it")
+    return found[0]
 
 
 def row(id: str) -> Row:
@@ -49,6 +92,11 @@ class Effect:
     def row(self) -> Row:
         """What the catalogue, or the user's file, says of it."""
         return row(self.id) if self.own is None else self.own.row
+
+    @property
+    def applied(self) -> Applied | None:
+        """What calls it where engines and sensors do not know its type: the user's own, and rows with ``apply``."""
+        return _APPLIED.get(self.id) if self.own is None else self.own
 
     @property
     def sizes(self) -> dict[str, float]:
@@ -94,6 +142,16 @@ def effect(id: str, **given: float | str) -> Effect:
     return Effect(
         id, kind.type(**{name: value if isinstance(value, str) else float(value) for name, value in given.items()})
     )
+
+
+def effect_of(value: Any, acts_on: str | None = None) -> Effect:
+    """Return an effect of the catalogue with a value of its type; ``acts_on`` as for `catalogued`.
+
+    >>> from discsim.effects.air import Density
+    >>> effect_of(Density(1.1)).id
+    'air.density'
+    """
+    return effect(catalogued(type(value), acts_on).id, **value._asdict())
 
 
 def by_id(effects: Sequence[Effect]) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -38,10 +38,19 @@ class Row(NamedTuple):
 
     For a fit, by a parameter's name: ``bounds`` within which it makes sense, the ``sign`` that physics gives it,
     ``positive`` those that have no meaning at or below zero, ``grid`` the values at which a parameter that shapes the
-    effect is tried first, and ``grid_sigma`` how uncertain it is before it is fitted. An effect is ``searched`` where a
-    detector finds it and no linear question about whole recordings does; it ``moves_time`` where it moves nothing but
+    effect is tried first, and ``grid_sigma`` how uncertain it is before it is fitted. A ``detector`` is named where one
+    finds the effect and no linear question about whole recordings does. It ``moves_time`` where it moves nothing but
     the instants at which samples were taken; its parameters are places ``on_disc``; on the plants of ``unseen_on`` no
-    reading shows it.
+    reading shows it, nor where a sheet of the sensors it ``needs`` is absent.
+
+    On its nature: an event ``lasts`` some seconds, or as long as the parameter that is named there says; an effect
+    ``of_disc`` comes with a disc into all of its recordings; one that ``follows_spin`` makes the motion pulse with the
+    turns, one ``per_turn`` so many times as that parameter says; one of the motion that is ``also_read`` changes what a
+    sensor reads of a given motion, too; one that ``hides_readings`` leaves no reading behind that a fit could use;
+    parameters ``in_percent`` are shares; it ``becomes`` (another effect's id, by its parameter, at a value).
+
+    ``apply`` is all that an effect with no place in the engines and sensors needs: a function of the forms that
+    `discsim.effects.applied` tells.
     """
 
     id: str
@@ -61,10 +70,20 @@ class Row(NamedTuple):
     positive: tuple[str, ...] = ()
     grid: Mapping[str, tuple[float, ...]] = _NOTHING
     grid_sigma: Mapping[str, float] = _NOTHING
-    searched: bool = False
+    detector: str = ""
     moves_time: bool = False
     on_disc: bool = False
     unseen_on: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+    lasts: float | str = 0.0
+    of_disc: bool = False
+    follows_spin: bool = False
+    per_turn: str = ""
+    also_read: bool = False
+    hides_readings: bool = False
+    in_percent: bool = False
+    becomes: tuple[str, str, float] | None = None
+    apply: Callable[..., Any] | None = None
 
     @property
     def key(self) -> str:
@@ -80,6 +99,11 @@ class Row(NamedTuple):
     def settings(self) -> tuple[str, ...]:
         """Names of the settings, which are texts; no fit can move one."""
         return tuple(name for name, none in self.baseline._asdict().items() if isinstance(none, str))
+
+    @property
+    def brief(self) -> bool:
+        """Whether it is an event of a length that is known: a blow, not a gust."""
+        return self.event and not isinstance(self.lasts, str)
 
     @property
     def sizes(self) -> dict[str, float]:

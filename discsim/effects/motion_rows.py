@@ -1,6 +1,6 @@
 """Rows of the catalogue: what a baseline leaves out of the motion: air, aerodynamics, body, events, rigs.
 
-The fields are those of `discsim.effects.kind.Row`; forms and parameters are those of docs/physics.md.
+The fields are those of `discsim.effects.kind.Row`; docs/effects.md is made from them.
 """
 
 from __future__ import annotations
@@ -8,9 +8,9 @@ from __future__ import annotations
 from discsim.effects import aero, air, body, events, rig
 from discsim.effects.kind import AIRBORNE, FLIGHT, RIGS, Row
 
-__all__ = ["MOTION_ROWS"]
+__all__ = ["ROWS"]
 
-MOTION_ROWS = (
+ROWS = (
     Row(
         "air.wind",
         air.Wind,
@@ -35,6 +35,7 @@ MOTION_ROWS = (
         bounds={"exponent": (-0.5, 3.0)},
         grid={"exponent": (0.12, 0.25, 0.5, 1.0)},
         grid_sigma={"exponent": 0.5},
+        becomes=("air.wind", "exponent", 0.0),
     ),
     Row(
         "air.gust",
@@ -50,7 +51,8 @@ MOTION_ROWS = (
         bounds={"width_s": (0.03, 6.0)},
         positive=("width_s",),
         grid_sigma={"t_s": 1.0, "width_s": 1.0},
-        searched=True,
+        detector="gusts",
+        lasts="width_s",
     ),
     Row(
         "air.density",
@@ -86,6 +88,7 @@ MOTION_ROWS = (
         form="C<sub>Y</sub> = {CYr} · γ",
         grows_with="advance ratio (spin over speed)",
         trace="a sideways force that changes side with the spin",
+        of_disc=True,
     ),
     Row(
         "aero.spin_lift",
@@ -97,6 +100,7 @@ MOTION_ROWS = (
         form="C<sub>L</sub> += {CLr} · |γ|",
         grows_with="advance ratio (spin over speed)",
         trace="lift that spin adds, whichever way it turns",
+        of_disc=True,
     ),
     Row(
         "aero.spin_drag",
@@ -108,6 +112,7 @@ MOTION_ROWS = (
         form="C<sub>D</sub> += {CDrr} · γ<sup>2</sup>",
         grows_with="advance ratio (spin over speed)",
         trace="drag that spin adds",
+        of_disc=True,
     ),
     Row(
         "aero.spin_pitching_moment",
@@ -119,6 +124,7 @@ MOTION_ROWS = (
         form="C<sub>M</sub> += {CMr} · γ",
         grows_with="advance ratio (spin over speed)",
         trace="a pitching moment that spin adds",
+        of_disc=True,
     ),
     Row(
         "aero.stall",
@@ -133,6 +139,7 @@ MOTION_ROWS = (
         bounds={"alpha_stall_rad": (-0.2, 0.8)},
         grid={"alpha_stall_rad": (0.03, 0.06, 0.1, 0.14, 0.18, 0.22, 0.28)},
         grid_sigma={"alpha_stall_rad": 0.1},
+        of_disc=True,
     ),
     Row(
         "aero.yaw_reynolds",
@@ -144,6 +151,7 @@ MOTION_ROWS = (
         form="CNr → CNr · (V / 15 m/s)<sup>{exponent}</sup>",
         grows_with="speed",
         trace="the spin decays by a coefficient that changes with speed",
+        of_disc=True,
     ),
     Row(
         "aero.yaw_quadratic",
@@ -155,6 +163,7 @@ MOTION_ROWS = (
         form="C<sub>N</sub> += {CNrr} · γ |γ|",
         grows_with="advance ratio (spin over speed)",
         trace="the spin decays faster than in proportion to itself",
+        of_disc=True,
     ),
     Row(
         "aero.yaw_alpha",
@@ -166,6 +175,7 @@ MOTION_ROWS = (
         form="C<sub>N</sub> += {CNraa} · γ α<sup>2</sup>",
         grows_with="angle of attack",
         trace="the spin decays faster at high angles of attack",
+        of_disc=True,
     ),
     Row(
         "body.mass_imbalance",
@@ -178,6 +188,9 @@ MOTION_ROWS = (
         grows_with="spin",
         trace="sensor and air act off the centre of mass: a trace that turns with the disc",
         on_disc=True,
+        of_disc=True,
+        follows_spin=True,
+        also_read=True,
     ),
     Row(
         "body.inertia_asymmetry",
@@ -189,6 +202,8 @@ MOTION_ROWS = (
         form="Iyy = Ixx + {dIyy_kg_m2}",
         grows_with="wobble",
         trace="the wobble pulses at twice the spin",
+        of_disc=True,
+        follows_spin=True,
     ),
     Row(
         "event.impulse",
@@ -201,7 +216,8 @@ MOTION_ROWS = (
         form="Δv = ({dv_north_m_s} north, {dv_east_m_s} east, {dv_down_m_s} down) at t = {t_s}",
         grows_with="an instant",
         trace="the velocity jumps at one instant: a touch",
-        searched=True,
+        detector="events",
+        lasts=events.EVENT_WIDTH_S,
     ),
     Row(
         "event.spin_step",
@@ -214,7 +230,8 @@ MOTION_ROWS = (
         form="Δr = {dr_rad_s} at t = {t_s}",
         grows_with="an instant",
         trace="the spin jumps at one instant",
-        searched=True,
+        detector="events",
+        lasts=events.EVENT_WIDTH_S,
     ),
     Row(
         "rig.coulomb_friction",
@@ -262,6 +279,7 @@ MOTION_ROWS = (
         grows_with="angle turned",
         trace="the rate pulses with the angle turned",
         bounds={"order": (0.02, 200.0)},
-        searched=True,
+        detector="speed_ripple",
+        per_turn="order",
     ),
 )

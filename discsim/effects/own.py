@@ -6,18 +6,17 @@ What such a file holds is told in docs/diagnosing.md. A file is code and runs as
 from __future__ import annotations
 
 import re
-import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from math import isfinite
 from pathlib import Path
-from types import MappingProxyType, ModuleType
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects.applied import MOVED, SENSOR_WIDTHS, Applied, compiled_wrench, failed
 from discsim.effects.catalogue import CATALOGUE, Effect, Row
 from discsim.errors import InputError
 from discsim.files import read_text
@@ -25,47 +24,22 @@ from discsim.frames import turn
 from discsim.motion import State
 from discsim.recording import PLANTS
 
-__all__ = ["SENSOR_WIDTHS", "UserEffect", "compiled_wrench", "load_user_effect", "load_user_effects"]
+__all__ = ["UserEffect", "load_user_effect", "load_user_effects"]
 
-#: sensors that a user's effect may act on, and the width of their readings
-SENSOR_WIDTHS = MappingProxyType({"magnetometer": 3, "accelerometer": 3, "gyroscope": 3, "gps": 6})
 _ACTS_ON = (*SENSOR_WIDTHS, "motion")
-#: where forces and moments of one's own move something: a table turns as commanded, and in a free spin, whose path
-#: nobody knows, any moment is an unknown already
-_MOVED = ("flight", "spin_down")
 #: what a file must define beside its type
 _NEEDED = ("ID", "ACTS_ON", "SCALE", "apply")
 _ID = re.compile(r"[a-z][a-z0-9_]*\.[a-z][a-z0-9_]*")
 
 
 @dataclass(frozen=True)
-class UserEffect:
-    """An effect of the user's own.
+class UserEffect(Applied):
+    """An effect of the user's own, in its Python file.
 
-    Attributes
-    ----------
-    row : Row
-        What the catalogue says of an effect; ``acts_on`` is a sensor of `SENSOR_WIDTHS` or "motion".
-    function : callable
-        On a sensor ``apply(effect, readings (n, k), t (n,), motion) -> readings (n, k)``, before lag, noise and
-        rounding; ``motion`` is a `State` at the true times of the samples. On motion ``apply(effect, t, h, u, v, w,
-        P, Q, r) -> (Fx, Fy, Fz, Mx, My, Mz)``, added to the force (N) and moment (N m) of the air, arguments and
-        frame as in `discsim.aerodynamics.air_wrench`; see `compiled_wrench`.
-    text : str
-        First line of the type's docstring.
-    path : Path
-        The file.
+    ``text`` is the first line of its type's docstring.
     """
 
-    row: Row
-    function: Callable[..., Any]
     text: str
-    path: Path
-
-    @property
-    def id(self) -> str:
-        """Its id."""
-        return self.row.id
 
     def sized(self, sizes: Mapping[str, float]) -> Effect:
         """Return the effect with its parameters, those left out as they do nothing; raises `InputError`."""
@@ -73,47 +47,6 @@ class UserEffect:
             if name not in self.row.parameters:
                 raise InputError(f"{self.id}: unknown parameter '{name}'; expected {', '.join(self.row.parameters)}")
         return Effect(self.id, self.row.type(**{name: float(size) for name, size in sizes.items()}), self)
-
-    @cached_property
-    def address(self) -> int:
-        """Where the compiled wrench of an effect on motion starts, for `discsim.own_wrench`."""
-        return int(self._native.address)
-
-    @cached_property
-    def _native(self) -> Any:
-        import numba
-
-        compiler: Any = numba
-        types, carray = compiler.types, compiler.carray
-        wrench, count = compiled_wrench(self), len(self.row.parameters)
-        number, numbers = types.float64, types.CPointer(types.float64)
-
-        @compiler.cfunc(types.void(numbers, *(number,) * 8, numbers))
-        def native(sizes, t, h, u, v, w, P, Q, r, out):  # type: ignore[no-untyped-def]
-            six = carray(out, 6)
-            six[0], six[1], six[2], six[3], six[4], six[5] = wrench(carray(sizes, count), t, h, u, v, w, P, Q, r)
-
-        return native
-
-    def on_readings(self, values: Sequence[float], readings: FloatArray, t: FloatArray, motion: State) -> FloatArray:
-        """Return a sensor's readings (n, k) with the effect of size ``values`` on them.
-
-        Raises `InputError` where the function fails or gives something else.
-        """
-        effect = self.row.type(*(float(value) for value in values))
-        readings, t = readings.view(), t.view()
-        readings.flags.writeable = t.flags.writeable = False
-        try:
-            changed = np.asarray(self.function(effect, readings, t, motion), dtype=np.float64)
-        except Exception as error:
-            raise _failed(self.path, error, f"apply() with {effect}") from None
-        if changed.shape != readings.shape:
-            raise InputError.at(
-                self.path,
-                None,
-                f"apply() gave an array of shape {changed.shape}, expected that of the readings, (n, k)",
-            )
-        return changed
 
 
 def load_user_effects(paths: Sequence[Path]) -> list[UserEffect]:
@@ -144,12 +77,13 @@ def load_user_effect(path: Path) -> UserEffect:
     if not callable(function):
         raise InputError.at(path, None, "apply is no function")
     plants = found.get("PLANTS", ("flight",) if acts_on in ("motion", "gps") else PLANTS)
-    possible = _MOVED if acts_on == "motion" else PLANTS
+    possible = MOVED if acts_on == "motion" else PLANTS
     if not isinstance(plants, tuple | list) or not plants or not set(plants) <= set(possible):
         raise InputError.at(path, None, f"PLANTS is {plants!r}, expected a tuple of some of {', '.join(possible)}")
-    row = Row(id, kind, acts_on, tuple(plants), _scale(path, found["SCALE"], kind))
+    of_disc = id.partition(".")[0] in ("aero", "body")
+    row = Row(id, kind, acts_on, tuple(plants), _scale(path, found["SCALE"], kind), of_disc=of_disc, apply=function)
     text = (kind.__doc__ or "").strip().splitlines()
-    effect = UserEffect(row, function, text[0] if text and not text[0].startswith(f"{kind.__name__}(") else id, path)
+    effect = UserEffect(row, path, text[0] if text and not text[0].startswith(f"{kind.__name__}(") else id)
     _try(effect)
     return effect
 
@@ -163,14 +97,8 @@ def _run(path: Path) -> ModuleType:
     except SyntaxError as error:
         raise InputError.at(path, error.lineno, f"no valid Python: {error.msg}") from None
     except Exception as error:
-        raise _failed(path, error, "reading the file") from None
+        raise failed(path, error, "reading the file") from None
     return module
-
-
-def _failed(path: Path, error: Exception, what: str) -> InputError:
-    """Return the error of a user's code, at the last line of the file that took part in it."""
-    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
-    return InputError.at(path, lines[-1] if lines else None, f"{what} failed: {type(error).__name__}: {error}")
 
 
 def _parameter_type(path: Path, module: ModuleType) -> type[Any]:
@@ -262,46 +190,3 @@ def _try(effect: UserEffect) -> None:
         raise InputError.at(
             path, None, f"apply() with {row.type(*scaled)} gives NaN or infinity; expected finite numbers"
         )
-
-
-def compiled_wrench(effect: UserEffect) -> Callable[..., tuple[float, float, float, float, float, float]]:
-    """Return a motion effect as compiled code: (values (k,) array, t, h, u, v, w, P, Q, r) to six floats.
-
-    Raises `InputError` where numba cannot compile the user's function, or it gives something else.
-    """
-    import numba
-    from numba.core.errors import NumbaError
-    from numba.np.unsafe.ndarray import to_fixed_tuple
-
-    function = effect.function
-    if not hasattr(function, "py_func"):
-        function = numba.njit(error_model="numpy")(function)
-    kind, count = effect.row.type, len(effect.row.parameters)
-
-    fixed: Any = to_fixed_tuple  # its second argument is only seen by the compiler
-
-    @numba.njit(error_model="numpy")
-    def wrench(
-        values: FloatArray, t: float, h: float, u: float, v: float, w: float, P: float, Q: float, r: float
-    ) -> tuple[float, float, float, float, float, float]:
-        Fx, Fy, Fz, Mx, My, Mz = function(kind(*fixed(values, count)), t, h, u, v, w, P, Q, r)
-        return float(Fx), float(Fy), float(Fz), float(Mx), float(My), float(Mz)
-
-    try:
-        wrench.compile((numba.float64[::1], *(numba.float64,) * 8))
-    except NumbaError as error:
-        raise _not_compiled(effect.path, str(error)) from None
-    return wrench
-
-
-def _not_compiled(path: Path, message: str) -> InputError:
-    """Return the error for numba's message: its first line that says something, at the line it tells of the file."""
-    said = [line.strip() for line in message.splitlines() if line.strip()]
-    reason = next((line for line in said if not line.startswith("Failed in nopython")), "numba refuses it")
-    line = re.search(rf'File "[^"]*{re.escape(path.name)}", line (\d+)', message)
-    return InputError.at(
-        path,
-        int(line[1]) if line else None,
-        f"apply() cannot be compiled ({reason}); expected arithmetic and functions of math on numbers, and six of "
-        "them returned",
-    )

@@ -1,6 +1,6 @@
 """Rows of the catalogue: what a baseline leaves out of sensors and their clocks.
 
-The fields are those of `discsim.effects.kind.Row`; forms and parameters are those of docs/physics.md.
+The fields are those of `discsim.effects.kind.Row`; docs/effects.md is made from them.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from math import inf
 from discsim.effects import sensors
 from discsim.effects.kind import EVERYWHERE, FLIGHT, UNSEEN_IN_MEANS, Row, with_article
 
-__all__ = ["SENSOR_ROWS"]
+__all__ = ["ROWS"]
 
 _AWAY = "its spin phase runs away from that of the other sensors"
 
@@ -63,12 +63,12 @@ def _dropped_samples(prefix: str, sensor: str) -> Row:
         form=f"a share of {{fraction}} of the {sensor}'s samples is lost, the rest written as if none were",
         grows_with="time, in steps",
         trace="its spin phase steps ahead each time a sample is lost",
-        searched=True,
+        detector="dropped_samples",
         unseen_on=UNSEEN_IN_MEANS.get(sensor, ()),
     )
 
 
-SENSOR_ROWS = (
+ROWS = (
     Row(
         "mag.hard_iron",
         sensors.HardIron,
@@ -90,6 +90,7 @@ SENSOR_ROWS = (
         form="m → (I + S) m, S symmetric: xx {sxx}, xy {sxy}, xz {sxz}, yy {syy}, yz {syz}, zz {szz}",
         grows_with="field in body axes",
         trace="the field is bent: the circle of the readings is an ellipse",
+        in_percent=True,
     ),
     _lag("mag", "magnetometer"),
     Row(
@@ -155,6 +156,7 @@ SENSOR_ROWS = (
         form="f<sub>i</sub> → (1 + s<sub>i</sub>) f<sub>i</sub>, s = ({sx}, {sy}, {sz})",
         grows_with="specific force",
         trace="readings are off in proportion to themselves",
+        in_percent=True,
     ),
     Row(
         "accel.cross_axis",
@@ -166,6 +168,7 @@ SENSOR_ROWS = (
         form="f → (I + S) f, S: xy {sxy}, xz {sxz}, yx {syx}, yz {syz}, zx {szx}, zy {szy}",
         grows_with="specific force on another axis",
         trace="one axis shows a share of another",
+        in_percent=True,
     ),
     Row(
         "accel.saturation",
@@ -178,7 +181,8 @@ SENSOR_ROWS = (
         grows_with="specific force",
         trace="readings stop below the stated range",
         bounds={"limit_m_s2": (0.5, inf)},
-        searched=True,
+        detector="saturation",
+        hides_readings=True,
     ),
     _lag("gyro", "gyroscope"),
     _clock("gyro", "gyroscope", "the gyroscope", "its phase runs away from that of the other sensors"),
@@ -203,6 +207,7 @@ SENSOR_ROWS = (
         form="ω<sub>i</sub> → (1 + s<sub>i</sub>) ω<sub>i</sub>, s = ({sx}, {sy}, {sz})",
         grows_with="rate",
         trace="readings are off in proportion to themselves",
+        in_percent=True,
     ),
     Row(
         "gyro.g_sensitivity",
@@ -215,6 +220,7 @@ SENSOR_ROWS = (
         grows_with="specific force",
         trace="readings grow with the specific force",
         units={"kx": "rad/s per m/s²", "ky": "rad/s per m/s²", "kz": "rad/s per m/s²"},
+        needs=("accelerometer",),
     ),
     _clock("gps", "gps", "the GPS", "fixes run away from the motion that the other sensors show", 1e-4),
     Row(

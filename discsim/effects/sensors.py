@@ -1,6 +1,6 @@
 """Effects of sensors and clocks that a baseline leaves out.
 
-Functions take arrays of readings (n, 3) in B and return new ones. Order of the chain: soft iron, then hard iron and
+Functions take arrays of readings (..., 3) in B and return new ones. Order of the chain: soft iron, then hard iron and
 stray field; sensitivity, then bias and drift; then lag, noise, rounding, clipping.
 """
 
@@ -49,7 +49,7 @@ class HardIron(NamedTuple):
 
 
 def hard_iron(effect: HardIron, m: FloatArray) -> FloatArray:
-    """Return m + b, (n, 3) uT."""
+    """Return m + b, (..., 3) uT."""
     return np.add(m, effect)
 
 
@@ -65,7 +65,7 @@ class SoftIron(NamedTuple):
 
 
 def soft_iron(effect: SoftIron, m: FloatArray) -> FloatArray:
-    """Return (I + S) m, (n, 3) uT."""
+    """Return (I + S) m, (..., 3) uT."""
     xx, xy, xz, yy, yz, zz = effect
     S = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     return np.add(m, np.matmul(m, S))  # S is symmetric
@@ -81,9 +81,9 @@ class StrayField(NamedTuple):
 
 
 def stray_field(effect: StrayField, h: FloatArray) -> FloatArray:
-    """Return the added field in N, (n, 3) uT, at heights h (n,) m above ground."""
+    """Return the added field in N, (..., 3) uT, at heights h (...,) m above ground."""
     decay = np.exp(-np.maximum(h, 0.02) / effect.height_m)
-    return np.multiply(decay[:, None], effect[:3])
+    return np.multiply(decay[..., None], effect[:3])
 
 
 class Lag(NamedTuple):
@@ -198,7 +198,7 @@ class GSensitivity(NamedTuple):
 
 
 def g_sensitivity(effect: GSensitivity, f: FloatArray) -> FloatArray:
-    """Return the added rate (n, 3) rad/s for specific force f (n, 3) m/s^2."""
+    """Return the added rate (..., 3) rad/s for specific force f (..., 3) m/s^2."""
     return np.multiply(f, effect)
 
 

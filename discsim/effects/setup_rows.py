@@ -1,6 +1,6 @@
 """Rows of the catalogue: faults of the setup, which are no physics: columns, units, times, mounts, the stated field.
 
-The fields are those of `discsim.effects.kind.Row`; forms and parameters are those of docs/physics.md.
+The fields are those of `discsim.effects.kind.Row`; docs/effects.md is made from them.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any
 from discsim.effects import setup
 from discsim.effects.kind import EVERYWHERE, FLIGHT, UNSEEN_IN_MEANS, Row, with_article
 
-__all__ = ["SETUP_ROWS"]
+__all__ = ["ROWS"]
 
 _SHIFTED = "readings are early or late by one and the same time"
 _TURNED = f"{_SHIFTED}, all of their size there"
@@ -67,7 +67,7 @@ def _time_offset(prefix: str, sensor: str, grows_with: str, trace: str) -> Row:
     )
 
 
-SETUP_ROWS = (
+ROWS = (
     _axes("mag", "magnetometer"),
     _axes("accel", "accelerometer"),
     _axes("gyro", "gyroscope"),

@@ -32,8 +32,8 @@ __all__ = ["Accelerometer", "specific_force"]
 def specific_force(state: State, motion: Motion, position: FloatArray) -> FloatArray:
     """f_B = C_BN (a_N - g_N) + w x (w x d) + wdot x d, Eq. (1), (n, 3) m/s^2, at ``position`` (3,) m in B.
 
-    The paper adds g in (1); a sensor at rest reads minus gravity (f_z = -g), as here. d runs from the centre of mass,
-    whose acceleration a_N is; ``position`` from the geometric centre.
+    The paper adds g in (1) and in its x row, (6); a sensor at rest reads minus gravity (f_z = -g), as here. d runs
+    from the centre of mass, whose acceleration a_N is; ``position`` from the geometric centre.
     """
     d = np.broadcast_to(position - motion.centre_of_mass, state.rate.shape)
     gravity = np.array([0.0, 0.0, motion.environment.gravity])
@@ -44,7 +44,7 @@ def specific_force(state: State, motion: Motion, position: FloatArray) -> FloatA
 
 @dataclass(frozen=True)
 class Accelerometer:
-    """A three-axis accelerometer; every error starts at zero, so a bare one is ideal.
+    """A three-axis accelerometer by (3); every error starts at zero, so a bare one is ideal.
 
     ``position`` (3,) m in B is where it is stated to sit and ``offset`` what that is wrong by; ``misalignment`` (3,)
     rad turns its axes. ``noise``, ``resolution`` and ``range`` are in m/s^2.

@@ -1,4 +1,4 @@
-"""What is added to a sensor's readings before lag and noise: effects of the user's own, and laws about a sensor."""
+"""What is added to a sensor's readings before lag and noise: effects that are called by their row, laws."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ def added(additions: Sequence[Addition], readings: FloatArray, t: FloatArray, mo
 
 
 def by_effect(effect: Effect) -> Addition:
-    """Return what an effect of the user's own does to its sensor's readings."""
-    own = effect.own
-    assert own is not None
+    """Return what an effect with a function of its own does to its sensor's readings."""
+    applied = effect.applied
+    assert applied is not None
 
     def addition(readings: FloatArray, t: FloatArray, motion: Motion) -> FloatArray:
         since = t - motion.start
-        return own.on_readings(tuple(effect.value), readings, since, motion.at(t)._replace(t=since))
+        return applied.on_readings(tuple(effect.value), readings, since, motion.at(t)._replace(t=since))
 
     return addition
 

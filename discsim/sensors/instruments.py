@@ -157,7 +157,7 @@ class Instruments:
                 for name in BOARD & module.sensors.keys():
                     module = module.fitted(name, board=value)
             elif target in module.sensors:
-                if item.own is not None:
+                if item.applied is not None:
                     module = module._adding(target, by_effect(item))
                 elif id in _FIELDS:
                     module = module.fitted(target, **{_FIELDS[id]: value})

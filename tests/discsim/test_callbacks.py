@@ -247,10 +247,13 @@ class TestForeignModels:
         np.testing.assert_array_equal(copy.qpos, flying.data.qpos)
 
     @pytest.mark.parametrize("compile_it", [mujoco.MjModel.from_xml_string, None], ids=["from_xml", "spec"])
-    def test_a_model_compiled_inside_the_block_is_a_clear_error(self, compile_it):
+    def test_a_model_compiled_inside_the_block_is_a_clear_error_where_the_callback_is_python_s(self, compile_it):
         flying = FlyingDisc(DRIVER, FIELD)
         compile_it = compile_it or (lambda text: mujoco.MjSpec.from_string(text).compile())
-        with pytest.raises(RuntimeError, match="compile every model before entering the block"), flying.air():
+        with flying.air():
+            assert compile_it(OTHER_MODEL).nv == 6
+        refusal = pytest.raises(RuntimeError, match="compile every model before entering the block")
+        with refusal, flying.air(python=True):
             compile_it(OTHER_MODEL)
 
     def test_compile_model_works_inside_a_block_and_changes_nothing(self):

@@ -1,4 +1,4 @@
-"""Every effect on a flight: nothing at its baseline, and in its size the form of docs/physics.md, written again."""
+"""Every effect on a flight: nothing at its baseline, and in its size the form of docs/effects.md, written again."""
 
 from __future__ import annotations
 

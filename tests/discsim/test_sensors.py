@@ -1,4 +1,4 @@
-"""Sensors: ideal ones against MuJoCo's and closed forms, every error against the form of docs/physics.md."""
+"""Sensors: ideal ones against MuJoCo's and closed forms, every error against the form of docs/effects.md."""
 
 from __future__ import annotations
 

@@ -275,3 +275,19 @@ def test_validate_exits_with_1_where_a_score_is_outside_its_tolerance(monkeypatc
     monkeypatch.setattr(headless, "concealed_checks", lambda cases: [])
     assert run(monkeypatch, "validate", "--quick", "--out", str(tmp_path / "report")) == 1
     assert "FAIL" in (tmp_path / "report" / "report.html").read_text()
+
+
+def test_a_module_on_board_is_in_the_disc_that_the_recording_states(monkeypatch, tmp_path, capsys):
+    flown = ["fly", "--engine", "trajectory"]
+    assert run(monkeypatch, *flown, "--module", "mass_kg=0.037,radius_m=0.03", "--out", str(tmp_path / "heavy")) == 0
+    disc, _ = load_disc("driver")
+    stated = read_recording(tmp_path / "heavy").disc
+    assert stated.mass == pytest.approx(disc.mass + 0.037)
+    assert stated.Izz == pytest.approx(disc.Izz + 0.037 * 0.03**2 / 2)
+    capsys.readouterr()
+    for text, what in (("x_m=0.01", "has no mass"), ("mass=0.01", "'mass=0.01'"), ("mass_kg=heavy", "with a number")):
+        assert run(monkeypatch, *flown, "--module", text, "--out", str(tmp_path / "wrong")) == 2
+        assert what in capsys.readouterr().err
+    twice = ["--module", "mass_kg=0.01,x_m=0.01", "--effect", "body.mass_imbalance:ex_m=0.001"]
+    assert run(monkeypatch, *flown, *twice, "--out", str(tmp_path / "wrong")) == 2
+    assert "given twice" in capsys.readouterr().err

@@ -523,12 +523,6 @@ REFUSED = {
     "header.csv": (b"time,ax,ay,az\n", "no rows of numbers"),
     "short.csv": (b"t_s,gx_dps,gy_dps,gz_dps\n0,1,2,3\n0.1,1,2,4\n", "2 rows of numbers in it"),
     "binary.bin": (bytes(range(256)) * 40, "is binary, no text"),
-    "receiver.nmea": (
-        b"$GPGGA,123519.00,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n"
-        b"$GPRMC,123519.00,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W*6A\r\n" * 20,
-        "holds NMEA sentences of a satellite receiver",
-    ),
-    "receiver.ubx": (b"\xb5\x62\x01\x07" + bytes(100), "is a u-blox UBX log"),
     "book.xlsx": (b"PK\x03\x04" + bytes(100), "export it as CSV"),
     "broken.zip": (b"PK\x03\x04" + bytes(100), "cannot be unpacked"),
 }

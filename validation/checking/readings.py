@@ -7,6 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
+from discsim.effects.catalogue import catalogued
+from discsim.effects.sensors import Scale
+from discsim.effects.setup import AccelerometerUnit, GpsAxes, GyroscopeUnit, MagnetometerUnit
 from discsim.recording import Recording
 from validation.checking.finding import Finding
 from validation.checking.statements import FASTEST_SPIN, FIELD
@@ -88,7 +91,7 @@ def _force(recording: Recording) -> Iterator[Finding]:
             return
         unit = next((name for name, factor in FORCES.items() if abs(size / (9.81 * factor) - 1) < REST), None)
         yield Finding(
-            "accel.units" if unit else "accel.scale",
+            catalogued(AccelerometerUnit).id if unit else catalogued(Scale, "accelerometer").id,
             "error" if unit else "warning",
             "accelerometer",
             f"at rest it reads {size:.4g} m/s^2",
@@ -127,7 +130,12 @@ def _field(recording: Recording) -> Iterator[Finding]:
     # a field turned in any way swings by its size at most, whatever iron is on board
     if unit in ("T", "mT", "gauss") or (unit in ("mG", "nT") and swing > FIELD[1]):
         yield Finding(
-            "mag.units", "error", "magnetometer", f"it reads {middle:.3g} uT", expected, f"it is written in {unit}"
+            catalogued(MagnetometerUnit).id,
+            "error",
+            "magnetometer",
+            f"it reads {middle:.3g} uT",
+            expected,
+            f"it is written in {unit}",
         )
     elif swing > 1.3 * FIELD[1]:
         yield Finding(
@@ -160,7 +168,7 @@ def _rate(recording: Recording) -> Iterator[Finding]:
         fastest = float(np.nanquantile(size, 0.99)) if np.any(np.isfinite(size)) else 0.0
         if fastest > FASTEST_SPIN:
             yield Finding(
-                f"{sensor}.units" if sensor != "gyroscope" else "gyro.units",
+                f"{sensor}.units" if sensor != "gyroscope" else catalogued(GyroscopeUnit).id,
                 "error",
                 sensor,
                 f"it reads {fastest:.4g} rad/s ({np.degrees(fastest):,.0f} deg/s)",
@@ -187,7 +195,7 @@ def _path(recording: Recording) -> Iterator[Finding]:
         # the share of its own motion that an axis's velocity explains: 1 where both agree, -1 where a sign is wrong
         if far > 1.0 and 2 * float(moved[:, axis] @ told[:, axis]) / far < 0:
             yield Finding(
-                "gps.axes",
+                catalogued(GpsAxes).id,
                 "warning",
                 "gps",
                 f"its {name} position and velocity go opposite ways",

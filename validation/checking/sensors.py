@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from discsim.arrays import BoolArray
+from discsim.effects.catalogue import catalogued
+from discsim.effects.setup import ClockUnit
 from discsim.recording import SENSORS, Recording
 from validation.checking.finding import Finding
 from validation.checking.noise import noise_of
@@ -212,7 +214,7 @@ def _rate_findings(found: SensorCheck) -> Iterator[Finding]:
     if abs(off) > RATE_TOLERANCE and not found.held:
         guess = _units_of_time(found)
         yield Finding(
-            f"{where}.rate" if not guess else "clock.units",
+            f"{where}.rate" if not guess else catalogued(ClockUnit).id,
             "error" if guess else "warning",
             where,
             f"time stamps say {found.rate_hz:.4g} Hz, rate_hz is {found.stated_rate_hz:.4g} Hz",

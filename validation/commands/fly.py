@@ -11,6 +11,7 @@ import typer
 from validation.reporting.options import (
     EffectOption,
     ModelOption,
+    ModuleOption,
     OutOption,
     SeedOption,
     SiteOption,
@@ -19,6 +20,7 @@ from validation.reporting.options import (
     at_site,
     disc_to_fly,
     laws_upon,
+    parse_module,
 )
 
 __all__ = ["command"]
@@ -50,6 +52,7 @@ def command(
     parts: Annotated[
         str, typer.Option(help="Sensor parts on board, shipped names or TOML files, separated by commas.")
     ] = "mpu9250,neo_m8n",
+    module: ModuleOption = None,
     site: SiteOption = None,
     effect: EffectOption = None,
     own: WithOption = None,
@@ -68,9 +71,11 @@ def command(
     Example: discsim fly --disc driver --effect air.wind:w_north_m_s=2 --out flight
     or, with what a diagnosis or a fit has written: discsim fly --model model.toml --engine trajectory --out flight
     """
+    from discsim.effects.catalogue import by_id
     from discsim.effects.own import load_user_effects
     from discsim.engine import fly
     from discsim.errors import InputError
+    from discsim.module import loaded
     from discsim.recording import write_recording
     from discsim.sensors import Instruments, record
     from discsim.shipped import load_throw
@@ -86,6 +91,10 @@ def command(
     release = load_throw(throw)
     instruments = Instruments.from_parts(*parts.split(","))
     effects, notes = all_effects(stated, effect, "flight", list(instruments.sensors), out.resolve().name, mine)
+    if module is not None:
+        body, aboard = loaded(body, parse_module(module))
+        effects = [*effects, *aboard]
+        by_id(effects)
     laws, passed = laws_upon(stated, "flight", list(instruments.sensors))
     instruments = instruments.with_effects(effects).with_laws(laws)
     names = (disc or "", throw, site or "", *parts.split(","))

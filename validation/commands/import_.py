@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
@@ -11,7 +12,7 @@ from validation.reporting.options import DateOption, OutOption, PlaceOption
 
 if TYPE_CHECKING:
     from validation.importing import Imported, ImportMap
-    from validation.importing.sniffing import Proposal, Stretch
+    from validation.importing.sniffing import Decision, Proposal, Stretch
     from validation.reporting.run import Run
 
 __all__ = ["command"]
@@ -55,38 +56,61 @@ def command(
     Example: discsim import my-log.csv --throw 1 --out throw-1
     or, with a map: discsim import 2025-08-31-001-rb.csv --map flatball --rows 1590:1830 --out throw-1
     """
-    from dataclasses import replace
-
-    from discsim.errors import InputError
-    from validation.importing import find_map, parse_rows, read_map, read_readings
-    from validation.importing.sniffing import opened, recognised, sniff, stretches, write_raw_page
-    from validation.importing.sniffing.chosen import chosen_recordings
+    from validation.importing import find_map, read_map
+    from validation.importing.sniffing import opened, recognised, sniff
     from validation.reporting.options import at_place
     from validation.reporting.run import start_run
 
-    if sum((rows is not None, throw is not None, all_throws)) > 1:
-        raise InputError("--rows, --throw and --all-throws: expected one of them at most")
-    chosen = None if rows is None else parse_rows(rows)
+    part = _part(rows, throw, all_throws)
     named = None if map_ in ("auto", "sniff") else read_map(find_map(map_))
-    source = (raw if raw.is_dir() else raw.parent).resolve()
-    if out.resolve() == source:
-        raise InputError(f"--out {out}: the raw files are in it; expected another folder, to leave them as they are")
-    with opened(raw) as logged:
+    _leave_alone(raw, out)
+    said: list[str] = []
+    with opened(raw, said.append) as logged:
         known = recognised(logged) if map_ == "auto" else named
         proposal = sniff(logged, plant) if known is None else None
         decisions = [] if proposal is None else proposal.all_decisions
         with start_run(out, None, [raw, *([known.path] if known else [])]) as run:
             if known is not None and named is None:
-                run.step(f"taken: the shipped map '{known.name}', made for these columns (--map sniff asks anew)")
+                said.append(f"taken: the shipped map '{known.name}', made for these columns (--map sniff asks anew)")
+            _tell(run, said)
             import_map = known or _proposed(run, proposal, write_map or out / "map.toml")
             proposal = None  # its table is as large as the one that is read now
             import_map = replace(import_map, environment=at_place(import_map.environment, place, date))
-            read = read_readings(logged, import_map, chosen)
-            throws = stretches(read)
-            recordings = chosen_recordings(read, throws, chosen, throw, every=all_throws)
-            write_raw_page(out / "raw.html", raw.name, read, throws, decisions)
-            _write(run, recordings, import_map, one_folder=not all_throws)
-    _say(recordings, throws, whole=rows is None and throw is None and not all_throws)
+            _say(*_imported(run, raw.name, logged, import_map, part, decisions), whole=part.whole)
+
+
+class _Part(NamedTuple):
+    """What of a log is taken: rows, a throw by its number, every throw as a recording of its own, or all of it."""
+
+    rows: slice | None
+    throw: int | None
+    every: bool
+
+    @property
+    def whole(self) -> bool:
+        return self.rows is None and self.throw is None and not self.every
+
+
+def _tell(run: Run, notes: list[str]) -> None:
+    for note in notes:
+        run.step(note)
+
+
+def _part(rows: str | None, throw: int | None, all_throws: bool) -> _Part:
+    from discsim.errors import InputError
+    from validation.importing import parse_rows
+
+    if sum((rows is not None, throw is not None, all_throws)) > 1:
+        raise InputError("--rows, --throw and --all-throws: expected one of them at most")
+    return _Part(None if rows is None else parse_rows(rows), throw, all_throws)
+
+
+def _leave_alone(raw: Path, out: Path) -> None:
+    """Refuse to write where the raw files are."""
+    from discsim.errors import InputError
+
+    if out.resolve() == (raw if raw.is_dir() else raw.parent).resolve():
+        raise InputError(f"--out {out}: the raw files are in it; expected another folder, to leave them as they are")
 
 
 def _proposed(run: Run, proposal: Proposal | None, target: Path) -> ImportMap:
@@ -102,6 +126,22 @@ def _proposed(run: Run, proposal: Proposal | None, target: Path) -> ImportMap:
     for remark in (*proposal.notes, f"the map with its reasons: {target}"):
         run.step(remark)
     return read_map(target)
+
+
+def _imported(
+    run: Run, name: str, logged: Path, import_map: ImportMap, part: _Part, decisions: list[Decision]
+) -> tuple[list[Imported], list[Stretch]]:
+    """Read a log by a map, write the part that is asked for with the page of all traces; return it and the throws."""
+    from validation.importing import read_readings
+    from validation.importing.sniffing import stretches, write_raw_page
+    from validation.importing.sniffing.chosen import chosen_recordings
+
+    read = read_readings(logged, import_map, part.rows)
+    throws = stretches(read)
+    recordings = chosen_recordings(read, throws, part.rows, part.throw, every=part.every)
+    write_raw_page(run.out / "raw.html", name, read, throws, decisions)
+    _write(run, recordings, import_map, one_folder=not part.every)
+    return recordings, throws
 
 
 def _write(run: Run, recordings: list[Imported], import_map: ImportMap, *, one_folder: bool) -> None:

@@ -44,7 +44,8 @@ def command(
     """Turn a rate table through a profile and score every method against the truth.
 
     Writes a recording folder (MPU-9250 and the table's read-out), the wide-range gyroscope's recording in adxrs649/,
-    truth.csv, plateaus.csv, scores.json, methods.png (the paper's Fig. 7) and waveform.png (its Fig. 3) into --out.
+    truth.csv, plateaus.csv, scores.json, methods.png (the paper's Fig. 7) and waveform.png (a second of the
+    fastest plateau, and the spectrum of one padded window) into --out.
 
     Example: discsim rate-table --mount 0.001,0.001,0 --out rate-table
     """

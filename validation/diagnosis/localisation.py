@@ -86,7 +86,7 @@ def located_effect(found: Search, trial: Trial, names: Sequence[str]) -> list[Lo
             start, stop = _span({k: v for k, v in mine.items() if k[1:] == (sensor, axis)}, found.board.linears)
         if event:
             instant = _instant(found, trial)
-            width = 0.03 if trial.id.startswith("event.") else 2.0 * _width(found, trial)
+            width = 2.0 * abs(_value(found, trial, row.lasts)) if isinstance(row.lasts, str) else 3.0 * row.lasts
             start, stop = max(instant - width, 0.0), instant + width
         where = "all" if trial.recordings is None else ", ".join(names[i] for i in sorted(trial.recordings))
         said = f"{text} (at {_instant(found, trial):.3f} s)" if event else text
@@ -103,10 +103,6 @@ def _value(found: Search, trial: Trial, name: str) -> float:
 
 def _instant(found: Search, trial: Trial) -> float:
     return _value(found, trial, "t_s")
-
-
-def _width(found: Search, trial: Trial) -> float:
-    return abs(_value(found, trial, "width_s"))
 
 
 def located_rest(found: Search, names: Sequence[str]) -> list[Located]:

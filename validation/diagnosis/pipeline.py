@@ -41,8 +41,8 @@ _STACK = 2
 
 def _stacked(found: Search) -> bool:
     """Tell whether several effects on the motion were found, so that one law is worth comparing with them."""
-    rows = [row_of(trial.id) for trial in found.final.hypothesis.trials if not trial.id.startswith("event.")]
-    return sum(row is not None and row.acts_on == "motion" for row in rows) >= _STACK
+    rows = [row_of(trial.id) for trial in found.final.hypothesis.trials]
+    return sum(row is not None and row.acts_on == "motion" and not row.brief for row in rows) >= _STACK
 
 
 @dataclass(frozen=True)

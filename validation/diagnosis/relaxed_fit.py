@@ -13,13 +13,15 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import CATALOGUE
+from discsim.effects.catalogue import CATALOGUE, catalogued
+from discsim.effects.sensors import ClockRate
 from discsim.frames import conjugate, multiply
 from discsim.recording import Recording
 from validation.diagnosis.consistency.spin_agreement import written_ratios
 from validation.identification.gauss_newton import Fit, linearised, merit_of, refit
 from validation.identification.linear import Linear
 from validation.identification.noise import channel_of, estimate_noise, stated_noise, whitened
+from validation.identification.ordinary_errors import ordinary_errors
 from validation.identification.parameters import Parameter
 from validation.identification.plants import plant_of
 from validation.identification.prediction import shown
@@ -35,25 +37,8 @@ __all__ = [
     "without_outliers",
 ]
 
-#: ordinary errors that a relaxed fit allows for: (effect, parameter, one sigma)
-_ORDINARY = (
-    *(("mag.hard_iron", f"b{a}_uT", 10.0) for a in "xyz"),
-    *(("mag.soft_iron", name, 0.1) for name in ("sxx", "sxy", "sxz", "syy", "syz", "szz")),
-    *(("accel.bias", f"b{a}_m_s2", 1.0) for a in "xyz"),
-    *(("accel.position_offset", f"d{a}_m", 0.003) for a in "xy"),
-    *(("accel.scale", f"s{a}", 0.05) for a in "xyz"),
-    *(("gyro.bias", f"b{a}_rad_s", 0.1) for a in "xyz"),
-    *(("gyro.scale", f"s{a}", 0.05) for a in "xyz"),
-    ("air.wind", "w_north_m_s", 3.0),
-    ("air.wind", "w_east_m_s", 3.0),
-    ("air.density", "ratio", 0.1),
-    ("aero.yaw_quadratic", "CNrr", 1e-3),
-    ("body.inertia_asymmetry", "dIyy_kg_m2", 2e-5),
-    ("body.mass_imbalance", "ex_m", 1e-3),
-    ("body.mass_imbalance", "ey_m", 1e-3),
-    ("rig.coulomb_friction", "torque_N_m", 3e-4),
-    ("rig.quadratic_drag", "coefficient_N_m_s2", 3e-6),
-)
+#: the clock of all sensors
+_CLOCK = (catalogued(ClockRate, "clock").id, "ratio")
 
 
 def nodes_of(recording: Recording) -> FloatArray:
@@ -83,7 +68,7 @@ def first_chain(recording: Recording, ratio: float = 1.0, edges: FloatArray | No
 def ordinary(sensors: set[str], plant: str) -> tuple[Parameter, ...]:
     """Return the parameters that a relaxed fit sets free within a prior, of the sensors that are there."""
     chosen = []
-    for id, name, sigma in _ORDINARY:
+    for id, name, sigma, _ in ordinary_errors("relaxed fit"):
         row = CATALOGUE[id]
         if plant in row.plants and (row.acts_on == "motion" or row.acts_on in sensors):
             size = row.scale[row.parameters.index(name)]
@@ -110,9 +95,9 @@ def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), it
     ratio = _wrong_time(recordings)
     chains = tuple(first_chain(one) if ratio == 1.0 else chain_in_true_time(one, ratio) for one in recordings)
     sensors = {readings.sensor for one in chains for readings in one.readings}
-    clock = () if ratio == 1.0 else (Parameter("clock.rate", "ratio", 1.0, 1e-6, _TIME_SIGMA),)
+    clock = () if ratio == 1.0 else (Parameter(*_CLOCK, 1.0, 1e-6, _TIME_SIGMA),)
     parameters = (*known, *loose_parameters(recordings, sensors), *clock)
-    at = np.array([ratio if q.group == "clock.rate" else q.stated for q in parameters])
+    at = np.array([ratio if q.key == _CLOCK else q.stated for q in parameters])
     fit = Fit(chains, parameters, at, plant.sizes.relaxed, {})
     bare = linearised(fit, ())
     fit = replace(fit, noise=stated_noise(bare))
@@ -164,7 +149,7 @@ def from_other_starts(fit: Fit) -> Fit:
     better = dict[int, Chain]()
     for i in _astray(fit)[:FEW]:
         recording = fit.chains[i].recording
-        ratio = fit.values(i).get(("clock.rate", "ratio"), 1.0)
+        ratio = fit.values(i).get(_CLOCK, 1.0)
         first = (
             first_chain(recording, edges=fit.chains[i].edges) if ratio == 1.0 else chain_in_true_time(recording, ratio)
         )
@@ -217,7 +202,7 @@ def part_of(fit: Fit, chosen: Sequence[int]) -> Fit:
 
 
 #: sensors without which the motion of a flight can still be followed, with the effect that is their clock
-_LED = {"accelerometer": ("accel.clock_rate", "ratio"), "gyroscope": ("gyro.clock_rate", "ratio")}
+_LED = {sensor: (catalogued(ClockRate, sensor).id, "ratio") for sensor in ("accelerometer", "gyroscope")}
 #: clocks that are tried on a motion that the other sensors tell
 _CLOCKS_TRIED = 1.0 + 1e-4 * np.arange(-300, 301)
 
@@ -331,8 +316,8 @@ _CLOCK_SIGMA, _FIRST_LOOK = 0.02, 1.3
 def free_clocks(sensors: set[str]) -> tuple[Parameter, ...]:
     """Return the clocks of sensors on board, free within a few per cent."""
     return tuple(
-        Parameter(f"{prefix}.clock_rate", "ratio", 1.0, 1e-6, _CLOCK_SIGMA)
-        for sensor, prefix in (("magnetometer", "mag"), ("accelerometer", "accel"), ("gyroscope", "gyro"))
+        Parameter(catalogued(ClockRate, sensor).id, "ratio", 1.0, 1e-6, _CLOCK_SIGMA)
+        for sensor in ("magnetometer", "accelerometer", "gyroscope")
         if sensor in sensors
     )
 
@@ -354,7 +339,7 @@ def _with_clocks(fit: Fit) -> Fit:
     look = _first_look(free)
     if len(_astray(look)) == len(look.chains):
         return fit
-    ratio = look.values(0).get(("mag.clock_rate", "ratio"), 1.0)
+    ratio = look.values(0).get((catalogued(ClockRate, "magnetometer").id, "ratio"), 1.0)
     chains = tuple(first_chain(one.recording, ratio) for one in fit.chains)
     # what the first look says of the rest is little: only the clocks are taken over
     known = {q.key for q in clocks}

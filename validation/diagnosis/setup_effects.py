@@ -6,18 +6,19 @@ rotation, a field) stays free about its first value in every fit, so that it get
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import CATALOGUE, Effect, effect, row
+from discsim.effects.catalogue import CATALOGUE, Effect, catalogued, effect, row
 from discsim.effects.kind import BOARD
+from discsim.effects.setup import BoardRotation, ClockUnit, SiteField, TimeOffset
 from discsim.model_file import ModelEffect
 from discsim.recording import Recording
-from discsim.written import PREFIX
 from validation.diagnosis.result import (
     SMALLEST_P_VALUE,
     Confusion,
@@ -37,10 +38,9 @@ __all__ = ["free_parameters", "with_setup"]
 
 #: how far a number of a fault may be from its first value, one sigma: s; rad; rad and share. Offsets are found to a few
 #: ms, rotations to a tenth of a radian (an accelerometer's place may be 3 mm of 16 off), fields to a few per cent
-_SIGMA = {"time_offset": 0.01, "rotation": 0.2, "field": 0.2}
+_SIGMA: Mapping[type[Any], float] = {TimeOffset: 0.01, BoardRotation: 0.2, SiteField: 0.2}
 #: a number whose error is this share of that was not determined by the recordings
 _UNDETERMINED = 0.3
-_SENSORS = {prefix: sensor for sensor, prefix in PREFIX.items()}
 
 
 def free_parameters(findings: SetupFindings) -> tuple[Parameter, ...]:
@@ -49,7 +49,7 @@ def free_parameters(findings: SetupFindings) -> tuple[Parameter, ...]:
     for fault in findings.effects:
         kind = row(fault.id)
         for name, scale, none in zip(kind.parameters, kind.scale, _numbers(kind.baseline), strict=True):
-            free.append(Parameter(fault.id, name, none, 0.1 * scale, _SIGMA[fault.id.partition(".")[2]]))
+            free.append(Parameter(fault.id, name, none, 0.1 * scale, _SIGMA[kind.type]))
     return tuple(free)
 
 
@@ -106,7 +106,7 @@ def with_setup(outcome: Outcome, findings: SetupFindings, written: Sequence[Reco
     return replace(outcome, diagnosis=changed, model=replace(outcome.model, effects=(*outcome.model.effects, *carried)))
 
 
-_TURNED = "board.rotation"
+_TURNED = catalogued(BoardRotation).id
 
 
 def _on_board_axes(outcome: Outcome, C: FloatArray, fit: Fit) -> Outcome:
@@ -172,11 +172,11 @@ def _refined(fault: Effect, fit: Fit) -> _Refined:
     if fault.id == _TURNED:
         # the fit turned what was corrected: readings = (R_fit C)^T (vector in B)
         total = (Rotation.from_rotvec(moved) * Rotation.from_rotvec(first)).as_rotvec()
-    elif fault.id == "site.field":
+    elif fault.row.type is SiteField:
         total = np.array([first[0] + moved[0], first[1] + moved[1], first[2] * moved[2]])
     else:
         total = first + moved
-    room = _SIGMA[fault.id.partition(".")[2]]
+    room = _SIGMA[fault.row.type]
     errors = tuple(float(one) if one < _UNDETERMINED * room else None for one in sd)
     return _Refined(effect(fault.id, **dict(zip(names, total.tolist(), strict=True))), errors)
 
@@ -212,22 +212,19 @@ def _telling(twin: Effect, fault: Effect) -> str:
 
 def _excess(fault: Effect, written: Sequence[Recording], meant: Sequence[Recording], fit: Fit) -> float:
     """Return the chi-squared of what the written readings of a fault's sensors are off the corrected ones."""
-    prefix = fault.id.partition(".")[0]
     total = 0.0
     for before, after in zip(written, meant, strict=True):
         for sensor, samples in before.samples.items():
-            if prefix in _SENSORS and sensor != _SENSORS[prefix]:
+            if not fault.row.acts_with((sensor,)):
                 continue
-            if fault.id == _TURNED and sensor not in BOARD:
-                continue
-            if fault.id == "site.field":
+            if fault.row.type is SiteField:
                 if sensor == "magnetometer":
                     apart = after.environment.magnetic_field - before.environment.magnetic_field
                     total += len(samples) * float(apart @ apart) / _variance(fit, sensor)
                 continue
             there = after.samples[sensor]
             value, meant_value = _columns(samples.value), _columns(there.value)
-            if fault.id.endswith("time_offset") or fault.id == "clock.units":
+            if fault.row.type in (TimeOffset, ClockUnit):
                 meant_value = np.column_stack([_at(samples.t, there.t, column) for column in meant_value.T])
             left = (value - meant_value) ** 2
             total += float(np.nansum(left)) / _variance(fit, sensor)
@@ -249,7 +246,8 @@ def _variance(fit: Fit, sensor: str) -> float:
 
 
 def _located(named: NamedEffect, fault: SetupFault, share: float, written: Sequence[Recording]) -> Located:
-    sensor = _SENSORS.get(named.id.partition(".")[0], "all")
+    whose = fault.effect.row
+    sensor = "all" if whose.acts_on in ("board", "clock") or whose.type is SiteField else whose.acts_on
     end = max(float(samples.t[-1]) for one in written for samples in one.samples.values())
     return Located("all", sensor, "all", 0.0, end, float(np.clip(share, 0.0, 1.0)), said(fault.effect))
 

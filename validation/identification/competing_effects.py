@@ -7,11 +7,13 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from types import MappingProxyType
 
-from discsim.effects.catalogue import CATALOGUE, Row
+from discsim.effects.catalogue import CATALOGUE, Effect, Row, effect
 from discsim.effects.own import UserEffect
 
-__all__ = ["competing", "row_of", "rows", "user_effect", "user_effects_on"]
+__all__ = ["applied_on", "competing", "row_of", "rows", "user_effect"]
 
+#: rows of the catalogue that engines and sensors do not know by name
+_CALLED = tuple(effect(row.id) for row in CATALOGUE.values() if row.apply is not None)
 _NONE: Mapping[str, UserEffect] = MappingProxyType({})
 #: a context's own, so that diagnoses side by side do not see one another's; threads take it over in `fitting.mapped`
 _OWN: ContextVar[Mapping[str, UserEffect]] = ContextVar("user_effects", default=_NONE)
@@ -45,6 +47,9 @@ def user_effect(id: str) -> UserEffect | None:
     return _OWN.get().get(id)
 
 
-def user_effects_on(target: str) -> tuple[UserEffect, ...]:
-    """Return the user's own effects on a sensor or on "motion", in the order in which they act."""
-    return tuple(effect for effect in _OWN.get().values() if effect.row.acts_on == target)
+def applied_on(target: str) -> tuple[Effect, ...]:
+    """Return the effects on a sensor or on "motion" that are called by their row, at their baseline, as they act."""
+    return (
+        *(one for one in _CALLED if one.row.acts_on == target),
+        *(own.sized({}) for own in _OWN.get().values() if own.row.acts_on == target),
+    )

@@ -18,6 +18,7 @@ import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
 from discsim.effects.catalogue import CATALOGUE
+from discsim.effects.sensors import Lag
 from discsim.parameters import parameter_index, parameters
 from discsim.recording import Recording
 from validation.identification.competing_effects import row_of
@@ -349,7 +350,7 @@ def _add_sensor_columns(around: _Around, s: Sampled, rows: FloatArray, M: FloatA
             continue
         here = {**values, **{(group, shape): number for shape, number in given}}
         place = around.d + j
-        if group in CLOCKS or (name == "tau_s" and group in CATALOGUE):
+        if group in CLOCKS or group in _LAGS:
             if rate is None:
                 rate = s.time_slope(around.runner, around.flat, around.own, values, around.chain)
             if group in CLOCKS:
@@ -368,10 +369,11 @@ def _add_sensor_columns(around: _Around, s: Sampled, rows: FloatArray, M: FloatA
 
 #: parameters of the motion that also enter what a sensor reads of a given motion
 _ALSO_READ = {
-    ("body.mass_imbalance", "ex_m"),
-    ("body.mass_imbalance", "ey_m"),
+    *((row.id, name) for row in CATALOGUE.values() if row.also_read for name in row.parameters),
     ("environment", "gravity"),
 }
+#: the effects by which a sensor lags
+_LAGS = {row.id for row in CATALOGUE.values() if row.type is Lag}
 
 
 def _current(values: Values, recording: Recording, group: str, name: str) -> float:
@@ -404,8 +406,6 @@ def _moves(column: Column, plant: Plant) -> bool:
 
 def _concerns(group: str, sensor: str) -> bool:
     """Tell whether an effect that is not of the motion can touch a sensor."""
-    if group == "clock.rate":
-        return True
     if group == "environment":
         return sensor == "magnetometer"
     row = row_of(group)

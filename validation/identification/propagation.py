@@ -10,9 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects.catalogue import CATALOGUE
 from discsim.parameters import PARAMETERS, parameter_index, parameters, tables
 from discsim.recording import Recording
-from validation.identification.competing_effects import row_of, user_effects_on
+from validation.identification.competing_effects import applied_on, row_of
 from validation.identification.dynamics import LAW_PLACES, SIZE
 from validation.identification.parameters import Values
 from validation.identification.plants import Plant, plant_of
@@ -59,7 +60,7 @@ def place_in_flat(group: str, name: str) -> int:
     if group == "law":
         behind = SIZE + _own_sizes().size
         return behind + _term(name) * len(LAW_PLACES) + LAW_PLACES.index(name.partition(".")[2])
-    own = [effect.id for effect in user_effects_on("motion")]
+    own = [effect.id for effect in applied_on("motion")]
     if group in own:
         row = row_of(group)
         assert row is not None
@@ -68,8 +69,8 @@ def place_in_flat(group: str, name: str) -> int:
 
 
 def _own_sizes() -> FloatArray:
-    """Return the parameters of the user's own effects on motion at which they do nothing, (effects, k)."""
-    return tables(None, None, [effect.sized({}) for effect in user_effects_on("motion")]).own_sizes
+    """Return the parameters of the effects on motion that are called, at which they do nothing, (effects, k)."""
+    return tables(None, None, applied_on("motion")).own_sizes
 
 
 FLAT_ENVIRONMENT = {("environment", name) for name in PARAMETERS["environment"].names or ()}
@@ -127,7 +128,7 @@ def _knots(recording: Recording) -> FloatArray:
 
 
 def _events(values: Values, columns: Sequence[Column] = ()) -> tuple[tuple[float, float], ...]:
-    """Return instants and widths of short events among values and among the shapes that columns are taken at."""
+    """Return instants and widths of brief events among values and among the shapes that columns are taken at."""
     found = {values[group, "t_s"] for group in EVENTS if (group, "t_s") in values}
     found |= {number for column in columns if column.group in EVENTS for name, number in column.given if name == "t_s"}
     return tuple((t, 0.01) for t in sorted(found))
@@ -135,27 +136,24 @@ def _events(values: Values, columns: Sequence[Column] = ()) -> tuple[tuple[float
 
 def _order(values: Values, columns: Sequence[Column] = ()) -> float:
     """Return the highest order of a speed ripple among values and among the shapes that columns are taken at."""
-    found = [values.get(("rig.speed_ripple", "order"), 0.0)]
-    found += [n for c in columns if c.group == "rig.speed_ripple" for name, n in c.given if name == "order"]
+    found = [values.get(key, 0.0) for key in _PER_TURN]
+    found += [n for c in columns for name, n in c.given if (c.group, name) in _PER_TURN]
     return max(abs(order) for order in found)
 
 
-#: short events, and how far from its instant one acts, s: six times its width of 10 ms, and what an instant is moved by
-EVENTS, EVENT_REACH = ("event.impulse", "event.spin_step"), 0.08
-
-
-_UNEVEN_BODY = (
-    ("body.inertia_asymmetry", "dIyy_kg_m2"),
-    ("body.mass_imbalance", "ex_m"),
-    ("body.mass_imbalance", "ey_m"),
-)
+#: brief events, and how far from its instant one acts, s: six times its width of 10 ms, and what an instant is moved by
+EVENTS, EVENT_REACH = tuple(row.id for row in CATALOGUE.values() if row.brief), 0.08
+#: parameters that say how often in a turn something repeats
+_PER_TURN = tuple((row.id, row.per_turn) for row in CATALOGUE.values() if row.per_turn)
+#: those of a body that is uneven, so that its motion follows the spin
+_UNEVEN_BODY = tuple((row.id, name) for row in CATALOGUE.values() if row.follows_spin for name in row.parameters)
 
 
 def runner_of(recording: Recording, values: Values, columns: Sequence[Column] = ()) -> Runner:
     """Return what runs a recording's segments with values, in steps short enough for ``columns``, too."""
     given = Given(
         recording,
-        tables(recording.disc, None, [effect.sized({}) for effect in user_effects_on("motion")]),
+        tables(recording.disc, None, applied_on("motion")),
         _knots(recording),
         _order(values, columns),
         any(value(values, *key) != 0.0 for key in _UNEVEN_BODY),

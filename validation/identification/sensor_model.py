@@ -1,27 +1,52 @@
 """What the sensors of a recording would read of a motion, with any effect on them.
 
-The catalogue's forms are those of docs/physics.md; motions come as rows (19,) of
+Errors of sensors act by the functions of `discsim.effects`, as in `discsim.sensors`; motions come as rows (19,) of
 `validation.identification.dynamics`, any number of neighbouring ones at once. Noise, rounding and clipping are the
 fit's business.
 """
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Any, TypeVar
+
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import CATALOGUE
-from discsim.effects.sensors import CrossAxis, Scale, sensitivity
-from discsim.effects.setup import BoardRotation, SiteField, field_there, on_board
+from discsim.effects.body import MassImbalance
+from discsim.effects.catalogue import CATALOGUE, catalogued
+from discsim.effects.sensors import (
+    AccelerometerBias,
+    AccelerometerSaturation,
+    BiasDrift,
+    ClockRate,
+    CrossAxis,
+    GSensitivity,
+    GyroscopeBias,
+    HardIron,
+    Latency,
+    PositionOffset,
+    Scale,
+    SoftIron,
+    StrayField,
+    bias_drift,
+    g_sensitivity,
+    hard_iron,
+    sensitivity,
+    soft_iron,
+    stray_field,
+)
+from discsim.effects.setup import BoardRotation, SiteField, TimeOffset, field_there, on_board
 from discsim.motion import State
 from discsim.recording import Recording
-from discsim.written import PREFIX
-from validation.identification.competing_effects import row_of, user_effects_on
+from validation.identification.competing_effects import applied_on, row_of
 from validation.identification.dynamics import to_body
 from validation.identification.parameters import Values
 from validation.identification.plants import plant_of
 
-__all__ = ["CLOCKS", "Values", "delay", "is_motion", "predicted", "value"]
+__all__ = ["CLOCKS", "Values", "delay", "is_motion", "predicted", "sized", "value"]
+
+_Kind = TypeVar("_Kind")
 
 #: the effects that only move the instants at which samples were taken
 CLOCKS = tuple(row.id for row in CATALOGUE.values() if row.moves_time)
@@ -38,6 +63,26 @@ def value(values: Values, group: str, name: str) -> float:
     return float(_BASELINE.get((group, name), 0.0))
 
 
+@cache
+def _places(kind: type[Any], acts_on: str | None) -> tuple[tuple[tuple[str, str], float], ...]:
+    """Return the keys of an effect's parameters and their baselines; none where a sensor cannot have such an effect."""
+    try:
+        row = catalogued(kind, acts_on)
+    except KeyError:
+        return ()
+    return tuple(((row.id, name), none) for name, none in row.sizes.items())
+
+
+def sized(values: Values, kind: type[_Kind], acts_on: str | None = None) -> _Kind:
+    """Return an effect of the catalogue by its type as values have it, those that are not given at their baseline.
+
+    ``acts_on`` tells the sensor where several have one of this type.
+    """
+    made: Any = kind
+    effect: _Kind = made(*(values.get(key, none) for key, none in _places(made, acts_on)))
+    return effect
+
+
 def is_motion(group: str) -> bool:
     """Tell whether a group of parameters acts on the motion (and not on a sensor)."""
     if (row := row_of(group)) is not None:
@@ -47,26 +92,22 @@ def is_motion(group: str) -> bool:
 
 def delay(values: Values, sensor: str, written: FloatArray) -> FloatArray:
     """Return by how much earlier (s) than written (n,) the samples of a sensor show the motion."""
-    ratio = value(values, "clock.rate", "ratio")
-    offset, prefix = 0.0, PREFIX.get(sensor)
-    if prefix is not None:
-        ratio *= value(values, f"{prefix}.clock_rate", "ratio")
-        offset = value(values, f"{prefix}.time_offset", "offset_s")
-    late = written - (written - offset) / ratio
-    if sensor == "gps":
-        late = late + value(values, "gps.latency", "delay_s")
-    return late
+    ratio = sized(values, ClockRate, "clock").ratio * sized(values, ClockRate, sensor).ratio
+    late = written - (written - sized(values, TimeOffset, sensor).offset_s) / ratio
+    return late + sized(values, Latency, sensor).delay_s
 
 
 def predicted(sensor: str, recording: Recording, values: Values, t: FloatArray, rows: FloatArray) -> FloatArray:
     """Return the readings (..., m, k) of a sensor before lag and noise at true times t (m,) for rows (..., m, 19)."""
     readings = _by_catalogue(sensor, recording, values, t, rows)
-    for effect in user_effects_on(sensor):
+    for effect in applied_on(sensor):
         sizes = [value(values, effect.id, name) for name in effect.row.parameters]
-        if sizes != list(effect.row.baseline):
+        if sizes != list(effect.value) and effect.applied is not None:
             flat = rows.reshape(-1, rows.shape[-1])
             times = np.broadcast_to(t, rows.shape[:-1]).ravel()
-            changed = effect.on_readings(sizes, readings.reshape(-1, readings.shape[-1]), times, _state(times, flat))
+            changed = effect.applied.on_readings(
+                sizes, readings.reshape(-1, readings.shape[-1]), times, _state(times, flat)
+            )
             readings = changed.reshape(readings.shape)
     return readings
 
@@ -94,44 +135,35 @@ def _field(recording: Recording, values: Values) -> FloatArray:
     moved = [values.get(("environment", name)) for name in _FIELD]
     stated = recording.environment.magnetic_field
     meant = np.array([own if new is None else new for own, new in zip(stated, moved, strict=True)])
-    return field_there(SiteField(*(value(values, "site.field", name) for name in SiteField._fields)), meant)
+    return field_there(sized(values, SiteField), meant)
 
 
 def _on_board(values: Values, vector: FloatArray) -> FloatArray:
     """Return vectors (..., 3) of B along the axes of the sensor board."""
-    return on_board(BoardRotation(*(value(values, "board.rotation", n) for n in BoardRotation._fields)), vector)
+    return on_board(sized(values, BoardRotation), vector)
 
 
 def _magnetometer(recording: Recording, values: Values, rows: FloatArray) -> FloatArray:
     m = _on_board(values, to_body(rows, np.broadcast_to(_field(recording, values), (*rows.shape[:-1], 3))))
-    xx, xy, xz, yy, yz, zz = (
-        value(values, "mag.soft_iron", f"s{name}") for name in ("xx", "xy", "xz", "yy", "yz", "zz")
-    )
-    m = m + m @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    m = m + np.array([value(values, "mag.hard_iron", f"b{axis}_uT") for axis in "xyz"])
-    stray = np.array([value(values, "mag.stray_field", f"b{axis}_uT") for axis in "ned"])
-    if np.any(stray):
-        h = np.maximum(-rows[..., 2], 0.02)
-        decay = np.exp(-h / value(values, "mag.stray_field", "height_m"))
-        m = m + _on_board(values, to_body(rows, decay[..., None] * stray))
+    m = hard_iron(sized(values, HardIron), soft_iron(sized(values, SoftIron), m))
+    stray = sized(values, StrayField)
+    if any(stray[:3]):
+        m = m + _on_board(values, to_body(rows, stray_field(stray, -rows[..., 2])))
     return np.asarray(m)
 
 
 def place(recording: Recording, values: Values) -> FloatArray:
     """Return where the accelerometer sits from the geometric centre, (3,) m in B."""
     stated = recording.sheets["accelerometer"].position if "accelerometer" in recording.sheets else None
-    offset = [value(values, "accel.position_offset", f"d{axis}_m") for axis in "xyz"]
-    return (np.zeros(3) if stated is None else np.array(stated)) + offset
+    return np.asarray((np.zeros(3) if stated is None else np.array(stated)) + sized(values, PositionOffset))
 
 
 def specific_force(recording: Recording, values: Values, rows: FloatArray) -> FloatArray:
     """Return f_B (..., 3) at the accelerometer, Eq. (1) with g's sign corrected, m/s^2."""
-    d = place(recording, values)
-    d = d - np.array([value(values, "body.mass_imbalance", "ex_m"), value(values, "body.mass_imbalance", "ey_m"), 0.0])
+    d = place(recording, values) - np.array([*sized(values, MassImbalance), 0.0])
     gravity = values.get(("environment", "gravity"), recording.environment.gravity)
-    if not plant_of(
-        recording
-    ).path_known:  # turns with the spin, like the translation that nobody knows: left to the means
+    if not plant_of(recording).path_known:
+        # it turns with the spin, like the translation that nobody knows: left to the means
         gravity = 0.0
     f = to_body(rows, rows[..., 6:9] - np.array([0.0, 0.0, gravity]))
     w, dw = rows[..., 13:16], rows[..., 16:19]
@@ -146,25 +178,23 @@ def specific_force(recording: Recording, values: Values, rows: FloatArray) -> Fl
 
 def _accelerometer(recording: Recording, values: Values, t: FloatArray, rows: FloatArray) -> FloatArray:
     f = _on_board(values, specific_force(recording, values, rows))
-    scale = Scale(*(value(values, "accel.scale", f"s{axis}") for axis in "xyz"))
-    cross = CrossAxis(*(value(values, "accel.cross_axis", name) for name in CrossAxis._fields))
+    scale, cross = sized(values, Scale, "accelerometer"), sized(values, CrossAxis)
     if any(scale) or any(cross):
         f = f @ sensitivity(scale, cross).T
-    f = f + np.array([value(values, "accel.bias", f"b{axis}_m_s2") for axis in "xyz"])
-    drift = np.array([value(values, "accel.bias_drift", f"b{axis}_m_s3") for axis in "xyz"])
-    if np.any(drift):
-        f = f + t[:, None] * drift
-    limit = value(values, "accel.saturation", "limit_m_s2")
+    f = f + np.array(sized(values, AccelerometerBias))
+    drift = sized(values, BiasDrift)
+    if any(drift):
+        f = f + bias_drift(drift, t)
+    limit = sized(values, AccelerometerSaturation).limit_m_s2
     return np.asarray(np.clip(f, -limit, limit) if np.isfinite(limit) else f)
 
 
 def _gyroscope(recording: Recording, values: Values, t: FloatArray, rows: FloatArray) -> FloatArray:
-    scale = np.array([value(values, "gyro.scale", f"s{axis}") for axis in "xyz"])
-    w = _on_board(values, rows[..., 13:16]) * (1.0 + scale)
-    w = w + np.array([value(values, "gyro.bias", f"b{axis}_rad_s") for axis in "xyz"])
-    faked = np.array([value(values, "gyro.g_sensitivity", f"k{axis}") for axis in "xyz"])
-    if np.any(faked):
-        w = w + faked * _felt(recording, values, t, rows)
+    w = _on_board(values, rows[..., 13:16]) * (1.0 + np.array(sized(values, Scale, "gyroscope")))
+    w = w + np.array(sized(values, GyroscopeBias))
+    faked = sized(values, GSensitivity)
+    if any(faked):
+        w = w + g_sensitivity(faked, _felt(recording, values, t, rows))
     return np.asarray(w)
 
 
@@ -178,9 +208,10 @@ def _felt(recording: Recording, values: Values, t: FloatArray, rows: FloatArray)
     if measured is not None:
         whole = np.all(np.isfinite(measured.value), axis=1)
         if np.count_nonzero(whole) > 1:
-            written = t * value(values, "clock.rate", "ratio") * value(values, "accel.clock_rate", "ratio")
-            written = written + value(values, "accel.time_offset", "offset_s")
+            ratios = [sized(values, ClockRate, whose).ratio for whose in ("clock", "accelerometer")]
+            written = t * ratios[0] * ratios[1] + sized(values, TimeOffset, "accelerometer").offset_s
             return np.stack([np.interp(written, measured.t[whole], f) for f in measured.value[whole].T], axis=-1)
     # the stated place: both sit on one chip
-    here = {key: v for key, v in values.items() if key[0] != "accel.position_offset"}
+    moved = catalogued(PositionOffset).id
+    here = {key: v for key, v in values.items() if key[0] != moved}
     return _on_board(values, specific_force(recording, here, rows))

@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike
 
 from discsim.arrays import FloatArray
 from discsim.disc import Aero, aero_key
+from discsim.effects.catalogue import catalogued
+from discsim.effects.sensors import PositionOffset
 from discsim.recording import Recording
 from validation.identification.parameters import Parameter
 from validation.identification.plants import plant_of
@@ -74,8 +76,9 @@ def _of(recording: Recording) -> Iterator[tuple[str, str, float, float]]:
                 yield "rig", _RIG[key], float(getattr(rig, _RIG[key])), float(np.max(sigma))
     sheet = recording.sheets.get("accelerometer")
     if sheet is not None and "position_m" in sheet.sigma and sheet.position is not None:
+        moved = catalogued(PositionOffset).id
         for axis, size in zip("xyz", _three(sheet.sigma["position_m"]), strict=True):
-            yield "accel.position_offset", f"d{axis}_m", 0.0, float(size)
+            yield moved, f"d{axis}_m", 0.0, float(size)
 
 
 def _three(sigma: ArrayLike) -> FloatArray:

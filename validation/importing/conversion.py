@@ -18,7 +18,7 @@ from discsim.disc import Release
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from validation.importing.cleaning import Readings, cleaned
-from validation.importing.import_map import ImportMap, SensorMap
+from validation.importing.import_map import ImportMap, SensorMap, TimeBase
 from validation.importing.raw_table import RawRow, RawTable, Repair, RepairList, number, read_raw
 from validation.importing.row_clock import RowClock, row_clock
 from validation.importing.timing import row_timing
@@ -114,7 +114,7 @@ def recording_of(read: RawReadings, rows: slice | None = None) -> Imported:
     raw, import_map, readings = read.raw, read.import_map, read.readings
     notes = list(read.notes)
     if rows is not None:
-        whole, readings = readings, _cut(readings, read.tables, read.main, rows)
+        whole, readings = readings, _cut(read, rows)
         notes += [f"no {sensor} in these rows" for sensor in whole if sensor not in readings]
     repairs = RepairList(import_map.repairs)
     readings, rates, said = _fresh(raw, readings, import_map, read.tables, repairs)
@@ -155,27 +155,32 @@ def _read_sensors(
 ) -> tuple[dict[str, Readings], list[str]]:
     """Return the sound rows of each sensor that is there, that of the first file first, and what to say of the rest."""
     notes: list[str] = []
-    clocks: dict[Path, RowClock] = {}
+    clocks: dict[tuple[Path, str | None, str], RowClock] = {}
     readings: dict[str, Readings] = {}
-    main: RawTable | None = None
+    first: tuple[Path, str | None] | None = None
     for sensor, sensor_map in import_map.sensors.items():
         table = tables.get(sensor)
         names = None if table is None else _columns(table, sensor_map, import_map)
         if table is None or names is None:
             notes.append(f"no {sensor} in it")
             continue
-        if table.path not in clocks:
-            clocks[table.path] = row_clock(table, import_map, repairs)
-            main = main or table
-            notes += _stretches(table, clocks[table.path], rows if table is main else None)
-        clock, cut = clocks[table.path], rows if table is main else None
+        base = import_map.time_of(sensor)
+        if sensor_map.time is not None:
+            table = _own_rows(table, [*names, sensor_map.time])
+        first = first or (table.path, sensor_map.time)
+        cut = rows if first == (table.path, sensor_map.time) else None
+        key = (table.path, sensor_map.time, "" if sensor_map.time is None else sensor)
+        if key not in clocks:
+            clocks[key] = row_clock(table, import_map, base, repairs)
+            notes += _stretches(table, clocks[key], cut)
+        clock = clocks[key]
         found = _readings(table, sensor, names, sensor_map, import_map, clock, cut, repairs)
         chosen = _chosen_rows(table, sensor_map)
         lost = chosen - found.time.size
         if found.time.size == 0:
             raise InputError.at(table.path, None, f"no usable row of the {sensor}; expected numbers in {names}")
         if found.time.size == 1 and chosen > 2 and sensor_map.where is None:
-            raise InputError.at(table.path, None, _no_time(sensor, chosen, import_map, clock))
+            raise InputError.at(table.path, None, _no_time(sensor, chosen, base, clock))
         if lost > MUCH_LOST * chosen and not clock.starts:
             times = len(set(clock.time.values()))
             coarse = sensor_map.where is None and times < (1 - MUCH_LOST) * len(clock.time)
@@ -195,9 +200,26 @@ def _read_sensors(
     return readings, notes
 
 
-def _no_time(sensor: str, rows: int, import_map: ImportMap, clock: RowClock) -> str:
+def _own_rows(table: RawTable, names: Sequence[str]) -> RawTable:
+    """Return a table with the rows of a sensor that has its own stamps: not those that hold nothing of it, nor repeats.
+
+    Where sensors of several rates stand side by side, a slower one's cells end earlier, or its reading stands with its
+    stamp until the next one.
+    """
+    indices = [table.columns.index(name) for name in names]
+    rows: list[RawRow] = []
+    before: list[str] = []
+    for row in table.rows:
+        cells = [row.cells[index] for index in indices]
+        if any(cells) and cells != before:
+            rows.append(row)
+            before = cells
+    return replace(table, rows=tuple(rows))
+
+
+def _no_time(sensor: str, rows: int, base: TimeBase, clock: RowClock) -> str:
     times = list(clock.time.values())
-    column = import_map.time.column or import_map.time.counter
+    column = base.column or base.counter
     return (
         f"time does not go on over the {sensor}'s {rows} rows: '{column}' runs from {times[0]:.9g} s to "
         f"{times[-1]:.9g} s; expected stamps that ascend; name another column in [time], or step_s"
@@ -323,7 +345,7 @@ def _columns(table: RawTable, sensor_map: SensorMap, import_map: ImportMap) -> l
     here = next((names for names in sensor_map.columns if known.issuperset(names)), None)
     if here is None and sensor_map.optional:
         return None
-    time = import_map.time
+    time = import_map.time if sensor_map.time is None else replace(import_map.time, column=sensor_map.time)
     needed = list(here or min(sensor_map.columns, key=lambda names: len(set(names) - known)))
     needed += [name for name in (time.column, time.counter) if name is not None]
     needed += [sensor_map.where[0]] if sensor_map.where is not None else []
@@ -354,6 +376,8 @@ def _there(tables: dict[str, RawTable], raw: Path) -> str:
 
 
 def _chosen_rows(table: RawTable, sensor_map: SensorMap) -> int:
+    if sensor_map.time is not None:
+        return len(table.rows)
     if sensor_map.where is None:
         return table.total
     column = table.columns.index(sensor_map.where[0])
@@ -382,8 +406,9 @@ def _readings(
         here = [row for row in here if clock.stretch[row.number] == kept_stretch]
     rows: list[RawRow] = []
     values: list[list[float]] = []
+    hollow = _hollow(table, here, dict(zip(indices, names, strict=True)), repairs)
     for row in here:
-        value = _value(table, row, sensor, names, indices, import_map, repairs)
+        value = _value(table, row, sensor, names, indices, hollow, import_map, repairs)
         if value is not None:
             rows.append(row)
             values.append(value)
@@ -398,12 +423,21 @@ def _readings(
     return Readings(np.array([rows[k].number for k in kept]), np.array([times[k] for k in kept]), read)
 
 
+def _hollow(table: RawTable, rows: list[RawRow], names: dict[int, str], repairs: RepairList) -> set[int]:
+    """Return the columns that are empty in every row, each of which is listed once."""
+    hollow = {index for index in names if rows and not any(row.cells[index] for row in rows)}
+    for index in hollow:
+        repairs.add("number", table.path, rows[0].line, f"'{names[index]}' is empty in every row", "gaps throughout")
+    return hollow
+
+
 def _value(
     table: RawTable,
     row: RawRow,
     sensor: str,
     names: list[str],
     indices: list[int],
+    hollow: set[int],
     import_map: ImportMap,
     repairs: RepairList,
 ) -> list[float] | None:
@@ -414,7 +448,7 @@ def _value(
             what = f"'{name}' is '{row.cells[index][:40]}', no number"
             repairs.add("number", table.path, row.line, what, f"row left out of {sensor}")
             return None
-        if np.isnan(reading):
+        if np.isnan(reading) and index not in hollow:
             what = f"'{row.cells[index][:40]}'" if row.cells[index] else "empty"
             repairs.add("number", table.path, row.line, f"'{name}' is {what}", "gap")
         value.append(reading)
@@ -457,9 +491,11 @@ def _ascending(table: RawTable, rows: list[RawRow], times: list[float], repairs:
 # --------------------------------------------------------------------------------------------- the recording
 
 
-def _cut(
-    readings: dict[str, Readings], tables: dict[str, RawTable], main: RawTable, rows: slice
-) -> dict[str, Readings]:
+def _cut(read: RawReadings, rows: slice) -> dict[str, Readings]:
+    """Return the readings of some rows of the first sensor, and of the others in the same span of time."""
+    readings, main = read.readings, read.main
+    own = {sensor: read.import_map.sensors[sensor].time for sensor in readings}
+    here = {s for s in readings if read.tables[s] is main and own[s] == own[next(iter(readings))]}
     start = 0 if rows.start is None else rows.start + (main.total if rows.start < 0 else 0)
     stop = main.total if rows.stop is None else rows.stop + (main.total if rows.stop < 0 else 0)
     if not 0 <= start < stop <= main.total:
@@ -468,14 +504,14 @@ def _cut(
     cut = {}
     spans = []
     for sensor, found in readings.items():
-        if tables[sensor] is main:
+        if sensor in here:
             cut[sensor] = found.select((found.number >= start) & (found.number < stop))
             spans += [cut[sensor].time[:1], cut[sensor].time[-1:]]
     span = np.concatenate(spans)
     if span.size == 0:
         raise InputError.at(main.path, None, f"--rows {start}:{stop}: no usable row among them")
     for sensor, found in readings.items():
-        if tables[sensor] is not main:
+        if sensor not in here:
             cut[sensor] = found.select((found.time >= span.min()) & (found.time <= span.max()))
     return {sensor: cut[sensor] for sensor in readings if cut[sensor].time.size}
 

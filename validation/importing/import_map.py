@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date, datetime
 from pathlib import Path
 from types import MappingProxyType
@@ -76,6 +76,8 @@ class SensorMap:
         A column and the value it has in the rows of this sensor.
     optional : bool
         Whether the sensor may be absent.
+    time : str or None
+        The column of this sensor's own time stamps, in the unit of ``[time]``; None where it has the file's.
     sheet : SensorSheet
         What the data sheet states; a rate of NaN is taken from the time stamps.
     """
@@ -87,6 +89,7 @@ class SensorMap:
     where: tuple[str, str] | None
     optional: bool
     sheet: SensorSheet
+    time: str | None = None
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,11 @@ class ImportMap:
     throws: Mapping[str, MeasuredThrow]
     sensors: Mapping[str, SensorMap]
     recognised_by: tuple[str, ...] | None = None
+
+    def time_of(self, sensor: str) -> TimeBase:
+        """Return the clock of a sensor's rows: its own column of time stamps, or the file's."""
+        own = self.sensors[sensor].time
+        return self.time if own is None else replace(self.time, column=own)
 
 
 def find_map(name_or_path: str) -> Path:
@@ -140,6 +148,10 @@ def read_map(path: Path) -> ImportMap:
     sensors = _sensors(_need(top, "sensors"), strict=plant != "free_spin")
     recognised_by = _texts(top, "recognised_by")
     top.finish()
+    own = [sensor for sensor, sensor_map in sensors.items() if sensor_map.time is not None]
+    if own and time.column is None:
+        what = f"[sensors.{own[0]}] names a column of time stamps"
+        raise top.error("sensors", f"{what}; expected 'column' in [time] too, whose unit holds for both")
     if throws and "track" not in sensors:
         raise top.error("throws", "[throws] without [sensors.track]; expected the track whose first row is the release")
     return ImportMap(
@@ -296,9 +308,10 @@ def _sensor(table: TomlTable, sensor: str, *, strict: bool) -> SensorMap:
             raise where.error(None, f"{len(keys)} keys, expected one: COLUMN = 'value'")
         chosen = (keys[0], cast(str, where.text(keys[0])))
     optional = table.flag("optional")
+    time = table.text("time", required=False)
     # a rate that the map does not state comes from the time stamps
     sheet = read_sheet(table, sensor, strict=strict, rate_required=False)
-    return SensorMap(file, columns, choices[unit] * (scale or 1.0), axes, chosen, optional, sheet)
+    return SensorMap(file, columns, choices[unit] * (scale or 1.0), axes, chosen, optional, sheet, time)
 
 
 def _columns(table: TomlTable, sensor: str) -> tuple[tuple[str, ...], ...]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from validation.importing.clock import Break, iso_seconds, mended
-from validation.importing.import_map import ImportMap
+from validation.importing.import_map import ImportMap, TimeBase
 from validation.importing.raw_table import RawRow, RawTable, RepairList, number
 
 __all__ = ["RowClock", "row_clock"]
@@ -27,17 +27,17 @@ class RowClock:
         return int(found[np.argmax(counts)])
 
 
-def row_clock(table: RawTable, import_map: ImportMap, repairs: RepairList) -> RowClock:
-    """Return the time of each row; raises `InputError` for a damage that the map does not allow to repair."""
-    counters = _counters(table, import_map, repairs)
+def row_clock(table: RawTable, import_map: ImportMap, base: TimeBase, repairs: RepairList) -> RowClock:
+    """Return the time of each row by ``base``; raises `InputError` for damage that the map does not let repair."""
+    decimal = import_map.layout.decimal
+    counters = _counters(table, base.counter, decimal, repairs)
     rows: list[RawRow] = []
     times: list[float] = []
     for row in table.rows:
-        time = _time(table, row, counters, import_map, repairs)
+        time = _time(table, row, counters, base, decimal, repairs)
         if time is not None:
             rows.append(row)
             times.append(time)
-    base = import_map.time
     clock = mended(times, base.scale if base.step is None else base.step)
     starts = []
     for found in clock.breaks:
@@ -57,9 +57,8 @@ def _action(found: Break) -> str:
     return f"time goes on: {found.shift:.9g} s added from here" if found.shift else "a new stretch begins here"
 
 
-def _counters(table: RawTable, import_map: ImportMap, repairs: RepairList) -> dict[int, float]:
+def _counters(table: RawTable, name: str | None, decimal: str, repairs: RepairList) -> dict[int, float]:
     """Return the counter of each row (by row number), with its jumps listed."""
-    name, decimal = import_map.time.counter, import_map.layout.decimal
     if name is None:
         return {}
     index = table.columns.index(name)
@@ -78,16 +77,15 @@ def _counters(table: RawTable, import_map: ImportMap, repairs: RepairList) -> di
 
 
 def _time(
-    table: RawTable, row: RawRow, counters: dict[int, float], import_map: ImportMap, repairs: RepairList
+    table: RawTable, row: RawRow, counters: dict[int, float], base: TimeBase, decimal: str, repairs: RepairList
 ) -> float | None:
-    base = import_map.time
     if base.counter is not None and row.number not in counters:
         return None
     if base.column is None:
         assert base.step is not None
         return (counters[row.number] if base.counter is not None else row.number) * base.step
     cell = row.cells[table.columns.index(base.column)]
-    time = iso_seconds(cell) if base.iso else number(cell, import_map.layout.decimal)
+    time = iso_seconds(cell) if base.iso else number(cell, decimal)
     if time is None or np.isnan(time):
         expected = ", expected an ISO time" if base.iso else ""
         repairs.add("number", table.path, row.line, f"'{base.column}' is '{cell[:40]}'{expected}", "row left out")

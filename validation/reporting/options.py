@@ -18,6 +18,7 @@ from discsim.environment import FIELD_MODEL_SIGMA, Environment, world_magnetic_f
 from discsim.errors import InputError
 from discsim.law import WRENCH_TARGETS, Law
 from discsim.model_file import Model, read_model
+from discsim.module import Module
 from discsim.recording import Plant
 from discsim.shipped import load_disc, load_site
 
@@ -25,6 +26,7 @@ __all__ = [
     "DateOption",
     "EffectOption",
     "ModelOption",
+    "ModuleOption",
     "OutOption",
     "PlaceOption",
     "SeedOption",
@@ -36,6 +38,7 @@ __all__ = [
     "disc_to_fly",
     "laws_upon",
     "parse_effects",
+    "parse_module",
     "parse_vector",
 ]
 
@@ -72,6 +75,16 @@ ModelOption: TypeAlias = Annotated[
         "--model",
         help="A model file: surroundings, disc, law, and effects; those of named recordings act where --out has that "
         "name.",
+    ),
+]
+
+ModuleOption: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--module",
+        metavar="mass_kg=M,...",
+        help="A module that adds to the disc's mass and inertia: mass_kg=M,x_m=X,y_m=Y,radius_m=A; place and radius "
+        "are 0 by default. Without it the disc's mass holds all.",
     ),
 ]
 
@@ -205,6 +218,24 @@ def parse_effects(
             raise InputError(f"--effect {given.id}: {problem}")
         effects.append(given)
     return effects
+
+
+def parse_module(text: str) -> Module:
+    """Return the module of ``--module mass_kg=M,x_m=X,y_m=Y,radius_m=A``.
+
+    Raises `InputError` for another key, for what is no number, and for a module without a mass.
+    """
+    keys = {"mass_kg": "mass", "x_m": "x", "y_m": "y", "radius_m": "radius"}
+    sizes: dict[str, float] = {}
+    for item in filter(None, text.split(",")):
+        name, _, value = (part.strip() for part in item.partition("="))
+        try:
+            sizes[keys[name]] = float(value)
+        except (KeyError, ValueError):
+            raise InputError(f"--module {text}: '{item}' is not one of {', '.join(keys)} with a number") from None
+    if "mass" not in sizes:
+        raise InputError(f"--module {text}: has no mass; expected mass_kg=NUMBER, such as mass_kg=0.015")
+    return Module(**sizes)
 
 
 def parse_vector(text: str, option: str, unit: str, largest: float) -> FloatArray:

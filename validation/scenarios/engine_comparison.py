@@ -8,7 +8,8 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.disc import Disc, Release
-from discsim.effects.catalogue import Effect, effect
+from discsim.effects import aero, air, body, events
+from discsim.effects.catalogue import Effect, effect_of
 from discsim.engine import fly
 from discsim.environment import Environment
 from discsim.frames import rotation_error
@@ -54,25 +55,25 @@ def strong_throw(rng: np.random.Generator, number: int) -> StrongThrow:
         np.array([around(5.0), around(5.0), direction * between(35.0, 105.0)]),
     )
     effects = (
-        effect("air.wind", w_north_m_s=around(5.0), w_east_m_s=around(5.0)),
-        effect("air.wind_shear", w_north_m_s=around(2.0), w_east_m_s=around(2.0), exponent=0.2),
-        effect("air.gust", t_s=between(0.3, 2.0), width_s=0.2, w_north_m_s=around(3.0), w_east_m_s=around(3.0)),
-        effect("air.density", ratio=1.1),
-        effect("air.ground_effect", k=0.3),
-        effect("aero.spin_side_force", CYr=around(0.02)),
-        effect("aero.spin_lift", CLr=around(0.02)),
-        effect("aero.spin_drag", CDrr=between(0.0, 0.02)),
-        effect("aero.spin_pitching_moment", CMr=around(0.001)),
-        effect("aero.stall", k=0.3, alpha_stall_rad=0.35),
-        effect("aero.yaw_reynolds", exponent=0.2),
-        effect("aero.yaw_quadratic", CNrr=-0.001),
-        effect("aero.yaw_alpha", CNraa=-0.01),
-        effect("body.mass_imbalance", ex_m=0.001 * np.cos(number), ey_m=0.001 * np.sin(number)),
-        effect("body.inertia_asymmetry", dIyy_kg_m2=between(0.0, 0.02) * disc.Ixx),
-        effect("event.impulse", t_s=between(0.2, 1.0), dv_north_m_s=0.5, dv_east_m_s=-0.5, dv_down_m_s=around(0.3)),
-        effect("event.spin_step", t_s=between(0.2, 1.0), dr_rad_s=around(3.0)),
+        air.Wind(w_north_m_s=around(5.0), w_east_m_s=around(5.0)),
+        air.WindShear(w_north_m_s=around(2.0), w_east_m_s=around(2.0), exponent=0.2),
+        air.Gust(t_s=between(0.3, 2.0), width_s=0.2, w_north_m_s=around(3.0), w_east_m_s=around(3.0)),
+        air.Density(ratio=1.1),
+        air.GroundEffect(k=0.3),
+        aero.SpinSideForce(CYr=around(0.02)),
+        aero.SpinLift(CLr=around(0.02)),
+        aero.SpinDrag(CDrr=between(0.0, 0.02)),
+        aero.SpinPitchingMoment(CMr=around(0.001)),
+        aero.Stall(k=0.3, alpha_stall_rad=0.35),
+        aero.YawReynolds(exponent=0.2),
+        aero.YawQuadratic(CNrr=-0.001),
+        aero.YawAlpha(CNraa=-0.01),
+        body.MassImbalance(ex_m=0.001 * np.cos(number), ey_m=0.001 * np.sin(number)),
+        body.InertiaAsymmetry(dIyy_kg_m2=between(0.0, 0.02) * disc.Ixx),
+        events.Impulse(t_s=between(0.2, 1.0), dv_north_m_s=0.5, dv_east_m_s=-0.5, dv_down_m_s=around(0.3)),
+        events.SpinStep(t_s=between(0.2, 1.0), dr_rad_s=around(3.0)),
     )
-    return StrongThrow(f"{number}: {name}", disc, environment, release, effects)
+    return StrongThrow(f"{number}: {name}", disc, environment, release, tuple(map(effect_of, effects)))
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,17 @@ from estimators.gyroscope import gyroscope
 from estimators.rate import YawRate
 from validation.reporting.scores import Score, at_most, score
 
-__all__ = ["Plateau", "RateTableRun", "plateau_table", "rate_table_checks", "run_rate_table", "write_plateaus"]
+__all__ = [
+    "MOUNT_ERRORS",
+    "Plateau",
+    "RateTableRun",
+    "envelope_on",
+    "fft_delay",
+    "plateau_table",
+    "rate_table_checks",
+    "run_rate_table",
+    "write_plateaus",
+]
 
 #: margin kept from a plateau's ends: half the paper's window of 128 samples at 100 Hz, and a little
 MARGIN_S = 0.7
@@ -82,7 +92,7 @@ def run_rate_table(
     kind; ``laws`` about sensors come on top. ``progress`` is `turn_table`'s. Raises `InputError` where both ``mount``
     and ``effects`` move the accelerometer.
     """
-    if mount is not None and np.any(mount) and any(item.id == "accel.position_offset" for item in effects):
+    if mount is not None and np.any(mount) and any(isinstance(item.value, PositionOffset) for item in effects):
         raise InputError("a mount error and accel.position_offset both move the accelerometer; expected one of them")
     draw_module, draw_wide, draw_yaw, noise_module, noise_wide = rng.spawn(5)
     motion = turn_table(profile, environment, effects, yaw=float(draw_yaw.uniform(0, 2 * np.pi)), progress=progress)
@@ -189,7 +199,7 @@ def rate_table_checks(run: RateTableRun, table: list[Plateau]) -> list[Score]:
         scores.append(score("rate table: noise of the wide-range gyroscope", noise, "deg/s", 14.0, 1.4))
         # a single accelerometer may by chance be a good one; what it can be trusted to is its envelope, and beyond its
         # range nothing, where the wide-range gyroscope is the next best
-        trusted = np.array([_envelope(run, MOUNT_ERRORS[0], row.rate)[0] / 2 for row in fast])
+        trusted = np.array([envelope_on(run, MOUNT_ERRORS[0], row.rate)[0] / 2 for row in fast])
         ratio = np.max(_rms(fast) / np.fmin(_rms(of("adxrs649", high)), trusted))
         scores.append(score("rate table: fft error over the next best method's at high rates", ratio, "1", 0.0, 1.0))
     if known := [row for row in of("accelerometer", high) if row.known > 0.5]:
@@ -210,7 +220,7 @@ def _rms(rows: list[Plateau]) -> FloatArray:
     return np.array([np.hypot(row.bias, row.sd) for row in rows])
 
 
-def _envelope(run: RateTableRun, mount: float, rate: float) -> tuple[float, float]:
+def envelope_on(run: RateTableRun, mount: float, rate: float) -> tuple[float, float]:
     """Return the envelope's median width on the plateau of a rate (rad/s) and the share of it that misses the truth.
 
     NaN where the accelerometer is beyond its range.
@@ -231,7 +241,7 @@ def _envelope_checks(run: RateTableRun, rate: float) -> list[Score]:
     distance = float(np.hypot(*np.asarray(run.recording.sheets["accelerometer"].position)[:2]))
     scores, widths, missed = [], {}, []
     for mount in MOUNT_ERRORS:
-        widths[mount], outside = _envelope(run, mount, rate)
+        widths[mount], outside = envelope_on(run, mount, rate)
         if mount >= run.mount:
             missed.append(outside)
         # (9) at the corners of mount error and (13), at high rate; what bias and gravity add is in the margin

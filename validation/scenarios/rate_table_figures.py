@@ -1,4 +1,4 @@
-"""The paper's Fig. 3 and Fig. 7 from a rate-table run."""
+"""The paper's Fig. 7 from a rate-table run, and one window of its fastest plateau as the FFT sees it."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def draw_methods(run: RateTableRun, path: Path) -> None:
 
 
 def draw_waveform(run: RateTableRun, path: Path) -> None:
-    """Draw Fig. 3: the magnetometer's waveform on the fastest plateau, and the spectrum of a padded window of it."""
+    """Draw a second of the magnetometer on the fastest plateau, and one window's padded spectrum, (P-3) to (P-5)."""
     magnetometer = run.recording.need("magnetometer")
     start, _, level = max(plateaus(run.profile), key=lambda span: abs(span[2]))
     settings = FftSettings()

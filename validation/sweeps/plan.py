@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from discsim.arrays import FloatArray, readonly
 from discsim.effects.catalogue import Effect, effect, row
+from discsim.effects.sensors import PositionOffset
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import digest, model_file, model_names
@@ -414,7 +415,7 @@ def _read_effect(table: TomlTable, key: str, plant: str) -> Axis:
         raise table.error(key, f"'{key}': {error}") from None
     if plant not in kind.plants:
         raise table.error(key, f"'{key}' acts on {', '.join(kind.plants)}; this is a {plant}")
-    if id == "accel.position_offset":
+    if kind.type is PositionOffset:
         raise table.error(key, f"'{key}': mounts move the accelerometer; expected [mounts] instead")
     values = tuple(_number(table, key, value) for value in _listed(table, key))
     return Axis(key, values, values, kind.acts_on == "motion")

@@ -60,7 +60,10 @@ class PaperTable:
 
 
 def damping_by_26(disc: Disc, density: float, r_dot: float, r: FloatArray | float, V: FloatArray | float) -> FloatArray:
-    """C_Nr = 16 Izz rdot/(V r rho pi d^4), (26), of magnitudes r (rad/s) and rdot (rad/s^2); broadcasts r and V."""
+    """C_Nr = 16 Izz rdot/(V r rho pi d^4), (26), of magnitudes r (rad/s) and rdot (rad/s^2); broadcasts r and V.
+
+    It is N = Izz rdot with (24) in (25).
+    """
     return np.asarray(16.0 * disc.Izz * r_dot / (V * r * density * np.pi * disc.diameter**4))
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from discsim.effects.own import compiled_wrench, load_user_effect, load_user_effects
+from discsim.effects.applied import compiled_wrench
+from discsim.effects.own import load_user_effect, load_user_effects
 from discsim.errors import InputError
 from discsim.motion import State
 

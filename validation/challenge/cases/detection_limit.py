@@ -26,7 +26,7 @@ from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, Noise, record
 from discsim.trajectory import predict
 from validation.challenge.cases.case import Case, Coast, Concealed, Run, Turning
-from validation.challenge.cases.sizes import HIDING
+from validation.challenge.cases.sizes import hiding_of
 
 __all__ = ["THRESHOLD", "sizes", "strength"]
 
@@ -103,7 +103,7 @@ def _orthonormal(columns: FloatArray) -> FloatArray:
 
 def _small(item: Effect, case: Case) -> tuple[Effect, float]:
     """Return the effect at a size where readings are linear in it, and the share of its size that this is."""
-    hiding = HIDING[item.id]
+    hiding = hiding_of(item.id)
     values = item.value._asdict()
     if item.id.endswith("dropped_samples"):
         # what the losses do on average: a clock that runs slow by the share that is lost

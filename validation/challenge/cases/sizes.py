@@ -16,7 +16,7 @@ import numpy as np
 from discsim.effects.catalogue import CATALOGUE, Effect, effect
 from discsim.recording import Plant
 
-__all__ = ["HIDING", "Hiding", "conceivable", "draw_effect", "ordinary", "scaled"]
+__all__ = ["HIDING", "Hiding", "conceivable", "draw_effect", "hiding_of", "ordinary", "scaled"]
 
 
 @dataclass(frozen=True)
@@ -222,6 +222,30 @@ HIDING: Mapping[str, Hiding] = MappingProxyType(
     }
 )
 
+#: of an effect that has no place here yet, from what is visible of it, by the row's scale, to what nobody would miss
+_VISIBLE, _PLAIN = 1.0, 30.0
+
+
+def hiding_of(id: str) -> Hiding:
+    """Return how an effect is drawn; one that is new in the catalogue goes by its row's scale.
+
+    Its first parameter and those alike share one size, the others are drawn evenly up to ten times their scale.
+    """
+    if id in HIDING:
+        return HIDING[id]
+    row = CATALOGUE[id]
+    scale, about = dict(zip(row.parameters, row.scale, strict=True)), row.sizes
+    first = row.parameters[0]
+    alike = tuple(name for name in row.parameters if (scale[name], about[name]) == (scale[first], about[first]))
+    ranges = {
+        name: (about[name] + scale[name], about[name] + 10.0 * scale[name])
+        for name in row.parameters
+        if name not in alike
+    }
+    low, high = _VISIBLE * scale[first], _PLAIN * scale[first]
+    return Hiding(alike, low, high, "the row's scale", ranges, about[first], row.sign.get(first, 0.0) > 0.0)
+
+
 #: effects that unknowns of a plant take in: the part of a free spin's acceleration that turns with the spin is
 #: unmodelled, and the rest hardly changes
 _HIDDEN_FOR_GOOD: Mapping[Plant, frozenset[str]] = MappingProxyType(
@@ -245,7 +269,7 @@ def draw_effect(
     id: str, plant: Plant, rng: np.random.Generator, recorded: float = 3.5, *, largest: bool = False
 ) -> Effect:
     """Draw the size of an effect on a plant, or take its ``largest``; an event falls well within ``recorded`` (s)."""
-    hiding = HIDING[id]
+    hiding = hiding_of(id)
     low, high = hiding.limits(plant)
     size = float(np.exp(rng.uniform(np.log(low), np.log(high))))
     if largest:
@@ -264,7 +288,7 @@ def draw_effect(
 
 def ordinary(item: Effect, plant: Plant) -> bool:
     """Tell whether an effect is of ordinary size: in the upper half, by logarithm, of those that are drawn."""
-    hiding = HIDING[item.id]
+    hiding = hiding_of(item.id)
     low, high = hiding.limits(plant)
     size = float(np.linalg.norm([item.sizes[name] - hiding.about for name in hiding.sized]))
     middle = float(np.sqrt(low * high))
@@ -276,7 +300,7 @@ def scaled(item: Effect, factor: float, plant: Plant) -> Effect:
 
     It does not become larger than effects are drawn.
     """
-    hiding, values = HIDING[item.id], item.value._asdict()
+    hiding, values = hiding_of(item.id), item.value._asdict()
     size = float(np.linalg.norm([values[name] - hiding.about for name in hiding.sized]))
     factor = min(factor, hiding.limits(plant)[1] / size)
     for name in hiding.sized:

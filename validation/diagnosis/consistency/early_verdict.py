@@ -17,8 +17,9 @@ from types import MappingProxyType
 
 import numpy as np
 
+from discsim.effects.catalogue import CATALOGUE
+from discsim.effects.sensors import Lag
 from discsim.recording import SENSORS, Recording
-from discsim.written import PREFIX
 from validation.diagnosis.consistency.followed import left_of, left_when_shifted, true_noise
 from validation.diagnosis.consistency.spin_rates import RatesApart, rates_apart
 from validation.diagnosis.relaxed_fit import (
@@ -223,9 +224,10 @@ def _follows_lagging(
 
     A gyroscope's noise is so low that the others' motion, however right, does not tell its readings to within it.
     """
-    if lagging not in PREFIX:
+    lags = {row.acts_on: row.id for row in CATALOGUE.values() if row.type is Lag}
+    if lagging not in lags:
         return False
-    lag = Parameter(f"{PREFIX[lagging]}.lag", "tau_s", 0.0, _LAG_STEP, _LAG_SIGMA)
+    lag = Parameter(lags[lagging], "tau_s", 0.0, _LAG_STEP, _LAG_SIGMA)
     look = look_at(recordings, known, sensors, _AGAIN, {lag: _LAG})
     return look is not None and look.follows
 

@@ -13,12 +13,15 @@ from typing import Any
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects.catalogue import catalogued
+from discsim.effects.sensors import Lag
 from discsim.recording import Recording
 from validation.diagnosis.consistency.turning import pull_of
 from validation.identification.plants import plant_of
 
 __all__ = ["SettleProof", "Settling", "settling_of"]
 
+_LAG = catalogued(Lag, "accelerometer").id
 #: time constants that are tried, s
 _TAUS = np.geomspace(0.02, 0.6, 240)
 #: an accelerometer settles slowly where an exponential leaves less than this share of the squares in most recordings
@@ -84,14 +87,14 @@ class Settling:
         return [
             f"At first the accelerometer contradicts the gyroscope: what it reads beyond the pull towards the axis "
             f"dies away with a time constant of {1e3 * self.tau_s:.0f} ± {1e3 * self.sd_s:.0f} ms, as behind a "
-            f"low-pass (accel.lag) that still holds the acceleration of the hand, and that hides what turns with "
+            f"low-pass ({_LAG}) that still holds the acceleration of the hand, and that hides what turns with "
             f"the spin ({proofs})."
         ]
 
     def to_json(self) -> dict[str, Any]:
         """Return the JSON object."""
         return {
-            "id": "accel.lag",
+            "id": _LAG,
             "tau_s": self.tau_s,
             "sd_s": self.sd_s,
             "heldout": [proof.to_json() for proof in self.proofs],

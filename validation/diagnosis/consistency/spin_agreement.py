@@ -12,10 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from discsim.effects.catalogue import catalogued
+from discsim.effects.sensors import ClockRate, Scale
 from discsim.recording import Recording
 from validation.diagnosis.consistency.row_times import Rows, rows_of
 from validation.diagnosis.consistency.settling import Settling, settling_of
@@ -48,16 +50,37 @@ _TURNING = 0.5
 _LARGE = 10.0
 #: a correlation above this is said to tell the same
 _TELLING = 0.4
-#: cause -> parameter, and by how much each comparison grows with its logarithm
-_CAUSES: Mapping[str, tuple[str, Mapping[str, float]]] = {
-    "clock.rate": ("ratio", {"field": -1.0, "wobble": -1.0}),
-    "gyro.scale": (
-        "sz",
-        {"field": -1.0, "wobble": -1.0, "pull to the axis": -1.0},
-    ),
-    "mag.clock_rate": ("ratio", {"field": -1.0}),
-    "gyro.clock_rate": ("ratio", {"wobble": -1.0}),
-    "accel.scale": ("sx = sy", {"pull to the axis": 0.5}),
+
+
+class _Claim(NamedTuple):
+    """A cause in words, its parameter, and by how much each comparison grows with that one's logarithm."""
+
+    words: str
+    parameter: str
+    grows: Mapping[str, float]
+
+
+_CAUSES: Mapping[str, _Claim] = {
+    catalogued(kind, acts_on).id: claim
+    for kind, acts_on, claim in (
+        (ClockRate, "clock", _Claim("one wrong clock for all sensors", "ratio", {"field": -1.0, "wobble": -1.0})),
+        (
+            Scale,
+            "gyroscope",
+            _Claim(
+                "a wrong sensitivity of the gyroscope about z",
+                "sz",
+                {"field": -1.0, "wobble": -1.0, "pull to the axis": -1.0},
+            ),
+        ),
+        (ClockRate, "magnetometer", _Claim("a wrong clock of the magnetometer alone", "ratio", {"field": -1.0})),
+        (ClockRate, "gyroscope", _Claim("a wrong clock of the gyroscope alone", "ratio", {"wobble": -1.0})),
+        (
+            Scale,
+            "accelerometer",
+            _Claim("a wrong sensitivity, or place, of the accelerometer", "sx = sy", {"pull to the axis": 0.5}),
+        ),
+    )
 }
 
 
@@ -299,7 +322,7 @@ def _left(comparisons: Sequence[Comparison], grows: Mapping[str, float], size: f
 
 def _cause(id: str, comparisons: Sequence[Comparison], recordings: Mapping[str, Recording]) -> Cause | None:
     """Return a cause as large as the comparisons make it, None where none of them would show it."""
-    parameter, grows = _CAUSES[id]
+    _, parameter, grows = _CAUSES[id]
     size, error, after = _size(comparisons, grows)
     if not np.isfinite(error):
         return None
@@ -403,13 +426,6 @@ _SAID = {
     "wobble": "the gyroscope's wobble (x and y)",
     "pull to the axis": "the accelerometer's pull towards the axis",
 }
-_CLAIM = {
-    "clock.rate": "one wrong clock for all sensors",
-    "gyro.scale": "a wrong sensitivity of the gyroscope about z",
-    "mag.clock_rate": "a wrong clock of the magnetometer alone",
-    "gyro.clock_rate": "a wrong clock of the gyroscope alone",
-    "accel.scale": "a wrong sensitivity, or place, of the accelerometer",
-}
 
 
 def _sentences(found: Agreement) -> list[str]:
@@ -430,13 +446,13 @@ def _sentences(found: Agreement) -> list[str]:
         held = sum(proof.before for proof in best.proofs)
         own = ", ".join(f"{proof.own:.4f} ± {proof.own_sd:.4f} in {proof.recording}" for proof in best.proofs)
         said.append(
-            f"The single cause that reconciles most is {_CLAIM[best.id]} ({best.id}, {best.parameter} = "
+            f"The single cause that reconciles most is {_CAUSES[best.id].words} ({best.id}, {best.parameter} = "
             f"{best.value:.4f} ± {best.sd:.4f}): χ² of the comparisons falls from {best.before:.3g} to {best.after:.3g}"
             + (f", on recordings set aside from {held:.3g} to {best.heldout_after:.3g}" if best.proofs else "")
             + (f". By themselves the recordings ask for {own}." if own else ".")
         )
         said += [
-            f"{_CLAIM[other.id].capitalize()} ({other.id}) leaves {other.after:.3g}, {other.heldout_after:.3g} "
+            f"{_CAUSES[other.id].words.capitalize()} ({other.id}) leaves {other.after:.3g}, {other.heldout_after:.3g} "
             "on recordings set aside."
             for other in found.causes[1:3]
         ]

@@ -15,6 +15,8 @@ from math import ceil
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects.catalogue import catalogued
+from discsim.effects.rig import AxisTilt
 from discsim.recording import SENSORS, Recording, Samples
 from validation.diagnosis.design.plans import plans_about
 from validation.diagnosis.relaxed_fit import unknowns
@@ -22,6 +24,7 @@ from validation.diagnosis.result import Advice, Separation
 from validation.diagnosis.selection.candidates import Trial, parameters_of
 from validation.diagnosis.selection.evidence import BOUNDS
 from validation.diagnosis.selection.found import Rival, Search
+from validation.identification.competing_effects import row_of
 from validation.identification.gauss_newton import Fit, mapped
 from validation.identification.linearisation import linearise, moved
 from validation.identification.noise import NoiseModel
@@ -42,20 +45,24 @@ CONFUSED = 12.0
 ENOUGH = 25.0
 #: recordings of one kind that a person may be asked for
 _MOST = 10
-#: what happened once does not happen again in a new recording
-_ONCE = ("event.", "air.gust")
 #: a person leans a rig to within this, rad
 _LEAN_SIGMA = 0.03
-_LEAN = (("rig.axis_tilt", "tilt_north_rad"), ("rig.axis_tilt", "tilt_east_rad"))
+_LEAN = tuple((catalogued(AxisTilt).id, name) for name in AxisTilt._fields)
 #: steps of the fit of a hypothesis to a recording that could be made
 _STEPS = 3
 #: a step that improves less than this share is the last
 _SETTLED = 0.01
 
 
+def _once(id: str) -> bool:
+    """Tell whether an effect happened once, and will not happen again in a new recording."""
+    row = row_of(id)
+    return row is not None and row.event
+
+
 def in_words(id: str, advice: Advice | None) -> str:
     """Return what to record next to tell an effect from another, as a sentence without its first word's capital."""
-    if id.startswith(_ONCE):
+    if _once(id):
         return "no further recording can, for it happened once; more sensors or faster ones would show such a thing."
     if advice is None:
         return "none of the recordings that were tried can be simulated."
@@ -90,16 +97,17 @@ def confusions(found: Search, trial: Trial) -> list[Rival]:
     ]
 
 
-#: (an effect, what it is at one shape) -> the parameter that shapes it, its value there, and how well it must be known
-_SPECIAL = {("air.wind_shear", "air.wind"): ("exponent", 0.0, 0.05)}
+#: the parameter by which an effect becomes another must be known to this share of how uncertain it was at first
+_KNOWN = 0.1
 
 
 def _become(rival: Rival, trial: Trial) -> bool:
     """Tell whether the recordings shape a rival so that it is the effect in whose place it stands."""
-    if (rival.trial.id, trial.id) not in _SPECIAL:
+    row = row_of(rival.trial.id)
+    if row is None or row.becomes is None or row.becomes[0] != trial.id:
         return False
-    name, value, known = _SPECIAL[rival.trial.id, trial.id]
-    fit = rival.tied.fit
+    _, name, value = row.becomes
+    known, fit = _KNOWN * row.grid_sigma[name], rival.tied.fit
     place = next(k for k, q in enumerate(fit.parameters) if q.key == (rival.trial.id, name))
     sd = float(np.sqrt(max(float(fit.covariance[place, place]), 0.0)))
     return 0.0 < sd < known and abs(float(fit.at[place]) - value) < 3.0 * sd
@@ -115,7 +123,7 @@ def advise(found: Search, names: Sequence[str], plans: Sequence[Plan] | None = N
     advice = {}
     for trial in found.final.hypothesis.trials:
         rivals = confusions(found, trial)
-        if not rivals or trial.id.startswith(_ONCE):
+        if not rivals or _once(trial.id):
             continue
         like = _typical(found, trial)
         longest = max(one.recording.end for one in found.final.fit.chains)
@@ -290,7 +298,7 @@ class _Held:
 
 def _holds(q: Parameter, like: int, plant: Plant) -> bool:
     """Tell whether a parameter of those in hand would act in a new recording like number ``like``."""
-    return q.acts_in(like) and not q.group.startswith(_ONCE) and q.key not in plant.own_keys
+    return q.acts_in(like) and not _once(q.group) and q.key not in plant.own_keys
 
 
 def _sums(parameters: Sequence[Parameter], at: FloatArray, active: Sequence[int]) -> dict[tuple[str, str], float]:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects.catalogue import catalogued
+from discsim.effects.sensors import DroppedSamples
 from validation.diagnosis.detectors.sample_alignment import first_yaw, lost_along, phase_counts, repaired
 from validation.diagnosis.relaxed_fit import relaxed
 from validation.diagnosis.selection.candidates import Trial
@@ -62,7 +64,7 @@ class Slips:
 
     def found(self, fit: Fit, known: Sequence[Parameter], taken: Sequence[Trial]) -> list[Shifted]:
         """Return `dropped_magnetometer` of a relaxed fit, unless it is among the effects that are ``taken`` already."""
-        if any(trial.id == "mag.dropped_samples" for trial in taken):
+        if any(trial.id == catalogued(DroppedSamples, "magnetometer").id for trial in taken):
             return []
         for asked, answer in self._known:
             if asked is fit:
@@ -78,7 +80,8 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = 40
     own times, and the counts are then read once more off the motion that all sensors agree on.
     """
     chains = fit.chains
-    id, sensor = "mag.dropped_samples", "magnetometer"
+    sensor = "magnetometer"
+    id = catalogued(DroppedSamples, sensor).id
     counts = [
         phase_counts(chain.recording) if chain.recording.get(sensor) is not None else np.zeros(0) for chain in chains
     ]
@@ -152,7 +155,8 @@ def dropped_accelerometer(
     fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: float = 40.0
 ) -> list[Shifted]:
     """Return lost samples of the accelerometer as a proposal where the motion tells that its readings slip."""
-    id, sensor = "accel.dropped_samples", "accelerometer"
+    sensor = "accelerometer"
+    id = catalogued(DroppedSamples, sensor).id
     if sensor not in {r.sensor for chain in fit.chains for r in chain.readings}:
         return []
     if any(trial.id == id for trial in taken):

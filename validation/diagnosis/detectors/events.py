@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects.events import Impulse, SpinStep
 from validation.diagnosis.detectors.local_problem import Asked, Ground, gain_of, peaks
-from validation.diagnosis.selection.candidates import Trial, available
+from validation.diagnosis.selection.candidates import Trial, detected
 from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import Fit, mapped
 from validation.identification.linearisation import linearise
+from validation.identification.plants.plant import Layout
 from validation.identification.propagation import Column
 from validation.identification.segments import undone
 
 __all__ = ["events"]
+
+#: what of a state an event makes jump
+_MOVES: Mapping[type[Any], Callable[[Layout], slice | int | None]] = {
+    Impulse: lambda layout: layout.velocity,
+    SpinStep: lambda layout: layout.spin,
+}
 
 #: how many recordings and kinds of event are followed up at a time: the strongest, the others come after them
 _FOLLOWED = 3
@@ -68,16 +77,12 @@ def events(asked: Asked, least: float = 25.0) -> list[Proposal]:
     instant is then read off the event's true signature, in which a pulse of 10 ms is a needle.
     """
     recordings = [chain.recording for chain in asked.fit.chains]
-    plant = asked.fit.plant
-    layout, times = plant.layout, plant.durations
-    there = available(recordings)
-    kinds: list[tuple[str, Sequence[int], tuple[str, ...]]] = []
-    if "event.impulse" in there and layout.velocity is not None:
-        kinds.append(
-            ("event.impulse", layout.directions_of(layout.velocity), ("dv_north_m_s", "dv_east_m_s", "dv_down_m_s"))
-        )
-    if "event.spin_step" in there and layout.spin is not None:
-        kinds.append(("event.spin_step", layout.directions_of(layout.spin), ("dr_rad_s",)))
+    layout, times = asked.fit.plant.layout, asked.fit.plant.durations
+    kinds: list[tuple[str, Sequence[int], tuple[str, ...]]] = [
+        (row.id, layout.directions_of(places), tuple(name for name in row.parameters if name != "t_s"))
+        for row in detected(recordings, "events")
+        if (places := _MOVES[row.type](layout)) is not None
+    ]
 
     def scanned(task: tuple[int, tuple[str, Sequence[int], tuple[str, ...]]]) -> FloatArray:
         i, (id, directions, _) = task

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from validation.diagnosis.detectors.local_problem import WIND, Asked, Ground, gain_of
-from validation.diagnosis.selection.candidates import Trial, available
+from validation.diagnosis.selection.candidates import Trial, detected
 from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import mapped
 from validation.identification.propagation import Column
@@ -24,17 +24,17 @@ def gusts(asked: Asked, least: float = 25.0) -> list[Proposal]:
 
     A gust is a sum of winds that blow for one piece of motion each, so any instant and width is asked for by algebra.
     """
-    if "air.gust" not in available([chain.recording for chain in asked.fit.chains]):
-        return []
+    kinds = detected([chain.recording for chain in asked.fit.chains], "gusts")
 
-    def one(i: int) -> Proposal | None:
-        return None if asked.has("air.gust", i) else _gust(asked.grounds[i], i, asked.wind)
+    def one(task: tuple[str, int]) -> Proposal | None:
+        id, i = task
+        return None if asked.has(id, i) else _gust(id, asked.grounds[i], i, asked.wind)
 
-    found = [p for p in mapped(one, list(asked.grounds)) if p is not None and p.gain > least]
-    return sorted(found, key=gain_of, reverse=True)
+    found = mapped(one, [(row.id, i) for row in kinds for i in asked.grounds])
+    return sorted((p for p in found if p is not None and p.gain > least), key=gain_of, reverse=True)
 
 
-def _gust(ground: Ground, recording: int, wide: Sequence[int]) -> Proposal | None:
+def _gust(id: str, ground: Ground, recording: int, wide: Sequence[int]) -> Proposal | None:
     """Return the gust in a recording that would gain most; ``wide`` are the places of a steady wind's columns."""
     linear, piece, edges = ground.linear, ground.piece, ground.chain.edges
     d, own, k = ground.chain.plant.layout.directions, linear.unknowns, len(ground.chain.states)
@@ -54,12 +54,9 @@ def _gust(ground: Ground, recording: int, wide: Sequence[int]) -> Proposal | Non
             gain, value = ground.ask(ground.whiten(columns))
             if best is None or gain > best.gain:
                 given = (("t_s", float(t)), ("width_s", width))
-                trial = Trial(
-                    "air.gust",
-                    tuple(Column("air.gust", name, 0.05, given) for _, name in WIND),
-                    frozenset([recording]),
-                )
+                columns_of = tuple(Column(id, name, 0.05, given) for _, name in WIND)
+                trial = Trial(id, columns_of, frozenset([recording]))
                 sizes = zip((name for _, name in WIND), value.tolist(), strict=True)
-                start = {(("air.gust", name), trial.recordings): number for name, number in (*sizes, *given)}
+                start = {((id, name), trial.recordings): number for name, number in (*sizes, *given)}
                 best = Proposal(trial, gain, start)
     return best

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects.air import Wind
+from discsim.effects.catalogue import catalogued
 from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
 from validation.diagnosis.selection.proposals import Proposal
@@ -24,7 +26,8 @@ __all__ = ["WIND", "Asked", "Ground", "asked_of", "gain_of", "peaks"]
 _FINE = 0.1
 
 
-WIND = (("air.wind", "w_north_m_s"), ("air.wind", "w_east_m_s"))
+#: the parameters of a steady wind
+WIND = tuple((catalogued(Wind).id, name) for name in Wind._fields)
 
 
 @dataclass(frozen=True)

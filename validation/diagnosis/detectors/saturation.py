@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects.catalogue import catalogued
+from discsim.effects.sensors import AccelerometerSaturation
 from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.clipping import equal_beyond_chance, plateau
@@ -18,6 +20,8 @@ from validation.identification.sensor_model import delay
 
 __all__ = ["saturation"]
 
+_ID = catalogued(AccelerometerSaturation).id
+
 
 def saturation(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = ()) -> list[Proposal]:
     """Return an accelerometer's limit below its range as a proposal where readings stand still at it.
@@ -26,7 +30,7 @@ def saturation(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = ()) -> list
     should have been larger, and that noise alone would have had to hold at one size. On a disc whose path is unknown
     the motion asks for nothing, and what counts is how many readings are equal.
     """
-    if any(trial.id == "accel.saturation" for trial in taken):
+    if any(trial.id == _ID for trial in taken):
         return []
     gain, limits = 0.0, {}
     steps = [0.0]
@@ -41,7 +45,7 @@ def saturation(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = ()) -> list
             gain += equal_beyond_chance(chain.recording)
             continue
         at, axis = np.nonzero(readings.clipped)
-        values = {key: v for key, v in fit.values(i).items() if key[0] != "accel.saturation"}
+        values = {key: v for key, v in fit.values(i).items() if key[0] != _ID}
         moved = readings.t - _lateness(chain, values, readings.t)
         expected = shown(chain, values, "accelerometer", moved)[at, axis]
         beyond = expected * np.sign(readings.value[at, axis]) - limit
@@ -53,7 +57,7 @@ def saturation(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = ()) -> list
     above = [i for i, chain in enumerate(fit.chains) if i not in limits and _largest(chain) > limit + max(steps)]
     recordings = None if not above else frozenset(limits)
     # the readings are the limit, to within a step of the converter
-    trial = Trial("accel.saturation", (), recordings, (("limit_m_s2", limit, max(max(steps), 1e-6) / 12.0**0.5),))
+    trial = Trial(_ID, (), recordings, (("limit_m_s2", limit, max(max(steps), 1e-6) / 12.0**0.5),))
     return [Proposal(trial, gain, {})]
 
 

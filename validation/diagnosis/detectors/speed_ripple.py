@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects.catalogue import catalogued
+from discsim.effects.rig import SpeedRipple
 from validation.diagnosis.detectors.local_problem import gain_of, peaks
 from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.proposals import Proposal
@@ -17,6 +19,7 @@ from validation.identification.sensor_model import delay
 
 __all__ = ["ripple"]
 
+_ID = catalogued(SpeedRipple).id
 #: orders of a speed ripple looked for, and the angle (rad) within which readings are taken together
 _ORDERS, _BIN = (0.1, 40.0), 0.02
 
@@ -27,7 +30,7 @@ def ripple(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: floa
     The rate's residual (rate reference, else gyroscope, else the magnetometer's phase) is transformed over the angle
     turned; the best orders are then refined by least squares. The gain is less what so many orders gain by chance.
     """
-    if not fit.plant.commanded or any(trial.id == "rig.speed_ripple" for trial in taken):
+    if not fit.plant.commanded or any(trial.id == _ID for trial in taken):
         return []
     told = [_rate_residual(fit, i, noise) for i in range(len(fit.chains))]
     parts = [part for part in told if part is not None]
@@ -58,7 +61,7 @@ def ripple(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: floa
         )
         gain, o, amplitude, phase = best
         if gain - chance > least:
-            id, shape = "rig.speed_ripple", (("order", o), ("phase_rad", phase))
+            id, shape = _ID, (("order", o), ("phase_rad", phase))
             trial = Trial(id, (Column(id, "amplitude_rad_s", 0.005, shape),))
             start: dict[tuple[tuple[str, str], frozenset[int] | None], float] = {
                 ((id, name), None): number for name, number in (*shape, ("amplitude_rad_s", amplitude))

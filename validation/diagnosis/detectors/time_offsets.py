@@ -13,7 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.written import PREFIX
+from discsim.effects.catalogue import catalogued
+from discsim.effects.sensors import Lag
+from discsim.effects.setup import TimeOffset
 from validation.diagnosis.selection.candidates import Trial, free_trial
 from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import Fit
@@ -43,8 +45,8 @@ def time_offsets(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least
         return []
     found = []
     for sensor in ("accelerometer", "gyroscope"):
-        prefix = PREFIX[sensor]
-        if any(trial.id in (f"{prefix}.time_offset", f"{prefix}.lag") for trial in taken):
+        late, lag = catalogued(TimeOffset, sensor).id, catalogued(Lag, sensor).id
+        if any(trial.id in (late, lag) for trial in taken):
             continue
         left = sum((_left(chain, fit.values(i), sensor, noise) for i, chain in enumerate(fit.chains)), np.zeros(1))
         best = int(np.argmin(left))
@@ -52,9 +54,9 @@ def time_offsets(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least
         gain = float(left[int(np.argmin(np.abs(_TRIED)))] - left[best]) if offset else 0.0
         if abs(offset) < _LEAST or gain < least:
             continue
-        found.append(_proposal(f"{prefix}.time_offset", "offset_s", offset, gain))
+        found.append(_proposal(late, "offset_s", offset, gain))
         if 0.0 < offset <= _LONGEST_LAG:
-            found.append(_proposal(f"{prefix}.lag", "tau_s", offset, gain))
+            found.append(_proposal(lag, "tau_s", offset, gain))
     return found
 
 

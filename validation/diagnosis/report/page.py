@@ -140,7 +140,7 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
 def _named(item: NamedEffect) -> str:
     """Return an effect in a few words, with its size where one number tells it."""
     size = ""
-    if item.id.startswith("air.") and (wind := wind_in_words(item.parameters)):
+    if wind := wind_in_words(item.parameters):
         size = f" ({wind})"
     elif len(item.parameters) == 1:
         ((name, parameter),) = item.parameters.items()
@@ -222,7 +222,7 @@ def _other(item: Confusion) -> str:
 
 def _where(item: NamedEffect) -> str:
     where = "In all recordings." if item.recordings is None else f"In {_recordings(item.recordings)} only."
-    wind = wind_in_words(item.parameters) if item.id.startswith("air.") else ""
+    wind = wind_in_words(item.parameters)
     return f"{where} {wind}." if wind else where
 
 

@@ -1,6 +1,6 @@
 """The effects of the catalogue as a person reads them: a name, a formula, values with units.
 
-The forms are those of docs/physics.md. In a formula ``{name}`` is the place of a parameter: of its symbol in the
+The forms are those of the catalogue's rows. In a formula ``{name}`` is the place of a parameter: of its symbol in the
 general form, of its value and unit in the form that was found.
 """
 
@@ -80,6 +80,9 @@ def symbol(name: str) -> str:
     """Return a parameter's name without its unit; an event's instant is told from time itself."""
     if name == "t_s":
         return "t<sub>0</sub>"
+    before, per, _ = name.rpartition("_per_")
+    if per:
+        return symbol(before)
     ending = next((ending for ending, _ in _UNITS if name.endswith(ending)), "")
     return name.removesuffix(ending) or name
 
@@ -185,7 +188,7 @@ def everyday(id: str, name: str, item: ParameterValue) -> str:
     scaled = None
     if name == "ratio":
         value, scaled = value - 1.0, (100.0, "%")
-    elif name == "fraction" or id.endswith((".scale", ".cross_axis", ".soft_iron")):
+    elif name == "fraction" or (id in CATALOGUE and CATALOGUE[id].in_percent):
         scaled = (100.0, "%")
     elif name.endswith("_rad"):
         scaled = (degrees(1.0), "°")

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from discsim.effects.catalogue import Row
 from discsim.recording import Recording
 from validation.identification.competing_effects import row_of, rows
 from validation.identification.parameters import Parameter
@@ -50,10 +51,10 @@ _STEP = 0.1
 
 
 def _step(id: str, name: str) -> float:
-    if (id, name) == ("rig.speed_ripple", "order"):
-        return 1e-6  # times the angle turned, hundreds of turns, this is what moves the phase
     row = row_of(id)
     assert row is not None
+    if name == row.per_turn:
+        return 1e-6  # times the angle turned, hundreds of turns, this is what moves the phase
     return _STEP * row.scale[row.parameters.index(name)]
 
 
@@ -75,15 +76,19 @@ def available(recordings: Sequence[Recording]) -> list[str]:
     return found
 
 
+def detected(recordings: Sequence[Recording], detector: str) -> list[Row]:
+    """Return the effects that can act on these recordings and that a detector is named for."""
+    found = [row_of(id) for id in available(recordings)]
+    return [row for row in found if row is not None and row.detector == detector]
+
+
 def trials_for(recordings: Sequence[Recording]) -> tuple[Trial, ...]:
     """Return the trials of all effects that enter linearly, at each of their shapes."""
     trials = []
     for id in available(recordings):
         row = row_of(id)
         assert row is not None
-        if row.searched:
-            continue
-        if id == "gyro.g_sensitivity" and "accelerometer" not in recordings[0].sheets:
+        if row.detector or any(sensor not in recordings[0].sheets for sensor in row.needs):
             continue
         shapes: list[tuple[tuple[str, float], ...]] = [()]
         for name, values in row.grid.items():

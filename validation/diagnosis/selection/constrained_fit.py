@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects.catalogue import catalogued
+from discsim.effects.sensors import ClockRate
 from validation.diagnosis.relaxed_fit import beginning
 from validation.diagnosis.selection.evidence import BOUNDS
 from validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
@@ -69,7 +71,7 @@ def tied_fit(
 
 
 #: clocks by which the motion of a relaxed fit goes: it follows the magnetometer's phase
-_LEADING = (("clock.rate", "ratio"), ("mag.clock_rate", "ratio"))
+_LEADING = tuple((catalogued(ClockRate, whose).id, "ratio") for whose in ("clock", "magnetometer"))
 
 
 def _retimed(loose: Fit, parameters: Sequence[Parameter], at: FloatArray) -> tuple[Chain, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from discsim.effects.catalogue import CATALOGUE
 from validation.diagnosis.selection.candidates import Trial, parameters_of
+from validation.identification.competing_effects import row_of
 
 __all__ = ["price"]
 
@@ -43,9 +44,9 @@ ONE_SIDED: Mapping[tuple[str, str], float] = {
 def price(trial: Trial) -> float:
     """Return what a trial must gain to be believed."""
     count = len(parameters_of(trial))
-    if trial.id == "air.gust":
-        return GUST_ENTRY + PER_PARAMETER * count
-    if trial.id.startswith("event."):
-        return EVENT_ENTRY + PER_PARAMETER * count
-    odd = trial.recordings is not None and trial.id.startswith(("aero.", "body."))
+    row = row_of(trial.id)
+    assert row is not None
+    if row.event:
+        return (EVENT_ENTRY if row.brief else GUST_ENTRY) + PER_PARAMETER * count
+    odd = trial.recordings is not None and row.of_disc
     return ENTRY + PER_PARAMETER * count + (OTHER_DISC if odd else 0.0)

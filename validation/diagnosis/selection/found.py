@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from discsim.effects.catalogue import catalogued
+from discsim.effects.events import SpinStep
 from discsim.recording import Recording
 from validation.diagnosis.detectors.dropped_samples import Slips
 from validation.diagnosis.selection.candidates import Trial
@@ -37,6 +39,8 @@ __all__ = [
     "values_of_fit",
 ]
 
+#: when a kick changed the spin
+_KICK = (catalogued(SpinStep).id, "t_s")
 #: a fit whose chi-squared per reading, in the noise of the relaxed fit, is above this is far from the data
 FAR = 1.6
 
@@ -170,7 +174,7 @@ def possible(tied: Tied) -> bool:
     for q, value, error in zip(tied.fit.parameters, tied.fit.at, sd, strict=True):
         if q.key in ONE_SIDED and ONE_SIDED[q.key] * value < -3.0 * error:
             return False
-        if q.key == ("event.spin_step", "t_s") and value < tied.fit.plant.durations.event_from:
+        if q.key == _KICK and value < tied.fit.plant.durations.event_from:
             return False
         if _is_place(q.group) and abs(value) - 3.0 * error > radius:
             return False

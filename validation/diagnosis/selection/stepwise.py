@@ -37,6 +37,7 @@ from validation.diagnosis.selection.found import (
 from validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
 from validation.diagnosis.selection.proposals import Proposal, one_per_effect, pairs, proposals, start_of
 from validation.diagnosis.selection.screening import Board, board_of
+from validation.identification.competing_effects import row_of
 from validation.identification.gauss_newton import Fit, merit_of
 from validation.identification.noise import NoiseModel, estimate_noise, robust_noise
 from validation.identification.parameters import Parameter
@@ -221,7 +222,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
         if len(seen) >= (REFITTED if near_data else REFITTED_AT_MOST):
             break
         seen.add(key)
-        if proposal.trial.id == "accel.saturation":
+        if (row := row_of(proposal.trial.id)) is not None and row.hides_readings:
             # readings at the limit take no part in a fit: what the motion asks for beyond it is the evidence
             cost = -proposal.gain
         # beside the data it must gain half its price, as algebra said it would; where other readings take part that

@@ -15,13 +15,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import Effect, effect
-from discsim.effects.setup import axes_of
+from discsim.effects.catalogue import Effect, effect_of
+from discsim.effects.setup import Axes, BoardRotation, axes_of
 from discsim.recording import Recording
 from discsim.written import corrected
 from validation.diagnosis.setup.relations import Columns, misfit, wanted_force
 from validation.diagnosis.setup.rotation import board_turns, spin_axis
 from validation.diagnosis.setup.spin_signals import SpinSignals, spin_signals
+from validation.identification.ordinary_errors import ordinary_sigma
 from validation.identification.plants import plant_of
 
 __all__ = ["PERMUTATIONS", "Hypothesis", "Ranking", "board_effect", "chosen", "hypotheses", "pairs"]
@@ -160,7 +161,7 @@ def hypotheses(recordings: Sequence[Recording], price: float = 0.0) -> Ranking:
         base = _base(some, {}, None)
     else:
         upright = _to_z(main)
-        base = _base(some, {"magnetometer": upright}, effect("mag.axes", axes=axes_of(upright.T)))
+        base = _base(some, {"magnetometer": upright}, effect_of(Axes(axes_of(upright.T)), "magnetometer"))
     found: list[Hypothesis] = []
     as_written = None
     if base.signals and not base.axes:
@@ -268,7 +269,7 @@ def _rivals(base: _Base) -> Iterator[Hypothesis]:
 
 #: what f . m leaves on sound throws, times the field's size, m/s^2; how far a field may be from the stated one, as a
 #: share of it, and iron along the axis, uT
-_LEFT, _APART, _IRON = 0.25, 0.4, 40.0
+_LEFT, _APART, _IRON = 0.25, 0.4, ordinary_sigma("setup, rival of a field")
 
 
 def _field(base: _Base) -> Iterator[Hypothesis]:
@@ -314,9 +315,8 @@ def _linear(A: FloatArray, y: FloatArray, usual: float, sigma: float) -> FloatAr
 
 
 def board_effect(matrix: FloatArray) -> Effect:
-    """Return board.rotation of a matrix (3, 3) that takes what is written to body axes."""
-    rx, ry, rz = Rotation.from_matrix(matrix).as_rotvec().tolist()
-    return effect("board.rotation", rx_rad=rx, ry_rad=ry, rz_rad=rz)
+    """Return the rotation of the board of a matrix (3, 3) that takes what is written to body axes."""
+    return effect_of(BoardRotation(*Rotation.from_matrix(matrix).as_rotvec().tolist()))
 
 
 def _boards(some: Sequence[Recording]) -> Iterator[Hypothesis]:

@@ -27,6 +27,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from validation.diagnosis.setup.spin_signals import STEP, ComplexArray, Locked, SpinSignals
+from validation.identification.ordinary_errors import ordinary_sigma
 from validation.identification.plants import plant_of
 
 __all__ = ["Columns", "Misfit", "misfit", "misfits", "wanted_force"]
@@ -50,7 +51,7 @@ _SMOOTH = 4
 #: of a rig: what precession-free phases leave, rad; the share of a ramp that may be another's, and its weight
 _ANGLE, _RAMP, _RAMP_WEIGHT = 0.2, 0.3, 10.0
 #: of a rig: hard iron along the axis, uT; a bias, m/s^2; a ramp over which clocks matter, rad/s^2
-_IRON, _GRAVITY, _STEADY = 15.0, 1.5, 5.0
+_IRON, _GRAVITY, _STEADY = ordinary_sigma("setup of a rig"), 1.5, 5.0
 
 
 @dataclass(frozen=True)
@@ -250,7 +251,9 @@ def wanted_force(signals: SpinSignals, matrix: FloatArray) -> FloatArray:
 def _of_path(signals: SpinSignals, matrix: FloatArray) -> list[Misfit]:
     assert signals.path is not None
     down = (signals.path.position @ matrix.T)[:, 2]
-    found = _judged("height", ("gps",), np.maximum(down, 0.0), _HEIGHT * np.ones(1))
+    found = []
+    if plant_of(signals.recording).follows_path:  # other logs begin anywhere, on a hill or on a roof
+        found = _judged("height", ("gps",), np.maximum(down, 0.0), _HEIGHT * np.ones(1))
     release = signals.recording.release
     if release is not None and release.velocity is not None:
         sigma = float(np.max(release.sigma.get("velocity_ned_m_s", 0.0)))

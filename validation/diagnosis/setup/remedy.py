@@ -9,15 +9,26 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect
-from discsim.effects.setup import board_axes, permutation
-from discsim.written import PREFIX
+from discsim.effects.setup import (
+    AccelerometerUnit,
+    Axes,
+    BoardRotation,
+    ClockUnit,
+    GpsAxes,
+    GyroscopeUnit,
+    MagnetometerUnit,
+    TimeOffset,
+    board_axes,
+    permutation,
+)
 
 __all__ = ["remedy"]
 
 #: a map's axes: for each body axis the sensor's column and its sign, None where it was not seen
 MapAxes: TypeAlias = tuple[tuple[int, float] | None, ...]
 
-_SENSORS = {prefix: sensor for sensor, prefix in PREFIX.items()}
+#: sensors of one board, in the order of a map
+_BOARD = ("magnetometer", "accelerometer", "gyroscope")
 #: units as a map spells them, where it has another word
 _MAP_UNITS = {"mG": "mgauss", "G": "gauss"}
 #: a rotation within this of right angles (root sum of squares) is one that a map's axes can write
@@ -29,24 +40,23 @@ def remedy(fault: Effect, axes: Mapping[str, MapAxes] | None = None) -> str:
 
     ``axes`` are those that the map has now, by sensor; without them the columns are taken as they stand.
     """
-    prefix, _, what = fault.id.partition(".")
-    sensor = _SENSORS.get(prefix, "")
-    if what == "axes" and prefix == "gps":
+    sensor, value = fault.row.acts_on, fault.value
+    if isinstance(value, GpsAxes):
         return "to mend it, swap the columns of the file, or give them in the map in the order north, east, down"
-    if what == "axes":
-        return f"to mend it, write into the import map: {_axes_line(sensor, permutation(fault.value).T, axes)}"
-    if fault.id == "clock.units":
-        return f'to mend it, write into the import map: [time] unit = "{fault.value.written_in}"'
-    if what == "units":
-        unit = _MAP_UNITS.get(fault.value.written_in, fault.value.written_in)
+    if isinstance(value, Axes):
+        return f"to mend it, write into the import map: {_axes_line(sensor, permutation(value).T, axes)}"
+    if isinstance(value, ClockUnit):
+        return f'to mend it, write into the import map: [time] unit = "{value.written_in}"'
+    if isinstance(value, MagnetometerUnit | AccelerometerUnit | GyroscopeUnit):
+        unit = _MAP_UNITS.get(value.written_in, value.written_in)
         return f'to mend it, write into the import map: [sensors.{sensor}] unit = "{unit}"'
-    if what == "time_offset":
-        return f"to mend it, subtract {1e3 * fault.value.offset_s:.1f} ms from the times of {sensor}.csv"
-    if fault.id == "board.rotation":
-        matrix = board_axes(fault.value)
+    if isinstance(value, TimeOffset):
+        return f"to mend it, subtract {1e3 * value.offset_s:.1f} ms from the times of {sensor}.csv"
+    if isinstance(value, BoardRotation):
+        matrix = board_axes(value)
         right = np.round(matrix)
         if np.linalg.norm(matrix - right) < _RIGHT and abs(float(np.linalg.det(right))) > 0.5:
-            lines = "; ".join(_axes_line(name, right, axes) for name in list(_SENSORS.values())[:3])
+            lines = "; ".join(_axes_line(name, right, axes) for name in _BOARD)
             return f"to mend it, write into the import map: {lines}"
         return "turn the board back, or diagnose with it: the rotation is estimated"
     return "look the field up for the place and the date (--place LAT,LON --date YYYY-MM-DD)"

@@ -7,14 +7,15 @@ none: where it is near one, or near no unit's factor, nothing is said.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import Effect, effect
+from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.setup import UNITS, AccelerometerUnit, ClockUnit, GyroscopeUnit, MagnetometerUnit
 from discsim.recording import Recording, Samples
 from validation.diagnosis.setup.spin_signals import FEWEST, PURE, turning_axis
@@ -31,7 +32,7 @@ _STAMPS = 0.3
 
 
 def clock_unit(recordings: Sequence[Recording]) -> Effect | None:
-    """Return clock.units where every sensor's stamps lie a thousand, or a million, times the stated spacing apart.
+    """Return the unit of time where every sensor's stamps lie a thousand, or a million, times the stated spacing apart.
 
     Where the rates were taken from the stamps themselves, the fixes' positions over their velocities tell.
     """
@@ -47,7 +48,7 @@ def clock_unit(recordings: Sequence[Recording]) -> Effect | None:
         by_stamps, by_path = (all(abs(one / factor - 1.0) < _STAMPS for one in some) for some in (spacing, taken))
         usual = all(1.0 / NEAR < one < NEAR for one in spacing)
         if factor > 1.0 and ((by_path and (by_stamps or usual)) if taken else (by_stamps and bool(spacing))):
-            return effect("clock.units", written_in=unit)
+            return effect_of(ClockUnit(unit))
     return None
 
 
@@ -69,19 +70,20 @@ def _path_ratio(recording: Recording) -> float | None:
 
 
 def sensor_units(recordings: Sequence[Recording]) -> list[Effect]:
-    """Return mag.units, accel.units and gyro.units where a sensor's magnitude is that of another unit."""
+    """Return the units of the sensors where a sensor's magnitude is that of another unit."""
     found = []
-    for id, kind, ratio in (
-        ("mag.units", MagnetometerUnit, _field_ratio),
-        ("accel.units", AccelerometerUnit, _force_ratio),
-        ("gyro.units", GyroscopeUnit, _rate_ratio),
-    ):
-        turning = recordings if id == "mag.units" else [_where_it_turns(one) for one in recordings]
+    kinds: tuple[tuple[type[Any], Callable[[Recording], float | None]], ...] = (
+        (MagnetometerUnit, _field_ratio),
+        (AccelerometerUnit, _force_ratio),
+        (GyroscopeUnit, _rate_ratio),
+    )
+    for kind, ratio in kinds:
+        turning = recordings if kind is MagnetometerUnit else [_where_it_turns(one) for one in recordings]
         ratios = [value for one in turning if (value := ratio(one)) is not None]
         if ratios:
             unit = _nearest(float(np.median(ratios)), UNITS[kind])
             if unit is not None:
-                found.append(effect(id, written_in=unit))
+                found.append(effect_of(kind(unit)))
     return found
 
 

@@ -1,4 +1,4 @@
-"""``python -m validation.experiments.feedback``: the paper's Figs. 9, 11, 12 and 13 on our truth, with scores."""
+"""``python -m validation.experiments.feedback``: the paper's Figs. 11 and 13 on our truth, with scores."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import typer
 from discsim.errors import InputError
 from discsim.shipped import load_throw
 from validation.experiments.feedback.experiment import Experiment, run_experiment
-from validation.experiments.feedback.figures import draw_fig_9, draw_fig_11, draw_fig_13, draw_what_matters
+from validation.experiments.feedback.figures import draw_fig_11, draw_fig_13, draw_what_matters
 from validation.experiments.feedback.scoring import Predicted, feedback_checks
 from validation.experiments.feedback.sensitivity import CHANGES, touch_down_shifts
 from validation.reporting.options import OutOption, SeedOption
@@ -25,8 +25,8 @@ __all__ = ["app", "command"]
 def command(out: OutOption = Path("feedback"), seed: SeedOption = 0) -> None:
     """Fit C_Nr to eight throws by every source of spin, and predict three flights with what each source gives.
 
-    Writes fig-9.png, fig-11.png, fig-13-*.png (with the paper's Fig. 12 in them), sources.png, what-matters.png,
-    feedback.json and scores.json into --out. The paper's release is models/throws/paper.toml.
+    Writes fig-11.png, fig-13-*.png, sources.png, what-matters.png, feedback.json and scores.json into --out. The
+    paper's release is models/throws/paper.toml.
 
     Example: python -m validation.experiments.feedback --out feedback
     """
@@ -65,7 +65,6 @@ def _write(run: Run, experiment: Experiment) -> None:
             },
         },
     )
-    draw_fig_9(experiment.flown[0], run.out / "fig-9.png")
     draw_fig_11(experiment, run.out / "fig-11.png")
     for flown in experiment.flown:
         draw_fig_13(flown, run.out / f"fig-13-{flown.name.split()[0].removesuffix(chr(39) + 's')}.png")

@@ -1,4 +1,4 @@
-"""The experiment behind the paper's Figs. 9, 11, 12, 13 on our truth: eight throws give C_Nr, three are predicted."""
+"""The experiment behind the paper's Figs. 11 and 13 on our truth: eight throws give C_Nr, three are predicted."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ from discsim.motion import Motion
 from discsim.recording import Recording
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc, load_throw
-from estimators.methods import estimate
-from estimators.rate import YawRate
 from validation.experiments.feedback.scoring import Predicted, dampings, feed_back
 from validation.reporting.run import Run
 from validation.scenarios.throws import FULL_SET
@@ -32,12 +30,10 @@ INSIDE = FULL_SET[-1]
 
 @dataclass(frozen=True)
 class Flown:
-    """One throw that is predicted: its truth, what was recorded and estimated of it, and the predictions."""
+    """One throw that is predicted: its truth, and the predictions."""
 
     name: str
     motion: Motion
-    recording: Recording
-    rates: tuple[YawRate, ...]
     predicted: tuple[Predicted, ...]
 
 
@@ -81,16 +77,14 @@ def run_experiment(run: Run) -> Experiment:
     ):
         run.step(f"predicting: {name}")
         motion, recording = one(name, release, stream)
-        rates, observed = [], {}
+        observed = {}
         for item in found:
             seen = as_mounted(recording, item.source)
             try:
-                rate = estimate(seen, item.source.method)
-                observed[item.source.label] = observe(seen, item.source.method, rate)
+                observed[item.source.label] = observe(seen, item.source.method)
             except InputError:
                 continue
-            rates.append(rate)
         given = [damping for damping in dampings(found) if damping.source in observed]
         predicted = feed_back(motion, release, disc, environment, given, observed)
-        flown.append(Flown(name, motion, recording, tuple(rates), tuple(predicted)))
+        flown.append(Flown(name, motion, tuple(predicted)))
     return Experiment(disc, environment, tuple(throws), fit, paper, tuple(found), tuple(flown))

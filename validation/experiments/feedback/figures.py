@@ -1,4 +1,4 @@
-"""The paper's figures on our truth: Fig. 9 (rate and path), 11 (lines and surface), 12 and 13 (predicted paths)."""
+"""The paper's figures on our truth: Fig. 11 (lines and surface) and 13 (predicted paths)."""
 
 from __future__ import annotations
 
@@ -15,36 +15,15 @@ from validation.experiments.feedback.scoring import LINE, OUTPUT_ERROR, Predicte
 from validation.reporting.figures import COLOURS, new_figure, save_figure
 from validation.yaw_damping.figures import draw_surface_on
 
-__all__ = ["draw_fig_9", "draw_fig_11", "draw_fig_13", "draw_what_matters"]
+__all__ = ["draw_fig_11", "draw_fig_13", "draw_what_matters"]
 
-#: what is drawn in Figs. 12 and 13: source and way, with colour and line
+#: what is drawn in Fig. 13: source and way, with colour and line
 _DRAWN = (
     ("best", OUTPUT_ERROR, COLOURS["best"], "-"),
     ("fft", LINE, COLOURS["fft"], "-"),
     ("accelerometer, 1 mm", LINE, COLOURS["accelerometer"], "-"),
     ("accelerometer, 5 mm", LINE, COLOURS["accelerometer"], "--"),
 )
-
-
-def draw_fig_9(flown: Flown, path: Path) -> None:
-    """Draw the spin that the module measures, and its path by GPS, both over the truth."""
-    figure, axes = new_figure(1, 2, width=11.0, height=4.2)
-    t = np.linspace(0.0, flown.motion.end, 300)
-    for rate in flown.rates[:3]:  # best, fft, accelerometer at its place
-        shade = COLOURS.get("best" if rate is flown.rates[0] else rate.method)
-        label = f"best ({rate.method})" if rate is flown.rates[0] else rate.method
-        axes[0].plot(rate.t, np.degrees(np.abs(rate.rate)), color=shade, lw=0.9, label=label)
-    truth = np.degrees(np.abs(flown.motion.at(t).rate[:, 2]))
-    axes[0].plot(t, truth, color=COLOURS["truth"], lw=0.9, ls="--", label="truth")
-    axes[0].set(title=f"Fig. 9a: spin rate, {flown.name}", xlabel="time (s)", ylabel="rate (deg/s)")
-    axes[0].set_ylim(truth.min() - 150, truth.max() + 150)
-    axes[0].legend()
-    gps = flown.recording.need("gps")
-    _draw_from_above(axes[1], flown.motion)
-    axes[1].plot(gps.value[:, 1], gps.value[:, 0], ".", color="#cc79a7", ms=4, label="GPS")
-    axes[1].set_title("Fig. 9b: path seen from above")
-    axes[1].legend()
-    save_figure(figure, path)
 
 
 def draw_fig_11(experiment: Experiment, path: Path) -> None:

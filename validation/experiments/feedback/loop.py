@@ -60,7 +60,7 @@ def close_loop(results: Sequence[ThrowResult], disc: Disc, environment: Environm
     for number, result in enumerate(results[:PREDICTED]):
         seen = {label: throws[number] for label, throws in observed.items()}
         predicted = feed_back(result.motion, result.throw.release, disc, environment, dampings(found), seen)
-        flown.append(Flown(result.throw.name, result.motion, result.recording, (), tuple(predicted)))
+        flown.append(Flown(result.throw.name, result.motion, tuple(predicted)))
 
     scores = [
         at_most("C_Nr: error with the best spin", 100 * (best.CNr / disc.aero.CNr - 1), "%", 1.0),

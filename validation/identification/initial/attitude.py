@@ -32,6 +32,7 @@ from validation.identification.initial.spin_phase import (
     gaussian_kernel,
     phase_spin,
 )
+from validation.identification.ordinary_errors import ordinary_sigma
 
 __all__ = ["Attitude", "field_in_start", "frame_of", "other_attitudes", "states_from", "turned_to_ned", "windowed"]
 
@@ -44,7 +45,7 @@ ATTITUDE_SIGMA = 0.4
 
 
 #: prior standard deviation of hard iron along the spin axis, uT, and of the field's gain
-IRON_SD, GAIN_SD = 8.0, 0.06
+IRON_SD, GAIN_SD = ordinary_sigma("attitude at the start"), 0.06
 
 
 class Attitude(NamedTuple):

@@ -23,9 +23,12 @@ from validation.identification.initial.smoothing import (
     readings_for,
     smoothed,
 )
+from validation.identification.ordinary_errors import ordinary_sigma
 
 __all__ = ["Spin", "centripetal_rate", "expected_rate", "field_spin", "gaussian_kernel", "phase_spin", "rig_starts"]
 
+#: prior of the centre of the circle that the field runs, uT
+_IRON = ordinary_sigma("circle of the field")
 #: of the smoothing of the spin's phase, s (one sigma)
 PHASE_SIGMA = 0.05
 
@@ -134,8 +137,8 @@ def _conic(t: FloatArray, z: ComplexArray, knots: float, scale: float) -> tuple[
     share = place - k
     A = np.column_stack([2 * x, 2 * y, -(x * x - y * y), -2 * x * y])
     target = x * x + y * y
-    # priors: 15 uT of hard iron, 0.1 of ellipse; the readings' own scatter about the conic is a few per cent
-    prior = 0.05 / np.array([15.0 / scale, 15.0 / scale, 0.15, 0.15])
+    # priors of the centre and of the ellipse; the readings' own scatter about the conic is a few per cent
+    prior = 0.05 / np.array([_IRON / scale, _IRON / scale, 0.15, 0.15])
     weight = np.ones(t.size)
     solution: FloatArray = np.zeros(4)
 

@@ -15,7 +15,7 @@ from discsim.arrays import FloatArray
 from discsim.compiled import compiled_nogil
 from discsim.disc import Release
 from discsim.effects.air import Wind
-from discsim.effects.catalogue import CATALOGUE
+from discsim.effects.catalogue import catalogued
 from discsim.effects.kind import BOARD
 from discsim.errors import InputError
 from discsim.frames import body_to_ned, multiply, quaternion_from_matrix, turn
@@ -167,7 +167,7 @@ def _terms() -> tuple[Term, ...]:
 
 
 #: an unknown steady wind
-_WIND = next(row.id for row in CATALOGUE.values() if row.type is Wind)
+_WIND = catalogued(Wind).id
 
 
 def _symbols(recording: Recording, t: FloatArray, states: FloatArray, values: Values) -> dict[str, FloatArray]:

@@ -1,4 +1,4 @@
-"""A raw file, folder, zip or flight log as files of text. Takes a path; gives one that can be read, within limits."""
+"""A raw file, folder, zip or log of messages as files of text. Takes a path; gives one that can be read."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import shutil
 import stat
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
 from discsim.errors import InputError
-from validation.importing.sniffing.ulog import MAGIC, write_tables
+from validation.importing.logs import kind_of, write_tables
 
 __all__ = ["MAX_BYTES", "MAX_FILES", "opened"]
 
@@ -28,11 +28,11 @@ _BESIDE = re.compile(r"^(readme|license|licence|notes?)\b|\.(md|pdf|png|jpe?g|ht
 
 
 @contextmanager
-def opened(raw: Path) -> Iterator[Path]:
-    """Give ``raw`` itself, or a folder of that name with the files of a zip or the tables of a ULog, gone afterwards.
+def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterator[Path]:
+    """Give ``raw`` itself, or a folder of that name with the files of a zip or a log's tables, gone afterwards.
 
-    Raises `InputError` for no such file, a damaged zip, one with a password, one with paths that lead out of it or
-    links, one above the limits, and a ULog that cannot be read.
+    ``say`` is told what was left out of a log of messages. Raises `InputError` for no such file, a damaged zip, one
+    with a password, one with paths that lead out of it or links, one above the limits, a log that cannot be read.
     """
     if not raw.exists():
         raise InputError.at(raw, None, "no such file or folder; expected what a logger wrote")
@@ -43,25 +43,17 @@ def opened(raw: Path) -> Iterator[Path]:
             folder.mkdir()
             _unpack(raw, folder)
             logged = _inner(folder, raw)
-        if _is_ulog(logged):
+        kind = kind_of(logged)
+        if kind is not None:
             tables = Path(place) / "tables" / logged.name
             tables.mkdir(parents=True)
-            write_tables(logged, tables)
+            for note in write_tables(logged, kind, tables):
+                say(note)
             logged = tables
         try:
             yield logged
         except InputError as error:  # speaks of the archive that the user knows, not of where it was unpacked
             raise InputError(str(error).replace(str(logged), str(raw))) from None
-
-
-def _is_ulog(path: Path) -> bool:
-    if not path.is_file():
-        return False
-    try:
-        with path.open("rb") as stream:
-            return stream.read(len(MAGIC)) == MAGIC
-    except OSError:
-        return False  # the reader of text says why
 
 
 def _unpack(raw: Path, folder: Path) -> None:

@@ -11,7 +11,7 @@ from discsim.arrays import FloatArray
 from validation.importing.clock import is_stamp, iso_seconds
 from validation.importing.sniffing.decision import Decision, Sureness
 from validation.importing.sniffing.groups import Numbers
-from validation.importing.sniffing.names import is_time_name, read_name, sensor_of
+from validation.importing.sniffing.names import is_time_name, read_name, sensor_of, timeless
 from validation.importing.sniffing.preamble import stated_rate
 from validation.importing.sniffing.units import readings_of, split_unit
 
@@ -22,10 +22,15 @@ SCALES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 EPOCH = (1e9, 3e9)
 #: Logs of motion are written at 2 Hz to 20 kHz; outside that no unit is believed.
 SPACING = (5e-5, 0.5)
+#: ... and fixes of a satellite receiver come twenty times a second to once a minute.
+SLOWEST_FIX = 60.0
 #: Loggers without time stamps write 100 rows a second more often than any other number; all rates scale with it.
 STEP = 0.01
 #: Share of steps that ascend in a column of time: a log has some doubled or swapped rows, never every tenth.
 ASCENDING = 0.9
+#: Share of rows at which a column of time goes on: several sensors' rows share a stamp, a second's rows are no time;
+#: what a sensor's own column may have stood at, at 1 Hz in a log of 500 Hz.
+STEPS, OWN_STEPS = 0.1, 0.002
 #: Steps that must be even before a column with a name that is not known is a clock's: a trend keeps that up for fewer.
 LEAST_EVEN = 100
 #: What a step without stamps may be off by: a guess by a factor of two either way (loggers write 25 to 400 rows a
@@ -88,13 +93,14 @@ def _clock(numbers: Numbers, k: int, name: str) -> Clock | None:
         why = Decision("time", f"'{name}', date and time", "certain", "its cells are dates with a time")
         return Clock(name, "iso", None, None, why) if _ascends(time) else None
     value = numbers.values[:, k]
-    if not _ascends(value):
-        return None
     spoken = numbers.names[k]
     named = is_time_name(spoken)
+    # a slow sensor's own stamps stand on the rows of a fast one
+    if not _ascends(value, OWN_STEPS if named and sensor_of(timeless(spoken)) is not None else STEPS):
+        return None
     if not named and (k > 1 or (numbers.dialect.has_header and not _evenly(value, spoken))):
         return None  # what has another name is another thing; else the first two columns are tried
-    unit, sure, why_unit = _unit(value, spoken)
+    unit, sure, why_unit = _unit(value, spoken, SLOWEST_FIX if numbers.tells_positions else SPACING[1])
     if unit is None:
         return None
     if not named and numbers.dialect.has_header:
@@ -103,10 +109,10 @@ def _clock(numbers: Numbers, k: int, name: str) -> Clock | None:
     return Clock(name, unit, None, None, said)
 
 
-def _ascends(value: FloatArray) -> bool:
+def _ascends(value: FloatArray, rising: float = STEPS) -> bool:
     """Tell time from readings: its own rows ascend; rows of several sensors may share a stamp."""
     steps = np.diff(value[np.isfinite(value)])
-    return steps.size > 1 and bool(np.mean(steps >= 0) > ASCENDING and np.mean(steps > 0) > 0.1)
+    return steps.size > 1 and bool(np.mean(steps >= 0) > ASCENDING and np.mean(steps > 0) > rising)
 
 
 def _evenly(value: FloatArray, name: str) -> bool:
@@ -119,12 +125,12 @@ def _evenly(value: FloatArray, name: str) -> bool:
     return bool(low > 0 and usual != 1 and high - low < 0.5 * usual)
 
 
-def _unit(value: FloatArray, name: str) -> tuple[str | None, Sureness, str]:
-    """Return the unit of time stamps, how sure that is, and why."""
+def _unit(value: FloatArray, name: str, slowest: float) -> tuple[str | None, Sureness, str]:
+    """Return the unit of time stamps, how sure that is, and why; rows are at most ``slowest`` s apart."""
     steps = np.diff(value[np.isfinite(value)])
     step = float(np.median(steps[steps > 0]))
     largest = float(np.nanmax(value))
-    fits = [unit for unit, scale in SCALES.items() if SPACING[0] <= step * scale <= SPACING[1]]
+    fits = [unit for unit, scale in SCALES.items() if SPACING[0] <= step * scale <= slowest]
     written = _written(name)
     if written is not None:
         if written in fits:

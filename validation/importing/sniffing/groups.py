@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
+from discsim.recording import SENSORS
 from validation.importing.raw_table import RawTable, number
 from validation.importing.sniffing.dialect import Dialect
 from validation.importing.sniffing.names import Name, penalty_of, read_name, says_nothing, sensor_of
@@ -37,6 +38,11 @@ class Numbers:
     def path(self) -> Path:
         """The raw file."""
         return self.table.path
+
+    @property
+    def tells_positions(self) -> bool:
+        """Whether it has the columns of a recording's gps."""
+        return set(SENSORS["gps"].columns) <= set(self.table.columns)
 
     @cached_property
     def names(self) -> tuple[str, ...]:

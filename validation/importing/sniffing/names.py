@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from validation.importing.sniffing.units import readings_of, split_unit
 
-__all__ = ["Name", "is_time_name", "penalty_of", "read_name", "says_nothing", "sensor_of"]
+__all__ = ["Name", "foreign_words", "is_time_name", "penalty_of", "read_name", "says_nothing", "sensor_of", "timeless"]
 
 
 class Name(NamedTuple):
@@ -56,6 +56,8 @@ _TIME_STEMS = (
     "time zeit temps tiempo tempo tijd czas cas czas tid aika zaman vreme время час 时间 時間 시간 timestamp stamp "
     "seconds millis micros elapsed clock epoch uhrzeit datum date"
 )
+#: Words for time beside the name of a sensor.
+_TIME_WORDS = ("t", "ts")
 _TIME_NAMES = "t ts ms us ns sec secs s msec usec tms tus"
 
 
@@ -69,6 +71,22 @@ def _plain(text: str) -> str:
 #: The stems as names are after `_plain`, which takes Hangul and voiced kana apart as well.
 _PLAIN_STEMS = {sensor: tuple(map(_plain, stems.split())) for sensor, stems in _STEMS.items()}
 _PLAIN_TIME_STEMS = tuple(map(_plain, _TIME_STEMS.split()))
+
+
+#: Those that are written in no Latin letters: an encoding under which they stand in a text is the text's.
+_FOREIGN = frozenset(
+    stem for stems in (*_PLAIN_STEMS.values(), _PLAIN_TIME_STEMS) for stem in stems if not stem.isascii()
+)
+
+
+def foreign_words(text: str) -> int:
+    """Return how many signs of a text are words known here that are written in no Latin letters, each word once.
+
+    >>> foreign_words("時間, 加速度 x, 加速度 y"), foreign_words("Zeit, Beschleunigung"), foreign_words("ŽžŠÔ")
+    (4, 0, 0)
+    """
+    plain = _plain(text)
+    return sum(len(stem) for stem in _FOREIGN if stem in plain)
 
 
 def _without_axis(name: str) -> tuple[str, int | None]:
@@ -116,6 +134,19 @@ def penalty_of(base: str) -> int:
     return sum(weight for weight, listed in _STAND_BACK.items() for word in listed.split() if word in words)
 
 
+def timeless(name: str) -> str:
+    """Return what stands beside a word for time in a column's name, without the unit; empty where there is none.
+
+    >>> timeless("mag_timestamp_us"), timeless("t_gyro"), timeless("time"), timeless("gyro_x")
+    ('mag', 'gyro', '', '')
+    """
+    words = re.split(r"[\s_\-.]+", _plain(split_unit(name.strip())[0]))
+    left = [word for word in words if word not in _TIME_WORDS]
+    for stem in sorted(_PLAIN_TIME_STEMS, key=len, reverse=True):
+        left = [word.replace(stem, "") for word in left]
+    return "" if left == words else " ".join(word for word in left if word)
+
+
 def is_time_name(name: str) -> bool:
     """Tell whether a column is called after time."""
     rest, unit = split_unit(name.strip())
@@ -123,6 +154,7 @@ def is_time_name(name: str) -> bool:
     return (
         any(stem in plain for stem in _PLAIN_TIME_STEMS)
         or plain in _TIME_NAMES.split()
+        or (timeless(rest) != "" and sensor_of(timeless(rest)) is not None)  # t_gyro
         or (unit != "" and any(r.sensor == "time" for r in readings_of(unit)) and sensor_of(rest) is None)
     )
 

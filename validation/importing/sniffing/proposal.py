@@ -9,33 +9,38 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from discsim.arrays import FloatArray
-from discsim.recording import Plant
+from discsim.recording import SENSORS, Plant
 from validation.importing.raw_table import Layout
 from validation.importing.sniffing.axes import letters
 from validation.importing.sniffing.clock import Clock
 from validation.importing.sniffing.decision import Decision
-from validation.importing.sniffing.groups import Triple
+from validation.importing.sniffing.groups import Numbers, Triple
 from validation.importing.sniffing.magnitudes import Unit
 
 __all__ = ["Proposal", "ProposedSensor", "map_text"]
 
+_POSITIONS = Decision("gps", ", ".join(SENSORS["gps"].columns), "certain", "its columns are called as in a recording")
 MIRRORED = -0.5  # a signed permutation's determinant is 1 or -1
 
 
 @dataclass(frozen=True)
 class ProposedSensor:
-    """A sensor of a proposed map."""
+    """A sensor of a proposed map; ``clock`` is that of its own column of time, None where it has the file's."""
 
     sensor: str
     triple: Triple
     decision: Decision
     unit: Unit
     axes: FloatArray
+    clock: Clock | None = None
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """A proposed map; ``decisions`` are those on the whole (axes), ``notes`` what else a user should know."""
+    """A proposed map; ``decisions`` are those on the whole (axes), ``notes`` what else a user should know.
+
+    ``positions`` is the table with a gps's columns, None where there is none.
+    """
 
     name: str
     raw: Path
@@ -45,6 +50,7 @@ class Proposal:
     sensors: tuple[ProposedSensor, ...]
     decisions: tuple[Decision, ...]
     notes: tuple[str, ...] = field(default=())
+    positions: Numbers | None = None
 
     @property
     def all_decisions(self) -> list[Decision]:
@@ -52,7 +58,7 @@ class Proposal:
         found = [self.clock.decision]
         for sensor in self.sensors:
             found += [sensor.decision, sensor.unit.decision]
-        return [*found, *self.decisions]
+        return [*found, *self.decisions, *([_POSITIONS] if self.positions is not None else [])]
 
 
 def _text(value: str) -> str:
@@ -99,6 +105,9 @@ def map_text(proposal: Proposal) -> str:
     ]
     for sensor in proposal.sensors:
         lines += _sensor(proposal, sensor)
+    if proposal.positions is not None:
+        lines += ["", "[sensors.gps]", *_file(proposal, proposal.positions)]
+        lines += [_remark(_POSITIONS), f"columns = {_texts(SENSORS['gps'].columns)}"]
     return "\n".join([*lines, ""])
 
 
@@ -118,14 +127,19 @@ def _layout(layout: Layout) -> list[str]:
     return ["", "[layout]", *lines] if lines else []
 
 
+def _file(proposal: Proposal, numbers: Numbers) -> list[str]:
+    return [f"file = {_text(glob.escape(numbers.path.name))}"] * proposal.raw.is_dir()
+
+
 def _sensor(proposal: Proposal, sensor: ProposedSensor) -> list[str]:
     triple, unit = sensor.triple, sensor.unit
     lines = ["", f"[sensors.{sensor.sensor}]"]
-    if proposal.raw.is_dir():
-        lines.append(f"file = {_text(glob.escape(triple.numbers.path.name))}")
+    lines += _file(proposal, triple.numbers)
     lines += [_remark(sensor.decision), f"columns = {_texts(triple.names)}"]
     if triple.where is not None:
         lines.append(f"where = {{ {_text(triple.where[0])} = {_text(triple.where[1])} }}")
+    if sensor.clock is not None and sensor.clock.column is not None:
+        lines.append(f"time = {_text(sensor.clock.column)} # its own stamps, in the unit of [time]")
     lines += [_remark(unit.decision), f"unit = {_text(unit.unit)}"]
     lines += [f"scale = {unit.scale!r}"] * (unit.scale != 1.0)
     named = letters(sensor.axes)
@@ -139,6 +153,8 @@ def _sensor(proposal: Proposal, sensor: ProposedSensor) -> list[str]:
 
 
 def _about(decision: Decision, sensor: str) -> bool:
+    if decision.what.endswith(" time"):
+        return decision.what == f"{sensor} time"
     return not decision.what.startswith("magnetometer") or sensor == "magnetometer"
 
 

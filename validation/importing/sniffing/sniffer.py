@@ -32,6 +32,8 @@ from validation.importing.sniffing.magnitudes import (
     magnetometer_unit,
     rest_norm,
 )
+from validation.importing.sniffing.names import sensor_of, timeless
+from validation.importing.sniffing.own_clock import OwnClocks, own_clocks
 from validation.importing.sniffing.preamble import stated_worths
 from validation.importing.sniffing.proposal import Proposal, ProposedSensor
 from validation.importing.sniffing.turning import Fit, best_worth, steps_between
@@ -48,8 +50,6 @@ TELLING = 0.35
 OFF_FITTED = 0.04
 #: A column that stands this far back (gravity taken off, worked out, in the earth's axes) is no sensor's reading.
 NO_READING = 9
-#: What a sentence of NMEA 0183 begins with: the constellation's two letters and the sentence's three.
-_SENTENCE = re.compile(r"\$G[A-Z](GGA|RMC|GLL|GNS|GSA|GSV|VTG|ZDA)$")
 
 
 @dataclass(frozen=True)
@@ -69,17 +69,21 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     files, failures = _read(raw)
     layout, files, notes = _one_layout(files)
     found, left = _assigned(files)
-    clock = _one_clock([triple.numbers for triple, _ in found.values()] or [file.numbers for file in files])
+    fixes = [file.numbers for file in files if file.numbers.tells_positions]
+    clock = _one_clock([triple.numbers for triple, _ in found.values()] or fixes or [file.numbers for file in files])
+    fixes = [numbers for numbers in fixes if _on(clock, numbers)][:1]
     unknown = [triple for triple in left if triple.sensor is None and _on(clock, triple.numbers)]
     missing = [sensor for sensor in ORDER if sensor not in found]
     if unknown and missing:
         seen = by_behaviour(unknown, [seconds(clock, triple.numbers)[triple.rows] for triple in unknown])
         found |= {sensor: (triple, decision) for triple, sensor, decision in seen if sensor in missing}
     found = {s: found[s] for s in ORDER if s in found and _on(clock, found[s][0].numbers)}
-    if not found:
+    if not found and not fixes:
         raise _nothing(raw, files, failures)
     notes += _others(found, left)
-    return _proposal(raw, plant, layout, clock, found, notes)
+    own = own_clocks(clock, {sensor: triple for sensor, (triple, _) in found.items()})
+    proposal = _proposal(raw, plant, layout, clock, own, found, [*notes, *own.notes])
+    return replace(proposal, positions=fixes[0] if fixes else None)
 
 
 # --------------------------------------------------------------------------------------------------- reading
@@ -203,11 +207,10 @@ def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) 
     rows = max(len(file.numbers.table.rows) for file in files)
     if rows < FEWEST_ROWS:
         return InputError.at(raw, None, f"{rows} rows of numbers in it; expected a log of {FEWEST_ROWS} at least")
-    if all(_SENTENCE.match(file.numbers.table.rows[0].cells[0]) for file in files):
-        what = "holds NMEA sentences of a satellite receiver: positions, and no sensor of motion"
-        return InputError.at(raw, None, f"{what}; `gpsbabel -i nmea -f FILE -o unicsv -F track.csv` writes them as CSV")
     columns = ", ".join(f"'{name}'" for name in files[0].numbers.table.columns[:12])
     also = f" ({len(failures)} other files there are no tables)" if failures else ""
+    guessed = files[0].numbers.dialect.layout.encoding in ("cp1252", "latin-1") and not columns.isascii()
+    also += "; the text is no UTF-8 and its encoding could not be told (save it as UTF-8)" * guessed
     return InputError.at(
         raw,
         None,
@@ -230,7 +233,13 @@ def _one_clock(tables: Sequence[Numbers]) -> Clock:
     clocks = [clock for numbers in tables for clock in clocks_of(numbers)]
     ranks = {"certain": 0, "likely": 1, "guess": 2}
     shared = [clock for clock in clocks if sum(_on(clock, numbers) for numbers in tables) > len(tables) / 2]
-    return min(shared, key=lambda clock: (clock.column is None, ranks[clock.decision.sure], clocks.index(clock)))
+
+    def order(clock: Clock) -> tuple[bool, float, int]:
+        # a column that is one sensor's own stands behind the file's, but for one that is a guess
+        own = clock.column is not None and sensor_of(timeless(clock.column)) is not None
+        return clock.column is None, ranks[clock.decision.sure] + 1.5 * own, clocks.index(clock)
+
+    return min(shared, key=order)
 
 
 def _fitted(clock: Clock, fit: Fit | None, unit: Unit) -> tuple[Clock, float]:
@@ -255,10 +264,14 @@ def _proposal(
     plant: Plant,
     layout: Layout,
     clock: Clock,
+    own: OwnClocks,
     found: dict[str, tuple[Triple, Decision]],
     notes: list[str],
 ) -> Proposal:
-    times = {sensor: seconds(clock, triple.numbers)[triple.rows] for sensor, (triple, _) in found.items()}
+    times = {
+        sensor: seconds(own.clocks.get(sensor, clock), triple.numbers)[triple.rows]
+        for sensor, (triple, _) in found.items()
+    }
     fit = _turned(found, times)
     units: dict[str, Unit] = {}
     for sensor, (triple, _) in found.items():
@@ -285,11 +298,12 @@ def _proposal(
     }
     axes = body_axes(readings)
     sensors = tuple(
-        ProposedSensor(sensor, triple, decision, units[sensor], axes.matrix[sensor])
+        ProposedSensor(sensor, triple, decision, units[sensor], axes.matrix[sensor], own.clocks.get(sensor))
         for sensor, (triple, decision) in found.items()
     )
     name = re.sub(r"[^\w.-]+", "-", raw.resolve().stem).strip("-") or "log"
-    return Proposal(name, raw, plant, layout, clock, sensors, axes.decisions, tuple(notes))
+    decisions = (*own.decisions, *axes.decisions) if found else ()  # positions alone have no axes of a board
+    return Proposal(name, raw, plant, layout, clock, sensors, decisions, tuple(notes))
 
 
 def _stated(sensor: str, triple: Triple, value: FloatArray) -> tuple[Reading | None, bool]:

@@ -6,7 +6,8 @@ import codecs
 from pathlib import Path
 
 from discsim.errors import InputError
-from validation.importing.sniffing.ulog import MAGIC
+from validation.importing.logs import kind_of
+from validation.importing.sniffing.names import foreign_words
 
 __all__ = ["encoding_of", "lines_of"]
 
@@ -22,12 +23,6 @@ SIGNATURES = (
     (b"\x1f\x8b", "a gzip archive; unpack it first"),
     (b"\x89HDF", "an HDF5 file; write its tables as CSV"),
     (b"SQLite format 3", "an SQLite data base; write its tables as CSV"),
-    (MAGIC, "a PX4 ULog among other files; import that file itself"),
-    (
-        b"\xa3\x95\x80",
-        "an ArduPilot log; `mavlogdump.py --format csv --types IMU FILE` (pip install pymavlink) writes CSV",
-    ),
-    (b"\x89MCAP", "an MCAP log; write its topics as CSV"),
     (
         b"FMT,",
         "an ArduPilot text log; `mavlogdump.py --format csv --types IMU FILE` (pip install pymavlink) writes CSV",
@@ -35,7 +30,6 @@ SIGNATURES = (
     (b'[{"', "JSON; write it as CSV (in Python: pandas.read_json(FILE).to_csv(OTHER))"),
     (b'{"', "JSON; write it as CSV (in Python: pandas.read_json(FILE, lines=True).to_csv(OTHER))"),
     (b"<?xml", "XML; write its readings as CSV"),
-    (b"\xb5\x62", "a u-blox UBX log; write its messages as CSV (pip install pyubx2 reads them)"),
 )
 _BOMS = (
     (codecs.BOM_UTF8, "utf-8"),
@@ -44,6 +38,8 @@ _BOMS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
+#: Encodings of Windows in Korea, Japan, China and Taiwan, and of Cyrillic.
+FOREIGN = ("cp949", "cp932", "gb18030", "big5", "cp1251")
 _LOOKED_AT = 1 << 16
 _CONTROL = frozenset(range(1, 32)) - {9, 10, 12, 13, 27}  # what no text has: not tab, line ends, form feed, escape
 
@@ -52,7 +48,8 @@ def encoding_of(path: Path) -> str:
     """Return the encoding of a text file; raises `InputError` for an empty file and for what is no text.
 
     A log's text is ASCII but for a few signs (degree, micro, accents of a locale), so no statistics of languages are
-    needed: valid UTF-8 is UTF-8 (a Latin-1 text with an accent is not valid), all else is Windows' Latin-1.
+    needed: valid UTF-8 is UTF-8 (a Latin-1 text with an accent is not valid). Else it is in the encoding of `FOREIGN`
+    under which words for time and sensors stand in it, or in Windows' Latin-1.
     """
     try:
         content = path.read_bytes()
@@ -60,6 +57,9 @@ def encoding_of(path: Path) -> str:
         raise InputError.at(path, None, f"cannot be read ({error.strerror}); expected what a logger wrote") from None
     if not content.strip():
         raise InputError.at(path, None, "the file is empty; expected rows of numbers")
+    kind = kind_of(path)
+    if kind is not None:
+        raise InputError.at(path, None, f"is {kind.name} among other files; import that file itself")
     for start, what in SIGNATURES:
         if content.startswith(start):
             raise InputError.at(path, None, f"is {what}; expected text with rows of numbers")
@@ -71,13 +71,30 @@ def encoding_of(path: Path) -> str:
         raise InputError.at(path, None, "is binary, no text; expected text with rows of numbers")
     if head.count(0):
         return _wide(path, head)
-    for encoding in ("utf-8", "cp1252"):
-        try:
-            content.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-        return encoding
-    return "latin-1"
+    if _decodes(content, "utf-8"):
+        return "utf-8"
+    return _foreign(head) or ("cp1252" if _decodes(content, "cp1252") else "latin-1")
+
+
+def _decodes(content: bytes, encoding: str) -> bool:
+    try:
+        content.decode(encoding)
+    except UnicodeDecodeError:
+        return False
+    return True
+
+
+def _foreign(head: bytes) -> str | None:
+    """Return the encoding under which most known words of other scripts stand in a text; None where none has two signs.
+
+    One sign may be there by chance. What an encoding cannot read (a damaged line holds some) counts against it.
+    """
+    found = {}
+    for encoding in FOREIGN:
+        text = head.decode(encoding, errors="replace")
+        found[encoding] = foreign_words(text) - text.count("\ufffd")
+    best = max(found, key=lambda encoding: found[encoding])
+    return best if found[best] >= 2 else None
 
 
 def _wide(path: Path, head: bytes) -> str:

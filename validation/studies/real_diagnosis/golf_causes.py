@@ -9,13 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from discsim.arrays import FloatArray
 from discsim.disc import Disc
-from discsim.effects.catalogue import Effect, effect
+from discsim.effects.aero import SpinDrag, SpinLift, SpinPitchingMoment, SpinSideForce
+from discsim.effects.air import Density, GroundEffect, WindShear
+from discsim.effects.catalogue import Effect, catalogued, effect_of
 from discsim.environment import Environment
 from discsim.model_file import Model, ModelEffect
 from discsim.recording import Recording
@@ -61,8 +64,10 @@ def _of_table(
     return apply
 
 
-def _of_catalogue(id: str, name: str, **others: float) -> Callable[[Disc, float], tuple[Disc, tuple[Effect, ...]]]:
-    return lambda disc, x: (disc, (effect(id, **{name: x, **others}),))
+def _of_catalogue(what: str, step: float, effect: Callable[[float], Any], most: float = np.inf) -> Cause:
+    """Return an effect of the catalogue as a cause; ``what`` is its size in words, behind its id."""
+    name = f"{catalogued(type(effect(0.0))).id}, {what}"
+    return Cause(name, step, lambda disc, x: (disc, (effect_of(effect(x)),)), most)
 
 
 NONE = Cause("none", 0.0, lambda disc, x: (disc, ()))
@@ -71,13 +76,13 @@ CAUSES: Sequence[Cause] = (
     Cause("lift of the table, change", 0.01, _of_table("CL", lambda c, x: c * (1.0 + x))),
     Cause("drag of the table, change", 0.01, _of_table("CD", lambda c, x: c * (1.0 + x))),
     Cause("pitching moment of the table, offset", 0.001, _of_table("CM", lambda c, x: c + x)),
-    Cause("air.density, ratio less 1", 0.01, lambda disc, x: (disc, (effect("air.density", ratio=1.0 + x),))),
-    Cause("air.wind_shear, north, m/s", 0.1, _of_catalogue("air.wind_shear", "w_north_m_s", exponent=0.25)),
-    Cause("aero.spin_lift, CLr", 0.002, _of_catalogue("aero.spin_lift", "CLr")),
-    Cause("aero.spin_drag, CDrr", 0.002, _of_catalogue("aero.spin_drag", "CDrr")),
-    Cause("aero.spin_side_force, CYr", 0.002, _of_catalogue("aero.spin_side_force", "CYr")),
-    Cause("aero.spin_pitching_moment, CMr", 0.0002, _of_catalogue("aero.spin_pitching_moment", "CMr")),
-    Cause("air.ground_effect, k", 0.05, _of_catalogue("air.ground_effect", "k"), 2.0),
+    _of_catalogue("ratio less 1", 0.01, lambda x: Density(1.0 + x)),
+    _of_catalogue("north, m/s", 0.1, lambda x: WindShear(w_north_m_s=x, exponent=0.25)),
+    _of_catalogue("CLr", 0.002, SpinLift),
+    _of_catalogue("CDrr", 0.002, SpinDrag),
+    _of_catalogue("CYr", 0.002, SpinSideForce),
+    _of_catalogue("CMr", 0.0002, SpinPitchingMoment),
+    _of_catalogue("k", 0.05, GroundEffect, 2.0),
 )  # fmt: skip
 
 

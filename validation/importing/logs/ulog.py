@@ -1,4 +1,4 @@
-"""A PX4 flight log (ULog) as one table per sensor. Takes a file; writes text tables that import reads as any others."""
+"""A PX4 flight log (ULog) as tables: units and fields as PX4's message definitions have them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.errors import InputError
+from validation.importing.logs.tables import Log, Table
 
-__all__ = ["MAGIC", "write_tables"]
+__all__ = ["TOPICS", "begins", "read"]
 
 #: The first bytes of a ULog (PX4 guide, "ULog File Format"); the next byte is its version.
 MAGIC = b"ULog\x01\x12\x35"
@@ -35,7 +35,7 @@ class _Source(NamedTuple):
     over: str = ""
 
 
-class _Table(NamedTuple):
+class _Found(NamedTuple):
     """Readings of a topic's instance: stamps (n,) us, values (n, 3)."""
 
     topic: str
@@ -66,50 +66,33 @@ _MAGNETIC = (
     _Source("sensor_combined", _indexed("magnetometer_ga"), scale=100.0, lag="magnetometer_timestamp_relative"),
     _Source("sensor_mag", _XYZ, scale=100.0),
 )
-_TOPICS = sorted({source.topic for source in (*_MAGNETIC, *(one for pair in _INERTIAL for one in pair))})
-_COLUMNS = {"gyroscope": "gyro_{} (rad/s)", "accelerometer": "accel_{} (m/s^2)", "magnetometer": "mag_{} (uT)"}
+TOPICS = sorted({source.topic for source in (*_MAGNETIC, *(one for pair in _INERTIAL for one in pair))})
+_UNITS = {"gyroscope": "rad/s", "accelerometer": "m/s^2", "magnetometer": "uT"}
 
 
-def write_tables(raw: Path, folder: Path) -> None:
-    """Write ``gyroscope.csv``, ``accelerometer.csv`` and ``magnetometer.csv``, those that the log has.
+def begins(head: bytes) -> bool:
+    """Tell a ULog."""
+    return head.startswith(MAGIC)
 
-    Each has its own stamps since the start of the autopilot, us. Of several topics the one with the most rows is
-    taken, the accelerometer's from where the gyroscope's is. A log that breaks off is read up to there.
 
-    Raises `InputError` where the reader is not installed, the log cannot be read or holds none of the topics.
+def read(raw: Path) -> Log:
+    """Return the tables of a log; times are since the start of the autopilot.
+
+    Of several topics the one with the most rows is taken, the accelerometer's from where the gyroscope's is. A log that
+    breaks off is read up to there.
     """
-    log = _read(raw)
-    for sensor, table in _chosen(log.data_list).items():
-        lines = [",".join(["timestamp_us", *(_COLUMNS[sensor].format(axis) for axis in _XYZ)])]
-        if log.file_corruption:
-            lines.insert(0, f"# {raw.name}: damaged messages in it were left out".encode("ascii", "replace").decode())
-        # nine digits are all that a float of 32 bits has
-        lines += [f"{t:.0f},{x:.9g},{y:.9g},{z:.9g}" for t, (x, y, z) in zip(table.stamp, table.value, strict=True)]
-        (folder / f"{sensor}.csv").write_text("\n".join([*lines, ""]), encoding="utf-8")
-    if not any(folder.iterdir()):
-        kind = "a damaged PX4 ULog" if log.file_corruption else "a PX4 ULog"
-        topics = ", ".join(_TOPICS)
-        raise InputError.at(
-            raw, None, f"is {kind} without readings of motion in it; expected one of the topics {topics}"
-        )
+    from pyulog import ULog
+
+    with raw.open("rb") as stream, contextlib.redirect_stdout(io.StringIO()):  # it prints what it finds damaged
+        log = ULog(stream, list(TOPICS))
+    tables = {
+        sensor: Table(found.stamp, found.value, _UNITS[sensor]) for sensor, found in _chosen(log.data_list).items()
+    }
+    damaged = bool(log.file_corruption)
+    return Log(tables, ("damaged messages in it were left out",) if damaged else (), damaged)
 
 
-def _read(raw: Path) -> Any:
-    try:
-        from pyulog import ULog
-    except ImportError:
-        raise InputError.at(
-            raw, None, 'is a PX4 ULog, whose reader is not installed; get it by: pip install "discsim[logs]"'
-        ) from None
-    try:
-        with raw.open("rb") as stream, contextlib.redirect_stdout(io.StringIO()):  # it prints what it finds damaged
-            return ULog(stream, _TOPICS)
-    except Exception as error:  # whatever a parser of bytes stumbles on in a damaged file
-        what = str(error) or type(error).__name__
-        raise InputError.at(raw, None, f"is a damaged PX4 ULog ({what}); expected one that ulog_info reads") from None
-
-
-def _chosen(topics: Iterable[Any]) -> dict[str, _Table]:
+def _chosen(topics: Iterable[Any]) -> dict[str, _Found]:
     """Return the sensors' tables."""
     by_name: dict[str, list[dict[str, Any]]] = {}
     for topic in topics:
@@ -121,13 +104,13 @@ def _chosen(topics: Iterable[Any]) -> dict[str, _Table]:
     return {sensor: table for sensor, table in found.items() if table is not None}
 
 
-def _longest(by_name: dict[str, list[dict[str, Any]]], sources: Iterable[_Source]) -> _Table | None:
+def _longest(by_name: dict[str, list[dict[str, Any]]], sources: Iterable[_Source]) -> _Found | None:
     """Return the table with the most rows, of several the first; None where none has a row."""
     tables = [_table(source, data) for source in sources for data in by_name.get(source.topic, [])]
     return max((table for table in tables if table is not None), key=lambda table: table.stamp.size, default=None)
 
 
-def _table(source: _Source, data: dict[str, Any]) -> _Table | None:
+def _table(source: _Source, data: dict[str, Any]) -> _Found | None:
     """Return the readings of one instance of a topic; None where fields are missing or no row is sound."""
     needed = {"timestamp", *source.fields, *filter(None, (source.lag, source.over))}
     if not needed <= set(data):
@@ -146,4 +129,4 @@ def _table(source: _Source, data: dict[str, Any]) -> _Table | None:
         sound &= over > 0
         value = value / np.where(over > 0, over * 1e-6, np.nan)[:, None]
         stamp = stamp - over / 2  # the mean over a span is the reading of its middle
-    return _Table(source.topic, stamp[sound], value[sound]) if sound.any() else None
+    return _Found(source.topic, stamp[sound], value[sound]) if sound.any() else None

@@ -1,0 +1,138 @@
+"""Many throws of one disc in MuJoCo, on all cores: `fly_many`.
+
+`mujoco.batch` steps them on its own threads, in which our air is a C function and needs no interpreter. It never runs a
+callback in Python: on two threads that is slower than on one, and an exception in it would end the process.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from discsim.arrays import FloatArray
+from discsim.callbacks import own_warnings, stepped_by_c
+from discsim.compiled import compiled
+from discsim.disc import Disc, Release
+from discsim.effects.catalogue import Effect
+from discsim.engine import DIVERGED, FlyingDisc, centre_state, touch_down
+from discsim.environment import Environment
+from discsim.errors import InputError
+from discsim.law import Law
+from discsim.logbook import Logbook, height
+from discsim.motion import State
+
+__all__ = ["Ends", "fly_many"]
+
+#: steps that all flights together take before the ground is looked for: what is recorded meanwhile is a few megabytes,
+#: and what a thread waits that opens a block is tenths of a second
+ROUND = 20_000
+#: what is recorded: 14 numbers, which stand first in the whole state, too
+_STATE = int(mujoco.mjtState.mjSTATE_TIME | mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL)
+_WIDTH = 14
+_WHOLE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+
+
+class Ends(NamedTuple):
+    """How n flights ended: the state at the end of each, and touched_down (n,).
+
+    All of a flight whose motion or whose air is not finite is NaN, as outside a C_Nr table.
+    """
+
+    state: State
+    touched_down: np.ndarray[Any, np.dtype[np.bool_]]
+
+
+@compiled
+def _first_below(rows: FloatArray, ex: float, ey: float, ez: float) -> int:
+    """Place of the first of rows (m, 14) whose centre of mass is below the ground or nowhere; m where none is."""
+    for k in range(rows.shape[0]):
+        if not height(rows[k, 1:], ex, ey, ez) > 0.0:
+            return k
+    return int(rows.shape[0])
+
+
+def fly_many(
+    disc: Disc,
+    environment: Environment,
+    releases: Sequence[Release],
+    effects: Sequence[Effect] = (),
+    *,
+    timestep: float = 1e-3,
+    duration: float = 30.0,
+    threads: int | None = None,
+    law: Law | Sequence[Law] | None = None,
+) -> Ends:
+    """Fly n throws in MuJoCo until each touches down, or for ``duration`` s; see `fly`.
+
+    What comes out does not depend on the number of threads, by default one for each core. Where the callback cannot be
+    in C, all fly on one thread. Raises `InputError` for a release that lacks something.
+    """
+    count, steps = len(releases), max(1, round(duration / timestep))
+    flying, last = (FlyingDisc(disc, environment, effects, timestep=timestep, law=law) for _ in range(2))
+    rows = np.full((count, 1 + last.model.nq + 2 * last.model.nv), np.nan)
+    touched = np.zeros(count, dtype=np.bool_)
+    if not count:
+        return Ends(centre_state(rows, flying), touched)
+    with own_warnings(), flying.air(), last.air():
+        batch = Batch(flying.model, count, threads or len(os.sched_getaffinity(0)))
+        batch.set_models(flying.model)  # the callback knows this one; the batch's own is a copy
+        for k, release in enumerate(releases):
+            flying.release(release)
+            mujoco.mj_getState(flying.model, flying.data, batch.state[k], _WHOLE)
+        ids, done = np.arange(count), 0
+        while ids.size and done < steps:
+            length = min(max(ROUND // ids.size, 1), steps - done)
+            # each flight from where the round began, so that the state before a step is always there
+            path = np.empty((ids.size, length + 1, _WIDTH))
+            path[:, 0] = batch.state[ids, :_WIDTH]
+            path[:, 1:] = _advance(flying, batch, ids, length)
+            done += length
+            flies = np.ones(ids.size, dtype=np.bool_)
+            for place, k in enumerate(ids.tolist()):
+                way = path[place]
+                first = _first_below(way, *flying.centre_of_mass)
+                touched[k] = first <= length and bool(np.isfinite(way[first]).all())
+                if touched[k] or (first > length and done == steps):
+                    rows[k] = _last_row(last, way[min(first, length + 1) - 1], bool(touched[k]))
+                flies[place] = first > length and not batch.warning[k, DIVERGED, 1].any()
+            ids = ids[flies]
+        for each in (flying, last):
+            each.lost_air()  # those flights are NaN
+    return Ends(centre_state(rows, flying), touched)
+
+
+def _advance(flying: FlyingDisc, batch: Batch, ids: Any, length: int) -> FloatArray:
+    """Step some flights ``length`` times and return time, qpos and qvel after each step, (ids, length, WIDTH)."""
+    with stepped_by_c() as in_c:
+        if in_c:
+            return np.asarray(batch.rollout(length, record=(_STATE,), ids=ids)[_STATE])
+    path = np.full((ids.size, length, _WIDTH), np.nan)
+    for place, k in enumerate(ids.tolist()):
+        mujoco.mj_resetData(flying.model, flying.data)  # an error leaves it in the middle of a step
+        mujoco.mj_setState(flying.model, flying.data, batch.state[k], _WHOLE)
+        # the callback in Python says at once what the one in C writes down
+        with suppress(InputError):
+            for row in path[place]:
+                mujoco.mj_step(flying.model, flying.data)
+                mujoco.mj_getState(flying.model, flying.data, row, _STATE)
+        mujoco.mj_getState(flying.model, flying.data, batch.state[k], _WHOLE)
+    return path
+
+
+def _last_row(last: FlyingDisc, start: FloatArray, lands: bool) -> FloatArray:
+    """Return time, qpos, qvel and qacc at the end of a flight: at ``start`` (14,), or on the ground within a step."""
+    if lands:
+        touch_down(last, start)
+    else:
+        mujoco.mj_setState(last.model, last.data, start, _STATE)
+    mujoco.mj_forward(last.model, last.data)
+    log = Logbook(last.model, last.data, last.centre_of_mass)
+    log.note()
+    row: FloatArray = log.rows[0]
+    return row
