@@ -10,7 +10,7 @@ import pytest
 from made import coasts, throws
 
 from discsim.effects.catalogue import CATALOGUE, effect
-from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain
+from validation.diagnosis.relaxed_fit import first_chain
 from validation.diagnosis.selection import exchange
 from validation.diagnosis.selection import found as finding
 from validation.diagnosis.selection import stepwise as searching
@@ -22,6 +22,8 @@ from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.diagnosis.selection.proposals import Proposal, hinted
 from validation.identification.gauss_newton import Fit, linearised, merit_of
 from validation.identification.noise import stated_noise
+from validation.identification.plants.flight import FLIGHT
+from validation.identification.plants.spin_down import SPIN_DOWN
 
 #: what algebra ranks, best first; none but the seventh comes near the data
 RANKED = [Trial(id, ()) for id, row in CATALOGUE.items() if id.startswith(("mag.", "gyro.")) and not row.event]
@@ -38,7 +40,7 @@ def step(
     Beside it how much below the present fit's merit each had to come, per reading, or be given up.
     """
     recordings = coasts(seconds=1.0)
-    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), NO_JUMPS["spin_down"], {})
+    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
     linears = linearised(fit)
     fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
     base = Tied(Hypothesis(), fit, 1e6)
@@ -95,7 +97,7 @@ def test_near_the_data_four_are_refitted(monkeypatch):
 def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present_one_is(monkeypatch):
     """Algebra asked for a number far off; from no effect at all the same fit comes to what it gains."""
     recordings = coasts(seconds=1.0)
-    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), NO_JUMPS["spin_down"], {})
+    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
     linears = linearised(fit)
     fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
     base = Tied(Hypothesis(), fit, 1e4)
@@ -130,7 +132,7 @@ def exchanged(monkeypatch: pytest.MonkeyPatch, without_scale: float) -> set[str]
     ``without_scale`` is the score of the offset and the place alone; that of the three is 40, with the place 42.
     """
     recordings = coasts(seconds=1.0)
-    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), NO_JUMPS["spin_down"], {})
+    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
     linears = linearised(fit)
     fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
     offset, scale, board, place = map(
@@ -166,7 +168,7 @@ def scope(monkeypatch: pytest.MonkeyPatch, everywhere: float) -> frozenset[int] 
     ``everywhere`` is its score in both.
     """
     recordings = coasts(seconds=1.0)
-    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), NO_JUMPS["spin_down"], {})
+    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
     linears = linearised(fit)
     fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
     stall = replace(free_trial("aero.stall"), recordings=frozenset([1]))
@@ -191,7 +193,7 @@ def test_an_effect_that_the_others_contradict_stays_in_its_recording(monkeypatch
 def test_a_centre_of_mass_off_the_disc_is_not_refitted_and_a_sensor_s_unknown_place_is():
     """Where a path alone is recorded algebra asks for metres of the one; along the axis nothing shows the other."""
     recordings = throws(seconds=0.3)
-    base = Tied(Hypothesis(), Fit((), (), np.empty(0), NO_JUMPS["flight"], {}), 0.0)
+    base = Tied(Hypothesis(), Fit((), (), np.empty(0), FLIGHT.sizes.continuous, {}), 0.0)
     found = finding.Search(tuple(recordings), (), base.fit, {}, (), base, base)
     radius = 0.5 * recordings[0].disc.diameter
 

@@ -17,7 +17,7 @@ from discsim.effects import Effect
 from discsim.recording import Recording
 from validation.diagnosis.detectors.all import searched
 from validation.diagnosis.detectors.dropped_samples import Shifted
-from validation.diagnosis.relaxed_fit import NO_JUMPS, relaxed, unknowns, without_outliers
+from validation.diagnosis.relaxed_fit import relaxed, unknowns, without_outliers
 from validation.diagnosis.selection.candidates import Trial, parameters_of, trials_for
 from validation.diagnosis.selection.constrained_fit import Tied, tied_fit
 from validation.diagnosis.selection.evidence import ONE_SIDED, RIVAL, price
@@ -49,7 +49,6 @@ from validation.identification.competing_effects import row_of
 from validation.identification.gauss_newton import Fit, merit_of
 from validation.identification.noise import NoiseModel, estimate_noise, robust_noise
 from validation.identification.parameters import Parameter
-from validation.identification.propagation import WOBBLE
 from validation.identification.stated_parameters import stated_parameters
 
 __all__ = ["search", "tried_without"]
@@ -65,8 +64,6 @@ MOST_EFFECTS = 4
 REFITTED, REFITTED_AT_MOST = 4, 9
 #: chi-squared per reading, in the noise of the relaxed fit, below which a fit is near the data
 _NEAR = 1.2
-#: most steps of the baseline's fit, and as many again where it comes near the data: a free spin's is slow
-_BASE_ITERATIONS = {"flight": 8, "free_spin": 16, "spin_down": 8, "rate_table": 8}
 #: a refit that will leave this many times the chi-squared of the best one so far is given up, and where that is near
 #: the data
 _HOPELESS, _HOPELESS_NEAR = 10.0, 4.0
@@ -102,15 +99,15 @@ def search(
     report("following the data", 0, 4)
     loose, left_out = without_outliers(relaxed(recordings, known) if followed is None else followed)
     noise = estimate_noise(loose.linears, [linear.residual for linear in loose.linears])
-    plant = recordings[0].plant
+    plant = loose.plant
     given = {q.group for q in free}
     trials = tuple(trial for trial in trials_for(recordings) if trial.id not in given)
     report("asking every effect", 1, 4)
-    board = board_of(loose, trials, noise, NO_JUMPS[plant])
+    board = board_of(loose, trials, noise, plant.sizes.continuous)
     report("fitting the baseline", 2, 4)
     start = {**_start(board, Hypothesis(), own), **_wobbles(loose)}
-    base = tied_fit(loose, Hypothesis(), own, noise, start, iterations=_BASE_ITERATIONS[plant])
-    if chi2_in(base, noise) < FAR * base.fit.count and base.fit.iterations >= _BASE_ITERATIONS[plant]:
+    base = tied_fit(loose, Hypothesis(), own, noise, start, iterations=plant.base_steps)
+    if chi2_in(base, noise) < FAR * base.fit.count and base.fit.iterations >= plant.base_steps:
         # beside the data what the baseline has left to gain would pass for what an effect gains
         again = tied_fit(
             base.fit,
@@ -118,7 +115,7 @@ def search(
             own,
             base.fit.noise,
             values_of_fit(base),
-            iterations=_BASE_ITERATIONS[plant],
+            iterations=plant.base_steps,
             bar=merit_of(base.fit, base.fit.linears),
         )
         base = min(base, again, key=lambda one: one.score)
@@ -191,7 +188,7 @@ def _wobbles(fit: Fit) -> Start:
     What algebra expects of it is far from linear where turning for a second makes a radian.
     """
     parameters = zip(fit.parameters, fit.at, strict=True)
-    return {(q.key, q.recordings): float(v) for q, v in parameters if q.key in WOBBLE}
+    return {(q.key, q.recordings): float(v) for q, v in parameters if q.key in fit.plant.own_keys}
 
 
 def _told(tied: Tied | None) -> bool:
@@ -375,7 +372,7 @@ def _from_there(found: Search, current: Tied, better: Tied) -> Tied | None:
     None where it is, or where it gains so much that no start could.
     """
     trial = better.hypothesis.trials[-1]
-    if current.score - better.score > _DOUBTFUL or found.recordings[0].plant != "free_spin":
+    if current.score - better.score > _DOUBTFUL or not found.loose.plant.weakly_identified:
         return None
     start = values_of_fit(better)
     again = tied_fit(better.fit, current.hypothesis, found.own, better.fit.noise, start)

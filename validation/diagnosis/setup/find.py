@@ -23,6 +23,7 @@ from validation.diagnosis.setup.hypotheses import Hypothesis, Ranking, board_eff
 from validation.diagnosis.setup.proof import left_by_short_fit
 from validation.diagnosis.setup.remedy import MapAxes, remedy
 from validation.diagnosis.setup.units import clock_unit, sensor_units
+from validation.identification.plants import Plant, plant_of
 
 __all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said", "with_likeliest_fault"]
 
@@ -38,9 +39,8 @@ AGREE, SOUND = 0.6, 0.25
 WORST = 2.1
 #: a hypothesis that costs no more than this above the best cannot be told from it
 TWIN = 8.0
-#: longest that is judged of a recording, s: a minute of turning, or the plateaus of a rate table
-LOOK = {"flight": 60.0, "free_spin": 60.0, "spin_down": 300.0, "rate_table": 300.0}
-#: in which it turns at this share of the fastest rate or more, asked every so many s (half a turn at 6 rad/s)
+#: what is judged of a long recording turns at this share of the fastest rate or more, asked every so many s (half a
+#: turn at 6 rad/s)
 _QUARTER, _SLOT = 0.25, 0.5
 #: most faults of one setup that are looked for, and most twins that are told
 MOST, MOST_TWINS = 3, 8
@@ -145,7 +145,7 @@ def _judgeable(recording: Recording) -> Recording:
     kept = {name: own for name, own in recording.samples.items() if name not in BOARD or _alive(own)}
     if not recording.environment.field_known:
         kept.pop("magnetometer", None)
-    busiest = _busiest(kept, LOOK[recording.plant])
+    busiest = _busiest(kept, plant_of(recording).durations.setup)
     if busiest is not None:
         kept = {name: samples.between(*busiest) for name, samples in kept.items()}
     return replace(recording, samples=kept)
@@ -226,7 +226,7 @@ def _fault(as_written: Hypothesis | None, found: Sequence[Hypothesis], recording
     """Return the best of hypotheses as a fault, with those that cannot be told from it."""
     site = recordings[0].environment.magnetic_field
     before = None if as_written is None else as_written.costs
-    tied = [item for item in found if _may_be_meant(item, found[0], recordings[0].plant)]
+    tied = [item for item in found if _may_be_meant(item, found[0], plant_of(recordings[0]))]
     best, others = _told_apart(tied, recordings, site)
     twins = [_effect(item, site) for item in sorted(others, key=lambda item: item.kind != best.kind)]
     gain = float("inf") if before is None else float(np.sum(before) - best.cost)
@@ -246,7 +246,7 @@ def _told_apart(
     of those two the columns are named.
     """
     tied = sorted(tied, key=lambda item: _turned_round(item, site))
-    if len(tied) == 1 or recordings[0].plant != "flight":
+    if len(tied) == 1 or not plant_of(recordings[0]).air_modelled:
         return tied[0], list(tied[1:])
     some = chosen(recordings)
     left = [left_by_short_fit([corrected(one, [_effect(item, site)]) for one in some]) for item in tied[:_FITTED]]
@@ -262,14 +262,14 @@ def _turned_round(item: Hypothesis, stated: FloatArray) -> bool:
 
 def _borne_out(as_written: Hypothesis | None, item: Hypothesis, recordings: Sequence[Recording]) -> bool:
     """Tell whether the air bears out a hypothesis that gains less than its price: a short fit leaves far less."""
-    if recordings[0].plant != "flight" or not _gains(as_written, item, _PRICE_IN_AIR / PRICE):
+    if not plant_of(recordings[0]).air_modelled or not _gains(as_written, item, _PRICE_IN_AIR / PRICE):
         return False
     some = chosen(recordings)
     meant = [corrected(one, [_effect(item, some[0].environment.magnetic_field)]) for one in some]
     return _REFUTED * left_by_short_fit(meant) < left_by_short_fit(some)
 
 
-def _may_be_meant(item: Hypothesis, best: Hypothesis, plant: str) -> bool:
+def _may_be_meant(item: Hypothesis, best: Hypothesis, plant: Plant) -> bool:
     """Tell whether a hypothesis is to be told from the best by more than what it costs.
 
     Where the best leaves more than sound recordings do, something else is wrong, too: lost samples turn the phase of
@@ -280,7 +280,7 @@ def _may_be_meant(item: Hypothesis, best: Hypothesis, plant: str) -> bool:
         return True
     spoilt = best.cost > SOUND * best.weight
     alike = best.kind == "axes" and (item.kind, item.sensor) == (best.kind, best.sensor)
-    return plant == "flight" and spoilt and alike and item.cost < AGREE * item.weight
+    return plant.air_modelled and spoilt and alike and item.cost < AGREE * item.weight
 
 
 def _agrees(item: Hypothesis) -> bool:
