@@ -32,6 +32,7 @@ __all__ = [
     "limit_of",
     "reading_fault",
     "time_fault",
+    "written_time_fault",
 ]
 
 
@@ -126,6 +127,12 @@ GRID_ROWS, GRID_PER_ROW = 1_000_000, 100
 LARGEST_READING = 1e9
 
 
+#: units in which a clock may have been written as if they were seconds
+_UNITS = (1e-3, 1e-6)
+#: fewest rows whose spacing shows a unit: of two or three any time between them is one
+_SHOWS_ITS_UNIT = 10
+
+
 def limit_of(key: str) -> Limit:
     """Return the limits of a key: its own, its unit's, or those of any number.
 
@@ -165,6 +172,17 @@ def time_fault(t: FloatArray) -> tuple[int, str] | None:
             f"for at most {room:.3g} (does the clock jump by {steps[row - 1]:.6g} s here?)"
         )
     return None
+
+
+def written_time_fault(t: FloatArray) -> tuple[int, str] | None:
+    """As `time_fault`, of times as they stand in a file: milliseconds or microseconds written as seconds are let pass.
+
+    That is a fault of the setup (clock.units), which is found and said where a recording is used.
+    """
+    fault = time_fault(t)
+    if fault is None or t.size < _SHOWS_ITS_UNIT:
+        return fault
+    return None if any(time_fault(unit * t) is None for unit in _UNITS) else fault
 
 
 def reading_fault(value: FloatArray) -> tuple[int, int, str] | None:

@@ -28,7 +28,7 @@ from discsim.disc import Aero, Disc, Release, Rig, aero_key
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import read_text, write_text
-from discsim.limits import MOST_ROWS, reading_fault, time_fault
+from discsim.limits import MOST_ROWS, reading_fault, written_time_fault
 from discsim.toml_table import TomlTable, read_toml
 
 __all__ = [
@@ -352,7 +352,7 @@ def read_csv(path: Path, header: str, *, gaps_allowed: bool = True) -> Samples:
 
 def _beyond(samples: Samples, header: str) -> tuple[int, str] | None:
     """Return the row (from 0) at which samples leave the limits (`discsim.limits`), and what is wrong there."""
-    found = time_fault(samples.t)
+    found = written_time_fault(samples.t)
     if found is None and (wild := reading_fault(samples.value.reshape(len(samples), -1))):
         row, column, message = wild
         found = row, f"{header.split(',')[1 + column]} {message}"

@@ -31,9 +31,11 @@ from discsim.effects.setup import (
     permutation,
     written_per_si,
 )
+from discsim.errors import InputError
+from discsim.limits import time_fault
 from discsim.recording import Recording, Samples, SensorSheet
 
-__all__ = ["PREFIX", "as_written", "corrected"]
+__all__ = ["PREFIX", "as_written", "corrected", "require_seconds"]
 
 #: sensor -> prefix of its effects
 PREFIX: Mapping[str, str] = MappingProxyType(
@@ -124,3 +126,11 @@ def _turned(sensor: str, value: FloatArray, sheet: SensorSheet, values: _Values,
     mixing = np.count_nonzero(R, axis=1) > 1
     spoilt = np.where(mixing, (lost | sheet.clipped(value)) @ (R.T != 0.0), lost @ (R.T != 0.0))
     return np.where(spoilt, np.nan, np.where(lost, 0.0, value) @ R.T)
+
+
+def require_seconds(recording: Recording) -> None:
+    """Raise `InputError` where a recording, its clock's unit put right, still has times that none has."""
+    for sensor, samples in recording.samples.items():
+        if len(samples) and (fault := time_fault(samples.t)) is not None:
+            place = f"{recording.path or recording.name}, {sensor}"
+            raise InputError(f"{place}, row {fault[0] + 1}: {fault[1]}")

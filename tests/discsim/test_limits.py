@@ -21,6 +21,7 @@ from discsim.rig import read_profile
 from discsim.sensors.sampling import Sampling
 from discsim.shipped import load_disc
 from discsim.trajectory import predict
+from discsim.written import corrected, require_seconds
 
 
 def field_file(t: np.ndarray) -> dict[str, str]:
@@ -59,6 +60,18 @@ def test_times_that_no_recording_has_are_refused_at_their_line(tmp_path, t, line
 def test_times_of_recordings_at_the_edge_are_taken(tmp_path, t):
     recording = read_recording(make(tmp_path / "flight", csv=field_file(t)))
     np.testing.assert_array_equal(recording.samples["magnetometer"].t, t)
+
+
+@pytest.mark.parametrize("unit", [1e3, 1e6], ids=["ms", "us"])
+def test_milliseconds_and_microseconds_written_as_seconds_are_read_for_the_setup_to_find(tmp_path, unit):
+    t = unit * np.arange(0.0, 20.0, 0.01)
+    whole = read_recording(make(tmp_path / "flight", csv=field_file(t)))
+    recording = replace(whole, samples={"magnetometer": whole.samples["magnetometer"]})
+    np.testing.assert_array_equal(recording.samples["magnetometer"].t, t)
+    require_seconds(corrected(recording, [effect("clock.units", written_in="ms" if unit == 1e3 else "us")]))
+    if unit == 1e6:
+        with pytest.raises(InputError, match=r"magnetometer, row \d+: "):
+            require_seconds(recording)
 
 
 def test_an_hour_at_a_kilohertz_is_within_the_limits():

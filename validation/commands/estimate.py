@@ -59,6 +59,7 @@ def command(
 
     from discsim.files import write_pieces
     from discsim.recording import read_recording
+    from discsim.written import require_seconds
     from estimators.accelerometer import AccelerometerErrors
     from estimators.fft import FftSettings
     from estimators.methods import Options
@@ -76,6 +77,7 @@ def command(
     data = replace(data, environment=at_place(data.environment, place, date))
     setup = find_setup_faults([data])
     data = setup.recordings[0]
+    require_seconds(data)
     rates, left_out = estimate_all(data, method, options)
     notes = [f"{fault.sentence}; the estimates are of the readings so corrected" for fault in setup.faults]
     notes += all_notes(data)

@@ -11,6 +11,7 @@ from discsim.arrays import BoolArray, FloatArray
 from discsim.clipping import constant_axes
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
+from discsim.written import require_seconds
 from validation.identification.initial.smoothing import FEWEST
 from validation.identification.plants import plant_of
 
@@ -57,6 +58,7 @@ def _refuse(recording: Recording, name: str) -> None:
     lacks = plant_of(recording).lacks(recording)
     if lacks is not None:
         raise InputError(f"{place}: {lacks}")
+    require_seconds(recording)
     first = min((float(s.t[0]) for s in recording.samples.values() if len(s)), default=0.0)
     if first > _longest(recording):
         raise InputError(
