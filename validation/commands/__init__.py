@@ -21,10 +21,14 @@ COMMANDS: dict[str, str] = {
     "sweep": "sweep",
     "validate": "validate",
     "view": "view",
+    "list": "list_",
+    "show": "show",
+    "study": "study",
 }
 
 
 def register(app: typer.Typer) -> None:
     """Add every sub-command to ``app``; heavy imports happen inside the commands, not here."""
     for name, module in COMMANDS.items():
-        app.command(name)(import_module(f"validation.commands.{module}").command)
+        loaded = import_module(f"validation.commands.{module}")
+        app.command(name, context_settings=getattr(loaded, "CONTEXT", None))(loaded.command)
