@@ -22,6 +22,7 @@ from typing import Any
 import mujoco
 import numba
 import numpy as np
+from rich.box import MARKDOWN
 from rich.console import Console
 from rich.table import Table
 
@@ -102,6 +103,7 @@ def step(sizes: list[int], rounds: int) -> None:
         title=f"CPU time per RK4 step of 1 ms over the bare loop's, {rounds} rounds",
         caption=f"MuJoCo {mujoco.__version__}, numba {numba.__version__}, Python {platform.python_version()}, "
         f"{platform.machine()}, {os.cpu_count()} cores",
+        box=MARKDOWN,
     )
     table.add_column("steps")
     for heading in ("variant", "us", "over the bare loop", "quartiles"):

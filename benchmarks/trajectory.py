@@ -1,7 +1,7 @@
 """The standalone model: its error, its speed against FrisPy on the same throw, bulk runs, and MuJoCo beside it.
 
 Usage: ``python benchmarks/trajectory.py [errors] [frispy] [bulk] [mujoco] [--frispy PYTHON] [--rounds 25]
-[--throws 1000] [--pairs 50]``; without names, all four parts.
+[--throws 100 300 1000] [--pairs 50]``; without names, all four parts.
 
 FrisPy (``pip install frispy``, which wants its own environment) runs in the interpreter given, or in this one. Rounds
 of both alternate, so that a change of the machine's clock falls on both; times are each process's own CPU time.
@@ -14,8 +14,8 @@ import os
 import statistics
 import subprocess
 import sys
-from collections.abc import Callable
-from time import perf_counter, process_time
+from collections.abc import Callable, Sequence
+from time import perf_counter, process_time, thread_time
 
 import numpy as np
 
@@ -127,26 +127,34 @@ def against_frispy(python: str, rounds: int) -> None:
     process.wait()
 
 
-def bulk(count: int) -> None:
-    """Print the wall time of many throws on one thread and on all cores, in turns, best of each."""
+def bulk(counts: Sequence[int]) -> None:
+    """Print landings per second of CPU on one core, and their error, at several tolerances; and how the cost grows."""
     rng = np.random.default_rng(0)
     some = predict(DISC, ENVIRONMENT, THROW).state[0]
-    states = np.tile(some, (count, 1))
-    states[:, 3:6] *= rng.uniform(0.8, 1.1, (count, 1))
-    predict_many(DISC, ENVIRONMENT, states[:2])
+    states = np.tile(some, (max(counts), 1))
+    states[:, 3:6] *= rng.uniform(0.8, 1.1, (max(counts), 1))
+    few = states[: min(counts)]
+    exact = predict_many(DISC, ENVIRONMENT, few, rtol=1e-12, atol=1e-12, threads=1).state[:, :3]
+    print(f"landings of {len(few)} throws on one thread: largest error m, landings per second of CPU")
+    for tolerance in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8):
+        spent = []
+        for _ in range(5):
+            start = thread_time()
+            found = predict_many(DISC, ENVIRONMENT, few, rtol=tolerance, atol=tolerance, threads=1).state[:, :3]
+            spent.append(thread_time() - start)
+        error = np.linalg.norm(found - exact, axis=1).max()
+        print(f"  tolerance {tolerance:.0e}: {error:8.1e} {len(few) / min(spent):8.0f}")
     cores = len(os.sched_getaffinity(0))
-    took: dict[int, list[float]] = {1: [], cores: []}
-    for _ in range(7):
-        for threads, times in took.items():
-            start = perf_counter()
-            predict_many(DISC, ENVIRONMENT, states, threads=threads)
-            times.append(perf_counter() - start)
-    one, all_cores = min(took[1]), min(took[cores])
-    ratio = statistics.median(a / b for a, b in zip(took[1], took[cores], strict=True))
-    print(
-        f"{count} landings: {one:.3f} s on one thread ({one / count * 1e3:.2f} ms each), {all_cores:.3f} s on {cores}; "
-        f"ratio of the best {one / all_cores:.2f}, median of pairs {ratio:.2f}"
-    )
+    for count in counts:
+        start, own = perf_counter(), thread_time()
+        predict_many(DISC, ENVIRONMENT, states[:count], threads=1)
+        clock, one = perf_counter() - start, thread_time() - own
+        start, process = perf_counter(), process_time()
+        predict_many(DISC, ENVIRONMENT, states[:count], threads=cores)
+        print(
+            f"{count:6d} landings at 1e-8: {one:.3f} s of CPU on one thread, {one / count * 1e3:.2f} ms each, "
+            f"{process_time() - process:.3f} s on {cores}; {clock / (perf_counter() - start):.2f} times less time"
+        )
 
 
 def against_mujoco(count: int) -> None:
@@ -168,7 +176,7 @@ def main() -> None:
     parser.add_argument("parts", nargs="*", help="errors, frispy, bulk, mujoco; none: all")
     parser.add_argument("--frispy", default=sys.executable, help="interpreter that has FrisPy")
     parser.add_argument("--rounds", type=int, default=25)
-    parser.add_argument("--throws", type=int, default=1000)
+    parser.add_argument("--throws", type=int, nargs="+", default=[100, 300, 1000])
     parser.add_argument("--pairs", type=int, default=50)
     given = parser.parse_args()
     parts: dict[str, Callable[[], None]] = {

@@ -74,7 +74,10 @@ def _interpolate(x: float, nodes: FloatArray, values: FloatArray) -> float:
     return float(values[k] + (values[k + 1] - values[k]) * share)
 
 
-@compiled
+# these three are compiled into their caller: to hand them the tables would cost more than all of the air's arithmetic
+
+
+@inlined
 def static_coefficients(p: Any, tables: Tables, alpha: float) -> tuple[float, float, float]:
     """C_L, C_D, C_M of a disc that does not spin: linear and quadratic forms, or the table in their place."""
     columns = tables.static.columns
@@ -89,7 +92,7 @@ def static_coefficients(p: Any, tables: Tables, alpha: float) -> tuple[float, fl
     return a.CL0 + a.CLa * alpha, a.CD0 + a.CDa * (alpha - a.alpha0) ** 2, a.CM0 + a.CMa * alpha
 
 
-@compiled
+@inlined
 def rolling_coefficient(p: Any, tables: Tables, alpha: float, gamma: float, roll: float) -> float:
     """C_R = C_Rr(alpha, gamma) + C_Rp(alpha) roll, Eq. (16), roll being p_H d/(2 V): derivatives, or tables."""
     lookup = tables.static.rolling
@@ -107,7 +110,7 @@ def rolling_coefficient(p: Any, tables: Tables, alpha: float, gamma: float, roll
     return float((CR if gamma >= 0.0 else -CR) + CRp * roll)
 
 
-@compiled
+@inlined
 def yaw_damping(p: Any, tables: Tables, r: float, V: float) -> float:
     """CNr, a constant or the spline of the (r, V) table (28); NaN outside the table."""
     if tables.rate.size == 0:

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import mujoco
 
+from discsim.errors import InputError
 from discsim.native import NativeCallback, NativeForce, native_callback
 
 __all__ = ["PassiveForce", "check_lent", "compile_model", "own_warnings", "passive_force", "stepped_by_c"]
@@ -132,13 +133,16 @@ def _dispatcher(before: Any) -> Callable[..., None]:
     return _dispatch
 
 
+def _found() -> NativeCallback | None:
+    """Return the callback in C where one has been looked for already."""
+    return native_callback() if native_callback.cache_info().currsize else None
+
+
 def _act(model: Any) -> None:
     """Let the force of the last block of a model act on it, if there is one: by C where that is possible."""
     forces = _FORCES.get(id(model))
     wanted = None if forces is None else forces[-1].native
-    callback: NativeCallback | None = None
-    if wanted is not None or native_callback.cache_info().currsize:
-        callback = native_callback()
+    callback = _found() if wanted is None else native_callback()
     by_c = wanted is not None and callback is not None and callback.put(model._address, wanted)
     if callback is not None and not by_c:
         callback.remove(model._address)
@@ -194,6 +198,8 @@ def passive_force(model: Any, apply: PassiveForce, native: NativeForce | None = 
                 _FORCES[id(model)] = forces[:last] + forces[last + 1 :]
             _act(model)
             lent = _PASSIVE.give_back()
+            if not _FORCES and (callback := _found()) is not None:
+                callback.hand_on(None)
         if not lent and not failed:
             raise _PASSIVE.taken
 
@@ -231,11 +237,15 @@ def compile_model(spec: Any) -> Any:
 
     MuJoCo's compiler steps the half-built model, which it cannot hand to a Python callback: it would only say "Python
     exception raised". A model without springs and dampers never calls it, so both are switched off until it is built.
+    Raises `InputError` where no body has the masses or inertias that were given.
     """
     flags = spec.option.disableflags
     spec.option.disableflags = flags | int(mujoco.mjtDisableBit.mjDSBL_SPRING | mujoco.mjtDisableBit.mjDSBL_DAMPER)
     try:
         model = spec.compile()
+    except ValueError as error:
+        reason = str(error).splitlines()[0].removeprefix("Error: ")
+        raise InputError(f"no rigid body has these inertias or masses: {reason}; expected those of a body") from None
     finally:
         spec.option.disableflags = flags
     model.opt.disableflags = flags

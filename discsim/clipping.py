@@ -13,10 +13,10 @@ limit are equal to the last digit, time after time, and nothing lies beyond them
 from __future__ import annotations
 
 import weakref
+from math import erf
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.special import erf
 
 from discsim.arrays import BoolArray, FloatArray
 
@@ -283,7 +283,7 @@ def _is_limit(column: FloatArray, axis: int, top: float, step: float, quiet: _No
     if not TOGGLING <= noise < NOISIEST * top / step:
         return False
     # the best chance that a constant input has of one reading, and of that one before any larger
-    chance = max(float(erf(1.0 / (2.0 * np.sqrt(2.0) * noise))), 1e-12)
+    chance = max(erf(1.0 / (2.0 * np.sqrt(2.0) * noise)), 1e-12)
     longest = _longest_run(at_top)
     if longest >= SHORTEST and longest * np.log(chance) + np.log(column.size) < np.log(CHANCE):
         return True

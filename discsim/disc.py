@@ -13,6 +13,7 @@ import numpy as np
 from discsim.arrays import FloatArray, readonly
 from discsim.errors import InputError
 from discsim.frames import attitude_matrix
+from discsim.limits import ANY_NUMBER
 from discsim.toml_table import TomlTable
 
 __all__ = ["RELEASE_HEIGHT", "Aero", "AeroTable", "Disc", "Release", "Rig", "RollingTable", "YawDampingTable"]
@@ -207,7 +208,7 @@ def _aero(table: TomlTable, tabulated: Set[str], required: bool) -> tuple[Aero |
                 None, "[disc.aero_sigma] without [disc.aero]; expected the coefficients it is about"
             )
         for key in map(aero_key, Aero._fields):
-            value = sigma_table.number(key, required=False, minimum=0.0)
+            value = sigma_table.number(key, required=False, minimum=0.0, limit=ANY_NUMBER)
             if value is None:
                 continue
             if key in absent:

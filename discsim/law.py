@@ -71,7 +71,8 @@ class Law:
             if not isfinite(value):
                 raise InputError(f"law: {name} is not finite ({value}); expected a finite number")
         if strange := set(self.sigma) - set(self.coefficients):
-            raise InputError(f"law: sigma of '{min(strange)}', which is no coefficient")
+            known = ", ".join(self.coefficients) or "none"
+            raise InputError(f"law: sigma of '{min(strange)}', which is no coefficient; expected some of {known}")
         rows = self.rows
         if self.target in WRENCH_TARGETS:
             if np.any(rows[:, 2 + SYMBOLS.index("x") : 2 + _COUNT]):

@@ -20,7 +20,7 @@ from discsim.callbacks import own_warnings, stepped_by_c
 from discsim.compiled import compiled
 from discsim.disc import Disc, Release
 from discsim.effects.catalogue import Effect
-from discsim.engine import DIVERGED, FlyingDisc, centre_state, touch_down
+from discsim.engine import DIVERGED, LARGEST_TURN, FlyingDisc, centre_state, touch_down
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.law import Law
@@ -29,9 +29,10 @@ from discsim.motion import State
 
 __all__ = ["Ends", "fly_many"]
 
-#: steps that all flights together take before the ground is looked for: what is recorded meanwhile is a few megabytes,
-#: and what a thread waits that opens a block is tenths of a second
-ROUND = 20_000
+#: steps that all flights together take before the ground is looked for, and the most that each takes: what is recorded
+#: meanwhile is a few megabytes, what a thread waits that opens a block is tenths of a second, and what is flown below
+#: the ground is a small part of a flight
+ROUND, LONGEST = 20_000, 200
 #: what is recorded: 14 numbers, which stand first in the whole state, too
 _STATE = int(mujoco.mjtState.mjSTATE_TIME | mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL)
 _WIDTH = 14
@@ -41,7 +42,8 @@ _WHOLE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 class Ends(NamedTuple):
     """How n flights ended: the state at the end of each, and touched_down (n,).
 
-    All of a flight whose motion or whose air is not finite is NaN, as outside a C_Nr table.
+    All of a flight whose motion or whose air is not finite is NaN, as outside a C_Nr table, and so is one that turns by
+    more than `discsim.engine.LARGEST_TURN` in a step.
     """
 
     state: State
@@ -87,7 +89,7 @@ def fly_many(
             mujoco.mj_getState(flying.model, flying.data, batch.state[k], _WHOLE)
         ids, done = np.arange(count), 0
         while ids.size and done < steps:
-            length = min(max(ROUND // ids.size, 1), steps - done)
+            length = min(max(ROUND // ids.size, 1), LONGEST, steps - done)
             # each flight from where the round began, so that the state before a step is always there
             path = np.empty((ids.size, length + 1, _WIDTH))
             path[:, 0] = batch.state[ids, :_WIDTH]
@@ -96,6 +98,11 @@ def fly_many(
             flies = np.ones(ids.size, dtype=np.bool_)
             for place, k in enumerate(ids.tolist()):
                 way = path[place]
+                with np.errstate(invalid="ignore"):
+                    too_fast = np.max(np.sum(way[:, 11:14] ** 2, axis=1)) > (LARGEST_TURN / timestep) ** 2
+                if too_fast:
+                    flies[place] = False
+                    continue
                 first = _first_below(way, *flying.centre_of_mass)
                 touched[k] = first <= length and bool(np.isfinite(way[first]).all())
                 if touched[k] or (first > length and done == steps):

@@ -21,6 +21,7 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import write_text
 from discsim.law import Law
+from discsim.limits import ANY_NUMBER
 from discsim.recording import disc_toml, environment_toml, rig_toml, toml_lines
 from discsim.toml_table import TomlTable, read_toml
 
@@ -102,13 +103,15 @@ def _read_effect(table: TomlTable, own: Sequence[UserEffect]) -> ModelEffect:
         raise table.error("id", str(error)) from None
     known = kind.parameters
     sizes, sigmas = table.table("parameters", required=bool(known)), table.table("sigma")
-    size = {} if sizes is None else {name: sizes.number(name, required=False) for name in known}
+    size = {}
+    if sizes is not None:
+        size = {name: sizes.number(name, required=False, positive=name in kind.positive) for name in known}
     if sizes is not None:
         sizes.finish()
     setting = _read_setting(table, kind)
     sigma: dict[str, float | None] = {}
     if sigmas is not None:
-        sigma = {name: sigmas.number(name, required=False, minimum=0.0) for name in known}
+        sigma = {name: sigmas.number(name, required=False, minimum=0.0, limit=ANY_NUMBER) for name in known}
         sigmas.finish()
     table.finish()
     given = {name: value for name, value in size.items() if value is not None}
@@ -148,7 +151,7 @@ def _read_law(table: TomlTable) -> Law:
 
 def _numbers(table: TomlTable | None) -> dict[str, float]:
     """Return all of a table's numbers, whatever they are called."""
-    return {} if table is None else {name: table.need(name) for name in table}
+    return {} if table is None else {name: table.number(name, limit=ANY_NUMBER) or 0.0 for name in table}
 
 
 def write_model(model: Model, path: Path) -> None:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from discsim.arrays import FloatArray, readonly, vector3
 from discsim.environment import Environment
 from discsim.frames import conjugate, euler_angles, multiply, rotation_vector, to_body, turn
+from discsim.splines import hermite, spline_slopes
 
 __all__ = ["Motion", "State"]
 
@@ -95,28 +94,12 @@ class Motion:
         return euler_angles(self.attitude)
 
     @cached_property
-    def _position(self) -> Callable[[FloatArray], FloatArray]:
-        return self._hermite(self.position, self.velocity)
+    def _jerk(self) -> FloatArray:
+        return spline_slopes(self.t, self.acceleration)
 
     @cached_property
-    def _velocity(self) -> Callable[[FloatArray], FloatArray]:
-        return self._hermite(self.velocity, self.acceleration)
-
-    @cached_property
-    def _acceleration(self) -> Callable[[FloatArray], FloatArray]:
-        return CubicSpline(self.t, self.acceleration) if self.acceleration.any() else _zero
-
-    def _hermite(self, value: FloatArray, slope: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        # a rig stays where it is; splines of nothing would take more memory than all the rest of a long run
-        return CubicHermiteSpline(self.t, value, slope) if value.any() or slope.any() else _zero
-
-    @cached_property
-    def _rate(self) -> CubicHermiteSpline:
-        return CubicHermiteSpline(self.t, self.rate, self.angular_acceleration)
-
-    @cached_property
-    def _angular_acceleration(self) -> CubicSpline:
-        return CubicSpline(self.t, self.angular_acceleration)
+    def _angular_jerk(self) -> FloatArray:
+        return spline_slopes(self.t, self.angular_acceleration)
 
     def at(self, t: FloatArray) -> State:
         """Return the motion at instants t (m,) s between start and end.
@@ -127,14 +110,17 @@ class Motion:
         t = np.asarray(t, dtype=float)
         if t.size and (t.min() < self.start - 1e-12 or t.max() > self.end + 1e-12):
             raise ValueError(f"motion runs from {self.start:g} to {self.end:g} s, asked for {t.min():g} to {t.max():g}")
+        # a rig stays where it is: nothing is interpolated of it
+        moves = any(values.any() for values in (self.position, self.velocity, self.acceleration))
+        still = np.zeros((t.size, 3))
         return State(
             t,
-            self._position(t),
-            self._velocity(t),
-            self._acceleration(t),
+            hermite(self.t, self.position, self.velocity, t) if moves else still,
+            hermite(self.t, self.velocity, self.acceleration, t) if moves else still,
+            hermite(self.t, self.acceleration, self._jerk, t) if moves else still,
             self._attitude(t),
-            self._rate(t),
-            self._angular_acceleration(t),
+            hermite(self.t, self.rate, self.angular_acceleration, t),
+            hermite(self.t, self.angular_acceleration, self._angular_jerk, t),
         )
 
     def _attitude(self, t: FloatArray) -> FloatArray:
@@ -147,10 +133,6 @@ class Motion:
         slope0, slope1 = h * self.rate[k], h * _right_jacobian_inverse(whole, self.rate[k + 1])
         vector = s * (1 - s) ** 2 * slope0 + s**2 * (3 - 2 * s) * whole - s**2 * (1 - s) * slope1
         return multiply(first, turn(vector))
-
-
-def _zero(t: FloatArray) -> FloatArray:
-    return np.zeros((t.size, 3))
 
 
 def _right_jacobian_inverse(phi: FloatArray, w: FloatArray) -> FloatArray:

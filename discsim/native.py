@@ -248,8 +248,10 @@ def _structure(name: str, described: Mapping[str, Any]) -> Any:
 
 def _works(callback: NativeCallback) -> bool:
     """Call it on two sets of data of a small model: it must find the time and the arrays that MuJoCo shows."""
+    # without springs and dampers MuJoCo compiles it whatever callback is installed, see `callbacks.compile_model`
     model = mujoco.MjModel.from_xml_string(
-        "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
+        "<mujoco><option><flag spring='disable' damper='disable'/></option>"
+        "<worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
     )
     seen: list[tuple[float, int, int, int]] = []
     kind = ctypes.CFUNCTYPE(

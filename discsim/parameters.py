@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from discsim.arrays import FloatArray
 from discsim.disc import Aero, Disc, Rig
@@ -154,6 +153,8 @@ def tables(disc: Disc | None, law: Law | Sequence[Law] | None = None, effects: S
     static = _angle_tables(disc)
     rate, speed, spline = np.empty(0), np.empty(0), np.empty((0, 0, 4, 4))
     if disc is not None and (damping := disc.yaw_damping_table) is not None:
+        from scipy.interpolate import CubicSpline  # loads in a third of a second, and few discs have this table
+
         rate, speed = np.array(damping.rate), np.array(damping.speed)
         along_rate = CubicSpline(rate, damping.CNr, axis=0).c  # (4, nr - 1, nv)
         along_both = CubicSpline(speed, along_rate, axis=2).c  # (4, nv - 1, 4, nr - 1)

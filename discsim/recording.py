@@ -28,6 +28,7 @@ from discsim.disc import Aero, Disc, Release, Rig, aero_key
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import read_text, write_text
+from discsim.limits import MOST_ROWS, reading_fault, time_fault
 from discsim.toml_table import TomlTable, read_toml
 
 __all__ = [
@@ -331,6 +332,8 @@ def read_csv(path: Path, header: str, *, gaps_allowed: bool = True) -> Samples:
     body = body.rstrip("\n \t")
     if not body:
         raise InputError.at(path, 2, "no samples; expected at least one row (or leave the file out)")
+    if (rows := body.count("\n") + 1) > MOST_ROWS:
+        raise InputError.at(path, 2 + MOST_ROWS, f"{rows} rows; expected at most {MOST_ROWS}: cut it into recordings")
     width = header.count(",") + 1
     tables: list[FloatArray] = []
     line, previous = 2, -np.inf
@@ -344,7 +347,20 @@ def read_csv(path: Path, header: str, *, gaps_allowed: bool = True) -> Samples:
         tables.append(table)
         line, previous = line + len(table), float(table[-1, 0])
     table = np.concatenate(tables)
-    return Samples(table[:, 0], table[:, 1] if width == 2 else table[:, 1:])
+    samples = Samples(table[:, 0], table[:, 1] if width == 2 else table[:, 1:])
+    if found := _beyond(samples, header):
+        row, message = found
+        raise InputError.at(path, 2 + row, message)
+    return samples
+
+
+def _beyond(samples: Samples, header: str) -> tuple[int, str] | None:
+    """Return the row (from 0) at which samples leave the limits (`discsim.limits`), and what is wrong there."""
+    found = time_fault(samples.t)
+    if found is None and (wild := reading_fault(samples.value.reshape(len(samples), -1))):
+        row, column, message = wild
+        found = row, f"{header.split(',')[1 + column]} {message}"
+    return found
 
 
 def _blocks(body: str) -> Iterator[str]:
@@ -460,14 +476,22 @@ def _texts(recording: Recording) -> dict[str, str]:
     for sensor, samples in recording.samples.items():
         if len(samples) == 0:
             raise InputError(f"{recording.name}: {sensor} has no samples; expected some, or the sensor left out")
-        texts[f"{sensor}.csv"] = _csv(samples, SENSORS[sensor].header)
+        texts[f"{sensor}.csv"] = _within(recording, sensor, samples, SENSORS[sensor].header)
     if not recording.samples:
         raise InputError(f"{recording.name}: no sensor has samples; expected at least one of {', '.join(SENSORS)}")
     if recording.command is not None:
         if len(recording.command) == 0 or recording.command.gaps:
             raise InputError(f"{recording.name}: the command has no knots or a gap; expected numbers throughout")
-        texts["command.csv"] = _csv(recording.command, COMMAND_HEADER)
+        texts["command.csv"] = _within(recording, "command", recording.command, COMMAND_HEADER)
     return texts
+
+
+def _within(recording: Recording, name: str, samples: Samples, header: str) -> str:
+    """Return a sensor's CSV; raises `InputError` where the reader would refuse it."""
+    if found := _beyond(samples, header):
+        row, message = found
+        raise InputError(f"{recording.name}: {name}, row {row}: {message}")
+    return _csv(samples, header)
 
 
 def _csv(samples: Samples, header: str) -> str:

@@ -26,12 +26,13 @@ from discsim.errors import InputError
 from discsim.files import model_file, read_text
 from discsim.frames import flip_yz, multiply, turn
 from discsim.law import Law, law_wrench
+from discsim.limits import FASTEST_SPIN, LONGEST_RUN
 from discsim.motion import Motion
 from discsim.own_wrench import own_wrench
 from discsim.parameters import PARAMETERS, Tables, parameters, tables
 from discsim.recording import COMMAND_HEADER, Samples, read_csv
 
-__all__ = ["default_profile", "read_profile", "spin_down", "turn_table"]
+__all__ = ["default_profile", "profile_fault", "read_profile", "spin_down", "turn_table"]
 
 #: plateaus of the default profile, deg/s
 PLATEAUS_DEG_S = (0, 300, 600, 1000, 1500, 2000, 2500, 3000, 3500, 4000, 4500, 5000)
@@ -55,11 +56,26 @@ def read_profile(path: Path) -> Samples:
     """Read a profile: a CSV file with columns ``time_s,rate_rad_s`` or ``time_s,rate_deg_s``, one row per knot."""
     degrees = read_text(path).partition("\n")[0] == "time_s,rate_deg_s"
     knots = read_csv(path, "time_s,rate_deg_s" if degrees else COMMAND_HEADER, gaps_allowed=False)
+    knots = Samples(knots.t, np.radians(knots.value)) if degrees else knots
     if len(knots) < 2:
         raise InputError.at(path, 2, "one knot only; expected at least two")
     if knots.t[0] != 0.0:
         raise InputError.at(path, 2, f"first knot at {knots.t[0]:g} s, expected 0 s (the start of the recording)")
-    return Samples(knots.t, np.radians(knots.value)) if degrees else knots
+    if found := profile_fault(knots):
+        knot, message = found
+        raise InputError.at(path, 2 + knot, message)
+    return knots
+
+
+def profile_fault(knots: Samples) -> tuple[int, str] | None:
+    """Return the knot (from 0) at which a profile leaves the limits (`discsim.limits`), and what is wrong there."""
+    if knots.t[-1] > LONGEST_RUN:
+        return len(knots) - 1, f"the profile ends at {knots.t[-1]:.6g} s, expected at most {LONGEST_RUN:g} s"
+    fast = np.abs(knots.value) > FASTEST_SPIN
+    if np.any(fast):
+        knot = int(np.argmax(fast))
+        return knot, f"the rate is {knots.value[knot]:.6g} rad/s, expected at most {FASTEST_SPIN:g} rad/s in size"
+    return None
 
 
 @compiled

@@ -7,6 +7,7 @@ their frame there (``velocity_ned_m_s`` has ``velocity_sigma_m_s``).
 from __future__ import annotations
 
 import difflib
+import math
 import re
 import sys
 import tomllib
@@ -17,11 +18,14 @@ from typing import Any
 from discsim.arrays import FloatArray, readonly
 from discsim.errors import InputError
 from discsim.files import read_text
+from discsim.limits import ANY_NUMBER, Limit, limit_of
 
 __all__ = ["TomlTable", "read_toml"]
 
 # a table's name, not a row of a matrix that is written over several lines
 _HEADER = re.compile(r"""^\s*\[+\s*(["'A-Za-z_][\w\-.\s"']*?)\s*\]+\s*(?:#.*)?$""")
+#: a key or a value without blanks that no line of an error should hold whole
+_LONG_WORD = re.compile(r"\S{120,}")
 _KEY = re.compile(r"""^\s*(["']?)([A-Za-z0-9_\-.]+)\1\s*=""")
 
 
@@ -41,8 +45,34 @@ def _line_index(text: str) -> dict[str, int]:
 
 
 def _shown(value: Any) -> str:
-    text = str(value).lower() if isinstance(value, bool) else repr(value)
+    return _cut(str(value).lower() if isinstance(value, bool) else repr(value))
+
+
+def _cut(text: str) -> str:
     return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+#: TOML's integers have 64 bits
+_WHOLE = 2**63
+#: integers of fewer digits are always printed, Python's limit being no lower
+_PRINTED = sys.int_info.str_digits_check_threshold
+
+
+def _too_long(content: Mapping[str, Any]) -> tuple[str, int] | None:
+    """Return the place (``table.key``) of an integer beyond TOML's 64 bits, and the integer; None where none is.
+
+    Such an integer is no float either where it has hundreds of digits, and no text where it has thousands.
+    """
+    left: list[tuple[str, Any]] = [("", content)]
+    while left:
+        place, value = left.pop()
+        if isinstance(value, dict):
+            left += [(f"{place}.{key}".lstrip("."), item) for key, item in value.items()]
+        elif isinstance(value, list):
+            left += [(place, item) for item in value]
+        elif isinstance(value, int) and not -_WHOLE <= value < _WHOLE:
+            return place, value
+    return None
 
 
 def read_toml(path: Path) -> TomlTable:
@@ -59,7 +89,14 @@ def read_toml(path: Path) -> TomlTable:
             int(line.group(1)) if line else (text.count("\n") + 1 if "end of document" in str(error) else None),
             f"no valid TOML: {error}; expected lines of `key = value`, each key once",
         ) from None
-    return TomlTable(content, path, "", _line_index(text))
+    table = TomlTable(content, path, "", _line_index(text))
+    if found := _too_long(content):
+        place, value = found
+        digits = int(value.bit_length() * math.log10(2.0)) + 1
+        shown = _cut(repr(value)) if digits < _PRINTED else f"an integer of {digits} digits"
+        message = f"'{place}' is {shown}, expected a finite number (an integer of at most 64 bits, or 1e20)"
+        raise table.error(place, message)
+    return table
 
 
 class TomlTable:
@@ -82,12 +119,15 @@ class TomlTable:
     def _full(self, key: str) -> str:
         return f"{self.name}.{key}" if self.name else key
 
+    def _named(self, key: str) -> str:
+        return _cut(self._full(key))
+
     def error(self, key: str | None, message: str) -> InputError:
         """Return an error at ``key``'s line, or its table's, or that of the table around it."""
         place = self._full(key) if key else self.name
         while place and place not in self._lines:
             place = place.rpartition(".")[0]
-        return InputError.at(self.path, self._lines.get(place), message)
+        return InputError.at(self.path, self._lines.get(place), _LONG_WORD.sub(lambda word: _cut(word[0]), message))
 
     def __contains__(self, key: str) -> bool:
         return key in self._left
@@ -155,13 +195,19 @@ class TomlTable:
             raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected an array of tables [[{key}]]")
         return [TomlTable(item, self.path, self._full(key), self._lines) for item in value]
 
-    def _check(self, key: str, value: Any, positive: bool, minimum: float | None) -> float:
+    def _check(self, key: str, value: Any, positive: bool, minimum: float | None, limit: Limit | None = None) -> float:
+        expected = ""
         if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= sys.float_info.max:
-            raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected a finite number")
-        if positive and value <= 0:
-            raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected a number above zero")
-        if minimum is not None and value < minimum:
-            raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected at least {minimum:g}")
+            expected = "expected a finite number"
+        elif positive and value <= 0:
+            expected = "expected a number above zero"
+        elif minimum is not None and value < minimum:
+            expected = f"expected at least {minimum:g}"
+        else:
+            # what may not be negative is a size, and divides others
+            expected = (limit or limit_of(key)).fault(value, divides=positive or minimum == 0.0)
+        if expected:
+            raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, {expected}")
         return float(value)
 
     def number(
@@ -172,12 +218,13 @@ class TomlTable:
         required: bool = True,
         positive: bool = False,
         minimum: float | None = None,
+        limit: Limit | None = None,
     ) -> float | None:
-        """Take ``stem_unit`` and, if present, its uncertainty ``stem_sigma_unit``."""
+        """Take ``stem_unit`` and, if present, its uncertainty ``stem_sigma_unit``; ``limit`` takes the key's place."""
         key = f"{stem}_{unit}" if unit else stem
         value = self._take(key, "a number", required)
         self._take_sigma(stem, unit, key, present=value is not None, length=None)
-        return None if value is None else self._check(key, value, positive, minimum)
+        return None if value is None else self._check(key, value, positive, minimum, limit)
 
     def need(self, stem: str, unit: str = "", *, positive: bool = False, minimum: float | None = None) -> float:
         """Like `number`, for a key that must be there."""
@@ -235,9 +282,9 @@ class TomlTable:
                 f"'{self._full(sigma_key)}' is the uncertainty of '{key}', which is missing; expected both or neither",
             )
         if isinstance(value, list) and length is not None and len(value) == length:
-            self.sigma[key] = readonly([self._check(sigma_key, item, False, 0.0) for item in value])
+            self.sigma[key] = readonly([self._check(sigma_key, item, False, 0.0, ANY_NUMBER) for item in value])
         else:
-            self.sigma[key] = self._check(sigma_key, value, False, 0.0)
+            self.sigma[key] = self._check(sigma_key, value, False, 0.0, ANY_NUMBER)
 
     def finish(self) -> None:
         """Raise `InputError` for the first key that was not taken, with the nearest known one."""

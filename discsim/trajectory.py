@@ -36,6 +36,7 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.frames import euler_angles, heading_angles, norm3, quaternion_from_matrix, rotate_by_quaternion
 from discsim.law import Law, law_wrench
+from discsim.limits import FASTEST_SPIN
 from discsim.motion import Motion, State
 from discsim.own_wrench import own_wrench
 from discsim.parameters import PARAMETERS, Tables, flight_parameters, tables
@@ -646,13 +647,16 @@ def predict(
     """Fly a disc by the standalone model, until its centre of mass reaches the ground or for ``duration`` s.
 
     rtol is of the size of velocity, attitude and rates, atol in SI units: estimated errors of one step. Raises
-    `InputError` for a release that lacks something, and where a C_Nr table does not reach.
+    `InputError` for a release that lacks something, where a C_Nr table does not reach, and above `FASTEST_SPIN`.
     """
     flat, lookup = flight_parameters(disc, environment, effects), tables(disc, law, effects)
     state = release_state(release)
     ended, t, states, dense = integrate(flat, lookup, state, 0.0, float(duration), rtol, atol, True)
     if ended == _LOST:
         raise _lost(flat, lookup, float(t[-1]), states[-1])
+    fastest = float(np.sqrt(np.max(np.sum(states[:, 10:13] ** 2, axis=1))))
+    if fastest > FASTEST_SPIN:  # its nutation needs steps as short as those that are taken whatever their error
+        raise InputError(f"the disc turns at {fastest:.4g} rad/s; expected at most {FASTEST_SPIN:g} rad/s")
     return Flight(t, states, dense, flat, lookup, environment, ended == _TOUCHED)
 
 

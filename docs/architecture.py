@@ -90,8 +90,8 @@ def draw(edges: Mapping[str, set[str]]) -> None:
         for k, room in enumerate(own):
             order[room] = (k + 1) / (len(own) + 1)
             place[room] = (order[room], float(floor))
-    for room, others in edges.items():
-        for other in others:
+    for room in sorted(edges):
+        for other in sorted(edges[room]):
             (x0, y0), (x1, y1) = place[room], place[other]
             axes.plot([x0, x1], [y0 - 0.16, y1 + 0.16], color="0.7", lw=0.6, zorder=1)
     colours = {"discsim": "#cfe3f5", "estimators": "#d9efd2", "validation": "#f7e3c4"}

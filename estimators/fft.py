@@ -139,20 +139,45 @@ def fft(
         If the recording is shorter than one window, or the threshold is not below half the sampling rate.
     """
     settings = settings or FftSettings()
-    n, total = settings.window, settings.window + settings.pad
-    t = magnetometer.t
+    _refuse(magnetometer, settings)
+    n, t = settings.window, magnetometer.t
+    starts = np.arange(0, t.size - n + 1, settings.step)
+    rate, sd, amplitude, axial = _by_window(magnetometer, starts, settings)
+    centre = (t[starts] + t[starts + n - 1]) / 2
+    half = (n - 1) * magnetometer.interval / 2
+    sd = np.hypot(sd, _uneven_acceleration(centre, rate, sd, half))
+    precession = np.where(np.isnan(rate), np.nan, 0.0)
+    if not fixed_axis:
+        some = slice(None, None, max(1, round(n / 25 / settings.step), starts.size // AXIAL_WINDOWS))
+        iron = axial_field(amplitude[some], axial[some], strength)  # windows as far apart as those of `likelihood`
+        precession = _precession(amplitude, axial, iron, strength) * settings.precession_sd
+    when = centre if settings.stamp == "centre" else t[starts + n - 1]
+    return YawRate("fft", when, rate, np.hypot(sd, precession), precession_sd=precession)
+
+
+def _refuse(magnetometer: Samples, settings: FftSettings) -> None:
+    """Refuse a recording that is shorter than a window, or sampled too slowly for the threshold."""
+    n, interval, t = settings.window, magnetometer.interval, magnetometer.t
     if t.size < n:
-        interval = magnetometer.interval
         have = f"{t.size} samples" + (f" ({t.size * interval:.2f} s)" if t.size > 1 else "")
         want = f"{n} samples" + (f" ({n * interval:.2f} s)" if t.size > 1 else "")
         raise InputError(f"fft: the magnetometer has {have}; a window needs {want}")
-    nyquist = np.pi / magnetometer.interval
+    nyquist = np.pi / interval
     if settings.threshold >= nyquist:
         raise InputError(
             f"fft threshold: {np.degrees(settings.threshold):.0f} deg/s is not below half the magnetometer's sampling "
             f"rate ({np.degrees(nyquist):.0f} deg/s)"
         )
-    starts = np.arange(0, t.size - n + 1, settings.step)
+
+
+def _by_window(
+    magnetometer: Samples, starts: IndexArray, settings: FftSettings
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return each window's rate and its sd, rad/s, the line's amplitude and the mean of z, uT: (w,) each.
+
+    NaN where a window says nothing.
+    """
+    n, t = settings.window, magnetometer.t
     rate, sd, amplitude, axial = (np.full(starts.size, np.nan) for _ in range(4))
     along_axis = sliding_window_view(magnetometer.value[:, 2], n)
     stamps, field = sliding_window_view(t, n), np.ascontiguousarray(magnetometer.value[:, :2])
@@ -171,23 +196,14 @@ def fft(
         peak, line, known = (np.concatenate(parts) for parts in zip(*found, strict=True))
         if not known.any():
             continue
-        omega = 2 * np.pi * peak[known] / total  # (PE2), rad per sample
+        omega = 2 * np.pi * peak[known] / (n + settings.pad)  # (PE2), rad per sample
         spread, size, certain = _uncertainty(still[known], mean[known], line[known], omega, settings)
         slots = (first + np.flatnonzero(usable))[known]
         rate[slots] = np.where(certain, omega / spacing[known], np.nan)
         sd[slots] = np.where(certain, spread / spacing[known], np.nan)
         amplitude[slots] = np.where(certain, size, np.nan)
         axial[slots] = _mean_known(along_axis[starts[slots]])
-    centre = (t[starts] + t[starts + n - 1]) / 2
-    half = (n - 1) * magnetometer.interval / 2
-    sd = np.hypot(sd, _uneven_acceleration(centre, rate, sd, half))
-    precession = np.where(np.isnan(rate), np.nan, 0.0)
-    if not fixed_axis:
-        some = slice(None, None, max(1, round(n / 25 / settings.step), starts.size // AXIAL_WINDOWS))
-        iron = axial_field(amplitude[some], axial[some], strength)  # windows as far apart as those of `likelihood`
-        precession = _precession(amplitude, axial, iron, strength) * settings.precession_sd
-    when = centre if settings.stamp == "centre" else t[starts + n - 1]
-    return YawRate("fft", when, rate, np.hypot(sd, precession), precession_sd=precession)
+    return rate, sd, amplitude, axial
 
 
 def _evenly_spaced(t: FloatArray, interval: FloatArray) -> BoolArray:

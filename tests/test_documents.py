@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from pathlib import Path
 
 import pytest
+import yaml
 
 from discsim.disc import Aero, aero_key
 from discsim.recording import COMMAND_HEADER, PLANTS, SENSORS, read_recording, sigma_key
+from validation.commands.validate import command as validate
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -65,3 +68,18 @@ def test_the_format_pages_uncertainties_are_the_programs():
     assert len(rows) > 5
     for key, sigma in rows:
         assert sigma_key(key) == sigma
+
+
+def test_the_pipelines_of_the_ci_page_are_yaml_and_use_options_that_there_are():
+    page = (ROOT / "docs" / "headless-ci.md").read_text(encoding="utf-8")
+    pipelines = re.findall(r"^```yaml\n(.*?)^```", page, re.M | re.S)
+    assert len(pipelines) == 2
+    assert all("validate" in yaml.safe_load(text).get("jobs", yaml.safe_load(text)) for text in pipelines)
+    options = {
+        f"--{name.replace('_', '-')}" for name in inspect.signature(validate).parameters
+    }  # what typer makes of a parameter's name
+    used = set(
+        re.findall(r"(--[a-z-]+)", "".join(re.findall(r"discsim validate.*?(?=\n\s*- |\n```|\n\n)", page, re.S)))
+    )
+    assert used >= {"--quick", "--limits", "--against", "--junit", "--summary"}
+    assert used <= options

@@ -13,7 +13,7 @@ import traceback
 import typer
 
 from discsim.errors import InputError
-from validation.reporting.run import package_version
+from validation.commands import register
 
 __all__ = ["app", "main"]
 
@@ -30,6 +30,8 @@ app = typer.Typer(
 
 def _version(show: bool) -> None:
     if show:
+        from validation.reporting.run import package_version
+
         typer.echo(f"discsim {package_version()}")
         raise typer.Exit
 
@@ -41,12 +43,6 @@ def _common(
     """Physics validation testbed for a flying disc."""
 
 
-def _register() -> None:
-    from validation import commands
-
-    commands.register(app)
-
-
 def main() -> None:
     """Run the command line."""
     arguments = sys.argv[1:]
@@ -54,7 +50,9 @@ def main() -> None:
     sys.argv[1:] = [argument for argument in arguments if argument != "--debug"]
     os.environ.setdefault("MPLBACKEND", "Agg")
     try:
-        _register()
+        # the options that stand before a command take no value, so the first other word is its name
+        app.registered_commands.clear()
+        register(app, next((argument for argument in sys.argv[1:] if not argument.startswith("-")), None))
         status = app(standalone_mode=False)
     except (InputError, typer.TyperException) as error:
         if debug:

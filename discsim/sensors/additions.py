@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect
@@ -58,6 +57,8 @@ def _symbols(readings: FloatArray, t: FloatArray, motion: Motion) -> dict[str, F
     u, v, w = state.in_body(state.velocity - motion.environment.wind).T
     beta = np.arctan2(v, u)
     P, Q, r = state.rate.T
+    from scipy.interpolate import CubicHermiteSpline  # loads in a third of a second, and few sensors have a law
+
     spin = CubicHermiteSpline(motion.t, motion.rate[:, 2], motion.angular_acceleration[:, 2])
     read = {name: readings[:, k] for k, name in enumerate("xyz") if k < readings.shape[1]}
     return {

@@ -13,6 +13,7 @@ from discsim.compiled import compiled
 from discsim.effects.sensors import ClockRate, DroppedSamples, Lag, lag, true_time
 from discsim.effects.setup import TimeOffset
 from discsim.errors import InputError
+from discsim.limits import MOST_ROWS
 from discsim.motion import Motion
 from discsim.recording import SensorSheet
 
@@ -60,7 +61,13 @@ class Sampling:
         ``start`` is time zero of the recording.
         """
         late = self.offset.offset_s - self.phase_s
-        count = int(np.floor(((stop - start) * self.clock.ratio + late) * self.rate_hz + 1e-9)) + 1
+        rows = ((stop - start) * self.clock.ratio + late) * self.rate_hz
+        if not rows < MOST_ROWS:
+            raise InputError(
+                f"sampling {stop - start:g} s at {self.rate_hz:g} Hz (clock rate {self.clock.ratio:g}) gives "
+                f"{rows:.3g} rows; expected at most {MOST_ROWS}"
+            )
+        count = int(np.floor(max(rows, -1.0) + 1e-9)) + 1
         nominal = self.phase_s + np.arange(max(count, 0)) / self.rate_hz
         if self.offset.offset_s > 0.0:
             nominal = nominal[nominal >= self.offset.offset_s - 1e-9 / self.rate_hz]

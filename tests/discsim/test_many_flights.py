@@ -41,7 +41,8 @@ def test_they_end_as_flown_one_by_one_to_the_last_bit(alone, threads):
 def test_the_ground_is_found_whatever_the_length_of_a_round(alone, monkeypatch):
     """A flight may land in the first step of a round, or in its last."""
     for length in (1, 7, 10**6):
-        monkeypatch.setattr(many_flights, "ROUND", length * len(THROWS))
+        monkeypatch.setattr(many_flights, "ROUND", length * 2)
+        monkeypatch.setattr(many_flights, "LONGEST", length)
         assert_same(fly_many(DRIVER, FIELD, THROWS[:2], threads=2), alone[:2])
 
 

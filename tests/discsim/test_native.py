@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import dataclasses
 from _ctypes import CFuncPtr
 from concurrent.futures import ThreadPoolExecutor
@@ -170,6 +171,24 @@ class TestWhichCallback:
             mujoco.set_mjcb_passive(None)
         assert seen == [flying.model]
 
+    def test_a_foreign_callback_in_c_is_forgotten_after_the_last_block(self):
+        """Who then puts back what they found in a block, ours, must not have theirs called."""
+        seen = []
+        foreign = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(lambda model, data: seen.append(model))
+        flying = FlyingDisc(DRIVER, FIELD)
+        mujoco.set_mjcb_passive(foreign)
+        try:
+            with FlyingDisc(DRIVER, FIELD).air():
+                ours = in_slot()
+                assert isinstance(ours, CFuncPtr)
+                mujoco.mj_forward(flying.model, flying.data)
+            assert seen == [flying.model._address]
+            mujoco.set_mjcb_passive(ours)
+            mujoco.mj_forward(flying.model, flying.data)
+        finally:
+            mujoco.set_mjcb_passive(None)
+        assert len(seen) == 1
+
     def test_flights_in_threads_of_both_kinds_are_those_flown_alone(self):
         alone = fly(DRIVER, FIELD, throw(), duration=0.5)
         with ThreadPoolExecutor(4) as pool:
@@ -186,6 +205,13 @@ class TestWhereItCannotBe:
             wrong = list(offsets)
             wrong[field] += 8
             assert not native._works(NativeCallback(wrong))
+
+    def test_it_is_found_inside_a_block_in_python_too(self):
+        """Looking for it compiles a model, which under a callback in Python MuJoCo does only of one without springs."""
+        native_callback.cache_clear()
+        other = FlyingDisc(DRIVER, FIELD)
+        with passive_force(other.model, lambda model, data: None):
+            assert native_callback() is not None
 
     def test_without_it_flights_are_the_same(self, monkeypatch):
         with_it = fly(DRIVER, FIELD, throw(), duration=0.3)

@@ -14,9 +14,10 @@ from hypothesis.extra import numpy as npst
 from recording_folder import AERO_TABLE, CNR_TABLE, CSV, RATE_TABLE, SPIN_DOWN, TOML, line_of, make, refusal
 
 from discsim import recording as module
-from discsim.disc import Aero, AeroTable, Disc, Release, Rig, RollingTable, YawDampingTable
+from discsim.disc import Aero, AeroTable, Disc, Release, Rig, RollingTable, YawDampingTable, aero_key
 from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.limits import LARGEST_READING, limit_of
 from discsim.recording import (
     FORMAT,
     SENSORS,
@@ -341,16 +342,35 @@ def test_a_recording_has_known_sensors_with_sheets_and_the_right_width():
 
 # ------------------------------------------------------------------------------------------ round trip
 
-reals = st.floats(allow_nan=False, allow_infinity=False)
-positives = st.floats(1e-9, 1e9)
-vectors = npst.arrays(np.float64, 3, elements=reals)
-sigma_values = st.one_of(st.floats(0, 1e6), npst.arrays(np.float64, 3, elements=st.floats(0, 1e6)))
+
+def reals(key: str) -> st.SearchStrategy[float]:
+    """Return numbers that a key may have, however small."""
+    largest = limit_of(key).largest
+    return st.floats(-largest, largest)
+
+
+def positives(key: str) -> st.SearchStrategy[float]:
+    return st.floats(limit_of(key).smallest, limit_of(key).largest)
+
+
+def sizes(key: str) -> st.SearchStrategy[float]:
+    return st.just(0.0) | positives(key)
+
+
+def vectors(key: str) -> st.SearchStrategy[np.ndarray]:
+    return npst.arrays(np.float64, 3, elements=reals(key))
+
+
+sigma_values = st.one_of(sizes("any"), npst.arrays(np.float64, 3, elements=sizes("any")))
 
 
 @st.composite
 def samples_of(draw: st.DrawFn, width: int, gaps: bool = True) -> Samples:
-    t = np.sort(draw(npst.arrays(np.float64, st.integers(1, 6), elements=reals, unique=True)))
-    elements = st.floats(allow_infinity=False, allow_nan=gaps)
+    """Return up to six rows at times within the limits: a hundredth of a second apart or more, and to the last bit."""
+    steps = draw(npst.arrays(np.float64, st.integers(1, 6), elements=st.floats(0.01, 100.0)))
+    t = draw(st.floats(-1e5, 1e5)) + np.cumsum(steps)
+    readings = st.floats(-LARGEST_READING, LARGEST_READING)
+    elements = readings | st.just(float("nan")) if gaps else readings
     return Samples(t, draw(npst.arrays(np.float64, t.shape if width == 1 else (t.size, width), elements=elements)))
 
 
@@ -358,26 +378,26 @@ def samples_of(draw: st.DrawFn, width: int, gaps: bool = True) -> Samples:
 def maybe_sigma(draw: st.DrawFn, keys: dict[str, bool]) -> dict[str, object]:
     """Return uncertainties of some of ``keys`` (key -> whether it is a vector)."""
     chosen = draw(st.lists(st.sampled_from(sorted(keys)), unique=True)) if keys else []
-    return {key: draw(sigma_values if keys[key] else st.floats(0, 1e6)) for key in chosen}
+    return {key: draw(sigma_values if keys[key] else sizes("any")) for key in chosen}
 
 
 @st.composite
 def discs(draw: st.DrawFn) -> Disc:
-    Ixx = draw(positives)
-    aero = Aero(*(draw(reals) for _ in Aero._fields))
+    Ixx = draw(st.floats(1e-11, 1e3))
+    aero = Aero(*(draw(reals(aero_key(name))) for name in Aero._fields))
     table = None
     if draw(st.booleans()):
-        alpha = np.sort(draw(npst.arrays(np.float64, st.integers(2, 5), elements=reals, unique=True)))
-        table = AeroTable(alpha, *(draw(npst.arrays(np.float64, alpha.size, elements=reals)) for _ in range(3)))
+        alpha = np.sort(draw(npst.arrays(np.float64, st.integers(2, 5), elements=reals("alpha_rad"), unique=True)))
+        table = AeroTable(alpha, *(draw(npst.arrays(np.float64, alpha.size, elements=reals("CL"))) for _ in range(3)))
     damping = None
     if draw(st.booleans()):
         rate = np.radians(4500.0 + 50.0 * np.arange(draw(st.integers(4, 51))))
         speed = 6.0 + 0.5 * np.arange(5)
-        damping = YawDampingTable(rate, speed, draw(npst.arrays(np.float64, (rate.size, 5), elements=reals)))
+        damping = YawDampingTable(rate, speed, draw(npst.arrays(np.float64, (rate.size, 5), elements=reals("CNr"))))
     keys = dict.fromkeys(("mass_kg", "diameter_m", "Ixx_kg_m2", "Izz_kg_m2", "CL0", "alpha0_rad", "CNr"), False)
     return Disc(
-        draw(positives),
-        draw(positives),
+        draw(positives("mass_kg")),
+        draw(positives("diameter_m")),
         Ixx,
         Ixx * draw(st.floats(0.1, 2.0)),
         aero,
@@ -390,10 +410,10 @@ def discs(draw: st.DrawFn) -> Disc:
 
 @st.composite
 def rolling_tables(draw: st.DrawFn) -> RollingTable:
-    alpha = np.sort(draw(npst.arrays(np.float64, st.integers(2, 5), elements=reals, unique=True)))
+    alpha = np.sort(draw(npst.arrays(np.float64, st.integers(2, 5), elements=reals("alpha_rad"), unique=True)))
     ratio = np.cumsum(draw(npst.arrays(np.float64, st.integers(1, 4), elements=st.floats(0.01, 1.0))))
-    CR = draw(st.none() | npst.arrays(np.float64, (alpha.size, ratio.size), elements=reals))
-    columns = npst.arrays(np.float64, alpha.size, elements=reals)
+    CR = draw(st.none() | npst.arrays(np.float64, (alpha.size, ratio.size), elements=reals("CR")))
+    columns = npst.arrays(np.float64, alpha.size, elements=reals("CRp"))
     CRp = draw(columns if CR is None else st.none() | columns)
     return RollingTable(alpha, None if CR is None else ratio, CR, CRp)
 
@@ -405,24 +425,25 @@ def recordings(draw: st.DrawFn) -> Recording:
     maybe = lambda strategy: draw(st.one_of(st.none(), strategy))  # noqa: E731
     sheets = {}
     for sensor in sensors:
-        gps = sensor == "gps"
+        gps, unit = sensor == "gps", SENSORS[sensor].unit or "m"
         sheets[sensor] = SensorSheet(
-            draw(positives),
-            maybe(st.floats(0, 1e6)),
-            None if gps else maybe(st.floats(0, 1e6)),
-            None if gps else maybe(positives),
-            maybe(st.floats(0, 1e6)) if gps else None,
-            draw(vectors) if sensor == "accelerometer" else None,
+            draw(positives("rate_hz")),
+            maybe(sizes(f"noise_rms_{unit}")),
+            None if gps else maybe(sizes(f"resolution_{unit}")),
+            None if gps else maybe(positives(f"range_{unit}")),
+            maybe(sizes("noise_rms_m_s")) if gps else None,
+            draw(vectors("position_m")) if sensor == "accelerometer" else None,
             draw(maybe_sigma({"rate_hz": False} | ({"position_m": True} if sensor == "accelerometer" else {}))),
         )
-    fields = {"position_ned_m": maybe(vectors), "velocity_ned_m_s": maybe(vectors), "roll_rad": maybe(reals)}
-    fields |= {"pitch_rad": maybe(reals), "yaw_rad": maybe(reals), "body_rate_rad_s": maybe(vectors)}
+    fields = {key: maybe(vectors(key)) for key in ("position_ned_m", "velocity_ned_m_s")}
+    fields |= {key: maybe(reals(key)) for key in ("roll_rad", "pitch_rad", "yaw_rad")}
+    fields |= {"body_rate_rad_s": maybe(vectors("body_rate_rad_s"))}
     known = {key: isinstance(value, np.ndarray) for key, value in fields.items() if value is not None}
     environment = Environment(
-        draw(positives),
-        draw(vectors),
-        draw(positives),
-        draw(vectors),
+        draw(positives("gravity_m_s2")),
+        draw(vectors("magnetic_field_ned_uT")),
+        draw(positives("air_density_kg_m3")),
+        draw(vectors("wind_ned_m_s")),
         draw(maybe_sigma({"gravity_m_s2": False, "magnetic_field_ned_uT": True, "wind_ned_m_s": True})),
     )
     return Recording(
@@ -430,7 +451,7 @@ def recordings(draw: st.DrawFn) -> Recording:
         draw(st.text(st.characters(exclude_categories=["Cs"]))),
         environment,
         draw(discs()) if plant == "flight" else maybe(discs()),
-        Rig(draw(positives), draw(st.floats(0, 1)), draw(maybe_sigma({"viscous_N_m_s": False})))
+        Rig(draw(positives("Izz_kg_m2")), draw(sizes("viscous_N_m_s")), draw(maybe_sigma({"viscous_N_m_s": False})))
         if plant == "spin_down"
         else None,
         maybe(st.just(Release(*fields.values(), sigma=draw(maybe_sigma(known))))),

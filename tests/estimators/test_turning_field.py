@@ -8,7 +8,8 @@ import pytest
 from discsim.recording import Samples
 from estimators.precession import transverse_rates
 from estimators.tone import turns
-from estimators.tracking import TrackingSettings, _Problem
+from estimators.tracking import TrackingSettings
+from estimators.tracking.problem import Problem
 
 
 def test_turns_are_cosine_and_sine_to_the_last_digit():
@@ -22,7 +23,7 @@ def test_turns_are_cosine_and_sine_to_the_last_digit():
     np.testing.assert_allclose(sine, np.sin(angle), rtol=0, atol=4.5e-16)
 
 
-def differences(problem: _Problem, x: np.ndarray) -> np.ndarray:
+def differences(problem: Problem, x: np.ndarray) -> np.ndarray:
     """Return the derivative (3 n, m) of the model's field by central differences."""
     columns = []
     for j in range(x.size):
@@ -47,7 +48,7 @@ def test_normal_equations_are_those_of_the_whole_derivative(case):
     m = 30 * np.stack([np.cos(20 * t), -np.sin(20 * t), 0 * t + 1.2], axis=1) + rng.normal(0, 0.3, (t.size, 3))
     at = np.arange(-0.5, t[-1] + 0.5, 0.005)
     gyroscope = Samples(at, rng.normal(0, 0.1, (at.size, 3))) if case.startswith("gyroscope") else None
-    problem = _Problem(
+    problem = Problem(
         t, m, TrackingSettings(), gyroscope=gyroscope, strength=None, fixed_axis=case == "fixed axis", decaying=True,
         rows=[], top_rate=20.0, typical_rate=20.0, walk=0.01 if "counts" in case else 0.0,
     )  # fmt: skip

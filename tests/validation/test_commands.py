@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -17,6 +19,7 @@ from discsim.recording import read_recording
 from discsim.shipped import load_disc
 from discsim.written import as_written
 from validation.cli import main
+from validation.commands import COMMANDS
 from validation.experiments import validation_run as headless
 from validation.reporting.scores import at_most
 
@@ -34,6 +37,32 @@ def short_profile(tmp_path: Path) -> Path:
     path = tmp_path / "profile.csv"
     path.write_text("time_s,rate_deg_s\n0,0\n1,1500\n3.5,1500\n4.5,3000\n7,3000\n")
     return path
+
+
+def test_the_help_says_of_each_command_what_the_command_itself_says():
+    """Its first lines stand in a table, so that the commands need not be loaded to be listed."""
+    for module, line in COMMANDS.values():
+        command = import_module(f"validation.commands.{module}").command
+        assert line == command.__doc__.strip().splitlines()[0]
+
+
+def test_a_command_loads_neither_the_others_nor_what_it_does_not_need():
+    """`discsim --help` and `import discsim` need no numpy, and a flight no scipy, which takes a third of a second."""
+
+    def loaded(code: str) -> set[str]:
+        line = f"import sys\n{code}\nprint(*sys.modules)"
+        out = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True).stdout
+        return set(out.splitlines()[-1].split())
+
+    assert "numpy" not in loaded("import discsim; discsim.InputError")
+    shown = loaded(
+        "sys.argv = ['discsim', '--help']\ntry:\n import validation.cli as c; c.main()\nexcept SystemExit: pass"
+    )
+    assert "validation.commands" in shown
+    assert not shown & {"numpy", "validation.commands.fly"}
+    flown = loaded("import validation.commands.fly; import discsim.engine, discsim.sensors, discsim.many_flights")
+    assert "mujoco" in flown
+    assert not flown & {"scipy.interpolate", "scipy.optimize", "scipy.special", "matplotlib"}
 
 
 def test_a_flight_leaves_a_recording_and_its_truth_which_ends_on_the_ground(monkeypatch, tmp_path, capsys):
@@ -275,6 +304,77 @@ def test_validate_exits_with_1_where_a_score_is_outside_its_tolerance(monkeypatc
     monkeypatch.setattr(headless, "concealed_checks", lambda cases: [])
     assert run(monkeypatch, "validate", "--quick", "--out", str(tmp_path / "report")) == 1
     assert "FAIL" in (tmp_path / "report" / "report.html").read_text()
+
+
+class TestValidateOnesOwn:
+    """One throw, a short profile, no concealed case: what is passed through is looked at, not how well it does."""
+
+    @pytest.fixture(autouse=True)
+    def nothing_concealed(self, monkeypatch):
+        monkeypatch.setattr(headless, "QUICK_CASES", ())
+        monkeypatch.setattr(headless, "concealed_checks", lambda cases: [])
+        monkeypatch.setattr(headless, "closed_form_checks", lambda *_: [at_most("engine: made up", 0.0, "m", 1.0)])
+        for name in ("GITHUB_ACTIONS", "GITHUB_STEP_SUMMARY"):
+            monkeypatch.delenv(name, raising=False)
+
+    def test_a_disc_throw_profile_and_recording_of_ones_own_with_limits_and_an_earlier_run(
+        self, monkeypatch, tmp_path, capsys, short_profile
+    ):
+        short = tmp_path / "short.toml"
+        short.write_text("velocity_ned_m_s = [14.0, 0.0, -4.0]\npitch_rad = 0.1\nbody_rate_rad_s = [0.0, 0.0, 70.0]\n")
+        thrown = ["--disc", "cd5", "--engine", "trajectory", "--throw", str(short)]
+        assert run(monkeypatch, "fly", *thrown, "--out", str(tmp_path / "mine")) == 0
+        subject = ["--quick", "--disc", "cd5", "--throws", str(short), "--profile", str(short_profile)]
+        first = ["--recordings", str(tmp_path / "mine"), "--record-limits", str(tmp_path / "l.toml"), "--repeat", "2"]
+        run(monkeypatch, "validate", *subject, *first, "--out", str(tmp_path / "first"))
+        scores = {item["name"]: item for item in json.loads((tmp_path / "first" / "scores.json").read_text())}
+        mine = {name for name in scores if name.startswith("recordings: ")}
+        assert mine >= {"recordings: mine, share of time that best knows", "recordings: C_Nr"}
+        assert all(scores[name]["ok"] for name in mine)
+        assert scores["recordings: C_Nr"]["expected"] == load_disc("cd5")[0].aero.CNr
+        limits = (tmp_path / "l.toml").read_text()
+        assert '"throws: worst rms error of best" = ' in limits
+        assert "from 2 seeds" in limits
+
+        page = tmp_path / "page.md"
+        monkeypatch.setenv("GITHUB_ACTIONS", "true")
+        monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(page))
+        (tmp_path / "tight.toml").write_text('[limits]\n"throws: worst rms error of best" = 1e-9\n')
+        again = ["--limits", str(tmp_path / "tight.toml"), "--against", str(tmp_path / "first")]
+        capsys.readouterr()
+        assert run(monkeypatch, "validate", *subject, *again, "--out", str(tmp_path / "second")) == 1
+        assert "::error title=throws%3A worst rms error of best::" in capsys.readouterr().out
+        assert "throws: worst rms error of best" in page.read_text()
+        regression = (tmp_path / "second" / "against.html").read_text()
+        assert "FAIL now" in regression
+        assert "gone" in regression  # the recordings' scores
+        values = [
+            next(
+                item["value"]
+                for item in json.loads((tmp_path / name / "scores.json").read_text())
+                if "best" in item["name"]
+            )
+            for name in ("first", "second")
+        ]
+        assert values[0] == values[1], "the same seed gives the same scores, whatever else is asked for"
+
+    @pytest.mark.parametrize(
+        ("arguments", "expected"),
+        [
+            (["--parts", "neo_m8n"], "no magnetometer on board"),
+            (["--parts", "mpu9250"], "no gps on board"),
+            (["--throws", "driver,driver"], "one name"),
+            (["--limits", "none.toml"], "none.toml"),
+            (["--against", "none"], "none"),
+            (["--recordings", "none"], "none"),
+            (["--record-limits", "."], "no place for a file"),
+        ],
+    )
+    def test_what_cannot_be_is_said_before_the_work(self, monkeypatch, tmp_path, capsys, arguments, expected):
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(headless, "validate", lambda *_, **__: pytest.fail("work has begun"))
+        assert run(monkeypatch, "validate", "--quick", *arguments) == 2
+        assert expected in capsys.readouterr().err
 
 
 def test_a_module_on_board_is_in_the_disc_that_the_recording_states(monkeypatch, tmp_path, capsys):

@@ -292,3 +292,22 @@ def test_where_the_field_alone_is_read_a_tilt_of_the_axis_and_another_field_stan
     (trial,) = found.final.hypothesis.trials
     assert trial.id == "rig.axis_tilt"
     assert "site.field" in [rival.trial.id for rival in found.rivals["rig.axis_tilt"]]
+
+
+def test_a_late_gyroscope_that_few_relations_show_is_borne_out_by_the_air():
+    """No magnetometer, and an accelerometer whose x is cut off throughout."""
+    case = draw_case(93029, kind="setup")
+    assert [item.effect.id for item in case.concealed] == ["gyro.time_offset", "accel.saturation"]
+    (found,) = find_setup_faults(recordings(case)).effects
+    assert found.id == "gyro.time_offset"
+    assert found.value.offset_s == pytest.approx(case.concealed[0].effect.value.offset_s, abs=2e-3)  # type: ignore[attr-defined]
+
+
+def test_a_clock_by_whose_error_phases_run_away_is_no_fault_of_the_setup_and_a_hint_to_the_fit():
+    case = draw_case(92011, kind="setup")
+    assert [item.effect.id for item in case.concealed] == ["accel.units", "gyro.clock_rate"]
+    findings = find_setup_faults(recordings(replace(case, runs=case.runs[:3])))
+    assert findings.effects == (case.concealed[0].effect,)
+    hint = findings.hints[0]
+    assert hint.id == "gyro.clock_rate"
+    assert hint.value.ratio == pytest.approx(1.014078, abs=1.5e-3)  # type: ignore[attr-defined]

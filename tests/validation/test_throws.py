@@ -21,6 +21,7 @@ from validation.scenarios.throws import (
     MOUNT_ERROR,
     QUICK_SET,
     SCORED,
+    StatedThrow,
     Throw,
     ThrowResult,
     fly_throws,
@@ -244,3 +245,16 @@ def test_the_root_mean_square_is_of_what_is_known():
     assert rms(np.array([3.0, np.nan, 4.0])) == pytest.approx(np.sqrt(12.5))
     assert np.isnan(rms(np.array([np.nan, np.nan])))
     assert np.isnan(rms(np.array([])))
+
+
+def test_parts_without_accelerometer_and_gyroscope_are_scored_by_what_is_left(tmp_path):
+    """The throw is a stated one: `discsim validate --parts --throws` has such."""
+    part = tmp_path / "field-only.toml"
+    part.write_text('name = "AK8963 alone"\n[magnetometer]\nrate_hz = 100.0\nnoise_rms_uT = 0.6\n', encoding="utf-8")
+    throw = StatedThrow("mine", load_throw("driver"))
+    assert throw.spin_deg_s == pytest.approx(4200.0)
+    [result] = fly_throws([throw], DISC, FIELD, np.random.default_rng(0), (str(part), "neo_m8n"))
+    assert set(result.rates) == {"fft", "best"}
+    scores = {item.name: item for item in throw_checks([result])}
+    assert not [name for name in scores if "accelerometer" in name or "gyroscope" in name]
+    assert scores["throws: worst rms error of fft"].ok

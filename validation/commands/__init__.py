@@ -8,27 +8,52 @@ import typer
 
 __all__ = ["COMMANDS", "register"]
 
-#: name on the command line -> module in this package
-COMMANDS: dict[str, str] = {
-    "import": "import_",
-    "check": "check",
-    "diagnose": "diagnose",
-    "challenge": "challenge",
-    "estimate": "estimate",
-    "fit": "fit",
-    "fly": "fly",
-    "rate-table": "rate_table",
-    "sweep": "sweep",
-    "validate": "validate",
-    "view": "view",
-    "list": "list_",
-    "show": "show",
-    "study": "study",
+#: name on the command line -> module in this package, and the first line of its help
+COMMANDS: dict[str, tuple[str, str]] = {
+    "import": ("import_", "Turn a raw logger file into a recording folder."),
+    "check": ("check", "Say what a recording holds, what is wrong with it, and what it can tell. Nothing is fitted."),
+    "diagnose": (
+        "diagnose",
+        "Tell whether the baseline explains recordings down to their noise, and if not, what was left out.",
+    ),
+    "challenge": ("challenge", "Put discsim diagnose to a blind test and score it."),
+    "estimate": ("estimate", "Estimate the spin rate of a recording and its standard deviation over time."),
+    "fit": ("fit", "Fit C_Nr to the throws of a data set."),
+    "fly": ("fly", "Fly a disc and write what its instruments record."),
+    "rate-table": ("rate_table", "Turn a rate table through a profile and score every method against the truth."),
+    "sweep": (
+        "sweep",
+        "Score estimators over every combination of a plan's axes and mounts, on one truth run for all mounts.",
+    ),
+    "validate": (
+        "validate",
+        "Run the rate table and a set of throws, score every estimator against truth, and write a report.",
+    ),
+    "view": (
+        "view",
+        "Show a flight or a rate table in MuJoCo's interactive viewer, or draw it off screen with --video.",
+    ),
+    "list": ("list_", "List what is shipped: discs, parts, throws, sites, maps, sweeps or effects, a line each."),
+    "show": (
+        "show",
+        "Show a disc, part, throw, site, map or sweep as its file has it, or an effect with its parameters.",
+    ),
+    "study": (
+        "study",
+        "Run a study of the documentation. NAME --help shows its options; without NAME all studies are listed.",
+    ),
 }
 
 
-def register(app: typer.Typer) -> None:
-    """Add every sub-command to ``app``; heavy imports happen inside the commands, not here."""
-    for name, module in COMMANDS.items():
-        loaded = import_module(f"validation.commands.{module}")
-        app.command(name, context_settings=getattr(loaded, "CONTEXT", None))(loaded.command)
+def register(app: typer.Typer, asked: str | None) -> None:
+    """Add every sub-command to ``app``, of which only the one asked for is loaded: ``--help`` is there at once."""
+    for name, (module, line) in COMMANDS.items():
+        if name == asked:
+            loaded = import_module(f"validation.commands.{module}")
+            app.command(name, context_settings=getattr(loaded, "CONTEXT", None))(loaded.command)
+        else:
+            app.command(name, help=line)(_not_loaded)
+
+
+def _not_loaded() -> None:
+    raise AssertionError("a command was called that is not the first argument")

@@ -79,7 +79,6 @@ def command(
     from discsim.recording import write_recording
     from discsim.sensors import Instruments, record
     from discsim.shipped import load_throw
-    from discsim.trajectory import predict
     from validation.reporting.run import start_run
     from validation.reporting.truth import write_flight_truth
 
@@ -101,6 +100,8 @@ def command(
     inputs = [*([model] if model else []), *(own or []), *(Path(name) for name in names if name.endswith(".toml"))]
     with start_run(out, seed, inputs) as run:
         if engine is Engine.trajectory:
+            from discsim.trajectory import predict
+
             motion = predict(body, environment, release, effects, duration=duration, law=laws).motion()
         else:
             motion = fly(body, environment, release, effects, duration=duration, ground=ground.value, law=laws)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from discsim.errors import InputError
-from validation.reporting.options import OutOption, SeedOption
+from validation.reporting.options import ModelOption, OutOption, SeedOption
 
 __all__ = ["command"]
 
@@ -16,26 +17,87 @@ __all__ = ["command"]
 def command(
     quick: Annotated[bool, typer.Option("--quick", help="A shorter profile and fewer throws.")] = False,
     junit: Annotated[Path | None, typer.Option(help="Also write the scores as a JUnit XML file.")] = None,
+    summary: Annotated[Path | None, typer.Option(help="Also write the scores as a Markdown file.")] = None,
+    disc: Annotated[str | None, typer.Option(help="A shipped disc's name or a TOML file. Default: driver.")] = None,
+    model: ModelOption = None,
+    parts: Annotated[
+        str | None, typer.Option(help="Parts on board of the throws, names or TOML files, separated by commas.")
+    ] = None,
+    throws: Annotated[
+        str | None, typer.Option(help="Throws, shipped names or TOML files, separated by commas, in place of ours.")
+    ] = None,
+    profile: Annotated[Path | None, typer.Option(help="The rate table's profile, as of discsim rate-table.")] = None,
+    recordings: Annotated[
+        Path | None, typer.Option(help="Recordings of your own, a data set or one: their scores join the others.")
+    ] = None,
+    limits: Annotated[Path | None, typer.Option(help="A TOML file of tolerances of your own, by score.")] = None,
+    record_limits: Annotated[
+        Path | None, typer.Option(help="Write such a file, from the spread of this run over --repeat seeds.")
+    ] = None,
+    repeat: Annotated[int, typer.Option(min=2, help="--record-limits: number of seeds, from --seed on.")] = 5,
+    against: Annotated[
+        Path | None, typer.Option(help="An earlier run's folder or scores.json: write against.html beside the report.")
+    ] = None,
     out: OutOption = Path("validation-report"),
     seed: SeedOption = 0,
 ) -> None:
     """Run the rate table and a set of throws, score every estimator against truth, and write a report.
 
-    Writes scores.json, report.html and figures into --out. Exit status 1 if a score is outside its tolerance.
+    Writes scores.json, report.html and figures into --out. Exit status 1 if a score is outside its tolerance. Where
+    GitHub runs it, failures become annotations and the summary goes to the job's page.
 
     Example: discsim validate --quick --junit scores.xml --out validation-report
+    or: discsim validate --disc mine.toml --throws mine-1.toml,mine-2.toml --limits limits.toml --against last-report
     """
-    from validation.experiments.validation_run import validate
+    from discsim.recording import read_dataset
+    from validation.experiments.subject import stated_subject
+    from validation.experiments.validation_run import Judging, validate
+    from validation.reporting.ci import github_commands, markdown_summary
+    from validation.reporting.options import disc_to_fly
     from validation.reporting.run import start_run
     from validation.reporting.scores import all_ok
 
-    if junit is not None and (junit.is_dir() or junit.parent.is_file()):
-        raise InputError(f"--junit {junit}: is no place for a file; expected the name of one")
-    with start_run(out, seed) as run:
-        scores = validate(run, quick=quick, junit=junit)
-    for item in scores:
+    files = {"--junit": junit, "--summary": summary, "--record-limits": record_limits}
+    for option, file in files.items():
+        if file is not None and (file.is_dir() or file.parent.is_file()):
+            raise InputError(f"{option} {file}: is no place for a file; expected the name of one")
+    body, surroundings, stated = disc_to_fly(disc, model)
+    names = [part.split(",") if part else [] for part in (parts, throws)]
+    subject = stated_subject(
+        quick,
+        disc=None if disc is None and model is None else (body, surroundings),
+        parts=names[0],
+        throws=names[1],
+        profile=profile,
+    )
+    mine = [] if recordings is None else read_dataset(recordings)
+    judging = Judging.read(limits, against, record_limits, repeat)
+    given = [disc or "", *names[0], *names[1]]
+    inputs = [path for path in (model, profile, recordings, limits) if path is not None]
+    if stated is not None and (stated.effects or stated.laws):
+        typer.echo(f"{model}: its effects and laws are passed over; the scores are of its disc")
+    with start_run(out, seed, [*inputs, *(Path(name) for name in given if name.endswith(".toml"))]) as run:
+        done = validate(run, quick=quick, junit=junit, subject=subject, judging=judging, recordings=mine)
+    text = markdown_summary("discsim validate", done.scores, done.changes)
+    _leave(text, summary)
+    if os.environ.get("GITHUB_ACTIONS") == "true":
+        for line in github_commands(done.scores, done.changes):
+            typer.echo(line)
+    for item in done.scores:
         typer.echo(item.text)
-    failed = sum(not item.ok for item in scores)
-    typer.echo(f"{len(scores) - failed} of {len(scores)} scores within tolerance; report: {out / 'report.html'}")
-    if not all_ok(scores):
+    failed = sum(not item.ok for item in done.scores)
+    count = len(done.scores)
+    typer.echo(f"{count - failed} of {count} scores within tolerance; report: {out / 'report.html'}")
+    if not all_ok(done.scores):
         raise typer.Exit(1)
+
+
+def _leave(text: str, summary: Path | None) -> None:
+    """Write the summary where it was asked for, and append it to the page of GitHub's job where there is one."""
+    from discsim.files import write_text
+
+    if summary is not None:
+        write_text(summary, text)
+    if page := os.environ.get("GITHUB_STEP_SUMMARY"):
+        with Path(page).open("a", encoding="utf-8") as stream:
+            stream.write(text)

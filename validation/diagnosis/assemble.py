@@ -41,7 +41,7 @@ from validation.diagnosis.selection.stepwise import tried_without
 from validation.diagnosis.unknown_law.find import FoundLaw
 from validation.diagnosis.verdict import RECALIBRATED_NAMES, recalibrations, standard_errors, verdict_of
 from validation.identification.competing_effects import user_effect
-from validation.identification.linearisation import Linear
+from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel, chi_squared
 from validation.identification.residual_tests import remainders
 

@@ -11,12 +11,12 @@ from discsim.errors import InputError
 from discsim.model_file import Model
 from discsim.recording import Recording
 from validation.diagnosis.datasets import need_field
-from validation.diagnosis.design.plans import Plan
 from validation.diagnosis.pipeline import diagnose
 from validation.diagnosis.report.files import write_outcome
 from validation.diagnosis.report.page import verdict_sentence
 from validation.diagnosis.result import Diagnosis, NamedEffect, Outcome
 from validation.given import Given, given_recordings
+from validation.identification.plants.plan import Plan
 
 __all__ = ["Diagnosed", "diagnose_named", "diagnose_recordings"]
 

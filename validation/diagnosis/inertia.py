@@ -15,6 +15,7 @@ from discsim.disc import Disc
 from discsim.errors import InputError
 from discsim.recording import Recording
 from validation.diagnosis.consistency.turning import angle_turned, rate_of
+from validation.identification.plants import plant_of
 
 __all__ = ["with_inertia"]
 
@@ -41,7 +42,7 @@ def with_inertia(recordings: Sequence[Recording]) -> tuple[list[Recording], list
     have, or about what the wobble shows where that is none of a disc. Raises `InputError` where a body tumbles and its
     rates show no ratio.
     """
-    if recordings[0].plant != "free_spin" or all(one.disc is not None for one in recordings):
+    if "disc" not in plant_of(recordings[0]).hardware or all(one.disc is not None for one in recordings):
         return list(recordings), []
     known = next((one.disc for one in recordings if one.disc is not None), None)
     if known is not None:

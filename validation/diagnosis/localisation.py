@@ -12,7 +12,7 @@ from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.found import Search
 from validation.diagnosis.selection.hypothesis import fitted_parameters
 from validation.identification.competing_effects import row_of, user_effect
-from validation.identification.linearisation import Linear
+from validation.identification.linear import Linear
 from validation.identification.normal_equations import local_step
 
 __all__ = ["located_effect", "located_rest"]
@@ -154,39 +154,21 @@ def _grows_with(
     found: Search, excess: Mapping[tuple[int, str, str], FloatArray], linears: Sequence[Linear]
 ) -> str | None:
     """Return the state with which the excess, piece by piece, goes up most plainly."""
-    plant = found.recordings[0].plant
-    rows: list[list[float]] = []
+    rows: dict[str, list[float]] = {}
     amounts: list[float] = []
     for (index, sensor, axis), value in excess.items():
         linear, chain = linears[index], found.loose.chains[index]
         channel = next(c for c in linear.channels if (c.sensor, c.axis) == (sensor, axis))
         piece = np.searchsorted(chain.edges, linear.t[channel.rows], side="right") - 1
-        for i in range(len(chain.states)):
-            mine = value[piece == i]
-            if mine.size == 0:
-                continue
-            state = chain.states[i]
-            amounts.append(float(np.mean(mine)))
-            if plant == "flight":
-                speed = float(np.linalg.norm(state[3:6]))
-                rows.append([float(chain.edges[i]), abs(state[12]), speed, -state[2], abs(state[12]) / max(speed, 0.1)])
-            elif plant == "free_spin":
-                rows.append([float(chain.edges[i]), abs(state[12]), float(np.hypot(state[10], state[11]))])
-            else:
-                rate = abs(state[1]) if plant == "spin_down" else float(i)
-                rows.append([float(chain.edges[i]), rate])
-    names = {
-        "flight": ["time", "spin", "speed", "height", "advance ratio (spin over speed)"],
-        "free_spin": ["time", "spin", "wobble"],
-        "spin_down": ["time", "spin"],
-        "rate_table": ["time", "time"],
-    }[plant]
-    table = np.array(rows)
+        some = [i for i in range(len(chain.states)) if np.any(piece == i)]
+        amounts += [float(np.mean(value[piece == i])) for i in some]
+        for name, values in chain.plant.grows_with(chain.edges[some], chain.states[some]).items():
+            rows.setdefault(name, []).extend(values.tolist())
     if len(amounts) < 8:
         return None
     rank = np.argsort(np.argsort(amounts)).astype(float)
     best, strength = None, 0.4
-    for name, column in zip(names, table.T, strict=True):
+    for name, column in rows.items():
         if np.ptp(column) == 0:
             continue
         r = float(np.corrcoef(np.argsort(np.argsort(column)), rank)[0, 1])

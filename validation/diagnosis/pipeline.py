@@ -13,7 +13,6 @@ from validation.diagnosis.consistency.spin_agreement import agreement_of
 from validation.diagnosis.contradicted import contradicted_outcome
 from validation.diagnosis.datasets import recording_names
 from validation.diagnosis.design.next_recording import advise
-from validation.diagnosis.design.plans import Plan
 from validation.diagnosis.inertia import with_inertia
 from validation.diagnosis.prepared import prepared
 from validation.diagnosis.relaxed_fit import relaxed
@@ -26,6 +25,7 @@ from validation.diagnosis.unknown_law.find import find_law
 from validation.diagnosis.verdict import verdict_of
 from validation.identification.competing_effects import competing, row_of
 from validation.identification.gauss_newton import Fit
+from validation.identification.plants.plan import Plan
 from validation.identification.stated_parameters import stated_parameters
 
 __all__ = ["diagnose"]
@@ -105,7 +105,7 @@ def diagnose(
             outcome = with_setup(outcome, setup, recordings, None)
             return _with_notes(outcome, begun.notes, meant, called)
         free = free_parameters(setup)
-        found = search(fitted, progress, meant, begun.followed, free)
+        found = search(fitted, progress, meant, begun.followed, free, setup.hints)
         law = None
         verdict, unexplained = verdict_of(found)
         if unexplained or _stacked(found):

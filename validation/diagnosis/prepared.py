@@ -12,11 +12,10 @@ from discsim.clipping import constant_axes
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from validation.identification.initial.smoothing import FEWEST
+from validation.identification.plants import plant_of
 
 __all__ = ["prepared"]
 
-#: longest recording that is looked at, s: twice the longest throw; ten minutes of a rig
-LONGEST = {"flight": 20.0, "free_spin": 20.0, "spin_down": 600.0, "rate_table": 600.0}
 #: fastest readings that are looked at, Hz: eighty of a turn of the fastest disc (80 rad/s), more would only take time
 FASTEST = 1000.0
 #: fewest fixes of a path that are used at all
@@ -40,7 +39,7 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
         kept = {}
         sheets = dict(recording.sheets)
         for sensor, samples in recording.samples.items():
-            left, step = _shortened(samples, sheets[sensor], LONGEST[recording.plant])
+            left, step = _shortened(samples, sheets[sensor], _longest(recording))
             for note in _notes(recording, sensor, samples, left, step):
                 notes.setdefault(note, []).append(name)
             if left is not None:
@@ -55,14 +54,11 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
 def _refuse(recording: Recording, name: str) -> None:
     """Refuse a recording that lacks what its plant cannot do without, or whose time does not begin near zero."""
     place = recording.path or name
-    if recording.plant == "flight" and (recording.disc is None or recording.environment.air_density is None):
-        raise InputError(f"{place}: a flight needs [disc] and air_density_kg_m3; add them to recording.toml")
-    if recording.plant == "spin_down" and recording.rig is None:
-        raise InputError(f"{place}: a spin_down needs [rig] with Izz_kg_m2 and viscous_N_m_s; add it to recording.toml")
-    if recording.plant == "rate_table" and recording.command is None:
-        raise InputError(f"{place}: a rate_table needs command.csv, the rate that was asked for; add it")
+    lacks = plant_of(recording).lacks(recording)
+    if lacks is not None:
+        raise InputError(f"{place}: {lacks}")
     first = min((float(s.t[0]) for s in recording.samples.values() if len(s)), default=0.0)
-    if first > LONGEST[recording.plant]:
+    if first > _longest(recording):
         raise InputError(
             f"{place}: its first reading is at {first:.6g} s; expected time to count from the release or the start of "
             "the run, in seconds (import the rows of one throw, --rows A:B)"
@@ -77,8 +73,13 @@ def _enough(recording: Recording, name: str) -> None:
     told = ", ".join(f"{sensor} {count}" for sensor, count in counts.items()) or "none"
     raise InputError(
         f"{recording.path or name}: too few readings for a diagnosis (whole rows within "
-        f"{LONGEST[recording.plant]:g} s: {told}); expected at least {FEWEST} of one sensor, in seconds"
+        f"{_longest(recording):g} s: {told}); expected at least {FEWEST} of one sensor, in seconds"
     )
+
+
+def _longest(recording: Recording) -> float:
+    """Return how much of a recording is looked at, s."""
+    return plant_of(recording).durations.longest
 
 
 def _rows(samples: Samples) -> int:
@@ -138,10 +139,10 @@ def _notes(recording: Recording, sensor: str, samples: Samples, left: Samples | 
             yield f"{column} of the {sensor} holds no reading: nothing is said of that axis."
         elif standing[axis]:
             yield f"{column} of the {sensor} stands still at {value[finite[:, axis], axis][0]:g}: it is left out."
-    if float(samples.t[-1]) > LONGEST[recording.plant]:
+    if float(samples.t[-1]) > _longest(recording):
         yield (
             f"the {sensor} goes on to {samples.t[-1]:.4g} s, longer than any {recording.plant} lasts: its first "
-            f"{LONGEST[recording.plant]:g} s are looked at."
+            f"{_longest(recording):g} s are looked at."
         )
     if step > 1:
         yield f"the {sensor} is faster than {FASTEST:g} Hz: one of {step} of its readings is looked at."
@@ -169,7 +170,7 @@ def _silences(samples: Samples, recording: Recording, sensor: str) -> Iterator[s
     """Yield where a sensor says nothing for a while, at its start, in between or to its end."""
     t = samples.t[np.isfinite(_table(samples)).any(axis=1)]
     ends = [s.t[-1] for s in recording.samples.values() if len(s)]
-    end = min(float(max(ends)), LONGEST[recording.plant])
+    end = min(float(max(ends)), _longest(recording))
     long = max(_SILENT, _INTERVALS * (samples.interval if len(samples) > 1 else 0.0))
     marks = np.concatenate([[0.0], t, [end]])
     for k in np.flatnonzero(np.diff(marks) > long):

@@ -19,81 +19,39 @@ from discsim.frames import conjugate, multiply
 from discsim.recording import Recording
 from validation.diagnosis.consistency.spin_agreement import written_ratios
 from validation.identification.gauss_newton import Fit, linearised, merit_of, refit
-from validation.identification.initial.flight import flight_starts, spin_starts
-from validation.identification.initial.spin_phase import rig_starts
-from validation.identification.linearisation import Linear
+from validation.identification.linear import Linear
 from validation.identification.noise import channel_of, estimate_noise, stated_noise, whitened
-from validation.identification.observations import Readings
 from validation.identification.ordinary_errors import ordinary_errors
-from validation.identification.parameters import Jumps, Parameter
+from validation.identification.parameters import Parameter
+from validation.identification.plants import plant_of
 from validation.identification.prediction import shown
-from validation.identification.propagation import WOBBLE
+from validation.identification.readings import Readings
 from validation.identification.segments import Chain, chain
 from validation.identification.sensor_model import delay
 
 __all__ = [
-    "NO_JUMPS",
-    "PIECE",
     "beginning",
     "first_chain",
     "from_other_starts",
-    "loose_jumps",
     "relaxed",
     "without_outliers",
 ]
-
-#: length of a piece, s
-PIECE = {"flight": 0.5, "free_spin": 0.2, "spin_down": 0.5, "rate_table": 1.0}
-
-#: one-sigma jumps between pieces of a relaxed fit: m, m/s, rad, rad/s; rad and rad/s on a rig
-_LOOSE = {
-    "flight": np.repeat([0.1, 0.5, 0.05, 0.3], 3),
-    "spin_down": np.array([0.5, 0.5]),
-    "rate_table": np.array([0.5]),
-}
-#: how the slopes of what a free spin does not model change from piece to piece, rad/s^3 and 1/s^2, and how much faster
-#: stiffer air turns the wobble, rad/s, and how its stiffness bends, 1/rad; for good
-_WANDER = np.array([0, 0, 300.0, 300.0, 0, 0.02, 0, 0, 0, 0, 0, 0, 0.5, 0.5, 0.5])
-NO_JUMPS = {
-    "flight": Jumps(np.zeros(12)),
-    "free_spin": Jumps(_WANDER),
-    "spin_down": Jumps(np.zeros(2)),
-    "rate_table": Jumps(np.zeros(1)),
-}
 
 #: the clock of all sensors
 _CLOCK = (catalogued(ClockRate, "clock").id, "ratio")
 
 
-def loose_jumps(plant: str) -> Jumps:
-    """Return the jumps of a relaxed fit."""
-    if plant == "free_spin":
-        sd = _WANDER.copy()
-        sd[6:9], sd[9:12] = 0.05, 0.3
-        return Jumps(sd)
-    return Jumps(_LOOSE[plant])
-
-
-def edges_of(recording: Recording) -> FloatArray:
-    """Return the boundaries of a recording's pieces, s."""
-    length = PIECE[recording.plant]
-    end = max(recording.end, 1e-3) + 1e-6
-    if recording.plant == "free_spin":
-        # just after release the moments of the air change fast
-        first = np.concatenate([np.arange(0.0, 0.2, 0.025), np.arange(0.2, 0.4, 0.05), np.arange(0.4, 0.8, 0.1)])
-        if end < 0.9:
-            return np.append(first[first < end - 0.02], end)
-        return np.concatenate([first, np.linspace(0.8, end, max(1, round((end - 0.8) / length)) + 1)])
-    count = max(1, round(recording.end / length))
-    return np.linspace(0.0, end, count + 1)
+def nodes_of(recording: Recording) -> FloatArray:
+    """Return the nodes of a recording's segments, s."""
+    plant = plant_of(recording)
+    return plant.nodes(recording, plant.durations.segment)
 
 
 def chain_in_true_time(recording: Recording, ratio: float) -> Chain:
     """Return the first chain of a recording all of whose times are written as ``ratio`` times the true ones."""
     first = first_chain(recording)
     states = first.states.copy()
-    states[:, 4] *= ratio
-    states[:, 12] *= ratio
+    states[:, list(first.plant.layout.per_time)] *= ratio
     return replace(first, edges=first.edges / ratio, states=states)
 
 
@@ -101,26 +59,10 @@ def first_chain(recording: Recording, ratio: float = 1.0, edges: FloatArray | No
     """Return a recording's chain of pieces with starts from the data; ``ratio`` is that of the magnetometer's clock.
 
     Starts stand in the time that the magnetometer writes. ``edges`` (k + 1,) are the boundaries of the pieces, s, where
-    they are not those that `edges_of` a recording takes.
+    they are not those that `nodes_of` a recording takes.
     """
-    edges = edges_of(recording) if edges is None else edges
-    states = np.zeros((edges.size - 1, 13))
-    if recording.plant in ("flight", "free_spin"):
-        written = np.minimum(edges[:-1] * ratio, recording.end)
-        starts = (flight_starts if recording.plant == "flight" else spin_starts)(recording, written)
-        states[:, 6:10], states[:, 10:13] = starts.attitude, starts.rate
-        states[:, 12] *= ratio
-        if recording.plant == "flight":
-            states[:, :3], states[:, 3:6] = starts.position, starts.velocity
-        else:
-            r = starts.rate[:, 2]
-            states[:, 4] = np.gradient(r, edges[:-1]) / r if r.size > 1 else 0.0
-    else:
-        psi, r = rig_starts(recording, edges[:-1])
-        states[:, 0], states[:, 1] = psi, r
-        if recording.plant == "rate_table":
-            states[:, 1] = psi - psi[0]
-    return chain(recording, edges, states)
+    edges = nodes_of(recording) if edges is None else edges
+    return chain(recording, edges, plant_of(recording).initial.states(recording, edges[:-1], ratio))
 
 
 def ordinary(sensors: set[str], plant: str) -> tuple[Parameter, ...]:
@@ -136,14 +78,8 @@ def ordinary(sensors: set[str], plant: str) -> tuple[Parameter, ...]:
 
 def unknowns(recordings: Sequence[Recording]) -> tuple[Parameter, ...]:
     """Return what each recording leaves open beside its states: how the wobble of a free spin dies and turns."""
-    if recordings[0].plant != "free_spin":
-        return ()
-    sigmas = (5.0, 5.0, 10.0, 10.0, 2.0, 2.0, 2.0, 2.0, 5.0, 10.0)
-    return tuple(
-        Parameter(group, name, 0.0, 1e-3, sigma, frozenset([i]))
-        for i in range(len(recordings))
-        for (group, name), sigma in zip(WOBBLE, sigmas, strict=True)
-    )
+    own = plant_of(recordings[0]).own
+    return tuple(replace(q, recordings=frozenset([i])) for i in range(len(recordings)) for q in own)
 
 
 def loose_parameters(recordings: Sequence[Recording], sensors: set[str]) -> tuple[Parameter, ...]:
@@ -155,19 +91,19 @@ def loose_parameters(recordings: Sequence[Recording], sensors: set[str]) -> tupl
 @np.errstate(over="ignore", invalid="ignore")
 def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), iterations: int = 12) -> Fit:
     """Fit recordings of one plant so loosely that any effect of ordinary size finds room."""
-    plant = recordings[0].plant
+    plant = plant_of(recordings[0])
     ratio = _wrong_time(recordings)
     chains = tuple(first_chain(one) if ratio == 1.0 else chain_in_true_time(one, ratio) for one in recordings)
     sensors = {readings.sensor for one in chains for readings in one.readings}
     clock = () if ratio == 1.0 else (Parameter(*_CLOCK, 1.0, 1e-6, _TIME_SIGMA),)
     parameters = (*known, *loose_parameters(recordings, sensors), *clock)
     at = np.array([ratio if q.key == _CLOCK else q.stated for q in parameters])
-    fit = Fit(chains, parameters, at, loose_jumps(plant), {})
+    fit = Fit(chains, parameters, at, plant.sizes.relaxed, {})
     bare = linearised(fit, ())
     fit = replace(fit, noise=stated_noise(bare))
     fit = refit(fit, iterations=iterations, tolerance=1e-4 * sum(linear.raw.size for linear in bare))
     fit = from_other_starts(fit)
-    if plant in ("spin_down", "rate_table"):
+    if not plant.airborne:
         fit = _with_own_clock(fit)
     if ratio == 1.0:
         fit = _with_clocks(_led_by_others(fit))
@@ -185,7 +121,7 @@ _LEAST_WRONG = 0.03
 
 def _wrong_time(recordings: Sequence[Recording]) -> float:
     """Return the ratio of written to true time where most recordings say that it is far from 1, else 1."""
-    if recordings[0].plant not in ("flight", "free_spin"):
+    if not plant_of(recordings[0]).airborne:
         return 1.0
     ratio = float(np.median(written_ratios(recordings)))
     return ratio if abs(ratio - 1.0) > _LEAST_WRONG else 1.0
@@ -207,8 +143,8 @@ def _astray(fit: Fit) -> list[int]:
 
 def from_other_starts(fit: Fit) -> Fit:
     """Try other attitudes at release for recordings whose fit went astray, each by itself."""
-    plant = fit.chains[0].recording.plant
-    if plant not in ("flight", "free_spin"):
+    attitude = fit.plant.layout.attitude
+    if attitude is None:
         return fit
     better = dict[int, Chain]()
     for i in _astray(fit)[:FEW]:
@@ -217,13 +153,12 @@ def from_other_starts(fit: Fit) -> Fit:
         first = (
             first_chain(recording, edges=fit.chains[i].edges) if ratio == 1.0 else chain_in_true_time(recording, ratio)
         )
-        starts = (flight_starts if plant == "flight" else spin_starts)(recording, np.zeros(1))
         alone = part_of(fit, [i])
         alone = replace(alone, merit=merit_of(alone, alone.linears))
-        for other in starts.ambiguous[:3]:
-            turned = multiply(other, conjugate(first.states[0, 6:10]))
+        for other in fit.plant.initial.other_attitudes(recording)[:3]:
+            turned = multiply(other, conjugate(first.states[0, attitude]))
             states = first.states[: len(fit.chains[i].states)].copy()
-            states[:, 6:10] = multiply(np.broadcast_to(turned, (len(states), 4)), states[:, 6:10])
+            states[:, attitude] = multiply(np.broadcast_to(turned, (len(states), 4)), states[:, attitude])
             trial = replace(alone, chains=(replace(fit.chains[i], states=states),))
             trial = refit(trial, iterations=6, tolerance=1e-3 * fit.count)
             if trial.merit < _RESCUED * alone.merit:
@@ -279,7 +214,7 @@ def _led_by_others(fit: Fit) -> Fit:
     does not, the motion is left as the others tell it, for a search to find what the sensor has.
     """
     there = {readings.sensor for one in fit.chains for readings in one.readings}
-    if fit.chains[0].recording.plant != "flight" or not _astray(fit):
+    if not fit.plant.follows_path or not _astray(fit):
         return fit
     few = 1e-4 * fit.count
     for sensor, clock in _LED.items():
@@ -346,7 +281,7 @@ def _misfit(fit: Fit, sensor: str) -> float:
 def _silenced(recording: Recording, sensor: str) -> Chain:
     """Return a recording's first chain as if it had not a sensor."""
     samples = {name: own for name, own in recording.samples.items() if name != sensor}
-    return first_chain(replace(recording, samples=samples), edges=edges_of(recording))
+    return first_chain(replace(recording, samples=samples), edges=nodes_of(recording))
 
 
 def _without(fit: Fit, sensor: str, tolerance: float) -> Fit:
@@ -392,8 +327,7 @@ def _with_clocks(fit: Fit) -> Fit:
 
     A first look at the beginning, where no phase is off by a turn, gives the clocks; then all of it.
     """
-    plant = fit.chains[0].recording.plant
-    if plant not in ("flight", "free_spin") or not _astray(fit):
+    if not fit.plant.airborne or not _astray(fit):
         return fit
     clocks = free_clocks({readings.sensor for one in fit.chains for readings in one.readings})
     parameters = (*fit.parameters, *clocks)

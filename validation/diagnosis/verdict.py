@@ -17,9 +17,6 @@ from validation.identification.residual_tests import remainders
 
 __all__ = ["RECALIBRATED_NAMES", "standard_errors"]
 
-#: a free spin's first moments that are not asked whether they are noise, s
-_SETTLED = 0.4
-
 
 RECALIBRATED_NAMES = {
     ("disc", "mass"): "mass_kg",
@@ -37,9 +34,8 @@ def verdict_of(found: Search) -> tuple[Verdict, bool]:
     """Return the verdict, and whether something is left that is not noise."""
     final = found.final
     left = remainders(final.fit.linears, final.residuals, final.fit.noise)
-    if found.recordings[0].plant == "free_spin":
-        # just after release the wobble is largest, and what the air does to it is not modelled in every detail
-        left = [item for item in left if item.kind != "window" or item.from_s > _SETTLED]
+    plant = found.loose.plant
+    left = [item for item in left if item.kind != "window" or item.from_s > plant.durations.settled]
     if left or misses(found, final):
         return "unexplained", True
     if final.hypothesis.trials:
@@ -55,7 +51,7 @@ def recalibrations(found: Search) -> dict[str, Recalibration]:
     result = {}
     for q, value, error in zip(fit.parameters, fit.at, sd, strict=True):
         if (
-            q.group == "free_spin"
+            q.key in fit.plant.own_keys
             or q.group in CATALOGUE
             or not any(q.key == p.key and q.recordings == p.recordings for p in found.own)
         ):

@@ -3,198 +3,159 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from discsim.rig import PLATEAUS_DEG_S, default_profile
-from discsim.shipped import load_disc
-from validation.experiments.concealed import FULL_CASES, QUICK_CASES, Concealed, concealed_cases, concealed_checks
+from discsim.errors import InputError
+from discsim.files import write_text
+from discsim.recording import Recording
+from validation.experiments.concealed import FULL_CASES, QUICK_CASES, concealed_cases, concealed_checks
 from validation.experiments.feedback.figures import draw_fig_13
 from validation.experiments.feedback.loop import Loop, close_loop
-from validation.experiments.feedback.scoring import OUTPUT_ERROR
-from validation.reporting.figures import COLOURS, new_figure, save_figure, symmetric_log
-from validation.reporting.html import Section, write_report
+from validation.experiments.recorded import recording_checks
+from validation.experiments.subject import Subject, shipped_subject
+from validation.experiments.validation_report import draw_throws, write_validation_report
+from validation.reporting.limits import Limit, limited, limits_text, read_limits
+from validation.reporting.regression import Change, compare_scores, read_scores, write_regression
 from validation.reporting.run import Run
-from validation.reporting.scores import Score, all_ok, write_junit
+from validation.reporting.scores import Score, write_junit
 from validation.scenarios.closed_forms import closed_form_checks
-from validation.scenarios.rate_table import plateau_table, rate_table_checks, run_rate_table, write_plateaus
+from validation.scenarios.rate_table import (
+    Plateau,
+    RateTableRun,
+    plateau_table,
+    plateaus,
+    rate_table_checks,
+    run_rate_table,
+    write_plateaus,
+)
 from validation.scenarios.rate_table_figures import draw_methods, draw_waveform
-from validation.scenarios.throws import EDGE_S, FULL_SET, QUICK_SET, ThrowResult, fly_throws, rms, throw_checks
+from validation.scenarios.throws import ThrowResult, fly_throws, throw_checks
 from validation.yaw_damping.figures import draw_fit, draw_sources
 
-__all__ = ["validate"]
-
-QUICK_PLATEAUS = (0, 300, 1000, 2500, 4000, 5000)
+__all__ = ["Judging", "Validated", "validate"]
 
 
-def validate(run: Run, *, quick: bool, junit: Path | None = None) -> list[Score]:
-    """Run everything, write ``scores.json``, ``report.html`` and figures into the run's folder, return the scores."""
+@dataclass(frozen=True)
+class Judging:
+    """What scores are held against: limits and an earlier run; and how many seeds are recorded into a file of limits.
+
+    `read` reads both, so that what is wrong with them is said before the work.
+    """
+
+    limits: Mapping[str, Limit] = field(default_factory=dict)
+    before: Sequence[Score] | None = None
+    record: Path | None = None
+    seeds: int = 5
+    against: Path | None = None
+
+    @classmethod
+    def read(cls, limits: Path | None, against: Path | None, record: Path | None, seeds: int) -> Judging:
+        """Read files of limits and scores; raises `InputError` as they do."""
+        known = {} if limits is None else read_limits(limits)
+        return cls(known, None if against is None else read_scores(against), record, seeds, against)
+
+
+@dataclass(frozen=True)
+class Validated:
+    """The scores of a run as judged, and what has changed against an earlier one."""
+
+    scores: list[Score]
+    changes: list[Change] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """What one seed gave: the scores of all that draws random numbers, and what the pictures show."""
+
+    scores: list[Score]
+    table_run: RateTableRun
+    table: list[Plateau]
+    results: list[ThrowResult]
+    loop: Loop
+
+
+def validate(
+    run: Run,
+    *,
+    quick: bool,
+    junit: Path | None = None,
+    subject: Subject | None = None,
+    judging: Judging | None = None,
+    recordings: Sequence[Recording] = (),
+) -> Validated:
+    """Run everything, write ``scores.json``, ``report.html`` and figures into the run's folder, return the scores.
+
+    With an earlier run in ``judging`` also ``against.html``.
+    """
     started = time.monotonic()
-    table_stream, throw_stream = run.rng.spawn(2)
-    disc, environment = load_disc("driver")
+    subject, judging = subject or shipped_subject(quick), judging or Judging()
 
     run.step("engine against closed forms")
-    scores = closed_form_checks(disc, environment)
-
-    run.step("rate table")
-    profile = default_profile(QUICK_PLATEAUS if quick else PLATEAUS_DEG_S, hold=3.0 if quick else 5.0)
-    table_run = run_rate_table(profile, environment, table_stream)
-    table = plateau_table(table_run)
-    write_plateaus(run.out / "plateaus.csv", table)
-    scores += rate_table_checks(table_run, table)
-    draw_methods(table_run, run.out / "rate-table.png")
-    draw_waveform(table_run, run.out / "waveform.png")
-
-    throws = QUICK_SET if quick else FULL_SET
-    results = list(run.progress(fly_throws(throws, disc, environment, throw_stream), len(throws), "throw"))
-    scores += throw_checks(results)
-    draw_throws(results, run.out / "throws.png")
-
-    run.step("C_Nr and the flights that it predicts")
-    loop = close_loop(results, disc, environment)
-    scores += loop.scores
-    draw_fit(loop.throws, loop.fit, loop.paper, run.out / "cnr.png")
-    draw_sources(loop.found, run.out / "cnr-sources.png")
-    draw_fig_13(loop.flown[0], run.out / "feedback.png")
-
+    scores = closed_form_checks(subject.disc, subject.environment)
+    measured = _measure(run, run.rng, subject)
+    scores += measured.scores
+    _draw(run, measured)
     requests = QUICK_CASES if quick else FULL_CASES
     concealed = list(run.progress(concealed_cases(requests), len(requests), "concealed case"))
     scores += concealed_checks(concealed)
+    if recordings:
+        run.step("recordings")
+        scores += recording_checks(recordings)
 
+    if judging.record is not None:
+        _record(run, judging, subject, scores)
+    scores = limited(scores, judging.limits)
     run.step("report")
     run.write_json("scores.json", [item.as_dict() for item in scores])
     if junit is not None:
         write_junit(junit, scores, time.monotonic() - started)
-    _write_report(run, scores, results, loop, concealed)
-    return scores
+    changes = [] if judging.before is None else compare_scores(judging.before, scores)
+    if judging.before is not None:
+        write_regression(run.out, changes, str(judging.against))
+    write_validation_report(run, scores, measured.results, measured.loop, concealed)
+    return Validated(scores, changes)
 
 
-def draw_throws(results: Sequence[ThrowResult], path: Path) -> None:
-    """Draw each throw's error of spin rate by method, and where it flew."""
-    figure, axes = new_figure(1, 2, width=11.0, height=4.2)
-    for number, result in enumerate(results):
-        position = result.motion.position
-        axes[0].plot(position[:, 1], position[:, 0], lw=1.2, label=result.throw.name)
-        for method in ("accelerometer", "fft", "best"):
-            rate = result.rates[method]
-            inner = (rate.t >= EDGE_S) & (rate.t <= result.motion.end - EDGE_S)
-            axes[1].plot(
-                rate.t[inner],
-                np.degrees(result.error(method)),
-                color=COLOURS[method],
-                lw=0.7,
-                alpha=0.8,
-                label=method if number == 0 else None,
-            )
-    axes[0].set_title("Seen from above")
-    axes[0].set_xlabel("east, m")
-    axes[0].set_ylabel("north, m")
-    axes[0].set_aspect("equal", adjustable="datalim")
-    axes[0].legend(fontsize=7)
-    symmetric_log(axes[1], linear=20.0, limit=600.0)
-    axes[1].axhline(0, color=COLOURS["truth"], lw=0.8)
-    axes[1].set_title("Error of the estimated spin rate on every throw")
-    axes[1].set_xlabel("time, s")
-    axes[1].set_ylabel("error, deg/s (logarithmic beyond 20)")
-    axes[1].legend()
-    save_figure(figure, path)
+def _measure(run: Run, rng: np.random.Generator, subject: Subject) -> _Measured:
+    """Turn the table, fly the throws, fit C_Nr and feed it back, all with one stream of random numbers."""
+    table_stream, throw_stream = rng.spawn(2)
+    run.step("rate table")
+    table_run = run_rate_table(subject.profile, subject.environment, table_stream)
+    table = plateau_table(table_run)
+    scores = rate_table_checks(table_run, table)
+    flown = fly_throws(subject.throws, subject.disc, subject.environment, throw_stream, subject.parts)
+    results = list(run.progress(flown, len(subject.throws), "throw"))
+    scores += throw_checks(results)
+    run.step("C_Nr and the flights that it predicts")
+    loop = close_loop(results, subject.disc, subject.environment)
+    return _Measured([*scores, *loop.scores], table_run, table, results, loop)
 
 
-def _write_report(
-    run: Run,
-    scores: Sequence[Score],
-    results: Sequence[ThrowResult],
-    loop: Loop,
-    concealed: Sequence[Concealed],
-) -> None:
-    failed = sum(not item.ok for item in scores)
-    verdict = (
-        "every score is within its tolerance" if all_ok(scores) else f"{failed} scores are outside their tolerance"
-    )
-    rows = [
-        (
-            item.name,
-            f"{item.value:.5g}",
-            item.unit,
-            f"{item.expected:g}",
-            f"{item.tolerance:g}",
-            "ok" if item.ok else "FAIL",
-        )
-        for item in scores
-    ]
-    methods = list(results[0].rates)
-    throw_rows = [
-        (result.throw.name, *(_cell(np.degrees(rms(result.error(method)))) for method in methods)) for result in results
-    ]
-    sections = [
-        Section("Scores", (), ("score", "value", "unit", "expected", "tolerance", ""), rows),
-        Section(
-            "Rate table",
-            (
-                "One MPU-9250, drawn within its data sheet, on a table that runs through plateaus; the wide-range "
-                "gyroscope beside it. Envelopes are the accelerometer's worst case for each mount error.",
-            ),
-            figures=[
-                ("All methods against truth", run.out / "rate-table.png"),
-                ("Waveform and spectrum on the fastest plateau", run.out / "waveform.png"),
-            ],
-        ),
-        Section(
-            "Throws",
-            (
-                "The driver disc with the same module, its accelerometer 1 mm off along x and y. Figures are rms "
-                "errors of the spin rate in deg/s away from the ends of the flight; a dash where a method knows "
-                "nothing.",
-            ),
-            ("throw", *methods),
-            throw_rows,
-            figures=[("Flights and errors", run.out / "throws.png")],
-        ),
-        Section(
-            "C_Nr, and the flights that it predicts",
-            (
-                "One C_Nr for all throws, by output error and by straight lines and (26), from each method's spin. "
-                "Errors are those of the first throw flown with the source's C_Nr (output error) and spin at release; "
-                "the last column has the true spin, so that only C_Nr is the source's.",
-            ),
-            ("spin by", "CNr", "sd", "by (26)", "landing, m", "track, m", "landing by CNr alone, m"),
-            _loop_rows(loop),
-            figures=[
-                ("Spin, its models and what they leave", run.out / "cnr.png"),
-                ("C_Nr by source", run.out / "cnr-sources.png"),
-                ("Predicted flights against the truth", run.out / "feedback.png"),
-            ],
-        ),
-        Section(
-            "Concealed cases",
-            (
-                "Drawn and simulated as discsim challenge does, diagnosed by another process that got the recordings "
-                "and nothing else. The command repeats a case alone.",
-            ),
-            ("concealed", "found", "", "command"),
-            [case.row for case in concealed],
-        ),
-    ]
-    write_report(
-        run.out / "report.html",
-        "Validation report",
-        f"{len(scores)} scores, seed {run.seed}: {verdict}.",
-        sections,
-    )
+def _draw(run: Run, measured: _Measured) -> None:
+    write_plateaus(run.out / "plateaus.csv", measured.table)
+    draw_methods(measured.table_run, run.out / "rate-table.png")
+    if plateaus(measured.table_run.profile):
+        draw_waveform(measured.table_run, run.out / "waveform.png")
+    else:
+        (run.out / "waveform.png").unlink(missing_ok=True)  # of an earlier run into this folder
+    draw_throws(measured.results, run.out / "throws.png")
+    loop = measured.loop
+    draw_fit(loop.throws, loop.fit, loop.paper, run.out / "cnr.png")
+    draw_sources(loop.found, run.out / "cnr-sources.png")
+    draw_fig_13(loop.flown[0], run.out / "feedback.png")
 
 
-def _loop_rows(loop: Loop) -> list[tuple[str, ...]]:
-    predicted = {item.damping.source: item for item in loop.flown[0].predicted if item.damping.way == OUTPUT_ERROR}
-    rows = []
-    for item in loop.found:
-        assert item.fit is not None
-        flight = predicted[item.source.label]
-        errors = (f"{value:.3f}" for value in (flight.landing, flight.track, flight.damping_only))
-        rows.append((item.source.label, f"{item.fit.CNr:.6f}", f"{item.fit.sd:.6f}", f"{item.fit.by_26:.6f}", *errors))
-    return rows
-
-
-def _cell(value: float) -> str:
-    return f"{value:.2f}" if np.isfinite(value) else "\u2013"
+def _record(run: Run, judging: Judging, subject: Subject, scores: Sequence[Score]) -> None:
+    """Write limits from this run and as many more seeds as asked for."""
+    assert judging.record is not None
+    if run.seed is None:
+        raise InputError("--record-limits needs a seed to count on from")
+    runs = [list(scores)]
+    for number in range(1, judging.seeds):
+        run.step(f"seed {run.seed + number}, {number + 1} of {judging.seeds}")
+        runs.append(_measure(run, np.random.default_rng(run.seed + number), subject).scores)
+    write_text(judging.record, limits_text(runs, " ".join(["discsim", *run.command])))

@@ -16,14 +16,15 @@ from typing import Any
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
-from validation.identification.linearisation import Linear, linearise, moved, reread
+from validation.identification.linear import Linear
+from validation.identification.linearisation import linearise, moved, reread
 from validation.identification.noise import NoiseModel, chi_squared
-from validation.identification.normal_equations import WOBBLE_REACH, Reduced, local_step, reduce, shared_step
-from validation.identification.parameters import Jumps, Parameter, values_of
-from validation.identification.propagation import WOBBLE, Column
+from validation.identification.normal_equations import OWN_REACH, Reduced, local_step, reduce, shared_step
+from validation.identification.parameters import Jumps, Parameter, Values, values_of
+from validation.identification.plants import Plant
+from validation.identification.propagation import Column
 from validation.identification.release_prior import release_rows
-from validation.identification.segments import STEPS, Chain, stepped
-from validation.identification.sensor_model import Values
+from validation.identification.segments import Chain, stepped
 
 __all__ = ["Fit", "linearised_columns", "refit"]
 
@@ -52,6 +53,11 @@ class Fit:
     def values(self, recording: int) -> dict[tuple[str, str], float]:
         """Return the values that hold in a recording."""
         return values_of(self.parameters, self.at, recording, self.fixed)
+
+    @property
+    def plant(self) -> Plant:
+        """The plant of its recordings, which is one for all."""
+        return self.chains[0].plant
 
     @property
     def count(self) -> int:
@@ -154,7 +160,7 @@ def refit(
     linears = linearised(fit) if moved_on else fit.linears
     fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
     fit, settled = _gone_on(fit, iterations, tolerance, bounds or {}, _FREE, bar)
-    if not settled and iterations >= _LONG and open_gaps(fit) and fit.chains[0].recording.plant == "free_spin":
+    if not settled and iterations >= _LONG and open_gaps(fit) and fit.plant.weakly_identified:
         # free steps hop about where the readings say little: short ones, and what held them back is not known
         fit, _ = _gone_on(fit, _HELD * iterations, tolerance, bounds or {}, _FIRST_HOLD, bar)
         _, (_, covariance, _) = _solved(fit, np.full(len(fit.chains), _FREE))
@@ -214,8 +220,8 @@ def _gone_on(
 
 
 def _hopped(fit: Fit, better: Fit) -> bool:
-    """Tell whether a free step has neither closed the pieces of a free spin nor brought it much nearer its data."""
-    return fit.chains[0].recording.plant == "free_spin" and open_gaps(better) and better.merit > _NO_NEARER * fit.merit
+    """Tell whether a free step has neither closed pieces whose data say little nor brought them much nearer these."""
+    return fit.plant.weakly_identified and open_gaps(better) and better.merit > _NO_NEARER * fit.merit
 
 
 def _better_closed(known: Fit | None, fit: Fit) -> Fit | None:
@@ -379,8 +385,8 @@ def _reach(fit: Fit, hold: FloatArray) -> FloatArray | None:
         return None
     reach = np.full(len(fit.parameters), np.inf)
     for j, q in enumerate(fit.parameters):
-        if q.key in WOBBLE and q.recordings is not None:
-            reach[j] = WOBBLE_REACH * q.sigma / np.sqrt(np.max(hold[list(q.recordings)]))
+        if q.key in fit.plant.own_keys and q.recordings is not None:
+            reach[j] = OWN_REACH * q.sigma / np.sqrt(np.max(hold[list(q.recordings)]))
     return reach
 
 
@@ -391,7 +397,7 @@ _CLOSED = 20.0
 def open_gaps(fit: Fit) -> bool:
     """Tell whether pieces that may not jump still do."""
     forbidden = ~fit.jumps.allowed
-    steps = STEPS[fit.chains[0].recording.plant]
+    steps = fit.plant.sizes.differences
     return any(bool(np.any(np.abs(linear.gaps[:, forbidden]) > _CLOSED * steps[forbidden])) for linear in fit.linears)
 
 

@@ -12,8 +12,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
@@ -23,27 +22,25 @@ from discsim.effects.sensors import Lag
 from discsim.parameters import parameter_index, parameters
 from discsim.recording import Recording
 from validation.identification.competing_effects import row_of
-from validation.identification.dynamics import (
-    ROW,
-)
-from validation.identification.observations import group_of
+from validation.identification.dynamics import ROW
+from validation.identification.linear import Channel, IntArray, Linear
+from validation.identification.parameters import Values
+from validation.identification.plants import Plant, plant_of
 from validation.identification.prediction import Sampled
 from validation.identification.propagation import (
     EVENT_REACH,
     EVENTS,
     FLAT_ENVIRONMENT,
-    WOBBLE,
     Column,
     base_flat,
     place_in_flat,
     runner_of,
 )
-from validation.identification.segments import STEPS, Chain, difference, shifted, stepped
-from validation.identification.sensor_model import CLOCKS, Values, is_motion, predicted, value
+from validation.identification.readings import group_of
+from validation.identification.segments import Chain, stepped
+from validation.identification.sensor_model import CLOCKS, is_motion, predicted, value
 
-__all__ = ["Channel", "Linear", "linearise", "moved", "reread"]
-
-IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
+__all__ = ["linearise", "moved", "reread"]
 
 #: neighbours simulated at a time, to bound memory
 _BATCH = 16
@@ -53,129 +50,6 @@ _INSTANTS = 256
 _SHARE = 3
 #: a lagged sensor has forgotten its start after this many time constants
 _FORGOTTEN = 8.0
-
-
-@dataclass(frozen=True)
-class Channel:
-    """One axis of one sensor in a linearisation: where its rows are, and their place among the sensor's samples."""
-
-    sensor: str
-    axis: str
-    group: str
-    rows: slice
-    index: IntArray
-
-
-@dataclass(frozen=True)
-class Linear:
-    """Residuals of a recording and how they depend on its unknowns: ``residual - J du``.
-
-    The unknowns are the local ones, the first state and the allowed jumps (l,), and the shared ones (p,). Each row is
-    kept by the state of its own piece (compact); `local` and `shared` chain the pieces on demand.
-
-    Attributes
-    ----------
-    raw : (n,) array
-        Measured minus predicted where the chain stands, rows by channel.
-    own : (n, d + p) array
-        Derivatives of the prediction by the state of the row's piece and by the parameters within it.
-    piece : (n,) int array
-        The piece of each row; -1 for a reading that hangs on several, as with a lag or where it is a mean.
-    whole : (m, l + p) array
-        Derivatives of those by the unknowns themselves, in their order.
-    t, sd : (n,) arrays
-        Written times, stated noise.
-    channels : tuple of Channel
-    jump, jump_kind, jump_piece : (l,) arrays
-        Current size of each allowed jump, its direction within the state (-1 for the first state) and its piece.
-    moves : (k, d, l + p) array
-        How the states of the pieces follow the unknowns.
-    passes : (k - 1, d, d + p) array
-        How the state of each next piece follows that of the one before and the shared parameters.
-    closing : (k, d) array
-        How they move to close the jumps that are not allowed.
-    gaps : (k - 1, d) array
-        All jumps as they stand.
-    shifts : (n,) array
-        What the closing adds to the prediction.
-    """
-
-    raw: FloatArray
-    own: FloatArray
-    piece: IntArray
-    whole: FloatArray
-    t: FloatArray
-    sd: FloatArray
-    channels: tuple[Channel, ...]
-    jump: FloatArray
-    jump_kind: IntArray
-    jump_piece: IntArray
-    moves: FloatArray
-    passes: FloatArray
-    closing: FloatArray
-    gaps: FloatArray
-    shifts: FloatArray
-
-    @property
-    def unknowns(self) -> int:
-        """Number of local unknowns, l."""
-        return self.jump.size
-
-    @property
-    def residual(self) -> FloatArray:
-        """Measured minus predicted (n,) once the jumps that are not allowed are closed."""
-        return self.raw - self.shifts
-
-    @cached_property
-    def _full(self) -> FloatArray:
-        d, width = self.moves.shape[1:]
-        full = np.empty((self.raw.size, width))
-        for i in range(self.moves.shape[0]):
-            rows = np.flatnonzero(self.piece == i)
-            full[rows] = self.own[rows, :d] @ self.moves[i]
-        full[:, self.unknowns :] += self.own[:, d:]
-        if self.whole.size:
-            full[self.piece < 0] = self.whole
-        return full
-
-    def spread(self, places: Sequence[int], width: int) -> Linear:
-        """Return the linearisation with its shared columns at ``places`` of ``width``, the others zero."""
-        d, u = self.own.shape[1] - len(places), self.unknowns
-
-        def spread(columns: FloatArray, kept: int) -> FloatArray:
-            """Return columns (..., kept + p) with the shared ones, behind those that are kept, at their places."""
-            out = np.zeros((*columns.shape[:-1], kept + width))
-            out[..., :kept] = columns[..., :kept]
-            out[..., [kept + j for j in places]] = columns[..., kept:]
-            return out
-
-        return replace(
-            self,
-            own=spread(self.own, d),
-            moves=spread(self.moves, u),
-            passes=spread(self.passes, d),
-            whole=spread(self.whole, u),
-        )
-
-    def after(self, local: FloatArray, shared: FloatArray) -> FloatArray:
-        """Return the residuals (n,) that a step of the unknowns is expected to leave."""
-        d = self.moves.shape[1]
-        step = np.concatenate([local, shared])
-        tangents = self.moves @ step
-        moved = np.einsum("nd,nd->n", self.own[:, :d], tangents[self.piece]) + self.own[:, d:] @ shared
-        if self.whole.size:
-            moved[self.piece < 0] = self.whole @ step
-        return np.asarray(self.residual - moved)
-
-    @property
-    def local(self) -> FloatArray:
-        """Derivatives of the prediction (n, l) by the local unknowns."""
-        return self._full[:, : self.unknowns]
-
-    @property
-    def shared(self) -> FloatArray:
-        """Derivatives of the prediction (n, p) by the shared parameters."""
-        return self._full[:, self.unknowns :]
 
 
 def linearise(
@@ -215,30 +89,30 @@ class _Around:
 
     def __init__(self, current: Chain, values: Values, columns: Sequence[Column], central: bool | None) -> None:
         self.chain, self.values, self.columns, self.central = current, values, columns, central
-        self.recording = recording = current.recording
+        self.recording, self.plant = recording, plant = current.recording, current.plant
         self.runner = runner_of(recording, values, columns)
-        self.motion = [j for j, column in enumerate(columns) if _moves(column)]
-        self.d = d = current.tangent
+        self.motion = [j for j, column in enumerate(columns) if _moves(column, plant)]
+        self.d = d = plant.layout.directions
         self.half = d + len(self.motion)
         #: half the differences, and the columns of slopes that they belong to
-        self.widths = np.concatenate([STEPS[recording.plant], [columns[j].step for j in self.motion]])
+        self.widths = np.concatenate([plant.sizes.differences, [columns[j].step for j in self.motion]])
         self.places = np.array([*range(d), *(d + j for j in self.motion)])
         self.flat = base_flat(recording, values, [column.key for column in columns])
-        self.wobble = np.array([values.get(key, 0.0) for key in WOBBLE])
+        self.own = plant.own_values(values)
         signs = () if central is None else (1.0, -1.0) if central else (1.0,)
         self.flats = np.repeat(self.flat[None], 1 + len(signs) * self.half, axis=0)
-        self.wobbles = np.repeat(self.wobble[None], 1 + len(signs) * self.half, axis=0)
+        self.owns = np.repeat(self.own[None], 1 + len(signs) * self.half, axis=0)
         tangents = np.zeros((1 + len(signs) * self.half, d))
         for side, sign in enumerate(signs):
             first = 1 + side * self.half
-            tangents[first : first + d] = sign * np.diag(STEPS[recording.plant])
+            tangents[first : first + d] = sign * np.diag(plant.sizes.differences)
             for row, j in enumerate(self.motion, first + d):
                 self._set_parameter(row, columns[j], sign)
         self.everyone = np.arange(tangents.shape[0])
         #: the states (k, c, s) that the neighbours of each segment start from
         self.states = np.repeat(current.states[:, None], tangents.shape[0], axis=1)
         turned = np.flatnonzero(np.any(tangents != 0.0, axis=1))
-        self.states[:, turned] = shifted(recording.plant, current.states[:, None], tangents[turned])
+        self.states[:, turned] = plant.layout.moved(current.states[:, None], tangents[turned])
         #: rows of the neighbours that belong to a short event, and when it is, s
         self._events = {
             row: t
@@ -257,8 +131,8 @@ class _Around:
     def _set_parameter(self, row: int, column: Column, sign: float) -> None:
         """Move a parameter of the motion in one row of neighbours."""
         group, name, size, given = column
-        if column.key in WOBBLE:
-            self.wobbles[row, WOBBLE.index(column.key)] += sign * size
+        if column.key in self.plant.own_keys:
+            self.owns[row, self.plant.own_keys.index(column.key)] += sign * size
             return
         for shape, number in given:
             self.flats[row, place_in_flat(group, shape)] = number
@@ -281,7 +155,7 @@ def reread(current: Chain, values: Values, linear: Linear, threads: int = 1) -> 
     One motion in the place of dozens, for steps within which the slopes hardly change. None where other readings take
     part, or fall into other segments, than in ``linear``.
     """
-    k, d = current.states.shape[0], current.tangent
+    k, d = current.states.shape[0], current.plant.layout.directions
     samples = [Sampled(current, readings, values) for readings in current.readings]
     segment_of = [np.clip(np.searchsorted(current.edges, s.instants, side="right") - 1, 0, k - 1) for s in samples]
     read = _Read(_Around(current, values, (), None), samples)
@@ -302,7 +176,7 @@ def reread(current: Chain, values: Values, linear: Linear, threads: int = 1) -> 
             raw.append(s.readings.value[index, axis] - prediction[index, axis])
     if next(channels, None) is not None:
         return None
-    gaps = difference(current.recording.plant, current.states[1:], ends[:-1], d)
+    gaps = current.plant.layout.difference(current.states[1:], ends[:-1])
     closing = _closing(linear.passes, gaps, np.setdiff1d(np.arange(d), linear.jump_kind))
     jump, some = np.zeros_like(linear.jump), linear.jump_kind >= 0
     jump[some] = gaps[linear.jump_piece[some] - 1, linear.jump_kind[some]]
@@ -355,7 +229,7 @@ class _Read:
         """Run a share of the pieces, read the sensors there, and write the states (c, s) at its ends into ``ends``."""
         around, edges = self._around, self._around.chain.edges
         waiting: list[tuple[list[IntArray], IntArray, FloatArray]] = []
-        acted, flats, wobbles = around.everyone, around.flats, around.wobbles
+        acted, flats, owns = around.everyone, around.flats, around.owns
         for i in share:
             start, stop = float(edges[i]), float(edges[i + 1])
             own = [np.flatnonzero(piece == i) for piece in piece_of]
@@ -367,10 +241,10 @@ class _Read:
             acting = around.acting(start, float(times[-1]))
             if not np.array_equal(acting, acted):
                 self._read(waiting, acted)
-                waiting, acted, flats, wobbles = [], acting, around.flats[acting], around.wobbles[acting]
+                waiting, acted, flats, owns = [], acting, around.flats[acting], around.owns[acting]
             rows, there = around.runner.run(
                 flats,
-                wobbles,
+                owns,
                 around.states[i, acting],
                 times,
                 last,
@@ -439,15 +313,15 @@ class _Chained:
 
 def _chained(current: Chain, around: _Around, ends: FloatArray, jumps: BoolArray) -> _Chained:
     """Chain the pieces: their states as functions of [first state | jumps | parameters]."""
-    plant, d, k, p = current.recording.plant, around.d, current.states.shape[0], len(around.columns)
+    layout, d, k, p = current.plant.layout, around.d, current.states.shape[0], len(around.columns)
     allowed, forbidden = np.flatnonzero(jumps), np.flatnonzero(~jumps)
     u = d + (k - 1) * allowed.size
     S = np.zeros((k, d, u + p))
     S[0, :, :d] = np.eye(d)
     passes = np.zeros((max(k - 1, 0), d, d + p))
     nominal = ends[:-1, 0]
-    gaps = difference(plant, current.states[1:], nominal, d)
-    reached = difference(plant, ends[:-1], np.broadcast_to(nominal[:, None], ends[:-1].shape), d)
+    gaps = layout.difference(current.states[1:], nominal)
+    reached = layout.difference(ends[:-1], np.broadcast_to(nominal[:, None], ends[:-1].shape))
     passes[:, :, around.places] = np.moveaxis(around.slopes(np.moveaxis(reached, 1, 0)), 0, 2)
     for i in range(k - 1):
         Phi, first = passes[i, :, :d], d + i * allowed.size
@@ -478,7 +352,7 @@ def _add_sensor_columns(around: _Around, s: Sampled, rows: FloatArray, M: FloatA
         place = around.d + j
         if group in CLOCKS or group in _LAGS:
             if rate is None:
-                rate = s.time_slope(around.runner, around.flat, around.wobble, values, around.chain)
+                rate = s.time_slope(around.runner, around.flat, around.own, values, around.chain)
             if group in CLOCKS:
                 base = _current(values, recording, group, name)
                 plus, minus = {**here, (group, name): base + size}, {**here, (group, name): base - size}
@@ -510,8 +384,9 @@ def _current(values: Values, recording: Recording, group: str, name: str) -> flo
         return value(values, group, name)
     if group == "environment" and name.startswith("magnetic_"):
         return float(recording.environment.magnetic_field[["north", "east", "down"].index(name.split("_")[1])])
-    if (group, name) in WOBBLE:
-        return 0.0
+    own = next((q for q in plant_of(recording).own if q.key == (group, name)), None)
+    if own is not None:
+        return own.stated
     return float(parameters(recording.environment, recording.disc, recording.rig)[parameter_index(group, name)])
 
 
@@ -522,11 +397,11 @@ def _instant(column: Column, values: Values) -> float | None:
     return dict(column.given).get("t_s", values.get((column.group, "t_s")))
 
 
-def _moves(column: Column) -> bool:
+def _moves(column: Column, plant: Plant) -> bool:
     """Tell whether a column is of the motion; the field of the earth is only read."""
     if column.group == "environment":
         return column.key in FLAT_ENVIRONMENT
-    return is_motion(column.group) or column.key in WOBBLE
+    return is_motion(column.group) or column.key in plant.own_keys
 
 
 def _concerns(group: str, sensor: str) -> bool:
@@ -559,7 +434,7 @@ def _stack(
     raw, own, pieces, whole, t, sd, shifts = [], [], [], [], [], [], []
     channels: list[Channel] = []
     at = 0
-    d = current.tangent
+    d = current.plant.layout.directions
     p = S.shape[2] - u
     for s, y, M, piece in zip(samples, read.ideal, read.slopes, piece_of, strict=True):
         readings = s.readings

@@ -16,7 +16,7 @@ from scipy.signal import lfilter
 from scipy.special import expit, logit
 
 from discsim.arrays import FloatArray
-from validation.identification.linearisation import Channel, IntArray, Linear
+from validation.identification.linear import Channel, IntArray, Linear
 
 __all__ = ["GroupNoise", "NoiseModel", "chi_squared", "estimate_noise", "likeliest_noise", "log_likelihood", "whitened"]
 

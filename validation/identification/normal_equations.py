@@ -10,21 +10,13 @@ import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 
 from discsim.arrays import FloatArray
-from validation.identification.linearisation import Linear
+from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel, whitened
 from validation.identification.parameters import Jumps, Parameter
 from validation.identification.release_prior import release_rows
 from validation.identification.segments import Chain
 
-__all__ = ["WOBBLE_REACH", "Reduced", "reduce", "unknown_prior"]
-
-#: what is known of a state without any reading: m, m/s, rad, rad/s; nuisances of a free spin; rigs
-_ANYWHERE = {
-    "flight": np.repeat([1e4, 300.0, 30.0, 1e3], 3),
-    "free_spin": np.array([100.0, 100.0, 100.0, 100.0, 3.0, 3.0, 30.0, 30.0, 30.0, 1e3, 1e3, 1e3, 0.01, 0.5, 0.5]),
-    "spin_down": np.array([1e6, 1e3]),
-    "rate_table": np.array([1e6]),
-}
+__all__ = ["OWN_REACH", "Reduced", "reduce", "unknown_prior"]
 
 
 @dataclass(frozen=True)
@@ -85,7 +77,7 @@ def unknown_prior(linear: Linear, current: Chain, jumps: Jumps) -> tuple[FloatAr
     u = linear.unknowns
     prior = np.zeros(u)
     first = linear.jump_kind < 0
-    prior[first] = _ANYWHERE[current.recording.plant] ** -2.0
+    prior[first] = current.plant.sizes.unknown**-2.0
     prior[~first] = jumps.sd[linear.jump_kind[~first]] ** -2.0
     # a jump is pulled to zero from where it stands
     H, right, chi2 = np.diag(prior), -prior * linear.jump, float(prior @ linear.jump**2)
@@ -104,8 +96,10 @@ def reduce(linear: Linear, current: Chain, noise: NoiseModel, jumps: Jumps, hold
     u = linear.unknowns
     G = normal_matrix(linear, noise)
     H, right, chi2 = unknown_prior(linear, current, jumps)
-    if hold:
-        H[_TURNS, _TURNS] += hold * _ATTITUDE_REACH**-2.0
+    attitude = current.plant.layout.attitude
+    if hold and attitude is not None:
+        turns = list(current.plant.layout.directions_of(attitude))
+        H[turns, turns] += hold * _ATTITUDE_REACH**-2.0
     G[:u, :u] += H
     G[:u, -1] += right
     G[-1, :u] += right
@@ -176,9 +170,7 @@ def shared_step(
     return step, covariance, expected
 
 
-#: how far one step goes where the readings of a free spin say little, beyond which its turning is far from linear:
-#: shares of the sigma of how its wobble dies and turns, and rad of its attitude, which may turn about the field
-WOBBLE_REACH, _ATTITUDE_REACH = 1.0 / 15.0, 0.02
-
-
-_TURNS = np.arange(6, 9)
+#: how far one step goes where the readings say little, beyond which motion is far from linear: shares of the sigma of
+#: a plant's own parameters, as how a free spin's wobble dies and turns, and rad of its attitude, which may turn about
+#: the field
+OWN_REACH, _ATTITUDE_REACH = 1.0 / 15.0, 0.02

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
-from validation.identification.sensor_model import Values
 
-__all__ = ["Jumps", "Parameter", "values_of"]
+__all__ = ["Jumps", "Parameter", "Values", "values_of"]
+
+#: parameters that differ from their baseline, by (group, name); groups are effect ids, or aero, disc, environment, rig,
+#: or a plant with parameters of its own; a law's are called TERM.PLACE, as in 0.power_r
+Values: TypeAlias = Mapping[tuple[str, str], float]
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,11 @@ from discsim.arrays import FloatArray
 from validation.identification.dynamics import (
     ROW,
 )
-from validation.identification.observations import Readings
-from validation.identification.propagation import WOBBLE, Runner, base_flat, runner_of
+from validation.identification.parameters import Values
+from validation.identification.propagation import Runner, base_flat, runner_of
+from validation.identification.readings import Readings
 from validation.identification.segments import Chain
-from validation.identification.sensor_model import Values, delay, predicted, value
+from validation.identification.sensor_model import delay, predicted, value
 
 __all__ = ["Sampled", "read", "shown"]
 
@@ -60,7 +61,7 @@ class Sampled:
         return late
 
     def time_slope(
-        self, runner: Runner, flat: FloatArray, wobble: FloatArray, values: Values, current: Chain
+        self, runner: Runner, flat: FloatArray, own: FloatArray, values: Values, current: Chain
     ) -> FloatArray:
         """Return the slopes (m, width) of the ideal readings in time."""
         slope = np.empty((self.instants.size, self.width))
@@ -75,7 +76,7 @@ class Sampled:
             late = early + 2.0 * _TIME_STEP
             both = np.concatenate([late, early])
             times, last = runner.times(float(edges[i]), float(edges[i + 1]), float(both.max()), current.states[i])
-            rows, _ = runner.run(flat[None], wobble[None], current.states[i : i + 1], times, last, both)
+            rows, _ = runner.run(flat[None], own[None], current.states[i : i + 1], times, last, both)
             read = predicted(self.sensor, current.recording, values, both, rows[0])
             slope[o] = (read[: o.size] - read[o.size :]) / (2.0 * _TIME_STEP)
         return slope
@@ -92,7 +93,7 @@ def shown(current: Chain, values: Values, sensor: str, t: FloatArray) -> FloatAr
     """Return what a sensor would read (n, k) at true instants t (n,) of a chain's motion, before lag and noise."""
     recording = current.recording
     runner = runner_of(recording, values)
-    flat, wobble = base_flat(recording, values), np.array([values.get(key, 0.0) for key in WOBBLE])
+    flat, own = base_flat(recording, values), current.plant.own_values(values)
     rows = np.empty((t.size, ROW))
     piece = np.clip(np.searchsorted(current.edges, t, side="right") - 1, 0, len(current.states) - 1)
     for i in range(len(current.states)):
@@ -101,7 +102,7 @@ def shown(current: Chain, values: Values, sensor: str, t: FloatArray) -> FloatAr
             out = np.maximum(t[mine], current.edges[i])
             start, stop = float(current.edges[i]), float(current.edges[i + 1])
             times, last = runner.times(start, stop, float(out.max()), current.states[i])
-            rows[mine] = runner.run(flat[None], wobble[None], current.states[i : i + 1], times, last, out)[0][0]
+            rows[mine] = runner.run(flat[None], own[None], current.states[i : i + 1], times, last, out)[0][0]
     return predicted(sensor, recording, values, t, rows)
 
 

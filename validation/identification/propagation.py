@@ -11,46 +11,16 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE
-from discsim.effects.kind import BOARD
-from discsim.parameters import PARAMETERS, Tables, parameter_index, parameters, tables
+from discsim.parameters import PARAMETERS, parameter_index, parameters, tables
 from discsim.recording import Recording
 from validation.identification.competing_effects import applied_on, row_of
-from validation.identification.dynamics import (
-    LAW_PLACES,
-    ROW,
-    SIZE,
-    flight_pieces,
-    free_spin_pieces,
-    spin_down_pieces,
-    table_pieces,
-)
-from validation.identification.sensor_model import Values, is_motion, value
+from validation.identification.dynamics import LAW_PLACES, SIZE
+from validation.identification.parameters import Values
+from validation.identification.plants import Plant, plant_of
+from validation.identification.plants.plant import Given
+from validation.identification.sensor_model import is_motion, value
 
-__all__ = ["FLAT_ENVIRONMENT", "WOBBLE", "Column", "Runner", "place_in_flat", "runner_of"]
-
-#: longest step of a flight's integrator, s, and in radians of nutation
-STEP, NUTATION = 0.01, 1.2
-
-
-#: and where an uneven body makes the motion follow the spin
-UNEVEN = 0.6
-
-
-#: and where coefficients come from a table, whose corners a step may not leap over
-CORNERED = 0.5
-
-
-#: a fit that has gone astray to faster spins, rad/s, is not followed with ever shorter steps
-FASTEST = 400.0
-
-
-#: longest step of a table's integrator in radians of its ripple
-RIPPLE = 0.3
-
-
-#: longest step of a free spin, s: the moments of the air change within 20 ms of release; and in radians of nutation:
-#: over 0.2 s at 120 rad/s a wobble of 3.6 rad/s is 1.2e-4 rad/s off, a thirtieth of a good gyroscope's noise
-_FREE_STEP, _FREE_NUTATION = 0.005, 0.22
+__all__ = ["FLAT_ENVIRONMENT", "Column", "Runner", "place_in_flat", "runner_of"]
 
 
 class Column(NamedTuple):
@@ -108,47 +78,26 @@ FLAT_ENVIRONMENT = {("environment", name) for name in PARAMETERS["environment"].
 
 @dataclass(frozen=True)
 class Runner:
-    """Runs pieces of one recording."""
+    """Runs segments of one recording: by its plant, of what is ``given``, with short steps about ``events``.
 
-    recording: Recording
-    lookup: Tables
-    knots: FloatArray
+    These are instants and widths, s.
+    """
+
+    plant: Plant
+    given: Given
     events: tuple[tuple[float, float], ...]
-    #: highest order of a speed ripple
-    order: float = 0.0
-    #: whether the body is uneven, so that its motion follows the spin
-    uneven: bool = False
 
     def times(self, start: float, stop: float, last: float, state: FloatArray) -> tuple[FloatArray, int]:
         """Return the integrator's steps from start over at least [start, last], and the place of ``stop`` in them."""
-        plant = self.recording.plant
-        if plant == "flight":
-            disc = self.recording.disc
-            assert disc is not None
-            spin = min(abs(float(state[12])), FASTEST)
-            nutation = max(spin * disc.Izz / disc.Ixx, spin, 1.0)
-            largest = CORNERED if disc.aero_table is not None else UNEVEN if self.uneven else NUTATION
-            # a path shows no nutation: 0.04 mm off after 2.5 s at 138 rad/s, by tables and with a wobble of 2 rad/s
-            largest = NUTATION if BOARD.isdisjoint(self.recording.samples) else largest
-            h = min(STEP, largest / nutation)
-        elif plant == "free_spin":
-            h = min(_FREE_STEP, _FREE_NUTATION / max(min(abs(float(state[12])), FASTEST) * 2.0, 1.0))
-        elif plant == "spin_down":
-            h = 0.01
-        else:
-            # the fastest the table turns in this piece
-            inside = np.interp([start, max(stop, last)], *self.knots)
-            within = self.knots[1, (self.knots[0] > start) & (self.knots[0] < max(stop, last))]
-            turning = float(np.max(np.abs(np.concatenate([inside, within]))))
-            h = min(0.01, RIPPLE / max(self.order * turning, 1.0))
+        dynamics, end = self.plant.dynamics, max(stop, last)
+        h = dynamics.longest_step(self.given, state, start, end)
         marks = [start, stop]
         if last > stop:
             marks.append(last + 1e-9)
-        if plant == "rate_table":
-            marks += [float(t) for t in self.knots[0] if start < t < max(stop, last)]
+        marks += dynamics.corners(self.given, start, end)
         for t, width in self.events:
             for mark in (t - 6 * width, t + 6 * width):
-                if start < mark < max(stop, last):
+                if start < mark < end:
                     marks.append(mark)
         marks = sorted(set(marks))
         steps = [np.array([start])]
@@ -163,21 +112,13 @@ class Runner:
         return times, int(np.argmin(np.abs(times - stop)))
 
     def run(
-        self, flats: FloatArray, wobbles: FloatArray, states: FloatArray, times: FloatArray, last: int, out: FloatArray
+        self, flats: FloatArray, own: FloatArray, states: FloatArray, times: FloatArray, last: int, out: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return rows (c, m, 19) at instants out and the states (c, s) at ``times[last]``."""
-        c = states.shape[0]
-        rows, ends = np.empty((c, out.size, ROW)), np.empty(states.shape)
-        plant = self.recording.plant
-        if plant == "flight":
-            flight_pieces(flats, self.lookup, states, times, last, out, rows, ends)
-        elif plant == "free_spin":
-            free_spin_pieces(flats, wobbles, states, times, last, out, rows, ends)
-        elif plant == "spin_down":
-            spin_down_pieces(flats, self.lookup, states, times, last, out, rows, ends)
-        else:
-            table_pieces(flats, self.knots, states, times, last, out, rows, ends)
-        return rows, ends
+        """Return rows (c, m, 19) at instants out and the states (c, s) at ``times[last]``.
+
+        ``flats`` (c, k) are parameters of the physics, ``own`` (c, o) those of the plant's own.
+        """
+        return self.plant.dynamics.propagate(self.given, flats, own, states, times, last, out)
 
 
 def _knots(recording: Recording) -> FloatArray:
@@ -210,20 +151,11 @@ _UNEVEN_BODY = tuple((row.id, name) for row in CATALOGUE.values() if row.follows
 
 def runner_of(recording: Recording, values: Values, columns: Sequence[Column] = ()) -> Runner:
     """Return what runs a recording's segments with values, in steps short enough for ``columns``, too."""
-    return Runner(
+    given = Given(
         recording,
         tables(recording.disc, None, applied_on("motion")),
         _knots(recording),
-        _events(values, columns),
         _order(values, columns),
         any(value(values, *key) != 0.0 for key in _UNEVEN_BODY),
     )
-
-
-#: how the wobble of a free spin dies (1/s) and turns (rad/s), how that differs along and across the wind, and their
-#: slopes in time: unknowns of each recording
-WOBBLE = (
-    *(("free_spin", f"{name}_{unit}") for name in ("decay", "turn", "along", "across") for unit in ("1_s", "1_s2")),
-    ("free_spin", "decay_1_s3"),
-    ("free_spin", "turn_1_s3"),
-)
+    return Runner(plant_of(recording), given, _events(values, columns))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from discsim.arrays import FloatArray
-from validation.identification.linearisation import Linear
+from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel, estimate_noise, log_likelihood, whitened
 
 __all__ = ["Remainder", "remainders"]

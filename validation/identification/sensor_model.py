@@ -7,9 +7,8 @@ fit's business.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cache
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -41,14 +40,13 @@ from discsim.effects.setup import BoardRotation, SiteField, TimeOffset, field_th
 from discsim.motion import State
 from discsim.recording import Recording
 from validation.identification.competing_effects import applied_on, row_of
+from validation.identification.dynamics import to_body
+from validation.identification.parameters import Values
+from validation.identification.plants import plant_of
 
-__all__ = ["CLOCKS", "Values", "delay", "is_motion", "predicted", "sized", "to_body", "value"]
+__all__ = ["CLOCKS", "Values", "delay", "is_motion", "predicted", "sized", "value"]
 
 _Kind = TypeVar("_Kind")
-
-#: parameters that differ from their baseline, by (group, name); groups are effect ids, or aero, disc, environment, rig;
-#: a law's are called TERM.PLACE, as in 0.power_r
-Values: TypeAlias = Mapping[tuple[str, str], float]
 
 #: the effects that only move the instants at which samples were taken
 CLOCKS = tuple(row.id for row in CATALOGUE.values() if row.moves_time)
@@ -133,17 +131,6 @@ def _by_catalogue(sensor: str, recording: Recording, values: Values, t: FloatArr
     return _accelerometer(recording, values, t, rows)
 
 
-def to_body(rows: FloatArray, vector: FloatArray) -> FloatArray:
-    """Return N vectors (..., 3) in B by the attitudes in rows (..., 19)."""
-    w, x, y, z = rows[..., 9], rows[..., 10], rows[..., 11], rows[..., 12]
-    a, b, c = vector[..., 0], vector[..., 1], vector[..., 2]
-    # v' = v + 2 w (v x q) + 2 q x (q x v), the inverse turn
-    tx, ty, tz = 2 * (b * z - c * y), 2 * (c * x - a * z), 2 * (a * y - b * x)
-    return np.stack(
-        [a + w * tx + (ty * z - tz * y), b + w * ty + (tz * x - tx * z), c + w * tz + (tx * y - ty * x)], axis=-1
-    )
-
-
 def _field(recording: Recording, values: Values) -> FloatArray:
     moved = [values.get(("environment", name)) for name in _FIELD]
     stated = recording.environment.magnetic_field
@@ -175,7 +162,8 @@ def specific_force(recording: Recording, values: Values, rows: FloatArray) -> Fl
     """Return f_B (..., 3) at the accelerometer, Eq. (1) with g's sign corrected, m/s^2."""
     d = place(recording, values) - np.array([*sized(values, MassImbalance), 0.0])
     gravity = values.get(("environment", "gravity"), recording.environment.gravity)
-    if recording.plant == "free_spin":  # turns with the spin, like the translation that nobody knows: left to the means
+    if not plant_of(recording).path_known:
+        # it turns with the spin, like the translation that nobody knows: left to the means
         gravity = 0.0
     f = to_body(rows, rows[..., 6:9] - np.array([0.0, 0.0, gravity]))
     w, dw = rows[..., 13:16], rows[..., 16:19]
@@ -216,7 +204,7 @@ def _felt(recording: Recording, values: Values, t: FloatArray, rows: FloatArray)
     Where the path is unknown the motion tells only the part of it that is centripetal; the accelerometer on the same
     chip has measured all of it, with errors of some per cent and so far below those of the gyroscope's faked rate.
     """
-    measured = recording.get("accelerometer") if recording.plant == "free_spin" else None
+    measured = None if plant_of(recording).path_known else recording.get("accelerometer")
     if measured is not None:
         whole = np.all(np.isfinite(measured.value), axis=1)
         if np.count_nonzero(whole) > 1:

@@ -13,6 +13,7 @@ from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import PositionOffset
 from discsim.recording import Recording
 from validation.identification.parameters import Parameter
+from validation.identification.plants import plant_of
 
 __all__ = ["stated_parameters"]
 
@@ -57,19 +58,19 @@ def _of(recording: Recording) -> Iterator[tuple[str, str, float, float]]:
         elif key.startswith("wind"):
             for axis, each, size in zip(("north", "east", "down"), environment.wind, _three(sigma), strict=True):
                 yield "environment", f"wind_{axis}", float(each), float(size)
-    disc = recording.disc
-    if disc is not None and recording.plant in ("flight", "free_spin"):
+    disc, hardware = recording.disc, plant_of(recording).hardware
+    if disc is not None and "disc" in hardware:
         for key, sigma in disc.sigma.items():
             if key in _DISC:
                 place = _DISC[key]
                 value = disc.diameter if place == "d" else getattr(disc, place)
                 yield "disc", place, float(value), float(np.max(sigma))
-        if disc.aero is not None and recording.plant == "flight":
+        if disc.aero is not None and "aero" in hardware:
             for name in Aero._fields:
                 if aero_key(name) in disc.sigma:
                     yield "aero", name, float(getattr(disc.aero, name)), float(np.max(disc.sigma[aero_key(name)]))
     rig = recording.rig
-    if rig is not None:
+    if rig is not None and "rig" in hardware:
         for key, sigma in rig.sigma.items():
             if key in _RIG:
                 yield "rig", _RIG[key], float(getattr(rig, _RIG[key])), float(np.max(sigma))

@@ -16,6 +16,7 @@ import numpy as np
 from discsim.clipping import clipping_notes
 from discsim.disc import Release
 from discsim.errors import InputError
+from discsim.limits import LARGEST_READING, time_fault
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from validation.importing.cleaning import Readings, cleaned
 from validation.importing.import_map import ImportMap, SensorMap, TimeBase
@@ -120,11 +121,7 @@ def recording_of(read: RawReadings, rows: slice | None = None) -> Imported:
     readings, rates, said = _fresh(raw, readings, import_map, read.tables, repairs)
     notes += said
     zero = min(found.time[0] for found in readings.values())
-    samples = {
-        sensor: Samples(np.round(found.time - zero, TIME_DECIMALS), found.value[:, 0] if one else found.value)
-        for sensor, found in readings.items()
-        for one in [len(SENSORS[sensor].columns) == 1]
-    }
+    samples = {sensor: _samples(sensor, found, zero, read.tables[sensor].path) for sensor, found in readings.items()}
     release = _release(raw, import_map, readings)
     if release is None and (import_map.release is not None or import_map.throws):
         notes.append("no release conditions: the map has none for this file, or the first row is not used")
@@ -148,6 +145,21 @@ def recording_of(read: RawReadings, rows: slice | None = None) -> Imported:
     )
     listed = (*read.repairs, *repairs.listed())
     return Imported(recording, listed, (*notes, *clipping_notes(recording)))
+
+
+def _samples(sensor: str, found: Readings, zero: float, path: Path) -> Samples:
+    """Return a sensor's readings by the time since ``zero`` s; raises `InputError` for times that no recording has."""
+    t = np.round(found.time - zero, TIME_DECIMALS)
+    if np.any(np.diff(t) <= 0):
+        raise InputError.at(
+            path,
+            None,
+            f"the {sensor}'s {t.size} rows span {t[-1] - t[0]:.3g} s, less than a nanosecond from one to the next; "
+            "expected stamps in the unit that the map states: name another unit in [time], or step_s",
+        )
+    if fault := time_fault(t):
+        raise InputError.at(path, None, f"the {sensor}'s times: {fault[1]}; --rows A:B takes a part")
+    return Samples(t, found.value[:, 0] if len(SENSORS[sensor].columns) == 1 else found.value)
 
 
 def _read_sensors(
@@ -358,7 +370,9 @@ def _columns(table: RawTable, sensor_map: SensorMap, import_map: ImportMap) -> l
         )
     twice = [name for name in needed if table.columns.count(name) > 1]
     if twice:
-        raise InputError.at(table.path, table.header_line or None, f"two columns are called {_quoted(twice)}")
+        raise InputError.at(
+            table.path, table.header_line or None, f"two columns are called {_quoted(twice)}; expected each once"
+        )
     return list(here or ())
 
 
@@ -441,6 +455,8 @@ def _value(
     import_map: ImportMap,
     repairs: RepairList,
 ) -> list[float] | None:
+    """Return a row's readings of a sensor, NaN for gaps; None where a cell is no number."""
+    factor = import_map.sensors[sensor].factor
     value = []
     for name, index in zip(names, indices, strict=True):
         reading = number(row.cells[index], import_map.layout.decimal)
@@ -451,6 +467,10 @@ def _value(
         if np.isnan(reading) and index not in hollow:
             what = f"'{row.cells[index][:40]}'" if row.cells[index] else "empty"
             repairs.add("number", table.path, row.line, f"'{name}' is {what}", "gap")
+        elif not abs(reading * factor) <= LARGEST_READING:
+            what = f"'{name}' is '{row.cells[index][:40]}', more than {LARGEST_READING:g} in the {sensor}'s unit"
+            repairs.add("number", table.path, row.line, what, "gap")
+            reading = float("nan")
         value.append(reading)
     return value
 

@@ -13,6 +13,10 @@ from validation.importing.raw_table import RawRow, RawTable, RepairList, number
 __all__ = ["RowClock", "row_clock"]
 
 
+#: no clock of a logger shows more, s from its zero: microseconds since 1970 that are taken for ms are 1.8e12
+FURTHEST = 1e13
+
+
 @dataclass(frozen=True)
 class RowClock:
     """Time (s) and stretch of each row that has a time, by the row's number; lines at which a new stretch begins."""
@@ -89,5 +93,8 @@ def _time(
     if time is None or np.isnan(time):
         expected = ", expected an ISO time" if base.iso else ""
         repairs.add("number", table.path, row.line, f"'{base.column}' is '{cell[:40]}'{expected}", "row left out")
+        return None
+    if not abs(time * base.scale) <= FURTHEST:
+        repairs.add("number", table.path, row.line, f"'{base.column}' is '{cell[:40]}', no time", "row left out")
         return None
     return time * base.scale

@@ -17,6 +17,7 @@ from discsim.effects.own import UserEffect
 from discsim.environment import FIELD_MODEL_SIGMA, Environment, world_magnetic_field
 from discsim.errors import InputError
 from discsim.law import WRENCH_TARGETS, Law
+from discsim.limits import limit_of
 from discsim.model_file import Model, read_model
 from discsim.module import Module
 from discsim.recording import Plant
@@ -201,18 +202,20 @@ def parse_effects(
     for text in texts or ():
         id, _, rest = text.partition(":")
         mine = next((one for one in own if one.id == id.strip()), None)
-        settings = (row(id.strip()) if mine is None else mine.row).settings
+        kind = row(id.strip()) if mine is None else mine.row
         sizes: dict[str, float] = {}
         setting: dict[str, str] = {}
         for item in filter(None, rest.split(",")):
             name, _, value = (part.strip() for part in item.partition("="))
-            if name in settings:
+            if name in kind.settings:
                 setting[name] = value
                 continue
             try:
                 sizes[name] = float(value)
             except ValueError:
                 raise InputError(f"--effect {text}: '{item}' is no name=number; expected ID:name=number,...") from None
+            if beyond := limit_of(name).fault(sizes[name], divides=name in kind.positive):
+                raise InputError(f"--effect {text}: '{item}', {beyond}")
         given = effect(id.strip(), **sizes, **setting) if mine is None else mine.sized(sizes)
         if problem := _cannot_act(given, plant, sensors):
             raise InputError(f"--effect {given.id}: {problem}")

@@ -7,6 +7,7 @@ truth once, the force at the body's origin and its gradient, gives every mount's
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import prod
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -58,7 +59,7 @@ class MountDesign:
         if np.any(self.lower > self.upper):
             raise InputError("mounts: a range runs backwards; expected the smaller number first")
         if self.design == "grid":
-            object.__setattr__(self, "count", int(np.prod(self.points)))
+            object.__setattr__(self, "count", prod(self.points))
         if self.count < 1:
             raise InputError(f"mounts: got {self.count}, expected at least one")
 

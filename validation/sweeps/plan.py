@@ -20,7 +20,7 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import digest, model_file, model_names
 from discsim.recording import Samples
-from discsim.rig import default_profile, read_profile
+from discsim.rig import default_profile, profile_fault, read_profile
 from discsim.sensors import Instruments
 from discsim.sensors.sampling import Noise
 from discsim.shipped import load_disc, load_site, load_throw
@@ -332,6 +332,8 @@ def _read_truth(table: TomlTable) -> tuple[Literal["rate_table", "flight"], Samp
         if rates is not None:
             hold, ramp = table.need("hold", "s", positive=True), table.need("ramp", "s", positive=True)
             profile = default_profile(rates.tolist(), hold, ramp)
+            if found := profile_fault(profile):
+                raise table.error("rates_deg_s", found[1])
     else:
         longest = table.number("duration", "s", required=False, positive=True)
         duration = 30.0 if longest is None else longest

@@ -14,7 +14,7 @@ from discsim.errors import InputError
 from discsim.rig import spin_down
 from validation.diagnosis.assemble import assemble
 from validation.diagnosis.design.next_recording import ENOUGH, advise, confusions, expected_evidence, in_words
-from validation.diagnosis.design.plans import LEAN, Plan, plans_about, read_plans
+from validation.diagnosis.design.plans import plans_about, read_plans
 from validation.diagnosis.relaxed_fit import relaxed
 from validation.diagnosis.result import Advice, Separation
 from validation.diagnosis.selection.candidates import Trial, trials_for
@@ -22,6 +22,9 @@ from validation.diagnosis.selection.constrained_fit import tied_fit
 from validation.diagnosis.selection.found import Rival, Search, values_of_fit
 from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.diagnosis.selection.stepwise import search
+from validation.identification.plants import PLANTS
+from validation.identification.plants.plan import Plan
+from validation.identification.plants.rig import LEAN
 
 STRETCHED = effect("accel.scale", sx=0.02, sy=0.02, sz=0.0)
 
@@ -173,7 +176,7 @@ def test_a_persons_own_list_is_read(plant, tmp_path: Path):
     named, described = read_plans(file, plant)
     assert named.text == "as I like it"
     assert "turns" in described.text
-    assert described.state.shape == (13,)
+    assert described.state.shape == (PLANTS[plant].layout.size,)
     assert described.duration > 0.0
 
 

@@ -12,13 +12,14 @@ from made import RIG, coasts
 
 from discsim.arrays import FloatArray
 from discsim.effects import effect
-from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain
+from validation.diagnosis.relaxed_fit import first_chain
 from validation.diagnosis.selection.candidates import trials_for
 from validation.diagnosis.selection.screening import Board, board_of, column_of, free_columns
 from validation.identification.gauss_newton import Fit, linearised, refit
 from validation.identification.noise import stated_noise, whitened
 from validation.identification.normal_equations import unknown_prior
 from validation.identification.parameters import Parameter
+from validation.identification.plants.spin_down import SPIN_DOWN
 from validation.identification.propagation import Column
 
 VISCOUS = Parameter("rig", "viscous", RIG.viscous, 1e-8, 2e-7)
@@ -30,7 +31,7 @@ def fitted() -> tuple[Fit, Board]:
     """Three run-downs with friction, fitted without it, and the board of every effect."""
     recordings = coasts([effect("rig.coulomb_friction", torque_N_m=TORQUE)], rates=(60.0, 45.0, 30.0), seconds=1.5)
     chains = tuple(first_chain(recording) for recording in recordings)
-    fit = Fit(chains, (VISCOUS,), np.array([RIG.viscous]), NO_JUMPS["spin_down"], {})
+    fit = Fit(chains, (VISCOUS,), np.array([RIG.viscous]), SPIN_DOWN.sizes.continuous, {})
     fit = refit(replace(fit, noise=stated_noise(linearised(fit, ()))), iterations=10)
     return fit, board_of(fit, trials_for(recordings), fit.noise, fit.jumps)
 

@@ -15,7 +15,7 @@ from discsim.engine import fly
 from discsim.recording import Recording
 from discsim.sensors import record
 from discsim.shipped import load_disc
-from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain, relaxed, unknowns
+from validation.diagnosis.relaxed_fit import first_chain, relaxed, unknowns
 from validation.diagnosis.selection.constrained_fit import Tied, tied_fit
 from validation.diagnosis.selection.found import possible
 from validation.diagnosis.selection.hypothesis import Hypothesis
@@ -23,7 +23,9 @@ from validation.identification.gauss_newton import Fit, _Going, linearised, line
 from validation.identification.noise import estimate_noise, stated_noise, whitened
 from validation.identification.normal_equations import reduce
 from validation.identification.parameters import Jumps, Parameter
-from validation.identification.propagation import WOBBLE, Column
+from validation.identification.plants import PLANTS
+from validation.identification.plants.free_spin import FREE_SPIN
+from validation.identification.propagation import Column
 from validation.identification.sensor_model import predicted
 
 #: numbers of a gyroscope's and a magnetometer's module without a path
@@ -68,10 +70,12 @@ def test_air_that_is_stiffer_at_some_angles_of_attack_leaves_noise_alone(monkeyp
     fit = relaxed([spin_of_tables("dd2", NOSE_DOWN)])
     assert left_by(fit) < 1.4  # what is sharper than a piece is not followed
     for places in ([12], [13, 14]):  # one course in time is not enough, nor is one bend
-        held = NO_JUMPS["free_spin"].sd.copy()
+        held = FREE_SPIN.sizes.continuous.sd.copy()
         held[places] = 0.0
         with monkeypatch.context() as patch:
-            patch.setitem(NO_JUMPS, "free_spin", Jumps(held))
+            patch.setitem(
+                PLANTS, FREE_SPIN.name, replace(FREE_SPIN, sizes=replace(FREE_SPIN.sizes, continuous=Jumps(held)))
+            )
             assert left_by(fit) > 3.0
 
 
@@ -93,8 +97,8 @@ def test_a_wobble_of_one_recording_moves_no_other():
         record(flight(seconds=0.4), BLIND, np.random.default_rng(k), plant="free_spin", name=f"{k}", disc=DRIVER)
         for k in range(2)
     ]
-    fit = Fit(tuple(first_chain(r) for r in recordings), (), np.empty(0), NO_JUMPS["free_spin"], {})
-    columns = [Column(*WOBBLE[0], 1e-3, (("recording", float(k)),)) for k in range(2)]
+    fit = Fit(tuple(first_chain(r) for r in recordings), (), np.empty(0), FREE_SPIN.sizes.continuous, {})
+    columns = [Column(*FREE_SPIN.own_keys[0], 1e-3, (("recording", float(k)),)) for k in range(2)]
     first, second = linearised_columns(fit, columns)
     assert np.any(first.shared[:, 0])
     assert not np.any(first.shared[:, 1])
@@ -114,7 +118,7 @@ def test_a_knock_at_the_very_start_is_not_told_from_where_the_spin_started(insta
     )
     q = Parameter("event.spin_step", "t_s", instant, 1e-3, recordings=frozenset([0]))
     chains = (first_chain(recording),)
-    fit = Fit(chains, (q,), np.array([instant]), NO_JUMPS["free_spin"], {}, covariance=np.full((1, 1), 1e-6))
+    fit = Fit(chains, (q,), np.array([instant]), FREE_SPIN.sizes.continuous, {}, covariance=np.full((1, 1), 1e-6))
     assert possible(Tied(Hypothesis(), fit, 0.0)) is told
 
 
@@ -123,7 +127,7 @@ def test_a_recording_that_a_step_leads_astray_takes_less_of_it_and_the_other_all
         record(flight(seconds=0.4), BLIND, np.random.default_rng(k), plant="free_spin", name=f"{k}", disc=DRIVER)
         for k in range(2)
     ]
-    fit = Fit(tuple(first_chain(r) for r in recordings), (), np.empty(0), NO_JUMPS["free_spin"], {})
+    fit = Fit(tuple(first_chain(r) for r in recordings), (), np.empty(0), FREE_SPIN.sizes.continuous, {})
     fit = replace(fit, noise=stated_noise(linearised(fit)))
     for _ in range(3):  # near enough that a whole step leads nearer
         fit, _ = going(fit, 1.0).each_its_share()

@@ -12,14 +12,16 @@ from scipy.optimize import lsq_linear
 
 from discsim.arrays import FloatArray
 from discsim.effects import effect
-from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain, loose_jumps
+from validation.diagnosis.relaxed_fit import first_chain
 from validation.identification import gauss_newton, normal_equations
 from validation.identification.gauss_newton import Fit, _Going, linearised, merit_of, open_gaps, refit, residuals_after
 from validation.identification.noise import stated_noise, whitened
 from validation.identification.normal_equations import local_step, normal_matrix, reduce, shared_step, unknown_prior
 from validation.identification.parameters import Jumps, Parameter, values_of
+from validation.identification.plants.flight import FLIGHT
+from validation.identification.plants.spin_down import SPIN_DOWN
 from validation.identification.release_prior import release_rows
-from validation.identification.segments import Chain, chain, shifted, stepped
+from validation.identification.segments import Chain, chain, stepped
 
 FRICTION = Parameter("rig.coulomb_friction", "torque_N_m", 0.0, 1e-6)
 VISCOUS = Parameter("rig", "viscous", RIG.viscous, 1e-8, 2e-7)
@@ -31,7 +33,7 @@ def loose() -> Fit:
     """Two run-downs in pieces that may jump, beside the data and not yet fitted."""
     chains = tuple(first_chain(recording) for recording in coasts(seconds=2.0))
     parameters = (VISCOUS, FRICTION, HARD)
-    fit = Fit(chains, parameters, np.array([RIG.viscous, 1e-5, 0.3]), loose_jumps("spin_down"), {})
+    fit = Fit(chains, parameters, np.array([RIG.viscous, 1e-5, 0.3]), SPIN_DOWN.sizes.relaxed, {})
     linears = linearised(fit)
     noise = {group: level._replace(correlation=0.3) for group, level in stated_noise(linears).items()}
     return replace(fit, linears=linears, noise=noise)
@@ -100,7 +102,7 @@ def test_the_normal_matrix_of_long_chains_is_that_of_the_full_rows():
 
 
 def test_correlated_noise_weighs_tied_pieces_by_their_dense_covariance():
-    fit = replace(loose(), jumps=NO_JUMPS["spin_down"])
+    fit = replace(loose(), jumps=SPIN_DOWN.sizes.continuous)
     linear = linearised(fit)[0]
     A = np.hstack([linear.local, linear.shared, linear.residual[:, None]])
     G = np.zeros((A.shape[1],) * 2)
@@ -173,7 +175,7 @@ def test_a_fit_of_tied_pieces_finds_the_friction_with_an_honest_error():
     """From pieces started by the data; closed, the chain is one motion."""
     hidden = [effect("rig.coulomb_friction", torque_N_m=1.5e-4)]
     chains = tuple(first_chain(recording) for recording in coasts(hidden, seconds=2.0))
-    fit = Fit(chains, (FRICTION,), np.zeros(1), NO_JUMPS["spin_down"], {})
+    fit = Fit(chains, (FRICTION,), np.zeros(1), SPIN_DOWN.sizes.continuous, {})
     fit = refit(replace(fit, noise=stated_noise(linearised(fit, ()))), iterations=12)
     sd = float(np.sqrt(fit.covariance[0, 0]))
     assert fit.at[0] == pytest.approx(1.5e-4, abs=4.0 * sd)
@@ -195,7 +197,7 @@ def stated(seconds: float = 0.5) -> Chain:
     recording = replace(throws(seconds=seconds)[0], release=replace(release, sigma=sigma))
     state = states_of(flight(seconds=seconds), np.zeros(1))
     off = np.array([0.01, -0.02, 0.03, 0.4, -0.3, 0.2, 0.03, -0.02, 0.5, 0.05, -0.02, 0.3])
-    return chain(recording, np.array([0.0, seconds]), shifted("flight", state, off))
+    return chain(recording, np.array([0.0, seconds]), FLIGHT.layout.moved(state, off))
 
 
 def test_a_stated_release_pulls_the_first_state_by_its_sigmas():
@@ -207,7 +209,7 @@ def test_a_stated_release_pulls_the_first_state_by_its_sigmas():
     h = 1e-5
     for k in range(12):
         moved = [
-            release_rows(replace(current, states=shifted("flight", current.states, s * h * np.eye(12)[k])))[0]
+            release_rows(replace(current, states=FLIGHT.layout.moved(current.states, s * h * np.eye(12)[k])))[0]
             for s in (1.0, -1.0)
         ]
         slope = (moved[1] - moved[0]) / (2.0 * h)
@@ -232,13 +234,13 @@ def test_a_tied_fit_of_a_throw_comes_down_to_the_noise():
 def test_a_fit_that_ends_with_its_pieces_apart_goes_back_to_where_they_hung_together(monkeypatch):
     """Gaps are counted to first order only: what opens them may seem to gain."""
     chains = tuple(first_chain(recording) for recording in coasts(seconds=2.0))
-    fit = Fit(chains, (VISCOUS,), np.array([RIG.viscous]), NO_JUMPS["spin_down"], {})
+    fit = Fit(chains, (VISCOUS,), np.array([RIG.viscous]), SPIN_DOWN.sizes.continuous, {})
     fit = refit(replace(fit, noise=stated_noise(linearised(fit))))
     assert not open_gaps(fit)
 
     def apart(self: _Going) -> Fit:
         first, *others = self.fit.chains
-        tangents = np.zeros((len(first.states), first.tangent))
+        tangents = np.zeros((len(first.states), first.plant.layout.directions))
         tangents[-1, -1] = 1.0
         trial = replace(self.fit, chains=(stepped(first, tangents), *others))
         return replace(trial, linears=linearised(trial), merit=0.9 * self.fit.merit)
@@ -252,7 +254,7 @@ def test_a_fit_that_ends_with_its_pieces_apart_goes_back_to_where_they_hung_toge
 
 
 def test_a_fit_that_will_stay_above_a_bar_is_left_where_it_stands():
-    fit = replace(white(loose()), jumps=NO_JUMPS["spin_down"])
+    fit = replace(white(loose()), jumps=SPIN_DOWN.sizes.continuous)
     fit = replace(fit, at=np.array([5.0 * RIG.viscous, 1e-3, 0.3]))
     whole = refit(fit)
     assert refit(fit, bar=2.0 * whole.merit).merit == whole.merit
@@ -284,7 +286,7 @@ def test_there_is_no_chord_where_other_readings_take_part():
 
 def test_short_steps_by_chords_end_where_full_ones_do(monkeypatch):
     """Within a hundredth of a standard deviation, with fewer motions run."""
-    start = replace(loose(), jumps=NO_JUMPS["spin_down"])
+    start = replace(loose(), jumps=SPIN_DOWN.sizes.continuous)
     runs = []
     run = gauss_newton.linearised
     monkeypatch.setattr(gauss_newton, "linearised", lambda *given, **named: runs.append(1) or run(*given, **named))

@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 from scipy.stats import multivariate_normal
 
 from discsim.arrays import FloatArray
-from validation.identification.linearisation import Channel, Linear
+from validation.identification.linear import Channel, Linear
 from validation.identification.noise import (
     GroupNoise,
     estimate_noise,

@@ -11,7 +11,7 @@ from made import throws
 
 from discsim.effects import Effect, effect
 from validation.diagnosis.design.next_recording import confusions
-from validation.diagnosis.relaxed_fit import NO_JUMPS, relaxed, unknowns
+from validation.diagnosis.relaxed_fit import relaxed, unknowns
 from validation.diagnosis.selection import stepwise as searching
 from validation.diagnosis.selection.candidates import Trial, trials_for
 from validation.diagnosis.selection.constrained_fit import Tied
@@ -21,6 +21,7 @@ from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_paramet
 from validation.diagnosis.selection.proposals import Pair, Proposal, pairs
 from validation.diagnosis.selection.screening import board_of
 from validation.identification.noise import estimate_noise
+from validation.identification.plants.flight import FLIGHT
 from validation.identification.stated_parameters import stated_parameters
 
 YAW, CLOCK = effect("aero.yaw_reynolds", exponent=0.3), effect("mag.clock_rate", ratio=0.9996)
@@ -34,7 +35,7 @@ def ranked() -> list[Pair]:
     loose = relaxed(recordings, known)
     noise = estimate_noise(loose.linears, [linear.residual for linear in loose.linears])
     trials = trials_for(recordings)
-    board = board_of(loose, trials, noise, NO_JUMPS["flight"])
+    board = board_of(loose, trials, noise, FLIGHT.sizes.continuous)
     return pairs(board, trials, (*known, *unknowns(recordings)))
 
 
@@ -98,7 +99,7 @@ def as_shear() -> Tied:
 def test_an_effect_gives_way_to_one_that_explains_as_much_with_fewer_parameters():
     sheared = as_shear()
     found = replace(windy(), final=sheared)
-    found.board = board_of(sheared.fit, found.trials, sheared.fit.noise, NO_JUMPS["flight"])
+    found.board = board_of(sheared.fit, found.trials, sheared.fit.noise, FLIGHT.sizes.continuous)
     found.rivals = rivals_of(found)
     assert next(rival.trial.id for rival in found.rivals["air.wind_shear"]) == "air.wind"
     better = exchanged(found)

@@ -36,11 +36,14 @@ from discsim.sensors import Instruments, record
 from discsim.trajectory import predict
 from validation.diagnosis.relaxed_fit import beginning
 from validation.identification import linearisation
-from validation.identification.linearisation import Linear, linearise
+from validation.identification.linear import Linear
+from validation.identification.linearisation import linearise
 from validation.identification.observations import readings_of
+from validation.identification.plants.flight import FLIGHT
+from validation.identification.plants.free_spin import FREE_SPIN
 from validation.identification.prediction import shown
-from validation.identification.propagation import WOBBLE, Column, base_flat, runner_of
-from validation.identification.segments import STEPS, Chain, chain, recut, shifted
+from validation.identification.propagation import Column, base_flat, runner_of
+from validation.identification.segments import Chain, chain, recut
 from validation.identification.sensor_model import predicted
 
 #: sizes that show well within half a second of flight
@@ -152,7 +155,7 @@ def test_a_piece_flies_as_the_standalone_model_does(hidden: Effect):
 )
 def test_a_rig_coasts_as_in_the_engine(hidden: Sequence[Effect]):
     motion = spin_down(RIG, FIELD, 40.0, 1.5, hidden, yaw=0.5)
-    one = chain(coasting(motion, RIG), np.array([0.0, 1.5]), np.array([[0.5, 40.0, *np.zeros(11)]]))
+    one = chain(coasting(motion, RIG), np.array([0.0, 1.5]), np.array([[0.5, 40.0]]))
     t = np.arange(0.003, 1.49, 0.01)
     # MuJoCo's fourth-order steps of 1 ms leave this much of a pulse of 10 ms
     assert shown(one, values_of(*hidden), "gyroscope", t) == pytest.approx(motion.at(t).rate, abs=1e-5)
@@ -172,7 +175,7 @@ def test_a_rig_coasts_as_in_the_engine(hidden: Sequence[Effect]):
 def test_a_table_turns_as_in_the_engine(hidden: Sequence[Effect]):
     motion = turn_table(PROFILES[1], FIELD, hidden, yaw=0.5)
     recording = tables()[1]
-    one = chain(recording, np.array([0.0, 3.0]), np.array([[0.5, *np.zeros(12)]]))
+    one = chain(recording, np.array([0.0, 3.0]), np.array([[0.5, 0.0]]))
     t = np.arange(0.003, 2.99, 0.01)
     # the engine's table follows its command by a loop of 100/s, which trails a ripple by some of its amplitude
     loose = 1e-3 if hidden and hidden[0].id == "rig.speed_ripple" else 1e-6
@@ -185,8 +188,8 @@ def test_a_disc_in_no_air_spins_freely_as_in_the_engine():
     thin = replace(FIELD, air_density=1e-9)
     hidden = effect("body.inertia_asymmetry", dIyy_kg_m2=2e-5)
     motion = fly(DRIVER, thin, release_of(0.4, 70.0), [hidden], duration=0.45)
-    state = np.zeros(13)
-    state[6:10], state[10:13] = motion.attitude[0], motion.rate[0]
+    state = np.zeros(FREE_SPIN.layout.size)
+    state[FREE_SPIN.layout.attitude], state[FREE_SPIN.layout.rate] = motion.attitude[0], motion.rate[0]
     recording = record(
         motion, Instruments.from_parts("mpu9250"), np.random.default_rng(1), plant="free_spin", name="spin", disc=DRIVER
     )
@@ -276,7 +279,7 @@ def test_a_chain_cut_anew_is_the_same_motion():
 
 def predictions(one: Chain, values: dict[tuple[str, str], float], after: float = -1.0) -> FloatArray:
     """Measured minus predicted of a chain as it stands, simulated anew."""
-    linear = linearise(one, values, (), np.zeros(one.tangent, dtype=np.bool_))
+    linear = linearise(one, values, (), np.zeros(one.plant.layout.directions, dtype=np.bool_))
     return linear.raw[linear.t > after]
 
 
@@ -315,9 +318,11 @@ def test_columns_of_the_first_state_are_those_of_the_whole_flight():
     one, three = tied()
     linear = linearise(three, {}, (), np.zeros(12, dtype=np.bool_))
     assert linear.residual == pytest.approx(linear.raw, abs=1e-6)
-    for k, h in enumerate(STEPS["flight"]):
+    for k, h in enumerate(FLIGHT.sizes.differences):
         tangent = h * np.eye(12)[k]
-        moved = [predictions(replace(one, states=shifted("flight", one.states, s * tangent)), {}) for s in (1.0, -1.0)]
+        moved = [
+            predictions(replace(one, states=FLIGHT.layout.moved(one.states, s * tangent)), {}) for s in (1.0, -1.0)
+        ]
         assert_column(linear, linear.local[:, k], (moved[1] - moved[0]) / (2.0 * h), 1e-4, k)
 
 
@@ -330,11 +335,11 @@ def test_columns_of_a_jump_move_what_comes_after_it():
     two = recut(three, {}, np.array([0.0, 0.25, 0.9]))
     for place, direction in ((12, 3), (14, 5), (15, 11)):
         assert (linear.jump_kind[place], linear.jump_piece[place]) == (direction, 1)
-        h = STEPS["flight"][direction]
+        h = FLIGHT.sizes.differences[direction]
         ends = []
         for sign in (1.0, -1.0):
             states = two.states.copy()
-            states[1] = shifted("flight", two.states[1], sign * h * np.eye(12)[direction])
+            states[1] = FLIGHT.layout.moved(two.states[1], sign * h * np.eye(12)[direction])
             ends.append(predictions(replace(two, states=states), {}))
         assert_column(linear, linear.local[:, place], (ends[1] - ends[0]) / (2.0 * h), 1e-4, direction)
 
@@ -344,7 +349,7 @@ def test_a_gap_that_may_not_be_is_closed_by_the_step():
     one, three = tied()
     states = three.states.copy()
     states[1:, 0] += 1e-3
-    states[2] = shifted("flight", states[2], np.array([0, 0, 0, 1e-3, 0, 0, 0, 0, 1e-5, 0, 0, 0.0]))
+    states[2] = FLIGHT.layout.moved(states[2], np.array([0, 0, 0, 1e-3, 0, 0, 0, 0, 1e-5, 0, 0, 0.0]))
     linear = linearise(replace(three, states=states), {}, (), np.zeros(12, dtype=np.bool_))
     whole = predictions(one, {})
     assert np.max(np.abs(linear.raw - whole)) > 5e-4
@@ -448,15 +453,15 @@ def test_columns_of_a_rig_are_those_of_the_whole_run(recording, state, keys):  #
     recording = recording()
     values = {key: at for key, _, at in keys}
     edges = np.array([0.0, recording.end + 1e-6])
-    one = chain(recording, edges, np.array([[*state, *np.zeros(11)]]))
+    one = chain(recording, edges, np.array([state]))
     three = recut(one, values, np.linspace(0.0, edges[1], 4))
-    d = one.tangent
+    d = one.plant.layout.directions
     columns = [Column(*key, h) for key, h, _ in keys]
     linear = linearise(three, values, columns, np.zeros(d, dtype=np.bool_))
-    steps = STEPS[recording.plant]
+    steps = one.plant.sizes.differences
     for k in range(d):
         moved = [
-            predictions(replace(one, states=shifted(recording.plant, one.states, s * steps[k] * np.eye(d)[k])), values)
+            predictions(replace(one, states=one.plant.layout.moved(one.states, s * steps[k] * np.eye(d)[k])), values)
             for s in (1.0, -1.0)
         ]
         assert_column(linear, linear.local[:, k], (moved[1] - moved[0]) / (2.0 * steps[k]), 1e-4, k)
@@ -473,17 +478,21 @@ def test_columns_of_a_free_spin_are_those_of_the_whole_motion():
     state[0, :6] = [1.0, -2.0, 3.0, 1.0, -0.05, 0.01]
     state[0, 6:10], state[0, 10:13] = motion.attitude[0], motion.rate[0]
     # the wind's direction in the disc's plane is told by the piece, and so differs by the square of the tilt
-    values = {key: 0.3 for key in WOBBLE[:4]}
+    values = {key: 0.3 for key in FREE_SPIN.own_keys[:4]}
     one = chain(recording, np.array([0.0, 0.6]), state)
     three = recut(one, values, np.array([0.0, 0.2, 0.4, 0.6]))
-    columns = [Column(*WOBBLE[0], 1e-3), Column(*WOBBLE[3], 1e-3), Column("body.inertia_asymmetry", "dIyy_kg_m2", 1e-7)]
+    columns = [
+        Column(*FREE_SPIN.own_keys[0], 1e-3),
+        Column(*FREE_SPIN.own_keys[3], 1e-3),
+        Column("body.inertia_asymmetry", "dIyy_kg_m2", 1e-7),
+    ]
     linear = linearise(three, values, columns, np.zeros(15, dtype=np.bool_))
     # what wanders is told by the piece: its slope goes on, so that three pieces are the same motion as one
     assert predictions(three, values) == pytest.approx(predictions(one, values), abs=1e-3)
     for k in (0, 2, 4, 6, 9, 11, 12, 13, 14):
-        h = STEPS["free_spin"][k]
+        h = FREE_SPIN.sizes.differences[k]
         moved = [
-            predictions(replace(one, states=shifted("free_spin", one.states, s * h * np.eye(15)[k])), values)
+            predictions(replace(one, states=FREE_SPIN.layout.moved(one.states, s * h * np.eye(15)[k])), values)
             for s in (1.0, -1.0)
         ]
         assert_column(linear, linear.local[:, k], (moved[1] - moved[0]) / (2.0 * h), 1e-3, k)
@@ -533,6 +542,6 @@ def test_a_path_alone_is_flown_in_longer_steps_and_is_the_same_path():
     paths = []
     for runner in runners:
         times, last = runner.times(0.0, 0.9, 0.9, state)
-        flat, wobble = base_flat(whole, values)[None], np.zeros((1, len(WOBBLE)))
+        flat, wobble = base_flat(whole, values)[None], np.zeros((1, len(FREE_SPIN.own_keys)))
         paths.append(runner.run(flat, wobble, state[None], times, last, np.linspace(0.0, 0.9, 30))[0][0, :, :3])
     np.testing.assert_allclose(*paths, atol=1e-4)

@@ -11,7 +11,8 @@ from tests.validation.diagnosis.made import DRIVER as DISC
 from tests.validation.diagnosis.made import FIELD as SITE
 from validation.diagnosis.inertia import DISC as BARE
 from validation.diagnosis.inertia import with_inertia
-from validation.diagnosis.prepared import FASTEST, LONGEST, prepared
+from validation.diagnosis.prepared import FASTEST, prepared
+from validation.identification.plants.free_spin import FREE_SPIN
 
 RATE, NOISE = 200.0, 0.01
 
@@ -107,7 +108,7 @@ def test_what_is_faster_than_a_disc_needs_is_thinned_aloud():
 
 def test_what_lasts_longer_than_any_throw_is_cut_aloud():
     usable, said = prepared([spinning(end=30.0, rate=50.0)], ["01"])
-    assert usable[0].end <= LONGEST["free_spin"]
+    assert usable[0].end <= FREE_SPIN.durations.longest
     assert any("longer than any free_spin lasts" in one for one in said)
 
 

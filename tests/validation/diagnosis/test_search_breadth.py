@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from made import coasts, throws
 
-from discsim.effects.catalogue import CATALOGUE
-from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain
+from discsim.effects.catalogue import CATALOGUE, effect
+from validation.diagnosis.relaxed_fit import first_chain
 from validation.diagnosis.selection import exchange
 from validation.diagnosis.selection import found as finding
 from validation.diagnosis.selection import stepwise as searching
@@ -18,9 +19,11 @@ from validation.diagnosis.selection.constrained_fit import Tied
 from validation.diagnosis.selection.evidence import price
 from validation.diagnosis.selection.found import on_the_disc
 from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.selection.proposals import Proposal
+from validation.diagnosis.selection.proposals import Proposal, hinted
 from validation.identification.gauss_newton import Fit, linearised, merit_of
 from validation.identification.noise import stated_noise
+from validation.identification.plants.flight import FLIGHT
+from validation.identification.plants.spin_down import SPIN_DOWN
 
 #: what algebra ranks, best first; none but the seventh comes near the data
 RANKED = [Trial(id, ()) for id, row in CATALOGUE.items() if id.startswith(("mag.", "gyro.")) and not row.event]
@@ -29,13 +32,15 @@ RIGHT = RANKED[6]
 COUNT = 1812
 
 
-def step(monkeypatch: pytest.MonkeyPatch, *, far: bool, right: Trial) -> tuple[str, list[str], list[float]]:
+def step(
+    monkeypatch: pytest.MonkeyPatch, *, far: bool, right: Trial, hints: Sequence[Proposal] = ()
+) -> tuple[str, list[str], list[float]]:
     """Return what one step of the search adds, and what it refitted, where fits are not made but told.
 
     Beside it how much below the present fit's merit each had to come, per reading, or be given up.
     """
     recordings = coasts(seconds=1.0)
-    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), NO_JUMPS["spin_down"], {})
+    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
     linears = linearised(fit)
     fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
     base = Tied(Hypothesis(), fit, 1e6)
@@ -55,12 +60,13 @@ def step(monkeypatch: pytest.MonkeyPatch, *, far: bool, right: Trial) -> tuple[s
 
     monkeypatch.setattr(searching, "tied_fit", told)
     monkeypatch.setattr(searching, "chi2_in", chi2)
+    monkeypatch.setattr(finding, "chi2_in", chi2)
     monkeypatch.setattr(finding, "board_of", lambda *_: None)
     monkeypatch.setattr(searching, "searched", lambda *_: [])
     monkeypatch.setattr(searching, "proposals", lambda *_: [])
     ranked = [Proposal(trial, 1e6 - rank, {}) for rank, trial in enumerate(RANKED)]
     monkeypatch.setattr(searching, "one_per_effect", lambda _: ranked)
-    found = finding.Search(tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base)
+    found = finding.Search(tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base, hints=tuple(hints))
     best = searching._next(found, None, base, 0)  # type: ignore[arg-type]
     assert best is not None
     return best.hypothesis.trials[-1].id, refitted, bars
@@ -91,7 +97,7 @@ def test_near_the_data_four_are_refitted(monkeypatch):
 def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present_one_is(monkeypatch):
     """Algebra asked for a number far off; from no effect at all the same fit comes to what it gains."""
     recordings = coasts(seconds=1.0)
-    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), NO_JUMPS["spin_down"], {})
+    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
     linears = linearised(fit)
     fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
     base = Tied(Hypothesis(), fit, 1e4)
@@ -103,6 +109,7 @@ def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present
 
     monkeypatch.setattr(searching, "tied_fit", told)
     monkeypatch.setattr(searching, "chi2_in", lambda tied, noise: 1.1 * tied.fit.count)
+    monkeypatch.setattr(finding, "chi2_in", lambda tied, noise: 1.1 * tied.fit.count)
     monkeypatch.setattr(finding, "board_of", lambda *_: None)
     monkeypatch.setattr(searching, "searched", lambda *_: [])
     monkeypatch.setattr(searching, "proposals", lambda *_: [])
@@ -113,13 +120,19 @@ def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present
     assert best.hypothesis.trials == (tilt,)
 
 
+def test_far_from_the_data_what_sensors_asked_of_one_another_is_refitted_first_and_beside_it_is_not(monkeypatch):
+    hint = hinted(effect("gyro.clock_rate", ratio=1.014))
+    assert step(monkeypatch, far=True, right=RIGHT, hints=[hint])[1][0] == "gyro.clock_rate"
+    assert step(monkeypatch, far=False, right=RIGHT, hints=[hint])[1][0] == RANKED[0].id
+
+
 def exchanged(monkeypatch: pytest.MonkeyPatch, without_scale: float) -> set[str] | None:
     """Return what an offset, a scale and a turned board give way to, where a place could be in place of the board.
 
     ``without_scale`` is the score of the offset and the place alone; that of the three is 40, with the place 42.
     """
     recordings = coasts(seconds=1.0)
-    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), NO_JUMPS["spin_down"], {})
+    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
     linears = linearised(fit)
     fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
     offset, scale, board, place = map(
@@ -155,7 +168,7 @@ def scope(monkeypatch: pytest.MonkeyPatch, everywhere: float) -> frozenset[int] 
     ``everywhere`` is its score in both.
     """
     recordings = coasts(seconds=1.0)
-    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), NO_JUMPS["spin_down"], {})
+    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
     linears = linearised(fit)
     fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
     stall = replace(free_trial("aero.stall"), recordings=frozenset([1]))
@@ -180,7 +193,7 @@ def test_an_effect_that_the_others_contradict_stays_in_its_recording(monkeypatch
 def test_a_centre_of_mass_off_the_disc_is_not_refitted_and_a_sensor_s_unknown_place_is():
     """Where a path alone is recorded algebra asks for metres of the one; along the axis nothing shows the other."""
     recordings = throws(seconds=0.3)
-    base = Tied(Hypothesis(), Fit((), (), np.empty(0), NO_JUMPS["flight"], {}), 0.0)
+    base = Tied(Hypothesis(), Fit((), (), np.empty(0), FLIGHT.sizes.continuous, {}), 0.0)
     found = finding.Search(tuple(recordings), (), base.fit, {}, (), base, base)
     radius = 0.5 * recordings[0].disc.diameter
 

@@ -25,13 +25,14 @@ from validation.diagnosis.detectors.sample_alignment import likeliest_counts, ph
 from validation.diagnosis.detectors.saturation import saturation
 from validation.diagnosis.detectors.speed_ripple import ripple
 from validation.diagnosis.detectors.time_offsets import time_offsets
-from validation.diagnosis.relaxed_fit import NO_JUMPS, first_chain, relaxed
+from validation.diagnosis.relaxed_fit import first_chain, relaxed
 from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.constrained_fit import tied_fit
 from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.identification.clipping import equal_beyond_chance, plateau_of
 from validation.identification.gauss_newton import Fit
 from validation.identification.noise import estimate_noise
+from validation.identification.plants.rate_table import RATE_TABLE
 from validation.identification.prediction import shown
 
 DRIVER, FIELD = load_disc("driver")
@@ -232,7 +233,7 @@ def test_a_steady_table_has_no_ripple() -> None:
 def test_a_table_with_ripple_turns_as_in_the_engine() -> None:
     motion = turn_table(PROFILE, FIELD, [RIPPLE])
     chain = first_chain(table(RIPPLE))
-    assert chain.tangent == NO_JUMPS["rate_table"].sd.size
+    assert chain.plant.layout.directions == RATE_TABLE.sizes.continuous.sd.size
     values = {("rig.speed_ripple", name): v for name, v in RIPPLE.value._asdict().items()}
     t = np.arange(0.003, 0.95, 0.01)
     rate = shown(chain, values, "gyroscope", t)[:, 2]

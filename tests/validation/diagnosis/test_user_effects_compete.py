@@ -214,7 +214,7 @@ def test_the_column_of_an_effects_shape_is_that_of_its_form_whatever_its_name(tm
     values = {("my.warmth", "a_uT"): 3.0, ("my.warmth", "tau_s"): 4.0}
     columns = [Column("my.warmth", name, 1e-3) for name in ("a_uT", "tau_s")]
     with competing([effect]):
-        linear = linearise(current, values, columns, np.ones(current.tangent, dtype=np.bool_))
+        linear = linearise(current, values, columns, np.ones(current.plant.layout.directions, dtype=np.bool_))
     for channel in linear.channels:
         t, warms = linear.t[channel.rows], (channel.sensor, channel.axis) == ("magnetometer", "y_uT")
         expected = np.stack([-np.expm1(-t / 4.0), -3.0 * t / 16.0 * np.exp(-t / 4.0)], axis=1)

@@ -28,7 +28,6 @@ from validation.diagnosis.relaxed_fit import (
     first_chain,
     free_clocks,
     from_other_starts,
-    loose_jumps,
     loose_parameters,
 )
 from validation.diagnosis.selection.evidence import BOUNDS
@@ -36,11 +35,11 @@ from validation.identification.gauss_newton import Fit, refit
 from validation.identification.noise import GroupNoise
 from validation.identification.observations import readings_of
 from validation.identification.parameters import Parameter
+from validation.identification.plants import plant_of
 from validation.identification.segments import Chain
 
 __all__ = [
     "ASTRAY",
-    "LOOK",
     "RECONCILED",
     "Contradiction",
     "Look",
@@ -49,10 +48,6 @@ __all__ = [
     "look_at",
 ]
 
-#: what is looked at of each recording, s: two pieces of a flight, a short run on a rig. A free spin has too much that
-#: nobody knows: its beginning follows anything, or nothing before it is fitted whole; it is looked at for the figures
-#: of the answer alone, once spin rates are apart
-LOOK = {"flight": 1.0, "free_spin": 0.3, "spin_down": 10.0, "rate_table": 30.0}
 #: most steps of one look, and of one that serves for figures alone
 _STEPS, _STEPS_OF_FIGURES = 8, 2
 #: a robust root mean square of what is left of a sensor, in its noise, above which a look does not follow it. Of 44
@@ -113,12 +108,11 @@ class Contradiction:
     @property
     def sentences(self) -> tuple[str, ...]:
         """What there is to say, in words."""
-        recording = self.whole.fit.chains[0].recording
+        plant = self.whole.fit.plant
         length = float(np.median([chain.edges[-1] for chain in self.whole.fit.chains]))
-        motion = {"flight": "flight", "free_spin": "free spin", "spin_down": "run", "rate_table": "run of the table"}
         said = [
-            f"No motion of a {recording.plant} follows the first {length:.2g} s of these recordings, whatever the "
-            f"ordinary errors of the sensors are: the best {motion[recording.plant]} leaves "
+            f"No motion of a {plant.name} follows the first {length:.2g} s of these recordings, whatever the "
+            f"ordinary errors of the sensors are: the best {plant.motion} leaves "
             + ", ".join(f"{self.whole.level(s):.3g} times the noise of the {_said(s)}" for s in self.whole.sensors)
             + "."
         ]
@@ -175,11 +169,11 @@ def _listed(sensors: Sequence[str]) -> str:
 def contradiction_in(recordings: Sequence[Recording], known: Sequence[Parameter]) -> Contradiction | None:
     """Return which sensors contradict which, or None where some motion follows them, or may with a sensor's delay.
 
-    ``known`` are the stated numbers that may move. Of free spins only their rates are asked here, what follows their
-    readings later (`contradiction_after`).
+    ``known`` are the stated numbers that may move. Of free spins, whose beginnings follow anything, only their rates
+    are asked here, what follows their readings later (`contradiction_after`).
     """
     sensors = [name for name in SENSORS if any(name in one for one in recordings)]
-    if recordings[0].plant == "free_spin":
+    if plant_of(recordings[0]).weakly_identified:
         apart_by = rates_apart(recordings)
         figures = None if apart_by is None else look_at(recordings, known, sensors, FEW)
         if apart_by is None or figures is None:
@@ -243,7 +237,7 @@ def contradiction_after(fit: Fit) -> Contradiction | None:
 
     One sensor alone may be late, lag or have lost samples: where that would reconcile it, a search finds what it is.
     """
-    if fit.chains[0].recording.plant != "free_spin":
+    if not fit.plant.weakly_identified:
         return None
     noise = true_noise([readings for chain in fit.chains for readings in chain.readings])
     sensors = tuple(name for name in SENSORS if any(r.sensor == name for r in fit.chains[0].readings))
@@ -293,14 +287,14 @@ def look_at(
 
     ``free`` are parameters that may move beside the ordinary ones, and where they start.
     """
-    plant = recordings[0].plant
+    plant = plant_of(recordings[0])
     chains: list[Chain] = []
     places: list[int] = []
     for i, one in enumerate(recordings):
         samples = {name: own for name, own in one.samples.items() if name in sensors}
         if len(chains) == few or not samples:
             continue
-        chain = beginning(first_chain(replace(one, samples=samples)), LOOK[plant])
+        chain = beginning(first_chain(replace(one, samples=samples)), plant.durations.first_look)
         if any(np.any(readings.good) for readings in chain.readings):
             chains.append(chain)
             places.append(i)
@@ -318,12 +312,12 @@ def look_at(
     parameters = (*usual, *free)
     noise = true_noise([readings for chain in chains for readings in chain.readings])
     start = np.array([*(q.stated for q in usual), *free.values()])
-    fit = Fit(tuple(chains), parameters, start, loose_jumps(plant), noise)
+    fit = Fit(tuple(chains), parameters, start, plant.sizes.relaxed, noise)
     count = sum(int(np.count_nonzero(r.good)) for chain in chains for r in chain.readings)
-    steps = _STEPS_OF_FIGURES if plant == "free_spin" else _STEPS
+    steps = _STEPS_OF_FIGURES if plant.weakly_identified else _STEPS
     fit = refit(fit, iterations=steps, tolerance=1e-3 * count, bounds=BOUNDS)
     look = Look(tuple(name for name in SENSORS if name in there), tuple(places), fit, noise, tuple(left_of(fit, noise)))
-    if look.follows or len(there) == 1 or plant == "free_spin":
+    if look.follows or len(there) == 1 or plant.weakly_identified:
         return look
     # where no path is there, the attitude at the start may be any about the field
     fit = from_other_starts(fit)

@@ -15,8 +15,8 @@ from scipy.signal import lfilter
 from discsim.arrays import FloatArray
 from validation.identification.gauss_newton import Fit
 from validation.identification.noise import DEFAULT, GroupNoise
-from validation.identification.observations import Readings, group_of
 from validation.identification.prediction import shown
+from validation.identification.readings import Readings, group_of
 from validation.identification.segments import Chain
 from validation.identification.sensor_model import Values, delay
 
@@ -80,9 +80,8 @@ def left_of(fit: Fit, noise: Mapping[str, GroupNoise]) -> list[dict[str, float]]
 
 
 #: times by which a sensor may be off in the middle of a window, s: a turn of a slow spin; how wrong its clock may be
-#: within, as a share: lost samples and clocks that are worth the name stay below it; how long a window is, s, by plant
+#: within, as a share: lost samples and clocks that are worth the name stay below it
 _SHIFTS, _STRETCHED = np.arange(-0.16, 0.161, 0.002), np.linspace(-0.04, 0.04, 9)
-_WINDOW = {"flight": 0.5, "free_spin": 0.4, "spin_down": 1.0, "rate_table": 1.0}
 #: so many windows, and so many readings of each, are enough to tell
 _WINDOWS, _READINGS = 5, 60
 #: time constants of a lag that a sensor may have, s, and the spacing of the motion that it is taken of
@@ -104,7 +103,7 @@ def left_when_shifted(chain: Chain, values: Values, readings: Readings, noise: M
     if grid.size < 2 or used.size < 4:
         return np.nan
     told = shown(chain, values, readings.sensor, grid) / sd
-    window = np.floor((at[used] - start) / _WINDOW[chain.recording.plant]).astype(int)
+    window = np.floor((at[used] - start) / chain.plant.durations.window).astype(int)
     parts = [part for k in np.unique(window) if (part := used[window == k]).size >= 4]
     parts = [part[:: 1 + part.size // _READINGS] for part in parts[:: 1 + len(parts) // _WINDOWS]]
     levels = []

@@ -17,6 +17,7 @@ from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import Lag
 from discsim.recording import Recording
 from validation.diagnosis.consistency.turning import pull_of
+from validation.identification.plants import plant_of
 
 __all__ = ["SettleProof", "Settling", "settling_of"]
 
@@ -146,7 +147,7 @@ def _lowest(squares: FloatArray, readings: int) -> tuple[float, float]:
 
 def _start(recording: Recording, name: str) -> _Start | None:
     found = pull_of(recording)
-    if found is None or recording.plant not in ("flight", "free_spin"):
+    if found is None or not plant_of(recording).airborne:
         return None
     t, felt, pull = found
     good = np.all(np.isfinite(felt), axis=1)

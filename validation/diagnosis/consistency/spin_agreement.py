@@ -60,6 +60,7 @@ class _Claim(NamedTuple):
     grows: Mapping[str, float]
 
 
+#: single causes, by the ids of effects
 _CAUSES: Mapping[str, _Claim] = {
     catalogued(kind, acts_on).id: claim
     for kind, acts_on, claim in (

@@ -18,8 +18,8 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.rig import AxisTilt
 from discsim.recording import SENSORS, Recording, Samples
-from validation.diagnosis.design.plans import Plan, plans_about
-from validation.diagnosis.relaxed_fit import PIECE, unknowns
+from validation.diagnosis.design.plans import plans_about
+from validation.diagnosis.relaxed_fit import unknowns
 from validation.diagnosis.result import Advice, Separation
 from validation.diagnosis.selection.candidates import Trial, parameters_of
 from validation.diagnosis.selection.evidence import BOUNDS
@@ -29,12 +29,13 @@ from validation.identification.gauss_newton import Fit, mapped
 from validation.identification.linearisation import linearise, moved
 from validation.identification.noise import NoiseModel
 from validation.identification.normal_equations import local_step, reduce, shared_step
-from validation.identification.observations import Readings, group_of
-from validation.identification.parameters import Parameter, values_of
+from validation.identification.parameters import Parameter, Values, values_of
+from validation.identification.plants import Plant
+from validation.identification.plants.plan import Plan
 from validation.identification.prediction import read, shown
-from validation.identification.propagation import WOBBLE, Column
+from validation.identification.propagation import Column
+from validation.identification.readings import Readings, group_of
 from validation.identification.segments import Chain, chain, recut
-from validation.identification.sensor_model import Values
 
 __all__ = ["ENOUGH", "advise", "confusions", "expected_evidence", "in_words"]
 
@@ -155,11 +156,12 @@ def _typical(found: Search, trial: Trial) -> int:
 
 def _pace(one: Chain) -> float:
     """Return what recordings are put in order by: a throw's speed, a table's highest rate, else the rate at first."""
-    if one.recording.plant == "flight":
-        return float(np.linalg.norm(one.states[0, 3:6]))
+    layout = one.plant.layout
+    if layout.velocity is not None:
+        return float(np.linalg.norm(one.states[0, layout.velocity]))
     if one.recording.command is not None:
         return float(np.max(np.abs(one.recording.command.value)))
-    return abs(float(one.states[0, 1 if one.recording.plant == "spin_down" else 12]))
+    return 0.0 if layout.spin is None else abs(float(one.states[0, layout.spin]))
 
 
 def expected_evidence(found: Search, rival: Rival, plans: Sequence[Plan], like: int) -> list[float]:
@@ -185,7 +187,7 @@ def _values(fit: Fit, own: Sequence[Parameter], like: int) -> dict[tuple[str, st
     """Return the values that would hold in a new recording with unknowns of its own."""
     parameters = (*fit.parameters, *own)
     at = np.concatenate([fit.at, [q.stated for q in own]])
-    shared = [k for k, q in enumerate(fit.parameters) if _holds(q, like)]
+    shared = [k for k, q in enumerate(fit.parameters) if _holds(q, like, fit.plant)]
     return {**fit.fixed, **_sums(parameters, at, [*shared, *range(len(fit.parameters), len(parameters))])}
 
 
@@ -194,13 +196,12 @@ def _recorded(found: Search, plan: Plan, own: Sequence[Parameter], like: int) ->
     fit = found.final.fit
     values = _values(fit, own, like)
     old = fit.chains[like]
-    state = plan.state.copy()
-    if old.recording.plant == "free_spin":
-        state[4] = float(np.mean(old.states[:, 4]))  # the spin dies at the pace that it had
+    plant = old.plant
+    state = plan.state if plant.design is None else plant.design.as_in_hand(plan.state, old.states)
     bare = replace(old.recording, command=plan.command, release=None, name="planned", path=None, samples={})
     whole = chain(bare, np.array([0.0, plan.duration]), state[None])
-    end = _landing(whole, values) if bare.plant == "flight" else plan.duration
-    count = max(1, round(end / PIECE[bare.plant]))
+    end = _landing(whole, values) if plant.follows_path else plan.duration
+    count = max(1, round(end / plant.durations.segment))
     cut = recut(whole, values, np.linspace(0.0, end + 1e-6, count + 1))
     samples = {sensor: _samples(cut, values, sensor, old.recording, fit.noise) for sensor in old.recording.samples}
     samples = {sensor: item for sensor, item in samples.items() if len(item)}
@@ -268,7 +269,7 @@ class _Held:
         parameters = (*fit.parameters, *own)
         shared, p = len(fit.parameters), len(parameters)
         at = np.concatenate([fit.at, [q.stated for q in own]])
-        active = [k for k, q in enumerate(parameters) if k >= shared or _holds(q, like)]
+        active = [k for k, q in enumerate(parameters) if k >= shared or _holds(q, like, fit.plant)]
         columns = [Column(q.group, q.name, q.step) for q in (parameters[k] for k in active)]
         growth = np.nan
         for _ in range(_STEPS):
@@ -295,9 +296,9 @@ class _Held:
         return full
 
 
-def _holds(q: Parameter, like: int) -> bool:
+def _holds(q: Parameter, like: int, plant: Plant) -> bool:
     """Tell whether a parameter of those in hand would act in a new recording like number ``like``."""
-    return q.acts_in(like) and not _once(q.group) and q.key not in WOBBLE
+    return q.acts_in(like) and not _once(q.group) and q.key not in plant.own_keys
 
 
 def _sums(parameters: Sequence[Parameter], at: FloatArray, active: Sequence[int]) -> dict[tuple[str, str], float]:
@@ -311,10 +312,10 @@ def _sums(parameters: Sequence[Parameter], at: FloatArray, active: Sequence[int]
 def _own(found: Search, plan: Plan, like: int) -> tuple[Parameter, ...]:
     """Return what a new recording leaves open beside its states: a free spin's wobble, a rig's lean."""
     values = values_of(found.final.fit.parameters, found.final.fit.at, like, {})
-    wobble = [
+    motion = [
         replace(q, stated=values.get(q.key, q.stated), recordings=None) for q in unknowns([found.recordings[like]])
     ]
     lean = [
         Parameter(*key, angle, 2e-4, _LEAN_SIGMA) for key, angle in zip(_LEAN, plan.lean, strict=True) if any(plan.lean)
     ]
-    return (*wobble, *lean)
+    return (*motion, *lean)

@@ -19,7 +19,6 @@ from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import Fit
 from validation.identification.noise import NoiseModel
 from validation.identification.parameters import Parameter
-from validation.identification.propagation import WOBBLE
 
 __all__ = ["searched"]
 
@@ -39,15 +38,15 @@ def searched(
     taken = tied.hypothesis.trials
     fit, level = (loose, noise) if not taken else (tied.fit, tied.fit.noise)
     found: list[Proposal | Shifted] = []
-    if loose.chains[0].recording.plant != "rate_table":
+    if not loose.plant.commanded:
         asked = asked_of(fit, level, own, tied.hypothesis)
         found += events(asked, least)
         found += gusts(asked, least)
     found += ripple(tied.fit, tied.fit.noise, taken, least)
-    known = [q for q in own if q.key not in WOBBLE]
+    known = [q for q in own if q.key not in loose.plant.own_keys]
     found += slips.found(loose, known, taken)
     found += saturation(tied.fit, tied.fit.noise, taken)
     found += time_offsets(tied.fit, tied.fit.noise, taken)
-    if loose.chains[0].recording.plant != "free_spin":  # there an accelerometer counts by its means over turns
+    if loose.plant.path_known:  # else an accelerometer counts by its means over turns
         found += dropped_accelerometer(loose, noise, taken)
     return sorted(found, key=lambda p: p.proposal.gain if isinstance(p, Shifted) else p.gain, reverse=True)

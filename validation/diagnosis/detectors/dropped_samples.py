@@ -11,7 +11,7 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import DroppedSamples
 from validation.diagnosis.detectors.sample_alignment import first_yaw, lost_along, phase_counts, repaired
-from validation.diagnosis.relaxed_fit import NO_JUMPS, relaxed
+from validation.diagnosis.relaxed_fit import relaxed
 from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import Fit, mapped, refit
@@ -98,9 +98,9 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = 40
         return []
     new = tuple(_own_times(one, chain, {sensor: c}) for one, chain, c in zip(anew.chains, chains, counts, strict=True))
     # what was lost while the phase stood still shows in what comes after, by a motion that hangs together
-    plant = chains[0].recording.plant
+    plant = anew.plant
     found = replace(anew, chains=new)
-    if plant == "rate_table":
+    if plant.commanded:
         whole = tuple(
             _begun(replace(c, edges=c.edges[[0, -1]], states=c.states[:1]), anew, i) for i, c in enumerate(new)
         )
@@ -110,7 +110,7 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = 40
         )
         found = _with_losses(replace(found, chains=standing), counted, sensor)
     for _ in range(2):
-        tied = refit(replace(found, jumps=NO_JUMPS[plant]), iterations=4)
+        tied = refit(replace(found, jumps=plant.sizes.continuous), iterations=4)
         counted, _ = _counted(tied, sensor, _stated_sd(found, sensor, anew.noise))
         same = all(
             np.array_equal(a.lost.get(sensor, 0.0), b.lost.get(sensor, 0.0))
@@ -125,13 +125,12 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = 40
 
 def _begun(whole: Chain, fit: Fit, i: int) -> Chain:
     """Return a table's motion in one piece from the yaw that its first readings show."""
-    if whole.recording.get("magnetometer") is None:
+    yaw = whole.plant.layout.yaw
+    if yaw is None or whole.recording.get("magnetometer") is None:
         return whole
-    states = whole.states.copy()
-    states[0, :2] = 0.0
-    whole = replace(whole, states=states)
-    turned = states.copy()
-    turned[0, 0] = first_yaw(whole, fit.values(i))
+    whole = replace(whole, states=np.zeros_like(whole.states))
+    turned = whole.states.copy()
+    turned[:, yaw] = first_yaw(whole, fit.values(i))
     return replace(whole, states=turned)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,30 +11,21 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.events import Impulse, SpinStep
 from validation.diagnosis.detectors.local_problem import Asked, Ground, gain_of, peaks
-from validation.diagnosis.relaxed_fit import NO_JUMPS
 from validation.diagnosis.selection.candidates import Trial, detected
 from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import Fit, mapped
 from validation.identification.linearisation import linearise
+from validation.identification.plants.plant import Layout
 from validation.identification.propagation import Column
 from validation.identification.segments import undone
 
-__all__ = ["EARLIEST", "events"]
+__all__ = ["events"]
 
-#: directions of the state in which an event jumps, by plant
-_DIRECTIONS: Mapping[type[Any], Mapping[str, tuple[int, ...]]] = {
-    Impulse: {"flight": (3, 4, 5)},
-    SpinStep: {"flight": (11,), "free_spin": (11,), "spin_down": (1,)},
+#: what of a state an event makes jump
+_MOVES: Mapping[type[Any], Callable[[Layout], slice | int | None]] = {
+    Impulse: lambda layout: layout.velocity,
+    SpinStep: lambda layout: layout.spin,
 }
-
-
-#: how far about the best boundary the instant of an event is looked for, s
-_NEAR = {"flight": 0.09, "free_spin": 0.2, "spin_down": 0.12}
-
-
-#: an event of a free spin before this instant, s, is not told from where the spin and its decay started
-EARLIEST = {"flight": 0.0, "free_spin": 0.1, "spin_down": 0.0}
-
 
 #: how many recordings and kinds of event are followed up at a time: the strongest, the others come after them
 _FOLLOWED = 3
@@ -42,7 +33,7 @@ _FOLLOWED = 3
 
 def _jumps(ground: Ground, directions: Sequence[int]) -> FloatArray:
     """Return what a jump of the state in some directions at each boundary (k - 1,) would gain."""
-    d = ground.chain.tangent
+    d = ground.chain.plant.layout.directions
     k = len(ground.chain.states)
     moves = ground.linear.moves[:, :, :d]
     A = np.hstack([ground.white, ground.left[:, None]])
@@ -65,7 +56,7 @@ def _events_at(ground: Ground, fit: Fit, recording: int, trial: Trial, instants:
     """Return an event at each of some instants as a proposal, by its true columns."""
     columns = [Column(c.group, c.name, c.step, (("t_s", float(t)),)) for t in instants for c in trial.columns]
     values = fit.values(recording)
-    linear = linearise(ground.chain, values, columns, NO_JUMPS[ground.chain.recording.plant].allowed)
+    linear = linearise(ground.chain, values, columns, ground.chain.plant.sizes.continuous.allowed)
     white = ground.whiten(linear.shared)
     width = len(trial.columns)
     found = []
@@ -86,11 +77,11 @@ def events(asked: Asked, least: float = 25.0) -> list[Proposal]:
     instant is then read off the event's true signature, in which a pulse of 10 ms is a needle.
     """
     recordings = [chain.recording for chain in asked.fit.chains]
-    plant = recordings[0].plant
-    first = EARLIEST[plant]
+    layout, times = asked.fit.plant.layout, asked.fit.plant.durations
     kinds: list[tuple[str, Sequence[int], tuple[str, ...]]] = [
-        (row.id, _DIRECTIONS[row.type][plant], tuple(name for name in row.parameters if name != "t_s"))
+        (row.id, layout.directions_of(places), tuple(name for name in row.parameters if name != "t_s"))
         for row in detected(recordings, "events")
+        if (places := _MOVES[row.type](layout)) is not None
     ]
 
     def scanned(task: tuple[int, tuple[str, Sequence[int], tuple[str, ...]]]) -> FloatArray:
@@ -102,15 +93,16 @@ def events(asked: Asked, least: float = 25.0) -> list[Proposal]:
         ground = asked.grounds[i]
         trial = Trial(id, tuple(Column(id, name, 0.02) for name in names))
         inner, end = ground.chain.edges[1:-1], float(ground.chain.edges[-1])
-        near = np.concatenate([inner[j] + _NEAR[plant] * np.linspace(-1.0, 1.0, 13) for j in peaks(gain, 2)])
+        near = np.concatenate([inner[j] + times.event_near * np.linspace(-1.0, 1.0, 13) for j in peaks(gain, 2)])
         near = np.unique(near.round(4))
-        near = near[(near > max(0.01, first)) & (near < end)]
+        near = near[(near > max(0.01, times.event_from)) & (near < end)]
         if near.size == 0:
             return None
         best = max(_events_at(ground, asked.fit, i, trial, near), key=gain_of)
         about = best.trial.shapes["t_s"] + np.linspace(-0.012, 0.012, 7)
         best = max(
-            [best, *_events_at(ground, asked.fit, i, trial, about[(about > first) & (about < end)])], key=gain_of
+            [best, *_events_at(ground, asked.fit, i, trial, about[(about > times.event_from) & (about < end)])],
+            key=gain_of,
         )
         return best if best.gain > least else None
 

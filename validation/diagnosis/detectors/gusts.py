@@ -37,7 +37,7 @@ def gusts(asked: Asked, least: float = 25.0) -> list[Proposal]:
 def _gust(id: str, ground: Ground, recording: int, wide: Sequence[int]) -> Proposal | None:
     """Return the gust in a recording that would gain most; ``wide`` are the places of a steady wind's columns."""
     linear, piece, edges = ground.linear, ground.piece, ground.chain.edges
-    d, own, k = ground.chain.tangent, linear.unknowns, len(ground.chain.states)
+    d, own, k = ground.chain.plant.layout.directions, linear.unknowns, len(ground.chain.states)
     first = linear.local[:, :d]
     # u: the change of the first state that a wind up to each boundary amounts to
     u = np.stack([undone(m[:, :d], m[:, [own + w for w in wide]]) for m in linear.moves])

@@ -10,12 +10,11 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.air import Wind
 from discsim.effects.catalogue import catalogued
-from validation.diagnosis.relaxed_fit import NO_JUMPS
 from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
 from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import Fit, linearised
-from validation.identification.linearisation import IntArray, Linear
+from validation.identification.linear import IntArray, Linear
 from validation.identification.noise import NoiseModel, whitened
 from validation.identification.normal_equations import reduce, unknown_prior
 from validation.identification.parameters import Parameter
@@ -99,10 +98,10 @@ def asked_of(fit: Fit, noise: NoiseModel, own: Sequence[Parameter], hypothesis: 
 
     Parameters of the fit that the hypothesis does not have are taken back to where they stand without it.
     """
-    plant = fit.chains[0].recording.plant
+    plant = fit.plant
     free = fitted_parameters(hypothesis, own)
     wind: tuple[int, ...] = ()
-    if plant == "flight":
+    if plant.follows_path:
         # a wind without a prior would swallow a gust: where none is supposed, it is there for its columns alone
         keys = [q.key for q in free if q.recordings is None]
         free = (*free, *(Parameter(*key, 0.0, 0.05, 1e-9) for key in WIND if key not in keys))
@@ -111,8 +110,8 @@ def asked_of(fit: Fit, noise: NoiseModel, own: Sequence[Parameter], hypothesis: 
     every = (*free, *(q for q in fit.parameters if (q.key, q.recordings) not in mine))
     place = {(q.key, q.recordings): number for q, number in zip(fit.parameters, fit.at, strict=True)}
     at = np.array([place.get((q.key, q.recordings), q.stated) for q in every])
-    tied = replace(fit, parameters=every, at=at, jumps=NO_JUMPS[plant], noise=noise)
-    if plant != "free_spin":  # its pieces are short, and what it does not model wanders by the piece
+    tied = replace(fit, parameters=every, at=at, jumps=plant.sizes.continuous, noise=noise)
+    if not np.any(plant.sizes.continuous.allowed):  # else segments are short, and what is not modelled wanders by them
         chains = tuple(recut(chain, tied.values(i), _fine_edges(chain)) for i, chain in enumerate(tied.chains))
         tied = replace(tied, chains=chains)
     return Asked(tied, hypothesis.trials, _grounds(tied, len(free)), wind)

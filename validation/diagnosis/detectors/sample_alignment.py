@@ -13,7 +13,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.compiled import compiled_nogil
 from discsim.recording import Recording, Samples
-from validation.identification.linearisation import IntArray
+from validation.identification.linear import IntArray
 from validation.identification.prediction import shown
 from validation.identification.segments import Chain
 from validation.identification.sensor_model import Values, delay

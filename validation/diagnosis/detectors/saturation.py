@@ -41,7 +41,7 @@ def saturation(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = ()) -> list
             continue
         limits[i] = limit
         steps.append(chain.recording.sheets["accelerometer"].resolution or 0.0)
-        if chain.recording.plant == "free_spin":
+        if not chain.plant.path_known:
             gain += equal_beyond_chance(chain.recording)
             continue
         at, axis = np.nonzero(readings.clipped)

@@ -30,8 +30,7 @@ def ripple(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: floa
     The rate's residual (rate reference, else gyroscope, else the magnetometer's phase) is transformed over the angle
     turned; the best orders are then refined by least squares. The gain is less what so many orders gain by chance.
     """
-    recordings = [chain.recording for chain in fit.chains]
-    if recordings[0].plant != "rate_table" or any(trial.id == _ID for trial in taken):
+    if not fit.plant.commanded or any(trial.id == _ID for trial in taken):
         return []
     told = [_rate_residual(fit, i, noise) for i in range(len(fit.chains))]
     parts = [part for part in told if part is not None]
@@ -102,7 +101,8 @@ def _rate_residual(fit: Fit, i: int, noise: NoiseModel) -> tuple[FloatArray, Flo
         if sensor != "magnetometer":
             e = e - np.mean(e)
             return psi[moving], e[moving], sd[moving] ** -2.0
-        slope = np.concatenate([linear.own[c.rows, 0] for c in channels])
+        assert chain.plant.layout.yaw is not None
+        slope = np.concatenate([linear.own[c.rows, chain.plant.layout.yaw] for c in channels])
         ok = moving & (np.abs(slope) > 3.0 * sd)
         # the rate that a slip of phase amounts to is its slope in time: differences of one axis at a time
         return _phase_rate(t[ok], psi[ok], e[ok] / slope[ok], sd[ok] / np.abs(slope[ok]))

@@ -14,15 +14,14 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
-from discsim.effects.kind import RIGS
 from discsim.effects.sensors import Lag
 from discsim.effects.setup import TimeOffset
 from validation.diagnosis.selection.candidates import Trial, free_trial
 from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import Fit
 from validation.identification.noise import NoiseModel
-from validation.identification.observations import group_of
 from validation.identification.prediction import shown
+from validation.identification.readings import group_of
 from validation.identification.segments import Chain
 from validation.identification.sensor_model import delay
 
@@ -42,7 +41,7 @@ def time_offsets(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least
 
     What is gained is in chi-squared in ``noise``; effects that are ``taken`` already are not proposed.
     """
-    if fit.chains[0].recording.plant not in RIGS:
+    if fit.plant.airborne:
         return []
     found = []
     for sensor in ("accelerometer", "gyroscope"):

@@ -10,7 +10,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import ClockRate
-from validation.diagnosis.relaxed_fit import NO_JUMPS, beginning
+from validation.diagnosis.relaxed_fit import beginning
 from validation.diagnosis.selection.evidence import BOUNDS
 from validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
 from validation.identification.gauss_newton import Fit, penalty_of, refit
@@ -53,9 +53,9 @@ def tied_fit(
     """
     parameters = fitted_parameters(hypothesis, own)
     at = np.array([start.get((q.key, q.recordings), q.stated) for q in parameters])
-    plant = loose.chains[0].recording.plant
-    fit = Fit(_retimed(loose, parameters, at), parameters, at, NO_JUMPS[plant], noise)
-    if plant in ("rate_table", "spin_down") and any(q.group in CLOCKS for q in parameters):
+    plant = loose.plant
+    fit = Fit(_retimed(loose, parameters, at), parameters, at, plant.sizes.continuous, noise)
+    if not plant.airborne and any(q.group in CLOCKS for q in parameters):
         fit = replace(fit, at=_longer_and_longer(fit))
     begun = fit
     fit = refit(fit, iterations=iterations, bounds=BOUNDS, bar=bar)

@@ -11,8 +11,6 @@ from discsim.effects.catalogue import catalogued
 from discsim.effects.events import SpinStep
 from discsim.recording import Recording
 from validation.diagnosis.detectors.dropped_samples import Slips
-from validation.diagnosis.detectors.events import EARLIEST
-from validation.diagnosis.relaxed_fit import NO_JUMPS
 from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.constrained_fit import Tied
 from validation.diagnosis.selection.evidence import ONE_SIDED
@@ -86,6 +84,8 @@ class Search:
     warnings: list[str] = field(default_factory=list)
     #: what the magnetometer's phase told of lost samples, by the relaxed fit that it was asked of
     slips: Slips = field(default_factory=Slips)
+    #: what relations between sensors had asked for before any fit, with its values to start from
+    hints: tuple[Proposal, ...] = ()
     #: what choosing the samples that were lost has cost, in twice the log likelihood
     cost: float = 0.0
     _asked: tuple[Fit, Board] | None = None
@@ -93,7 +93,7 @@ class Search:
     def board_of(self, fit: Fit) -> Board:
         """Return what every effect would do to a fit, in its own noise; of the last fit that was asked it is known."""
         if self._asked is None or self._asked[0] is not fit:
-            self._asked = fit, board_of(fit, self.trials, fit.noise, NO_JUMPS[self.recordings[0].plant])
+            self._asked = fit, board_of(fit, self.trials, fit.noise, fit.plant.sizes.continuous)
         return self._asked[1]
 
     def at_base(self) -> Search:
@@ -172,12 +172,11 @@ def possible(tied: Tied) -> bool:
     """
     sd = np.sqrt(np.maximum(np.diag(tied.fit.covariance), 0.0))
     recording = tied.fit.chains[0].recording
-    plant = recording.plant
     radius = _radius(recording)
     for q, value, error in zip(tied.fit.parameters, tied.fit.at, sd, strict=True):
         if q.key in ONE_SIDED and ONE_SIDED[q.key] * value < -3.0 * error:
             return False
-        if q.key == _KICK and value < EARLIEST[plant]:
+        if q.key == _KICK and value < tied.fit.plant.durations.event_from:
             return False
         if _is_place(q.group) and abs(value) - 3.0 * error > radius:
             return False

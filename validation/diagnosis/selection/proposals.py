@@ -8,7 +8,8 @@ from itertools import combinations
 
 import numpy as np
 
-from validation.diagnosis.selection.candidates import Trial, parameters_of
+from discsim.effects import Effect
+from validation.diagnosis.selection.candidates import Trial, free_trial, parameters_of
 from validation.diagnosis.selection.evidence import ONE_SIDED, RIVAL
 from validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
 from validation.diagnosis.selection.screening import Answer, Board, free_columns
@@ -59,6 +60,12 @@ def proposals(
         if best is not None:
             found.append(best)
     return sorted(found, key=lambda p: RIVAL * len(parameters_of(p.trial)) - p.gain)
+
+
+def hinted(effect: Effect) -> Proposal:
+    """Return an effect of about the right size as a proposal, whatever algebra says of it."""
+    trial = free_trial(effect.id)
+    return Proposal(trial, np.inf, {((effect.id, name), None): size for name, size in effect.sizes.items()})
 
 
 def scope_price(recordings: int) -> float:

@@ -15,11 +15,12 @@ from discsim.arrays import FloatArray
 from discsim.errors import InputError
 from validation.diagnosis.selection.candidates import Trial, parameters_of
 from validation.identification.gauss_newton import Fit, linearised_columns, mapped
-from validation.identification.linearisation import Linear
+from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel
 from validation.identification.normal_equations import Reduced, reduce
 from validation.identification.parameters import Jumps, Parameter
-from validation.identification.propagation import WOBBLE, Column
+from validation.identification.plants import PLANTS
+from validation.identification.propagation import Column
 
 __all__ = ["Answer", "Board", "board_of"]
 
@@ -82,7 +83,7 @@ class Board:
 
 def column_of(q: Parameter) -> Column:
     """Return the column of a parameter; one that differs from recording to recording has a column for each."""
-    if q.recordings is not None and q.key in WOBBLE:
+    if q.recordings is not None and q.group in PLANTS:
         return Column(q.group, q.name, q.step, (("recording", float(min(q.recordings))),))
     return Column(q.group, q.name, q.step)
 

@@ -13,10 +13,11 @@ from typing import TypeAlias
 
 import numpy as np
 
+from discsim.effects import Effect
 from discsim.recording import Recording
 from validation.diagnosis.detectors.all import searched
 from validation.diagnosis.detectors.dropped_samples import Shifted
-from validation.diagnosis.relaxed_fit import NO_JUMPS, relaxed, unknowns, without_outliers
+from validation.diagnosis.relaxed_fit import relaxed, unknowns, without_outliers
 from validation.diagnosis.selection.candidates import Trial, parameters_of, trials_for
 from validation.diagnosis.selection.constrained_fit import Tied, tied_fit
 from validation.diagnosis.selection.evidence import ONE_SIDED, RIVAL, price
@@ -35,13 +36,19 @@ from validation.diagnosis.selection.found import (
     values_of_fit,
 )
 from validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
-from validation.diagnosis.selection.proposals import Proposal, one_per_effect, pairs, proposals, start_of
+from validation.diagnosis.selection.proposals import (
+    Proposal,
+    hinted,
+    one_per_effect,
+    pairs,
+    proposals,
+    start_of,
+)
 from validation.diagnosis.selection.screening import Board, board_of
 from validation.identification.competing_effects import row_of
 from validation.identification.gauss_newton import Fit, merit_of
 from validation.identification.noise import NoiseModel, estimate_noise, robust_noise
 from validation.identification.parameters import Parameter
-from validation.identification.propagation import WOBBLE
 from validation.identification.stated_parameters import stated_parameters
 
 __all__ = ["search", "tried_without"]
@@ -57,10 +64,9 @@ MOST_EFFECTS = 4
 REFITTED, REFITTED_AT_MOST = 4, 9
 #: chi-squared per reading, in the noise of the relaxed fit, below which a fit is near the data
 _NEAR = 1.2
-#: most steps of the baseline's fit, and as many again where it comes near the data: a free spin's is slow
-_BASE_ITERATIONS = {"flight": 8, "free_spin": 16, "spin_down": 8, "rate_table": 8}
-#: a refit that will leave this many times the chi-squared of the best one so far is given up
-_HOPELESS = 10.0
+#: a refit that will leave this many times the chi-squared of the best one so far is given up, and where that is near
+#: the data
+_HOPELESS, _HOPELESS_NEAR = 10.0, 4.0
 #: what it counts, in twice the log likelihood, that an effect came out with the sign that physics gives it: a lag and
 #: an offset of time are one to first order; of fits that tie to within what a few readings weigh the lag is named
 _RIGHT_SIGN = 4.0
@@ -79,26 +85,29 @@ def search(
     as_stated: Sequence[Recording] | None = None,
     followed: Fit | None = None,
     free: Sequence[Parameter] = (),
+    hints: Sequence[Effect] = (),
 ) -> Search:
     """Find the effects that explain recordings of one plant.
 
     ``as_stated`` are the same with nothing that stands in for what they do not state, ``followed`` their relaxed fit
-    where it is known already; ``free`` are numbers that every fit may move.
+    where it is known already; ``free`` are numbers that every fit may move. ``hints`` are effects of about the right
+    size that sensors asked of one another before any fit: algebra from far away finds no clock by whose error phases
+    run away.
     """
     known = (*stated_parameters(recordings), *free)
     own = (*known, *unknowns(recordings))
     report("following the data", 0, 4)
     loose, left_out = without_outliers(relaxed(recordings, known) if followed is None else followed)
     noise = estimate_noise(loose.linears, [linear.residual for linear in loose.linears])
-    plant = recordings[0].plant
+    plant = loose.plant
     given = {q.group for q in free}
     trials = tuple(trial for trial in trials_for(recordings) if trial.id not in given)
     report("asking every effect", 1, 4)
-    board = board_of(loose, trials, noise, NO_JUMPS[plant])
+    board = board_of(loose, trials, noise, plant.sizes.continuous)
     report("fitting the baseline", 2, 4)
     start = {**_start(board, Hypothesis(), own), **_wobbles(loose)}
-    base = tied_fit(loose, Hypothesis(), own, noise, start, iterations=_BASE_ITERATIONS[plant])
-    if chi2_in(base, noise) < FAR * base.fit.count and base.fit.iterations >= _BASE_ITERATIONS[plant]:
+    base = tied_fit(loose, Hypothesis(), own, noise, start, iterations=plant.base_steps)
+    if chi2_in(base, noise) < FAR * base.fit.count and base.fit.iterations >= plant.base_steps:
         # beside the data what the baseline has left to gain would pass for what an effect gains
         again = tied_fit(
             base.fit,
@@ -106,12 +115,13 @@ def search(
             own,
             base.fit.noise,
             values_of_fit(base),
-            iterations=_BASE_ITERATIONS[plant],
+            iterations=plant.base_steps,
             bar=merit_of(base.fit, base.fit.linears),
         )
         base = min(base, again, key=lambda one: one.score)
     found = Search(tuple(as_stated or recordings), own, loose, noise, trials, base, base)
     found.outliers = left_out
+    found.hints = tuple(hinted(hint) for hint in hints if any(trial.id == hint.id for trial in trials))
     report("refitting candidates", 3, 4)
     _settle(found, _grown(found, board))
     report("done", 4, 4)
@@ -178,7 +188,7 @@ def _wobbles(fit: Fit) -> Start:
     What algebra expects of it is far from linear where turning for a second makes a radian.
     """
     parameters = zip(fit.parameters, fit.at, strict=True)
-    return {(q.key, q.recordings): float(v) for q, v in parameters if q.key in WOBBLE}
+    return {(q.key, q.recordings): float(v) for q, v in parameters if q.key in fit.plant.own_keys}
 
 
 def _told(tied: Tied | None) -> bool:
@@ -186,11 +196,9 @@ def _told(tied: Tied | None) -> bool:
     return tied is not None and bool(tied.hypothesis.trials[-1].told)
 
 
-def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
-    """Return the fit with the best further effect, or None where none is worth its price."""
-    noise = found.loose_noise
-    chi2_now = chi2_in(current, noise)
-    distant = chi2_now > FAR * current.fit.count
+def _offers(found: Search, board: Board, current: Tied, step: int) -> list[Offer]:
+    """Return further effects that may be worth their price, those to be refitted first at the front."""
+    distant = far(found, current)
     # what is asked of the relaxed fit, and of the present one
     there: list[Offer] = []
     here: list[Offer] = []
@@ -214,11 +222,22 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     # far from the data the two are asked in different noise: what they gain does not compare
     there, here = ([offer for offer in some if on_the_disc(found, offer[0].start)] for some in (there, here))
     worth = _in_turn(there, here) if distant and step > 0 else _in_turn([*there, *here])
+    if distant:
+        present = {trial.id for trial in current.hypothesis.trials}
+        worth = [*((hint, found.loose, 0.0) for hint in found.hints if hint.trial.id not in present), *worth]
+    return worth
+
+
+def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
+    """Return the fit with the best further effect, or None where none is worth its price."""
+    noise = found.loose_noise
+    chi2_now = chi2_in(current, noise)
+    distant = far(found, current)
     fits: list[tuple[float, Tied, Fit, float]] = []
     seen: set[tuple[str, frozenset[int] | None]] = set()
     near_data = chi2_now < _NEAR * current.fit.count
     best_chi2, merit_now = chi2_now, merit_of(current.fit, current.fit.linears)
-    for proposal, fit, cost in worth:
+    for proposal, fit, cost in _offers(found, board, current, step):
         key = (proposal.trial.id, proposal.trial.recordings)
         if key in seen:
             continue
@@ -237,7 +256,7 @@ def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
             found.own,
             noise if distant else current.fit.noise,
             {**values_of_fit(current), **proposal.start, **_wobbles(fit)},
-            bar=_HOPELESS * best_chi2 if distant else beside,
+            bar=(_HOPELESS_NEAR if near_data else _HOPELESS) * best_chi2 if distant else beside,
         )
         if not distant and not cost and refitted.score > current.score + _WORSE:
             refitted = _begun_again(found, current, proposal, beside)
@@ -353,7 +372,7 @@ def _from_there(found: Search, current: Tied, better: Tied) -> Tied | None:
     None where it is, or where it gains so much that no start could.
     """
     trial = better.hypothesis.trials[-1]
-    if current.score - better.score > _DOUBTFUL or found.recordings[0].plant != "free_spin":
+    if current.score - better.score > _DOUBTFUL or not found.loose.plant.weakly_identified:
         return None
     start = values_of_fit(better)
     again = tied_fit(better.fit, current.hypothesis, found.own, better.fit.noise, start)

@@ -15,19 +15,23 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.kind import BOARD
+from discsim.effects.sensors import ClockRate, HardIron, Lag
 from discsim.effects.setup import Axes, BoardRotation, ClockUnit, GpsAxes, SiteField, TimeOffset, axes_of
 from discsim.recording import Recording, Samples
 from discsim.written import corrected
-from validation.diagnosis.setup.hypotheses import Hypothesis, board_effect, chosen, hypotheses, pairs
+from validation.diagnosis.setup.hypotheses import Hypothesis, Ranking, board_effect, chosen, hypotheses, pairs
 from validation.diagnosis.setup.proof import left_by_short_fit
 from validation.diagnosis.setup.remedy import MapAxes, remedy
 from validation.diagnosis.setup.units import clock_unit, sensor_units
+from validation.identification.plants import Plant, plant_of
 
 __all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said", "with_likeliest_fault"]
 
 #: what a fault must gain, in twice the log likelihood of the relations between sensors; on 40 concealed sets of all
 #: kinds the largest gain of a fault that is not there is 15 (lost samples of a magnetometer), the next 0.3
 PRICE = 30.0
+#: what it must gain in a flight where a short fit bears it out
+_PRICE_IN_AIR = 15.0
 #: sensors agree where the cost per independent statement is below this; sound sets have 0.02 to 0.25
 AGREE, SOUND = 0.6, 0.25
 #: no relation may be left to hold worse than this, cost per statement: 7 ordinary errors. A turned board that empties a
@@ -35,9 +39,8 @@ AGREE, SOUND = 0.6, 0.25
 WORST = 2.1
 #: a hypothesis that costs no more than this above the best cannot be told from it
 TWIN = 8.0
-#: longest that is judged of a recording, s: a minute of turning, or the plateaus of a rate table
-LOOK = {"flight": 60.0, "free_spin": 60.0, "spin_down": 300.0, "rate_table": 300.0}
-#: in which it turns at this share of the fastest rate or more, asked every so many s (half a turn at 6 rad/s)
+#: what is judged of a long recording turns at this share of the fastest rate or more, asked every so many s (half a
+#: turn at 6 rad/s)
 _QUARTER, _SLOT = 0.25, 0.5
 #: most faults of one setup that are looked for, and most twins that are told
 MOST, MOST_TWINS = 3, 8
@@ -79,6 +82,8 @@ class SetupFindings:
 
     faults: tuple[SetupFault, ...]
     recordings: tuple[Recording, ...]
+    #: physics that would make the sensors agree where no fault does: a lag, a clock, iron, of about this size
+    hints: tuple[Effect, ...] = ()
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -103,13 +108,14 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
     for unit in sensor_units([_judgeable(one) for one in current]):
         faults.append(SetupFault(unit, float("inf"), None))
         current = tuple(corrected(one, [unit]) for one in current)
+    hints: tuple[Effect, ...] = ()
     for _ in range(MOST):
-        found = _next([_judgeable(one) for one in current])
+        found, hints = _next([_judgeable(one) for one in current])
         if not found:
             break
         faults += found
         current = tuple(corrected(one, [fault.effect for fault in found]) for one in current)
-    return SetupFindings(tuple(faults), current)
+    return SetupFindings(tuple(faults), current, hints)
 
 
 def with_likeliest_fault(findings: SetupFindings) -> SetupFindings | None:
@@ -139,7 +145,7 @@ def _judgeable(recording: Recording) -> Recording:
     kept = {name: own for name, own in recording.samples.items() if name not in BOARD or _alive(own)}
     if not recording.environment.field_known:
         kept.pop("magnetometer", None)
-    busiest = _busiest(kept, LOOK[recording.plant])
+    busiest = _busiest(kept, plant_of(recording).durations.setup)
     if busiest is not None:
         kept = {name: samples.between(*busiest) for name, samples in kept.items()}
     return replace(recording, samples=kept)
@@ -178,31 +184,49 @@ def _busiest(samples: Mapping[str, Samples], length: float) -> tuple[float, floa
     return first, first + min(length, _SLOT * float(stops[longest] - starts[longest]))
 
 
-def _next(recordings: Sequence[Recording]) -> list[SetupFault]:
-    """Return the fault, or the two at once, that make the sensors agree; empty where they do, or nothing does."""
+def _next(recordings: Sequence[Recording]) -> tuple[list[SetupFault], tuple[Effect, ...]]:
+    """Return the fault, or the two at once, that make the sensors agree; none where they do, or nothing does.
+
+    Beside them where there are none the physics that would make them agree, as effects of about its size.
+    """
     ranking = hypotheses(recordings, PRICE)
     as_written, found = ranking.as_written, ranking.found
     site = recordings[0].environment.magnetic_field
     before = None if as_written is None else as_written.costs
     if found and found[0].kind == "rival" and _gains(as_written, found[0], 0.5):
-        return []
+        return [], _hints(ranking)
     found = tuple(item for item in found if item.kind != "rival")
-    if found and _agrees(found[0]) and _gains(as_written, found[0]):
-        return [_fault(as_written, found, recordings)]
+    if found and _agrees(found[0]) and (_gains(as_written, found[0]) or _borne_out(as_written, found[0], recordings)):
+        return [_fault(as_written, found, recordings)], ()
     if as_written is not None and _agrees(as_written):
-        return []
+        return [], ()
     for both, one, other in pairs(ranking.base)[:1]:
         if _agrees(both) and _gains(as_written, both, 2.0):
             gain = float("inf") if before is None else float(np.sum(before) - both.cost)
-            return [SetupFault(_effect(item, site), gain, None) for item in (one, other)]
-    return []
+            return [SetupFault(_effect(item, site), gain, None) for item in (one, other)], ()
+    return [], _hints(ranking)
+
+
+def _hints(ranking: Ranking) -> tuple[Effect, ...]:
+    """Return the lags, clocks and iron that are worth a fault's price, best first, as effects."""
+    rivals = [item for item in ranking.found if item.kind == "rival" and _gains(ranking.as_written, item)]
+    return tuple(_physics(item) for item in rivals if item.charged < rivals[0].charged + PRICE)
+
+
+def _physics(item: Hypothesis) -> Effect:
+    """Return what is no fault of the setup as an effect of its size."""
+    ((name, size),) = item.columns.rival.items()
+    sensor, _, what = name.rpartition(".")
+    if what == "lag":
+        return effect_of(Lag(size), sensor)
+    return effect_of(ClockRate(1.0 + size), sensor) if what == "clock" else effect_of(HardIron(0.0, 0.0, size))
 
 
 def _fault(as_written: Hypothesis | None, found: Sequence[Hypothesis], recordings: Sequence[Recording]) -> SetupFault:
     """Return the best of hypotheses as a fault, with those that cannot be told from it."""
     site = recordings[0].environment.magnetic_field
     before = None if as_written is None else as_written.costs
-    tied = [item for item in found if _may_be_meant(item, found[0], recordings[0].plant)]
+    tied = [item for item in found if _may_be_meant(item, found[0], plant_of(recordings[0]))]
     best, others = _told_apart(tied, recordings, site)
     twins = [_effect(item, site) for item in sorted(others, key=lambda item: item.kind != best.kind)]
     gain = float("inf") if before is None else float(np.sum(before) - best.cost)
@@ -222,7 +246,7 @@ def _told_apart(
     of those two the columns are named.
     """
     tied = sorted(tied, key=lambda item: _turned_round(item, site))
-    if len(tied) == 1 or recordings[0].plant != "flight":
+    if len(tied) == 1 or not plant_of(recordings[0]).air_modelled:
         return tied[0], list(tied[1:])
     some = chosen(recordings)
     left = [left_by_short_fit([corrected(one, [_effect(item, site)]) for one in some]) for item in tied[:_FITTED]]
@@ -236,7 +260,16 @@ def _turned_round(item: Hypothesis, stated: FloatArray) -> bool:
     return item.columns.site is not None and float(item.columns.site @ stated) < 0.0
 
 
-def _may_be_meant(item: Hypothesis, best: Hypothesis, plant: str) -> bool:
+def _borne_out(as_written: Hypothesis | None, item: Hypothesis, recordings: Sequence[Recording]) -> bool:
+    """Tell whether the air bears out a hypothesis that gains less than its price: a short fit leaves far less."""
+    if not plant_of(recordings[0]).air_modelled or not _gains(as_written, item, _PRICE_IN_AIR / PRICE):
+        return False
+    some = chosen(recordings)
+    meant = [corrected(one, [_effect(item, some[0].environment.magnetic_field)]) for one in some]
+    return _REFUTED * left_by_short_fit(meant) < left_by_short_fit(some)
+
+
+def _may_be_meant(item: Hypothesis, best: Hypothesis, plant: Plant) -> bool:
     """Tell whether a hypothesis is to be told from the best by more than what it costs.
 
     Where the best leaves more than sound recordings do, something else is wrong, too: lost samples turn the phase of
@@ -247,7 +280,7 @@ def _may_be_meant(item: Hypothesis, best: Hypothesis, plant: str) -> bool:
         return True
     spoilt = best.cost > SOUND * best.weight
     alike = best.kind == "axes" and (item.kind, item.sensor) == (best.kind, best.sensor)
-    return plant == "flight" and spoilt and alike and item.cost < AGREE * item.weight
+    return plant.air_modelled and spoilt and alike and item.cost < AGREE * item.weight
 
 
 def _agrees(item: Hypothesis) -> bool:

@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect_of
-from discsim.effects.kind import RIGS
 from discsim.effects.setup import Axes, BoardRotation, axes_of
 from discsim.recording import Recording
 from discsim.written import corrected
@@ -24,6 +23,7 @@ from validation.diagnosis.setup.relations import Columns, misfit, wanted_force
 from validation.diagnosis.setup.rotation import board_turns, spin_axis
 from validation.diagnosis.setup.spin_signals import SpinSignals, spin_signals
 from validation.identification.ordinary_errors import ordinary_sigma
+from validation.identification.plants import plant_of
 
 __all__ = ["PERMUTATIONS", "Hypothesis", "Ranking", "board_effect", "chosen", "hypotheses", "pairs"]
 
@@ -33,9 +33,9 @@ BOARD = ("magnetometer", "gyroscope", "accelerometer")
 MOST = 4
 #: largest offset of time that is looked for, s, and how far the phase turns between two that are tried, rad
 LATEST, PHASE_STEP = 0.15, 0.25
-#: lags that are tried as rivals, as phases, rad; and how wrong a clock may be
+#: lags that are tried as rivals, as phases, rad; and how wrong a clock may be, as far as a relaxed fit lets one go
 LAGS = np.array([0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.2, 3.3, 5.0, 8.0])
-MOST_CLOCK = 0.01
+MOST_CLOCK = 0.02
 #: a board nearer to a right angle than this (root sum of squares of the matrix) stands at it
 SNAP = 0.15
 #: what a statement costs that a hypothesis takes back (as readings that clip become gaps in a turned board): half of
@@ -228,7 +228,7 @@ def _one_sensor(base: _Base, *, alone: bool = True) -> Iterator[Hypothesis]:
 
 def _shifting(base: _Base) -> list[str]:
     """Return the sensors whose phase is seen: on a rig, where nothing precesses, only that of the field."""
-    rig = base.signals[0].recording.plant in RIGS
+    rig = not plant_of(base.signals[0].recording).airborne
     return [name for name in (BOARD[:1] if rig else BOARD) if any(name in one.recording for one in base.signals)]
 
 
@@ -248,7 +248,7 @@ def _offsets(base: _Base) -> Iterator[Hypothesis]:
 
 def _rivals(base: _Base) -> Iterator[Hypothesis]:
     """Return physics that is no fault of the setup, so that what it explains is not taken for one: lags and clocks."""
-    if base.signals[0].recording.plant in RIGS:
+    if not plant_of(base.signals[0].recording).airborne:
         return
     fastest = max(float(np.nanmax(np.abs(one.rate))) for one in base.signals)
     longest = max(float(one.grid[-1]) for one in base.signals)

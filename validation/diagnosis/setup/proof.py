@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.recording import Recording
-from validation.diagnosis.relaxed_fit import beginning, first_chain, loose_jumps, ordinary, unknowns
+from validation.diagnosis.relaxed_fit import beginning, first_chain, ordinary, unknowns
 from validation.identification.gauss_newton import Fit, linearised, refit
 from validation.identification.noise import stated_noise
 from validation.identification.stated_parameters import stated_parameters
@@ -32,7 +32,7 @@ def left_by_short_fit(recordings: Sequence[Recording]) -> float:
     sensors = {readings.sensor for one in chains for readings in one.readings}
     parameters = (*stated_parameters(some), *unknowns(some), *ordinary(sensors, some[0].plant))
     at = np.array([q.stated for q in parameters])
-    fit = Fit(chains, parameters, at, loose_jumps(some[0].plant), {})
+    fit = Fit(chains, parameters, at, chains[0].plant.sizes.relaxed, {})
     bare = linearised(fit, ())
     fit = refit(replace(fit, noise=stated_noise(bare)), iterations=_STEPS, tolerance=1e-3 * fit.count)
     merit = fit.merit / max(fit.count, 1)

@@ -26,9 +26,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.kind import RIGS
 from validation.diagnosis.setup.spin_signals import STEP, ComplexArray, Locked, SpinSignals
 from validation.identification.ordinary_errors import ordinary_sigma
+from validation.identification.plants import plant_of
 
 __all__ = ["Columns", "Misfit", "misfit", "misfits", "wanted_force"]
 
@@ -140,12 +140,12 @@ def misfits(signals: SpinSignals, columns: Columns) -> list[Misfit]:
         if signals.path is not None:
             F = turned[:, 0] + 1j * turned[:, 1]
             found += _of_force_and_path(signals, F, mean[:, 2], along, columns)
-        if signals.recording.plant in ("flight", "free_spin"):
+        if plant_of(signals.recording).airborne:
             lift = float(np.nanmean(mean[:, 2])) if np.any(np.isfinite(mean[:, 2])) else 0.0
             found.append(Misfit("lift", ("accelerometer",), max(lift / _LIFT, 0.0) ** 2, 2.0))
     if signals.path is not None:
         found += _of_path(signals, columns.of("gps"))
-    if signals.recording.plant in RIGS:
+    if not plant_of(signals.recording).airborne:
         found += _of_rig(signals, columns, rate, along)
     return found
 
@@ -252,7 +252,7 @@ def _of_path(signals: SpinSignals, matrix: FloatArray) -> list[Misfit]:
     assert signals.path is not None
     down = (signals.path.position @ matrix.T)[:, 2]
     found = []
-    if signals.recording.plant == "flight":  # other logs begin anywhere, on a hill or on a roof
+    if plant_of(signals.recording).follows_path:  # other logs begin anywhere, on a hill or on a roof
         found = _judged("height", ("gps",), np.maximum(down, 0.0), _HEIGHT * np.ones(1))
     release = signals.recording.release
     if release is not None and release.velocity is not None:

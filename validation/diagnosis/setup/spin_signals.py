@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.kind import RIGS
 from discsim.recording import Recording
 from validation.diagnosis.consistency.turning import rate_of
 from validation.identification.initial.path import local_cubics, path_fixes
 from validation.identification.initial.spin_phase import field_spin
+from validation.identification.plants import plant_of
 
 __all__ = ["ComplexArray", "FlightPath", "Locked", "SpinSignals", "averages", "spin_signals", "turning_line", "usable"]
 
@@ -245,7 +245,7 @@ def _phase(recording: Recording) -> tuple[str, Callable[[FloatArray], FloatArray
     A magnetometer does where the field is stated: against its size iron is told from what turns.
     """
     if "magnetometer" in recording and recording.environment.field_known:
-        spin = field_spin(recording, steady=recording.plant in RIGS)
+        spin = field_spin(recording, steady=not plant_of(recording).airborne)
         return None if spin is None else ("magnetometer", spin.phase_at, float(spin.grid[0]), float(spin.grid[-1]))
     known = rate_of(recording)
     if known is None and recording.command is not None:

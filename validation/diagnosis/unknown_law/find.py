@@ -15,7 +15,6 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.kind import BOARD
 from discsim.recording import Recording
-from validation.diagnosis.relaxed_fit import NO_JUMPS
 from validation.diagnosis.result import Law
 from validation.diagnosis.selection.constrained_fit import Tied, tied_fit
 from validation.diagnosis.selection.evidence import ENTRY, PER_PARAMETER
@@ -23,11 +22,12 @@ from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.diagnosis.unknown_law.formula import as_laws, as_sensor_laws
 from validation.diagnosis.unknown_law.motion_law import candidate_laws, fitted_law, reference_of, state_of
 from validation.diagnosis.unknown_law.sensor_law import asked_of_sensors, fitted_sensor_law, sensor_library
-from validation.diagnosis.unknown_law.terms import FITTED, SensorTerm, Term, library
+from validation.diagnosis.unknown_law.terms import FITTED, SensorTerm
 from validation.identification.gauss_newton import Fit, mapped, refit
 from validation.identification.noise import GroupNoise, NoiseModel, chi_squared, log_likelihood, whitened
 from validation.identification.normal_equations import local_step, reduce, shared_step
 from validation.identification.parameters import Parameter
+from validation.identification.plants.law_terms import Term
 from validation.identification.residual_tests import remainders
 
 __all__ = ["FoundLaw", "find_law"]
@@ -112,7 +112,6 @@ def _beside(loose: Fit, own: Sequence[Parameter], own_at: FloatArray, noise: Noi
     In the air its pieces jump as those of the loose fit do, for what hides turns a whole flight too far from a line; a
     rig's hang together.
     """
-    plant = loose.chains[0].recording.plant
     fit = refit(Fit(loose.chains, tuple(own), own_at, loose.jumps, _white(noise)), iterations=5)
     levels: dict[str, list[float]] = {}
     for linear in fit.linears:
@@ -124,7 +123,7 @@ def _beside(loose: Fit, own: Sequence[Parameter], own_at: FloatArray, noise: Noi
         for g, item in fit.noise.items()
         if g in quick
     }
-    return replace(fit, noise=sure, jumps=fit.jumps if plant == "flight" else NO_JUMPS[plant])
+    return replace(fit, noise=sure, jumps=fit.jumps if fit.plant.airborne else fit.plant.sizes.continuous)
 
 
 def _quick(e: FloatArray) -> float:
@@ -140,8 +139,8 @@ def find_law(
     ``loose`` is the relaxed fit, ``best`` the best fit with effects of the catalogue (or without any), ``own`` the
     parameters that the recordings leave open without any effect, ``noise`` that of the relaxed fit.
     """
-    plant = recordings[0].plant
-    if plant == "free_spin":
+    plant = loose.plant
+    if plant.weakly_identified:
         return None  # what a free spin does not model takes up any further moment
     if len(recordings) == 1 and BOARD.isdisjoint(recordings[0].samples):
         return None  # one path takes any law, and no other recording could bear it out
@@ -150,7 +149,7 @@ def find_law(
     start = _beside(loose, own, own_at, noise)
     states = [state_of(chain, start.values(i)) for i, chain in enumerate(start.chains)]
     at = reference_of(states)
-    motion = library(plant)
+    motion = plant.laws.terms
     about = sensor_library(start)
     ranked: list[tuple[float, float, Term | SensorTerm]] = []
     if motion:
@@ -189,7 +188,6 @@ def _more_terms(
     terms: tuple[Term, ...] = (first,)
     if len(start.chains) < 2 or not remainders(tied.fit.linears, tied.residuals, tied.fit.noise):
         return tied, terms  # and where no other recording could bear a further term out
-    plant = start.chains[0].recording.plant
     held = tuple(q for q in tied.fit.parameters if q.group == "law")
     beside = Fit(start.chains, (*own, *held), tied.fit.at, start.jumps, start.noise, tied.fit.fixed)
     beside = refit(beside, iterations=3)
@@ -198,7 +196,7 @@ def _more_terms(
     coefficient = float(tied.fit.at[[q.name for q in tied.fit.parameters].index("0.coefficient")])
     powers = {q.name: float(v) for q, v in zip(tied.fit.parameters, tied.fit.at, strict=True) if q.group == "law"}
     settled = replace(first, powers=tuple((s, powers.get(f"0.power_{s}", n)) for s, n in first.powers))
-    others = [term for term in library(plant) if _key(term) != _key(first)]
+    others = [term for term in start.plant.laws.terms if _key(term) != _key(first)]
     best, chosen = tied, terms
     for _, further, term in _spread(candidate_laws(beside, (*own, *held), others, at)):
         assert isinstance(term, Term)

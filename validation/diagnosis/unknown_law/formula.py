@@ -9,8 +9,9 @@ import numpy as np
 
 from validation.diagnosis.result import Law, ParameterValue
 from validation.diagnosis.selection.evidence import PER_PARAMETER
-from validation.diagnosis.unknown_law.terms import SensorTerm, Term
+from validation.diagnosis.unknown_law.terms import SensorTerm
 from validation.identification.gauss_newton import Fit
+from validation.identification.plants.law_terms import Term
 
 __all__ = ["as_laws", "as_sensor_laws"]
 

@@ -8,27 +8,25 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.air import Wind
 from discsim.law import WRENCH_TARGETS
-from validation.diagnosis.relaxed_fit import NO_JUMPS
 from validation.diagnosis.selection.constrained_fit import Tied, noise_of, scored
 from validation.diagnosis.selection.evidence import BOUNDS
 from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.diagnosis.selection.screening import Answer, Board, column_of
 from validation.diagnosis.selection.to_stated import to_baseline
-from validation.diagnosis.unknown_law.terms import Term
 from validation.identification.gauss_newton import Fit, linearised_columns, mapped, refit
-from validation.identification.linearisation import Linear
+from validation.identification.linear import Linear
 from validation.identification.normal_equations import reduce
 from validation.identification.parameters import Parameter
+from validation.identification.plants import Plant
+from validation.identification.plants.law_terms import Term
 from validation.identification.propagation import Column
 from validation.identification.segments import Chain, recut
-from validation.identification.sensor_model import sized, to_body
 
 __all__ = ["candidate_laws", "fitted_law"]
 
-#: half the differences in force and moment, N and N m; in an exponent
-_FORCE_STEP, _MOMENT_STEP, _RIG_STEP, _POWER_STEP = 2e-2, 2e-4, 2e-5, 1e-3
+#: half the difference in an exponent
+_POWER_STEP = 1e-3
 
 
 #: an exponent is sought within this of where it starts
@@ -39,21 +37,7 @@ def state_of(chain: Chain, values: Mapping[tuple[str, str], float]) -> dict[str,
     """Return the symbols of a law, each (k,), in the middle of every piece."""
     middle = 0.5 * (chain.edges[1:] + chain.edges[:-1])
     there = recut(chain, values, np.append(middle, chain.edges[-1])).states
-    zero = np.zeros(middle.size)
-    if chain.recording.plant != "flight":
-        return {"t": middle, "r": there[:, 1], "h": zero, "V": zero, "alpha": zero, "p_H": zero, "q_H": zero}
-    rows = np.zeros((middle.size, 19))
-    rows[:, 9:13] = there[:, 6:10]
-    wind = np.array(chain.recording.environment.wind, dtype=float)
-    wind[:2] += sized(values, Wind)
-    u, v, w = to_body(rows, there[:, 3:6] - wind).T
-    return {
-        "t": middle,
-        "h": np.maximum(-there[:, 2], 0.02),
-        "V": np.sqrt(u * u + v * v + w * w),
-        "alpha": np.arctan2(w, np.hypot(u, v)),
-        "r": there[:, 12],
-    }
+    return chain.plant.laws.symbols(chain.recording, middle, there, values)
 
 
 def reference_of(states: Sequence[Mapping[str, FloatArray]]) -> dict[str, float]:
@@ -65,18 +49,12 @@ def reference_of(states: Sequence[Mapping[str, FloatArray]]) -> dict[str, float]
     return sizes
 
 
-def _step(target: str, plant: str) -> float:
-    if plant != "flight":
-        return _RIG_STEP
-    return _FORCE_STEP if target.endswith("_N") else _MOMENT_STEP
-
-
-def _constant(target: str, plant: str, term: int = 0) -> Column:
+def _constant(target: str, plant: Plant, term: int = 0) -> Column:
     """Return the column of a constant force or moment."""
     return Column(
         "law",
         f"{term}.coefficient",
-        _step(target, plant),
+        plant.laws.step(target),
         ((f"{term}.target", float(WRENCH_TARGETS.index(target))),),
     )
 
@@ -106,7 +84,7 @@ def board_of_terms(
     fit: Fit, terms: Sequence[Term], states: Sequence[Mapping[str, FloatArray]], at: Mapping[str, float]
 ) -> Board:
     """Return the board of a fit's own parameters and terms, its pieces jumping as they may."""
-    plant, jumps = fit.chains[0].recording.plant, fit.jumps
+    plant, jumps = fit.plant, fit.jumps
     targets = list(dict.fromkeys(term.target for term in terms))
     place_of = [targets.index(term.target) for term in terms]
     taken = len({int(q.name.partition(".")[0]) for q in fit.parameters if q.group == "law"})
@@ -133,12 +111,12 @@ def _asked(board: Board, own: Sequence[Parameter], terms: int) -> Iterator[tuple
 
 
 def _parameters(
-    terms: Sequence[Term], coefficients: Sequence[float], plant: str
+    terms: Sequence[Term], coefficients: Sequence[float], plant: Plant
 ) -> tuple[tuple[Parameter, ...], FloatArray]:
     """Return the parameters of terms for a fit and where they start, (p,)."""
     found, start = [], []
     for i, (term, coefficient) in enumerate(zip(terms, coefficients, strict=True)):
-        size = max(abs(coefficient), 1e-3 * _step(term.target, plant))
+        size = max(abs(coefficient), 1e-3 * plant.laws.step(term.target))
         found.append(Parameter("law", f"{i}.coefficient", 0.0, 0.02 * size, 1e4 * size))
         start.append(coefficient)
         for symbol, n in term.powers:
@@ -171,13 +149,13 @@ def fitted_law(
     iterations: int = 8,
 ) -> Tied:
     """Fit terms and own parameters by output error, pieces hanging together."""
-    plant = start.chains[0].recording.plant
+    plant = start.plant
     parameters, first = _parameters(terms, coefficients, plant)
     fit = Fit(
         start.chains,
         (*own, *parameters),
         np.concatenate([own_at, first]),
-        NO_JUMPS[plant],
+        plant.sizes.continuous,
         start.noise,
         _fixed(terms, at),
     )

@@ -9,14 +9,14 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from discsim.arrays import FloatArray
-from validation.diagnosis.relaxed_fit import NO_JUMPS
 from validation.diagnosis.selection.constrained_fit import Tied, noise_of, scored
 from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.diagnosis.selection.screening import Board, column_of
 from validation.diagnosis.selection.to_stated import to_baseline
 from validation.diagnosis.unknown_law.terms import SENSORS, SHAPES, SensorTerm
 from validation.identification.gauss_newton import Fit, linearised, mapped
-from validation.identification.linearisation import IntArray, Linear, moved
+from validation.identification.linear import IntArray, Linear
+from validation.identification.linearisation import moved
 from validation.identification.noise import whitened
 from validation.identification.normal_equations import local_step, reduce, shared_step
 from validation.identification.parameters import Parameter
@@ -43,17 +43,15 @@ class Turned:
 
 def turned(chain: Chain) -> Turned:
     """Return how a chain turns, from the states at the starts of its pieces."""
-    plant, t, states = chain.recording.plant, chain.edges[:-1], chain.states
-    if plant == "rate_table":
-        command = chain.recording.command
-        assert command is not None
+    t, spin, command = chain.edges[:-1], chain.plant.layout.spin, chain.recording.command
+    if command is not None:
         # piecewise linear, so its integral is exact on its knots and parabolas between
         grid = np.union1d(np.linspace(0.0, chain.edges[-1], 20 * t.size), np.clip(command.t, 0.0, chain.edges[-1]))
         r = np.interp(grid, command.t, command.value)
         psi = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(grid) * (r[1:] + r[:-1]))])
         rate = CubicHermiteSpline(grid, r, np.gradient(r, grid))
         return Turned(rate, CubicHermiteSpline(grid, psi, r))
-    r = states[:, 1] if plant == "spin_down" else states[:, 12]
+    r = np.zeros(t.size) if spin is None else chain.states[:, spin]
     if t.size < 3:
         t, r = np.append(t, chain.edges[-1]), np.append(r, r[-1])
     rate = CubicSpline(t, r)
@@ -193,7 +191,6 @@ def fitted_sensor_law(start: Fit, own: Sequence[Parameter], own_at: FloatArray, 
 
     The chains keep their readings; what the term takes off them is part of the residual.
     """
-    plant = start.chains[0].recording.plant
     axes = max((_axes(chain, term.sensor) for chain in start.chains), key=len)
     names = [(axis, j) for axis in axes for j in range(term.size)]
     noise, chains, shape = start.noise, start.chains, term.shape
@@ -204,7 +201,7 @@ def fitted_sensor_law(start: Fit, own: Sequence[Parameter], own_at: FloatArray, 
         Parameter("term", "shape", shape, _SHAPE_STEP * shape, 0.3 * shape if term.kind != "turning" else 0.01),
     )
     p = len(own)
-    fit = Fit(chains, parameters, at, NO_JUMPS[plant], noise)
+    fit = Fit(chains, parameters, at, start.plant.sizes.continuous, noise)
     for round in range(12):
         bare = linearised(replace(fit, parameters=tuple(own), at=fit.at[:p]))
         linears = []

@@ -1,69 +1,17 @@
-"""The library of terms from which a law is put together."""
+"""The terms from which an unknown law about a sensor is put together."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.law import WRENCH_TARGETS
 
-__all__ = ["FITTED", "SENSORS", "SHAPES", "Term"]
+__all__ = ["FITTED", "SENSORS", "SHAPES", "SensorTerm"]
 
-#: exponents that are tried first; the fit leaves them
-_RIG_POWERS = (-1.0, 0.0, 0.5, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0)
-
-
-_AIR_POWERS = {"V": (0.0, 1.0, 2.0, 3.0), "r": (0.0, 1.0, 2.0), "alpha": (0.0, 1.0, 2.0)}
-
-
-#: candidates that are fitted, sums of exponents beyond which no physics goes
-FITTED, _HIGHEST = 2, 5.0
-
-
-@dataclass(frozen=True)
-class Term:
-    """One product of powers about motion: ``target = c |x|^n ...``, keeping the signs of the symbols in ``odd``.
-
-    ``powers`` are pairs of symbol and exponent; ``decay`` (1/s) makes it die away in time.
-    """
-
-    target: str
-    powers: tuple[tuple[str, float], ...] = ()
-    odd: tuple[str, ...] = ()
-    decay: float = 0.0
-
-    def weight(self, state: Mapping[str, FloatArray], at: Mapping[str, float]) -> FloatArray:
-        """Return the term at states (k,) for a coefficient of one, symbols taken in units of ``at``."""
-        value = np.exp(-self.decay * state["t"])
-        for symbol, power in self.powers:
-            value = value * (np.abs(state[symbol]) / at[symbol]) ** power
-        for symbol in self.odd:
-            value = value * np.sign(state[symbol])
-        return np.asarray(value)
-
-
-def library(plant: str) -> list[Term]:
-    """Return the terms about motion that are asked for first."""
-    if plant == "spin_down":
-        terms = [Term("moment_z_N_m", (("r", n),) if n else (), ("r",)) for n in _RIG_POWERS]
-        # friction that changes with time, as a bearing warms
-        return terms + [Term("moment_z_N_m", (("r", 1.0),), ("r",), 1.0 / tau) for tau in (2.0, 4.0, 8.0, 16.0)]
-    if plant != "flight":
-        return []
-    terms = []
-    for target in WRENCH_TARGETS:
-        for powers in product(*_AIR_POWERS.values()):
-            named = tuple((symbol, n) for symbol, n in zip(_AIR_POWERS, powers, strict=True) if n)
-            odd = tuple(symbol for symbol, n in named if symbol != "V" and n == 1.0)
-            if sum(powers) <= _HIGHEST:
-                terms.append(Term(target, named, odd))
-        if target == "moment_z_N_m":
-            terms += [Term(target, (("r", n),), ("r",)) for n in (1.5, 2.0, 2.5, 3.0, 4.0)]
-    return terms
+#: candidates that are fitted
+FITTED = 2
 
 
 @dataclass(frozen=True)

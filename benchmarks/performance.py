@@ -1,0 +1,136 @@
+"""Make docs/performance.md: run the benchmarks of speed one after another and put what they print into the page.
+
+    python benchmarks/performance.py [--write] [--quick] [--no-log] [--frispy PYTHON]
+
+Without ``--write`` the page is only printed. ``--quick`` takes few rounds and short logs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import subprocess
+import sys
+from datetime import date
+from pathlib import Path
+
+import mujoco
+import numba
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = ROOT / "docs" / "performance.md"
+
+#: what is said of each measurement, before its output; {name} is what the benchmark of that name printed
+TEXT = """# What it costs
+
+Made by `{command}` on {day} with MuJoCo {mujoco}, numba {numba}, numpy {numpy} on Python {python}, {machine} with
+{cores} cores, load {load:.0f} at the end: other work on a machine adds to every time here and takes part in none of
+the ratios of CPU time, whose terms alternate in one run.
+
+## A step of the truth, and a flight
+
+`python benchmarks/step_cost.py step`. An RK4 step evaluates forces four times. MuJoCo calls the air in C, one
+compiled function for all discs that it reaches by address; the callback in Python calls the same function and gives
+the same states to the last bit. `fly` adds a fixed 2 to 4 ms for building the disc and the result, which the shorter
+loops show.
+
+{step}
+
+Goals: our air in C over the bare loop at most 1.15, in Python 2.3, and `fly` with its states kept 1.5 over a flight
+of 4000 steps.
+
+## Many flights at once
+
+`python benchmarks/step_cost.py batch`. `fly_many` steps all flights by `mujoco.batch`, whose threads need no
+interpreter. The busiest thread's CPU time, with all that is serial in it, is what the clock shows on a machine with
+nothing else to do; the ratio by the clock below it was taken beside other work.
+
+{batch}
+
+Goal: at least 0.9 of the cores for 1000 flights.
+
+## Start
+
+`python benchmarks/start_up.py`: the least of several processes. A flight loads numpy, numba and MuJoCo, whose own
+start stands beside it, and the compiled code from its cache; scipy is loaded by what needs it.
+
+{start}
+
+Goals: `import discsim` and `discsim --help` 0.3 s, `discsim fly` of a 3 s throw 1.5 s from the second time on.
+A flight misses it where the CPU time above is more: of it the three imports take half, and the rest is numba's own
+start, a quarter of a second, and the loading of cached code.
+
+## The standalone model
+
+`python benchmarks/trajectory.py bulk{frispy_part}`.
+
+{trajectory}
+
+Goals on one core: 10 000 landings a second at 1 cm, 2000 at 1e-6 m. The first is missed. A looser tolerance cannot
+reach it: above 1e-5 the table hardly changes, for the nutation, r Izz/Ixx or 140 rad/s of a driver, holds an explicit
+pair to steps of a fraction of its turn, beyond which it is unstable whatever error is allowed. What would reach it is a
+model without the nutation, or flights integrated in step in the lanes of the vector units; neither is there yet.
+
+## A long log
+
+`python benchmarks/long_log.py --minutes {minutes}`: `discsim check` and `discsim estimate --method all` of a log of
+three sensors at 1 kHz, start included.
+
+{log}
+
+Goal: an hour in 60 s and 1 GB. It is missed: the cost per minute of log hardly changes with length, and
+[what each method costs](estimators.md) says which methods take it.
+"""
+
+
+def printed(arguments: list[str]) -> str:
+    """Return what a benchmark prints, as a block of code; raises SystemExit where it fails."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "110"}
+    done = subprocess.run(
+        [sys.executable, *arguments], cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True, check=False
+    )
+    if done.returncode:
+        raise SystemExit(f"python {' '.join(arguments)}: status {done.returncode}")
+    lines = "\n".join(line.rstrip() for line in done.stdout.strip("\n").splitlines())
+    return f"```\n{lines}\n```"
+
+
+def main() -> None:
+    """Run the benchmarks and make the page."""
+    parser = argparse.ArgumentParser(description="Make the page of what things cost.")
+    parser.add_argument("--write", action="store_true", help="write docs/performance.md")
+    parser.add_argument("--quick", action="store_true", help="few rounds, few flights, short logs")
+    parser.add_argument("--no-log", action="store_true", help="leave out the long log, which takes longest")
+    parser.add_argument("--frispy", help="interpreter that has FrisPy; without it that comparison is left out")
+    given = parser.parse_args()
+    rounds, flights = ("3", ["10", "30", "100"]) if given.quick else ("15", ["10", "100", "1000"])
+    minutes = ["0.5", "1", "2"] if given.quick else ["1", "10", "60"]
+    frispy = ["frispy", "--frispy", given.frispy] if given.frispy else []
+    text = TEXT.partition("## A long log")[0].rstrip() + "\n" if given.no_log else TEXT
+    page = text.format(
+        command=" ".join(["python benchmarks/performance.py", *sys.argv[1:]]),
+        day=date.today(),
+        mujoco=mujoco.__version__,
+        numba=numba.__version__,
+        numpy=np.__version__,
+        python=platform.python_version(),
+        machine=platform.machine(),
+        cores=os.cpu_count(),
+        step=printed(["benchmarks/step_cost.py", "step", "--rounds", rounds]),
+        batch=printed(["benchmarks/step_cost.py", "batch", "--flights", *flights]),
+        start=printed(["benchmarks/start_up.py", "--rounds", "2" if given.quick else "7"]),
+        trajectory=printed(["benchmarks/trajectory.py", "bulk", *frispy]),
+        frispy_part=" frispy --frispy PYTHON" if frispy else "",
+        minutes=" ".join(minutes),
+        log="" if given.no_log else printed(["benchmarks/long_log.py", "--minutes", *minutes]),
+        load=os.getloadavg()[0],
+    )
+    print(page)
+    if given.write:
+        PAGE.write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

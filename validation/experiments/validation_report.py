@@ -1,0 +1,154 @@
+"""The report of a validation run: scores, rate table, throws, C_Nr, concealed cases, somebody's recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from validation.experiments.concealed import Concealed
+from validation.experiments.feedback.loop import Loop
+from validation.experiments.feedback.scoring import OUTPUT_ERROR
+from validation.reporting.figures import COLOURS, new_figure, save_figure, symmetric_log
+from validation.reporting.html import Section, write_report
+from validation.reporting.run import Run
+from validation.reporting.scores import Score, all_ok
+from validation.scenarios.throws import EDGE_S, ThrowResult, rms
+
+__all__ = ["draw_throws", "write_validation_report"]
+
+
+def draw_throws(results: Sequence[ThrowResult], path: Path) -> None:
+    """Draw each throw's error of spin rate by method, and where it flew."""
+    figure, axes = new_figure(1, 2, width=11.0, height=4.2)
+    for number, result in enumerate(results):
+        position = result.motion.position
+        axes[0].plot(position[:, 1], position[:, 0], lw=1.2, label=result.throw.name)
+        for method in ("accelerometer", "fft", "best"):
+            if method not in result.rates:
+                continue
+            rate = result.rates[method]
+            inner = (rate.t >= EDGE_S) & (rate.t <= result.motion.end - EDGE_S)
+            axes[1].plot(
+                rate.t[inner],
+                np.degrees(result.error(method)),
+                color=COLOURS[method],
+                lw=0.7,
+                alpha=0.8,
+                label=method if number == 0 else None,
+            )
+    axes[0].set_title("Seen from above")
+    axes[0].set_xlabel("east, m")
+    axes[0].set_ylabel("north, m")
+    axes[0].set_aspect("equal", adjustable="datalim")
+    axes[0].legend(fontsize=7)
+    symmetric_log(axes[1], linear=20.0, limit=600.0)
+    axes[1].axhline(0, color=COLOURS["truth"], lw=0.8)
+    axes[1].set_title("Error of the estimated spin rate on every throw")
+    axes[1].set_xlabel("time, s")
+    axes[1].set_ylabel("error, deg/s (logarithmic beyond 20)")
+    axes[1].legend()
+    save_figure(figure, path)
+
+
+def write_validation_report(
+    run: Run,
+    scores: Sequence[Score],
+    results: Sequence[ThrowResult],
+    loop: Loop,
+    concealed: Sequence[Concealed],
+) -> None:
+    """Write ``report.html`` into the run's folder; its figures are there already."""
+    failed = sum(not item.ok for item in scores)
+    verdict = (
+        "every score is within its tolerance" if all_ok(scores) else f"{failed} scores are outside their tolerance"
+    )
+    rows = [
+        (
+            item.name,
+            f"{item.value:.5g}",
+            item.unit,
+            f"{item.expected:g}",
+            f"{item.tolerance:g}",
+            "ok" if item.ok else "FAIL",
+        )
+        for item in scores
+    ]
+    methods = list(results[0].rates)
+    throw_rows = [
+        (result.throw.name, *(_cell(np.degrees(rms(result.error(method)))) for method in methods)) for result in results
+    ]
+    waveform = [("Waveform and spectrum on the fastest plateau", run.out / "waveform.png")]
+    if not waveform[0][1].exists():  # a profile without a plateau
+        waveform = []
+    sections = [
+        Section("Scores", (), ("score", "value", "unit", "expected", "tolerance", ""), rows),
+        Section(
+            "Rate table",
+            (
+                "One MPU-9250, drawn within its data sheet, on a table that runs through plateaus; the wide-range "
+                "gyroscope beside it. Envelopes are the accelerometer's worst case for each mount error.",
+            ),
+            figures=[
+                ("All methods against truth", run.out / "rate-table.png"),
+                *waveform,
+            ],
+        ),
+        Section(
+            "Throws",
+            (
+                "The disc with its module, the accelerometer 1 mm off along x and y. Figures are rms "
+                "errors of the spin rate in deg/s away from the ends of the flight; a dash where a method knows "
+                "nothing.",
+            ),
+            ("throw", *methods),
+            throw_rows,
+            figures=[("Flights and errors", run.out / "throws.png")],
+        ),
+        Section(
+            "C_Nr, and the flights that it predicts",
+            (
+                "One C_Nr for all throws, by output error and by straight lines and (26), from each method's spin. "
+                "Errors are those of the first throw flown with the source's C_Nr (output error) and spin at release; "
+                "the last column has the true spin, so that only C_Nr is the source's.",
+            ),
+            ("spin by", "CNr", "sd", "by (26)", "landing, m", "track, m", "landing by CNr alone, m"),
+            _loop_rows(loop),
+            figures=[
+                ("Spin, its models and what they leave", run.out / "cnr.png"),
+                ("C_Nr by source", run.out / "cnr-sources.png"),
+                ("Predicted flights against the truth", run.out / "feedback.png"),
+            ],
+        ),
+        Section(
+            "Concealed cases",
+            (
+                "Drawn and simulated as discsim challenge does, diagnosed by another process that got the recordings "
+                "and nothing else. The command repeats a case alone.",
+            ),
+            ("concealed", "found", "", "command"),
+            [case.row for case in concealed],
+        ),
+    ]
+    write_report(
+        run.out / "report.html",
+        "Validation report",
+        f"{len(scores)} scores, seed {run.seed}: {verdict}.",
+        sections,
+    )
+
+
+def _loop_rows(loop: Loop) -> list[tuple[str, ...]]:
+    predicted = {item.damping.source: item for item in loop.flown[0].predicted if item.damping.way == OUTPUT_ERROR}
+    rows = []
+    for item in loop.found:
+        assert item.fit is not None
+        flight = predicted[item.source.label]
+        errors = (f"{value:.3f}" for value in (flight.landing, flight.track, flight.damping_only))
+        rows.append((item.source.label, f"{item.fit.CNr:.6f}", f"{item.fit.sd:.6f}", f"{item.fit.by_26:.6f}", *errors))
+    return rows
+
+
+def _cell(value: float) -> str:
+    return f"{value:.2f}" if np.isfinite(value) else "\u2013"

@@ -1,0 +1,301 @@
+"""A throw: a disc flies through the air, its whole motion unknown.
+
+A state is position and velocity in N, attitude and body rates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from math import asin, atan2, cos, degrees, radians, sin
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.compiled import compiled_nogil
+from discsim.disc import Release
+from discsim.effects.air import Wind
+from discsim.effects.catalogue import catalogued
+from discsim.effects.kind import BOARD
+from discsim.errors import InputError
+from discsim.frames import body_to_ned, multiply, quaternion_from_matrix, turn
+from discsim.law import WRENCH_TARGETS
+from discsim.parameters import PARAMETERS, Tables
+from discsim.recording import Recording
+from discsim.toml_table import TomlTable
+from discsim.trajectory import derivative, evaluate, in_body, interpolant, step
+from validation.identification.dynamics import FASTEST, ROW, SIZE, acting_tables, to_body
+from validation.identification.initial.flight import flight_starts
+from validation.identification.parameters import Jumps, Values
+from validation.identification.plants.law_terms import Term
+from validation.identification.plants.plan import Plan, towards, turns
+from validation.identification.plants.plant import (
+    Design,
+    Durations,
+    Dynamics,
+    Given,
+    Initial,
+    Layout,
+    MotionLaws,
+    Plant,
+    Sizes,
+    rows_for,
+)
+
+__all__ = ["FLIGHT"]
+
+#: where the numbers of a state stand
+_POSITION, _VELOCITY, _ATTITUDE, _RATE, _SPIN = slice(0, 3), slice(3, 6), slice(6, 10), slice(10, 13), 12
+
+# ---------------------------------------------------------------------------------------------------- its motion
+
+#: longest step of the integrator, s, and in radians of nutation
+_STEP, _NUTATION = 0.01, 1.2
+#: and where an uneven body makes the motion follow the spin
+_UNEVEN = 0.6
+#: and where coefficients come from a table, whose corners a step may not leap over
+_CORNERED = 0.5
+
+
+def _longest_step(given: Given, state: FloatArray, start: float, stop: float) -> float:
+    del start, stop
+    disc = given.recording.disc
+    assert disc is not None
+    spin = min(abs(float(state[_SPIN])), FASTEST)
+    nutation = max(spin * disc.Izz / disc.Ixx, spin, 1.0)
+    largest = _CORNERED if disc.aero_table is not None else _UNEVEN if given.uneven else _NUTATION
+    # a path shows no nutation: 0.04 mm off after 2.5 s at 138 rad/s, by tables and with a wobble of 2 rad/s
+    largest = _NUTATION if BOARD.isdisjoint(given.recording.samples) else largest
+    return min(_STEP, largest / nutation)
+
+
+def _propagate(
+    given: Given, flats: FloatArray, own: FloatArray, states: FloatArray, times: FloatArray, last: int, out: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    del own
+    rows, ends = rows_for(states, out)
+    flight_pieces(flats, given.tables, states, times, last, out, rows, ends)
+    return rows, ends
+
+
+@compiled_nogil
+def flight_pieces(
+    flats: FloatArray,
+    tables: Tables,
+    states: FloatArray,
+    times: FloatArray,
+    last: int,
+    out: FloatArray,
+    rows: FloatArray,
+    ends: FloatArray,
+) -> None:
+    """Fly from states (c, 13), each with its row of flats (c, k), in the steps ``times`` (n,).
+
+    Writes rows (c, m, 19) at instants out (m,) and ends (c, 13), the states at ``times[last]``.
+    """
+    n = times.size
+    path, dense, K = np.empty((n, 14)), np.empty((n - 1, 7, 14)), np.empty((16, 14))
+    given = tables
+    for c in range(states.shape[0]):
+        flat = flats[c, :SIZE].copy()
+        p = flat.view(PARAMETERS)[0]
+        tables = acting_tables(given, flats[c])
+        path[0, :10] = states[c, :10]
+        path[0, 10:13] = states[c, 10:13]
+        path[0, 13] = 0.0
+        derivative(p, tables, times[0], path[0], K[0])
+        for k in range(n - 1):
+            h = times[k + 1] - times[k]
+            step(p, tables, times[k], path[k], h, K, path[k + 1])
+            derivative(p, tables, times[k + 1], path[k + 1], K[12])
+            interpolant(p, tables, times[k], path[k], h, K, path[k + 1], dense[k])
+            K[0] = K[12]
+        rows[c] = in_body(flat, tables, out, evaluate(times, path, dense, out))
+        end = in_body(flat, tables, times[last : last + 1], path[last : last + 1])[0]
+        ends[c, :6] = end[:6]
+        ends[c, 6:10] = end[9:13]
+        ends[c, 10:13] = end[13:16]
+
+
+def _states(recording: Recording, t: FloatArray, ratio: float) -> FloatArray:
+    starts = flight_starts(recording, np.minimum(t * ratio, recording.end))
+    states = np.hstack([starts.position, starts.velocity, starts.attitude, starts.rate])
+    states[:, _SPIN] *= ratio
+    return states
+
+
+def _other_attitudes(recording: Recording) -> tuple[FloatArray, ...]:
+    return flight_starts(recording, np.zeros(1)).ambiguous
+
+
+def _lacks(recording: Recording) -> str | None:
+    if recording.disc is not None and recording.environment.air_density is not None:
+        return None
+    return "a flight needs [disc] and air_density_kg_m3; add them to recording.toml"
+
+
+def _grows_with(t: FloatArray, states: FloatArray) -> dict[str, FloatArray]:
+    spin, speed = np.abs(states[:, _SPIN]), np.linalg.norm(states[:, _VELOCITY], axis=1)
+    return {
+        "time": t,
+        "spin": spin,
+        "speed": speed,
+        "height": -states[:, _POSITION][:, 2],
+        "advance ratio (spin over speed)": spin / np.maximum(speed, 0.1),
+    }
+
+
+# --------------------------------------------------------------------------------------- unknown laws about it
+
+#: exponents that are tried first; the fit leaves them
+_POWERS = {"V": (0.0, 1.0, 2.0, 3.0), "r": (0.0, 1.0, 2.0), "alpha": (0.0, 1.0, 2.0)}
+#: sums of exponents beyond which no physics goes
+_HIGHEST = 5.0
+
+
+def _terms() -> tuple[Term, ...]:
+    terms = []
+    for target in WRENCH_TARGETS:
+        for powers in product(*_POWERS.values()):
+            named = tuple((symbol, n) for symbol, n in zip(_POWERS, powers, strict=True) if n)
+            odd = tuple(symbol for symbol, n in named if symbol != "V" and n == 1.0)
+            if sum(powers) <= _HIGHEST:
+                terms.append(Term(target, named, odd))
+        if target == "moment_z_N_m":
+            terms += [Term(target, (("r", n),), ("r",)) for n in (1.5, 2.0, 2.5, 3.0, 4.0)]
+    return tuple(terms)
+
+
+#: an unknown steady wind
+_WIND = catalogued(Wind).id
+
+
+def _symbols(recording: Recording, t: FloatArray, states: FloatArray, values: Values) -> dict[str, FloatArray]:
+    rows = np.zeros((t.size, ROW))
+    rows[:, 9:13] = states[:, _ATTITUDE]
+    wind = np.array(recording.environment.wind, dtype=float)
+    wind[:2] += [values.get((_WIND, name), 0.0) for name in Wind._fields]
+    u, v, w = to_body(rows, states[:, _VELOCITY] - wind).T
+    return {
+        "t": t,
+        "h": np.maximum(-states[:, _POSITION][:, 2], 0.02),
+        "V": np.sqrt(u * u + v * v + w * w),
+        "alpha": np.arctan2(w, np.hypot(u, v)),
+        "r": states[:, _SPIN],
+    }
+
+
+# ------------------------------------------------------------------------------------------- its next recordings
+
+
+@dataclass(frozen=True)
+class _Throw:
+    """How a throw differs from one in hand: factors of speed and spin, turns in degrees."""
+
+    speed: float = 1.0
+    spin: float = 1.0
+    up: float = 0.0
+    bank: float = 0.0
+    heading: float = 0.0
+
+
+_THROWS = (
+    _Throw(speed=0.6),
+    _Throw(speed=0.8),
+    _Throw(speed=1.2),
+    _Throw(spin=0.5),
+    _Throw(spin=1.4),
+    _Throw(spin=-1.0),
+    _Throw(up=15.0),
+    _Throw(up=-8.0),
+    _Throw(bank=25.0),
+    _Throw(bank=-25.0),
+    _Throw(heading=90.0),
+    _Throw(heading=180.0),
+    _Throw(heading=270.0),
+    _Throw(speed=0.6, spin=0.5),
+    _Throw(speed=0.6, heading=180.0),
+    _Throw(spin=-0.6, heading=180.0),
+    _Throw(speed=0.7, up=30.0),
+)
+
+
+def _about(recording: Recording, base: FloatArray, end: float, longest: float) -> list[Plan]:
+    del recording
+    again = Plan(f"the same again: {_in_words(base)}", base, end)
+    thrown = [_thrown(base, throw) for throw in _THROWS]
+    return [again, *(Plan(_in_words(state), state, 1.5 * longest) for state in thrown)]
+
+
+def _thrown(state: FloatArray, throw: _Throw) -> FloatArray:
+    """Return the state (13,) of another throw: turned as a whole, but for the bank, which turns the disc alone."""
+    new = state.copy()
+    north, east, _ = new[_VELOCITY]
+    heading = atan2(east, north)
+    forward, right = np.array([cos(heading), sin(heading), 0.0]), np.array([-sin(heading), cos(heading), 0.0])
+    q, velocity = new[_ATTITUDE], throw.speed * new[_VELOCITY]
+    if throw.spin < 0:  # as the other hand throws it: the disc leans to the other side, the wobble keeps its size
+        down = body_to_ned(q)[:, 2]
+        q = multiply(_between(down, down - 2.0 * (down @ right) * right), q)
+    q = multiply(turn(radians(throw.bank) * forward), q)
+    whole = multiply(turn(np.array([0.0, 0.0, radians(throw.heading)])), turn(radians(throw.up) * right))
+    new[_VELOCITY], new[_ATTITUDE] = body_to_ned(whole) @ velocity, multiply(whole, q)
+    new[_SPIN] *= throw.spin
+    return new
+
+
+def _between(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the quaternion (4,) of the least turn that takes unit vector a (3,) to b."""
+    across = np.cross(a, b)
+    size = float(np.linalg.norm(across))
+    return turn(across * (atan2(size, float(a @ b)) / size if size > 0 else 0.0))
+
+
+def _in_words(state: FloatArray) -> str:
+    velocity, down = state[_VELOCITY], body_to_ned(state[_ATTITUDE])[:, 2]
+    speed, heading = float(np.linalg.norm(velocity)), atan2(velocity[1], velocity[0])
+    up = degrees(asin(-velocity[2] / max(speed, 1e-9)))
+    lean = degrees(atan2(-down @ np.array([-sin(heading), cos(heading), 0.0]), down[2]))
+    climb = f"{abs(up):.0f}° {'up' if up >= 0 else 'down'}"
+    side = f"its {'right' if lean > 0 else 'left'} edge {abs(lean):.0f}° down" if abs(lean) >= 0.5 else "level"
+    return f"a throw at {speed:.0f} m/s with {turns(float(state[_SPIN]))}, {climb}, {side}, {towards(heading)}"
+
+
+#: a throw ends on the ground, at the latest after this long, s
+_LONGEST_THROW = 15.0
+
+
+def _read(table: TomlTable) -> Plan:
+    text, duration = table.text("text", required=False), table.number("duration", "s", required=False, positive=True)
+    state = _release_state(table, Release.from_toml(table))
+    return Plan(text or _in_words(state), state, duration or _LONGEST_THROW)
+
+
+def _release_state(table: TomlTable, release: Release) -> FloatArray:
+    try:
+        position, velocity, C_NB, rate = release.start()
+    except InputError as error:
+        raise table.error(None, str(error)) from None
+    return np.concatenate([position, velocity, quaternion_from_matrix(C_NB), rate])
+
+
+FLIGHT = Plant(
+    name="flight",
+    motion="flight",
+    layout=Layout(13, 12, _POSITION, _VELOCITY, _ATTITUDE, _RATE, _SPIN, per_time=(_SPIN,)),
+    dynamics=Dynamics(_propagate, _longest_step),
+    initial=Initial(_states, _other_attitudes),
+    sizes=Sizes(  # m, m/s, rad, rad/s
+        differences=np.repeat([1e-3, 1e-3, 1e-5, 1e-4], 3),
+        unknown=np.repeat([1e4, 300.0, 30.0, 1e3], 3),
+        continuous=Jumps(np.zeros(12)),
+        relaxed=Jumps(np.repeat([0.1, 0.5, 0.05, 0.3], 3)),
+    ),
+    # twice the longest throw; a first look of two segments
+    durations=Durations(segment=0.5, first_look=1.0, window=0.5, longest=20.0, setup=60.0, event_near=0.09),
+    hardware=("disc", "aero"),
+    lacks=_lacks,
+    grows_with=_grows_with,
+    laws=MotionLaws(_terms(), _symbols, moment_step=2e-4),
+    design=Design(_about, _read),
+)

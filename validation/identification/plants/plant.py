@@ -1,0 +1,362 @@
+"""What a plant is to a fit: everything in which a throw, a free spin, a run-down and a rate table differ.
+
+A plant is one value of `Plant`, in a file of its own beside this one, and one line of the registry
+(`validation.identification.plants`). Numbers and functions of its file are all that the packages ask it for; none of
+them asks for a plant by its name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.frames import conjugate, multiply, rotation_vector, turn
+from discsim.parameters import Tables
+from discsim.recording import Recording
+from discsim.toml_table import TomlTable
+from validation.identification.dynamics import ROW
+from validation.identification.parameters import Jumps, Parameter, Values
+from validation.identification.plants.law_terms import Term
+from validation.identification.plants.plan import Plan
+from validation.identification.readings import Readings
+
+__all__ = ["Design", "Durations", "Dynamics", "Given", "Initial", "Layout", "MotionLaws", "Plant", "Sizes", "rows_for"]
+
+# ------------------------------------------------------------------------------------------ states and their motion
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the numbers of a state stand that others ask for by name; None for what a state does not hold.
+
+    A state has ``size`` numbers and moves in ``directions``: the four numbers of an attitude (quaternion from B to N)
+    by small turns in B, each other number by itself; without an attitude, numbers behind the last direction follow from
+    the others and do not move. ``position`` and ``velocity`` are in N, m and m/s, ``rate`` in B, rad/s; ``spin`` is the
+    rate about the spin axis, ``yaw`` a rig's angle about its own, rad. ``per_time`` are the numbers that come out
+    smaller by a ratio where all times are written larger by it.
+    """
+
+    size: int
+    directions: int
+    position: slice | None = None
+    velocity: slice | None = None
+    attitude: slice | None = None
+    rate: slice | None = None
+    spin: int | None = None
+    yaw: int | None = None
+    per_time: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.attitude is not None and self.directions != self.size - 1:
+            raise ValueError(
+                f"a state of {self.size} numbers, an attitude among them, moves in {self.directions} directions; "
+                f"expected {self.size - 1}"
+            )
+
+    def moved(self, states: FloatArray, tangents: FloatArray) -> FloatArray:
+        """Return states (..., s) moved by tangents (..., d)."""
+        shape = (*np.broadcast_shapes(states.shape[:-1], tangents.shape[:-1]), states.shape[-1])
+        new = np.array(np.broadcast_to(states, shape))
+        if self.attitude is None:
+            new[..., : self.directions] += tangents
+            return new
+        first, last = self.attitude.start, self.attitude.stop
+        new[..., :first] += tangents[..., :first]
+        new[..., first:last] = multiply(new[..., first:last], turn(tangents[..., first : last - 1]))
+        new[..., last:] += tangents[..., last - 1 :]
+        return new
+
+    def difference(self, a: FloatArray, b: FloatArray) -> FloatArray:
+        """Return the tangents (..., d) that move states b (..., s) to a."""
+        if self.attitude is None:
+            return np.asarray(a[..., : self.directions] - b[..., : self.directions])
+        first, last = self.attitude.start, self.attitude.stop
+        turned = rotation_vector(multiply(conjugate(b[..., first:last]), a[..., first:last]))
+        return np.concatenate([a[..., :first] - b[..., :first], turned, a[..., last:] - b[..., last:]], axis=-1)
+
+    def directions_of(self, places: slice | int) -> tuple[int, ...]:
+        """Return the directions in which the numbers at some places of a state move, or those of its attitude."""
+        numbers = range(places, places + 1) if isinstance(places, int) else range(places.start, places.stop)
+        if self.attitude is None or numbers.stop <= self.attitude.start:
+            return tuple(numbers)
+        if numbers.start == self.attitude.start:
+            return tuple(numbers[:-1])
+        return tuple(number - 1 for number in numbers)
+
+
+@dataclass(frozen=True)
+class Given:
+    """What the motion of one recording depends on beside states and parameters.
+
+    ``tables`` are coefficients and laws, ``knots`` (2, n) times and rates of a command; ``order`` is the highest order
+    of a speed ripple, and an ``uneven`` body makes the motion follow the spin.
+    """
+
+    recording: Recording
+    tables: Tables
+    knots: FloatArray
+    order: float = 0.0
+    uneven: bool = False
+
+
+#: given, flats (c, k) with the parameters of the physics, those of the plant's own (c, o), states (c, s), the steps of
+#: the integrator (n,), the place of a segment's end in them, instants (m,); gives rows (c, m, 19) of the motion at the
+#: instants, as `validation.identification.dynamics` has them, and the states (c, s) at the end
+Propagate: TypeAlias = Callable[
+    [Given, FloatArray, FloatArray, FloatArray, FloatArray, int, FloatArray], tuple[FloatArray, FloatArray]
+]
+
+
+def rows_for(states: FloatArray, out: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return room for rows (c, m, 19) at instants out (m,) and for the states (c, s) at the end."""
+    return np.empty((states.shape[0], out.size, ROW)), np.empty(states.shape)
+
+
+def _no_corners(given: Given, start: float, stop: float) -> list[float]:
+    del given, start, stop
+    return []
+
+
+def _itself(states: FloatArray) -> FloatArray:
+    return states
+
+
+@dataclass(frozen=True)
+class Dynamics:
+    """How states move.
+
+    ``longest_step`` gives the longest step (s) of the integrator from a state (s,) on between two instants, ``corners``
+    the instants there over which no step may leap; ``consistent`` gives states (k, s) of which some were moved with the
+    numbers that follow from others put right.
+    """
+
+    propagate: Propagate
+    longest_step: Callable[[Given, FloatArray, float, float], float]
+    corners: Callable[[Given, float, float], list[float]] = _no_corners
+    consistent: Callable[[FloatArray], FloatArray] = _itself
+
+
+def _no_attitudes(recording: Recording) -> tuple[FloatArray, ...]:
+    del recording
+    return ()
+
+
+@dataclass(frozen=True)
+class Initial:
+    """Where a fit starts, from the data alone.
+
+    ``states`` (k, s) at instants (k,) s where times are written as a ratio of the true ones; ``other_attitudes`` (4,)
+    at release are worth trying, too.
+    """
+
+    states: Callable[[Recording, FloatArray, float], FloatArray]
+    other_attitudes: Callable[[Recording], tuple[FloatArray, ...]] = _no_attitudes
+
+
+# -------------------------------------------------------------------------------------------------- sizes and times
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Sizes in each direction of a state (d,), in its units.
+
+    ``differences`` are half the differences by which slopes are taken; ``unknown`` is what is known of a state without
+    any reading, one sigma. ``continuous`` are the defects of continuity that a fit allows whose segments hang together,
+    ``relaxed`` those that it allows to stay beside the data whatever physics is missing.
+    """
+
+    differences: FloatArray
+    unknown: FloatArray
+    continuous: Jumps
+    relaxed: Jumps
+
+
+class Durations(NamedTuple):
+    """Lengths of time, s.
+
+    Attributes
+    ----------
+    segment : float
+        A segment of motion.
+    first_look : float
+        The beginning that is asked whether any motion follows all sensors.
+    window : float
+        A window within which a sensor that is late by anything is compared with a motion.
+    longest : float
+        What is looked at of a recording at most.
+    setup : float
+        What is judged of a recording for faults of its setup.
+    event_near : float
+        How far about the best node the instant of an event is looked for.
+    event_from : float
+        An event before this instant is not told from where the motion started.
+    settled : float
+        What is left before this instant is not asked whether it is noise.
+    """
+
+    segment: float
+    first_look: float
+    window: float
+    longest: float
+    setup: float
+    event_near: float = 0.0
+    event_from: float = 0.0
+    settled: float = -np.inf
+
+
+def even_nodes(recording: Recording, segment: float) -> FloatArray:
+    """Return the nodes (k + 1,) of segments of one length, about ``segment`` s."""
+    count = max(1, round(recording.end / segment))
+    return np.linspace(0.0, max(recording.end, 1e-3) + 1e-6, count + 1)
+
+
+# ------------------------------------------------------------------------------------------------ laws and designs
+
+
+def _time_alone(recording: Recording, t: FloatArray, states: FloatArray, values: Values) -> dict[str, FloatArray]:
+    del recording, states, values
+    return {"t": t}
+
+
+@dataclass(frozen=True)
+class MotionLaws:
+    """What an unknown law about the motion may be made of.
+
+    ``terms`` are asked for first; ``symbols`` gives what they are made of, each (k,), at instants (k,) s with states
+    (k, s); ``force_step`` and ``moment_step`` are half the differences in a force and a moment, N and N m.
+    """
+
+    terms: tuple[Term, ...] = ()
+    symbols: Callable[[Recording, FloatArray, FloatArray, Values], dict[str, FloatArray]] = _time_alone
+    force_step: float = 2e-2
+    moment_step: float = 2e-5
+
+    def step(self, target: str) -> float:
+        """Return half the difference in a force or moment."""
+        return self.force_step if target.endswith("_N") else self.moment_step
+
+
+def _as_planned(planned: FloatArray, states: FloatArray) -> FloatArray:
+    del states
+    return planned
+
+
+@dataclass(frozen=True)
+class Design:
+    """Recordings that could be made next.
+
+    ``about`` lists them about one in hand, first the same again: from the recording, its first state (s,), its end and
+    the length of the longest in hand, both in s; ``read`` takes one of a person's own list. ``as_in_hand`` gives a
+    planned first state (s,) with what it cannot say as the states (k, s) of one in hand have it.
+    """
+
+    about: Callable[[Recording, FloatArray, float, float], list[Plan]]
+    read: Callable[[TomlTable], Plan]
+    as_in_hand: Callable[[FloatArray, FloatArray], FloatArray] = _as_planned
+
+
+# ------------------------------------------------------------------------------------------------------- the plant
+
+
+def _nothing_lacks(recording: Recording) -> str | None:
+    del recording
+    return None
+
+
+def _as_read(recording: Recording, readings: Readings) -> Sequence[Readings]:
+    del recording
+    return (readings,)
+
+
+def _against_time(t: FloatArray, states: FloatArray) -> dict[str, FloatArray]:
+    del states
+    return {"time": t}
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """One kind of experiment.
+
+    Attributes
+    ----------
+    name : str
+        As ``plant`` in recording.toml has it.
+    motion : str
+        What one of its motions is called: the best *flight*.
+    layout, dynamics, initial, sizes, durations
+        See these types.
+    nodes : function
+        The nodes (k + 1,) of a recording's segments, s, of about a given length.
+    own : tuple of Parameter
+        Parameters of its motion that neither the catalogue nor a recording's hardware has, with what is known of them
+        before any reading; their group is its name. Each recording has its own, unless a fit says otherwise.
+    hardware : tuple of str
+        The groups of stated numbers that its motion depends on: "disc", "aero", "rig".
+    lacks : function
+        What a recording lacks that its motion cannot do without, in words; None for nothing.
+    observed : function
+        What counts of a sensor's usable readings.
+    path_known : bool
+        Whether its rows hold how the place of the sensors moves, so that an accelerometer's every reading is told.
+    commanded : bool
+        Whether a command prescribes its motion, which no event disturbs.
+    weakly_identified : bool
+        Whether readings of ordinary quality leave so much of its motion open that its beginning follows anything, and
+        free Gauss-Newton steps may hop about.
+    base_steps : int
+        Most Gauss-Newton steps of a fit of the baseline.
+    grows_with : function
+        What a mismatch may grow with, by name, each (k,), from instants (k,) s and states (k, s).
+    laws : MotionLaws
+    design : Design or None
+        None where no next recording can be proposed.
+    """
+
+    name: str
+    motion: str
+    layout: Layout
+    dynamics: Dynamics
+    initial: Initial
+    sizes: Sizes
+    durations: Durations
+    nodes: Callable[[Recording, float], FloatArray] = even_nodes
+    own: tuple[Parameter, ...] = ()
+    hardware: tuple[str, ...] = ()
+    lacks: Callable[[Recording], str | None] = _nothing_lacks
+    observed: Callable[[Recording, Readings], Sequence[Readings]] = _as_read
+    path_known: bool = True
+    commanded: bool = False
+    weakly_identified: bool = False
+    base_steps: int = 8
+    grows_with: Callable[[FloatArray, FloatArray], Mapping[str, FloatArray]] = _against_time
+    laws: MotionLaws = field(default_factory=MotionLaws)
+    design: Design | None = None
+
+    @property
+    def airborne(self) -> bool:
+        """Whether its body turns freely in the air, so that its attitude is part of its states."""
+        return self.layout.attitude is not None
+
+    @property
+    def follows_path(self) -> bool:
+        """Whether its states hold a path through the air."""
+        return self.layout.position is not None
+
+    @property
+    def air_modelled(self) -> bool:
+        """Whether the forces of the air act on it as its disc states them: they know a disc's top from its bottom."""
+        return "aero" in self.hardware
+
+    @cached_property
+    def own_keys(self) -> tuple[tuple[str, str], ...]:
+        """Group and name of its own parameters."""
+        return tuple(parameter.key for parameter in self.own)
+
+    def own_values(self, values: Values) -> FloatArray:
+        """Return its own parameters (o,), as given or as they stand without a fit."""
+        return np.array([values.get(parameter.key, parameter.stated) for parameter in self.own])
