@@ -179,6 +179,10 @@ class Recording:
     def __contains__(self, sensor: str) -> bool:
         return sensor in self.samples
 
+    def __repr__(self) -> str:
+        sensors = ", ".join(f"{sensor} {len(samples)} rows" for sensor, samples in self.samples.items())
+        return f"<Recording '{self.name}': {self.plant}, {self.end:.6g} s, {sensors or 'no sensors'}>"
+
     def get(self, sensor: str) -> Samples | None:
         """Return a sensor's samples, or None where the recording has none."""
         return self.samples.get(sensor)

@@ -56,6 +56,18 @@ class YawRate:
     def __len__(self) -> int:
         return int(self.t.size)
 
+    def __repr__(self) -> str:
+        return f"<YawRate {self.summary()}>"
+
+    def summary(self) -> str:
+        """Return one line: the method, how many values are known, the median rate and standard deviation."""
+        known = np.isfinite(self.rate)
+        if not known.any():
+            return f"by {self.method}: none of {len(self)} values is known"
+        median, sd = np.degrees([np.median(self.rate[known]), np.median(self.sd[known])])
+        sign = "" if self.signed else "magnitude, "
+        return f"by {self.method}: {sign}{known.sum()} of {len(self)} known, median {median:.5g} +- {sd:.2g} deg/s"
+
     def at(self, t: FloatArray) -> FloatArray:
         """Return the rate at times t (m,), linear between neighbours; NaN outside and next to unknown values."""
         return np.interp(t, self.t, self.rate, left=np.nan, right=np.nan) if len(self) else np.full(np.shape(t), np.nan)

@@ -55,3 +55,26 @@ def test_the_wheel_holds_every_package_and_the_models():
     assert wheel["force-include"] == {"models": "discsim/models"}
     for package in packages:
         assert (ROOT / package / "py.typed").exists()
+
+
+def test_what_leaves_the_wheel_is_imported_by_nothing_that_stays():
+    left = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["exclude"]
+    assert all((ROOT / folder / "__init__.py").is_file() for folder in left)
+    names = [folder.replace("/", ".") for folder in left]
+    for package in ("discsim", "estimators", "validation"):
+        for source in (ROOT / package).rglob("*.py"):
+            if not any((ROOT / folder) in source.parents for folder in left):
+                text = source.read_text(encoding="utf-8")
+                found = [name for name in names if re.search(rf"^\s*(from|import) {re.escape(name)}\b", text, re.M)]
+                assert not found, source
+
+
+def test_the_package_says_whose_it_is_under_which_licence_and_how_to_cite_it():
+    project = PROJECT["project"]
+    assert project["license"] == "Apache-2.0"
+    assert "Apache License" in (ROOT / project["license-files"][0]).read_text(encoding="utf-8")
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"version: {project['version']}\n" in citation
+    assert "doi: 10.3390/s18103564\n" in citation
+    assert f"## {project['version']}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert "docs/architecture.md" in (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")

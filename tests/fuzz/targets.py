@@ -26,7 +26,6 @@ from estimators.methods import Options
 from estimators.rate import YawRate
 from estimators.usable import FASTEST
 from validation.checking import check_recording
-from validation.commands.estimate import all_notes, estimate_all, rate_csv, summary
 from validation.diagnosis.design.plans import read_plans
 from validation.diagnosis.setup import find_setup_faults
 from validation.importing import import_recording, read_map, read_readings
@@ -34,6 +33,7 @@ from validation.importing.sniffing import map_text, opened, sniff, stretches
 from validation.reporting.run import json_text
 from validation.scenarios.method_disagreement import disagreements
 from validation.scenarios.rate_table import plateau_table, rate_table_checks, run_rate_table
+from validation.spin_estimates import all_notes, estimate_all, estimate_json, rate_csv
 from validation.sweeps.plan import read_plan
 
 from .judge import FaultFound
@@ -94,7 +94,7 @@ def _estimate(folder: Path) -> None:
     for rate in [*rates, *best]:
         _rate_that_can_be(rate, recording)
     "".join(rate_csv(rates))
-    json_text(summary(recording, "all", rates, left_out, disagreements(rates), all_notes(recording)))
+    json_text(estimate_json(recording, "all", rates, left_out, disagreements(rates), all_notes(recording)))
 
 
 def _rate_that_can_be(rate: YawRate, recording: Recording) -> None:

@@ -15,10 +15,11 @@ from discsim.recording import Recording, read_recording, write_recording
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
 from discsim.trajectory import predict
-from validation.commands.fit import command, notes
+from validation.commands.fit import command
 from validation.scenarios.throws import FULL_SET
 from validation.yaw_damping import fit_yaw_damping, observe, paper_table
 from validation.yaw_damping.bias import paper_biases
+from validation.yaw_damping.fitted import notes
 from validation.yaw_damping.observations import SHARED_S, Throw, misplaced
 from validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S, damping_by_26, table_csv
 from validation.yaw_damping.whiteness import whiteness

@@ -60,7 +60,7 @@ def test_shapes_and_counts_are_no_citations():
 
 def test_the_page_is_made_from_its_numbers():
     text = page_text(NUMBERS, PAGE.stem)
-    assert PAGE.read_text(encoding="utf-8") == text, "run `python -m validation.studies.paper --text`"
+    assert PAGE.read_text(encoding="utf-8") == text, "run `discsim study paper --text`"
 
 
 def same(one, other, where: str) -> list[str]:
@@ -76,7 +76,7 @@ def same(one, other, where: str) -> list[str]:
 
 def test_the_numbers_of_the_page_are_those_of_the_code():
     made = json.loads(json.dumps(compute(SEED)))
-    assert same(made, NUMBERS, "numbers") == [], "run `python -m validation.studies.paper`, and read the page"
+    assert same(made, NUMBERS, "numbers") == [], "run `discsim study paper`, and read the page"
 
 
 class TestFigures:

@@ -17,6 +17,7 @@ from discsim.errors import InputError
 from discsim.recording import Samples
 from estimators.rate import YawRate
 from validation.cli import main
+from validation.studies.catalogue import run_study
 from validation.studies.real_recordings import road
 from validation.studies.real_recordings.__main__ import app
 from validation.studies.real_recordings.agreement import LOWERED, Attempt, agreement, attempts, mean_between
@@ -247,9 +248,8 @@ def test_recordings_that_are_not_there_are_named_with_the_way_to_give_them(tmp_p
         find_recordings()
     (tmp_path / "real").mkdir()
     assert find_recordings(tmp_path) == tmp_path / "real"
-    result = CliRunner().invoke(app, ["--out", str(tmp_path / "page")])
-    assert result.exit_code == 2
-    assert "nowhere" in result.output
+    with pytest.raises(InputError, match="nowhere"):
+        run_study("real-recordings", ["--out", str(tmp_path / "page")])
     assert not (tmp_path / "page.md").exists()
 
 

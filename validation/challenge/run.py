@@ -10,21 +10,21 @@ from pathlib import Path
 from typing import Any
 
 import discsim
-from discsim.files import digest, model_file, model_names
+from discsim.files import digest, model_file, model_names, write_text
 from validation.challenge.blind import DIAGNOSE, Request, diagnose_blind, open_answers, seal_answers
 from validation.challenge.cases.detection_limit import sizes
 from validation.challenge.report.page import write_page
 from validation.challenge.scores.detection import detections, fit_curve
 from validation.challenge.scores.result import RESULT, Scored, rates_of, times
-from validation.reporting.run import Run, package_version, source_digest
+from validation.reporting.run import Run, json_text, package_version, source_digest
 from validation.tasks import Task, claim, discard, run_tasks
 
-__all__ = ["challenge", "limit_of"]
+__all__ = ["challenge", "limit_of", "write_challenge"]
 
 #: folder of what is done, in --out
 CHECKPOINTS = "checkpoints"
 #: what is done with finished cases: a change of it is no reason to do them again
-_AFTERWARDS = ("masks.py", "report", "run.py", "scores")
+_AFTERWARDS = ("__init__.py", "challenged.py", "masks.py", "report", "run.py", "scores")
 
 
 def challenge(
@@ -79,23 +79,28 @@ def challenge(
             requests, open_answers(requests, run.out), results, limits, strict=True
         )
     ]
-    curve = fit_curve(detections(scored))
-    run.write_json(
-        RESULT,
-        {
-            "command": list(command or DIAGNOSE[1:]),
-            "made_by": " ".join(["discsim", *run.command]),
-            "version": package_version(),
-            "code_sha256": versions["code"],
-            "mask": requests[0].mask,
-            "cases": [item.to_json() for item in scored],
-            "summary": {name: value.to_json() for name, value in rates_of(scored).items()},
-            "half_detection": curve.to_json() if curve is not None else None,
-            "seconds": times(scored).to_json(),
-        },
-    )
-    write_page(run.out, scored)
+    write_challenge(run.out, scored, requests[0].mask, run.command, command)
     return scored
+
+
+def write_challenge(
+    out: Path, scored: Sequence[Scored], mask: str | None, made_by: Sequence[str], command: Sequence[str] | None = None
+) -> None:
+    """Write ``challenge.json`` and ``report.html`` of scored cases into ``out``; ``command`` diagnosed them."""
+    curve = fit_curve(detections(scored))
+    content = {
+        "command": list(command or DIAGNOSE[1:]),
+        "made_by": " ".join(["discsim", *made_by]),
+        "version": package_version(),
+        "code_sha256": code_digest(),
+        "mask": mask,
+        "cases": [item.to_json() for item in scored],
+        "summary": {name: value.to_json() for name, value in rates_of(scored).items()},
+        "half_detection": curve.to_json() if curve is not None else None,
+        "seconds": times(scored).to_json(),
+    }
+    write_text(out / RESULT, json_text(content))
+    write_page(out, scored)
 
 
 def code_digest() -> str:

@@ -46,7 +46,8 @@ def noise_of(value: FloatArray) -> float | None:
         found.append(float(np.mean(_small(block))) / _lowered(block.shape[1]))
     if len(found) < max(1, len(starts) // 4):
         return None
-    return float(np.sqrt(np.median(found)))
+    # the least eigenvalues of readings without noise round to either side of zero
+    return float(np.sqrt(max(0.0, float(np.median(found)))))
 
 
 def _small(block: FloatArray) -> FloatArray:

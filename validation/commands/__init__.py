@@ -33,6 +33,15 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "view",
         "Show a flight or a rate table in MuJoCo's interactive viewer, or draw it off screen with --video.",
     ),
+    "list": ("list_", "List what is shipped: discs, parts, throws, sites, maps, sweeps or effects, a line each."),
+    "show": (
+        "show",
+        "Show a disc, part, throw, site, map or sweep as its file has it, or an effect with its parameters.",
+    ),
+    "study": (
+        "study",
+        "Run a study of the documentation. NAME --help shows its options; without NAME all studies are listed.",
+    ),
 }
 
 
@@ -40,7 +49,8 @@ def register(app: typer.Typer, asked: str | None) -> None:
     """Add every sub-command to ``app``, of which only the one asked for is loaded: ``--help`` is there at once."""
     for name, (module, line) in COMMANDS.items():
         if name == asked:
-            app.command(name)(import_module(f"validation.commands.{module}").command)
+            loaded = import_module(f"validation.commands.{module}")
+            app.command(name, context_settings=getattr(loaded, "CONTEXT", None))(loaded.command)
         else:
             app.command(name, help=line)(_not_loaded)
 

@@ -89,11 +89,9 @@ def command(
     """
     from discsim.errors import InputError
     from validation.challenge.blind import Request
+    from validation.challenge.challenged import Challenged
     from validation.challenge.masks import challenge_masks
-    from validation.challenge.report.page import goals_met
     from validation.challenge.run import challenge
-    from validation.challenge.scores.detection import detections, fit_curve
-    from validation.challenge.scores.result import rates_of, times
     from validation.reporting.run import start_run
 
     if scheduler is not None and workers is not None:
@@ -115,17 +113,9 @@ def command(
     for name, scored in results.items():
         if mask is MaskName.all:
             typer.echo(f"\n{name}")
-        rates, curve = rates_of(scored), fit_curve(detections(scored))
-        for label, found in rates.items():
-            share = f"{100 * found.value:.1f} % ({found.hits} of {found.of})" if found.of else "no such case"
-            typer.echo(f"{label.replace('_', ' ')}: {share}")
-        if curve is not None:
-            typer.echo(f"half-detection size, in detection limits: {curve.text}")
-        typer.echo(f"{sum(item.score.right for item in scored)} of {len(scored)} answered rightly")
-        typer.echo(f"a diagnosis took {times(scored).text}")
-        # the goals are for cases as they come; under a mask an answer is all that can be asked for
-        good = goals_met(rates, curve, few=len(scored) < 300) if name is None else not rates["crash_rate"].hits
-        met = met and good
+        found = Challenged(tuple(scored), name)
+        typer.echo(found.summary())
+        met = met and found.goals_met
     typer.echo(f"report: {out / 'report.html'}")
     if not met:
         raise typer.Exit(1)

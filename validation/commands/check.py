@@ -25,16 +25,12 @@ def command(
 
     Example: discsim check throw-01
     """
-    from discsim.recording import read_dataset
-    from validation.checking import check_recording
+    from validation.checking.checked import check
     from validation.checking.table import print_checks
-    from validation.diagnosis.setup import find_setup_faults
     from validation.reporting.run import start_run
 
-    dataset = read_dataset(recordings)
-    faults = find_setup_faults(dataset).faults
-    checks = [check_recording(recording, faults) for recording in dataset]
+    found = check(recordings)
     if out is not None:
-        with start_run(out, inputs=[recordings]) as run:
-            run.write_json("check.json", {"recordings": [check.to_json() for check in checks]})
-    print_checks(checks)
+        with start_run(out, inputs=[recordings]):
+            found.report(out)
+    print_checks(found.checks)

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from validation.reporting.options import DateOption, OutOption, PlaceOption, SeedOption
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from validation.diagnosis.result import Outcome
-
-__all__ = ["command", "write_outcome"]
+__all__ = ["command"]
 
 
 def command(
@@ -49,17 +44,15 @@ def command(
     Example: discsim diagnose open-field --out open-field-diagnosis
     """
     from dataclasses import replace
-    from importlib import import_module
 
     from discsim.effects.own import load_user_effects
     from validation.diagnosis.datasets import need_field, read_datasets
     from validation.diagnosis.design.plans import read_plans
-    from validation.diagnosis.report.page import verdict_sentence
+    from validation.diagnosis.diagnosed import diagnose_named
     from validation.reporting.options import at_place
     from validation.reporting.progress import shown
     from validation.reporting.run import start_run
 
-    diagnose = import_module("validation.diagnosis").diagnose
     files = user_effects or []
     effects = load_user_effects(files)
     recordings, names = read_datasets(datasets)
@@ -73,25 +66,13 @@ def command(
         files = [*files, candidates]
     with start_run(out, seed, [*datasets, *files]) as run:
         with shown() as progress:
-            outcome = diagnose(recordings, names, progress=progress, seed=seed, user_effects=effects, plans=plans)
-        settings = {
-            "command": f"discsim {' '.join(run.command)}",
-            "seed": str(seed),
-            "recordings": ", ".join(f"{name}: {len(set_)}" for name, set_ in zip(names, recordings, strict=True)),
-        }
-        write_outcome(outcome, out, settings)
-    typer.echo(f"{outcome.diagnosis.verdict}: {verdict_sentence(outcome.diagnosis)}")
+            found = diagnose_named(
+                dict(zip(names, recordings, strict=True)),
+                progress=progress,
+                seed=seed,
+                user_effects=effects,
+                plans=plans,
+            )
+        found.report(out, command=f"discsim {' '.join(run.command)}")
+    typer.echo(found.summary())
     typer.echo(f"read {out / 'report.html'}")
-
-
-def write_outcome(outcome: Outcome, out: Path, settings: Mapping[str, str]) -> None:
-    """Write all files of a diagnosis into ``out``, each whole or not at all, ``diagnosis.json`` last."""
-    from discsim.files import write_text
-    from discsim.model_file import write_model
-    from validation.diagnosis.report.page import draw_figures, write_diagnosis_report
-    from validation.reporting.run import json_text
-
-    figures = draw_figures(outcome, out)
-    write_diagnosis_report(out / "report.html", outcome, figures, settings)
-    write_model(outcome.model, out / "model.toml")
-    write_text(out / "diagnosis.json", json_text(outcome.diagnosis.to_json()))

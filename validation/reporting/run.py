@@ -10,12 +10,12 @@ from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
+import discsim
 from discsim.errors import InputError
 from discsim.files import digest, write_text
 
@@ -26,10 +26,7 @@ T = TypeVar("T")
 
 def package_version() -> str:
     """Return the installed version of discsim ("unknown" when run from a bare source tree)."""
-    try:
-        return version("discsim")
-    except PackageNotFoundError:
-        return "unknown"
+    return discsim.__version__
 
 
 def source_digest(*places: Path, without: Container[Path] = ()) -> str:

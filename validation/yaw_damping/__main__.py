@@ -1,4 +1,4 @@
-"""``python -m validation.yaw_damping``: the bias of the paper's way to C_Nr, measured against the truth."""
+"""``discsim study bias``: the bias of the paper's way to C_Nr, measured against the truth."""
 
 from __future__ import annotations
 

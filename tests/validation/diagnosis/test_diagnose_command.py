@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from outcomes import OUTCOMES, explained
 
-import validation.diagnosis
 from discsim.disc import Rig
 from discsim.environment import Environment
 from discsim.errors import InputError
@@ -62,7 +61,7 @@ def asked(monkeypatch):
         calls.append((datasets, names, options))
         return replace(explained(), residuals=explained().residuals[:3])
 
-    monkeypatch.setattr(validation.diagnosis, "diagnose", diagnose, raising=False)
+    monkeypatch.setattr("validation.diagnosis.diagnosed.diagnose", diagnose)
     return calls
 
 

@@ -1,6 +1,6 @@
 """Conceal: simulate a case in MuJoCo, write plain recordings, and seal the answer away from them.
 
-``python -m validation.challenge.cases.conceal --seed 1 --cases 3 --out DIR`` writes ``DIR/<case>/<01..>/``
+``discsim study conceal --seed 1 --cases 3 --out DIR`` writes ``DIR/<case>/<01..>/``
 (recordings), ``DIR/answers/<case>.toml`` (answers) and ``DIR/sealed.json`` (digests of both,
 published before anybody diagnoses).
 """
@@ -241,7 +241,7 @@ def seal(
 
 def main() -> None:
     """Conceal cases from the command line."""
-    parser = argparse.ArgumentParser(prog="python -m validation.challenge.cases.conceal", description=__doc__)
+    parser = argparse.ArgumentParser(prog="discsim study conceal", description=__doc__)
     parser.add_argument("--seed", type=int, default=0, help="seed of the first case; case k has seed + k")
     parser.add_argument("--cases", type=int, default=1)
     parser.add_argument("--plant", choices=PLANTS)

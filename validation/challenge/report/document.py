@@ -1,6 +1,6 @@
 """Write finished challenges into the page on the blind test.
 
-    python -m validation.challenge.report.document challenge --masks challenge-masks
+    discsim study blind-test challenge --masks challenge-masks
 
 puts result, confusions, failures (each with the command that reproduces it) and figures of the challenge in the folder
 ``challenge`` into docs/challenge.md, and of each mask finished in ``challenge-masks`` a row into its table of masks;
@@ -262,7 +262,7 @@ def _blank(folder: Path, plain: Result) -> Result:
 def main() -> None:
     """Write results into the page from the command line."""
     parser = argparse.ArgumentParser(
-        prog="python -m validation.challenge.report.document",
+        prog="discsim study blind-test",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

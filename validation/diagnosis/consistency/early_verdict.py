@@ -51,7 +51,7 @@ __all__ = [
 #: most steps of one look, and of one that serves for figures alone
 _STEPS, _STEPS_OF_FIGURES = 8, 2
 #: a robust root mean square of what is left of a sensor, in its noise, above which a look does not follow it. Of 44
-#: sound flights and runs (``python -m validation.challenge.cases.conceal --seed 70000 --cases 40``, and flights with
+#: sound flights and runs (``discsim study conceal --seed 70000 --cases 40``, and flights with
 #: ``--effects`` of each clock, lag and loss of samples) the median recording leaves 0.7 to 6.3 (physics of no
 #: catalogue), and up to 15 to 31 where three or five samples in a hundred were lost, which a shift reconciles: none is
 #: contradicted. Noise that is three times what is stated leaves 3, sensors of different throws or runs 17 and more

@@ -20,7 +20,7 @@ __all__ = ["APART", "RatesApart", "rates_apart"]
 
 #: how many times the ordinary error of two sensors (1.5 rad/s and 5 %) their rates differ by, in the median recording,
 #: where no motion reconciles them: 30 rad/s at a spin of 60 rad/s. Of 71 sound sets, half of them with an effect of the
-#: catalogue (``python -m validation.challenge.cases.conceal --seed 70000 --cases 40``, and flights and free spins with
+#: catalogue (``discsim study conceal --seed 70000 --cases 40``, and flights and free spins with
 #: ``--effects`` of each clock, lag and loss of samples; thirteen others), the largest is 1.7, and 3.7 in one recording:
 #: a table's ramps. Sensors of runs in the other direction, and random numbers, leave 17 and more
 APART = 7.0

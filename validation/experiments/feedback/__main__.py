@@ -1,4 +1,4 @@
-"""``python -m validation.experiments.feedback``: the paper's Figs. 11 and 13 on our truth, with scores."""
+"""``discsim study feedback``: the paper's Figs. 11 and 13 on our truth, with scores."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import typer
 
-from discsim.errors import InputError
 from discsim.shipped import load_throw
 from validation.experiments.feedback.experiment import Experiment, run_experiment
 from validation.experiments.feedback.figures import draw_fig_11, draw_fig_13, draw_what_matters
@@ -28,14 +27,10 @@ def command(out: OutOption = Path("feedback"), seed: SeedOption = 0) -> None:
     Writes fig-11.png, fig-13-*.png, sources.png, what-matters.png, feedback.json and scores.json into --out. The
     paper's release is models/throws/paper.toml.
 
-    Example: python -m validation.experiments.feedback --out feedback
+    Example: discsim study feedback --out feedback
     """
-    try:
-        with start_run(out, seed) as run:
-            _write(run, run_experiment(run))
-    except InputError as error:
-        typer.echo(f"feedback: {error}", err=True)
-        raise typer.Exit(2) from None
+    with start_run(out, seed) as run:
+        _write(run, run_experiment(run))
 
 
 def _write(run: Run, experiment: Experiment) -> None:

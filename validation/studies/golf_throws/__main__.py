@@ -1,4 +1,4 @@
-"""``python -m validation.studies.golf_throws``: write the page on the three tracked golf throws."""
+"""``discsim study golf-throws``: write the page on the three tracked golf throws."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from discsim.errors import InputError
 from validation.studies.golf_throws.page import write_page
 from validation.studies.real_recordings.sources import find_recordings
 
@@ -29,13 +28,9 @@ def command(
 ) -> None:
     """Fly three measured throws, compare them with their tracks, and write a page with a table and a figure.
 
-    Example: python -m validation.studies.golf_throws --page docs/golf-throws.md
+    Example: discsim study golf-throws --page docs/golf-throws.md
     """
-    try:
-        found = write_page(find_recordings(recordings), page, seed)
-    except InputError as error:
-        typer.echo(f"golf_throws: {error}", err=True)
-        raise typer.Exit(2) from None
+    found = write_page(find_recordings(recordings), page, seed)
     for throw in found:
         typer.echo(
             f"{throw.name}: misses by {np.linalg.norm(throw.miss):.1f} m, band (1 sd) {throw.band[0]:.1f} m north and "

@@ -70,7 +70,7 @@ def _text(found: Sequence[Prediction], figure: str) -> str:
         ),
         "",
         "```sh",
-        "python -m validation.studies.golf_throws",
+        "discsim study golf-throws",
         "```",
         "",
         _wrapped(

@@ -1,4 +1,4 @@
-"""``python -m validation.studies.paper``: write the page that sets the paper beside the project."""
+"""``discsim study paper``: write the page that sets the paper beside the project."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def command(
 ) -> None:
     """Compute every number and figure that can be set beside the paper's, and write the page.
 
-    Example: python -m validation.studies.paper --page docs/paper.md
+    Example: discsim study paper --page docs/paper.md
     """
     folder = page.parent / page.stem
     if not text:

@@ -42,7 +42,7 @@ def _lead() -> list[str]:
         ),
         "",
         "```sh",
-        "python -m validation.studies.paper",
+        "discsim study paper",
         "```",
         "",
         _wrapped(

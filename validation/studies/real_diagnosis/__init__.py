@@ -1,4 +1,4 @@
-"""Measured recordings diagnosed, as a page of the documentation: ``python -m validation.studies.real_diagnosis``."""
+"""Measured recordings diagnosed, as a page of the documentation: ``discsim study real-diagnosis``."""
 
 from validation.studies.real_diagnosis.page import write_page
 

@@ -1,4 +1,4 @@
-"""``python -m validation.studies.real_diagnosis``: write the page on what a diagnosis says of measured recordings."""
+"""``discsim study real-diagnosis``: write the page on what a diagnosis says of measured recordings."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from discsim.errors import InputError
 from validation.studies.real_diagnosis.page import write_page
 from validation.studies.real_recordings.sources import find_recordings
 
@@ -33,14 +32,10 @@ def command(
 ) -> None:
     """Diagnose measured recordings and write a page with tables and figures.
 
-    Example: python -m validation.studies.real_diagnosis --work real-diagnosis
+    Example: discsim study real-diagnosis --work real-diagnosis
     """
-    try:
-        found = find_recordings(recordings)
-        written = write_page(found, page, work, seed, lambda text: print(text, file=sys.stderr, flush=True))
-    except InputError as error:
-        typer.echo(f"real_diagnosis: {error}", err=True)
-        raise typer.Exit(2) from None
+    found = find_recordings(recordings)
+    written = write_page(found, page, work, seed, lambda text: print(text, file=sys.stderr, flush=True))
     typer.echo(f"{written}")
 
 

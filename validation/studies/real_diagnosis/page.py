@@ -73,7 +73,7 @@ def _lead(seed: int) -> str:
             ),
             "",
             "```sh",
-            "python -m validation.studies.real_diagnosis" + (f" --seed {seed}" if seed else ""),
+            "discsim study real-diagnosis" + (f" --seed {seed}" if seed else ""),
             "```",
             "",
             f"Made with discsim {package_version()}, diagnosis `{diagnosis_digest()[:12]}`, seed {seed}.",

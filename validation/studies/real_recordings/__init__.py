@@ -1,4 +1,4 @@
-"""The methods on measured recordings, as a page: ``python -m validation.studies.real_recordings``."""
+"""The methods on measured recordings, as a page: ``discsim study real-recordings``."""
 
 from validation.studies.real_recordings.page import write_page
 from validation.studies.real_recordings.sources import SOURCES, find_recordings

@@ -1,4 +1,4 @@
-"""``python -m validation.studies.real_recordings``: write the page on measured recordings."""
+"""``discsim study real-recordings``: write the page on measured recordings."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from discsim.errors import InputError
 from validation.studies.real_recordings.page import write_page
 from validation.studies.real_recordings.road import LOGS, walk
 from validation.studies.real_recordings.sources import find_recordings
@@ -39,15 +38,11 @@ def command(
 ) -> None:
     """Write a page: what the four commands say of each measured log, and each method against a reference sensor.
 
-    Example: python -m validation.studies.real_recordings --out docs/real-recordings
+    Example: discsim study real-recordings --out docs/real-recordings
     """
-    try:
-        real = find_recordings(recordings)
-        found = [walk(log, real, logs, _say) for log in LOGS] if walked else []
-        page = write_page(real, out, also, _say, walked=found)
-    except InputError as error:
-        typer.echo(f"real_recordings: {error}", err=True)
-        raise typer.Exit(2) from None
+    real = find_recordings(recordings)
+    found = [walk(log, real, logs, _say) for log in LOGS] if walked else []
+    page = write_page(real, out, also, _say, walked=found)
     typer.echo(f"{page}")
 
 

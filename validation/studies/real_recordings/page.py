@@ -82,7 +82,7 @@ def _lead() -> str:
         _wrapped(what),
         "",
         "```sh",
-        "python -m validation.studies.real_recordings",
+        "discsim study real-recordings",
         "```",
         "",
     ]

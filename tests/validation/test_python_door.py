@@ -1,0 +1,202 @@
+"""What the commands do is there from Python: results that can be read, and the same files as the commands write."""
+
+from __future__ import annotations
+
+import doctest
+import subprocess
+import sys
+from dataclasses import dataclass
+from importlib import import_module
+
+import numpy as np
+import pytest
+
+import discsim
+import validation
+from discsim.recording import Recording, SensorSheet
+from estimators import estimate, fft
+from validation.cli import main
+from validation.studies.catalogue import STUDIES, run_study
+
+#: modules with examples: each is run as it stands
+EXAMPLES = ("discsim", "discsim.plain_arrays", "validation", "validation.checking.checked")
+RATE = 30.0
+
+
+def field_of(rate: float, seconds: float = 3.0, noise: float = 0.05) -> tuple[np.ndarray, np.ndarray]:
+    """Return time (n,) s and the field (n, 3) uT that a magnetometer sees which turns about z, rad/s."""
+    t = np.arange(0.0, seconds, 0.01)
+    field = np.column_stack([40 * np.cos(rate * t), -40 * np.sin(rate * t), np.full(t.size, 20.0)])
+    return t, field + np.random.default_rng(0).normal(0.0, noise, field.shape)
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    return discsim.recording_from_arrays({"magnetometer": field_of(RATE)}, name="turning")
+
+
+def command(monkeypatch: pytest.MonkeyPatch, *words: str) -> None:
+    monkeypatch.setattr(sys, "argv", ["discsim", *words])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert not stop.value.code
+
+
+@pytest.mark.parametrize("module", EXAMPLES)
+def test_the_examples_of_the_docstrings_give_what_they_say(module, recording, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    found = doctest.testmod(import_module(module), extraglobs={"recording": recording})
+    assert found.attempted > 0
+    assert found.failed == 0
+
+
+@pytest.mark.parametrize("package", [discsim, validation])
+def test_every_name_that_a_package_offers_is_there(package):
+    for name in package.__all__:
+        assert getattr(package, name) is not None, name
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        package.nothing  # noqa: B018
+
+
+def test_importing_discsim_loads_neither_mujoco_nor_numpy():
+    code = "import discsim, sys; print([name for name in ('mujoco', 'numpy', 'numba') if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+def test_arrays_are_enough_for_a_spin_rate(recording):
+    assert np.median(np.abs(estimate(recording, "fft").rate)) == pytest.approx(RATE, rel=0.01)
+    assert np.median(np.abs(fft(discsim.Samples(*field_of(RATE))).rate)) == pytest.approx(RATE, rel=0.01)
+
+
+def test_arrays_keep_what_a_sheet_states_and_take_the_rate_from_the_times():
+    sheet = SensorSheet(float("nan"), position=np.array([-0.0161, 0.0, 0.0]))
+    t = np.arange(0.0, 1.0, 0.002)
+    made = discsim.recording_from_arrays({"accelerometer": (t, np.zeros((t.size, 3)))}, sheets={"accelerometer": sheet})
+    assert made.sheets["accelerometer"].rate_hz == pytest.approx(500.0)
+    np.testing.assert_array_equal(made.sheets["accelerometer"].position, sheet.position)
+    assert not made.environment.field_known
+
+
+@pytest.mark.parametrize(
+    ("readings", "said"),
+    [
+        ({"compass": ([0, 1], [[1, 2, 3]] * 2)}, "unknown sensor 'compass'; expected one of magnetometer"),
+        ({"magnetometer": ([0, 1], [[1, 2]] * 2)}, r"magnetometer: got values \(2, 2\), expected \(n, 3\)"),
+        ({"magnetometer": ([0, 0], [[1, 2, 3]] * 2)}, "time runs from 0 to 0 s; expected ascending"),
+        ({"magnetometer": ([0], [[1, 2, 3]])}, "1 rows tell no sampling rate; expected two or more"),
+        ({"magnetometer": (["a"], [[1, 2, 3]])}, "magnetometer: could not convert"),
+    ],
+)
+def test_arrays_that_are_no_recording_are_refused_in_a_sentence(readings, said):
+    with pytest.raises(discsim.InputError, match=said):
+        discsim.recording_from_arrays(readings)
+
+
+def test_a_recording_and_a_rate_show_themselves_in_a_line(recording):
+    assert repr(recording) == "<Recording 'turning': free_spin, 2.99 s, magnetometer 300 rows>"
+    assert repr(estimate(recording, "fft")).startswith("<YawRate by fft: magnitude, ")
+
+
+def test_an_estimate_from_python_writes_the_bytes_of_the_command(recording, tmp_path, monkeypatch):
+    discsim.write_recording(recording, tmp_path / "turning")
+    found = validation.estimate(tmp_path / "turning", "fft")
+    assert repr(found) == "<SpinEstimates of 'turning': fft>"
+    assert found.summary().startswith("by fft: magnitude")
+    found.report(tmp_path / "mine")
+    command(monkeypatch, "estimate", str(tmp_path / "turning"), "--method", "fft", "--out", str(tmp_path / "theirs"))
+    for name in ("rate.csv", "estimate.json"):
+        assert (tmp_path / "mine" / name).read_bytes() == (tmp_path / "theirs" / name).read_bytes()
+    np.testing.assert_array_equal(found["fft"].rate, found.rates[0].rate)
+
+
+def test_a_check_from_python_writes_the_bytes_of_the_command(recording, tmp_path, monkeypatch):
+    discsim.write_recording(recording, tmp_path / "turning")
+    found = validation.check(tmp_path / "turning")
+    assert repr(found).startswith("<Checked: 1 recordings, ")
+    assert "turning: free_spin" in found.summary()
+    found.report(tmp_path / "mine")
+    command(monkeypatch, "check", str(tmp_path / "turning"), "--out", str(tmp_path / "theirs"))
+    assert (tmp_path / "mine" / "check.json").read_bytes() == (tmp_path / "theirs" / "check.json").read_bytes()
+
+
+def test_a_log_imported_from_python_is_the_recording_of_the_command(tmp_path, monkeypatch):
+    t, field = field_of(RATE)
+    rows = "\n".join(f"{a:.3f},{x:.3f},{y:.3f},{z:.3f}" for a, (x, y, z) in zip(t, field, strict=True))
+    raw = tmp_path / "log.csv"
+    raw.write_text(f"time_s,mag_x_uT,mag_y_uT,mag_z_uT\n{rows}\n")
+    found = validation.import_log(raw)
+    found.report(tmp_path / "mine")
+    command(monkeypatch, "import", str(raw), "--out", str(tmp_path / "theirs"))
+    for name in ("recording.toml", "magnetometer.csv", "repairs.csv", "map.toml"):
+        assert (tmp_path / "mine" / name).read_bytes() == (tmp_path / "theirs" / name).read_bytes()
+    assert repr(found).startswith("<ImportedLog 'log.csv': 1 recordings, ")
+    assert "magnetometer: 300 samples" in found.summary()
+
+
+def test_recordings_are_taken_as_they_come(recording, tmp_path):
+    from validation.given import given_recordings
+
+    discsim.write_recording(recording, tmp_path / "01")
+    given = given_recordings([recording, tmp_path, str(tmp_path / "01")])
+    assert [one.name for one in given] == ["turning"] * 3
+    with pytest.raises(discsim.InputError, match="no recordings were given"):
+        given_recordings([])
+
+
+def test_recordings_of_two_plants_are_not_diagnosed_together(recording):
+    other = discsim.recording_from_arrays({"magnetometer": field_of(RATE)}, plant="rate_table")
+    with pytest.raises(discsim.InputError, match="expected recordings of one plant"):
+        validation.diagnose([recording, other])
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a blind test was asked for."""
+
+    given: tuple[object, ...]
+    named: dict[str, object]
+
+
+def test_the_package_of_the_blind_test_is_called_as_its_function(monkeypatch):
+    import validation.challenge.challenged as home
+
+    monkeypatch.setattr(home, "blind_test", lambda *given, **named: Asked(given, named))
+    assert validation.challenge(3, seed=5) == Asked((3,), {"seed": 5})
+    assert validation.challenge.challenged is home
+
+
+def test_what_is_shipped_is_listed_and_shown_by_the_command(monkeypatch, capsys):
+    command(monkeypatch, "list", "discs")
+    assert "a sensible golf distance driver" in capsys.readouterr().out
+    command(monkeypatch, "show", "mpu9250")
+    assert capsys.readouterr().out.startswith("# parts/mpu9250\n")
+
+
+def test_h_asks_for_help_as_the_long_option_does(monkeypatch, capsys):
+    command(monkeypatch, "list", "-h")
+    short = capsys.readouterr().out
+    command(monkeypatch, "list", "--help")
+    assert short == capsys.readouterr().out
+    assert "Example: discsim list discs" in short
+
+
+def test_a_study_is_run_by_its_name_with_its_own_options(monkeypatch, capsys):
+    command(monkeypatch, "study")
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(STUDIES)
+    command(monkeypatch, "study", "paper", "--help")
+    assert "Usage: discsim study paper" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("study", STUDIES.values(), ids=list(STUDIES))
+def test_every_study_is_there_in_a_checkout(study):
+    found = import_module(study.module)
+    assert hasattr(found, "app") or hasattr(found, "main")
+
+
+def test_a_study_that_is_unknown_or_not_installed_is_refused_in_a_sentence(monkeypatch):
+    with pytest.raises(discsim.InputError, match="no study 'papre'; expected one of paper, "):
+        run_study("papre", [])
+    monkeypatch.setattr("validation.studies.catalogue.find_spec", lambda name: None)
+    with pytest.raises(discsim.InputError, match=r"not part of an installed discsim; expected a checkout"):
+        run_study("golf-throws", [])

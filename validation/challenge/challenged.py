@@ -1,0 +1,115 @@
+"""`blind_test` and what it gives: scored cases of the blind test, their summary and their files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from discsim.recording import Plant
+from validation.challenge.blind import Request
+from validation.challenge.cases.case import Kind, Mask
+from validation.challenge.report.page import goals_met
+from validation.challenge.run import challenge, write_challenge
+from validation.challenge.scores.detection import Curve, detections, fit_curve
+from validation.challenge.scores.result import Scored, rates_of, times
+from validation.challenge.scores.scoring import Rate
+from validation.reporting.run import Run
+
+__all__ = ["Challenged", "blind_test"]
+
+#: from this many cases on a rate of one per cent can be shown
+MANY = 300
+
+
+@dataclass(frozen=True)
+class Challenged:
+    """A finished blind test.
+
+    Attributes
+    ----------
+    cases : tuple of Scored
+        Each case opened: what was concealed, what the diagnosis said, and the score.
+    mask : str or None
+        What lay over every case.
+    """
+
+    cases: tuple[Scored, ...]
+    mask: Mask | None = None
+
+    def __repr__(self) -> str:
+        return f"<Challenged: {self._right}>"
+
+    @property
+    def _right(self) -> str:
+        return f"{sum(item.score.right for item in self.cases)} of {len(self.cases)} answered rightly"
+
+    @cached_property
+    def rates(self) -> dict[str, Rate]:
+        """False alarms, right sets, coverage and the others, each with its 95 % interval."""
+        return rates_of(self.cases)
+
+    @cached_property
+    def curve(self) -> Curve | None:
+        """The chance to be named over the size in detection limits; None where too little was concealed."""
+        return fit_curve(detections(self.cases))
+
+    @property
+    def goals_met(self) -> bool:
+        """Whether every goal is met; under a mask an answer to every case is all that can be asked for."""
+        if self.mask is not None:
+            return not self.rates["crash_rate"].hits
+        return goals_met(self.rates, self.curve, few=len(self.cases) < MANY)
+
+    def summary(self) -> str:
+        """Return the rates, the size that is named in half of all cases, and the time: a line each."""
+        lines = []
+        for label, found in self.rates.items():
+            share = f"{100 * found.value:.1f} % ({found.hits} of {found.of})" if found.of else "no such case"
+            lines.append(f"{label.replace('_', ' ')}: {share}")
+        if self.curve is not None:
+            lines.append(f"half-detection size, in detection limits: {self.curve.text}")
+        return "\n".join([*lines, self._right, f"a diagnosis took {times(self.cases).text}"])
+
+    def report(self, folder: Path | str) -> Path:
+        """Write challenge.json and report.html with its figures into ``folder``; return the report's path."""
+        out = Path(folder)
+        write_challenge(out, self.cases, self.mask, ["challenge"])
+        return out / "report.html"
+
+
+def blind_test(
+    cases: int = 20,
+    seed: int = 0,
+    *,
+    plant: Plant | None = None,
+    effects: Sequence[str] = (),
+    kind: Kind | None = None,
+    mask: Mask | None = None,
+    workers: int | None = None,
+    folder: Path | str | None = None,
+) -> Challenged:
+    """Put the diagnosis to a blind test: effects are concealed, diagnosed by another process, then opened and scored.
+
+    Parameters
+    ----------
+    cases, seed : int
+        Case k has the seed ``seed + k``.
+    plant, effects, kind, mask
+        Only this plant, these concealed effects (ids), this kind of case, this mask; by default as drawn, no mask.
+    workers : int, optional
+        Local processes; 1 works in this one.
+    folder : Path, optional
+        Where finished cases are kept, so that a test that was stopped goes on. By default nothing is kept.
+
+    Raises `InputError` for what does not go together, such as an effect that a plant does not have.
+    """
+    requests = [Request(number, plant, tuple(effects), kind, mask) for number in range(seed, seed + cases)]
+    requests[0].draw()  # what does not go together is refused before hours are spent
+    with ExitStack() as stack:
+        out = Path(folder if folder is not None else stack.enter_context(TemporaryDirectory()))
+        out.mkdir(parents=True, exist_ok=True)
+        return Challenged(tuple(challenge(Run(out, ["challenge"], seed), requests, workers=workers)), mask)

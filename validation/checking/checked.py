@@ -1,0 +1,68 @@
+"""`check` and what it gives: all findings on some recordings, as a table, as JSON, as a file."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from discsim.files import write_text
+from validation.checking.check import Check, check_recording
+from validation.checking.table import print_checks
+from validation.diagnosis.setup import find_setup_faults
+from validation.given import Given, given_recordings
+from validation.reporting.run import json_text
+
+__all__ = ["Checked", "check"]
+
+
+@dataclass(frozen=True, repr=False)
+class Checked:
+    """What was found in recordings: a `Check` of each, in their order."""
+
+    checks: tuple[Check, ...]
+
+    def __repr__(self) -> str:
+        errors, warnings = (sum(len(one.of(severity)) for one in self.checks) for severity in ("error", "warning"))
+        return f"<Checked: {len(self.checks)} recordings, {errors} errors, {warnings} warnings>"
+
+    @property
+    def ok(self) -> bool:
+        """Whether no error was found."""
+        return not any(one.of("error") for one in self.checks)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of check.json."""
+        return {"recordings": [one.to_json() for one in self.checks]}
+
+    def summary(self, width: int = 120) -> str:
+        """Return the text that ``discsim check`` prints, in lines of at most ``width`` characters."""
+        text = io.StringIO()
+        print_checks(self.checks, Console(file=text, width=width))
+        return text.getvalue()
+
+    def report(self, folder: Path | str) -> Path:
+        """Write check.json into ``folder``; return its path."""
+        file = Path(folder) / "check.json"
+        write_text(file, json_text(self.to_json()))
+        return file
+
+
+def check(recordings: Given) -> Checked:
+    """Say what recordings hold, what is wrong with them, and what they can tell. Nothing is fitted.
+
+    ``recordings`` is a recording, a folder of one or of a data set, or a sequence of these; setup faults (axes, units,
+    offsets in time) are looked for in all of them together.
+
+    >>> import numpy as np, discsim
+    >>> t = np.arange(0, 2, 0.01)
+    >>> field = 40 * np.column_stack([np.cos(30 * t), -np.sin(30 * t), 0 * t])
+    >>> check(discsim.recording_from_arrays({"magnetometer": (t, field)})).checks[0].sensors[0].rows
+    200
+    """
+    found = given_recordings(recordings)
+    faults = find_setup_faults(found).faults
+    return Checked(tuple(check_recording(recording, faults) for recording in found))

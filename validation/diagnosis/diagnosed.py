@@ -1,0 +1,136 @@
+"""`diagnose_recordings` and what it gives: a diagnosis with its summary and its report, from one call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from discsim.effects.own import UserEffect
+from discsim.errors import InputError
+from discsim.model_file import Model
+from discsim.recording import Recording
+from validation.diagnosis.datasets import need_field
+from validation.diagnosis.pipeline import diagnose
+from validation.diagnosis.report.files import write_outcome
+from validation.diagnosis.report.page import verdict_sentence
+from validation.diagnosis.result import Diagnosis, NamedEffect, Outcome
+from validation.given import Given, given_recordings
+from validation.identification.plants.plan import Plan
+
+__all__ = ["Diagnosed", "diagnose_named", "diagnose_recordings"]
+
+
+def _silent(stage: str, done: int, total: int) -> None:
+    del stage, done, total
+
+
+@dataclass(frozen=True, repr=False)
+class Diagnosed:
+    """A finished diagnosis.
+
+    Attributes
+    ----------
+    outcome : Outcome
+        Everything: the answer, the improved model, residuals and candidates (`validation.diagnosis.result`).
+    counts : mapping
+        Number of recordings by the name of their data set.
+    """
+
+    outcome: Outcome
+    counts: Mapping[str, int]
+
+    def __repr__(self) -> str:
+        effects = ", ".join(effect.id for effect in self.effects) or "no effect named"
+        return f"<Diagnosed: {self.verdict}, {effects}, {sum(self.counts.values())} recordings>"
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """The answer; its ``to_json()`` is the content of ``diagnosis.json``."""
+        return self.outcome.diagnosis
+
+    @property
+    def verdict(self) -> str:
+        """One of consistent, recalibrated, explained, unexplained."""
+        return self.diagnosis.verdict
+
+    @property
+    def effects(self) -> tuple[NamedEffect, ...]:
+        """The effects that were left out, strongest evidence first."""
+        return self.diagnosis.effects
+
+    @property
+    def model(self) -> Model:
+        """The improved model, which `discsim.write_model` writes and ``discsim fly --model`` takes."""
+        return self.outcome.model
+
+    def summary(self) -> str:
+        """Return the verdict and the sentence that explains it, one line."""
+        return f"{self.verdict}: {verdict_sentence(self.diagnosis)}"
+
+    def report(self, folder: Path | str, command: str = "validation.diagnose") -> Path:
+        """Write diagnosis.json, report.html, figures and model.toml into ``folder``; return the report's path.
+
+        ``command`` is what the report says that it was made by.
+        """
+        out = Path(folder)
+        settings = {
+            "command": command,
+            "seed": str(self.diagnosis.seed),
+            "recordings": ", ".join(f"{name}: {count}" for name, count in self.counts.items()),
+        }
+        write_outcome(self.outcome, out, settings)
+        return out / "report.html"
+
+
+def diagnose_recordings(
+    recordings: Given,
+    *,
+    name: str | None = None,
+    seed: int = 0,
+    user_effects: Sequence[UserEffect] = (),
+    plans: Sequence[Plan] | None = None,
+    progress: Callable[[str, int, int], None] = _silent,
+) -> Diagnosed:
+    """Tell whether the baseline explains recordings down to their noise, and if not, what was left out.
+
+    Parameters
+    ----------
+    recordings
+        Recordings of one plant that share their hardware, a folder of them, or a sequence of either.
+    name : str, optional
+        What the report calls the data set; by default the folder's name.
+    seed : int
+        Seed of everything random.
+    user_effects
+        Effects of your own (`discsim.effects.own.load_user_effects`), which compete with the catalogue's.
+    plans
+        Recordings that you could make (`validation.diagnosis.design.plans`), to choose the next one from.
+    progress
+        Called with a stage, the steps done, and the steps in all.
+
+    Raises `InputError` for recordings of different plants, and for a magnetometer in a field that is not stated.
+    """
+    if name is None:
+        name = Path(recordings).resolve().name if isinstance(recordings, Path | str) else "recordings"
+    return diagnose_named(
+        {name: given_recordings(recordings)}, seed=seed, user_effects=user_effects, plans=plans, progress=progress
+    )
+
+
+def diagnose_named(
+    datasets: Mapping[str, Sequence[Recording]],
+    *,
+    seed: int = 0,
+    user_effects: Sequence[UserEffect] = (),
+    plans: Sequence[Plan] | None = None,
+    progress: Callable[[str, int, int], None] = _silent,
+) -> Diagnosed:
+    """Diagnose several data sets by name together, as `diagnose_recordings` does one."""
+    sets = list(datasets.values())
+    plants = {recording.plant for one in sets for recording in one}
+    if len(plants) != 1:
+        raise InputError(f"recordings of {', '.join(sorted(plants)) or 'nothing'}; expected recordings of one plant")
+    need_field(sets)
+    outcome = diagnose(sets, list(datasets), progress=progress, seed=seed, user_effects=user_effects, plans=plans)
+    return Diagnosed(outcome, {name: len(one) for name, one in datasets.items()})

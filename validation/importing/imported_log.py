@@ -1,0 +1,194 @@
+"""`import_log` and what it gives: the recordings of a raw log, the throws found in it, and the files of both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Literal, NamedTuple
+
+from discsim.environment import Environment
+from discsim.errors import InputError
+from discsim.files import write_text
+from discsim.recording import Recording, write_recording
+from validation.checking import check_recording
+from validation.diagnosis.setup import find_setup_faults
+from validation.importing.conversion import Imported, RawReadings, read_readings, repairs_csv
+from validation.importing.import_map import ImportMap, find_map, read_map
+from validation.importing.sniffing import (
+    Decision,
+    Stretch,
+    map_text,
+    opened,
+    recognised,
+    sniff,
+    stretches,
+    write_raw_page,
+)
+from validation.importing.sniffing.chosen import chosen_recordings
+
+__all__ = ["ImportedLog", "LogPart", "import_log", "take"]
+
+
+class LogPart(NamedTuple):
+    """What of a log is taken: rows, a throw by its number, every throw as a recording of its own, or all of it."""
+
+    rows: slice | None = None
+    throw: int | None = None
+    every: bool = False
+
+    def check(self) -> None:
+        """Raise `InputError` where more than one part is asked for."""
+        if sum((self.rows is not None, self.throw is not None, self.every)) > 1:
+            raise InputError("--rows, --throw and --all-throws: expected one of them at most")
+
+    @property
+    def whole(self) -> bool:
+        """Whether all of the log is taken."""
+        return self.rows is None and self.throw is None and not self.every
+
+
+@dataclass(frozen=True, repr=False)
+class ImportedLog:
+    """A raw log as recordings.
+
+    Attributes
+    ----------
+    name : str
+        The raw file's.
+    imported : tuple of Imported
+        Each recording with what was repaired and noted.
+    throws : tuple of Stretch
+        The throws found in the whole log.
+    import_map : ImportMap
+        The map that it was read by.
+    part : LogPart
+        What of the log was taken.
+    read : RawReadings
+        All readings in SI and body axes, before any row was chosen.
+    decisions : tuple of Decision
+        What a proposed map decided, with reasons; empty with a map that was given.
+    map_text : str
+        The proposed map as TOML; empty with a map that was given.
+    """
+
+    name: str
+    imported: tuple[Imported, ...]
+    throws: tuple[Stretch, ...]
+    import_map: ImportMap
+    part: LogPart
+    read: RawReadings
+    decisions: tuple[Decision, ...] = ()
+    map_text: str = ""
+
+    def __repr__(self) -> str:
+        return f"<ImportedLog '{self.name}': {len(self.imported)} recordings, {len(self.throws)} throws found>"
+
+    @property
+    def recordings(self) -> list[Recording]:
+        """The recordings."""
+        return [one.recording for one in self.imported]
+
+    @property
+    def remarks(self) -> list[str]:
+        """What was repaired and noted, and what `check` finds wrong: a line each."""
+        lines = list(dict.fromkeys(note for one in self.imported for note in one.notes))
+        lines.append(self.imported[0].summary)
+        lines += dict.fromkeys(advice for one in self.recordings for advice in check_recording(one).advice)
+        axes = {sensor: own.axes for sensor, own in self.import_map.sensors.items()}
+        faults = find_setup_faults(self.recordings).faults
+        return lines + [f"warning: {fault.id}: {fault.advice(axes)}" for fault in faults]
+
+    @property
+    def lines(self) -> list[str]:
+        """The rows of each sensor and the throws found: a line each."""
+        lines = []
+        for number, recording in enumerate(self.recordings, start=1):
+            label = f"{number:02d} " if len(self.imported) > 1 else ""
+            for sensor, samples in recording.samples.items():
+                span = f"{samples.t[0]:.3f} to {samples.t[-1]:.3f} s"
+                lines.append(f"{label}{sensor}: {len(samples)} samples, {span}, {samples.gaps} gaps")
+        lines += [f"throw {number}: {found.text}" for number, found in enumerate(self.throws, start=1)]
+        if self.part.whole and self.throws:
+            lines.append(f"the whole log was taken; --throw {'1' if len(self.throws) == 1 else 'N'} takes one throw")
+        return lines
+
+    def summary(self) -> str:
+        """Return what was decided, the rows of each sensor, the throws, and the remarks: a line each."""
+        return "\n".join([*(decision.text for decision in self.decisions), *self.lines, *self.remarks])
+
+    def report(self, folder: Path | str) -> Path:
+        """Write the recording (of every throw: a data set), repairs.csv, raw.html and a proposed map into ``folder``.
+
+        Returns the path of raw.html.
+        """
+        out = Path(folder)
+        out.mkdir(parents=True, exist_ok=True)
+        read = self.read
+        if self.map_text:
+            write_text(out / "map.toml", self.map_text)
+            read = replace(read, import_map=replace(read.import_map, path=out / "map.toml"))
+        write_raw_page(out / "raw.html", self.name, read, self.throws, self.decisions)
+        write_text(out / "repairs.csv", repairs_csv(self.imported[0].repairs))
+        for number, recording in enumerate(self.recordings, start=1):
+            write_recording(recording, out / f"{number:02d}" if self.part.every else out)
+        return out / "raw.html"
+
+
+def take(
+    logged: Path, name: str, import_map: ImportMap, part: LogPart, decisions: Sequence[Decision] = ()
+) -> ImportedLog:
+    """Read a log that is `opened` by a map and take a part of it; ``name`` is what its page calls it."""
+    read = read_readings(logged, import_map, part.rows)
+    throws = stretches(read)
+    imported = chosen_recordings(read, throws, part.rows, part.throw, every=part.every)
+    return ImportedLog(name, tuple(imported), tuple(throws), import_map, part, read, tuple(decisions))
+
+
+def import_log(
+    raw: Path | str,
+    map: str = "auto",
+    *,
+    rows: slice | None = None,
+    throw: int | None = None,
+    every_throw: bool = False,
+    plant: Literal["free_spin", "rate_table"] = "free_spin",
+    environment: Environment | None = None,
+) -> ImportedLog:
+    """Read a raw logger file as recordings.
+
+    Parameters
+    ----------
+    raw
+        What the logger wrote: a file, a zip, or a folder with one file per sensor.
+    map : str
+        A shipped map's name, a .toml file, ``sniff`` (propose one), or ``auto``: the shipped map that was made for this
+        logger, else a proposed one.
+    rows, throw, every_throw
+        One of them at most: rows of the first sensor's file, the throw of that number (from 1), or a recording of each
+        throw. By default all of the log is one recording.
+    plant : str
+        What a proposed map takes the log for.
+    environment : Environment, optional
+        Where it was recorded, in the place of what the map states.
+
+    Raises `InputError` naming file, line and what was expected.
+    """
+    path, part = Path(raw), LogPart(rows, throw, every_throw)
+    part.check()
+    named = None if map in ("auto", "sniff") else read_map(find_map(map))
+    # a proposed map is a file as any other while the log is read: what is read of it is named and digested
+    with opened(path) as logged, TemporaryDirectory() as place:
+        known = recognised(logged) if map == "auto" else named
+        text = ""
+        decisions: tuple[Decision, ...] = ()
+        if known is None:
+            proposal = sniff(logged, plant)
+            text, decisions = map_text(proposal), tuple(proposal.all_decisions)
+            write_text(Path(place) / "map.toml", text)
+            known = read_map(Path(place) / "map.toml")
+        if environment is not None:
+            known = replace(known, environment=environment)
+        found = take(logged, path.name, known, part, decisions)
+    return replace(found, map_text=text)

@@ -1,0 +1,143 @@
+"""`sweep` and what it gives: the scores of a plan as labelled arrays, their summary and their files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+import xarray as xr
+
+from validation.reporting.run import package_version
+from validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, truth_tasks
+from validation.sweeps.figures import draw_sweep
+from validation.sweeps.plan import Plan, plan_file, read_plan
+from validation.sweeps.result import labelled, write_netcdf
+from validation.tasks import Task, claim, discard, run_tasks
+
+__all__ = ["CHECKPOINTS", "Swept", "error_rows", "sweep"]
+
+T = TypeVar("T")
+
+#: folder of the results of single tasks, in the folder of a sweep
+CHECKPOINTS = "checkpoints"
+
+
+class Progress(Protocol):
+    """Yields the items handed in and shows how far it is."""
+
+    def __call__(self, items: Iterable[T], total: int, what: str) -> Iterator[T]:
+        """Yield ``items``, of which there are ``total``, each of them ``what``."""
+        ...
+
+
+def _silent(items: Iterable[T], total: int, what: str) -> Iterator[T]:
+    del total, what
+    return iter(items)
+
+
+@dataclass(frozen=True, repr=False)
+class Swept:
+    """A finished sweep.
+
+    Attributes
+    ----------
+    scores : xarray.Dataset
+        ``bias_deg_s``, ``rms_deg_s``, ``worst_deg_s`` and ``known`` over estimator, the plan's axes, mount and segment;
+        ``rate_deg_s`` and ``closed_form_deg_s`` beside them.
+    sweep : Sweep
+        The plan, its mounts (count, 6), and the true motions.
+    """
+
+    scores: xr.Dataset
+    sweep: Sweep
+
+    def __repr__(self) -> str:
+        sizes = ", ".join(f"{name} {size}" for name, size in self.scores.sizes.items())
+        return f"<Swept: plan '{self.sweep.plan.name}', {sizes}>"
+
+    def summary(self) -> str:
+        """Return each estimator's errors over all that was varied, a line each."""
+        return "\n".join(
+            f"{name}: {scored} scored, {known} known, rms {median or '?'} deg/s (median), 95 % below {most or '?'}"
+            for name, scored, known, median, most in error_rows(self.scores)
+        )
+
+    def report(self, folder: Path | str) -> Path:
+        """Write sweep.nc (netCDF) and sweep.png into ``folder``; return the path of the first."""
+        out = Path(folder)
+        out.mkdir(parents=True, exist_ok=True)
+        write_netcdf(out / "sweep.nc", self.scores)
+        draw_sweep(self.scores, self.sweep, out / "sweep.png")
+        return out / "sweep.nc"
+
+
+def error_rows(scores: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
+    """Return a row for each estimator: name, estimates scored, share known, median and 95th percentile of its rms."""
+    rows = []
+    for name in scores.estimator.values:
+        known = scores.known.sel(estimator=name).values
+        rms = scores.rms_deg_s.sel(estimator=name).values
+        scored, seen = known[np.isfinite(known)], rms[np.isfinite(rms)]
+        median, most = (f"{np.median(seen):.3f}", f"{np.quantile(seen, 0.95):.3f}") if seen.size else ("", "")
+        rows.append((str(name), str(scored.size), f"{100 * scored.mean():.0f} %", median, most))
+    return rows
+
+
+def sweep(
+    plan: Plan | Path | str,
+    *,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    checkpoints: Path | None = None,
+    anew: bool = False,
+    progress: Progress = _silent,
+    say: Callable[[str], None] = lambda text: None,
+) -> Swept:
+    """Score estimators over every combination of a plan's axes and mounts, on one truth run for all mounts.
+
+    Parameters
+    ----------
+    plan
+        A shipped plan's name, a TOML file, or a `Plan` (`validation.sweeps.plan.read_plan` takes a number of mounts
+        and a seed).
+    scheduler, workers
+        Address of a running Dask scheduler, or the number of local processes; 1 works in this one.
+    checkpoints : Path, optional
+        Folder of finished chunks: a sweep that was stopped goes on there. By default none is kept.
+    anew : bool
+        Whether to throw away what an earlier sweep left there.
+
+    Raises `InputError` for a plan that cannot be read, and for checkpoints of another plan.
+    """
+    asked = plan if isinstance(plan, Plan) else read_plan(plan_file(str(plan)))
+    identity = {**asked.identity, "versions": {"discsim": package_version(), "numpy": np.__version__}}
+    with ExitStack() as stack:
+        folder = checkpoints or Path(stack.enter_context(TemporaryDirectory()))
+        if anew:
+            discard(folder)
+        claim(folder, identity)
+
+        def run(tasks: list[Task], what: str, function: Callable[..., Any], shared: object) -> list[Any]:
+            there = sum((folder / f"{task.name}.npz").exists() for task in tasks)
+            if there:
+                say(f"{there} of {len(tasks)} {what}s are there from an earlier run")
+            return run_tasks(
+                tasks,
+                function,
+                folder,
+                shared=shared,
+                scheduler=scheduler,
+                workers=workers,
+                progress=lambda items, total: progress(items, total, what),
+            )
+
+        flown = run(truth_tasks(asked), "truth run", fly_truth, asked)
+        motions = tuple(motion_from(arrays, asked, number) for number, arrays in enumerate(flown))
+        whole = Sweep(asked, asked.mounts.mounts(asked.seed), motions)
+        chunks = run(chunk_tasks(asked), "chunk", score_chunk, whole)
+    return Swept(labelled(whole, [chunk["scores"] for chunk in chunks]), whole)

@@ -1,0 +1,194 @@
+"""`fit_recordings` and what it gives: C_Nr of recordings with its standard deviation, its summary and its files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+from discsim.errors import InputError
+from discsim.files import write_text
+from discsim.model_file import Model, write_model
+from discsim.recording import Recording
+from estimators.methods import METHODS
+from validation.given import Given, given_recordings
+from validation.reporting.run import json_text
+from validation.yaw_damping.compared import SOURCES, Compared, Source, compare_sources
+from validation.yaw_damping.figures import draw_fit, draw_sources, draw_surface
+from validation.yaw_damping.model import fitted_model, tabulated_model
+from validation.yaw_damping.observations import Throw, observe
+from validation.yaw_damping.output_error import Fit, fit_yaw_damping
+from validation.yaw_damping.paper_table import PaperTable, paper_table, table_csv
+
+__all__ = ["FittedYawDamping", "check_method", "cnr_json", "fit_recordings", "notes"]
+
+T = TypeVar("T")
+
+
+class Progress(Protocol):
+    """Yields the items handed in and shows how far it is."""
+
+    def __call__(self, items: Iterable[T], total: int, what: str) -> Iterator[T]:
+        """Yield ``items``, of which there are ``total``, each of them ``what``."""
+        ...
+
+
+def _silent(items: Iterable[T], total: int, what: str) -> Iterator[T]:
+    del total, what
+    return iter(items)
+
+
+@dataclass(frozen=True, repr=False)
+class FittedYawDamping:
+    """C_Nr fitted to throws.
+
+    Attributes
+    ----------
+    recordings : tuple of Recording
+        The throws, all of one disc.
+    throws : tuple of Throw
+        What of each the fit used.
+    fit : Fit
+        By output error: C_Nr, its standard deviation, the model flights and what they leave.
+    paper : PaperTable
+        The paper's table over spin rate and airspeed.
+    sources : tuple of Compared
+        The same by each source of spin, the chosen one first.
+    """
+
+    recordings: tuple[Recording, ...]
+    throws: tuple[Throw, ...]
+    fit: Fit
+    paper: PaperTable
+    sources: tuple[Compared, ...]
+
+    def __repr__(self) -> str:
+        return f"<FittedYawDamping: {self.headline}>"
+
+    @property
+    def CNr(self) -> float:
+        """The yaw damping derivative."""
+        return self.fit.CNr
+
+    @property
+    def sd(self) -> float:
+        """Its standard deviation."""
+        return self.fit.sd
+
+    @property
+    def headline(self) -> str:
+        """C_Nr in one line."""
+        fit = self.fit
+        return f"CNr = {fit.CNr:.6f} +- {fit.sd:.6f} ({len(fit.throws)} throws, spin by {fit.method})"
+
+    @property
+    def notes(self) -> list[str]:
+        """Where the residuals contradict what the recordings state, a line each."""
+        return notes(self.fit)
+
+    @property
+    def model(self) -> Model:
+        """The disc and its surroundings with the fitted C_Nr."""
+        return fitted_model(self.recordings[0], self.fit)
+
+    def summary(self) -> str:
+        """Return C_Nr, what each source of spin makes of it, and the notes: a line each."""
+        lines = [self.headline]
+        for item in self.sources[1:]:
+            found = item.reason if item.fit is None else f"CNr = {item.fit.CNr:.6f} +- {item.fit.sd:.6f}"
+            lines.append(f"spin by {item.source.label}: {found}")
+        return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of cnr.json."""
+        return cnr_json(self.fit, self.sources)
+
+    def report(self, folder: Path | str) -> Path:
+        """Write cnr.json, cnr_table.csv, model files and figures into ``folder``; return the path of the first."""
+        out = Path(folder)
+        write_text(out / "cnr.json", json_text(self.to_json()))
+        write_text(out / "cnr_table.csv", table_csv(self.paper))
+        write_model(self.model, out / "model.toml")
+        write_model(tabulated_model(self.recordings[0], self.paper), out / "model-table.toml")
+        draw_fit(self.throws, self.fit, self.paper, out / "fit.png")
+        draw_surface(self.paper, self.fit, out / "surface.png")
+        draw_sources(self.sources, out / "sources.png")
+        return out / "cnr.json"
+
+
+def check_method(method: str) -> None:
+    """Raise `InputError` for a method that there is not."""
+    if method != "best" and method not in METHODS:
+        raise InputError(f"--method {method}: unknown; expected one of best, {', '.join(METHODS)}")
+
+
+def fit_recordings(
+    recordings: Given,
+    method: str = "best",
+    *,
+    compare: bool = False,
+    progress: Progress = _silent,
+    say: Callable[[str], None] = lambda text: None,
+) -> FittedYawDamping:
+    """Fit the yaw damping derivative C_Nr to throws of one disc, by output error of the whole model flight.
+
+    ``recordings`` are flights with what tells the spin, and a track or GPS: recordings, a folder, or a sequence of
+    either. ``method`` of `estimators.estimate` gives the spin; with ``compare`` C_Nr is fitted by the paper's sources,
+    too. Raises `InputError` for an unknown method, throws of several discs, or nothing that tells the release.
+    """
+    check_method(method)
+    given = given_recordings(recordings)
+    throws = list(progress((observe(one, method) for one in given), len(given), "spin rate of throw"))
+    say("fitting model flights")
+    fit, paper = fit_yaw_damping(throws), paper_table(throws)
+    found = [Compared(Source(method), fit, paper)]
+    if compare:
+        others = [source for source in SOURCES if source != found[0].source]
+        found += progress(compare_sources(given, fit, others), len(others), "other source")
+    return FittedYawDamping(tuple(given), tuple(throws), fit, paper, tuple(found))
+
+
+def cnr_json(fit: Fit, found: Sequence[Compared]) -> dict[str, Any]:
+    """Return the content of cnr.json."""
+    return {
+        "CNr": {"value": fit.CNr, "sd": fit.sd},
+        "method": f"output error, spin by {fit.method}",
+        "recordings": [throw.name for throw in fit.throws],
+        "refined": {name: {"value": value, "sd": sd} for name, (value, sd) in fit.others.items()},
+        "residuals": {
+            "spin_over_stated": fit.spin_scale,
+            "path_over_stated": fit.path_scale,
+            "spin_whiteness_p": fit.spin_whiteness.p,
+            "path_whiteness_p": fit.path_whiteness.p,
+        },
+        "by_equation_26": fit.by_26,
+        "sources": [
+            {"source": item.source.label, "CNr": None, "reason": item.reason}
+            if item.fit is None
+            else {
+                "source": item.source.label,
+                "CNr": {"value": item.fit.CNr, "sd": item.fit.sd},
+                "by_equation_26": item.fit.by_26,
+                "spin_over_stated": item.fit.spin_scale,
+            }
+            for item in found
+        ],
+        "notes": notes(fit),
+    }
+
+
+def notes(fit: Fit) -> list[str]:
+    """Say where the residuals contradict what the recordings state."""
+    found = []
+    for what, scale, white in (
+        ("spin", fit.spin_scale, fit.spin_whiteness.p),
+        ("path", fit.path_scale, fit.path_whiteness.p),
+    ):
+        if scale > 1.5:
+            found.append(f"the {what} is {scale:.1f} times as far from the model as stated; the sd is raised by that")
+        if white < 0.001:
+            found.append(f"residuals of the {what} are not white (Ljung and Box: p = {white:.1g})")
+    if found:
+        found.append("the model lacks something, wind perhaps: CNr may be off by more than its sd says")
+    return found
