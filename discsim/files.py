@@ -91,6 +91,7 @@ def model_file(name: str) -> Path:
     path = Path(str(_models() / name))
     if not path.is_file():
         folder = name.rpartition("/")[0]
-        known = ", ".join(model_names(folder)) or "a file of models/"
+        # beside the folders lie files of several kinds
+        known = (", ".join(model_names(folder)) if folder else "") or "a file of models/"
         raise InputError(f"no shipped file '{name}'; expected one of {known}")
     return path.resolve()

@@ -105,7 +105,7 @@ def fft(
     ``magnetometer.value`` is (m, 3) in uT; of x and y the axis with the larger variance in the window is used.
     The rate has no sign. (PE1) runs to n + k, one element more than the n + k amplitudes it is matched with: here the
     frequencies are ``[0 .. n + k - 1] / (n + k)`` times the sampling rate, of which a real signal needs the first
-    half. The sampling rate is that of the window's own time stamps.
+    half; (PE2) makes a rate of the peak's. The sampling rate is that of the window's own time stamps.
 
     A value is NaN where
 

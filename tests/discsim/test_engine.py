@@ -510,7 +510,7 @@ def test_flights_repeat_to_the_last_bit():
 class TestDivergence:
     @pytest.mark.parametrize(
         ("velocity", "rate", "expected"),
-        [([24.0, 0.0, -4.0], 7300.0, "no longer finite"), ([1e200, 0.0, -4.0], 73.0, "no number")],
+        [([24.0, 0.0, -4.0], 7300.0, "7.3 rad in a step"), ([1e200, 0.0, -4.0], 73.0, "no number")],
     )
     def test_a_motion_that_diverges_is_one_error_and_leaves_no_log(
         self, velocity, rate, expected, tmp_path, monkeypatch

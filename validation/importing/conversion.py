@@ -467,7 +467,7 @@ def _value(
         if np.isnan(reading) and index not in hollow:
             what = f"'{row.cells[index][:40]}'" if row.cells[index] else "empty"
             repairs.add("number", table.path, row.line, f"'{name}' is {what}", "gap")
-        elif not abs(reading * factor) <= LARGEST_READING:
+        elif abs(reading * factor) > LARGEST_READING:
             what = f"'{name}' is '{row.cells[index][:40]}', more than {LARGEST_READING:g} in the {sensor}'s unit"
             repairs.add("number", table.path, row.line, what, "gap")
             reading = float("nan")

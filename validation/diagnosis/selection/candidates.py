@@ -43,8 +43,8 @@ class Trial:
 
 #: a parameter is held this many steps wide, so that one without a trace in the readings stays where it is
 _LOOSE = 1e5
-#: and an angle, rad: an axis, a board or a field that is turned further is found before any fit. Of a rig's two tilts
-#: the one square to the field hardly shows, and would wander off
+#: and an angle of the motion, rad: a rig's axis is plumb to within a few degrees. Of its two tilts the one square to
+#: the field hardly shows, and would wander off
 _ANGLE = 0.1
 #: share of an effect's scale that a difference is taken over
 _STEP = 0.1
@@ -58,9 +58,10 @@ def _step(id: str, name: str) -> float:
     return _STEP * row.scale[row.parameters.index(name)]
 
 
-def _loose(column: Column) -> float:
+def _loose(row: Row, column: Column) -> float:
     """Return how loosely a parameter is held at its baseline, one sigma."""
-    return min(_LOOSE * column.step, _ANGLE if column.name.endswith("_rad") else float("inf"))
+    held = row.acts_on == "motion" and column.name.endswith("_rad")
+    return min(_LOOSE * column.step, _ANGLE if held else float("inf"))
 
 
 def available(recordings: Sequence[Recording]) -> list[str]:
@@ -111,7 +112,8 @@ def parameters_of(trial: Trial, *, shaped: bool = True) -> tuple[Parameter, ...]
     assert row is not None
     baseline = row.sizes
     found = [
-        Parameter(c.group, c.name, float(baseline[c.name]), c.step, _loose(c), trial.recordings) for c in trial.columns
+        Parameter(c.group, c.name, float(baseline[c.name]), c.step, _loose(row, c), trial.recordings)
+        for c in trial.columns
     ]
     if shaped:
         for name, value in trial.shapes.items():
