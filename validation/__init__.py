@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from validation.challenge.challenged import blind_test as challenge
     from validation.checking.checked import check
     from validation.diagnosis.diagnosed import diagnose_recordings as diagnose
+    from validation.estimating.spin_estimates import estimate_spin as estimate
     from validation.importing.imported_log import import_log
-    from validation.spin_estimates import estimate_spin as estimate
     from validation.sweeps.swept import sweep
     from validation.yaw_damping.fitted import fit_recordings as fit_yaw_damping
 
@@ -34,7 +34,7 @@ __all__ = ["challenge", "check", "diagnose", "estimate", "fit_yaw_damping", "imp
 _HOMES = {
     "check": ("validation.checking.checked", "check"),
     "diagnose": ("validation.diagnosis.diagnosed", "diagnose_recordings"),
-    "estimate": ("validation.spin_estimates", "estimate_spin"),
+    "estimate": ("validation.estimating.spin_estimates", "estimate_spin"),
     "fit_yaw_damping": ("validation.yaw_damping.fitted", "fit_recordings"),
     "import_log": ("validation.importing.imported_log", "import_log"),
     "sweep": ("validation.sweeps.swept", "sweep"),

@@ -28,12 +28,12 @@ from estimators.usable import FASTEST
 from validation.checking import check_recording
 from validation.diagnosis.design.plans import read_plans
 from validation.diagnosis.setup import find_setup_faults
+from validation.estimating.spin_estimates import all_notes, estimate_all, estimate_json, rate_csv
 from validation.importing import import_recording, read_map, read_readings
 from validation.importing.sniffing import map_text, opened, sniff, stretches
 from validation.reporting.run import json_text
 from validation.scenarios.method_disagreement import disagreements
 from validation.scenarios.rate_table import plateau_table, rate_table_checks, run_rate_table
-from validation.spin_estimates import all_notes, estimate_all, estimate_json, rate_csv
 from validation.sweeps.plan import read_plan
 
 from .judge import FaultFound

@@ -135,7 +135,7 @@ def test_a_log_imported_from_python_is_the_recording_of_the_command(tmp_path, mo
 
 
 def test_recordings_are_taken_as_they_come(recording, tmp_path):
-    from validation.given import given_recordings
+    from validation.running.given import given_recordings
 
     discsim.write_recording(recording, tmp_path / "01")
     given = given_recordings([recording, tmp_path, str(tmp_path / "01")])

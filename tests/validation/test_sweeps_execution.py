@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 from discsim.errors import InputError
-from validation import tasks as execution
 from validation.cli import main
-from validation.tasks import Task, claim, discard, run_tasks
+from validation.running import tasks as execution
+from validation.running.tasks import Task, claim, discard, run_tasks
 
 #: twelve chunks of some tenth of a second each
 PLAN = """

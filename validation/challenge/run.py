@@ -17,7 +17,7 @@ from validation.challenge.report.page import write_page
 from validation.challenge.scores.detection import detections, fit_curve
 from validation.challenge.scores.result import RESULT, Scored, rates_of, times
 from validation.reporting.run import Run, json_text, package_version, source_digest
-from validation.tasks import Task, claim, discard, run_tasks
+from validation.running.tasks import Task, claim, discard, run_tasks
 
 __all__ = ["challenge", "limit_of", "write_challenge"]
 

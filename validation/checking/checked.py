@@ -13,8 +13,8 @@ from discsim.files import write_text
 from validation.checking.check import Check, check_recording
 from validation.checking.table import print_checks
 from validation.diagnosis.setup import find_setup_faults
-from validation.given import Given, given_recordings
 from validation.reporting.run import json_text
+from validation.running.given import Given, given_recordings
 
 __all__ = ["Checked", "check"]
 

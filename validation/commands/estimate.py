@@ -10,7 +10,7 @@ import typer
 from validation.reporting.options import DateOption, OutOption, PlaceOption
 
 if TYPE_CHECKING:
-    from validation.spin_estimates import SpinEstimates
+    from validation.estimating.spin_estimates import SpinEstimates
 
 __all__ = ["command"]
 
@@ -53,9 +53,9 @@ def command(
     from estimators.accelerometer import AccelerometerErrors
     from estimators.fft import FftSettings
     from estimators.methods import Options
+    from validation.estimating.spin_estimates import estimate_spin
     from validation.reporting.options import at_place
     from validation.reporting.run import start_run
-    from validation.spin_estimates import estimate_spin
 
     zeros = max(0, 2**14 - window) if pad is None else pad
     options = Options(
@@ -74,7 +74,7 @@ def _print(found: SpinEstimates) -> None:
     from rich.console import Console
     from rich.table import Column, Table
 
-    from validation.spin_estimates import figures_of
+    from validation.estimating.spin_estimates import figures_of
 
     # names are what --method takes: whole on a narrow terminal, too
     first = Column("method", no_wrap=True, min_width=max((len(rate.method) for rate in found.rates), default=0))

@@ -15,8 +15,8 @@ from validation.diagnosis.pipeline import diagnose
 from validation.diagnosis.report.files import write_outcome
 from validation.diagnosis.report.page import verdict_sentence
 from validation.diagnosis.result import Diagnosis, NamedEffect, Outcome
-from validation.given import Given, given_recordings
 from validation.identification.plants.plan import Plan
+from validation.running.given import Given, given_recordings
 
 __all__ = ["Diagnosed", "diagnose_named", "diagnose_recordings"]
 

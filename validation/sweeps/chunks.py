@@ -21,11 +21,11 @@ from estimators.accelerometer import accelerometer
 from estimators.fft import FftSettings, fft
 from estimators.methods import Options, estimate
 from estimators.rate import YawRate
+from validation.running.tasks import Task
 from validation.scenarios.rate_table import plateaus
 from validation.scenarios.throws import EDGE_S
 from validation.sweeps.mounts import look_with_accelerometer, look_with_magnetometer
 from validation.sweeps.plan import CHUNK, Case, Plan
-from validation.tasks import Task
 
 __all__ = ["SCORES", "Sweep", "chunk_tasks", "fly_truth", "motion_from", "score_chunk", "segments", "truth_tasks"]
 

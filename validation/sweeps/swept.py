@@ -13,11 +13,11 @@ import numpy as np
 import xarray as xr
 
 from validation.reporting.run import package_version
+from validation.running.tasks import Task, claim, discard, run_tasks
 from validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, truth_tasks
 from validation.sweeps.figures import draw_sweep
 from validation.sweeps.plan import Plan, plan_file, read_plan
 from validation.sweeps.result import labelled, write_netcdf
-from validation.tasks import Task, claim, discard, run_tasks
 
 __all__ = ["CHECKPOINTS", "Swept", "error_rows", "sweep"]
 

@@ -12,8 +12,8 @@ from discsim.files import write_text
 from discsim.model_file import Model, write_model
 from discsim.recording import Recording
 from estimators.methods import METHODS
-from validation.given import Given, given_recordings
 from validation.reporting.run import json_text
+from validation.running.given import Given, given_recordings
 from validation.yaw_damping.compared import SOURCES, Compared, Source, compare_sources
 from validation.yaw_damping.figures import draw_fit, draw_sources, draw_surface
 from validation.yaw_damping.model import fitted_model, tabulated_model

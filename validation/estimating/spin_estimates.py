@@ -29,9 +29,9 @@ from estimators.methods import (
 from estimators.rate import YawRate
 from estimators.usable import usable
 from validation.diagnosis.setup import find_setup_faults
-from validation.given import Given, given_recordings
 from validation.reporting.figures import draw_differences, draw_rates, new_figure, save_figure
 from validation.reporting.run import json_text
+from validation.running.given import Given, given_recordings
 from validation.scenarios.method_disagreement import Disagreement, disagreements
 
 __all__ = [
