@@ -19,6 +19,7 @@ from validation.challenge.cases.detection_limit import sizes
 from validation.challenge.cases.draw import draw_case
 from validation.challenge.cases.setups import draw_fault, equivalents, possible_faults
 from validation.challenge.cases.sizes import HIDING, ordinary
+from validation.diagnosis.consistency.early_verdict import contradiction_in
 from validation.diagnosis.selection.stepwise import search
 from validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault
 
@@ -311,3 +312,18 @@ def test_a_clock_by_whose_error_phases_run_away_is_no_fault_of_the_setup_and_a_h
     hint = findings.hints[0]
     assert hint.id == "gyro.clock_rate"
     assert hint.value.ratio == pytest.approx(1.014078, abs=1.5e-3)  # type: ignore[attr-defined]
+
+
+def test_a_rate_reference_that_pulses_contradicts_nothing_and_that_of_another_run_does():
+    """A ripple of the table's speed beside a turned board."""
+    case = draw_case(93087, kind="setup")
+    assert [item.effect.id for item in case.concealed] == ["board.rotation", "rig.speed_ripple"]
+    made = [corrected(one, [case.concealed[0].effect]) for one in recordings(replace(case, runs=case.runs[:2]))]
+    assert contradiction_in(made, ()) is None
+    others = [
+        replace(one, samples={**one.samples, "rate_reference": other.samples["rate_reference"]})
+        for one, other in zip(made, made[::-1], strict=True)
+    ]
+    contradiction = contradiction_in(others, ())
+    assert contradiction is not None
+    assert "rate_reference" in contradiction.blamed

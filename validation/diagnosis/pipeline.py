@@ -20,7 +20,7 @@ from validation.diagnosis.result import Outcome
 from validation.diagnosis.selection.found import Search
 from validation.diagnosis.selection.stepwise import search
 from validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault
-from validation.diagnosis.setup_effects import free_parameters, with_setup
+from validation.diagnosis.setup_effects import free_parameters, with_reversed_axes, with_setup
 from validation.diagnosis.unknown_law.find import find_law
 from validation.diagnosis.verdict import verdict_of
 from validation.identification.competing_effects import competing, row_of
@@ -74,6 +74,12 @@ def _begun(setup: SetupFindings, called: Sequence[str], progress: Callable[[str,
     return _Begun(setup, meant, fitted, [*warnings, *notes], followed, contradiction)
 
 
+def _found(begun: _Begun, progress: Callable[[str, int, int], None]) -> Search:
+    """Return the search from where recordings are followed."""
+    free, hints = free_parameters(begun.setup), begun.setup.hints
+    return search(begun.fitted, progress, begun.meant, begun.followed, free, hints)
+
+
 def diagnose(
     datasets: Sequence[Sequence[Recording]],
     names: Sequence[str],
@@ -104,8 +110,12 @@ def diagnose(
             outcome = contradicted_outcome(begun.contradiction, meant, names, called, seed)
             outcome = with_setup(outcome, setup, recordings, None)
             return _with_notes(outcome, begun.notes, meant, called)
-        free = free_parameters(setup)
-        found = search(fitted, progress, meant, begun.followed, free, setup.hints)
+        found = _found(begun, progress)
+        if (mirrored := with_reversed_axes(setup, found.final.fit)) is not None:
+            again = _begun(mirrored, called, progress)
+            if again.contradiction is None:
+                begun, found = again, _found(again, progress)
+                setup, meant, fitted = begun.setup, begun.meant, begun.fitted
         law = None
         verdict, unexplained = verdict_of(found)
         if unexplained or _stacked(found):

@@ -14,11 +14,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import CATALOGUE, Effect, catalogued, effect, row
+from discsim.effects.catalogue import CATALOGUE, Effect, catalogued, effect, effect_of, row
 from discsim.effects.kind import BOARD
-from discsim.effects.setup import BoardRotation, ClockUnit, SiteField, TimeOffset
+from discsim.effects.sensors import Scale
+from discsim.effects.setup import Axes, BoardRotation, ClockUnit, SiteField, TimeOffset
 from discsim.model_file import ModelEffect
 from discsim.recording import Recording
+from discsim.written import corrected
 from validation.diagnosis.result import (
     SMALLEST_P_VALUE,
     Confusion,
@@ -34,7 +36,7 @@ from validation.diagnosis.setup import SetupFault, SetupFindings, said
 from validation.identification.gauss_newton import Fit
 from validation.identification.parameters import Parameter
 
-__all__ = ["free_parameters", "with_setup"]
+__all__ = ["free_parameters", "with_reversed_axes", "with_setup"]
 
 #: how far a number of a fault may be from its first value, one sigma: s; rad; rad and share. Offsets are found to a few
 #: ms, rotations to a tenth of a radian (an accelerometer's place may be 3 mm of 16 off), fields to a few per cent
@@ -51,6 +53,24 @@ def free_parameters(findings: SetupFindings) -> tuple[Parameter, ...]:
         for name, scale, none in zip(kind.parameters, kind.scale, _numbers(kind.baseline), strict=True):
             free.append(Parameter(fault.id, name, none, 0.1 * scale, _SIGMA[kind.type]))
     return tuple(free)
+
+
+def with_reversed_axes(findings: SetupFindings, fit: Fit) -> SetupFindings | None:
+    """Return findings with the axes that a fit has found to read about -1 times what they should; None if it has none.
+
+    A scale error of -2 is a reversed column. Where the axis hardly shows, as one along which a sensor lies near the
+    spin axis, relations between sensors do not tell it before the fit.
+    """
+    sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    for sensor in ("accelerometer", "gyroscope"):
+        id = catalogued(Scale, sensor).id
+        scales = {q.name: (v, e) for q, v, e in zip(fit.parameters, fit.at, sd, strict=True) if q.group == id}
+        signs = ["-" if v + 3.0 * e < -1.0 else "" for v, e in (scales.get(name, (0.0, 0.0)) for name in Scale._fields)]
+        if any(signs):
+            axes = effect_of(Axes(" ".join(map("".join, zip(signs, "xyz", strict=True)))), sensor)
+            meant = tuple(corrected(one, [axes]) for one in findings.recordings)
+            return SetupFindings((*findings.faults, SetupFault(axes, float("inf"), None)), meant, findings.hints)
+    return None
 
 
 def _numbers(value: tuple[float | str, ...]) -> list[float]:

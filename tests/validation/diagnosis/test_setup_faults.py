@@ -9,8 +9,11 @@ import pytest
 from made import tables, throws
 
 from discsim.effects import CATALOGUE, Effect, effect
+from discsim.written import as_written
 from validation.diagnosis.selection.candidates import available, parameters_of, trials_for
 from validation.diagnosis.selection.stepwise import search
+from validation.diagnosis.setup import SetupFindings
+from validation.diagnosis.setup_effects import with_reversed_axes
 
 
 def test_a_setting_is_no_trial_of_the_search_and_a_size_is():
@@ -68,3 +71,20 @@ def test_an_offset_of_time_beside_a_place_is_not_told_as_a_turned_board_and_a_sc
     found = {q.name: v for q, v in zip(final.fit.parameters, final.fit.at, strict=True)}
     assert found["offset_s"] == pytest.approx(-0.018, abs=5e-4)
     assert found["dy_m"] == pytest.approx(-3.6e-4, abs=3e-5)
+
+
+def test_an_axis_that_the_fit_finds_scaled_by_minus_one_is_a_reversed_column():
+    fault = effect("gyro.axes", axes="x y -z")
+    written = tuple(as_written(one, [fault]) for one in tables())
+    fit = search(written).final.fit
+    findings = with_reversed_axes(SetupFindings((), written), fit)
+    assert findings is not None
+    assert findings.effects == (fault,)
+    assert findings.recordings[0].samples["gyroscope"].value[:, 2] == pytest.approx(
+        tables()[0].samples["gyroscope"].value[:, 2]
+    )
+
+
+def test_a_small_scale_is_no_reversed_column():
+    made = tuple(tables(errors=[effect("gyro.scale", sx=0.0, sy=0.0, sz=0.03)]))
+    assert with_reversed_axes(SetupFindings((), made), search(made).final.fit) is None

@@ -36,6 +36,7 @@ from validation.identification.noise import GroupNoise
 from validation.identification.observations import readings_of
 from validation.identification.parameters import Parameter
 from validation.identification.plants import plant_of
+from validation.identification.readings import group_of
 from validation.identification.segments import Chain
 
 __all__ = [
@@ -59,6 +60,8 @@ ASTRAY = 12.0
 #: what a sensor may leave of the motion that others tell when it is late, lags or lost samples: with one sample in
 #: twenty lost 1.7 (magnetometer) and 4 (accelerometer), while sensors of another throw or run leave 9 to 40
 RECONCILED = 6.0
+#: share of its rate by which a table's speed may pulse: one of another run is off by as much as rates differ
+_RIPPLE = 0.1
 #: two sensors of a free spin that are both astray, one of them by this much, follow no motion: sensors of other throws
 #: leave 300 and more, a clock or lost samples of one sensor below it
 LOST = 100.0
@@ -198,6 +201,8 @@ def contradiction_in(recordings: Sequence[Recording], known: Sequence[Parameter]
             continue
         if _reconciled(recordings, look, sensor) or _follows_lagging(recordings, known, sensors, sensor):
             return None
+        if _pulses(recordings, whole, sensor):
+            return None
         apart[sensor] = others
     if apart:
         # each of several may be left out: it is they that contradict one another
@@ -263,6 +268,18 @@ def _by_pairs(
             for sensor, other in (pair, pair[::-1]):
                 against[sensor] = (*against.get(sensor, ()), other)
     return Contradiction(whole, tuple(together), against)
+
+
+def _pulses(recordings: Sequence[Recording], whole: Look, sensor: str) -> bool:
+    """Tell whether a rate reference stays so near the rate of the others' motion that a ripple of the speed does it."""
+    if sensor != "rate_reference":
+        return False
+    left, rate = [], []
+    for place, level in zip(whole.places, whole.left, strict=True):
+        if sensor in level and sensor in recordings[place]:
+            left.append(level[sensor] * whole.noise[group_of(sensor, 0)].sd)
+            rate.append(float(np.nanmedian(np.abs(recordings[place].samples[sensor].value))))
+    return bool(left) and float(np.median(left)) < _RIPPLE * float(np.median(rate))
 
 
 def _reconciled(recordings: Sequence[Recording], look: Look, sensor: str) -> bool:
