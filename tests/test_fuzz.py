@@ -1,9 +1,9 @@
-"""Mutated inputs: what ever failed stays mended, and some two thousand new cases are tried at each run."""
+"""Mutated inputs: what ever failed stays mended, and some two thousand cases of a seed are tried."""
 
 from __future__ import annotations
 
+import os
 import random
-import secrets
 import time
 from pathlib import Path
 
@@ -17,10 +17,12 @@ from fuzz.targets import CHEAP, TARGETS
 
 from discsim.errors import InputError
 
-#: cases of a gate's run, as far as they fit into its time
+#: cases of a run, as far as they fit into its time
 CASES, SECONDS = 2000, 60.0
 #: cases of what takes a tenth of a second each, and their time
 DEARER, DEARER_SECONDS = 30, 40.0
+#: the same in every run, so that a change is judged by itself; DISCSIM_FUZZ_SEED=N tries others
+SEED = int(os.environ.get("DISCSIM_FUZZ_SEED", "20261122"))
 
 
 def faults(targets: list[str], cases: int, seconds: float, seed: int) -> list[str]:
@@ -35,12 +37,12 @@ def faults(targets: list[str], cases: int, seconds: float, seed: int) -> list[st
     return found
 
 
-def test_no_mutation_of_a_new_seed_crashes_hangs_or_lies():
-    assert not faults(list(CHEAP), CASES, SECONDS, secrets.randbelow(10**9))
+def test_no_mutation_crashes_hangs_or_lies():
+    assert not faults(list(CHEAP), CASES, SECONDS, SEED)
 
 
-def test_no_mutation_of_a_new_seed_leads_estimate_or_a_run_down_astray():
-    assert not faults(["spin-down", "estimate"], DEARER, DEARER_SECONDS, secrets.randbelow(10**9))
+def test_no_mutation_leads_estimate_or_a_run_down_astray():
+    assert not faults(["spin-down", "estimate"], DEARER, DEARER_SECONDS, SEED)
 
 
 @pytest.mark.parametrize("path", sorted(CORPUS.glob("*.toml")), ids=lambda path: path.stem)

@@ -430,3 +430,7 @@ def test_an_accelerometer_that_is_coarse_for_a_slow_change_is_not_frozen(tmp_pat
     gyro = turning(2000, rate=0.0) + np.outer(rate, [0, 0, 1.0])
     result = imported_with_force(tmp_path, [f"{10 * k}" for k in range(2000)], force, gyro)
     assert len(result.recording.samples["accelerometer"]) == 2000
+
+
+def test_readings_that_differ_by_rounding_alone_have_no_step_of_resolution():
+    assert step_of(3.0e7 * (1.0 + 1e-13 * np.arange(5.0))) is None

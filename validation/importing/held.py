@@ -287,6 +287,8 @@ def step_of(column: FloatArray) -> float | None:
         return float(seen[1] - seen[0]) if seen.size == 2 else None
     ladder = np.diff(seen)
     ladder = ladder[ladder > 1e-9 * max(abs(seen[0]), abs(seen[-1]))]
+    if ladder.size == 0:
+        return None  # they differ by rounding alone
     # the smallest differences, averaged, bear less of the blur than the smallest alone
     smallest = float(np.min(ladder))
     step = float(np.mean(ladder[ladder < 1.5 * smallest]))
