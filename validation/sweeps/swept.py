@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from validation.reporting.run import package_version
+from validation.running.progress import Progress, silent
 from validation.running.tasks import Task, claim, discard, run_tasks
 from validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, truth_tasks
 from validation.sweeps.figures import draw_sweep
@@ -21,23 +22,9 @@ from validation.sweeps.result import labelled, write_netcdf
 
 __all__ = ["CHECKPOINTS", "Swept", "error_rows", "sweep"]
 
-T = TypeVar("T")
 
 #: folder of the results of single tasks, in the folder of a sweep
 CHECKPOINTS = "checkpoints"
-
-
-class Progress(Protocol):
-    """Yields the items handed in and shows how far it is."""
-
-    def __call__(self, items: Iterable[T], total: int, what: str) -> Iterator[T]:
-        """Yield ``items``, of which there are ``total``, each of them ``what``."""
-        ...
-
-
-def _silent(items: Iterable[T], total: int, what: str) -> Iterator[T]:
-    del total, what
-    return iter(items)
 
 
 @dataclass(frozen=True, repr=False)
@@ -95,7 +82,7 @@ def sweep(
     workers: int | None = None,
     checkpoints: Path | None = None,
     anew: bool = False,
-    progress: Progress = _silent,
+    progress: Progress = silent,
     say: Callable[[str], None] = lambda text: None,
 ) -> Swept:
     """Score estimators over every combination of a plan's axes and mounts, on one truth run for all mounts.

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 from discsim.errors import InputError
 from discsim.files import write_text
@@ -14,6 +14,7 @@ from discsim.recording import Recording
 from estimators.methods import METHODS
 from validation.reporting.run import json_text
 from validation.running.given import Given, given_recordings
+from validation.running.progress import Progress, silent
 from validation.yaw_damping.compared import SOURCES, Compared, Source, compare_sources
 from validation.yaw_damping.figures import draw_fit, draw_sources, draw_surface
 from validation.yaw_damping.model import fitted_model, tabulated_model
@@ -22,21 +23,6 @@ from validation.yaw_damping.output_error import Fit, fit_yaw_damping
 from validation.yaw_damping.paper_table import PaperTable, paper_table, table_csv
 
 __all__ = ["FittedYawDamping", "check_method", "cnr_json", "fit_recordings", "notes"]
-
-T = TypeVar("T")
-
-
-class Progress(Protocol):
-    """Yields the items handed in and shows how far it is."""
-
-    def __call__(self, items: Iterable[T], total: int, what: str) -> Iterator[T]:
-        """Yield ``items``, of which there are ``total``, each of them ``what``."""
-        ...
-
-
-def _silent(items: Iterable[T], total: int, what: str) -> Iterator[T]:
-    del total, what
-    return iter(items)
 
 
 @dataclass(frozen=True, repr=False)
@@ -128,7 +114,7 @@ def fit_recordings(
     method: str = "best",
     *,
     compare: bool = False,
-    progress: Progress = _silent,
+    progress: Progress = silent,
     say: Callable[[str], None] = lambda text: None,
 ) -> FittedYawDamping:
     """Fit the yaw damping derivative C_Nr to throws of one disc, by output error of the whole model flight.
