@@ -477,7 +477,7 @@ def test_a_file_that_is_no_utf_8_is_refused(flight, file, junk):
 
 def test_a_fault_far_down_a_long_file_is_found(tmp_path, monkeypatch):
     """Blocks are far smaller here than in use, so that the fault lies in the thousandth of them."""
-    monkeypatch.setattr(module, "_BLOCK", 100)
+    monkeypatch.setattr(module, "BLOCK", 100)
     rows = [f"{k},1,2,3" for k in range(10_000)]
     file = tmp_path / "magnetometer.csv"
     file.write_text("\n".join([HEADER, *rows]))
@@ -494,7 +494,7 @@ def test_a_fault_far_down_a_long_file_is_found(tmp_path, monkeypatch):
 
 
 def test_time_must_ascend_from_block_to_block(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "_BLOCK", 1)
+    monkeypatch.setattr(module, "BLOCK", 1)
     file = tmp_path / "magnetometer.csv"
     file.write_text(f"{HEADER}\n{ROWS}0.02,1,2,3\n")
     with pytest.raises(InputError, match=r"magnetometer.csv:5: time 0.02 s follows 0.02 s"):

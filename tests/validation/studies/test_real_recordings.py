@@ -302,7 +302,7 @@ def test_a_walk_that_was_broken_off_goes_on_where_it_stopped(tmp_path, monkeypat
         ran.append(command[1])
         return Said(0 if command[1] == "import" else 3, 1.0, "")
 
-    monkeypatch.setattr(road, "_run", run)
+    monkeypatch.setattr(road, "run_command", run)
     first = road.walk(SPUN, tmp_path, tmp_path / "logs")
     again = road.walk(SPUN, tmp_path, tmp_path / "logs")
     assert ran == ["import", "check", "estimate", "diagnose"]

@@ -145,7 +145,7 @@ def _grown(found: Search, board: Board) -> Tied:
     """Return the fit to which effects were added as long as one is worth its price."""
     current = found.base
     for step in range(MOST_EFFECTS):
-        better = _next(found, board, current, step)
+        better = next_effect(found, board, current, step)
         if step == 0 and far(found, current) and (better is None or far(found, better)) and not _told(better):
             together = _together(found, board)
             if together is not None:
@@ -234,14 +234,14 @@ def _offers(found: Search, board: Board, current: Tied, step: int) -> list[Offer
             there.append((item, found.loose, 0.0))
     # far from the data the two are asked in different noise: what they gain does not compare
     there, here = ([offer for offer in some if on_the_disc(found, offer[0].start)] for some in (there, here))
-    worth = _in_turn(there, here) if distant and step > 0 else _in_turn([*there, *here])
+    worth = in_turn(there, here) if distant and step > 0 else in_turn([*there, *here])
     if distant:
         present = {trial.id for trial in current.hypothesis.trials}
         worth = [*((hint, found.loose, 0.0) for hint in found.hints if hint.trial.id not in present), *worth]
     return worth
 
 
-def _next(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
+def next_effect(found: Search, board: Board, current: Tied, step: int) -> Tied | None:
     """Return the fit with the best further effect, or None where none is worth its price."""
     noise = found.loose_noise
     chi2_now = chi2_in(current, noise)
@@ -301,7 +301,7 @@ def _begun_again(found: Search, current: Tied, proposal: Proposal, bar: float) -
     return tied_fit(current.fit, current.hypothesis.plus(proposal.trial), found.own, current.fit.noise, start, bar=bar)
 
 
-def _in_turn(*offers: Sequence[Offer]) -> list[Offer]:
+def in_turn(*offers: Sequence[Offer]) -> list[Offer]:
     """Return offers that may be worth their price, from each list the best in turn."""
 
     def later(offer: Offer) -> tuple[bool, float]:

@@ -67,7 +67,7 @@ def step(
     ranked = [Proposal(trial, 1e6 - rank, {}) for rank, trial in enumerate(RANKED)]
     monkeypatch.setattr(searching, "one_per_effect", lambda _: ranked)
     found = finding.Search(tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base, hints=tuple(hints))
-    best = searching._next(found, None, base, 0)  # type: ignore[arg-type]
+    best = searching.next_effect(found, None, base, 0)  # type: ignore[arg-type]
     assert best is not None
     return best.hypothesis.trials[-1].id, refitted, bars
 
@@ -115,7 +115,7 @@ def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present
     monkeypatch.setattr(searching, "proposals", lambda *_: [])
     monkeypatch.setattr(searching, "one_per_effect", lambda _: [Proposal(tilt, 1e6, {size: 0.3})])
     found = finding.Search(tuple(recordings), (), fit, fit.noise, (tilt,), base, base)
-    best = searching._next(found, None, base, 0)  # type: ignore[arg-type]
+    best = searching.next_effect(found, None, base, 0)  # type: ignore[arg-type]
     assert best is not None
     assert best.hypothesis.trials == (tilt,)
 
