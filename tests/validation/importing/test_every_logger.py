@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.logger_files import LOGGERS
+from support.places import ROOT
 
 from discsim.errors import InputError
 from discsim.recording import read_recording
@@ -21,7 +22,6 @@ from validation.commands.diagnose import command as diagnose
 from validation.commands.estimate import command as estimate
 from validation.commands.import_ import command as import_
 
-ROOT = Path(__file__).parents[3]
 MAPS = sorted(path.stem for path in (ROOT / "models" / "imports").glob("*.toml"))
 ROTATING = [name for name in MAPS if LOGGERS[name].methods]
 
