@@ -47,7 +47,7 @@ from estimators.methods import best as best_of_recording  # noqa: E402
 from estimators.precession import phase_rate  # noqa: E402
 from estimators.rate import YawRate  # noqa: E402
 from estimators.streaming import StreamingRate  # noqa: E402
-from estimators.tracking import TrackingSettings, track_bound, tracking  # noqa: E402
+from estimators.tracking import Segment, TrackingSettings, track_bound, tracking  # noqa: E402
 from validation.reporting.figures import new_figure, save_figure  # noqa: E402
 from validation.reporting.run import package_version  # noqa: E402
 
@@ -214,10 +214,16 @@ def drawn_bound(spin: Spin, truth: Truth, noise: float, middle: float) -> float:
     }
     recording, _ = record(spin, np.random.default_rng(0), None, quiet, ("magnetometer", "gyroscope"), truth=truth)
     samples = recording.need("magnetometer")
-    return track_bound(
-        samples.t, samples.value, truth.r(samples.t), noise, middle, SETTINGS,
-        gyroscope=recording.get("gyroscope"), strength=field_strength(recording), walk=WALK,
-    )  # fmt: skip
+    segment = Segment(
+        samples.t,
+        samples.value,
+        SETTINGS,
+        gyroscope=recording.get("gyroscope"),
+        strength=field_strength(recording),
+        decaying=False,
+        walk=WALK,
+    )
+    return track_bound(segment, truth.r(samples.t), noise, middle)
 
 
 def walk_share(t: FloatArray, noise: float, walk: float) -> float:

@@ -44,11 +44,10 @@ def tone_bound(
     *,
     degree: int = 1,
     phase: float = 0.0,
-    at: float | None = None,
     hard_iron: bool = True,
     ellipse_sd: float = 0.0,
 ) -> ToneBound:
-    """Return the bound for samples at times t (n,), s, of any spacing.
+    """Return the bound at the mean of times t (n,), s, of any spacing.
 
     Parameters
     ----------
@@ -61,15 +60,13 @@ def tone_bound(
     degree : int
         Of the unknown polynomial of the rate: 0 constant, 1 with chirp, 2 with curvature.
     phase : float
-        Phase at ``at``, rad.
-    at : float or None
-        Instant of the answer, s; the mean of ``t`` if None.
+        Phase at the mean of ``t``, rad.
     hard_iron : bool
         Whether the offset of both axes is unknown.
     ellipse_sd : float
         Prior standard deviation of each part of the relative ellipse c; 0 if c is known.
     """
-    jacobian = _tone_jacobian(t, amplitude, rate, degree, phase, at, hard_iron, ellipse_sd > 0)
+    jacobian = _tone_jacobian(t, amplitude, rate, degree, phase, hard_iron, ellipse_sd > 0)
     # unit columns: the powers of tau differ by orders of magnitude
     scale = np.linalg.norm(jacobian, axis=0)
     fisher = (jacobian / scale).T @ (jacobian / scale) / noise**2
@@ -91,12 +88,11 @@ def _tone_jacobian(
     rate: float,
     degree: int,
     phase: float,
-    at: float | None,
     hard_iron: bool,
     ellipse: bool,
 ) -> FloatArray:
     """Derivatives (2n, m) of both axes by phase, rate, chirp, ..., amplitude, hard iron (2), ellipse (2)."""
-    tau = np.asarray(t, dtype=float) - (float(np.mean(t)) if at is None else at)
+    tau = np.asarray(t, dtype=float) - float(np.mean(t))
     spin = np.exp(1j * (phase - rate * tau))
     columns = [1j * amplitude * spin]
     factorial = 1.0

@@ -69,7 +69,10 @@ class TestTheSameFlight:
     def test_c_and_python_fly_the_same_to_the_last_bit(self, disc, name):
         """1e-10 is promised; it is one compiled function, reached by two ways."""
         disc, field = load_disc(disc)
-        flights = [fly(disc, field, throw(), EFFECTS[name], duration=1.5, python=python) for python in (False, True)]
+        flights = [
+            follow(FlyingDisc(disc, field, EFFECTS[name]), throw(), duration=1.5, python=python)
+            for python in (False, True)
+        ]
         assert_same(*flights)
 
     def test_so_do_a_law_and_an_effect_of_the_user_s_own(self, tmp_path):

@@ -55,7 +55,7 @@ def test_what_stands_for_a_figure_is_there(name):
 
 def test_shapes_and_counts_are_no_citations():
     assert "3" not in cited("discsim.frames.C1")
-    assert cited("discsim.trajectory.derivative") == {"18", "19", "22", "23"}
+    assert cited("discsim.flight_equations.derivative") == {"18", "19", "22", "23"}
 
 
 def test_the_page_is_made_from_its_numbers():

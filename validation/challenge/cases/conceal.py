@@ -22,10 +22,11 @@ from discsim.engine import follow
 from discsim.errors import InputError
 from discsim.files import digest, write_text
 from discsim.motion import Motion
-from discsim.recording import PLANTS, Plant, Recording, toml_lines, write_recording
+from discsim.recording import PLANTS, Plant, Recording, write_recording
 from discsim.rig import turn_table
 from discsim.sensors import record
 from discsim.toml_table import read_toml
+from discsim.toml_text import toml_lines
 from validation.challenge.cases.case import Case, Coast, Kind, Mask, Run, Turning
 from validation.challenge.cases.draw import draw_case
 from validation.challenge.cases.off_catalogue import HiddenDisc, coast, haunted

@@ -19,7 +19,7 @@ class Row(NamedTuple):
     departs: str = ""
 
 
-_FLIGHT = "discsim.trajectory.derivative"
+_FLIGHT = "discsim.flight_equations.derivative"
 _AIR = "discsim.aerodynamics.air_wrench"
 _METHOD = "estimators.accelerometer.accelerometer"
 _KNOWN = "estimators.accelerometer.rate_with_known_terms"
