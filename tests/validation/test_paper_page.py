@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from discsim.shipped import load_disc
-from validation.studies.paper.__main__ import SEED, read_numbers
 from validation.studies.paper.beside import BLOCKS, FIGURES
+from validation.studies.paper.command import SEED, read_numbers
 from validation.studies.paper.distance import UNKNOWNS
 from validation.studies.paper.equations import EQUATIONS, STEPS, cited, find
 from validation.studies.paper.figures import draw_fig_9
