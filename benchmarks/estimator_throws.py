@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from estimator_windows import SETTINGS, rms
 from matplotlib.ticker import ScalarFormatter
-from spinning_sensor import Faults, Spin, record
+from support.spinning_sensor import Faults, Spin, record
 
 from discsim.arrays import FloatArray
 from discsim.recording import Recording

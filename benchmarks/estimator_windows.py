@@ -13,7 +13,7 @@ import scipy.fft
 import scipy.optimize
 import scipy.signal
 from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator, ScalarFormatter
-from spinning_sensor import MPU9250, Faults, Spin, Truth, move, record, without
+from support.spinning_sensor import MPU9250, Faults, Spin, Truth, move, record, without
 
 from discsim.arrays import FloatArray
 from discsim.recording import Recording, Samples

@@ -3,7 +3,7 @@
     python benchmarks/estimators.py [--quick] [--seed 0] [--write]
 
 ``--write`` puts tables and figures into docs/estimator-accuracy.md and docs/images. A full run takes about ten minutes
-on two cores, ``--quick`` one. Data come from closed-form motion (tests/estimators/spinning_sensor.py), not from MuJoCo.
+on two cores, ``--quick`` one. Data come from closed-form motion (tests/support/spinning_sensor.py), not from MuJoCo.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ import scipy
 import scipy.fft
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "estimators")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-from spinning_sensor import Spin, record, without  # noqa: E402
+from support.spinning_sensor import Spin, record, without  # noqa: E402
 
 from discsim.files import write_text  # noqa: E402
 from estimators.fft_fast import padded_peak  # noqa: E402
