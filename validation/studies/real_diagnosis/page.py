@@ -178,7 +178,7 @@ def _causes(found: Sequence[CauseHeldOut], best: CauseHeldOut, stated: Mapping[s
     sizes = [best.others[name].x for name in names]
     nearer = [name for name in names if best.landings[name].distance < stated[name].distance]
     return {
-        "none": none,
+        "without": none,
         "best": best,
         "names": names,
         "causes": [_cause_cells(one, none, names) for one in sorted(found, key=lambda one: one.together.merit)],
