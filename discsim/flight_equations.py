@@ -16,14 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from discsim.aerodynamics import air_wrench, wind
+from discsim.aerodynamics import total_wrench, wind
 from discsim.arrays import FloatArray
 from discsim.compiled import compiled, compiled_nogil, inlined
 from discsim.effects.body import centre_of_mass, transverse_inertia
 from discsim.effects.events import impulse, spin_step
 from discsim.frames import heading_angles, rotate_by_quaternion
-from discsim.law import law_wrench
-from discsim.own_wrench import own_wrench
 from discsim.parameters import PARAMETERS, Tables
 
 __all__ = ["WIDTH", "derivative", "in_body", "incidence"]
@@ -49,13 +47,7 @@ def derivative(p: Any, tables: Tables, t: float, y: FloatArray, dy: FloatArray) 
     h = -y[2]
     wn, we, wd = wind(p, t, h)
     u, v, w = rotate_by_quaternion(qw, -qx, -qy, -qz, y[3] - wn, y[4] - we, y[5] - wd)
-    Fx, Fy, Fz, Mx, My, Mz = air_wrench(p, tables, h, u, v, w, P, Q, r)
-    if tables.law.shape[0] > 0:
-        Lx, Ly, Lz, Kx, Ky, Kz = law_wrench(tables.law, t, h, u, v, w, P, Q, r)
-        Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
-    if tables.own_calls.size > 0:
-        Lx, Ly, Lz, Kx, Ky, Kz = own_wrench(tables.own_calls, tables.own_sizes, t, h, u, v, w, P, Q, r)
-        Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
+    Fx, Fy, Fz, Mx, My, Mz = total_wrench(p, tables, t, h, u, v, w, P, Q, r)
 
     # from the geometric centre to the centre of mass, whose place e turns with psi: M - e x F
     ex_B, ey_B, _ = centre_of_mass(p.body_mass_imbalance)

@@ -440,12 +440,12 @@ def test_a_challenge_scores_reports_and_goes_on_where_it_was_stopped(tmp_path, s
 
 
 def test_more_cases_join_those_that_are_done(tmp_path, spy):
-    few = [Request(seed, "spin_down", (), "nothing") for seed in (40, 41)]
+    few = [Request(seed, "flight", (), "nothing") for seed in (40, 41)]
     with start_run(tmp_path / "out", 40) as run:
         done = challenge(run, few, workers=1, command=spy)
     sealed = json.loads((tmp_path / "out" / "sealed.json").read_text())
     with start_run(tmp_path / "out", 40) as run:
-        more = challenge(run, [*few, Request(42, "spin_down", (), "nothing")], workers=1, command=spy)
+        more = challenge(run, [*few, Request(42, "flight", (), "nothing")], workers=1, command=spy)
     assert more[:2] == done
     assert len(more) == 3
     assert json.loads((tmp_path / "out" / "sealed.json").read_text()).items() > sealed.items()

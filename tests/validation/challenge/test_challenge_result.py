@@ -210,9 +210,9 @@ PAGE = "top\n<!-- masks -->\nold\n<!-- /masks -->\nmiddle\n<!-- result -->\nold\
 def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, blind, monkeypatch):
     """Under two masks of seven, and without any: a page with tables, figures and a command for each failure."""
     requests = [
-        Request(40, "spin_down", (), "nothing"),
-        Request(41, "spin_down", ("rig.quadratic_drag",)),
-        Request(42, "spin_down", ("power_law_torque",)),
+        Request(40, "flight", (), "nothing"),
+        Request(41, "flight", ("air.wind",)),
+        Request(42, "flight", ("lift_hysteresis",)),
     ]
     with start_run(tmp_path / "plain", 40) as run:
         challenge(run, requests, workers=1, command=blind)
@@ -222,8 +222,8 @@ def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, blind,
     assert list(results) == ["short", "few_recordings"]
     assert "few_recordings" in (tmp_path / "masks" / "report.html").read_text()
     written = json.loads((tmp_path / "masks" / "short" / "challenge.json").read_text())
-    assert written["cases"][1]["reproduce"].endswith("--seed 41 --cases 1 --plant spin_down "
-                                                     "--effect rig.quadratic_drag --mask short")  # fmt: skip
+    assert written["cases"][1]["reproduce"].endswith("--seed 41 --cases 1 --plant flight "
+                                                     "--effect air.wind --mask short")  # fmt: skip
     shutil.rmtree(tmp_path / "masks" / "short")
     assert list(masked_results([tmp_path / "masks"])) == ["few_recordings"]
 
@@ -237,7 +237,7 @@ def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, blind,
     assert text.endswith("\nend\n")
     assert "old" not in text
     assert "1 are answered rightly" in text
-    assert "`discsim challenge --seed 41 --cases 1 --plant spin_down --effect rig.quadratic_drag`" in text
+    assert "`discsim challenge --seed 41 --cases 1 --plant flight --effect air.wind`" in text
     assert "| none (the same seeds) | 3 |" in text
     assert "| `few_recordings` | 3 |" in text
     assert "`short`" not in text
@@ -248,7 +248,7 @@ def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, blind,
 
     # more cases without anything in them count for the false alarms, and only such cases
     with start_run(tmp_path / "blank", 50) as run:
-        challenge(run, [Request(50, "spin_down", (), "nothing")], workers=1, command=blind)
+        challenge(run, [Request(50, "flight", (), "nothing")], workers=1, command=blind)
     run_study("blind-test", [*given[:1], "--blank", str(tmp_path / "blank"), *given[-2:]])
     (alarms,) = [line for line in page.read_text().splitlines() if line.startswith("| false alarms")]
     assert "| 0 of 2 |" in alarms

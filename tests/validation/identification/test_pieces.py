@@ -211,7 +211,7 @@ def test_a_disc_in_no_air_spins_freely_as_in_the_engine():
 
 
 @pytest.mark.parametrize("error", ON_SENSORS, ids=lambda e: e.id)
-def test_a_sensor_reads_a_motion_as_the_sensor_model_does(error: Effect):
+def test_the_parameters_of_a_fit_act_on_a_sensor_as_the_effects_they_stand_for(error: Effect):
     """Lags and clocks aside, which are of the samples and not of a reading."""
     motion, t = clean(), np.linspace(0.05, 0.85, 41)
     module = noiseless(MODULE).with_effects([error])

@@ -27,8 +27,9 @@ __all__ = ["OwnClock", "SamplesShown", "own_clock_of"]
 ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
-#: knots of the field's slow turn and of the wobble's amplitude: one per so many seconds
-_KNOTS_S = 0.5
+#: knots of the field's slow turn and of the wobble's amplitude: one per so many seconds (a
+#: wobble halves in 0.3 s or more)
+_KNOTS_S = 0.3
 #: what a spline's second differences are held to, as a share of the field's size: loosely, so that rows which do not
 #: fit yet cannot bend it
 _STIFF = 0.2
