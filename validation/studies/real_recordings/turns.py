@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray
 from discsim.recording import Samples
@@ -45,7 +46,7 @@ def turned_by_rate(rate: YawRate, start: float, stop: float) -> float:
     """Turns by the integral of a rate between two times; what is unknown is bridged linearly."""
     known = np.isfinite(rate.rate)
     t, value = rate.t[known], rate.rate[known]
-    total = np.concatenate(([0.0], np.cumsum((value[1:] + value[:-1]) / 2 * np.diff(t))))
+    total = cumulative_trapezoid(value, t, initial=0)
     return float(np.interp(stop, t, total) - np.interp(start, t, total)) / (2 * np.pi)
 
 
