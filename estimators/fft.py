@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.compiled import compiled
 from discsim.errors import InputError
 from discsim.recording import Samples
@@ -16,7 +16,6 @@ from estimators.fft_fast import dirichlet, highest, spectra, transform_at
 from estimators.precession import AxialField, axial_field
 from estimators.rate import YawRate
 from estimators.spin_spline import IndexArray
-from estimators.tone import ComplexArray
 
 __all__ = ["FftSettings", "fft"]
 

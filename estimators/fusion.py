@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, sd_by_median
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples, SensorSheet
 from estimators.centripetal import centripetal
@@ -149,7 +149,7 @@ def _gyroscope_rows(recording: Recording, settings: FusionSettings) -> RateRows 
     mean_t, mean_z = np.add.reduceat(t, first) / count, np.add.reduceat(z, first) / count
     # noise from second differences of the readings: motion is smooth
     rough = np.diff(z, 2)
-    noise = float(1.4826 * np.median(np.abs(rough)) / np.sqrt(6)) if rough.size else 0.0
+    noise = float(sd_by_median(rough) / np.sqrt(6)) if rough.size else 0.0
     noise = max(noise, float(np.hypot(sheet.noise_rms or 0.0, (sheet.resolution or 0.0) / np.sqrt(12))), 1e-4)
     return RateRows(
         "linear",

@@ -7,9 +7,7 @@ are the fit's business.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cache
-from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -22,8 +20,8 @@ from discsim.effects.sensors import AccelerometerSaturation, ClockRate, Lag, Lat
 from discsim.effects.setup import BoardRotation, TimeOffset
 from discsim.motion import State, Surroundings
 from discsim.recording import Recording
-from discsim.sensors import Accelerometer, Gps, Gyroscope, Magnetometer, RateReference, Tracker
-from discsim.sensors.instruments import FIELDS, Sensor
+from discsim.sensors import Gyroscope
+from discsim.sensors.instruments import FIELDS, KINDS, Sensor
 from validation.identification.competing_effects import applied_on, row_of
 from validation.identification.parameters import Values
 from validation.identification.plants import plant_of
@@ -35,16 +33,6 @@ _Kind = TypeVar("_Kind")
 #: the effects that only move the instants at which samples were taken
 CLOCKS = tuple(row.id for row in CATALOGUE.values() if row.moves_time)
 _FIELD = ("magnetic_north", "magnetic_east", "magnetic_down")
-_KINDS: Mapping[str, type[Sensor]] = MappingProxyType(
-    {
-        "magnetometer": Magnetometer,
-        "accelerometer": Accelerometer,
-        "gyroscope": Gyroscope,
-        "gps": Gps,
-        "rate_reference": RateReference,
-        "track": Tracker,
-    }
-)
 _BASELINE = {(row.id, name): none for row in CATALOGUE.values() for name, none in row.sizes.items()}
 
 
@@ -131,7 +119,7 @@ def _model(sensor: str, recording: Recording, values: Values) -> Sensor:
     if sensor in ("accelerometer", "gyroscope"):
         stated = recording.sheets["accelerometer"].position if "accelerometer" in recording.sheets else None
         errors["position"] = np.zeros(3) if stated is None else stated
-    return _KINDS[sensor](**errors)
+    return KINDS[sensor](**errors)
 
 
 def _surroundings(recording: Recording, values: Values) -> Surroundings:
