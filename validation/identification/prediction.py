@@ -77,7 +77,7 @@ class Sampled:
             both = np.concatenate([late, early])
             times, last = runner.times(float(edges[i]), float(edges[i + 1]), float(both.max()), current.states[i])
             rows, _ = runner.run(flat[None], own[None], current.states[i : i + 1], times, last, both)
-            read = predicted(self.sensor, current.recording, values, both, rows[0])
+            read = predicted(self.sensor, current.recording, values, both, rows[0], current.effects)
             slope[o] = (read[: o.size] - read[o.size :]) / (2.0 * _TIME_STEP)
         return slope
 
@@ -92,8 +92,8 @@ class Sampled:
 def shown(current: Chain, values: Values, sensor: str, t: FloatArray) -> FloatArray:
     """Return what a sensor would read (n, k) at true instants t (n,) of a chain's motion, before lag and noise."""
     recording = current.recording
-    runner = runner_of(recording, values)
-    flat, own = base_flat(recording, values), current.plant.own_values(values)
+    runner = runner_of(recording, values, (), current.effects)
+    flat, own = base_flat(recording, values, (), current.effects), current.plant.own_values(values)
     rows = np.empty((t.size, ROW))
     piece = np.clip(np.searchsorted(current.edges, t, side="right") - 1, 0, len(current.states) - 1)
     for i in range(len(current.states)):
@@ -103,7 +103,7 @@ def shown(current: Chain, values: Values, sensor: str, t: FloatArray) -> FloatAr
             start, stop = float(current.edges[i]), float(current.edges[i + 1])
             times, last = runner.times(start, stop, float(out.max()), current.states[i])
             rows[mine] = runner.run(flat[None], own[None], current.states[i : i + 1], times, last, out)[0][0]
-    return predicted(sensor, recording, values, t, rows)
+    return predicted(sensor, recording, values, t, rows, current.effects)
 
 
 def read(current: Chain, values: Values, readings: Readings) -> FloatArray:
