@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, sd_by_median
 from discsim.effects.catalogue import CATALOGUE, catalogued
 from discsim.effects.sensors import ClockRate
 from discsim.frames import conjugate, multiply
@@ -355,7 +355,7 @@ def without_outliers(fit: Fit) -> tuple[Fit, list[tuple[int, str, str, float, fl
             x = linear.residual[channel.rows]
             if x.size < 8:
                 continue
-            sd = max(1.4826 * float(np.median(np.abs(x))), 1e-12)
+            sd = max(float(sd_by_median(x)), 1e-12)
             z = np.abs(x) / sd
             padded = np.concatenate([[0.0], z, [0.0]])
             alone = (z > RELAXED_FIT.outlier) & (

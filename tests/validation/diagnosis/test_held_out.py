@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import pytest
-from made import coasts
+from support.made import coasts
 
 from discsim.effects import effect
 from validation.diagnosis.pipeline import diagnose
