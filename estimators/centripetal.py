@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.recording import Samples, SensorSheet
-from estimators.tone import ComplexArray
 
 __all__ = ["LEAST_RESIDUAL", "MISFIT", "Centripetal", "centripetal"]
 
