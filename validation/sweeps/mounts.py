@@ -119,8 +119,7 @@ class AccelerometerView(NamedTuple):
         force = self.origin + x * self.gradient[:, :, 0] + y * self.gradient[:, :, 1] + z * self.gradient[:, :, 2]
         chain = body_to_ned(turn(sensor.misalignment)) @ sensitivity(sensor.scale, sensor.cross_axis).T
         value = _times(force, chain) + np.array(sensor.bias) + self.drift
-        limit = min(sensor.range, sensor.saturation.limit_m_s2)
-        reading = digitise(value, self.t, sensor.noise, rng, resolution=sensor.resolution, limit=limit)
+        reading = digitise(value, self.t, sensor.noise, rng, resolution=sensor.resolution, limit=sensor.limit)
         return Samples(self.t, reading)
 
 

@@ -15,7 +15,6 @@ from discsim.errors import InputError
 from validation.challenge.blind import Request
 from validation.challenge.cases.conceal import Answer
 from validation.challenge.masks import challenge_masks, masked_results
-from validation.challenge.report.document import main as write_document
 from validation.challenge.report.document import masks_text, plain_command, pooled, with_part
 from validation.challenge.report.page import fault_of, goals_met
 from validation.challenge.run import challenge
@@ -23,6 +22,7 @@ from validation.challenge.scores.detection import Sized, allowed, detections, fi
 from validation.challenge.scores.result import Scored, rates_of, read_result, times
 from validation.challenge.scores.scoring import score_case
 from validation.reporting.run import start_run
+from validation.studies.catalogue import run_study
 
 #: a "diagnosis" that finds nothing in anything
 BLIND = """
@@ -188,8 +188,8 @@ def test_each_way_to_be_wrong_has_its_name():
 def test_times_are_those_of_all_diagnoses_also_of_one_that_was_given_up():
     found = [scored(POWER, diagnosis("unexplained"), seconds=float(s)) for s in range(1, 12)]
     assert times(found) == (6.0, 10.0, 11.0)
-    assert times([*found, scored(POWER, None, seconds=1800.0)]).longest == 1800.0
-    assert np.isnan(times([]).median)
+    assert times([*found, scored(POWER, None, seconds=1800.0)]).longest_s == 1800.0
+    assert np.isnan(times([]).median_s)
 
 
 def test_of_two_effects_each_counts_by_its_own_size():
@@ -235,13 +235,12 @@ def masked(tmp_path_factory) -> Path:
     return folder / "masks"
 
 
-def documented(monkeypatch: pytest.MonkeyPatch, page: Path, plain: Path, *more: object) -> str:
+def documented(page: Path, plain: Path, *more: object) -> str:
     """Write a challenge into a page of documents, and return its text."""
     if not page.exists():
         page.parent.mkdir()
         page.write_text(PAGE)
-    monkeypatch.setattr(sys, "argv", ["document", str(plain), *map(str, more), "--page", str(page)])
-    write_document()
+    run_study("blind-test", [str(plain), *map(str, more), "--page", str(page)])
     return page.read_text()
 
 
@@ -252,13 +251,13 @@ def test_a_challenge_under_masks_leaves_a_report_and_a_command_for_each_case(mas
     assert written["cases"][1]["reproduce"].endswith(told)
 
 
-def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, plain, masked, monkeypatch):
+def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, plain, masked):
     """A page with tables, figures and a command for each failure; a mask without a result is left out."""
     shutil.copytree(masked, tmp_path / "masks")
     shutil.rmtree(tmp_path / "masks" / "short")
     assert list(masked_results([tmp_path / "masks"])) == ["few_recordings"]
     page = tmp_path / "docs" / "page.md"
-    text = documented(monkeypatch, page, plain, "--masks", tmp_path / "masks")
+    text = documented(page, plain, "--masks", tmp_path / "masks")
     assert text.startswith("top\n")
     assert text.endswith("\nend\n")
     assert "\nold\n" not in text
@@ -269,20 +268,18 @@ def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, plain,
     assert "`short`" not in text
     drawn_there = {path.name for path in (page.parent / "images").iterdir()}
     assert {f"images/{name}" in text for name in drawn_there} == {True}
-    assert documented(monkeypatch, page, plain, "--masks", tmp_path / "masks") == text
+    assert documented(page, plain, "--masks", tmp_path / "masks") == text
 
 
-def test_more_cases_without_anything_in_them_count_for_the_false_alarms_and_only_such_cases(
-    tmp_path, plain, monkeypatch
-):
+def test_more_cases_without_anything_in_them_count_for_the_false_alarms_and_only_such_cases(tmp_path, plain):
     with start_run(tmp_path / "blank", 50) as run:
         challenge(run, [Request(50, "flight", (), "nothing")], workers=1, command=blind(tmp_path))
     page = tmp_path / "docs" / "page.md"
-    text = documented(monkeypatch, page, plain, "--blank", tmp_path / "blank")
+    text = documented(page, plain, "--blank", tmp_path / "blank")
     (alarms,) = [line for line in text.splitlines() if line.startswith("| false alarms")]
     assert "| 0 of 2 |" in alarms
-    with pytest.raises(SystemExit):
-        documented(monkeypatch, page, plain, "--blank", plain)
+    with pytest.raises(InputError, match="conceals something"):
+        documented(page, plain, "--blank", plain)
 
 
 def test_effects_near_their_limit_count_in_the_curve(tmp_path, plain, monkeypatch):
@@ -292,7 +289,7 @@ def test_effects_near_their_limit_count_in_the_curve(tmp_path, plain, monkeypatc
     near.write_text(json.dumps({**json.loads((plain / "challenge.json").read_text()), "mask": "near_limit"}))
     monkeypatch.setattr("validation.challenge.masks.MASKS", {"near_limit": "near"})
     assert len(pooled(read_result(plain), read_result(near.parent))) == 2
-    text = documented(monkeypatch, tmp_path / "docs" / "page.md", plain, "--masks", near.parent)
+    text = documented(tmp_path / "docs" / "page.md", plain, "--masks", near.parent)
     assert "whose sizes lie near the limit: `discsim" in text
 
 

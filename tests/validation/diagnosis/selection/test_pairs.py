@@ -67,8 +67,7 @@ def test_a_start_holds_what_shapes_an_effect():
 @pytest.fixture
 def none_alone(monkeypatch):
     """Leave the search no effect alone that it could find worth its price."""
-    for limit in ("REFITTED", "REFITTED_AT_MOST"):
-        monkeypatch.setattr(searching, limit, 0)
+    monkeypatch.setattr(searching, "SELECTION", replace(searching.SELECTION, refitted=0, refitted_at_most=0))
 
 
 @pytest.mark.usefixtures("none_alone")
@@ -105,9 +104,8 @@ def as_shear() -> Tied:
 
 def test_an_effect_gives_way_to_one_that_explains_as_much_with_fewer_parameters():
     sheared = as_shear()
-    found = replace(windy(), final=sheared)
-    found.board = board_of(sheared.fit, found.trials, sheared.fit.noise, FLIGHT.sizes.continuous)
-    found.rivals = rivals_of(found)
+    found = replace(windy(), final=sheared).about(sheared.fit)
+    found = replace(found, rivals=rivals_of(found))
     assert next(rival.trial.id for rival in found.rivals["air.wind_shear"]) == "air.wind"
     better = exchanged(found)
     assert better is not None
