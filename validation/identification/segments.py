@@ -28,6 +28,8 @@ class Chain:
     states: FloatArray
     #: sensor -> samples lost before each of its samples (n,), where some were
     lost: Mapping[str, FloatArray] = field(default_factory=dict)
+    #: one sigma (d,) of what a step may move the first state by, where it is not the plant's
+    reach: FloatArray | None = None
 
     @property
     def plant(self) -> Plant:
