@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, IntArray
 from discsim.effects.air import Wind
 from discsim.effects.catalogue import catalogued
 from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
 from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import Fit, linearised
-from validation.identification.linear import IntArray, Linear
+from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel, whitened
 from validation.identification.normal_equations import inverse_of, known_directions, reduce, unknown_prior
 from validation.identification.parameters import Parameter
@@ -147,8 +147,8 @@ def _grounds(fit: Fit, f: int) -> dict[int, Ground]:
         right[own:] += pulled - grams[i][1] + off
         scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
         inverse = inverse_of(H * np.outer(scale, scale)) * np.outer(scale, scale)
-        piece = np.clip(np.searchsorted(chain.edges, linear.t, side="right") - 1, 0, len(chain.states) - 1)
-        found[i] = Ground(chain, linear, noise, np.where(linear.piece < 0, piece, linear.piece), A, e, inverse, right)
+        piece = np.where(linear.piece < 0, chain.segment_of(linear.t), linear.piece)
+        found[i] = Ground(chain, linear, noise, piece, A, e, inverse, right)
     return found
 
 
