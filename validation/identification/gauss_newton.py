@@ -179,14 +179,18 @@ def polished(fit: Fit) -> tuple[Fit, list[Reduced]]:
     """Return the optimum beside which a fit has ended, with what its last step solved.
 
     A fit ends a share of a standard deviation beside it, and slopes by differences to one side are slightly wrong: from
-    there whole steps with slopes by central differences are taken.
+    there whole steps with slopes by central differences are taken, as long as none leads away.
     """
+    before: tuple[Fit, list[Reduced]] | None = None
     for _ in range(_WHOLE_STEPS):
         linears = linearised(fit, central=True)
         fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
+        if before is not None and not fit.merit < before[0].merit + _NOTHING:
+            return before
         reduced, (step, covariance, expected) = _solved(fit, np.full(len(fit.chains), _FREE))
-        gain, fit = fit.merit - expected, replace(whole_step(fit, reduced, step), covariance=covariance)
-        if gain < _NOTHING:
+        before = replace(fit, covariance=covariance), reduced
+        fit = whole_step(before[0], reduced, step)
+        if fit.merit - expected < _NOTHING:
             break
     return fit, reduced
 

@@ -190,7 +190,7 @@ def shared_step(
     where the fit has gone where its predictions are not finite.
     """
     p = len(parameters)
-    prior = np.array([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for q in parameters])
+    prior = np.array([q.precision for q in parameters])
     off = np.array([q.stated for q in parameters]) - at
     H = gram[:p, :p] + np.diag(prior if reach is None else prior + reach**-2.0)
     right = gram[:p, -1] + prior * off

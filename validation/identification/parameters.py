@@ -39,6 +39,11 @@ class Parameter:
         """Group and name."""
         return self.group, self.name
 
+    @property
+    def precision(self) -> float:
+        """What its prior adds to a normal matrix, one over the variance: zero where it is free."""
+        return float(self.sigma**-2.0)
+
     def acts_in(self, recording: int) -> bool:
         """Tell whether it acts in a recording."""
         return self.recordings is None or recording in self.recordings

@@ -132,6 +132,8 @@ def fit_yaw_damping(throws: Sequence[Throw], start: Sequence[FloatArray] | None 
     segments = tuple(_segment(throw, state) for throw, state in zip(throws, states, strict=True))
     fit = Solution(segments, parameters, at, FLIGHT.sizes.continuous, _noise())
     fit, _ = polished(refit(fit, iterations=_MOST_STEPS, tolerance=_CONVERGED))
+    if not np.isfinite(fit.merit):
+        raise InputError("no flight from where the throws seem released; expected a disc that can fly")
     fit = replace(fit, noise=_excesses(throws, fit))
     return _result(throws, *polished(refit(fit, iterations=_MOST_STEPS, tolerance=_CONVERGED)))
 

@@ -130,7 +130,7 @@ def _grounds(fit: Fit, f: int) -> dict[int, Ground]:
         grams.append((G[:f, :f], back[:f]))
     total = np.sum([g for g, _ in grams], axis=0)
     pulled = np.sum([b for _, b in grams], axis=0)
-    prior = np.array([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for q in parameters])
+    prior = np.array([q.precision for q in parameters])
     off = prior * (np.array([q.stated for q in parameters]) - at[:f])
     found = {}
     for i, (linear, chain) in enumerate(zip(linears, fit.chains, strict=True)):

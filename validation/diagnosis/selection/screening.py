@@ -72,7 +72,7 @@ class Board:
             H += G[np.ix_(free, free)] * np.outer(active, active)
             right += G[free, -1] * active
             chi2 += float(G[-1, -1])
-        H = H + np.diag([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for _, q in parameters])
+        H = H + np.diag([q.precision for _, q in parameters])
         # what nothing shows stays at its baseline
         scale = np.where(np.diag(H) > 0.0, 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300)), 0.0)
         covariance = inverse_of(H * np.outer(scale, scale)) * np.outer(scale, scale)
