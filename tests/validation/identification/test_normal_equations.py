@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import validation
 from validation.identification.linear import Channel, Linear
 from validation.identification.noise import GroupNoise, whitened
 from validation.identification.normal_equations import CUT_OFF, Reduced, inverse_of, local_covariance
@@ -62,3 +66,19 @@ def test_recordings_that_state_a_number_differently_move_it_by_as_much():
     at = np.array([1.3])
     assert values_of([wind], at, 0, {}) == {wind.key: 1.3}
     assert values_of([wind], at, 1, {}) == {wind.key: pytest.approx(-1.2)}
+
+
+#: where `eigh` and `pinv` serve something else than normal equations that may lack a direction
+NO_NORMAL_EQUATIONS = {
+    "identification/normal_equations.py": "the solver itself, and the root of a matrix that rounding made indefinite",
+    "identification/initial/spin_phase.py": "the axes of an ellipse",
+    "diagnosis/setup/rotation.py": "the axis about which a sensor turns",
+    "diagnosis/setup/relations.py": "the error of one of three coefficients of a regression",
+}
+
+
+def test_symmetric_systems_are_solved_in_one_place():
+    room = Path(validation.__file__).parent
+    sources = [path for name in ("identification", "diagnosis", "yaw_damping") for path in (room / name).rglob("*.py")]
+    found = {str(path.relative_to(room)) for path in sources if re.search(r"\b(eigh|pinv)\(", path.read_text("utf-8"))}
+    assert found == set(NO_NORMAL_EQUATIONS)
