@@ -25,18 +25,13 @@ LONG_FILES = {
     "tests/discsim/test_sensors.py": "older than the rule, a little above it; to be split by idea",
     "tests/validation/importing/test_importing.py": "older than the rule, a little above it; to be split by idea",
     "tests/validation/importing/test_sniffing.py": "older than the rule, a little above it; to be split by idea",
-    "validation/diagnosis/result.py": "older than the rule, a little above it; to be split by idea",
 }
 LONG_FUNCTIONS = {
     "tests/support/outcomes.py:explained": "one literal: the whole outcome that the tests of the report read",
     "validation/commands/rate_table.py:command": "older than the rule; its body is to call and not to work",
-    "validation/diagnosis/assemble.py:assemble": "older than the rule; to be split by idea",
-    "validation/identification/initial/spin_phase.py:phase_spin": "older than the rule, two lines above it",
-    "validation/identification/linearisation.py:_stack": "older than the rule; to be split by idea",
     "validation/sweeps/result.py:labelled": "older than the rule; to be split by idea",
 }
 MANY_ARGUMENTS = {
-    "discsim/sensors/instruments.py:record": "older than the rule, one above it; what is stated belongs together",
     "tests/support/made_logs.py:write_table": "older than the rule, one above it",
     "tests/support/spinning_sensor.py:tone": "older than the rule; what a tone is made of belongs together",
 }

@@ -71,7 +71,7 @@ class Sampled:
         early = np.maximum(np.maximum(self.instants, current.edges[segments]) - _TIME_STEP, current.edges[segments])
         both, twice = np.concatenate([early + 2.0 * _TIME_STEP, early]), np.concatenate([segments, segments])
         rows = _rows(current, runner, (flat, own), both, twice)
-        read = predicted(self.sensor, current.recording, values, both, rows)
+        read = predicted(self.sensor, current.recording, values, both, rows, current.effects)
         return np.asarray((read[: early.size] - read[early.size :]) / (2.0 * _TIME_STEP))
 
     def weighted(self, array: FloatArray) -> FloatArray:
@@ -103,9 +103,10 @@ def _rows(
 def shown(current: Chain, values: Values, sensor: str, t: FloatArray) -> FloatArray:
     """Return what a sensor would read (n, k) at true instants t (n,) of a chain's motion, before lag and noise."""
     recording = current.recording
-    parameters = base_flat(recording, values), current.plant.own_values(values)
-    rows = _rows(current, runner_of(recording, values), parameters, t, current.segment_of(t))
-    return predicted(sensor, recording, values, t, rows)
+    effects = current.effects
+    parameters = base_flat(recording, values, (), effects), current.plant.own_values(values)
+    rows = _rows(current, runner_of(recording, values, (), effects), parameters, t, current.segment_of(t))
+    return predicted(sensor, recording, values, t, rows, effects)
 
 
 def read(current: Chain, values: Values, readings: Readings) -> FloatArray:

@@ -47,8 +47,9 @@ def span(values: Iterable[float], form: str, scale: float = 1.0) -> str:
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return the lines of a table."""
-    return "\n".join(f"| {' | '.join(line)} |" for line in (header, ["---"] * len(header), *rows))
+    """Return the lines of a table; a cell stays on its line, and in its column whatever stands in it."""
+    cells = ([" ".join(cell.split()).replace("|", "\\|") for cell in row] for row in rows)
+    return "\n".join(f"| {' | '.join(line)} |" for line in (header, ["---"] * len(header), *cells))
 
 
 def wrapped(text: str) -> str:

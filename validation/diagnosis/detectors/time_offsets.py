@@ -18,6 +18,7 @@ from discsim.effects.sensors import Lag
 from discsim.effects.setup import TimeOffset
 from validation.diagnosis.selection.candidates import Trial, free_trial
 from validation.diagnosis.selection.proposals import Proposal
+from validation.diagnosis.settings import DETECTORS
 from validation.identification.gauss_newton import Fit
 from validation.identification.noise import NoiseModel
 from validation.identification.prediction import shiftable
@@ -34,7 +35,9 @@ _LEAST = 0.01
 _LONGEST_LAG = 0.15
 
 
-def time_offsets(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: float = 25.0) -> list[Proposal]:
+def time_offsets(
+    fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: float = DETECTORS.least
+) -> list[Proposal]:
     """Return offsets of time, and lags, of the sensors of a rig whose readings do not turn with the field.
 
     What is gained is in chi-squared in ``noise``; effects that are ``taken`` already are not proposed.

@@ -19,7 +19,7 @@ from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.setup import Axes, BoardRotation, axes_of
 from discsim.recording import Recording
 from discsim.written import corrected
-from validation.diagnosis.relaxed_fit import CLOCK_SIGMA
+from validation.diagnosis.settings import RELAXED_FIT
 from validation.diagnosis.setup.relations import Columns, misfit, wanted_force
 from validation.diagnosis.setup.rotation import board_turns, spin_axis
 from validation.diagnosis.setup.spin_signals import SpinSignals, spin_signals
@@ -254,7 +254,7 @@ def _rivals(base: _Base) -> Iterator[Hypothesis]:
     longest = max(float(one.grid[-1]) for one in base.signals)
     for sensor in _shifting(base):
         step = PHASE_STEP / (fastest * longest)
-        count = int(CLOCK_SIGMA / step)
+        count = int(RELAXED_FIT.clock_sigma / step)
         sizes = {
             "lag": LAGS / fastest,
             "clock": step * np.arange(-count, count + 1),

@@ -212,15 +212,12 @@ def phase_spin(
         return None
     field = float(np.linalg.norm(recording.environment.magnetic_field)) if sensor == "magnetometer" else 10.0
     rough = -expected(grid) if expected is not None else _rough_rate(grid, t, z - np.mean(z), step)
-    typical = float(np.median(np.abs(rough)))
     if sensor == "magnetometer":
+        typical = float(np.median(np.abs(rough)))
         knots = t[-1] - t[0] if steady else max(0.5, 4 * np.pi / max(typical, 0.1))
         plane, _ = _conic(t, z, knots, field)
     else:
-        # a straight line for what stands still in B: it changes as the spin decays
-        coarse = np.arange(grid[0], grid[-1] + 0.05, 0.05)
-        still = smoothed(t, z, coarse, 0.3)
-        plane = z - np.interp(t, coarse, still.real) - 1j * np.interp(t, coarse, still.imag)
+        plane = _less_what_stands(t, z)
     rate = rough if expected is not None else _rough_rate(grid, t, plane, step)
     # the rate's course where another reading shows it better than the phase of a force that may vanish
     shape = rough if expected is not None and sensor == "accelerometer" else None
@@ -253,6 +250,13 @@ def phase_spin(
         phase = turned + _weighted_median(phase - turned, amplitude)
         return Spin(grid, phase, rate, rate, amplitude, t, plane)
     return Spin(grid, phase, rate, _without_steps(grid, rate, t, plane, step), amplitude, t, plane)
+
+
+def _less_what_stands(t: FloatArray, z: ComplexArray) -> ComplexArray:
+    """Return what turns of a vector z (n,), less what stands still in B: that changes as the spin decays."""
+    coarse = np.arange(t[0], t[-1] + 0.05, 0.05)
+    still = smoothed(t, z, coarse, 0.3)
+    return np.asarray(z - np.interp(t, coarse, still.real) - 1j * np.interp(t, coarse, still.imag))
 
 
 def _weighted_median(value: FloatArray, weight: FloatArray) -> float:

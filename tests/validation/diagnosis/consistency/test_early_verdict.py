@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from support.made import throws
 
-from validation.diagnosis.consistency.early_verdict import ASTRAY, RECONCILED, contradiction_in
+from validation.diagnosis.consistency.early_verdict import contradiction_in
 from validation.diagnosis.consistency.followed import left_of, left_when_shifted, true_noise
 from validation.diagnosis.contradicted import contradicted_outcome
 from validation.diagnosis.relaxed_fit import part_of, relaxed
+from validation.diagnosis.settings import CONSISTENCY
 from validation.identification.observations import readings_of
 
 
@@ -53,7 +54,7 @@ def test_the_outcome_is_unexplained_located_by_sensor_and_finite(mixed, contradi
     assert answer["verdict"] == "unexplained"
     assert answer["effects"] == []
     assert {place["sensor"] for place in answer["located"]} == set(contradiction.blamed)
-    assert answer["fit"]["final"]["chi2_per_sample"] > ASTRAY
+    assert answer["fit"]["final"]["chi2_per_sample"] > CONSISTENCY.astray
     json.dumps(answer, allow_nan=False)
 
 
@@ -85,6 +86,6 @@ def test_a_delay_and_lost_samples_are_reconciled_and_another_throw_is_not(sound,
 
     kept = np.sort(np.random.default_rng(1).choice(own.t.size, int(0.95 * own.t.size), replace=False))
     lost = replace(own, t=own.t[: kept.size], value=own.value[kept], good=own.good[kept], clipped=own.clipped[kept])
-    assert left(replace(own, t=own.t + 0.05)) < RECONCILED
-    assert left(lost) < RECONCILED
-    assert left(other) > RECONCILED
+    assert left(replace(own, t=own.t + 0.05)) < CONSISTENCY.reconciled
+    assert left(lost) < CONSISTENCY.reconciled
+    assert left(other) > CONSISTENCY.reconciled

@@ -65,17 +65,17 @@ def test_a_start_holds_what_shapes_an_effect():
 
 
 def test_where_no_effect_alone_is_worth_its_price_two_are_found_at_once(monkeypatch):
-    monkeypatch.setattr(searching, "_next", lambda *_: None)
+    monkeypatch.setattr(searching, "_next", lambda found, *_: (found, None))
     assert named([YAW], [CLOCK]) == [YAW.id, CLOCK.id]
 
 
 def test_of_two_at_once_the_superfluous_one_goes(monkeypatch):
-    monkeypatch.setattr(searching, "_next", lambda *_: None)
+    monkeypatch.setattr(searching, "_next", lambda found, *_: (found, None))
     assert named([YAW], []) == [YAW.id]
 
 
 def test_two_at_once_are_not_asked_for_near_the_data(monkeypatch):
-    monkeypatch.setattr(searching, "_next", lambda *_: None)
+    monkeypatch.setattr(searching, "_next", lambda found, *_: (found, None))
     monkeypatch.setattr(searching, "_together", lambda *_: pytest.fail("asked"))
     assert named([], []) == []
 
@@ -98,9 +98,8 @@ def as_shear() -> Tied:
 
 def test_an_effect_gives_way_to_one_that_explains_as_much_with_fewer_parameters():
     sheared = as_shear()
-    found = replace(windy(), final=sheared)
-    found.board = board_of(sheared.fit, found.trials, sheared.fit.noise, FLIGHT.sizes.continuous)
-    found.rivals = rivals_of(found)
+    found = replace(windy(), final=sheared).about(sheared.fit)
+    found = replace(found, rivals=rivals_of(found))
     assert next(rival.trial.id for rival in found.rivals["air.wind_shear"]) == "air.wind"
     better = exchanged(found)
     assert better is not None
