@@ -15,7 +15,6 @@ from discsim.errors import InputError
 from validation.challenge.blind import Request
 from validation.challenge.cases.conceal import Answer
 from validation.challenge.masks import challenge_masks, masked_results
-from validation.challenge.report.document import main as write_document
 from validation.challenge.report.document import masks_text, plain_command, pooled, with_part
 from validation.challenge.report.page import fault_of, goals_met
 from validation.challenge.run import challenge
@@ -23,6 +22,7 @@ from validation.challenge.scores.detection import Sized, allowed, detections, fi
 from validation.challenge.scores.result import Scored, rates_of, read_result, times
 from validation.challenge.scores.scoring import score_case
 from validation.reporting.run import start_run
+from validation.studies.catalogue import run_study
 
 #: a "diagnosis" that finds nothing in anything
 BLIND = """
@@ -186,8 +186,8 @@ def test_each_way_to_be_wrong_has_its_name():
 def test_times_are_those_of_all_diagnoses_also_of_one_that_was_given_up():
     found = [scored(POWER, diagnosis("unexplained"), seconds=float(s)) for s in range(1, 12)]
     assert times(found) == (6.0, 10.0, 11.0)
-    assert times([*found, scored(POWER, None, seconds=1800.0)]).longest == 1800.0
-    assert np.isnan(times([]).median)
+    assert times([*found, scored(POWER, None, seconds=1800.0)]).longest_s == 1800.0
+    assert np.isnan(times([]).median_s)
 
 
 def test_of_two_effects_each_counts_by_its_own_size():
@@ -231,8 +231,7 @@ def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, blind,
     page.parent.mkdir()
     page.write_text(PAGE)
     given = [str(tmp_path / "plain"), "--masks", str(tmp_path / "masks"), "--page", str(page)]
-    monkeypatch.setattr(sys, "argv", ["document", *given])
-    write_document()
+    run_study("blind-test", given)
     text = page.read_text()
     assert text.startswith("top\n")
     assert text.endswith("\nend\n")
@@ -244,19 +243,17 @@ def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, blind,
     assert "`short`" not in text
     drawn_there = {path.name for path in (page.parent / "images").iterdir()}
     assert {f"images/{name}" in text for name in drawn_there} == {True}
-    write_document()
+    run_study("blind-test", given)
     assert page.read_text() == text
 
     # more cases without anything in them count for the false alarms, and only such cases
     with start_run(tmp_path / "blank", 50) as run:
         challenge(run, [Request(50, "flight", (), "nothing")], workers=1, command=blind)
-    monkeypatch.setattr(sys, "argv", ["document", *given[:1], "--blank", str(tmp_path / "blank"), *given[-2:]])
-    write_document()
+    run_study("blind-test", [*given[:1], "--blank", str(tmp_path / "blank"), *given[-2:]])
     (alarms,) = [line for line in page.read_text().splitlines() if line.startswith("| false alarms")]
     assert "| 0 of 2 |" in alarms
-    monkeypatch.setattr(sys, "argv", ["document", *given[:1], "--blank", str(tmp_path / "plain"), *given[-2:]])
-    with pytest.raises(SystemExit):
-        write_document()
+    with pytest.raises(InputError, match="conceals something"):
+        run_study("blind-test", [*given[:1], "--blank", str(tmp_path / "plain"), *given[-2:]])
 
     # effects near their limit count in the curve: the same ones here, so there are twice as many
     near = tmp_path / "near" / "challenge.json"
@@ -266,8 +263,7 @@ def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, blind,
     )
     monkeypatch.setattr("validation.challenge.masks.MASKS", {"near_limit": "near"})
     assert len(pooled(read_result(tmp_path / "plain"), read_result(near.parent))) == 2
-    monkeypatch.setattr(sys, "argv", ["document", *given[:1], "--masks", str(near.parent), "--page", str(page)])
-    write_document()
+    run_study("blind-test", [*given[:1], "--masks", str(near.parent), "--page", str(page)])
     assert "whose sizes lie near the limit: `discsim" in page.read_text()
 
 

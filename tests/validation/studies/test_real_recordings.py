@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
-from typer.testing import CliRunner
 
 from discsim.errors import InputError
 from discsim.recording import Samples
@@ -19,7 +18,6 @@ from estimators.rate import YawRate
 from validation.cli import main
 from validation.studies.catalogue import run_study
 from validation.studies.real_recordings import road
-from validation.studies.real_recordings.__main__ import app
 from validation.studies.real_recordings.agreement import LOWERED, Attempt, agreement, attempts, mean_between
 from validation.studies.real_recordings.findings import SHIFTS, shifted_rms, turns_of
 from validation.studies.real_recordings.optical import HALF, optical_rate
@@ -211,8 +209,7 @@ def test_the_rolling_rocket_makes_seven_turns_by_its_field():
 def test_the_command_writes_the_page_with_every_figure(tmp_path):
     out = tmp_path / "real-recordings"
     arguments = ["--recordings", str(RECORDINGS), "--out", str(out), "--also", "accelerometer", "--no-walk"]
-    result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == 0, result.output
+    run_study("real-recordings", arguments)
     text = (tmp_path / "real-recordings.md").read_text(encoding="utf-8")
     assert sorted(file.name for file in out.iterdir()) == sorted(f"{key}.png" for key in SOURCE)
     assert max(file.stat().st_size for file in out.iterdir()) < 150_000

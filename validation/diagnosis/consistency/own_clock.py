@@ -24,7 +24,6 @@ from validation.diagnosis.consistency.turning import rate_of, retimed, signals_o
 
 __all__ = ["OwnClock", "SamplesShown", "own_clock_of"]
 
-
 #: knots of the field's slow turn and of the wobble's amplitude: one per so many seconds (a
 #: wobble halves in 0.3 s or more)
 _KNOTS_S = 0.3

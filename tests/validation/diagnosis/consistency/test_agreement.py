@@ -57,12 +57,12 @@ def test_a_wrong_time_leaves_the_pull_to_the_axis_alone_and_bends_what_turns(rat
     # the magnetometer's own clock would do the same where no wobble can be heard
     assert {cause.id for cause in found.causes[:2]} == {"clock.rate", "mag.clock_rate"}
     assert found.causes[0].value == pytest.approx(ratio, rel=0.01)
-    for proof in found.causes[0].proofs:
-        assert proof.others == pytest.approx(ratio, rel=0.01)
-        assert proof.after < 0.01 * proof.before
-        assert proof.field_after is not None
-        assert proof.field_before is not None
-        assert proof.field_after < 0.2 * proof.field_before
+    for proof in found.causes[0].heldout:
+        assert proof.value_of_others == pytest.approx(ratio, rel=0.01)
+        assert proof.chi2_after < 0.01 * proof.chi2_before
+        assert proof.field_left_uT_after is not None
+        assert proof.field_left_uT_before is not None
+        assert proof.field_left_uT_after < 0.2 * proof.field_left_uT_before
     assert found.rows is None
 
 
@@ -110,7 +110,7 @@ def test_an_accelerometer_that_still_holds_the_throw_is_found_by_the_others_time
     assert found.settling is not None
     # what turns with the spin blurs it by a few per cent
     assert found.settling.tau_s == pytest.approx(0.14, rel=0.1)
-    assert all(proof.after < 0.5 * proof.before for proof in found.settling.proofs)
+    assert all(proof.left_m_s2_after < 0.5 * proof.left_m_s2_before for proof in found.settling.heldout)
     assert told(spins()).settling is None
 
 
@@ -159,8 +159,8 @@ def test_the_throws_of_an_ultimate_disc_agree_once_their_rows_are_counted():
         assert proof.wobble is not None
         assert proof.wobble > 0.5
     assert found.settling is not None
-    for settled in found.settling.proofs:
-        assert settled.after < 0.1 * settled.before
+    for settled in found.settling.heldout:
+        assert settled.left_m_s2_after < 0.1 * settled.left_m_s2_before
     # a part with a clock of its own, of which each row shows the mean of two samples: what is left is near its noise
     assert found.own_clock is not None
     assert found.own_clock.period_s == pytest.approx(0.00943, rel=2e-3)
