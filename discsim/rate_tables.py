@@ -12,7 +12,7 @@ from discsim.arrays import FloatArray, readonly
 from discsim.effects.catalogue import Effect
 from discsim.environment import Environment
 from discsim.limits import LONGEST_RUN
-from discsim.motion import Motion
+from discsim.motion import Motion, State
 from discsim.recording import Samples
 from discsim.rig import read_profile, turn_table
 from discsim.second_axis import SecondAxis
@@ -57,13 +57,17 @@ class RateTable:
         if self.encoder is not None:
             module = replace(module, sensors={**module.sensors, "rate_reference": self.encoder})
         if self.second is not None and "rate_reference" in module.sensors:
-            module = module.adding("rate_reference", self.second.unseen)
+            module = module.adding("rate_reference", self._unseen)
         if not self.stray.is_none and "magnetometer" in module.sensors:
             module = module.adding("magnetometer", self._disturb)
         return module
 
-    def _disturb(self, readings: FloatArray, t: FloatArray, motion: Motion) -> FloatArray:
-        return readings + self.stray.at(t, motion, self.drive, self.second)
+    def _unseen(self, readings: FloatArray, state: State, motion: Motion) -> FloatArray:
+        assert self.second is not None
+        return self.second.unseen(readings, motion.start + state.t, motion)
+
+    def _disturb(self, readings: FloatArray, state: State, motion: Motion) -> FloatArray:
+        return readings + self.stray.at(motion.start + state.t, motion, self.drive, self.second)
 
 
 def load_table(name_or_path: str | PathLike[str]) -> RateTable:

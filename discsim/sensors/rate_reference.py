@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.motion import Motion
+from discsim.motion import Motion, State, Surroundings
 from discsim.recording import Samples, SensorSheet
-from discsim.sensors.additions import Addition, added
+from discsim.sensors.additions import Addition, MotionSensor
 from discsim.sensors.sampling import Noise, Sampling, digitise
 
 __all__ = ["RateReference"]
 
 
 @dataclass(frozen=True)
-class RateReference:
+class RateReference(MotionSensor):
     """The rate about z_B; ``noise`` and ``resolution`` in rad/s, ``scale`` its relative error.
 
     An encoder of ``counts_per_turn`` tells the counts between two instants half a sampling interval before and after a
@@ -33,10 +33,14 @@ class RateReference:
     #: what else is added to its readings before lag and noise
     additions: tuple[Addition, ...] = ()
 
+    def reading(self, state: State, surroundings: Surroundings) -> FloatArray:
+        """Return the rate about z_B, (..., n, 1) rad/s."""
+        return np.asarray((1.0 + self.scale) * state.rate[..., 2:])
+
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
         """Return the samples of a motion, value (n,) rad/s."""
         written, taken = self.sampling.instants(motion.start, motion.end, rng)
-        rate = added(self.additions, (1.0 + self.scale) * motion.at(taken).rate[:, 2:], taken, motion)
+        rate = self.ideal(motion, taken)
         if self.noise_share > 0.0:
             rate = rate * (1.0 + self.noise_share * rng.standard_normal(rate.shape))
         if self.counts_per_turn > 0:
@@ -48,8 +52,7 @@ class RateReference:
         from scipy.interpolate import CubicSpline  # loads in a third of a second, and few have an encoder
 
         # what is added to a reading may take away what an encoder does not see, such as the turning of its frame
-        seen = added(self.additions, motion.rate[:, 2:], motion.t, motion)[:, 0]
-        spin = CubicSpline(motion.t, seen)
+        spin = CubicSpline(motion.t, self.ideal(motion, motion.t)[:, 0])
         half, count = 0.5 / self.sampling.rate_hz, 2.0 * np.pi / self.counts_per_turn
         first, last = np.maximum(t - half, motion.start), np.minimum(t + half, motion.end)
         turned = np.floor(spin.antiderivative()(np.stack([first, last])) / count)

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, sd_by_median
 from discsim.effects.catalogue import CATALOGUE, catalogued
 from discsim.effects.sensors import ClockRate
 from discsim.frames import conjugate, multiply
@@ -231,7 +231,7 @@ def _led_by_others(fit: Fit) -> Fit:
             replace(new, recording=old.recording, readings=old.readings)
             for new, old in zip(led.chains, fit.chains, strict=True)
         )
-        free = Parameter(*clock, 1.0, 1e-6, _CLOCK_SIGMA)
+        free = Parameter(*clock, 1.0, 1e-6, CLOCK_SIGMA)
         both = replace(led, chains=chains, parameters=(*fit.parameters, free), at=np.append(led.at, ratio))
         both = refit(both, iterations=12, tolerance=few)
         if not _astray(both):
@@ -261,7 +261,7 @@ def _with_own_clock(fit: Fit) -> Fit:
     if not before > _LOST:
         return fit
     ratio = _clock_read(fit, [one.readings for one in fit.chains], sensor, clock)
-    free = Parameter(*clock, 1.0, 1e-6, _CLOCK_SIGMA)
+    free = Parameter(*clock, 1.0, 1e-6, CLOCK_SIGMA)
     timed = replace(fit, parameters=(*fit.parameters, free), at=np.append(fit.at, ratio))
     timed = refit(timed, iterations=8, tolerance=1e-4 * fit.count)
     return timed if _misfit(timed, sensor) < _RECONCILED * before else fit
@@ -310,13 +310,13 @@ def _clock_read(led: Fit, readings: Sequence[Sequence[Readings]], sensor: str, c
 
 
 #: how far clocks may be wrong where a fit went astray, and how long its first look is, s
-_CLOCK_SIGMA, _FIRST_LOOK = 0.02, 1.3
+CLOCK_SIGMA, _FIRST_LOOK = 0.02, 1.3
 
 
 def free_clocks(sensors: set[str]) -> tuple[Parameter, ...]:
     """Return the clocks of sensors on board, free within a few per cent."""
     return tuple(
-        Parameter(catalogued(ClockRate, sensor).id, "ratio", 1.0, 1e-6, _CLOCK_SIGMA)
+        Parameter(catalogued(ClockRate, sensor).id, "ratio", 1.0, 1e-6, CLOCK_SIGMA)
         for sensor in ("magnetometer", "accelerometer", "gyroscope")
         if sensor in sensors
     )
@@ -386,7 +386,7 @@ def without_outliers(fit: Fit) -> tuple[Fit, list[tuple[int, str, str, float, fl
             x = linear.residual[channel.rows]
             if x.size < 8:
                 continue
-            sd = max(1.4826 * float(np.median(np.abs(x))), 1e-12)
+            sd = max(float(sd_by_median(x)), 1e-12)
             z = np.abs(x) / sd
             padded = np.concatenate([[0.0], z, [0.0]])
             alone = (z > _OUTLIER) & (np.maximum(padded[:-2], padded[2:]) < np.maximum(_NEIGHBOUR, 0.2 * z))

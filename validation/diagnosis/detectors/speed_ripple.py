@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
@@ -144,7 +145,7 @@ def _phase_rate(
 
 def _turned(t: FloatArray, rate: FloatArray, at: FloatArray) -> FloatArray:
     """Return the angle (n,) that a table has turned at instants by its command's knots."""
-    until = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t))])
+    until = cumulative_trapezoid(rate, t, initial=0)
     inside = np.clip(at, t[0], t[-1])
     k = np.clip(np.searchsorted(t, inside, side="right") - 1, 0, t.size - 2)
     x = inside - t[k]

@@ -8,17 +8,16 @@ from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import solveh_banded
 from scipy.ndimage import median_filter
 
-from discsim.arrays import FloatArray
+from discsim.arrays import ComplexArray, FloatArray
 from discsim.recording import Recording
 from validation.identification.initial.smoothing import (
     FEWEST,
     SLOW,
-    ComplexArray,
-    integral_of,
     median_of,
     readings_for,
     smoothed,
@@ -69,7 +68,7 @@ def rig_starts(recording: Recording, t: FloatArray) -> tuple[FloatArray, FloatAr
     if spin is None:
         grid = np.arange(0.0, max(recording.end, float(np.max(t, initial=0.0))) + 0.02, 0.01)
         r = np.zeros(grid.size) if expected is None else expected(grid)
-        psi = integral_of(grid, r)
+        psi = cumulative_trapezoid(r, grid, initial=0)
         return np.interp(t, grid, psi), np.interp(t, grid, r)
     north, east, _ = recording.environment.magnetic_field
     # m_B = C3(psi) B: the complex field in B is that in N times exp(-i psi)
@@ -241,7 +240,7 @@ def phase_spin(
     # a force across the axis passes through zero and points the other way after: its square has no sign
     order, sigmas = (1, (3.0, 1.0, 1.0)) if sensor == "magnetometer" else (2, (2.0, 4.0, 6.0))
     for sigma in sigmas:
-        turned = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)])
+        turned = cumulative_trapezoid(rate, dx=step, initial=0)
         base = plane * np.exp(-1j * _curve(grid, turned, rate, t))
         smooth, weight = _spread(grid, t, base**order, max(sigma * PHASE_SIGMA, 1.5 * step))
         delta = np.unwrap(np.angle(np.where(np.abs(smooth) > 0, smooth, 1.0))) / order
@@ -250,7 +249,7 @@ def phase_spin(
     amplitude = (np.abs(smooth) / np.maximum(weight, 1e-9)) ** (1 / order)
     if shape is not None and np.all(np.abs(shape) > SLOW):
         rate = shape * _weighted_median(rate / shape, amplitude)
-        turned = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)])
+        turned = cumulative_trapezoid(rate, dx=step, initial=0)
         phase = turned + _weighted_median(phase - turned, amplitude)
         return Spin(grid, phase, rate, rate, amplitude, t, plane)
     return Spin(grid, phase, rate, _without_steps(grid, rate, t, plane, step), amplitude, t, plane)
