@@ -160,7 +160,7 @@ class Instruments:
                     module = module.fitted(name, board=value)
             elif target in module.sensors:
                 if item.applied is not None:
-                    module = module._adding(target, by_effect(item))
+                    module = module.adding(target, by_effect(item))
                 elif id in FIELDS:
                     module = module.fitted(target, **{FIELDS[id]: value})
                 else:
@@ -176,10 +176,11 @@ class Instruments:
         for law in laws:
             sensor = law.target.partition(".")[0]
             if sensor in module.sensors:
-                module = module._adding(sensor, by_law(law))
+                module = module.adding(sensor, by_law(law))
         return module
 
-    def _adding(self, sensor: str, addition: Addition) -> Instruments:
+    def adding(self, sensor: str, addition: Addition) -> Instruments:
+        """Return the module with one thing more that is added to a sensor's readings, before lag and noise."""
         return self.fitted(sensor, additions=(*self.sensors[sensor].additions, addition))
 
 
