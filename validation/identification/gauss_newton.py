@@ -112,7 +112,7 @@ def linearised(
     return tuple(mapped(one, which))
 
 
-def _reread(fit: Fit) -> tuple[Linear, ...] | None:
+def repredicted(fit: Fit) -> tuple[Linear, ...] | None:
     """Return the linearisations of a fit with residuals where its chains stand and slopes as they were, if they can."""
 
     def one(index: int) -> Linear | None:
@@ -250,7 +250,7 @@ def _gone_on(
         least = max(tolerance, 1e-7 * fit.merit)
         if fit.merit - expected < least and not open_gaps(fit):
             return fit, True
-        going = _Going(fit, reduced, step, bounds, expected)
+        going = GaussNewtonStep(fit, reduced, step, bounds, expected)
         if first > _FREE:
             better, rose = going.each_its_share()
             hold = np.where(rose, np.clip(_TIGHTER * hold, _LEAST_HOLD, _MOST_HOLD), _LOOSER * hold)
@@ -295,13 +295,13 @@ _FAR = 3.0
 _RISE = 1.3
 #: a step that is expected to gain less than this, three standard deviations in all, keeps the slopes that it was worked
 #: out with, unless it misses what was expected by more than this share of it
-_CHORD, _CHORD_MISSES = 10.0, 0.1
+CHORD, _CHORD_MISSES = 10.0, 0.1
 #: a rise by more than this is a step that went too far
 _ROSE = 1.02
 
 
 @dataclass(frozen=True)
-class _Going:
+class GaussNewtonStep:
     """A step from where a fit stands, and how much of it is taken."""
 
     fit: Fit
@@ -336,7 +336,7 @@ class _Going:
             )
             trial = replace(fit, chains=chains, at=at)
             if _finite(chains):
-                short = share == 1.0 and fit.merit - self.expected < _CHORD and not open_gaps(fit)
+                short = share == 1.0 and fit.merit - self.expected < CHORD and not open_gaps(fit)
                 new = (self._by_chord(trial) if short else None) or linearised(trial)
                 merit = merit_of(trial, new)
                 # while gaps are open the merit is that of the closed chain to first order only: too good
@@ -351,7 +351,7 @@ class _Going:
 
         What is short is told by what the step gains: in standard deviations it is the root of that.
         """
-        new = _reread(trial)
+        new = repredicted(trial)
         if new is None:
             return None
         missed = merit_of(trial, new) - self.expected

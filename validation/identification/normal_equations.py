@@ -138,7 +138,7 @@ def reduce(linear: Linear, current: Chain, noise: NoiseModel, jumps: Jumps, hold
     scale = 1.0 / np.sqrt(np.maximum(np.diag(G)[:u], 1e-300))
     H = G[:u, :u] * scale[:, None] * scale[None, :]
     H[np.arange(u), np.arange(u)] += 1e-12
-    L = _factor(H)
+    L = lower_root(H)
     cross = G[:u, u:] * scale[:, None]
     half = solve_triangular(L, cross, lower=True, check_finite=False)
     gram = G[u:, u:] - half.T @ half
@@ -149,7 +149,7 @@ def reduce(linear: Linear, current: Chain, noise: NoiseModel, jumps: Jumps, hold
 _ROUNDING = 1e-12
 
 
-def _factor(H: FloatArray) -> FloatArray:
+def lower_root(H: FloatArray) -> FloatArray:
     """Return the lower triangular root of a symmetric matrix (l, l) of sums of squares; NaN where it is not finite.
 
     Sums over segments whose motion grows without bounds lose the last digits of what came before: eigenvalues that are

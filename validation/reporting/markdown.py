@@ -32,7 +32,11 @@ def page_text(template: Path, **content: Any) -> str:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
-        loader=FileSystemLoader(template.parent), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(template.parent),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,  # else what is included would run into what follows
     )
     environment.filters |= {"f": format, "span": span, "degrees": math.degrees}
     environment.globals["table"] = table

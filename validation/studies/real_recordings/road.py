@@ -132,7 +132,7 @@ def walk(log: Log, real: Path, folder: Path, say: Callable[[str], None] = lambda
         note = home / f"{step[1]}.json"
         if not note.is_file():
             say(f"{log.key}: {step[1]}")
-            write_text(note, json.dumps(asdict(_run(step, home)), indent=1) + "\n")
+            write_text(note, json.dumps(asdict(run_command(step, home)), indent=1) + "\n")
         if step[1] == "import" and json.loads(note.read_text(encoding="utf-8"))["status"] != 0:
             break
     return answers(log, folder)
@@ -165,7 +165,7 @@ def _steps(log: Log, real: Path, home: Path) -> list[list[str]]:
     ]
 
 
-def _run(command: Sequence[str], home: Path) -> Said:
+def run_command(command: Sequence[str], home: Path) -> Said:
     home.mkdir(parents=True, exist_ok=True)
     if "--out" in command:
         shutil.rmtree(command[-1], ignore_errors=True)
