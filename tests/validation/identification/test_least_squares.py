@@ -115,7 +115,7 @@ def test_correlated_noise_weighs_tied_pieces_by_their_dense_covariance():
     A = np.hstack([linear.local, linear.shared, linear.residual[:, None]])
     G = np.zeros((A.shape[1],) * 2)
     for channel in linear.channels:
-        sd, phi, _ = fit.noise[channel.group]
+        sd, phi, *_ = fit.noise[channel.group]
         C = sd**2 * phi ** np.abs(channel.index[:, None] - channel.index[None, :])
         G += A[channel.rows].T @ np.linalg.solve(C, A[channel.rows])
     size = np.sqrt(np.maximum(np.diag(G), 1e-300))
