@@ -318,7 +318,7 @@ def read_sheet(table: TomlTable, sensor: str, *, strict: bool, rate_required: bo
 
 _EMPTY_CELL = re.compile(r"(?<=,)[ \t]*(?=,|$)", re.MULTILINE)
 _CELL = re.compile(r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan)", re.ASCII | re.IGNORECASE)
-_BLOCK = 1 << 22  # characters parsed at a time
+BLOCK = 1 << 22  # characters parsed at a time
 
 
 def read_csv(path: Path, header: str, *, gaps_allowed: bool = True) -> Samples:
@@ -366,7 +366,7 @@ def _beyond(samples: Samples, header: str) -> tuple[int, str] | None:
 def _blocks(body: str) -> Iterator[str]:
     start = 0
     while start < len(body):
-        stop = body.find("\n", start + _BLOCK)
+        stop = body.find("\n", start + BLOCK)
         stop = len(body) if stop < 0 else stop
         yield body[start:stop]
         start = stop + 1

@@ -7,6 +7,7 @@ from support.page_diff import told_by_a_copy
 
 ASKED = """
 import json, sys
+from dataclasses import replace
 from pathlib import Path
 import numpy as np
 from discsim import engine
@@ -23,8 +24,8 @@ disc, environment = load_disc("driver")
 release = load_throw("driver")
 motion = engine.fly(disc, environment, release, duration=1.5)
 instruments = Instruments.from_parts("mpu9250", "neo_m8n", str(folder / "part.toml"))
-made = record(motion, instruments, np.random.default_rng(1), plant="flight", name="up", disc=disc, release=release)
-write_recording(made, folder / "up")
+made = record(motion, instruments, np.random.default_rng(1), plant="flight", name="up", disc=disc)
+write_recording(replace(made, release=release), folder / "up")
 back = read_recording(folder / "up")
 height = np.interp(back.samples["barometer"].t, motion.t, -motion.position[:, 2])
 fit = relaxed([back])

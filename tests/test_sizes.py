@@ -32,7 +32,6 @@ LONG_FUNCTIONS = {
     "validation/sweeps/result.py:labelled": "older than the rule; to be split by idea",
 }
 MANY_ARGUMENTS = {
-    "discsim/sensors/instruments.py:record": "older than the rule, one above it; what is stated belongs together",
     "tests/support/made_logs.py:write_table": "older than the rule, one above it",
     "tests/support/spinning_sensor.py:tone": "older than the rule; what a tone is made of belongs together",
 }

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from discsim.arrays import FloatArray, readonly
-from discsim.disc import Disc, Release, Rig
+from discsim.disc import Disc, Rig
 from discsim.effects.catalogue import CATALOGUE, Effect, by_id
 from discsim.effects.kind import BOARD
 from discsim.effects.sensors import AccelerometerBias, ClockRate, CrossAxis, GSensitivity, GyroscopeBias, Scale
@@ -160,7 +160,7 @@ class Instruments:
                     module = module.fitted(name, board=value)
             elif target in module.sensors:
                 if item.applied is not None:
-                    module = module._adding(target, by_effect(item))
+                    module = module.adding(target, by_effect(item))
                 elif id in FIELDS:
                     module = module.fitted(target, **{FIELDS[id]: value})
                 else:
@@ -176,10 +176,11 @@ class Instruments:
         for law in laws:
             sensor = law.target.partition(".")[0]
             if sensor in module.sensors:
-                module = module._adding(sensor, by_law(law))
+                module = module.adding(sensor, by_law(law))
         return module
 
-    def _adding(self, sensor: str, addition: Addition) -> Instruments:
+    def adding(self, sensor: str, addition: Addition) -> Instruments:
+        """Return the module with one thing more that is added to a sensor's readings, before lag and noise."""
         return self.fitted(sensor, additions=(*self.sensors[sensor].additions, addition))
 
 
@@ -192,12 +193,11 @@ def record(
     name: str,
     disc: Disc | None = None,
     rig: Rig | None = None,
-    release: Release | None = None,
     command: Samples | None = None,
 ) -> Recording:
     """Let the instruments measure a motion, and write it as their logger does.
 
-    Each sensor draws from a random stream of its own.
+    Each sensor draws from a random stream of its own. ``dataclasses.replace`` adds what is stated besides, a release.
     """
     streams = dict(zip(SENSORS, rng.spawn(len(SENSORS)), strict=True))
     samples, sheets = {}, {}
@@ -210,7 +210,7 @@ def record(
         taken = replace(sensor, sampling=shared).measure(motion, streams[sensor_name])
         if len(taken):
             samples[sensor_name], sheets[sensor_name] = taken, sensor.sheet
-    sound = Recording(plant, name, motion.environment, disc, rig, release, sheets, samples, command)
+    sound = Recording(plant, name, motion.environment, disc, rig, None, sheets, samples, command)
     return as_written(sound, instruments.written)
 
 

@@ -208,12 +208,12 @@ class TestWhichCallback:
 
 class TestWhereItCannotBe:
     def test_data_that_are_not_where_they_are_said_to_be_are_noticed(self):
-        offsets = native._offsets()
-        assert native._works(NativeCallback(offsets))
+        offsets = native.field_offsets()
+        assert native.works(NativeCallback(offsets))
         for field in range(4):
             wrong = list(offsets)
             wrong[field] += 8
-            assert not native._works(NativeCallback(wrong))
+            assert not native.works(NativeCallback(wrong))
 
     def test_it_is_found_inside_a_block_in_python_too(self):
         """Looking for it compiles a model, which under a callback in Python MuJoCo does only of one without springs."""
@@ -224,7 +224,7 @@ class TestWhereItCannotBe:
 
     def test_without_it_flights_are_the_same(self, monkeypatch):
         with_it = fly(DRIVER, FIELD, throw(), duration=0.3)
-        monkeypatch.setattr(native, "_offsets", lambda: 1 / 0)
+        monkeypatch.setattr(native, "field_offsets", lambda: 1 / 0)
         native_callback.cache_clear()
         try:
             assert native_callback() is None

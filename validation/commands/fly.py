@@ -111,14 +111,16 @@ def command(
 
 def _flown_by(engine: Engine, ground: Ground) -> Callable[..., Motion]:
     """Return what flies a disc; raises `InputError` where the engine does not know that ground."""
-    from discsim.engine import fly
     from discsim.errors import InputError
-    from discsim.trajectory import predict
 
     if engine is Engine.mujoco:
+        from discsim.engine import fly
+
         return partial(fly, ground=ground.value)
     if ground is Ground.skip:
         raise InputError("--engine trajectory knows no contact with the ground; expected --ground stop with it")
+    from discsim.trajectory import predict
+
     return lambda *what, **how: predict(*what, **how).motion()
 
 

@@ -115,6 +115,6 @@ def heldout_chi2(found: Search, hypothesis: Hypothesis, i: int, choice: Choice |
         e[:-1] -= G[:-1][:, at] @ v
     if alone:
         free = np.array([board.place[column] for column, _ in alone])
-        H = G[np.ix_(free, free)] + np.diag([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for _, q in alone])
+        H = G[np.ix_(free, free)] + np.diag([q.precision for _, q in alone])
         chi2 -= float(e[free] @ np.linalg.solve(H + 1e-12 * np.diag(np.diag(H)), e[free]))
     return chi2

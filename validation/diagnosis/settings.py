@@ -35,6 +35,11 @@ class Consistency:
         and 4 (accelerometer), while sensors of another throw or run leave 9 to 40.
     ripple : float
         Share of its rate by which a table's speed may pulse: one of another run is off by as much as rates differ.
+    left_of_ripple : float
+        Share of a ripple that a look with one may leave of a sensor: relaxed segments place its phase to some
+        milliradians, 0.5 % are left at order 6 and 1.2 rad/s; sensors of another run leave as much as without it.
+    ripples : int
+        Ripples of a table's speed that are tried, the likeliest first.
     lost : float
         Two sensors of a free spin that are both astray, one by this much, follow no motion: sensors of other throws
         leave 300 and more, a clock or lost samples of one sensor stay below it.
@@ -45,6 +50,8 @@ class Consistency:
     astray: float = 12.0
     reconciled: float = 6.0
     ripple: float = 0.1
+    left_of_ripple: float = 0.01
+    ripples: int = 2
     lost: float = 100.0
     few: int = 3
     again: int = 2

@@ -423,7 +423,7 @@ def _counted(s: Sampled, prediction: FloatArray, axis: int) -> IntArray:
         good = good & (readings.t > _FORGOTTEN * s.tau)
     if limit is not None:
         # a clipped reading says only that the motion was beyond the range
-        margin = 6.0 * np.nan_to_num(readings.sd[axis])
+        margin = 6.0 * np.nan_to_num(readings.sd[..., axis])
         inside = readings.clipped[:, axis] & (np.abs(prediction[:, axis]) < limit - margin)
         good = good | (inside & np.isfinite(readings.value[:, axis]))
     return np.flatnonzero(good)
@@ -461,7 +461,7 @@ def _stack(
                 pieces.append(piece[index])
             shifts.append(closed[index, axis])
             t.append(readings.t[index])
-            sd.append(np.full(index.size, readings.sd[axis]))
+            sd.append(np.broadcast_to(readings.sd, readings.value.shape)[index, axis])
             rows = slice(at, at + index.size)
             channels.append(Channel(s.sensor, readings.axes[axis], group_of(s.sensor, axis), rows, index))
             at += index.size

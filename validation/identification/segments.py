@@ -33,6 +33,8 @@ class Chain:
     #: sensor -> samples lost before each of its samples (n,), where some were
     lost: Mapping[str, FloatArray] = field(default_factory=dict)
     effects: Competing = CATALOGUED
+    #: one sigma (d,) of what a step may move the first state by, where it is not the plant's
+    reach: FloatArray | None = None
 
     @property
     def plant(self) -> Plant:

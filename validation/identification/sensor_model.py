@@ -7,7 +7,7 @@ are the fit's business.
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -118,11 +118,17 @@ def _errors(sensor: str) -> tuple[tuple[str, type[Any], str], ...]:
 
 def _model(sensor: str, recording: Recording, values: Values) -> Sensor:
     """Return a sensor with the errors that values have; both sensors on the accelerometer's chip sit where stated."""
-    errors = {place: sized(values, kind, acts_on) for place, kind, acts_on in _errors(sensor)}
+    errors = [(place, sized(values, kind, acts_on)) for place, kind, acts_on in _errors(sensor)]
     if sensor in ("accelerometer", "gyroscope"):
         stated = recording.sheets["accelerometer"].position if "accelerometer" in recording.sheets else None
-        errors["position"] = np.zeros(3) if stated is None else stated
-    return KINDS[sensor](**errors)
+        errors.append(("position", (0.0, 0.0, 0.0) if stated is None else tuple(stated.tolist())))
+    return _made(sensor, tuple(errors))
+
+
+@lru_cache(256)
+def _made(sensor: str, errors: tuple[tuple[str, Any], ...]) -> Sensor:
+    """Return a sensor with errors by field; a fit asks for the same one for each batch of neighbours."""
+    return KINDS[sensor](**dict(errors))
 
 
 def _surroundings(recording: Recording, values: Values) -> Surroundings:

@@ -32,7 +32,11 @@ def page_text(template: Path, **content: Any) -> str:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
-        loader=FileSystemLoader(template.parent), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(template.parent),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,  # else what is included would run into what follows
     )
     environment.filters |= {"f": format, "span": span, "degrees": math.degrees}
     environment.globals["table"] = table
@@ -47,8 +51,9 @@ def span(values: Iterable[float], form: str, scale: float = 1.0) -> str:
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return the lines of a table."""
-    return "\n".join(f"| {' | '.join(line)} |" for line in (header, ["---"] * len(header), *rows))
+    """Return the lines of a table; a cell stays on its line, and in its column whatever stands in it."""
+    cells = ([" ".join(cell.split()).replace("|", "\\|") for cell in row] for row in rows)
+    return "\n".join(f"| {' | '.join(line)} |" for line in (header, ["---"] * len(header), *cells))
 
 
 def wrapped(text: str) -> str:

@@ -15,10 +15,13 @@ import xarray as xr
 from validation.reporting.run import package_version
 from validation.running.progress import Progress, silent
 from validation.running.tasks import Task, claim, discard, run_tasks
+from validation.sweeps.cases import landing_of, rows_of, write_rows
 from validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, truth_tasks
 from validation.sweeps.figures import draw_sweep
 from validation.sweeps.plan import Plan, plan_file, read_plan
 from validation.sweeps.result import labelled, write_netcdf
+from validation.sweeps.shares import draw_shares, shares_of, write_shares
+from validation.sweeps.tolerance import Tolerance, tolerances_of
 
 __all__ = ["CHECKPOINTS", "Swept", "error_rows", "sweep"]
 
@@ -55,12 +58,23 @@ class Swept:
         )
 
     def report(self, folder: Path | str) -> Path:
-        """Write sweep.nc (netCDF) and sweep.png into ``folder``; return the path of the first."""
+        """Write sweep.nc (netCDF), the tables cases.csv and cases.md, and sweep.png; return the path of the first.
+
+        Of a saltelli design also the shares of variance, shares.csv and shares.png.
+        """
         out = Path(folder)
         out.mkdir(parents=True, exist_ok=True)
         write_netcdf(out / "sweep.nc", self.scores)
+        write_rows(out, rows_of(self.scores, landing_of()))
         draw_sweep(self.scores, self.sweep, out / "sweep.png")
+        if shares := shares_of(self.scores, self.sweep):
+            write_shares(out / "shares.csv", shares)
+            draw_shares(shares, out / "shares.png")
         return out / "sweep.nc"
+
+    def tolerances(self, below: float) -> list[Tolerance]:
+        """Return what each case allows for 95 % of all mounts to err by less than a share of the rate."""
+        return tolerances_of(self.scores, self.sweep, below)
 
 
 def error_rows(scores: xr.Dataset) -> list[tuple[str, str, str, str, str]]:

@@ -7,15 +7,15 @@ import os
 import re
 import shlex
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from support.own_log import write_own_log
+from support.places import ROOT
 
 from validation.cli import main
 
-PAGE = (Path(__file__).parents[3] / "docs" / "your-own-log.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "your-own-log.md").read_text(encoding="utf-8")
 
 
 def commands() -> list[tuple[str, list[str]]]:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.places import ROOT
 
 from discsim.disc import Rig
 from discsim.effects.catalogue import CATALOGUE
@@ -40,7 +41,7 @@ from validation.identification.sensor_model import is_motion, predicted
 
 FIELD, RIG = Environment(air_density=None), Rig(1e-3, 8e-5)
 MODULE = Instruments.from_parts("mpu9250")
-PAGE = Path(__file__).parents[3] / "docs" / "diagnosing.md"
+PAGE = ROOT / "docs" / "diagnosing.md"
 #: a law of no size, which stands behind a user's own numbers
 LAW = {("law", "0.target"): 5.0, ("law", "0.coefficient"): 0.0}
 

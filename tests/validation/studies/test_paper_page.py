@@ -5,10 +5,10 @@ from __future__ import annotations
 import inspect
 import json
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
+from support.places import ROOT
 
 from discsim.shipped import load_disc
 from validation.studies.paper.beside import BLOCKS, FIGURES
@@ -24,7 +24,7 @@ from validation.studies.paper.releases import carry
 from validation.studies.paper.spectrum import whole_flight
 from validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S
 
-PAGE = Path(__file__).parents[3] / "docs" / "paper.md"
+PAGE = ROOT / "docs" / "paper.md"
 NUMBERS = read_numbers(PAGE.parent / PAGE.stem)
 DISC, AIR = load_disc("driver")
 

@@ -95,6 +95,7 @@ def page(found: Made, distance: float = 5.0, left: float = 3.0, named: str = "",
         golf=golf(found, distance, left, named),
         sensors=sensors,
     )
+    assert [line for line in text.splitlines() if "## " in line and not line.startswith("#")] == []
     assert max(len(line) for line in text.splitlines() if not line.startswith("|")) <= 118
     return " ".join(text.split())
 

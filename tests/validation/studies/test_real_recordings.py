@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
+from support.places import REAL, RECORDINGS, real
 
 from discsim.errors import InputError
 from discsim.recording import Samples
@@ -26,9 +25,6 @@ from validation.studies.real_recordings.road import LOGS, Answers, Log, Said, ro
 from validation.studies.real_recordings.sources import SOURCES, find_recordings, load
 from validation.studies.real_recordings.turns import field_phase, phase_rate, turned, turned_by_rate
 
-RECORDINGS = Path(os.environ.get("DISCSIM_RECORDINGS") or Path(__file__).parents[3].parent / "shared" / "recordings")
-REAL = RECORDINGS / "real"
-real = pytest.mark.skipif(not REAL.is_dir(), reason="no measured recordings here (DISCSIM_RECORDINGS)")
 SOURCE = {source.key: source for source in SOURCES}
 DEG = np.pi / 180
 
@@ -299,7 +295,7 @@ def test_a_walk_that_was_broken_off_goes_on_where_it_stopped(tmp_path, monkeypat
         ran.append(command[1])
         return Said(0 if command[1] == "import" else 3, 1.0, "")
 
-    monkeypatch.setattr(road, "_run", run)
+    monkeypatch.setattr(road, "run_command", run)
     first = road.walk(SPUN, tmp_path, tmp_path / "logs")
     again = road.walk(SPUN, tmp_path, tmp_path / "logs")
     assert ran == ["import", "check", "estimate", "diagnose"]

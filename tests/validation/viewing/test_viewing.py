@@ -347,9 +347,9 @@ def test_without_a_display_the_viewer_points_to_video(monkeypatch):
 
 @pytest.fixture
 def fresh_choice():
-    offscreen._working.cache_clear()
+    offscreen.working_opengl.cache_clear()
     yield
-    offscreen._working.cache_clear()
+    offscreen.working_opengl.cache_clear()
 
 
 def test_without_opengl_it_says_what_to_install(monkeypatch, fresh_choice):

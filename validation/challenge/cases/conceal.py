@@ -147,11 +147,11 @@ def recordings(case: Case) -> list[Recording]:
             name=f"concealed-{number + 1:02d}",
             disc=_stated_disc(case),
             rig=case.stated_rig,
-            release=case.stated_releases[number] if case.stated_releases else None,
             command=run.profile if isinstance(run, Turning) else None,
         )
         sheets = {name: case.sheets_of.sensors[name].sheet for name in taken.samples}
-        made.append(replace(taken, sheets=sheets))
+        release = case.stated_releases[number] if case.stated_releases else None
+        made.append(replace(taken, sheets=sheets, release=release))
     return made
 
 

@@ -20,6 +20,7 @@ from validation.challenge.report.page import deviates_of, fault_of, found_of, go
 from validation.challenge.scores.detection import Sized, detections, fit_curve
 from validation.challenge.scores.result import Result, Scored, rates_of, times
 from validation.challenge.scores.scoring import confusion, has_power_law
+from validation.reporting.markdown import table
 
 __all__ = ["masks_text", "result_text", "with_part"]
 
@@ -46,17 +47,6 @@ def with_part(page: str, name: str, text: str) -> str:
     if not (mark and closed):
         raise InputError(f"the page has no marks {start.strip()} and {end}; expected both, each on a line of its own")
     return f"{before}{start}{text.strip()}\n{end}{after}"
-
-
-def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table of Markdown."""
-    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    lines += ["| " + " | ".join(_cell(cell) for cell in row) + " |" for row in rows]
-    return "\n".join(lines)
-
-
-def _cell(text: str) -> str:
-    return re.sub(r"\s+", " ", text).replace("|", "\\|")
 
 
 def plain_command(command: str) -> str:

@@ -22,6 +22,7 @@ from discsim.effects.sensors import Lag
 from discsim.recording import SENSORS, Recording
 from validation.diagnosis.consistency.followed import left_of, left_when_shifted, true_noise
 from validation.diagnosis.consistency.spin_rates import RatesApart, rates_apart
+from validation.diagnosis.detectors.speed_ripple import ripple
 from validation.diagnosis.relaxed_fit import (
     beginning,
     first_chain,
@@ -186,6 +187,8 @@ def contradiction_in(recordings: Sequence[Recording], known: Sequence[Parameter]
         if _pulses(recordings, whole, sensor):
             return None
         apart[sensor] = others
+    if _follows_pulsing(recordings, known, whole):
+        return None
     if apart:
         # each of several may be left out: it is they that contradict one another
         guilty = tuple(apart)
@@ -217,6 +220,30 @@ def _follows_lagging(
     lag = Parameter(lags[lagging], "tau_s", 0.0, _LAG_STEP, _LAG_SIGMA)
     look = look_at(recordings, known, sensors, CONSISTENCY.again, {lag: _LAG})
     return look is not None and look.follows
+
+
+#: half the widths of a ripple's differences: of its order, amplitude (rad/s) and phase (rad)
+_RIPPLE_STEPS = {"order": 1e-6, "amplitude_rad_s": 1e-3, "phase_rad": 1e-4}
+
+
+def _follows_pulsing(recordings: Sequence[Recording], known: Sequence[Parameter], whole: Look) -> bool:
+    """Tell whether a motion follows all sensors of a table where its speed may ripple.
+
+    Of a strong ripple not the rate reference alone tells: the accelerometer feels how it turns faster and slower, so
+    that each contradicts what the others tell of a table without one.
+    """
+    for proposal in ripple(whole.fit, whole.noise)[: CONSISTENCY.ripples]:
+        starts = {name: number for ((_, name), _), number in proposal.start.items()}
+        free = {
+            Parameter(proposal.trial.id, name, 0.0, step): float(starts[name]) for name, step in _RIPPLE_STEPS.items()
+        }
+        look = look_at(recordings, known, whole.sensors, CONSISTENCY.few, free)
+        if look is not None and all(
+            look.level(sensor) <= max(CONSISTENCY.astray, CONSISTENCY.left_of_ripple * whole.level(sensor))
+            for sensor in whole.sensors
+        ):
+            return True
+    return False
 
 
 def contradiction_after(fit: Fit) -> Contradiction | None:

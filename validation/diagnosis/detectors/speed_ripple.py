@@ -34,7 +34,17 @@ def ripple(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: floa
     """
     if not fit.plant.commanded or any(trial.id == _ID for trial in taken):
         return []
-    told = [_rate_residual(fit, i, noise) for i in range(len(fit.chains))]
+    found = _ripples(fit, noise, least, 0.0)
+    if not found:
+        return []
+    # what is told first slows the table: over the angle that it then has turned a strong ripple is a line
+    amplitude = found[0].start[((_ID, "amplitude_rad_s"), None)]
+    return _ripples(fit, noise, least, amplitude) or found
+
+
+def _ripples(fit: Fit, noise: NoiseModel, least: float, amplitude: float) -> list[Proposal]:
+    """Return what `ripple` does, of a table that one of this amplitude (rad/s) slows."""
+    told = [_rate_residual(fit, i, noise, amplitude) for i in range(len(fit.chains))]
     parts = [part for part in told if part is not None]
     if not parts:
         return []
@@ -83,8 +93,13 @@ def _sine(psi: FloatArray, e: FloatArray, weight: FloatArray, order: float) -> t
     return float(a * es + b * ec), float(order), float(np.hypot(a, b)), float(np.arctan2(b, a))
 
 
-def _rate_residual(fit: Fit, i: int, noise: NoiseModel) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """Return angle turned, residual of the rate and its weight (n,) of a recording, from the sensor that tells best."""
+def _rate_residual(
+    fit: Fit, i: int, noise: NoiseModel, amplitude: float
+) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Return angle turned, residual of the rate and its weight (n,) of a recording, from the sensor that tells best.
+
+    A table of rate c + a sin(order psi) takes 2 pi / sqrt(c^2 - a^2) for a turn: it turns slower than its command.
+    """
     linear, chain = fit.linears[i], fit.chains[i]
     command = chain.recording.command
     assert command is not None
@@ -95,7 +110,8 @@ def _rate_residual(fit: Fit, i: int, noise: NoiseModel) -> tuple[FloatArray, Flo
         t = np.concatenate([linear.t[c.rows] for c in channels])
         t = t - delay(fit.values(i), sensor, t)
         rate = np.interp(t, command.t, command.value)
-        psi = _turned(command.t, command.value, t)
+        mean = np.sign(command.value) * np.sqrt(np.maximum(command.value**2 - amplitude**2, 0.0))
+        psi = _turned(command.t, mean, t)
         e = np.concatenate([linear.residual[c.rows] for c in channels])
         sd = np.concatenate([np.full(c.index.size, noise[c.group].sd) for c in channels])
         moving = np.abs(rate) > 0.5

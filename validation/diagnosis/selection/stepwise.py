@@ -140,7 +140,7 @@ def _grown(found: Search) -> Search:
     """Return the search with effects added as long as one is worth its price."""
     for step in range(SELECTION.most_effects):
         current = found.final
-        found, better = _next(found, current, step)
+        found, better = next_effect(found, current, step)
         if step == 0 and far(found, current) and (better is None or far(found, better)) and not _told(better):
             found, together = _together(found)
             if together is not None:
@@ -228,14 +228,14 @@ def _offers(found: Search, current: Tied, step: int) -> tuple[Search, list[Offer
             there.append((item, found.loose, 0.0))
     # far from the data the two are asked in different noise: what they gain does not compare
     there, here = ([offer for offer in some if on_the_disc(found, offer[0].start)] for some in (there, here))
-    worth = _in_turn(there, here) if distant and step > 0 else _in_turn([*there, *here])
+    worth = in_turn(there, here) if distant and step > 0 else in_turn([*there, *here])
     if distant:
         present = {trial.id for trial in current.hypothesis.trials}
         worth = [*((hint, found.loose, 0.0) for hint in found.hints if hint.trial.id not in present), *worth]
     return found, worth
 
 
-def _next(found: Search, current: Tied, step: int) -> tuple[Search, Tied | None]:
+def next_effect(found: Search, current: Tied, step: int) -> tuple[Search, Tied | None]:
     """Return the fit with the best further effect, or None where none is worth its price."""
     found, offers = _offers(found, current, step)
     noise = found.loose_noise
@@ -296,7 +296,7 @@ def _begun_again(found: Search, current: Tied, proposal: Proposal, bar: float) -
     return tied_fit(current.fit, current.hypothesis.plus(proposal.trial), found.own, current.fit.noise, start, bar=bar)
 
 
-def _in_turn(*offers: Sequence[Offer]) -> list[Offer]:
+def in_turn(*offers: Sequence[Offer]) -> list[Offer]:
     """Return offers that may be worth their price, from each list the best in turn."""
 
     def later(offer: Offer) -> tuple[bool, float]:

@@ -24,7 +24,7 @@ from validation.diagnosis.unknown_law.motion_law import candidate_laws, fitted_l
 from validation.diagnosis.unknown_law.sensor_law import asked_of_sensors, fitted_sensor_law, sensor_library
 from validation.diagnosis.unknown_law.terms import SensorTerm
 from validation.identification.gauss_newton import Fit, mapped, refit
-from validation.identification.noise import GroupNoise, NoiseModel, chi_squared, log_likelihood, whitened
+from validation.identification.noise import GroupNoise, NoiseModel, chi_squared, log_likelihood
 from validation.identification.normal_equations import local_step, reduce, shared_step
 from validation.identification.parameters import Parameter
 from validation.identification.plants.law_terms import Term
@@ -226,10 +226,7 @@ def _spread(ranked: Sequence[tuple[float, float, Term | SensorTerm]]) -> list[tu
 
 def _share(base: Fit, fit: Fit, noise: NoiseModel) -> float:
     """Return the part of the excess of chi2 over the number of readings that a fit takes away."""
-    before, after = (
-        sum(float(np.sum(whitened(linear, noise, linear.residual[:, None]) ** 2)) for linear in one.linears)
-        for one in (base, fit)
-    )
+    before, after = (sum(chi_squared(linear, noise, linear.residual) for linear in one.linears) for one in (base, fit))
     return (before - after) / max(before - base.count, 1.0)
 
 

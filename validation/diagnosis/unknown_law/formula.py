@@ -11,6 +11,7 @@ from validation.diagnosis.result import Law, ParameterValue
 from validation.diagnosis.settings import SELECTION
 from validation.diagnosis.unknown_law.terms import SensorTerm
 from validation.identification.gauss_newton import Fit
+from validation.identification.normal_equations import inverse_of
 from validation.identification.plants.law_terms import Term
 
 __all__ = ["as_laws", "as_sensor_laws"]
@@ -28,7 +29,7 @@ def as_sensor_laws(term: SensorTerm, fit: Fit, heldout: float | None) -> tuple[t
         values, block = fit.at[js], C[np.ix_(js, js)]
         if not np.any(np.diag(block) > 0):
             continue
-        z2 = float(values @ np.linalg.pinv(block) @ values)
+        z2 = float(values @ inverse_of(block) @ values)
         sds = np.sqrt(np.diag(block))
         if term.kind == "turning":
             text = "a * cos(k * psi) + b * sin(k * psi)"

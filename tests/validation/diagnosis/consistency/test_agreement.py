@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 from support.made import MODULE, throws
+from support.places import REAL
 
 from discsim.effects import Effect, effect
 from discsim.recording import Recording, Samples
@@ -21,8 +20,7 @@ from validation.importing import find_map, import_recording, read_map
 
 #: a gyroscope that shows the spin, which an MPU-9250 does not
 BOARD = MODULE.without("gps").fitted("gyroscope", range=100.0)
-SHARED = Path(os.environ.get("DISCSIM_RECORDINGS", Path(__file__).parents[5] / "shared" / "recordings"))
-REAL = SHARED / "real" / "flatball-ins-ultimate-disc"
+FLATBALL = REAL / "flatball-ins-ultimate-disc"
 FLIGHTS = {"001-rb": (1590, 1830), "003-rf": (860, 1125), "004-rf": (680, 908), "005-rh": (735, 988)}
 
 
@@ -137,11 +135,11 @@ def test_a_time_base_that_is_a_fifth_wrong_is_found_as_the_clock():
     assert answer.agreement.contradiction
 
 
-@pytest.mark.skipif(not REAL.is_dir(), reason="the recordings are not there")
+@pytest.mark.skipif(not FLATBALL.is_dir(), reason="the recordings are not there")
 def test_the_throws_of_an_ultimate_disc_agree_once_their_rows_are_counted():
     recordings = []
     for name, (first, last) in FLIGHTS.items():
-        raw = next(REAL.glob(f"*{name}.csv"))
+        raw = next(FLATBALL.glob(f"*{name}.csv"))
         recordings.append(import_recording(raw, read_map(find_map("flatball")), slice(first, last)).recording)
     found = agreement_of(recordings, list(FLIGHTS))
     assert found is not None

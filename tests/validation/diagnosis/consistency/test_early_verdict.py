@@ -7,6 +7,11 @@ import numpy as np
 import pytest
 from support.made import throws
 
+from discsim.effects import effect
+from discsim.environment import Environment
+from discsim.recording import Samples
+from discsim.rig import default_profile, turn_table
+from discsim.sensors import Instruments, record
 from validation.diagnosis.consistency.early_verdict import contradiction_in
 from validation.diagnosis.consistency.followed import left_of, left_when_shifted, true_noise
 from validation.diagnosis.contradicted import contradicted_outcome
@@ -89,3 +94,17 @@ def test_a_delay_and_lost_samples_are_reconciled_and_another_throw_is_not(sound,
     assert left(replace(own, t=own.t + 0.05)) < CONSISTENCY.reconciled
     assert left(lost) < CONSISTENCY.reconciled
     assert left(other) > CONSISTENCY.reconciled
+
+
+@pytest.mark.parametrize(("order", "amplitude"), [(1.0, 0.05), (3.0, 0.6), (6.0, 1.2)])
+def test_a_table_whose_speed_ripples_is_no_contradiction(order, amplitude):
+    """Of a strong one the accelerometer tells, too: it and the reference each contradict a table without a ripple."""
+    profile = default_profile((1000, 3000, 5000), hold=3.0)
+    ripples = effect("rig.speed_ripple", order=order, amplitude_rad_s=amplitude)
+    motion = turn_table(profile, Environment(), (ripples,), yaw=0.3)
+    parts = Instruments.from_parts("mpu9250", "ac1120s")
+    run = record(motion, parts, np.random.default_rng(3), plant="rate_table", name="run", command=profile)
+    assert contradiction_in([run], ()) is None
+    # the reference of a table that turns at another rate is no ripple
+    other = Samples(run.need("rate_reference").t, 0.8 * run.need("rate_reference").value)
+    assert contradiction_in([replace(run, samples={**run.samples, "rate_reference": other})], ()) is not None

@@ -71,7 +71,7 @@ def step(
     found = finding.Search(
         tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base, *UNASKED, hints=tuple(hints)
     )
-    _, best = searching._next(found, base, 0)
+    _, best = searching.next_effect(found, base, 0)
     assert best is not None
     return best.hypothesis.trials[-1].id, refitted, bars
 
@@ -119,7 +119,7 @@ def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present
     monkeypatch.setattr(searching, "proposals", lambda *_: [])
     monkeypatch.setattr(searching, "one_per_effect", lambda _: [Proposal(tilt, 1e6, {size: 0.3})])
     found = finding.Search(tuple(recordings), (), fit, fit.noise, (tilt,), base, base, *UNASKED)
-    _, best = searching._next(found, base, 0)
+    _, best = searching.next_effect(found, base, 0)
     assert best is not None
     assert best.hypothesis.trials == (tilt,)
 
