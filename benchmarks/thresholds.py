@@ -7,7 +7,8 @@ the sets all is as stated, in a quarter the noise of some sensors is louder, qui
 stated numbers are off within their sigma where a plant has such numbers. Asked is what the first step of a diagnosis
 asks about the fitted baseline: the largest gain of any effect, event, gust or ripple against its price (by a score
 test; what comes near its price is refitted, as in a diagnosis), and what the tests of the residuals reach against their
-limits. Each set is a row of ``sets.csv`` as soon as it is done: an interrupted run goes on from there.
+limits. Where one goes beyond its limit the whole diagnosis is made and its verdict noted. Each set is a row of
+``sets.csv`` as soon as it is done: an interrupted run goes on from there.
 
 ``--write`` puts the table of rates between the marks in docs/thresholds.md.
 """
@@ -41,6 +42,7 @@ from validation.diagnosis.detectors.local_problem import asked_of
 from validation.diagnosis.detectors.speed_ripple import ripple
 from validation.diagnosis.detectors.time_offsets import time_offsets
 from validation.diagnosis.inertia import with_inertia
+from validation.diagnosis.pipeline import diagnose
 from validation.diagnosis.prepared import prepared
 from validation.diagnosis.selection.candidates import parameters_of
 from validation.diagnosis.selection.constrained_fit import tied_fit
@@ -68,12 +70,16 @@ HEAD = ("set", "plant", "kind", "recordings", "readings")
 
 @dataclass(frozen=True)
 class Limit:
-    """A column of the table, what it is in words, and the limit that a diagnosis has for it."""
+    """A column of the table, what it is in words, and the limit that a diagnosis has for it.
+
+    Beyond it an ``alarm`` may follow; else other starts are tried, which takes time alone.
+    """
 
     column: str
     words: str
     limit: float
     plants: tuple[str, ...] = PLANTS
+    alarm: bool = True
 
 
 #: gains are twice the log likelihood, less what is charged for each parameter
@@ -94,9 +100,9 @@ LIMITS = (
     Limit("course", "a course in common", RESIDUAL_TESTS.course_gain),
     Limit("loudness", "a loud and slow noise", RESIDUAL_TESTS.loud),
     Limit("far", "χ² per reading, baseline", SELECTION.far),
-    Limit("astray", "χ² per reading, relaxed fit", RELAXED_FIT.astray),
+    Limit("astray", "χ² per reading, relaxed fit", RELAXED_FIT.astray, alarm=False),
 )
-COLUMNS = (*HEAD, *(limit.column for limit in LIMITS), *(f"{limit.column}_is" for limit in LIMITS[:6]))
+COLUMNS = (*HEAD, *(limit.column for limit in LIMITS), *(f"{limit.column}_is" for limit in LIMITS[:6]), "verdict")
 
 
 def null_set(number: int, seed: int) -> tuple[Case, list[Recording]]:
@@ -146,6 +152,16 @@ def asked(case: Case, recordings: Sequence[Recording]) -> dict[str, str]:
     return row
 
 
+def beyond_any(row: Mapping[str, str]) -> bool:
+    """Tell whether chance went beyond a limit after which an alarm may follow."""
+    return any(limit.alarm and float(row[limit.column] or 0.0) > limit.limit for limit in LIMITS)
+
+
+def verdict_on(number: int, seed: int) -> str:
+    """Return the verdict of a whole diagnosis on a set."""
+    return diagnose([null_set(number, seed)[1]], ["null"]).diagnosis.verdict
+
+
 def _less(proposal: Proposal) -> float:
     return proposal.gain - SELECTION.per_parameter * len(parameters_of(proposal.trial))
 
@@ -187,7 +203,7 @@ def _left(found: Search) -> dict[str, float]:
 # ------------------------------------------------------------------------------------------------ rates
 
 
-def beyond(reached: FloatArray, limit: float) -> tuple[int, float, float]:
+def excess(reached: FloatArray, limit: float) -> tuple[int, float, float]:
     """Return how many of the sets (n,) went beyond a limit, the 95 % bound of that rate, and the rate by the tail.
 
     The excess over a high level falls off exponentially (peaks over a threshold: S. Coles, An Introduction to
@@ -219,12 +235,21 @@ def rates_table(rows: Sequence[Mapping[str, str]]) -> str:
         reached = columns_of(rows)[limit.column]
         if reached.size < 20:
             continue
-        over, bound, tail = beyond(reached, limit.limit)
+        over, bound, tail = excess(reached, limit.limit)
         half, late = np.quantile(reached, [0.5, 0.99])
         lines.append(
             f"| {limit.words} | {limit.limit:g} | {reached.size} | {half:.1f} | {late:.1f} | {reached.max():.1f} | "
             f"{over} | {100 * bound:.1f} % | {_share(tail)} |"
         )
+    judged = [row["verdict"] for row in rows if row["verdict"]]
+    false = sum(verdict in ("explained", "unexplained") for verdict in judged)
+    bound = float(beta.ppf(0.95, false + 1, len(rows) - false))
+    lines += [
+        "",
+        f"In {len(judged)} of the {len(rows)} sets chance went beyond a limit. A whole diagnosis calls {false} of "
+        f"these explained or unexplained: false alarms in {100.0 * false / len(rows):.1f} % of the sets, at most "
+        f"{100.0 * bound:.1f} % (95 %).",
+    ]
     return "\n".join(lines)
 
 
@@ -247,6 +272,7 @@ def draw(rows: Sequence[Mapping[str, str]], path: Path) -> None:
         panel.axvline(limit.limit, color="#d55e00")
         panel.set_yscale("log")
         panel.set_ylim(1e-4, 1.2)
+        panel.set_xlim(left=max(float(x[0]), -0.5 * limit.limit))
         panel.set_title(limit.words)
     for panel in axes.flat[len(some) :]:
         panel.set_visible(False)
@@ -263,7 +289,12 @@ def known_rows(path: Path) -> list[dict[str, str]]:
     if not path.exists():
         return []
     text = path.read_text(encoding="utf-8")
-    return list(csv.DictReader(text[: text.rfind("\n") + 1].splitlines()))
+    rows = csv.DictReader(text[: text.rfind("\n") + 1].splitlines())
+    return [{name: row.get(name) or "" for name in COLUMNS} for row in rows]
+
+
+def _write(rows: Sequence[Mapping[str, str]], path: Path) -> None:
+    write_text(path, "\n".join([",".join(COLUMNS), *(",".join(row[name] for name in COLUMNS) for row in rows), ""]))
 
 
 def main() -> None:
@@ -277,12 +308,18 @@ def main() -> None:
     path = options.out / "sets.csv"
     options.out.mkdir(parents=True, exist_ok=True)
     rows = known_rows(path)
-    write_text(path, "\n".join([",".join(COLUMNS), *(",".join(row[name] for name in COLUMNS) for row in rows), ""]))
+    _write(rows, path)
+    for number, row in enumerate(rows):
+        if not row["verdict"] and beyond_any(row):
+            row["verdict"] = verdict_on(number, options.seed)
+            _write(rows, path)
     with shown() as report, path.open("a", encoding="utf-8") as stream:
         for number in range(len(rows), options.sets):
             report(f"{20 * (number // 20)} of {options.sets} sets", number, options.sets)
             row = asked(*null_set(number, options.seed))
             rows.append({name: row.get(name, "") for name in COLUMNS})
+            if beyond_any(rows[-1]):
+                rows[-1]["verdict"] = verdict_on(number, options.seed)
             stream.write(",".join(rows[-1].values()) + "\n")
             stream.flush()
     text = rates_table(rows)

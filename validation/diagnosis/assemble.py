@@ -278,7 +278,7 @@ def outcome_of(judged: Judged, question: Question) -> Outcome:
     tried = judged.tried
     ready, found = tried.prepared, tried.found
     setup = answer_of_setup(ready.setup, question.recordings, tried.fit, judged.verdict)
-    warnings, agreement = (*setup.warnings, *ready.notes), agreement_of(ready.meant, question.names)
+    warnings, agreement = (*setup.warnings, *ready.notes), agreement_of(ready.meant, question.names, ready.agreeing)
     if found is not None:
         return _outcome_of_search(judged, question, found, setup, warnings, agreement)
     assert tried.contradiction is not None

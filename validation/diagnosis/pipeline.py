@@ -8,6 +8,7 @@ from discsim.effects.own import UserEffect
 from discsim.recording import Recording
 from validation.diagnosis.assemble import outcome_of
 from validation.diagnosis.consistency.early_verdict import contradiction_after, contradiction_in
+from validation.diagnosis.consistency.spin_agreement import compared
 from validation.diagnosis.datasets import recording_names
 from validation.diagnosis.inertia import with_inertia
 from validation.diagnosis.prepared import prepared
@@ -62,7 +63,7 @@ def tried_under(setup: SetupFindings, question: Question) -> Tried:
     if contradiction is not None:
         return Tried(ready, contradiction)
     progress("following the data", 1, 5)
-    followed = relaxed(ready.fitted, known)
+    followed = relaxed(ready.fitted, known, agreeing=ready.agreeing)
     contradiction = contradiction_after(followed)
     if contradiction is not None:
         return Tried(ready, contradiction)
@@ -74,7 +75,7 @@ def prepared_under(setup: SetupFindings, question: Question) -> Prepared:
     """Return recordings as a setup says that they were meant, as a fit can use them."""
     meant, warnings = prepared(setup.recordings, question.names)
     fitted, notes = with_inertia(meant)
-    return Prepared(setup, tuple(meant), tuple(fitted), (*warnings, *notes))
+    return Prepared(setup, tuple(meant), tuple(fitted), (*warnings, *notes), compared(meant, question.names))
 
 
 def likeliest_fault(tried: Tried) -> SetupFindings | None:

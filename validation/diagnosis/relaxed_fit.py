@@ -17,7 +17,7 @@ from discsim.effects.catalogue import CATALOGUE, catalogued
 from discsim.effects.sensors import ClockRate
 from discsim.frames import conjugate, multiply
 from discsim.recording import Recording
-from validation.diagnosis.consistency.spin_agreement import written_ratios
+from validation.diagnosis.consistency.spin_agreement import Comparison, compared, written_ratios
 from validation.diagnosis.settings import CONSISTENCY, RELAXED_FIT
 from validation.identification.gauss_newton import Fit, linearised, merit_of, refit
 from validation.identification.linear import Linear
@@ -90,10 +90,18 @@ def loose_parameters(recordings: Sequence[Recording], sensors: set[str]) -> tupl
 
 # far from the data a motion may run beyond all numbers: such a step is not finite, and is not taken
 @np.errstate(over="ignore", invalid="ignore")
-def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), iterations: int = 12) -> Fit:
-    """Fit recordings of one plant so loosely that any effect of ordinary size finds room."""
+def relaxed(
+    recordings: Sequence[Recording],
+    known: Sequence[Parameter] = (),
+    iterations: int = 12,
+    agreeing: Sequence[Sequence[Comparison]] | None = None,
+) -> Fit:
+    """Fit recordings of one plant so loosely that any effect of ordinary size finds room.
+
+    ``agreeing`` is what their sensors say of one another (`compared`), where that is known.
+    """
     plant = plant_of(recordings[0])
-    ratio = _wrong_time(recordings)
+    ratio = _wrong_time(recordings, agreeing)
     chains = tuple(first_chain(one) if ratio == 1.0 else chain_in_true_time(one, ratio) for one in recordings)
     sensors = {readings.sensor for one in chains for readings in one.readings}
     clock = () if ratio == 1.0 else (Parameter(*_CLOCK, 1.0, 1e-6, RELAXED_FIT.time_sigma),)
@@ -114,11 +122,12 @@ def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), it
     return replace(fit, linears=linears, merit=merit_of(fit, linears))
 
 
-def _wrong_time(recordings: Sequence[Recording]) -> float:
+def _wrong_time(recordings: Sequence[Recording], agreeing: Sequence[Sequence[Comparison]] | None) -> float:
     """Return the ratio of written to true time where most recordings say that it is far from 1, else 1."""
     if not plant_of(recordings[0]).airborne:
         return 1.0
-    ratio = float(np.median(written_ratios(recordings)))
+    each = compared(recordings, [one.name for one in recordings]) if agreeing is None else agreeing
+    ratio = float(np.median(written_ratios(each)))
     return ratio if abs(ratio - 1.0) > RELAXED_FIT.least_wrong else 1.0
 
 

@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 from discsim.recording import Recording
 from validation.diagnosis.consistency.early_verdict import Contradiction
+from validation.diagnosis.consistency.spin_agreement import Comparison
 from validation.diagnosis.result import Verdict
 from validation.diagnosis.selection.found import Search
 from validation.diagnosis.setup import SetupFindings
@@ -45,12 +46,16 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """Recordings under a supposed setup: as they were ``meant``, and as they are ``fitted``; what must be known."""
+    """Recordings under a supposed setup: as they were ``meant``, and as they are ``fitted``; what must be known.
+
+    ``agreeing`` are the comparisons of each recording's sensors with one another.
+    """
 
     setup: SetupFindings
     meant: tuple[Recording, ...]
     fitted: tuple[Recording, ...]
     notes: tuple[str, ...]
+    agreeing: tuple[tuple[Comparison, ...], ...]
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,7 +34,7 @@ from validation.diagnosis.consistency.turning import (
     tone,
 )
 
-__all__ = ["Agreement", "Cause", "Comparison", "Proof", "RowProof", "agreement_of", "written_ratios"]
+__all__ = ["Agreement", "Cause", "Comparison", "Proof", "RowProof", "agreement_of", "compared", "written_ratios"]
 
 #: how far apart, in its logarithm, what is compared may be in a sound recording: precession bends the field's phase by
 #: up to 15 deg/s, a mount that is 1 mm off moves the pull by 3 %, an inertia without its electronics the wobble by 5 %
@@ -231,14 +231,26 @@ class Agreement:
         }
 
 
-def agreement_of(recordings: Sequence[Recording], names: Sequence[str]) -> Agreement | None:
-    """Compare the sensors of recordings (called ``names``) with one another; None where none shows the spin itself."""
-    some = [(r, n) for r, n in zip(recordings, names, strict=True) if rate_of(r) is not None]
-    if not some:
-        return None
-    comparisons = tuple(item for recording, name in some for item in _compared(recording, name))
+def compared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[tuple[Comparison, ...], ...]:
+    """Return each recording's comparisons of its sensors (called ``names``); none where no rate is known."""
+    return tuple(
+        () if rate_of(recording) is None else tuple(_compared(recording, name))
+        for recording, name in zip(recordings, names, strict=True)
+    )
+
+
+def agreement_of(
+    recordings: Sequence[Recording], names: Sequence[str], known_already: Sequence[Sequence[Comparison]] | None = None
+) -> Agreement | None:
+    """Compare the sensors of recordings (called ``names``) with one another; None where none shows the spin itself.
+
+    ``known_already`` is what `compared` says of them, where that is known.
+    """
+    each = compared(recordings, names) if known_already is None else known_already
+    comparisons = tuple(item for one in each for item in one)
     if not comparisons:
         return None
+    some = [(r, n) for r, n in zip(recordings, names, strict=True) if rate_of(r) is not None]
     known = rate_of(some[0][0])
     assert known is not None
     rows = rows_of([recording for recording, _ in some], [name for _, name in some])
@@ -455,14 +467,15 @@ def _sentences(found: Agreement) -> list[str]:
     return said
 
 
-def written_ratios(recordings: Sequence[Recording]) -> list[float]:
+def written_ratios(each: Sequence[Sequence[Comparison]]) -> list[float]:
     """Return each recording's ratio of written to true time by field and gyroscope, 1 where that is not in question.
+
+    ``each`` is what `compared` says of the recordings.
 
     A place for a fit to start from: whether it is the clock that is wrong, and not a sensor, remains to be seen.
     """
     ratios = []
-    for recording in recordings:
-        found = () if rate_of(recording) is None else _compared(recording, recording.name)
+    for found in each:
         field = next((item for item in found if item.signal == "field"), None)
         pull = next((item for item in found if item.signal == "pull to the axis"), None)
         wrong = field is not None and not field.agrees and (pull is None or pull.agrees)

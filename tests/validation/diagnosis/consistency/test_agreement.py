@@ -14,7 +14,7 @@ from support.places import REAL
 from discsim.effects import Effect, effect
 from discsim.recording import Recording, Samples
 from validation.diagnosis import diagnose
-from validation.diagnosis.consistency.spin_agreement import Agreement, agreement_of, written_ratios
+from validation.diagnosis.consistency.spin_agreement import Agreement, agreement_of, compared, written_ratios
 from validation.diagnosis.report.consistency_tables import tables_of
 from validation.importing import find_map, import_recording, read_map
 
@@ -42,7 +42,7 @@ def test_sensors_that_agree_are_not_said_to_contradict():
     assert found.sentences == ()
     # the tolerances are those of the comparisons: 1 % for a field, whose phase precession bends
     assert all(abs(item.ratio - 1.0) < 0.01 for item in found.comparisons)
-    assert written_ratios(spins()) == [1.0, 1.0]
+    assert written_ratios(compared(spins(), ["a", "b"])) == [1.0, 1.0]
 
 
 @pytest.mark.parametrize("ratio", [0.82, 1.15])
@@ -69,7 +69,7 @@ def test_a_gyroscope_of_wrong_sensitivity_contradicts_the_accelerometer_too():
     assert found.causes[0].id == "gyro.scale"
     # 1 % of the field, 3 % of a mount: what sound recordings show
     assert found.causes[0].value == pytest.approx(-0.16, abs=0.02)
-    assert written_ratios(spins(effect("gyro.scale", sz=-0.16))) == [1.0, 1.0]
+    assert written_ratios(compared(spins(effect("gyro.scale", sz=-0.16)), ["a", "b"])) == [1.0, 1.0]
 
 
 def late(recording: Recording, seed: int) -> Recording:

@@ -40,7 +40,7 @@ def stretched() -> Search:
 
 def answer_of(found: Search) -> Diagnosis:
     """What is answered where a search has found this in two recordings that were set up well."""
-    ready = Prepared(SetupFindings((), found.recordings), found.recordings, found.recordings, ())
+    ready = Prepared(SetupFindings((), found.recordings), found.recordings, found.recordings, (), ((), ()))
     question = Question(found.recordings, ("01", "02"), ("set",))
     return outcome_of(judged(Tried(ready, None, found), silent), question).diagnosis
 
