@@ -24,6 +24,7 @@ import numpy as np
 
 from discsim.errors import InputError
 from discsim.files import read_text, write_bytes, write_text
+from discsim.threads import limited
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -142,7 +143,7 @@ def _results(
     """Yield names and results as they come."""
     if scheduler is None and min(workers, len(tasks)) == 1:
         for task in tasks:
-            yield task.name, function(task.argument, shared)
+            yield _call(function, task, shared)
         return
     from distributed import as_completed
 
@@ -164,7 +165,7 @@ def _results(
 
 
 def _call(function: Callable[[Any, Any], Any], task: Task, shared: Any) -> tuple[str, Any]:
-    with _one_at_a_time:
+    with _one_at_a_time, limited():
         return task.name, function(task.argument, shared)
 
 

@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 
+from discsim.result import Result
 from validation.reporting.run import package_version
 from validation.running.progress import Progress, silent
 from validation.running.tasks import Task, claim, discard, run_tasks
@@ -28,7 +30,7 @@ CHECKPOINTS = "checkpoints"
 
 
 @dataclass(frozen=True, repr=False)
-class Swept:
+class Swept(Result):
     """A finished sweep.
 
     Attributes
@@ -53,6 +55,19 @@ class Swept:
             f"{name}: {scored} scored, {known} known, rms {median or '?'} deg/s (median), 95 % below {most or '?'}"
             for name, scored, known, median, most in error_rows(self.scores)
         )
+
+    def table(self) -> dict[str, Any]:
+        """Return a row for each estimator, case, mount and segment: what was varied, and the scores."""
+        frame = self.scores.to_dataframe().reset_index()
+        return {str(name): frame[name].to_numpy() for name in frame}
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the scores."""
+        return self.scores
+
+    def plot(self) -> Figure:
+        """Return the figure of sweep.png."""
+        return draw_sweep(self.scores, self.sweep)
 
     def report(self, folder: Path | str) -> Path:
         """Write sweep.nc (netCDF) and sweep.png into ``folder``; return the path of the first."""
