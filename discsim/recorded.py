@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from discsim.result import Result, needed
+from discsim.result import Result, require
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -60,10 +60,9 @@ class Recorded(Result):
 
     def to_xarray(self) -> xr.Dataset:
         """Return a variable ``SENSOR_COLUMN`` of each column, over the times ``SENSOR_time_s`` of its sensor."""
-        try:
-            import xarray as xr
-        except ImportError:
-            raise needed("xarray", "to_xarray()", "tables") from None
+        require("xarray", "to_xarray()", "tables")
+        import xarray as xr
+
         variables = {
             f"{sensor}_{name}": (f"{sensor}_time_s", values)
             for sensor in self.samples

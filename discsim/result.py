@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from html import escape
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -16,12 +17,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
-__all__ = ["Result", "needed"]
+__all__ = ["Result", "require"]
 
 
-def needed(package: str, what: str, extra: str) -> InputError:
-    """Return the error for an optional package that is not installed; ``what`` asks for it, ``extra`` installs it."""
-    return InputError(f"{what}: needs {package}, which is not installed; pip install 'discsim[{extra}]'")
+def require(package: str, what: str, extra: str) -> None:
+    """Raise `InputError` where an optional package is not installed; ``what`` needs it, ``extra`` brings it."""
+    try:
+        there = find_spec(package) is not None
+    except ValueError:  # a module that was set to None
+        there = False
+    if not there:
+        raise InputError(f"{what}: needs {package}, which is not installed; pip install 'discsim[{extra}]'")
 
 
 class Result:
@@ -57,18 +63,16 @@ class Result:
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the table as a `pandas.DataFrame`; raises `InputError` where pandas is not installed."""
-        try:
-            import pandas as pd
-        except ImportError:
-            raise needed("pandas", "to_dataframe()", "tables") from None
+        require("pandas", "to_dataframe()", "tables")
+        import pandas as pd
+
         return pd.DataFrame({name: np.asarray(values) for name, values in self.table().items()})
 
     def to_xarray(self) -> xr.Dataset:
         """Return the table as an `xarray.Dataset`; raises `InputError` where xarray is not installed."""
-        try:
-            import xarray as xr
-        except ImportError:
-            raise needed("xarray", "to_xarray()", "tables") from None
+        require("xarray", "to_xarray()", "tables")
+        import xarray as xr
+
         columns = {name: (self._dimension, np.asarray(values)) for name, values in self.table().items()}
         coordinate = {name: columns.pop(name) for name in [self._dimension] if name in columns}
         return xr.Dataset(columns, coords=coordinate)

@@ -37,6 +37,8 @@ def fft(t: ArrayLike, xyz: ArrayLike, settings: FftSettings | None = None) -> Ya
     InputError
         For arrays of other shapes, or times that do not ascend.
 
+    Examples
+    --------
     >>> import numpy as np
     >>> t = np.arange(0, 2, 0.01)
     >>> field = 40 * np.column_stack([np.cos(30 * t), -np.sin(30 * t), 0 * t])

@@ -162,7 +162,7 @@ def test_linear_algebra_has_one_thread_inside_and_as_many_as_before_outside():
 
 
 def test_importing_sets_no_environment_variable():
-    code = "import os; before = dict(os.environ); import discsim, validation, estimators; print(before == os.environ)"
+    code = "import os; old = dict(os.environ); import discsim, validation, estimators; print(old == os.environ)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "True\n"
 

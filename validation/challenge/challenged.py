@@ -125,7 +125,10 @@ def blind_test(
     folder : Path, optional
         Where finished cases are kept, so that a test that was stopped goes on. By default nothing is kept.
 
-    Raises `InputError` for what does not go together, such as an effect that a plant does not have.
+    Raises
+    ------
+    InputError
+        For what does not go together, such as an effect that a plant does not have.
     """
     requests = [Request(number, plant, tuple(effects), kind, mask) for number in range(seed, seed + cases)]
     requests[0].draw()  # what does not go together is refused before hours are spent

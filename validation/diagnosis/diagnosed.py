@@ -130,7 +130,10 @@ def diagnose_recordings(
     progress
         Called with a stage, the steps done, and the steps in all.
 
-    Raises `InputError` for recordings of different plants, and for a magnetometer in a field that is not stated.
+    Raises
+    ------
+    InputError
+        For recordings of different plants, and for a magnetometer in a field that is not stated.
     """
     if name is None:
         name = Path(recordings).resolve().name if isinstance(recordings, Path | str) else "recordings"

@@ -196,7 +196,10 @@ def import_log(
     environment : Environment, optional
         Where it was recorded, in the place of what the map states.
 
-    Raises `InputError` naming file, line and what was expected.
+    Raises
+    ------
+    InputError
+        With the file, its line, and what was expected.
     """
     path, part = Path(raw), LogPart(rows, throw, every_throw)
     part.check()

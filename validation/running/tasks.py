@@ -15,6 +15,7 @@ import threading
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from importlib.util import find_spec
 from itertools import islice
 from multiprocessing import resource_tracker
 from pathlib import Path
@@ -24,6 +25,7 @@ import numpy as np
 
 from discsim.errors import InputError
 from discsim.files import read_text, write_bytes, write_text
+from discsim.result import require
 from discsim.threads import limited
 
 if TYPE_CHECKING:
@@ -119,8 +121,9 @@ def run_tasks(
     through its file, so that a run that was stopped and one that was not return the same.
 
     ``scheduler`` is the address of a Dask scheduler; without one there are as many local processes as cores, or
-    ``workers``; one worker works in this process. ``shared`` goes once to each worker. Raises what a task raises, and
-    `InputError` where no scheduler answers. An interrupt leaves the results that are there.
+    ``workers``; one worker works in this process, and so does all where Dask (the extra cluster) is missing. ``shared``
+    goes once to each worker. Raises what a task raises, and `InputError` where no scheduler answers, or Dask is asked
+    for and missing. An interrupt leaves the results that are there.
     """
     names = [task.name for task in tasks]
     if len(set(names)) != len(names):
@@ -130,7 +133,7 @@ def run_tasks(
     done = {name: result for name in names if (result := _read(folder, name)) is not None}
     left = [task for task in tasks if task.name not in done]
     if left:
-        count = workers or len(os.sched_getaffinity(0))
+        count = workers or (len(os.sched_getaffinity(0)) if find_spec("distributed") else 1)
         results = _results(left, function, shared, scheduler, count)
         for name, result in progress(results, len(left)) if progress else results:
             done[name] = _write(folder, name, result)
@@ -145,6 +148,7 @@ def _results(
         for task in tasks:
             yield _call(function, task, shared)
         return
+    require("distributed", f"--scheduler {scheduler}" if scheduler else f"--workers {workers}", "cluster")
     from distributed import as_completed
 
     with _client(scheduler, min(workers, len(tasks))) as client:

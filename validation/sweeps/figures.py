@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
@@ -17,6 +16,9 @@ from discsim.arrays import FloatArray
 from validation.reporting.figures import colour, new_figure, save_figure
 from validation.sweeps.chunks import Sweep
 from validation.sweeps.mounts import closed_form
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["draw_axes", "draw_installation", "draw_sweep"]
 

@@ -7,13 +7,12 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from matplotlib.figure import Figure
 
-from discsim.result import Result
+from discsim.result import Result, require
 from validation.reporting.run import package_version
 from validation.running.progress import Progress, silent
 from validation.running.tasks import Task, claim, discard, run_tasks
@@ -21,6 +20,9 @@ from validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from,
 from validation.sweeps.figures import draw_sweep
 from validation.sweeps.plan import Plan, plan_file, read_plan
 from validation.sweeps.result import labelled, write_netcdf
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["CHECKPOINTS", "Swept", "error_rows", "sweep"]
 
@@ -114,8 +116,13 @@ def sweep(
     anew : bool
         Whether to throw away what an earlier sweep left there.
 
-    Raises `InputError` for a plan that cannot be read, and for checkpoints of another plan.
+    Raises
+    ------
+    InputError
+        For a plan that cannot be read, for checkpoints of another plan, and where xarray (the extra tables) is not
+        installed.
     """
+    require("xarray", "sweep", "tables")
     asked = plan if isinstance(plan, Plan) else read_plan(plan_file(str(plan)))
     identity = {**asked.identity, "versions": {"discsim": package_version(), "numpy": np.__version__}}
     with ExitStack() as stack:

@@ -361,8 +361,8 @@ def _failures(scored: Sequence[Scored]) -> Section:
         what = (fault_of(item), hidden_of(item), size, found_of(item), (item.error or "")[-200:], item.reproduce)
         rows.append((str(item.answer.seed), *what))
     text = (
-        "Each is reproduced alone by its command; its recordings and its answer are written by python -m "
-        "validation.challenge.cases.conceal --seed SEED --out DIR with the same options. Size is that of the least "
+        "Each is reproduced alone by its command; its recordings and its answer are written by "
+        "discsim study conceal --seed SEED --out DIR with the same options. Size is that of the least "
         "concealed effect in units of its detection limit."
     )
     header = ("seed", "fault", "concealed", "size", "found", "error", "command")

@@ -35,8 +35,10 @@ def _lead() -> list[str]:
         "# The paper side by side",
         "",
         _wrapped(
-            "*Study on Improved Flight Coefficient Estimation and Trajectory Analysis of a Flying Disc through "
-            "Onboard Magnetometer Measurements*: every equation, step, figure and table with the function that "
+            "J. Lee, B. Lee, J. W. Song, Y. J. Lee and S. Sung, *Study on Improved Flight Coefficient Estimation and "
+            "Trajectory Analysis of a Flying Disc through Onboard Magnetometer Measurements*, Sensors 18(10), 3564, "
+            "2018, [doi:10.3390/s18103564](https://doi.org/10.3390/s18103564): every equation, step, figure and table "
+            "with the function that "
             "implements it, every number that can be set beside one of ours, and why they differ. Page, figures and "
             "`paper/numbers.json` are made by"
         ),
