@@ -14,7 +14,7 @@ DOCS = Path(__file__).resolve().parent
 WIDTH = 120
 #: pages that programs write; their width is the programs' business
 MADE = ("effects.md", "estimator-accuracy.md", "golf-throws.md", "paper.md", "performance.md", "real-diagnosis.md")
-MADE += ("real-recordings.md",)
+MADE += ("real-recordings.md", "thresholds.md")
 _ITEM = re.compile(r"^(\s*)([-*+]|\d+\.)(\s+)")
 #: lines that stand as they are: tables, headings, comments, HTML, figures, options of the reference, definitions
 _KEPT = re.compile(r"^\s*(\||#|<|!\[|:::|\[\^)")

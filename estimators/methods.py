@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, sd_by_median
 from discsim.errors import InputError
 from discsim.recording import Recording
 from discsim.threads import one_thread
@@ -310,7 +310,7 @@ def clock_notes(recording: Recording) -> list[str]:
     if shares.size < FEWEST_SHARES:
         return []
     share = float(np.median(shares))
-    scatter = 1.4826 * float(np.median(np.abs(shares - share)))
+    scatter = float(sd_by_median(shares - share))
     if not (share > 0 and abs(share - 1) > OFF_CLOCK and scatter < OFF_CLOCK / 3):
         return []
     interval = 1000 * recording.need("magnetometer").interval

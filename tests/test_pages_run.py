@@ -23,7 +23,10 @@ ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 WRAP = runpy.run_path(str(ROOT / "docs" / "wrap.py"))
 #: pages that a test of their own runs
-ELSEWHERE = {"your-own-log.md": "tests/validation/test_own_log.py", "architecture.md": "tests/test_architecture.py"}
+ELSEWHERE = {
+    "your-own-log.md": "tests/validation/commands/test_own_log.py",
+    "architecture.md": "tests/test_architecture.py",
+}
 #: blocks of these kinds are run; others (toml, json, yaml, plain output) are read
 KINDS = ("sh", "console", "python")
 #: average words of a sentence that a page may have
@@ -63,8 +66,8 @@ def test_every_block_is_run_or_says_why_it_is_not(page):
         assert (ROOT / ELSEWHERE[page.name]).is_file()
         return
     for block in blocks(page):
-        studies = block.kind == "sh" and all(line.startswith("discsim study ") for line in block.commands)
-        if block.kind in KINDS and not studies:  # each study has a test of its own
+        made = ("discsim study ", "python benchmarks/")  # what makes a page has a test, or is measured by hand
+        if block.kind in KINDS and not all(line.startswith(made) for line in block.commands or [""]):
             assert re.match(r"^(run|not run: \w.{10,})$", block.above), f"{page.name}: {block.text}"
 
 

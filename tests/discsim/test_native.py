@@ -12,7 +12,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from flights import DRIVER, FIELD, throw
+from support.flights import DRIVER, FIELD, throw
 
 from discsim import native
 from discsim.callbacks import passive_force, stepped_by_c
@@ -69,7 +69,10 @@ class TestTheSameFlight:
     def test_c_and_python_fly_the_same_to_the_last_bit(self, disc, name):
         """1e-10 is promised; it is one compiled function, reached by two ways."""
         disc, field = load_disc(disc)
-        flights = [fly(disc, field, throw(), EFFECTS[name], duration=1.5, python=python) for python in (False, True)]
+        flights = [
+            follow(FlyingDisc(disc, field, EFFECTS[name]), throw(), duration=1.5, python=python)
+            for python in (False, True)
+        ]
         assert_same(*flights)
 
     def test_so_do_a_law_and_an_effect_of_the_user_s_own(self, tmp_path):
@@ -78,7 +81,10 @@ class TestTheSameFlight:
         law = Law("-c * r", "moment_z_N_m", {"c": 1e-5})
         push = load_user_effect(path).sized({"size": 0.02})
         plain = fly(DRIVER, FIELD, throw(), duration=1.0)
-        flights = [fly(DRIVER, FIELD, throw(), [push], law=law, duration=1.0, python=way) for way in (False, True)]
+        flights = [
+            follow(FlyingDisc(DRIVER, FIELD, [push], law=law), throw(), duration=1.0, python=way)
+            for way in (False, True)
+        ]
         assert_same(*flights)
         assert np.abs(flights[0].position[-1] - plain.position[-1]).max() > 0.1
 
@@ -190,9 +196,12 @@ class TestWhichCallback:
         assert len(seen) == 1
 
     def test_flights_in_threads_of_both_kinds_are_those_flown_alone(self):
+        def flown(python: bool) -> Motion:
+            return follow(FlyingDisc(DRIVER, FIELD), throw(), duration=0.5, python=python)
+
         alone = fly(DRIVER, FIELD, throw(), duration=0.5)
         with ThreadPoolExecutor(4) as pool:
-            jobs = [pool.submit(fly, DRIVER, FIELD, throw(), duration=0.5, python=k % 3 == 0) for k in range(12)]
+            jobs = [pool.submit(flown, k % 3 == 0) for k in range(12)]
             for job in jobs:
                 assert_same(job.result(), alone)
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from spinning_sensor import MPU9250, Faults, Spin, move, record, without
+from support.spinning_sensor import MPU9250, Faults, Spin, move, record, without
 
 from discsim.recording import Recording, Samples, SensorSheet
+from estimators.centripetal import centripetal
 from estimators.fusion import (
     FusionSettings,
     accelerometer_calibrated,
-    centripetal,
     compare_sensors,
     contradictions,
     fusion,

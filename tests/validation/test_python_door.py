@@ -276,8 +276,7 @@ def test_a_study_is_run_by_its_name_with_its_own_options(monkeypatch, capsys):
 
 @pytest.mark.parametrize("study", STUDIES.values(), ids=list(STUDIES))
 def test_every_study_is_there_in_a_checkout(study):
-    found = import_module(study.module)
-    assert hasattr(found, "app") or hasattr(found, "main")
+    assert callable(import_module(study.module).command)
 
 
 def test_a_study_that_is_unknown_or_not_installed_is_refused_in_a_sentence(monkeypatch):

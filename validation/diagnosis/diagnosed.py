@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,14 +21,11 @@ from validation.diagnosis.report.figures import draw_overview
 from validation.diagnosis.report.files import write_outcome
 from validation.diagnosis.report.page import verdict_sentence
 from validation.diagnosis.result import Diagnosis, NamedEffect, Outcome
+from validation.diagnosis.stages import Progress, silent
 from validation.identification.plants.plan import Plan
 from validation.running.given import Given, given_recordings
 
 __all__ = ["Diagnosed", "diagnose_named", "diagnose_recordings"]
-
-
-def _silent(stage: str, done: int, total: int) -> None:
-    del stage, done, total
 
 
 @dataclass(frozen=True, repr=False)
@@ -111,7 +108,7 @@ def diagnose_recordings(
     seed: int = 0,
     user_effects: Sequence[UserEffect] = (),
     plans: Sequence[Plan] | None = None,
-    progress: Callable[[str, int, int], None] = _silent,
+    progress: Progress = silent,
 ) -> Diagnosed:
     """Tell whether the baseline explains recordings down to their noise, and if not, what was left out.
 
@@ -149,7 +146,7 @@ def diagnose_named(
     seed: int = 0,
     user_effects: Sequence[UserEffect] = (),
     plans: Sequence[Plan] | None = None,
-    progress: Callable[[str, int, int], None] = _silent,
+    progress: Progress = silent,
 ) -> Diagnosed:
     """Diagnose several data sets by name together, as `diagnose_recordings` does one."""
     sets = list(datasets.values())

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
+from validation.identification.competing_effects import Competing
 from validation.identification.linear import Linear
 from validation.identification.linearisation import linearise, moved, reread
 from validation.identification.noise import NoiseModel, chi_squared
@@ -60,6 +61,11 @@ class Fit:
         return self.chains[0].plant
 
     @property
+    def effects(self) -> Competing:
+        """The effects that may act on its recordings."""
+        return self.chains[0].effects
+
+    @property
     def count(self) -> int:
         """Number of scalar readings that take part."""
         return sum(linear.residual.size for linear in self.linears)
@@ -69,7 +75,7 @@ class Fit:
 
 
 def mapped(function: Callable[..., Any], *arguments: Sequence[Any]) -> list[Any]:
-    """Map over recordings, on as many threads as there are cores, each in the context of the call."""
+    """Map over recordings, on as many threads as there are cores, each with the call's `numpy.errstate`."""
     with ThreadPoolExecutor(THREADS) as pool:
         tasks = [pool.submit(copy_context().run, function, *each) for each in zip(*arguments, strict=True)]
         return [task.result() for task in tasks]

@@ -15,8 +15,8 @@ from scipy.optimize import minimize
 from scipy.signal import lfilter
 from scipy.special import expit, logit
 
-from discsim.arrays import FloatArray
-from validation.identification.linear import Channel, IntArray, Linear
+from discsim.arrays import FloatArray, IntArray, sd_by_median
+from validation.identification.linear import Channel, Linear
 
 __all__ = ["GroupNoise", "NoiseModel", "chi_squared", "estimate_noise", "likeliest_noise", "log_likelihood", "whitened"]
 
@@ -261,11 +261,8 @@ def robust_noise(linears: Sequence[Linear], residuals: Sequence[FloatArray]) -> 
     sizes: dict[str, list[FloatArray]] = {}
     for linear, residual in zip(linears, residuals, strict=True):
         for channel in linear.channels:
-            sizes.setdefault(channel.group, []).append(np.abs(residual[channel.rows]))
-    return {
-        group: GroupNoise(max(1.4826 * float(np.median(np.concatenate(found))), 1e-12))
-        for group, found in sizes.items()
-    }
+            sizes.setdefault(channel.group, []).append(residual[channel.rows])
+    return {group: GroupNoise(max(float(sd_by_median(np.concatenate(found))), 1e-12)) for group, found in sizes.items()}
 
 
 def stated_noise(linears: Sequence[Linear], floor: Mapping[str, float] | None = None) -> dict[str, GroupNoise]:

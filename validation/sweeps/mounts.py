@@ -119,8 +119,7 @@ class AccelerometerView(NamedTuple):
         force = self.origin + x * self.gradient[:, :, 0] + y * self.gradient[:, :, 1] + z * self.gradient[:, :, 2]
         chain = body_to_ned(turn(sensor.misalignment)) @ sensitivity(sensor.scale, sensor.cross_axis).T
         value = _times(force, chain) + np.array(sensor.bias) + self.drift
-        limit = min(sensor.range, sensor.saturation.limit_m_s2)
-        reading = digitise(value, self.t, sensor.noise, rng, resolution=sensor.resolution, limit=limit)
+        reading = digitise(value, self.t, sensor.noise, rng, resolution=sensor.resolution, limit=sensor.limit)
         return Samples(self.t, reading)
 
 
@@ -130,8 +129,8 @@ def look_with_accelerometer(motion: Motion, sensor: Accelerometer, rng: np.rando
 
     def signal(t: FloatArray) -> FloatArray:
         state = motion.at(t)
-        origin = specific_force(state, motion, np.zeros(3))
-        along = [specific_force(state, motion, axis) - origin for axis in np.eye(3)]  # per metre
+        origin = specific_force(state, motion.surroundings, np.zeros(3))
+        along = [specific_force(state, motion.surroundings, axis) - origin for axis in np.eye(3)]  # per metre
         return np.hstack((origin, *along, bias_drift(sensor.drift, t - motion.start)))
 
     # a lag is linear and settled at the start, so it may act before the mount turns and weighs the parts

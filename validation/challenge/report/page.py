@@ -104,7 +104,7 @@ def write_page(out: Path, scored: Sequence[Scored]) -> None:
         caption = "Errors of parameters in their own standard deviations"
         sections.append(Section("Are the standard errors honest?", (text,), figures=[(caption, figures["deviates"])]))
     if items:
-        sections.append(_detection(items, curve, figures))
+        sections.append(_detection(curve, figures))
     if any(has_power_law(item.answer) for item in scored):
         sections.append(_exponents(scored, figures))
     sections.append(_failures(scored))
@@ -268,7 +268,7 @@ def _by_effect(scored: Sequence[Scored]) -> Section:
     return Section("By effect", (text,), header, rows)
 
 
-def _detection(items: Sequence[Sized], curve: Curve | None, figures: Mapping[str, Path]) -> Section:
+def _detection(curve: Curve | None, figures: Mapping[str, Path]) -> Section:
     text = [
         "Size of each concealed effect in units of its detection limit: the size at which the recordings of that very "
         "case, with everything fitted that is unknown in them, hold just enough information for a gain in chi2 that "

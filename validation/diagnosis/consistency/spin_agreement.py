@@ -11,7 +11,7 @@ Nothing here decides a verdict: sensors that contradict one another are told of,
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ import numpy as np
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import ClockRate, Scale
 from discsim.recording import Recording
+from validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
 from validation.diagnosis.consistency.row_times import Rows, rows_of
 from validation.diagnosis.consistency.settling import Settling, settling_of
 from validation.diagnosis.consistency.turning import (
@@ -89,7 +90,8 @@ _CAUSES: Mapping[str, _Claim] = {
 class Comparison:
     """What one signal says of the spin over what the sensor of the rate says: 1 where they agree.
 
-    ``timed`` tells that the written time enters; ``share`` is how much of the signal turns with the spin.
+    ``needs_time`` tells that the written time enters; ``share_that_turns`` is how much of the signal turns with the
+    spin.
     """
 
     recording: str
@@ -97,8 +99,8 @@ class Comparison:
     sensor: str
     ratio: float
     sd: float
-    share: float
-    timed: bool
+    share_that_turns: float
+    needs_time: bool
 
     @property
     def off(self) -> float:
@@ -110,50 +112,23 @@ class Comparison:
         """Whether both agree."""
         return abs(self.off) < CONTRADICTION
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the JSON object."""
-        return {
-            "recording": self.recording,
-            "signal": self.signal,
-            "sensor": self.sensor,
-            "ratio": float(self.ratio),
-            "sd": float(self.sd),
-            "share_that_turns": float(self.share),
-            "needs_time": self.timed,
-            "agrees": self.agrees,
-        }
-
 
 @dataclass(frozen=True)
 class Proof:
     """A cause on a recording that took no part: its size there and elsewhere, chi-squared of what is compared.
 
-    ``field_before`` and ``field_after`` are what is left of the field's turning, uT rms, None without a magnetometer.
+    ``field_left_uT_...`` are what is left of the field's turning, rms, None without a magnetometer.
     """
 
     recording: str
-    own: float
+    own_value: float
     own_sd: float
-    others: float
-    others_sd: float
-    before: float
-    after: float
-    field_before: float | None
-    field_after: float | None
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the JSON object."""
-        return {
-            "recording": self.recording,
-            "own_value": self.own,
-            "own_sd": self.own_sd,
-            "value_of_others": self.others,
-            "sd_of_others": self.others_sd,
-            "chi2_before": self.before,
-            "chi2_after": self.after,
-            "field_left_uT_before": self.field_before,
-            "field_left_uT_after": self.field_after,
-        }
+    value_of_others: float
+    sd_of_others: float
+    chi2_before: float
+    chi2_after: float
+    field_left_uT_before: float | None
+    field_left_uT_after: float | None
 
 
 @dataclass(frozen=True)
@@ -164,27 +139,20 @@ class Cause:
     parameter: str
     value: float
     sd: float
-    before: float
-    after: float
-    proofs: tuple[Proof, ...]
+    chi2_before: float
+    chi2_after: float
+    heldout: tuple[Proof, ...]
 
     @property
     def heldout_after(self) -> float:
         """Chi-squared of the recordings, each when it took no part."""
-        return sum(proof.after for proof in self.proofs) if self.proofs else self.after
+        return sum(proof.chi2_after for proof in self.heldout) if self.heldout else self.chi2_after
 
     def to_json(self) -> dict[str, Any]:
         """Return the JSON object."""
-        return {
-            "id": self.id,
-            "parameter": self.parameter,
-            "value": self.value,
-            "sd": self.sd,
-            "chi2_before": self.before,
-            "chi2_after": self.after,
-            "heldout_chi2_after": self.heldout_after,
-            "heldout": [proof.to_json() for proof in self.proofs],
-        }
+        kept = asdict(self)
+        heldout = kept.pop("heldout")
+        return {**kept, "heldout_chi2_after": self.heldout_after, "heldout": heldout}
 
 
 @dataclass(frozen=True)
@@ -234,6 +202,7 @@ class Agreement:
     rows: Rows | None = None
     row_proofs: tuple[RowProof, ...] = ()
     settling: Settling | None = None
+    own_clock: OwnClock | None = None
 
     @property
     def contradiction(self) -> bool:
@@ -252,11 +221,12 @@ class Agreement:
             "reference": self.reference,
             "contradiction": self.contradiction,
             "text": list(self.sentences),
-            "comparisons": [item.to_json() for item in self.comparisons],
+            "comparisons": [{**asdict(item), "agrees": item.agrees} for item in self.comparisons],
             "causes": [item.to_json() for item in self.causes],
             "rows": None
             if self.rows is None
             else {**self.rows.to_json(), "heldout": [item.to_json() for item in self.row_proofs]},
+            "own_clock": None if self.own_clock is None else self.own_clock.to_json(),
             "settling": None if self.settling is None else self.settling.to_json(),
         }
 
@@ -272,15 +242,22 @@ def agreement_of(recordings: Sequence[Recording], names: Sequence[str]) -> Agree
     known = rate_of(some[0][0])
     assert known is not None
     rows = rows_of([recording for recording, _ in some], [name for _, name in some])
+    own_clock = None if rows is None else own_clock_of([r for r, _ in some], [n for _, n in some], rows)
     # in the times that counted rows give, where there are such
-    timed = [(rows.counted(r, n, rows.tick_s) or r) if rows is not None else r for r, n in some]
+    timed = [r if rows is None else _in_true_time(r, n, rows, own_clock) for r, n in some]
     settling = settling_of(timed, [name for _, name in some])
-    found = Agreement(known[0], comparisons, (), rows, (), settling)
+    found = Agreement(known[0], comparisons, (), rows, (), settling, own_clock)
     if not found.contradiction:
         return found
     causes = [cause for id in _CAUSES if (cause := _cause(id, comparisons, {n: r for r, n in some})) is not None]
     causes.sort(key=lambda cause: cause.heldout_after)
-    return Agreement(known[0], comparisons, tuple(causes), rows, _row_proofs(rows, some), settling)
+    return replace(found, causes=tuple(causes), row_proofs=_row_proofs(rows, some))
+
+
+def _in_true_time(recording: Recording, name: str, rows: Rows, own_clock: OwnClock | None) -> Recording:
+    """Return a recording in the times that counted rows give, by the magnetometer's own clock where it has one."""
+    counted = None if own_clock is None else own_clock.counted(recording, name)
+    return counted or rows.counted(recording, name, rows.tick_s) or recording
 
 
 def _compared(recording: Recording, name: str) -> list[Comparison]:
@@ -436,7 +413,7 @@ def _sentences(found: Agreement) -> list[str]:
         if not some:
             continue
         verb = "agrees with" if all(item.agrees for item in some) else "contradicts"
-        timed = "over the written time" if some[0].timed else "and no time enters that"
+        timed = "over the written time" if some[0].needs_time else "and no time enters that"
         ratios = ", ".join(f"{item.ratio:.3f} ± {item.sd:.3f} in {item.recording}" for item in some)
         said.append(
             f"{words[:1].upper()}{words[1:]} {verb} the {found.reference.replace('_', ' ')} about z: "
@@ -444,17 +421,18 @@ def _sentences(found: Agreement) -> list[str]:
         )
     if found.causes and any(not item.agrees for item in found.comparisons):
         best = found.causes[0]
-        held = sum(proof.before for proof in best.proofs)
-        own = ", ".join(f"{proof.own:.4f} ± {proof.own_sd:.4f} in {proof.recording}" for proof in best.proofs)
+        held = sum(proof.chi2_before for proof in best.heldout)
+        own = ", ".join(f"{proof.own_value:.4f} ± {proof.own_sd:.4f} in {proof.recording}" for proof in best.heldout)
         said.append(
             f"The single cause that reconciles most is {_CAUSES[best.id].words} ({best.id}, {best.parameter} = "
-            f"{best.value:.4f} ± {best.sd:.4f}): χ² of the comparisons falls from {best.before:.3g} to {best.after:.3g}"
-            + (f", on recordings set aside from {held:.3g} to {best.heldout_after:.3g}" if best.proofs else "")
+            f"{best.value:.4f} ± {best.sd:.4f}): χ² of the comparisons falls from {best.chi2_before:.3g} to "
+            f"{best.chi2_after:.3g}"
+            + (f", on recordings set aside from {held:.3g} to {best.heldout_after:.3g}" if best.heldout else "")
             + (f". By themselves the recordings ask for {own}." if own else ".")
         )
         said += [
-            f"{_CAUSES[other.id].words.capitalize()} ({other.id}) leaves {other.after:.3g}, {other.heldout_after:.3g} "
-            "on recordings set aside."
+            f"{_CAUSES[other.id].words.capitalize()} ({other.id}) leaves {other.chi2_after:.3g}, "
+            f"{other.heldout_after:.3g} on recordings set aside."
             for other in found.causes[1:3]
         ]
     if found.rows is not None:
@@ -470,6 +448,8 @@ def _sentences(found: Agreement) -> list[str]:
             )
             for proof in found.row_proofs
         ]
+    if found.own_clock is not None:
+        said += found.own_clock.sentences
     if found.settling is not None:
         said += found.settling.sentences
     return said

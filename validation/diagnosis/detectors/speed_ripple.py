@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
@@ -12,6 +13,7 @@ from discsim.effects.rig import SpeedRipple
 from validation.diagnosis.detectors.local_problem import gain_of, peaks
 from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.proposals import Proposal
+from validation.diagnosis.settings import DETECTORS
 from validation.identification.gauss_newton import Fit
 from validation.identification.noise import NoiseModel
 from validation.identification.propagation import Column
@@ -24,7 +26,7 @@ _ID = catalogued(SpeedRipple).id
 _ORDERS, _BIN = (0.1, 40.0), 0.02
 
 
-def ripple(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: float = 25.0) -> list[Proposal]:
+def ripple(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: float = DETECTORS.least) -> list[Proposal]:
     """Return ripples of a table's speed as proposals, best first: several orders where they are near in gain.
 
     The rate's residual (rate reference, else gyroscope, else the magnetometer's phase) is transformed over the angle
@@ -37,8 +39,7 @@ def ripple(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: floa
     if not parts:
         return []
     psi, e, weight = (np.concatenate([part[j] for part in parts]) for j in range(3))
-    width = float(np.ptp(psi))
-    if psi.size < 32 or width < 2.0 * np.pi:
+    if psi.size < 32 or (width := float(np.ptp(psi))) < 2.0 * np.pi:
         return []
     bins = int(width / _BIN) + 1
     size = 1 << int(np.ceil(np.log2(4 * bins)))
@@ -128,7 +129,7 @@ def _phase_rate(
 
 def _turned(t: FloatArray, rate: FloatArray, at: FloatArray) -> FloatArray:
     """Return the angle (n,) that a table has turned at instants by its command's knots."""
-    until = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t))])
+    until = cumulative_trapezoid(rate, t, initial=0)
     inside = np.clip(at, t[0], t[-1])
     k = np.clip(np.searchsorted(t, inside, side="right") - 1, 0, t.size - 2)
     x = inside - t[k]

@@ -6,16 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, IntArray
 from validation.diagnosis.selection.constrained_fit import Tied, noise_of, scored
 from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.diagnosis.selection.screening import Board, column_of
 from validation.diagnosis.selection.to_stated import to_baseline
 from validation.diagnosis.unknown_law.terms import SENSORS, SHAPES, SensorTerm
 from validation.identification.gauss_newton import Fit, linearised, mapped
-from validation.identification.linear import IntArray, Linear
+from validation.identification.linear import Linear
 from validation.identification.linearisation import moved
 from validation.identification.noise import whitened
 from validation.identification.normal_equations import local_step, reduce, shared_step
@@ -48,7 +49,7 @@ def turned(chain: Chain) -> Turned:
         # piecewise linear, so its integral is exact on its knots and parabolas between
         grid = np.union1d(np.linspace(0.0, chain.edges[-1], 20 * t.size), np.clip(command.t, 0.0, chain.edges[-1]))
         r = np.interp(grid, command.t, command.value)
-        psi = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(grid) * (r[1:] + r[:-1]))])
+        psi = cumulative_trapezoid(r, grid, initial=0)
         rate = CubicHermiteSpline(grid, r, np.gradient(r, grid))
         return Turned(rate, CubicHermiteSpline(grid, psi, r))
     r = np.zeros(t.size) if spin is None else chain.states[:, spin]

@@ -20,6 +20,7 @@ from math import atan2, copysign, cos, degrees, hypot, radians, sin, sqrt
 from typing import Any
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray
 from discsim.compiled import compiled, compiled_nogil
@@ -42,7 +43,7 @@ from validation.identification.plants.plant import (
     Layout,
     Plant,
     Sizes,
-    rows_for,
+    propagated_by,
 )
 from validation.identification.readings import Readings
 
@@ -63,15 +64,6 @@ _STEP, _NUTATION = 0.005, 0.22
 def _longest_step(given: Given, state: FloatArray, start: float, stop: float) -> float:
     del given, start, stop
     return min(_STEP, _NUTATION / max(min(abs(float(state[_SPIN])), FASTEST) * 2.0, 1.0))
-
-
-def _propagate(
-    given: Given, flats: FloatArray, own: FloatArray, states: FloatArray, times: FloatArray, last: int, out: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    del given
-    rows, ends = rows_for(states, out)
-    free_spin_pieces(flats, own, states, times, last, out, rows, ends)
-    return rows, ends
 
 
 @compiled
@@ -296,7 +288,7 @@ def _over_turns(recording: Recording, one: Readings) -> list[Readings]:
     """
     grid = np.linspace(0.0, recording.end, max(int(recording.end / 0.05), 2))
     rate = spin_starts(recording, grid).rate[:, 2]
-    phase = np.interp(one.t, grid, np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(grid))]))
+    phase = np.interp(one.t, grid, cumulative_trapezoid(rate, grid, initial=0))
     phase = np.abs(phase) / (2.0 * np.pi)
     centres = np.arange(phase[0] + _TURNS / 2, phase[-1] - _TURNS / 2, _TURNS / 2)
     first, last = np.searchsorted(phase, centres - _TURNS / 2), np.searchsorted(phase, centres + _TURNS / 2)
@@ -381,7 +373,7 @@ FREE_SPIN = Plant(
     name=_NAME,
     motion="free spin",
     layout=Layout(_SIZE, 15, attitude=_ATTITUDE, rate=_RATE, spin=_SPIN, per_time=(_DECAY, _SPIN)),
-    dynamics=Dynamics(_propagate, _longest_step),
+    dynamics=Dynamics(propagated_by(free_spin_pieces, lambda given, own: own), _longest_step),
     initial=Initial(_states, _other_attitudes),
     sizes=Sizes(
         differences=np.array([1e-2, 1e-2, 1e-2, 1e-2, 1e-4, 1e-4, *[1e-5] * 3, *[1e-4] * 3, 1e-3, 3e-3, 3e-3]),

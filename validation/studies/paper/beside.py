@@ -46,7 +46,7 @@ BLOCKS: tuple[tuple[str, str], ...] = (
     ("of roll", "discsim.aerodynamics.rolling_coefficient"),
     ("of yaw, constant or from the table", "discsim.aerodynamics.yaw_damping"),
     ("force and moment in W, turned into B and N", "discsim.aerodynamics.air_wrench"),
-    ("equations of motion", "discsim.trajectory.derivative"),
+    ("equations of motion", "discsim.flight_equations.derivative"),
     ("the same, integrated by MuJoCo", "discsim.engine.fly"),
 )
 

@@ -20,6 +20,7 @@ from typing import Any, Literal
 import numpy as np
 
 from discsim.files import write_text
+from validation.reporting.markdown import table
 
 __all__ = ["LOGS", "Answers", "Log", "Said", "answers", "road_section", "walk"]
 
@@ -188,10 +189,8 @@ _HEADER = ("log", "import", "check", "estimate: best of its methods", "diagnose"
 
 def road_section(found: Sequence[Answers]) -> list[str]:
     """Return the lines of the table, and a list of what is known of each log."""
-    lines = [f"| {' | '.join(_HEADER)} |", "| --- | --- | --- | --- | --- | --- | --- |"]
-    lines += [f"| {' | '.join(_row(one))} |" for one in found]
     known = [f"- *{one.log.label}*: {one.log.truth}." for one in found]
-    return [*lines, "", "What is known of them:", "", *known]
+    return [*table(_HEADER, map(_row, found)).splitlines(), "", "What is known of them:", "", *known]
 
 
 def _row(one: Answers) -> list[str]:

@@ -1,0 +1,289 @@
+"""Searches for touches, knocks, gusts, ripples, limits and lost samples: on MuJoCo's motions, and on clean ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from discsim.disc import Release
+from discsim.effects.catalogue import Effect, effect
+from discsim.engine import fly
+from discsim.motion import Motion
+from discsim.recording import Recording, Samples
+from discsim.rig import turn_table
+from discsim.sensors import Instruments, record
+from discsim.shipped import load_disc
+from validation.diagnosis.detectors import dropped_samples
+from validation.diagnosis.detectors.dropped_samples import dropped_accelerometer
+from validation.diagnosis.detectors.events import events
+from validation.diagnosis.detectors.gusts import gusts
+from validation.diagnosis.detectors.local_problem import Asked, asked_of
+from validation.diagnosis.detectors.sample_alignment import likeliest_counts, phase_counts
+from validation.diagnosis.detectors.saturation import saturation
+from validation.diagnosis.detectors.speed_ripple import ripple
+from validation.diagnosis.detectors.time_offsets import time_offsets
+from validation.diagnosis.relaxed_fit import first_chain, relaxed
+from validation.diagnosis.selection.candidates import Trial
+from validation.diagnosis.selection.constrained_fit import tied_fit
+from validation.diagnosis.selection.hypothesis import Hypothesis
+from validation.identification.clipping import equal_beyond_chance, plateau_of
+from validation.identification.gauss_newton import Fit
+from validation.identification.noise import estimate_noise
+from validation.identification.plants.rate_table import RATE_TABLE
+from validation.identification.prediction import shown
+
+DRIVER, FIELD = load_disc("driver")
+MODULE = Instruments.from_parts("mpu9250", "neo_m8n")
+PROFILE = Samples(np.array([0.0, 2.0, 3.0, 6.0]), np.array([12.0, 12.0, 55.0, 55.0]))
+RIPPLE = effect("rig.speed_ripple", order=2.06, amplitude_rad_s=0.05, phase_rad=0.4)
+
+
+@cache
+def flight(*hidden: Effect, heading: float = 0.0) -> Motion:
+    """Two and a half seconds of a throw."""
+    c, s = np.cos(heading), np.sin(heading)
+    release = Release(
+        np.array([0.0, 0.0, -1.3]),
+        np.array([22.0 * c, 22.0 * s, -3.5]),
+        np.radians(-12.0),
+        np.radians(8.0),
+        0.3,
+        np.array([0.5, -0.4, 70.0]),
+    )
+    return fly(DRIVER, FIELD, release, hidden, duration=2.5)
+
+
+def measured(motion: Motion, *errors: Effect, seed: int = 1) -> Recording:
+    module = MODULE.with_effects(errors)
+    return record(motion, module, np.random.default_rng(seed), plant="flight", name="throw", disc=DRIVER)
+
+
+@cache
+def throws(hidden: tuple[Effect, ...] = (), errors: tuple[Effect, ...] = ()) -> tuple[Recording, ...]:
+    """Two throws, an event in the second; errors of sensors in both."""
+    return (
+        measured(flight(heading=0.5), *errors, seed=1),
+        measured(flight(*hidden, heading=-0.8), *errors, seed=2),
+    )
+
+
+@cache
+def loose(hidden: tuple[Effect, ...] = (), errors: tuple[Effect, ...] = ()) -> Fit:
+    return relaxed(throws(hidden, errors))
+
+
+def questions(hidden: tuple[Effect, ...] = ()) -> Asked:
+    fit = loose(hidden)
+    return asked_of(fit, shown_noise(fit), (), Hypothesis())
+
+
+def shown_noise(fit: Fit):  # type: ignore[no-untyped-def]
+    return estimate_noise(fit.linears, [linear.residual for linear in fit.linears])
+
+
+def table(*hidden: Effect, errors: tuple[Effect, ...] = ()) -> Recording:
+    motion = turn_table(PROFILE, FIELD, hidden)
+    module = Instruments.from_parts("mpu9250").with_effects(errors)
+    return record(motion, module, np.random.default_rng(4), plant="rate_table", name="table", command=PROFILE)
+
+
+# what makes a proposal worth a refit; with nothing hidden the best of some dozen boundaries gains 18 at most
+LEAST = 25.0
+
+
+@pytest.mark.parametrize(
+    ("hidden", "sizes"),
+    [
+        (
+            effect("event.impulse", t_s=1.237, dv_north_m_s=0.1, dv_east_m_s=-0.2, dv_down_m_s=0.05),
+            {"dv_north_m_s": 0.1, "dv_east_m_s": -0.2, "dv_down_m_s": 0.05},
+        ),
+        (effect("event.spin_step", t_s=1.237, dr_rad_s=0.4), {"dr_rad_s": 0.4}),
+    ],
+)
+def test_an_event_is_found_in_its_recording_at_its_instant_with_its_size(
+    hidden: Effect, sizes: dict[str, float]
+) -> None:
+    best = events(questions((hidden,)))[0]
+    assert best.trial.id == hidden.id
+    assert best.trial.recordings == frozenset([1])
+    tied = tied_fit(loose((hidden,)), Hypothesis((best.trial,)), (), shown_noise(loose((hidden,))), best.start)
+    found = {
+        q.name: (v, s)
+        for q, v, s in zip(tied.fit.parameters, tied.fit.at, np.sqrt(np.diag(tied.fit.covariance)), strict=True)
+    }
+    assert found["t_s"][0] == pytest.approx(1.237, abs=0.02)
+    for name, size in sizes.items():
+        value, sd = found[name]
+        assert value == pytest.approx(size, abs=4.0 * sd)
+        assert sd < 0.2 * max(abs(v) for v in sizes.values())
+
+
+def test_a_gust_is_found_in_its_recording_near_its_instant() -> None:
+    hidden = effect("air.gust", t_s=1.1, width_s=0.3, w_north_m_s=0.9, w_east_m_s=-0.5)
+    best = gusts(questions((hidden,)))[0]
+    assert best.trial.recordings == frozenset([1])
+    assert best.trial.shapes["t_s"] == pytest.approx(1.1, abs=0.25)
+    assert best.start[("air.gust", "w_north_m_s"), best.trial.recordings] > 0.3
+
+
+def test_nothing_is_proposed_for_throws_that_hide_nothing() -> None:
+    asked = questions()
+    assert events(asked, LEAST + 20.0) == []
+    assert gusts(asked, LEAST) == []
+    assert saturation(loose(), shown_noise(loose())) == []
+    assert dropped_accelerometer(loose(), shown_noise(loose())) == []
+
+
+def test_steps_of_the_phase_tell_how_many_samples_were_lost() -> None:
+    motion = flight(heading=0.5)
+    whole = measured(motion)
+    short = measured(motion, effect("mag.dropped_samples", fraction=0.04))
+    gone = len(whole.samples["magnetometer"]) - len(short.samples["magnetometer"])
+    assert gone > 3
+    # losses among the first and the last few samples have no neighbours to be judged by
+    assert phase_counts(short)[-1] == pytest.approx(gone, abs=2)
+    assert phase_counts(whole)[-1] == 0
+
+
+def test_a_wrong_clock_is_not_taken_for_lost_samples() -> None:
+    assert phase_counts(measured(flight(heading=0.5), effect("mag.clock_rate", ratio=1.02)))[-1] == 0
+
+
+def test_lost_samples_of_the_accelerometer_are_counted_by_the_motion_of_the_others() -> None:
+    errors = (effect("accel.dropped_samples", fraction=0.02),)
+    fit = loose((), errors)
+    (found,) = dropped_accelerometer(fit, shown_noise(fit))
+    whole, short = throws(), throws((), errors)
+    for chain, a, b in zip(found.chains, whole, short, strict=True):
+        gone = len(a.samples["accelerometer"]) - len(b.samples["accelerometer"])
+        assert chain.lost["accelerometer"][-1] == pytest.approx(gone, abs=1)
+    ((name, share, sd),) = found.proposal.trial.told
+    assert name == "fraction"
+    assert share == pytest.approx(0.02, abs=4.0 * sd)
+
+
+@pytest.mark.parametrize("ratio", [1.015, 0.985])
+def test_a_flight_is_followed_by_the_others_where_the_clock_of_one_sensor_is_wrong(ratio: float) -> None:
+    """With all at once the accelerometer's phase, off by turns, leads the fit astray."""
+    fit = loose((), (effect("accel.clock_rate", ratio=ratio),))
+    assert fit.merit < 1.2 * fit.count
+    assert fit.values(0)["accel.clock_rate", "ratio"] == pytest.approx(ratio, abs=2e-4)
+
+
+def test_counts_never_fall_and_follow_the_cheapest_way() -> None:
+    # samples 0 1 2 | 4 5 of a ramp: one was lost before the fourth
+    ramp, taken = np.arange(7.0), np.array([0, 1, 2, 4, 5])
+    cost = ((taken[:, None] - ramp[np.arange(5)[:, None] + np.arange(3)]) / 0.1) ** 2
+    counts, least = likeliest_counts(cost, np.array([0, 1, 1, 1, 1]), each=9.0)
+    assert counts.tolist() == [0, 0, 0, 1, 1]
+    assert least == pytest.approx(9.0)
+
+
+def test_readings_that_stand_still_below_the_range_are_a_limit() -> None:
+    errors = (effect("accel.saturation", limit_m_s2=40.0),)
+    fit = loose((), errors)
+    (found,) = saturation(fit, shown_noise(fit))
+    ((name, limit, _),) = found.trial.told
+    assert name == "limit_m_s2"
+    assert limit == pytest.approx(40.0, abs=1e-9)
+    assert found.gain > 1000.0
+
+
+def test_noise_alone_makes_no_plateau() -> None:
+    rng = np.random.default_rng(3)
+    for size in (50, 2000, 20000):
+        steady = 60.0 + 0.08 * rng.standard_normal((size, 3))
+        assert plateau_of(np.round(steady / 0.005) * 0.005, 0.005) is None
+        assert plateau_of(np.minimum(np.round(steady / 0.005) * 0.005, 60.0), 0.005) == 60.0
+
+
+def test_equal_readings_count_against_chance() -> None:
+    def spun(top: float) -> Recording:
+        made = throws()[0]
+        felt = made.need("accelerometer")
+        samples = {**made.samples, "accelerometer": Samples(felt.t, np.clip(felt.value, -top, top))}
+        return replace(made, samples=samples)
+
+    assert equal_beyond_chance(spun(1e3)) < 25.0
+    assert equal_beyond_chance(spun(60.0)) > 100.0
+
+
+def test_a_ripple_is_found_at_its_order_amplitude_and_phase() -> None:
+    fit = relaxed([table(RIPPLE)])
+    noise = shown_noise(fit)
+    tied = tied_fit(fit, Hypothesis(), (), noise, {})
+    best = ripple(tied.fit, tied.fit.noise)[0]
+    refit = tied_fit(fit, Hypothesis((best.trial,)), (), noise, best.start)
+    found = {q.name: v for q, v in zip(refit.fit.parameters, refit.fit.at, strict=True)}
+    assert found["order"] == pytest.approx(2.06, abs=2e-3)
+    assert found["amplitude_rad_s"] == pytest.approx(0.05, rel=0.05)
+    assert found["phase_rad"] == pytest.approx(0.4, abs=0.15)
+
+
+def test_a_steady_table_has_no_ripple() -> None:
+    fit = relaxed([table()])
+    tied = tied_fit(fit, Hypothesis(), (), shown_noise(fit), {})
+    assert ripple(tied.fit, tied.fit.noise) == []
+
+
+def test_a_table_that_stands_still_has_no_ripple() -> None:
+    """A ripple repeats over the angle turned: none is turned, and there is nothing to ask."""
+    still = Samples(np.array([0.0, 2.0]), np.zeros(2))
+    made = record(
+        turn_table(still, FIELD),
+        Instruments.from_parts("mpu9250"),
+        np.random.default_rng(4),
+        plant="rate_table",
+        name="still",
+        command=still,
+    )
+    fit = relaxed([made])
+    assert ripple(fit, shown_noise(fit)) == []
+
+
+def test_a_table_with_ripple_turns_as_in_the_engine() -> None:
+    motion = turn_table(PROFILE, FIELD, [RIPPLE])
+    chain = first_chain(table(RIPPLE))
+    assert chain.plant.layout.directions == RATE_TABLE.sizes.continuous.sd.size
+    values = {("rig.speed_ripple", name): v for name, v in RIPPLE.value._asdict().items()}
+    t = np.arange(0.003, 0.95, 0.01)
+    rate = shown(chain, values, "gyroscope", t)[:, 2]
+    # the first piece starts from nothing turned; its steps of 0.3 rad of the ripple leave some 1e-5 of its amplitude
+    assert np.max(np.abs(rate - motion.at(t).rate[:, 2])) < 1e-4 * 0.05 + 1e-6
+
+
+def offsets_found(*errors: Effect) -> dict[str, float]:
+    """Return what is proposed for a table: effect to its first value."""
+    made = relaxed([table(errors=errors)])
+    tied = tied_fit(made, Hypothesis(), (), shown_noise(made), {})
+    return {p.trial.id: next(iter(p.start.values())) for p in time_offsets(tied.fit, tied.fit.noise)}
+
+
+@pytest.mark.parametrize("offset", [-0.08, -0.03, 0.05])
+@pytest.mark.parametrize("sensor", ["accel", "gyro"])
+def test_an_offset_of_time_on_a_table_is_found_on_either_side(sensor: str, offset: float) -> None:
+    """A late sensor may lag instead: that is proposed, too, and fits decide."""
+    found = offsets_found(effect(f"{sensor}.time_offset", offset_s=offset))
+    assert found.pop(f"{sensor}.time_offset") == pytest.approx(offset, abs=0.006)
+    late = {f"{sensor}.lag"} if offset > 0.0 else set()
+    assert set(found) == late
+
+
+def test_no_offset_of_time_is_proposed_for_a_sound_table() -> None:
+    assert offsets_found() == {}
+
+
+def test_what_the_phase_tells_of_losses_is_worked_out_once_for_a_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+    monkeypatch.setattr(dropped_samples, "dropped_magnetometer", lambda fit, known: calls.append(fit) or [])
+    slips, one, other = dropped_samples.Slips(), loose(), replace(loose())
+    taken = [Trial("mag.dropped_samples", ())]
+    assert slips.found(one, (), taken) == []
+    assert calls == []
+    for fit in (one, one, other):
+        slips.found(fit, (), ())
+    assert calls == [one, other]
