@@ -17,16 +17,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
-__all__ = ["Result", "require"]
+__all__ = ["Result", "installed", "require"]
+
+
+def installed(package: str) -> bool:
+    """Tell whether a package is installed."""
+    try:
+        return find_spec(package) is not None
+    except ValueError:  # its module was set to None
+        return False
 
 
 def require(package: str, what: str, extra: str) -> None:
     """Raise `InputError` where an optional package is not installed; ``what`` needs it, ``extra`` brings it."""
-    try:
-        there = find_spec(package) is not None
-    except ValueError:  # a module that was set to None
-        there = False
-    if not there:
+    if not installed(package):
         raise InputError(f"{what}: needs {package}, which is not installed; pip install 'discsim[{extra}]'")
 
 

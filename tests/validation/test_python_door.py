@@ -21,6 +21,7 @@ from discsim.threads import limited, one_thread
 from estimators import estimate, fft
 from validation.cli import main
 from validation.reporting.run import start_run
+from validation.running.tasks import Task, run_tasks
 from validation.studies.catalogue import STUDIES, run_study
 
 #: modules with examples: each is run as it stands
@@ -142,6 +143,17 @@ def test_a_package_that_is_missing_is_named_with_the_extra_that_brings_it(record
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(discsim.InputError, match=rf"needs {package}, .* pip install 'discsim\[tables\]'"):
         getattr(discsim.fft(*field_of(RATE)), call)()
+
+
+def test_a_sweep_and_workers_name_the_extra_that_they_need(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(discsim.InputError, match=r"sweep: needs xarray, .*discsim\[tables\]"):
+        discsim.sweep("installation")
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    tasks = [Task("a", 1), Task("b", 2)]
+    with pytest.raises(discsim.InputError, match=r"--workers 2: needs distributed, .*discsim\[cluster\]"):
+        run_tasks(tasks, lambda argument, shared: argument, tmp_path, workers=2)
+    assert run_tasks(tasks, lambda argument, shared: argument, tmp_path) == [1, 2]
 
 
 def test_linear_algebra_has_one_thread_inside_and_as_many_as_before_outside():

@@ -15,7 +15,6 @@ import threading
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from importlib.util import find_spec
 from itertools import islice
 from multiprocessing import resource_tracker
 from pathlib import Path
@@ -25,7 +24,7 @@ import numpy as np
 
 from discsim.errors import InputError
 from discsim.files import read_text, write_bytes, write_text
-from discsim.result import require
+from discsim.result import installed, require
 from discsim.threads import limited
 
 if TYPE_CHECKING:
@@ -133,7 +132,7 @@ def run_tasks(
     done = {name: result for name in names if (result := _read(folder, name)) is not None}
     left = [task for task in tasks if task.name not in done]
     if left:
-        count = workers or (len(os.sched_getaffinity(0)) if find_spec("distributed") else 1)
+        count = workers or (len(os.sched_getaffinity(0)) if installed("distributed") else 1)
         results = _results(left, function, shared, scheduler, count)
         for name, result in progress(results, len(left)) if progress else results:
             done[name] = _write(folder, name, result)
