@@ -28,6 +28,7 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import read_text, write_text
 from discsim.limits import MOST_ROWS, reading_fault, written_time_fault
+from discsim.recorded import Recorded
 from discsim.toml_table import TomlTable, read_toml
 from discsim.toml_text import disc_toml, environment_toml, release_toml, rig_toml, toml_table, toml_value
 
@@ -148,7 +149,7 @@ class SensorSheet:
 
 
 @dataclass(frozen=True)
-class Recording:
+class Recording(Recorded):
     """One recording: what is stated about it and a `Samples` per sensor; it never carries the truth."""
 
     plant: Plant

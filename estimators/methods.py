@@ -12,6 +12,7 @@ import numpy as np
 from discsim.arrays import BoolArray, FloatArray, sd_by_median
 from discsim.errors import InputError
 from discsim.recording import Recording
+from discsim.threads import one_thread
 from estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors, accelerometer
 from estimators.fft import FftSettings, fft
 from estimators.fusion import accelerometer_calibrated, compare_sensors, contradictions, fusion
@@ -167,6 +168,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 )
 
 
+@one_thread
 def estimate(recording: Recording, name: str, options: Options | None = None) -> YawRate:
     """Spin rate of a recording by the method of that name, or by `best`.
 
@@ -203,6 +205,7 @@ def _clocked(found: YawRate, recording: Recording) -> YawRate:
     return replace(found, sd=np.hypot(found.sd, off / sheet.rate_hz * np.abs(found.rate)))
 
 
+@one_thread
 def all_methods(recording: Recording, options: Options | None = None) -> tuple[list[YawRate], dict[str, str]]:
     """Return what every method gives, and the methods left out, each with the reason in a sentence.
 
@@ -239,6 +242,7 @@ def best(recording: Recording, options: Options | None = None) -> YawRate:
     return best_of(recording, options)[0]
 
 
+@one_thread
 def best_of(recording: Recording, options: Options | None = None) -> tuple[YawRate, dict[str, str]]:
     """Return the rate of `best`, and why each method that it prefers to the one taken was passed over."""
     options, sound = options or Options(), usable(recording)

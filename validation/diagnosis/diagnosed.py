@@ -5,13 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
 
 from discsim.effects.own import UserEffect
 from discsim.errors import InputError
 from discsim.model_file import Model
 from discsim.recording import Recording
+from discsim.result import Result
+from discsim.threads import one_thread
 from validation.diagnosis.datasets import need_field
 from validation.diagnosis.pipeline import diagnose
+from validation.diagnosis.report.figures import draw_overview
 from validation.diagnosis.report.files import write_outcome
 from validation.diagnosis.report.page import verdict_sentence
 from validation.diagnosis.result import Diagnosis, NamedEffect, Outcome
@@ -23,7 +29,7 @@ __all__ = ["Diagnosed", "diagnose_named", "diagnose_recordings"]
 
 
 @dataclass(frozen=True, repr=False)
-class Diagnosed:
+class Diagnosed(Result):
     """A finished diagnosis.
 
     Attributes
@@ -64,6 +70,21 @@ class Diagnosed:
     def summary(self) -> str:
         """Return the verdict and the sentence that explains it, one line."""
         return f"{self.verdict}: {verdict_sentence(self.diagnosis)}"
+
+    def table(self) -> dict[str, list[Any]]:
+        """Return a row for each parameter of each named effect: effect, recordings, parameter, value, sd."""
+        rows = [(effect, name, found) for effect in self.effects for name, found in effect.parameters.items()]
+        return {
+            "effect": [effect.id for effect, *_ in rows],
+            "recordings": [", ".join(effect.recordings or ("all",)) for effect, *_ in rows],
+            "parameter": [name for _, name, _ in rows],
+            "value": [found.value for *_, found in rows],
+            "sd": [float("nan") if found.sd is None else found.sd for *_, found in rows],
+        }
+
+    def plot(self) -> Figure:
+        """Return the figure of residuals over the noise, by recording and axis, before and after."""
+        return draw_overview(self.outcome.residuals)
 
     def report(self, folder: Path | str, command: str = "validation.diagnose") -> Path:
         """Write diagnosis.json, report.html, figures and model.toml into ``folder``; return the report's path.
@@ -106,7 +127,10 @@ def diagnose_recordings(
     progress
         Called with a stage, the steps done, and the steps in all.
 
-    Raises `InputError` for recordings of different plants, and for a magnetometer in a field that is not stated.
+    Raises
+    ------
+    InputError
+        For recordings of different plants, and for a magnetometer in a field that is not stated.
     """
     if name is None:
         name = Path(recordings).resolve().name if isinstance(recordings, Path | str) else "recordings"
@@ -115,6 +139,7 @@ def diagnose_recordings(
     )
 
 
+@one_thread
 def diagnose_named(
     datasets: Mapping[str, Sequence[Recording]],
     *,

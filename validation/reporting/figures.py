@@ -77,13 +77,16 @@ def new_figure(
     return figure, figure.subplots(rows, columns, **options)
 
 
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as ``path``'s ending says (``.png`` or ``.svg``), without a date."""
+def save_figure(figure: Figure, path: Path | None) -> Figure:
+    """Write a figure as ``path``'s ending says (``.png`` or ``.svg``), without a date, unless it is None; return it."""
+    if path is None:
+        return figure
     kind = path.suffix.removeprefix(".")
     metadata = {"Date": None} if kind == "svg" else {"Software": None}
     buffer = io.BytesIO()
     figure.savefig(buffer, format=kind, dpi=150, metadata=metadata)
     write_bytes(path, buffer.getvalue())
+    return figure
 
 
 def symmetric_log(axes: Axes, *, linear: float, limit: float) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from discsim.files import write_text
+from discsim.version import commit
 from validation.reporting.run import package_version
 
 __all__ = ["Section", "write_page", "write_report"]
@@ -46,5 +47,7 @@ def write_page(path: Path, template: str, **content: Any) -> None:
         loader=PackageLoader("validation"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
     environment.tests["number_cell"] = lambda cell: bool(_NUMBER.match(str(cell)))
-    page = environment.get_template(template).render(footer=f"discsim {package_version()}", **content)
+    page = environment.get_template(template).render(
+        footer=f"discsim {package_version()}, commit {commit()}", **content
+    )
     write_text(path, page)

@@ -15,9 +15,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-import discsim
 from discsim.errors import InputError
 from discsim.files import digest, write_text
+from discsim.version import commit, version
 
 __all__ = ["Run", "package_version", "source_digest", "start_run"]
 
@@ -26,7 +26,7 @@ T = TypeVar("T")
 
 def package_version() -> str:
     """Return the installed version of discsim ("unknown" when run from a bare source tree)."""
-    return discsim.__version__
+    return version()
 
 
 def source_digest(*places: Path, without: Container[Path] = ()) -> str:
@@ -114,6 +114,7 @@ def start_run(out: Path, seed: int | None = None, inputs: Iterable[Path] = ()) -
         {
             "command": ["discsim", *run.command],
             "version": package_version(),
+            "commit": commit(),
             "seed": seed,
             "inputs": digests,
             "duration_s": round(time.monotonic() - started, 3),

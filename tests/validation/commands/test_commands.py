@@ -60,7 +60,7 @@ def test_a_command_loads_neither_the_others_nor_what_it_does_not_need():
     )
     assert "validation.commands" in shown
     assert not shown & {"numpy", "validation.commands.fly"}
-    flown = loaded("import validation.commands.fly; import discsim.engine, discsim.sensors, discsim.many_flights")
+    flown = loaded("import validation.commands.fly, discsim.engine, discsim.sensors, discsim.many_flights")
     assert "mujoco" in flown
     assert not flown & {"scipy.interpolate", "scipy.optimize", "scipy.special", "matplotlib"}
 

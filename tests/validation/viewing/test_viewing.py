@@ -322,7 +322,7 @@ def test_a_video_of_no_frames_or_backwards_is_refused(fps, speed):
 def test_an_mp4_without_ffmpeg_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setattr(viewing.shutil, "which", lambda name: None)
     monkeypatch.setattr(viewing, "find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"needs ffmpeg.*imageio-ffmpeg.*\.gif needs none"):
+    with pytest.raises(InputError, match=r"needs ffmpeg.*discsim\[video\].*\.gif needs none"):
         write_mp4(tmp_path / "a.mp4", iter([Image.new("RGB", (8, 8))]), 30.0)
 
 
