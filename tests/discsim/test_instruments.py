@@ -322,7 +322,7 @@ class TestRecord:
             assert np.array_equal(stated[name].position, sheet.position) or sheet.position is None
 
     def test_it_carries_what_is_stated_and_no_truth(self):
-        got = recorded(MODULE, release=None)
+        got = recorded(MODULE)
         assert (got.plant, got.name, got.disc, got.rig, got.release) == ("flight", "test", DRIVER, None, None)
         assert got.environment is FLIGHT.environment
 

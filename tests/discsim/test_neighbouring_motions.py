@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from flights import DRIVER, FIELD, throw
+from support.flights import DRIVER, FIELD, throw
 
 from discsim.effects.sensors import BiasDrift, CrossAxis, GSensitivity, PositionOffset, SoftIron, StrayField
 from discsim.effects.setup import BoardRotation, SiteField

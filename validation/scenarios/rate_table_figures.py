@@ -28,8 +28,7 @@ def draw_methods(run: RateTableRun, path: Path) -> None:
     top = axes[0]
     for method in names:
         rate = run.rates[method]
-        label = {"adxrs649": "ADXRS649"}.get(method, method)
-        top.plot(rate.t, np.degrees(rate.rate), color=colour(method, names), lw=_WIDTHS.get(method, 1.0), label=label)
+        top.plot(rate.t, np.degrees(rate.rate), color=colour(method, names), lw=_WIDTHS.get(method, 1.0), label=method)
     top.plot(truth_t, truth, color=COLOURS["truth"], lw=0.9, ls="--", label="truth")
     top.set_title("All methods on one profile")
     top.legend(loc="upper left", ncols=5, fontsize=8)

@@ -26,7 +26,6 @@ from validation.diagnosis.detectors.saturation import saturation
 from validation.diagnosis.detectors.speed_ripple import ripple
 from validation.diagnosis.detectors.time_offsets import time_offsets
 from validation.diagnosis.relaxed_fit import first_chain, relaxed
-from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.constrained_fit import tied_fit
 from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.identification.clipping import equal_beyond_chance, plateau_of
@@ -281,9 +280,8 @@ def test_what_the_phase_tells_of_losses_is_worked_out_once_for_a_fit(monkeypatch
     calls = []
     monkeypatch.setattr(dropped_samples, "dropped_magnetometer", lambda fit, known: calls.append(fit) or [])
     slips, one, other = dropped_samples.Slips(), loose(), replace(loose())
-    taken = [Trial("mag.dropped_samples", ())]
-    assert slips.found(one, (), taken) == []
     assert calls == []
     for fit in (one, one, other):
-        slips.found(fit, (), ())
+        slips = slips.about(fit, ())
+        assert slips.fit is fit
     assert calls == [one, other]
