@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,9 @@ def thresholds():
     path = ROOT / "benchmarks" / "thresholds.py"
     spec = importlib.util.spec_from_file_location("measured_thresholds", path)
     module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    known = sys.modules.setdefault(spec.name, module)  # where dataclasses look for their annotations
+    spec.loader.exec_module(known)
+    return known
 
 
 def test_the_page_has_the_rates_of_the_table_of_sets_against_the_limits_of_the_code(thresholds):
@@ -35,7 +37,8 @@ def test_the_tail_of_an_exponential_is_continued_to_its_own_rate(thresholds):
     over, bound, tail = thresholds.excess(reached, 20.0)
     assert over == np.sum(reached > 20.0)
     assert 0.0 < bound < 0.01
-    assert np.log(tail) == pytest.approx(-10.0, abs=0.5)  # the scale of 400 excesses is known to 5 %
+    # from 4.6 on by the scale of 400 excesses, known to 5 %: three standard deviations of 0.05 (20 - 4.6) / 2
+    assert np.log(tail) == pytest.approx(-10.0, abs=3.0 * 0.05 * (20.0 - 4.6) / 2.0)
 
 
 def test_a_line_that_was_cut_off_is_measured_again(thresholds, tmp_path):
