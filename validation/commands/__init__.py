@@ -20,6 +20,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "estimate": ("estimate", "Estimate the spin rate of a recording and its standard deviation over time."),
     "fit": ("fit", "Fit C_Nr to the throws of a data set."),
     "fly": ("fly", "Fly a disc and write what its instruments record."),
+    "scatter": ("scatter", "Tell where throws land when release, coefficients and wind are uncertain."),
     "rate-table": ("rate_table", "Turn a rate table through a profile and score every method against the truth."),
     "sweep": (
         "sweep",

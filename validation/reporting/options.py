@@ -37,9 +37,11 @@ __all__ = [
     "at_place",
     "at_site",
     "disc_to_fly",
+    "flight_effects",
     "laws_upon",
     "parse_effects",
     "parse_module",
+    "parse_sizes",
     "parse_vector",
 ]
 
@@ -134,6 +136,28 @@ def all_effects(
     effects += parse_effects(texts, plant, sensors, own)
     by_id(effects)
     return effects, notes
+
+
+def flight_effects(
+    model: Model | None, texts: Sequence[str] | None
+) -> tuple[list[Effect], dict[tuple[str, str], float], list[str]]:
+    """Return the effects of a model and of ``--effect`` upon a flight, one sigma of the model's by (id, parameter).
+
+    Beside them a line for each that is passed over. Raises `InputError` for a model with a law about the motion, which
+    the flights of many throws do not know.
+    """
+    if model is not None and any(law.target in WRENCH_TARGETS for law in model.laws):
+        raise InputError("the model has a law about the motion; expected one without (discsim fly takes it)")
+    effects, notes = all_effects(model, texts, "flight", (), None)
+    held = () if model is None else model.effects
+    sigma = {
+        (item.effect.id, name): size
+        for item in held
+        if item.effect in effects and item.effect.own is None and item.effect.row.apply is None
+        for name, size in item.sigma.items()
+        if size > 0.0
+    }
+    return effects, sigma, notes
 
 
 def laws_upon(model: Model | None, plant: Plant, sensors: Sequence[str]) -> tuple[list[Law], list[str]]:
@@ -239,6 +263,18 @@ def parse_module(text: str) -> Module:
     if "mass" not in sizes:
         raise InputError(f"--module {text}: has no mass; expected mass_kg=NUMBER, such as mass_kg=0.015")
     return Module(**sizes)
+
+
+def parse_sizes(text: str, option: str) -> dict[str, float]:
+    """Return the numbers of NAME=NUMBER,NAME=NUMBER; raises `InputError` for what is none."""
+    sizes: dict[str, float] = {}
+    for item in filter(None, text.split(",")):
+        name, _, value = (part.strip() for part in item.partition("="))
+        try:
+            sizes[name] = float(value)
+        except ValueError:
+            raise InputError(f"{option} {text}: '{item}' is no NAME=NUMBER; expected NAME=NUMBER,...") from None
+    return sizes
 
 
 def parse_vector(text: str, option: str, unit: str, largest: float) -> FloatArray:
