@@ -25,11 +25,12 @@ if TYPE_CHECKING:
     from validation.diagnosis.diagnosed import diagnose_recordings as diagnose
     from validation.estimating.spin_estimates import estimate_spin as estimate
     from validation.importing.imported_log import import_log
+    from validation.planning.planned import plan
     from validation.scattering.scattered import scatter
     from validation.sweeps.swept import sweep
     from validation.yaw_damping.fitted import fit_recordings as fit_yaw_damping
 
-__all__ = ["challenge", "check", "diagnose", "estimate", "fit_yaw_damping", "import_log", "scatter", "sweep"]
+__all__ = ["challenge", "check", "diagnose", "estimate", "fit_yaw_damping", "import_log", "plan", "scatter", "sweep"]
 
 #: name -> module and its name there. `challenge` is a package, too, so that package is called (see there).
 _HOMES = {
@@ -38,6 +39,7 @@ _HOMES = {
     "estimate": ("validation.estimating.spin_estimates", "estimate_spin"),
     "fit_yaw_damping": ("validation.yaw_damping.fitted", "fit_recordings"),
     "import_log": ("validation.importing.imported_log", "import_log"),
+    "plan": ("validation.planning.planned", "plan"),
     "scatter": ("validation.scattering.scattered", "scatter"),
     "sweep": ("validation.sweeps.swept", "sweep"),
 }

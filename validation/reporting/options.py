@@ -11,7 +11,7 @@ from typing import Annotated, TypeAlias
 import typer
 
 from discsim.arrays import FloatArray, readonly
-from discsim.disc import Disc
+from discsim.disc import Disc, Rig
 from discsim.effects.catalogue import Effect, by_id, effect, row
 from discsim.effects.own import UserEffect
 from discsim.environment import FIELD_MODEL_SIGMA, Environment, world_magnetic_field
@@ -20,7 +20,7 @@ from discsim.law import WRENCH_TARGETS, Law
 from discsim.limits import limit_of
 from discsim.model_file import Model, read_model
 from discsim.module import Module
-from discsim.recording import Plant
+from discsim.recording import PLANTS, Plant
 from discsim.shipped import load_disc, load_site
 
 __all__ = [
@@ -38,11 +38,13 @@ __all__ = [
     "at_site",
     "disc_to_fly",
     "flight_effects",
+    "known_plant",
     "laws_upon",
     "parse_effects",
     "parse_module",
     "parse_sizes",
     "parse_vector",
+    "rig_of",
 ]
 
 OutOption: TypeAlias = Annotated[Path, typer.Option("--out", help="Folder to write into; created where absent.")]
@@ -263,6 +265,24 @@ def parse_module(text: str) -> Module:
     if "mass" not in sizes:
         raise InputError(f"--module {text}: has no mass; expected mass_kg=NUMBER, such as mass_kg=0.015")
     return Module(**sizes)
+
+
+def known_plant(text: str) -> Plant:
+    """Return the plant of that name; raises `InputError` where there is none."""
+    for plant in PLANTS:
+        if plant == text:
+            return plant
+    raise InputError(f"--plant {text}: unknown; expected one of {', '.join(PLANTS)}")
+
+
+def rig_of(model: Path | None, plant: Plant) -> Rig | None:
+    """Return the rig of ``--model`` for a run-down, None for other plants; raises `InputError` where it has none."""
+    if plant != "spin_down":
+        return None
+    rig = None if model is None else read_model(model).rig
+    if rig is None:
+        raise InputError("--plant spin_down: needs a rig; expected --model with [rig] (Izz_kg_m2, viscous_N_m_s)")
+    return rig
 
 
 def parse_sizes(text: str, option: str) -> dict[str, float]:

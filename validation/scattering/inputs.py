@@ -274,6 +274,7 @@ def _release_items(release: Release) -> tuple[dict[str, Input], dict[tuple[str, 
 
 def _stated_sd(release: Release) -> FloatArray:
     """Return the stated sds (9,) of down, velocity, roll, pitch and body rate; zero where none is stated."""
+
     def of(key: str, size: int) -> FloatArray:
         return np.broadcast_to(np.asarray(release.sigma.get(key, 0.0), dtype=float), size)
 
