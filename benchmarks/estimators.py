@@ -3,7 +3,7 @@
     python benchmarks/estimators.py [--quick] [--seed 0] [--write]
 
 ``--write`` puts tables and figures into docs/estimator-accuracy.md and docs/images. A full run takes about ten minutes
-on two cores, ``--quick`` one. Data come from closed-form motion (tests/estimators/spinning_sensor.py), not from MuJoCo.
+on two cores, ``--quick`` one. Data come from closed-form motion (tests/support/spinning_sensor.py), not from MuJoCo.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ import scipy.signal
 from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator, ScalarFormatter
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "estimators")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-from spinning_sensor import MPU9250, Faults, Spin, Truth, move, record, without  # noqa: E402
+from support.spinning_sensor import MPU9250, Faults, Spin, Truth, move, record, without  # noqa: E402
 
 from discsim.arrays import FloatArray  # noqa: E402
 from discsim.files import write_text  # noqa: E402

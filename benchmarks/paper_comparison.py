@@ -23,9 +23,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "estimators")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-from spinning_sensor import move, record  # noqa: E402
+from support.spinning_sensor import move, record  # noqa: E402
 
 from discsim.recording import Recording  # noqa: E402
 from estimators import AccelerometerErrors, Options, YawRate, estimate  # noqa: E402

@@ -1,4 +1,4 @@
-"""From the relative wind to the force and moment of the air, (14)-(17), (20), (21): called by both engines.
+"""From the relative wind to the force and moment on the disc, (14)-(17), (20), (21): called by both engines.
 
 Everything here is compiled and works in any frame F whose z axis is z_B: body axes in MuJoCo, roll-pitch axes in the
 12-state model. ``p`` is the record of `discsim.parameters.PARAMETERS`.
@@ -29,9 +29,11 @@ from discsim.effects.aero import (
 from discsim.effects.air import ground_effect, gust, wind_shear
 from discsim.errors import InputError
 from discsim.frames import heading_angles, norm3
+from discsim.law import law_wrench
+from discsim.own_wrench import own_wrench
 from discsim.parameters import Tables
 
-__all__ = ["advance_ratio", "air_wrench", "outside_table", "wind"]
+__all__ = ["advance_ratio", "air_wrench", "outside_table", "total_wrench", "wind"]
 
 #: below this airspeed (m/s) the air does nothing; d/(2 V) would lose its meaning
 STILL_AIR = 1e-6
@@ -184,3 +186,18 @@ def air_wrench(
         sin_beta * Mx + cos_beta * My,
         Mz,
     )
+
+
+@inlined
+def total_wrench(
+    p: Any, tables: Tables, t: float, h: float, u: float, v: float, w: float, P: float, Q: float, r: float
+) -> tuple[float, float, float, float, float, float]:
+    """Force (N) and moment (N m) of the air, of laws and of effects that are called, at time t; as for `air_wrench`."""
+    Fx, Fy, Fz, Mx, My, Mz = air_wrench(p, tables, h, u, v, w, P, Q, r)
+    if tables.law.shape[0] > 0:
+        Lx, Ly, Lz, Kx, Ky, Kz = law_wrench(tables.law, t, h, u, v, w, P, Q, r)
+        Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
+    if tables.own_calls.size > 0:
+        Lx, Ly, Lz, Kx, Ky, Kz = own_wrench(tables.own_calls, tables.own_sizes, t, h, u, v, w, P, Q, r)
+        Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
+    return Fx, Fy, Fz, Mx, My, Mz

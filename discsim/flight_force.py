@@ -11,15 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from discsim.aerodynamics import air_wrench, wind
+from discsim.aerodynamics import total_wrench, wind
 from discsim.arrays import FloatArray
 from discsim.compiled import compiled, compiled_address, inlined
 from discsim.effects.body import centre_of_mass
 from discsim.effects.events import impulse, spin_step
 from discsim.frames import norm3, rotate_by_quaternion
-from discsim.law import LAW_WIDTH, law_wrench
+from discsim.law import LAW_WIDTH
 from discsim.native import FORCE_SIGNATURE, NativeForce, at, carray
-from discsim.own_wrench import own_wrench
 from discsim.parameters import PARAMETERS, AngleTables, Tables
 
 __all__ = ["LOST", "flight_force", "native_force"]
@@ -58,13 +57,7 @@ def flight_force(
     """Add the air and the events to a free joint's forces (6,); return False where a C_Nr table does not reach."""
     p = flat.view(PARAMETERS)[0]
     h, u, v, w, P, Q, r = _flow(p, t, qpos, qvel)
-    Fx, Fy, Fz, Mx, My, Mz = air_wrench(p, tables, h, u, v, w, P, Q, r)
-    if tables.law.shape[0] > 0:
-        Lx, Ly, Lz, Kx, Ky, Kz = law_wrench(tables.law, t, h, u, v, w, P, Q, r)
-        Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
-    if tables.own_calls.size > 0:
-        Lx, Ly, Lz, Kx, Ky, Kz = own_wrench(tables.own_calls, tables.own_sizes, t, h, u, v, w, P, Q, r)
-        Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
+    Fx, Fy, Fz, Mx, My, Mz = total_wrench(p, tables, t, h, u, v, w, P, Q, r)
 
     # a push through the centre of mass; about the geometric centre it has a moment
     qw, qx, qy, qz = qpos[3], qpos[4], -qpos[5], -qpos[6]

@@ -108,7 +108,14 @@ def body_to_ned(q: FloatArray) -> FloatArray:
 
 def to_body(q: FloatArray, v_ned: ArrayLike) -> FloatArray:
     """Return v_B (..., 3) of N vectors (3,) or (..., 3) at attitudes q (..., 4)."""
-    return np.asarray(np.einsum("...ji,...j->...i", body_to_ned(q), np.broadcast_to(v_ned, (*q.shape[:-1], 3))))
+    v = np.asarray(v_ned, dtype=float)
+    w, x, y, z = (q[..., i] for i in range(4))
+    a, b, c = (v[..., i] for i in range(3))
+    # v' = v + 2 w (v x q) + 2 q x (q x v), the inverse turn
+    tx, ty, tz = 2 * (b * z - c * y), 2 * (c * x - a * z), 2 * (a * y - b * x)
+    return np.stack(
+        [a + w * tx + (ty * z - tz * y), b + w * ty + (tz * x - tx * z), c + w * tz + (tx * y - ty * x)], axis=-1
+    )
 
 
 def euler_angles(q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

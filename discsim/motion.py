@@ -13,11 +13,25 @@ from discsim.environment import Environment
 from discsim.frames import conjugate, euler_angles, multiply, rotation_vector, to_body, turn
 from discsim.splines import hermite, spline_slopes
 
-__all__ = ["Motion", "State"]
+__all__ = ["Motion", "State", "Surroundings"]
+
+
+class Surroundings(NamedTuple):
+    """What sensors sense besides the motion: field (3,) uT in N, gravity m/s^2, and the centre of mass.
+
+    That (3,) m is from the geometric centre, in B.
+    """
+
+    magnetic_field: FloatArray
+    gravity: float
+    centre_of_mass: FloatArray
 
 
 class State(NamedTuple):
-    """Motion at instants t (n,) s; vectors (n, 3) in SI, position to acceleration in N, rates in B."""
+    """Motion at instants t (n,) s; vectors (..., n, 3) in SI, position to acceleration in N, rates in B.
+
+    Leading dimensions are those of neighbouring motions; most often there are none.
+    """
 
     t: FloatArray
     position: FloatArray
@@ -28,7 +42,7 @@ class State(NamedTuple):
     angular_acceleration: FloatArray
 
     def in_body(self, vector_ned: FloatArray) -> FloatArray:
-        """Return an N vector (3,) or (n, 3) in B, (n, 3)."""
+        """Return an N vector (3,) or (..., n, 3) in B, (..., n, 3)."""
         return to_body(self.attitude, vector_ned)
 
 
@@ -92,6 +106,11 @@ class Motion:
     def euler_angles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Roll, pitch, yaw (n,) in rad."""
         return euler_angles(self.attitude)
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """What sensors sense besides the motion."""
+        return Surroundings(self.environment.magnetic_field, self.environment.gravity, self.centre_of_mass)
 
     @cached_property
     def _jerk(self) -> FloatArray:

@@ -12,7 +12,7 @@ import ctypes
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import llvmlite.binding
 import mujoco
@@ -22,12 +22,11 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, IntArray
 from discsim.compiled import compiled, compiled_address
 
 __all__ = ["FORCE_SIGNATURE", "NativeCallback", "NativeForce", "at", "call_force", "carray", "native_callback"]
 
-IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
 #: what a force is called with: the address of its record, time s, and the addresses of qpos, qvel and qfrc_passive of
 #: the data that is stepped, to the last of which it adds. It returns whether it had a finite answer

@@ -9,11 +9,11 @@ Inside compiled code ``array.view(PARAMETERS)[0]`` is a record whose fields read
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, IntArray
 from discsim.disc import Aero, Disc, Rig
 from discsim.effects.catalogue import CATALOGUE, Effect, by_id
 from discsim.environment import Environment
@@ -22,7 +22,6 @@ from discsim.law import LAW_WIDTH, WRENCH_TARGETS, Law
 
 __all__ = ["PARAMETERS", "AngleTables", "Tables", "flight_parameters", "parameter_index", "parameters", "tables"]
 
-IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
 #: effects that the compiled physics knows by name; others are called by address
 _MOTION = tuple(row for row in CATALOGUE.values() if row.acts_on == "motion" and row.apply is None)

@@ -14,21 +14,21 @@ import mujoco
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.bearing import bearing_torque
 from discsim.callbacks import compile_model, own_warnings, passive_force
 from discsim.compiled import compiled
 from discsim.disc import Rig
 from discsim.effects.catalogue import Effect
 from discsim.effects.events import spin_step
-from discsim.effects.rig import SpeedRipple, axis, coulomb_friction, quadratic_drag, speed_ripple
+from discsim.effects.rig import SpeedRipple, axis, speed_ripple
 from discsim.engine import check_model, check_state, without_reset
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import model_file, read_text
 from discsim.frames import flip_yz, multiply, turn
-from discsim.law import Law, law_wrench
+from discsim.law import Law
 from discsim.limits import FASTEST_SPIN, LONGEST_RUN
 from discsim.motion import Motion
-from discsim.own_wrench import own_wrench
 from discsim.parameters import PARAMETERS, Tables, parameters, tables
 from discsim.recording import COMMAND_HEADER, Samples, read_csv
 
@@ -83,13 +83,7 @@ def bearing_force(flat: FloatArray, tables: Tables, t: float, qvel: FloatArray, 
     """Add the torque of a spin-down rig: ``Izz rdot = -viscous r`` and what a baseline leaves out."""
     p = flat.view(PARAMETERS)[0]
     r = qvel[0]
-    torque = -p.rig.viscous * r + coulomb_friction(p.rig_coulomb_friction, r)
-    torque += quadratic_drag(p.rig_quadratic_drag, r)
-    if tables.law.shape[0] > 0:
-        torque += law_wrench(tables.law, t, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, r)[5]
-    if tables.own_calls.size > 0:
-        torque += own_wrench(tables.own_calls, tables.own_sizes, t, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, r)[5]
-    qfrc[0] += torque + p.rig.Izz * spin_step(p.event_spin_step, t, r)
+    qfrc[0] += bearing_torque(p, tables, t, r) + p.rig.Izz * spin_step(p.event_spin_step, t, r)
 
 
 @compiled

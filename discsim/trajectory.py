@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.integrate import DOP853
 
-from discsim.aerodynamics import air_wrench, outside_table, wind
+from discsim.aerodynamics import outside_table, total_wrench, wind
 from discsim.arrays import FloatArray, readonly
 from discsim.compiled import compiled, compiled_nogil, inlined
 from discsim.disc import Disc, Release
@@ -35,10 +35,9 @@ from discsim.effects.events import EVENT_WIDTH_S, impulse, spin_step
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.frames import euler_angles, heading_angles, norm3, quaternion_from_matrix, rotate_by_quaternion
-from discsim.law import Law, law_wrench
+from discsim.law import Law
 from discsim.limits import FASTEST_SPIN
 from discsim.motion import Motion, State
-from discsim.own_wrench import own_wrench
 from discsim.parameters import PARAMETERS, Tables, flight_parameters, tables
 
 __all__ = ["ATOL", "RTOL", "Flight", "Landings", "evaluate", "integrate", "predict", "predict_many", "release_state"]
@@ -89,13 +88,7 @@ def derivative(p: Any, tables: Tables, t: float, y: FloatArray, dy: FloatArray) 
     h = -y[2]
     wn, we, wd = wind(p, t, h)
     u, v, w = rotate_by_quaternion(qw, -qx, -qy, -qz, y[3] - wn, y[4] - we, y[5] - wd)
-    Fx, Fy, Fz, Mx, My, Mz = air_wrench(p, tables, h, u, v, w, P, Q, r)
-    if tables.law.shape[0] > 0:
-        Lx, Ly, Lz, Kx, Ky, Kz = law_wrench(tables.law, t, h, u, v, w, P, Q, r)
-        Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
-    if tables.own_calls.size > 0:
-        Lx, Ly, Lz, Kx, Ky, Kz = own_wrench(tables.own_calls, tables.own_sizes, t, h, u, v, w, P, Q, r)
-        Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
+    Fx, Fy, Fz, Mx, My, Mz = total_wrench(p, tables, t, h, u, v, w, P, Q, r)
 
     # from the geometric centre to the centre of mass, whose place e turns with psi: M - e x F
     ex_B, ey_B, _ = centre_of_mass(p.body_mass_imbalance)

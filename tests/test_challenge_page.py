@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from page_table import with_table
+from support.page_table import with_table
 
 from validation.challenge.cases.case import MASKS
 from validation.challenge.cases.sizes import HIDING

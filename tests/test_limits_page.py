@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from page_table import with_table
+from support.page_table import with_table
 
 from discsim import limits
 from discsim.limits import ANY_NUMBER, BY_KEY, BY_UNIT, Limit

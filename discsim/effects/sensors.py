@@ -141,7 +141,7 @@ class BiasDrift(NamedTuple):
 
 
 def bias_drift(effect: BiasDrift, t: FloatArray) -> FloatArray:
-    """Return the bias (n, 3) m/s^2 at times t (n,) s."""
+    """Return the bias (n, 3) m/s^2 at times t (n,) s since the start."""
     return np.multiply(t[:, None], effect)
 
 

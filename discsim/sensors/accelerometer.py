@@ -20,30 +20,34 @@ from discsim.effects.sensors import (
 )
 from discsim.effects.setup import BoardRotation, on_board
 from discsim.errors import InputError
-from discsim.frames import body_to_ned, turn
-from discsim.motion import Motion, State
+from discsim.motion import Motion, State, Surroundings
 from discsim.recording import Samples, SensorSheet
-from discsim.sensors.additions import Addition, added
+from discsim.sensors.additions import Addition, MotionSensor
 from discsim.sensors.sampling import Noise, Sampling, check_lag, digitise, filtered, stated
 
 __all__ = ["Accelerometer", "specific_force"]
 
 
-def specific_force(state: State, motion: Motion, position: FloatArray) -> FloatArray:
-    """f_B = C_BN (a_N - g_N) + w x (w x d) + wdot x d, Eq. (1), (n, 3) m/s^2, at ``position`` (3,) m in B.
+def specific_force(state: State, surroundings: Surroundings, position: FloatArray) -> FloatArray:
+    """f_B = C_BN (a_N - g_N) + w x (w x d) + wdot x d, Eq. (1), (..., 3) m/s^2, at ``position`` (3,) m in B.
 
     The paper adds g in (1) and in its x row, (6); a sensor at rest reads minus gravity (f_z = -g), as here. d runs
     from the centre of mass, whose acceleration a_N is; ``position`` from the geometric centre.
     """
-    d = np.broadcast_to(position - motion.centre_of_mass, state.rate.shape)
-    gravity = np.array([0.0, 0.0, motion.environment.gravity])
-    centripetal = np.cross(state.rate, np.cross(state.rate, d))
-    tangential = np.cross(state.angular_acceleration, d)
-    return np.asarray(state.in_body(state.acceleration - gravity) + centripetal + tangential)
+    d = position - surroundings.centre_of_mass
+    f = state.in_body(state.acceleration - np.array([0.0, 0.0, surroundings.gravity]))
+    w, dw = state.rate, state.angular_acceleration
+    along, squared = w @ d, np.sum(w * w, axis=-1)
+    # w x (w x d) = w (w d) - w^2 d
+    f = f + w * along[..., None] - squared[..., None] * d
+    f[..., 0] += dw[..., 1] * d[2] - dw[..., 2] * d[1]
+    f[..., 1] += dw[..., 2] * d[0] - dw[..., 0] * d[2]
+    f[..., 2] += dw[..., 0] * d[1] - dw[..., 1] * d[0]
+    return np.asarray(f)
 
 
 @dataclass(frozen=True)
-class Accelerometer:
+class Accelerometer(MotionSensor):
     """A three-axis accelerometer by (3); every error starts at zero, so a bare one is ideal.
 
     ``position`` (3,) m in B is where it is stated to sit and ``offset`` what that is wrong by; ``misalignment`` (3,)
@@ -75,13 +79,14 @@ class Accelerometer:
         if not self.saturation.limit_m_s2 > 0:
             raise InputError(f"accelerometer saturates at {self.saturation.limit_m_s2:g} m/s^2, expected above zero")
 
-    def ideal(self, motion: Motion, t: FloatArray) -> FloatArray:
-        """Return the reading (n, 3) m/s^2 before lag and noise, S_T f + bias, Eq. (5), at instants t (n,)."""
-        f = specific_force(motion.at(t), motion, self.position + np.array(self.offset))
-        turned = on_board(self.board, f) @ body_to_ned(turn(self.misalignment))
-        drifting = bias_drift(self.drift, t - motion.start)
-        reading = turned @ sensitivity(self.scale, self.cross_axis).T + np.array(self.bias) + drifting
-        return added(self.additions, np.asarray(reading), t, motion)
+    def reading(self, state: State, surroundings: Surroundings) -> FloatArray:
+        """Return S_T f + bias, Eq. (5), (..., n, 3) m/s^2."""
+        f = specific_force(state, surroundings, self.position + np.array(self.offset))
+        f = on_board(BoardRotation(*self.misalignment), on_board(self.board, f))
+        if any(self.scale) or any(self.cross_axis):
+            f = f @ sensitivity(self.scale, self.cross_axis).T
+        f = f + np.array(self.bias)
+        return np.asarray(f + bias_drift(self.drift, state.t) if any(self.drift) else f)
 
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
         """Return the samples of a motion, value (n, 3) m/s^2."""

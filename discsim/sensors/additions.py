@@ -1,8 +1,11 @@
-"""What is added to a sensor's readings before lag and noise: effects that are called by their row, laws."""
+"""What all sensors share: a reading of the motion, and what is added to it before lag and noise.
+
+That is effects which are called by their row, and laws.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
@@ -10,20 +13,31 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect
 from discsim.law import Law
-from discsim.motion import Motion
+from discsim.motion import Motion, State, Surroundings
 from discsim.recording import SENSORS
 
-__all__ = ["Addition", "added", "by_effect", "by_law"]
+__all__ = ["Addition", "MotionSensor", "by_effect", "by_law"]
 
-#: readings (n, k), true instants t (n,) s and the motion they are of, to new readings (n, k)
-Addition: TypeAlias = Callable[[FloatArray, FloatArray, Motion], FloatArray]
+#: readings (n, k), the state they are of, whose times are since the motion's start, and the motion, to new readings
+Addition: TypeAlias = Callable[[FloatArray, State, Motion], FloatArray]
 
 
-def added(additions: Sequence[Addition], readings: FloatArray, t: FloatArray, motion: Motion) -> FloatArray:
-    """Return readings (n, k) at instants t (n,) with what is added to them, one addition after the other."""
-    for addition in additions:
-        readings = addition(readings, t, motion)
-    return readings
+class MotionSensor:
+    """A sensor: what it reads of a state of motion, and what is added to that."""
+
+    additions: tuple[Addition, ...]
+
+    def reading(self, state: State, surroundings: Surroundings) -> FloatArray:
+        """Return the readings (..., n, k) before additions, lag and noise of states whose t is since the start."""
+        raise NotImplementedError
+
+    def ideal(self, motion: Motion, t: FloatArray) -> FloatArray:
+        """Return the reading (n, k) before lag and noise at instants t (n,) s of a motion."""
+        state = motion.at(t)._replace(t=t - motion.start)
+        readings = self.reading(state, motion.surroundings)
+        for addition in self.additions:
+            readings = addition(readings, state, motion)
+        return readings
 
 
 def by_effect(effect: Effect) -> Addition:
@@ -31,9 +45,8 @@ def by_effect(effect: Effect) -> Addition:
     applied = effect.applied
     assert applied is not None
 
-    def addition(readings: FloatArray, t: FloatArray, motion: Motion) -> FloatArray:
-        since = t - motion.start
-        return applied.on_readings(tuple(effect.value), readings, since, motion.at(t)._replace(t=since))
+    def addition(readings: FloatArray, state: State, motion: Motion) -> FloatArray:
+        return applied.on_readings(tuple(effect.value), readings, state.t, state)
 
     return addition
 
@@ -43,17 +56,16 @@ def by_law(law: Law) -> Addition:
     sensor, _, column = law.target.partition(".")
     place = SENSORS[sensor].columns.index(column)
 
-    def addition(readings: FloatArray, t: FloatArray, motion: Motion) -> FloatArray:
+    def addition(readings: FloatArray, state: State, motion: Motion) -> FloatArray:
         changed = readings.copy()
-        changed[:, place] += law.evaluate(_symbols(readings, t, motion))
+        changed[:, place] += law.evaluate(_symbols(readings, state, motion))
         return changed
 
     return addition
 
 
-def _symbols(readings: FloatArray, t: FloatArray, motion: Motion) -> dict[str, FloatArray]:
+def _symbols(readings: FloatArray, state: State, motion: Motion) -> dict[str, FloatArray]:
     """Return the symbols of a law, each (n,)."""
-    state = motion.at(t)
     u, v, w = state.in_body(state.velocity - motion.environment.wind).T
     beta = np.arctan2(v, u)
     P, Q, r = state.rate.T
@@ -62,13 +74,13 @@ def _symbols(readings: FloatArray, t: FloatArray, motion: Motion) -> dict[str, F
     spin = CubicHermiteSpline(motion.t, motion.rate[:, 2], motion.angular_acceleration[:, 2])
     read = {name: readings[:, k] for k, name in enumerate("xyz") if k < readings.shape[1]}
     return {
-        "t": t - motion.start,
+        "t": state.t,
         "h": -state.position[:, 2],
         "V": np.sqrt(u * u + v * v + w * w),
         "alpha": np.arctan2(w, np.hypot(u, v)),
         "p_H": np.cos(beta) * P + np.sin(beta) * Q,
         "q_H": np.cos(beta) * Q - np.sin(beta) * P,
         "r": r,
-        "psi": spin.antiderivative()(t),
+        "psi": spin.antiderivative()(motion.start + state.t),
         **read,
     }

@@ -7,20 +7,19 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discsim.arrays import FloatArray, readonly, vector3
-from discsim.effects.sensors import GSensitivity, GyroscopeBias, Lag, Scale, g_sensitivity, sensitivity
+from discsim.effects.sensors import GSensitivity, GyroscopeBias, Lag, Scale, g_sensitivity
 from discsim.effects.setup import BoardRotation, on_board
-from discsim.frames import body_to_ned, turn
-from discsim.motion import Motion
+from discsim.motion import Motion, State, Surroundings
 from discsim.recording import Samples, SensorSheet
 from discsim.sensors.accelerometer import specific_force
-from discsim.sensors.additions import Addition, added
+from discsim.sensors.additions import Addition, MotionSensor
 from discsim.sensors.sampling import Noise, Sampling, check_lag, digitise, filtered, stated
 
 __all__ = ["Gyroscope"]
 
 
 @dataclass(frozen=True)
-class Gyroscope:
+class Gyroscope(MotionSensor):
     """A gyroscope of one to three axes; every error starts at zero, so a bare one is ideal.
 
     ``axes`` tells which of x, y, z exist; absent ones read NaN. ``position`` (3,) m in B is the accelerometer's stated
@@ -49,15 +48,18 @@ class Gyroscope:
             object.__setattr__(self, name, vector3(getattr(self, name), f"gyroscope {name}"))
         check_lag(self.lag)
 
-    def ideal(self, motion: Motion, t: FloatArray) -> FloatArray:
-        """Return the reading (n, 3) rad/s before lag and noise at instants t (n,)."""
-        state = motion.at(t)
-        turned = on_board(self.board, state.rate) @ body_to_ned(turn(self.misalignment))
-        reading = turned @ sensitivity(self.scale).T + np.array(self.bias)
+    def reading(self, state: State, surroundings: Surroundings, felt: FloatArray | None = None) -> FloatArray:
+        """Return the reading (..., n, 3) rad/s.
+
+        ``felt`` is the specific force along its axes, (n, 3) m/s^2, where something tells it better than the motion.
+        """
+        w = on_board(BoardRotation(*self.misalignment), on_board(self.board, state.rate))
+        w = w * (1.0 + np.array(self.scale)) + np.array(self.bias)
         if any(self.g_sensitivity):
-            felt = on_board(self.board, specific_force(state, motion, self.position))
-            reading = reading + g_sensitivity(self.g_sensitivity, felt)
-        return added(self.additions, np.asarray(reading), t, motion)
+            if felt is None:
+                felt = on_board(self.board, specific_force(state, surroundings, self.position))
+            w = w + g_sensitivity(self.g_sensitivity, felt)
+        return np.asarray(w)
 
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
         """Return the samples of a motion, value (n, 3) rad/s."""

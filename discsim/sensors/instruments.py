@@ -30,12 +30,12 @@ from discsim.sensors.sampling import Noise, Sampling
 from discsim.toml_table import TomlTable, read_toml
 from discsim.written import as_written
 
-__all__ = ["Instruments", "Sensor", "read_part", "record"]
+__all__ = ["FIELDS", "Instruments", "Sensor", "read_part", "record"]
 
 Sensor: TypeAlias = Accelerometer | Gyroscope | Magnetometer | Gps | RateReference | Tracker
 
 #: where an effect of the catalogue sits in its sensor: id -> field (clocks and losses are the sampling's)
-_FIELDS: Mapping[str, str] = MappingProxyType(
+FIELDS: Mapping[str, str] = MappingProxyType(
     {
         "mag.hard_iron": "hard_iron",
         "mag.soft_iron": "soft_iron",
@@ -159,8 +159,8 @@ class Instruments:
             elif target in module.sensors:
                 if item.applied is not None:
                     module = module._adding(target, by_effect(item))
-                elif id in _FIELDS:
-                    module = module.fitted(target, **{_FIELDS[id]: value})
+                elif id in FIELDS:
+                    module = module.fitted(target, **{FIELDS[id]: value})
                 else:
                     key = _SAMPLING_FIELDS[id.split(".")[1]]
                     sampling = replace(module.sensors[target].sampling, **{key: value})

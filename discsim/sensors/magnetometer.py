@@ -10,17 +10,16 @@ from discsim.arrays import FloatArray, readonly, vector3
 from discsim.effects.sensors import HardIron, Lag, SoftIron, StrayField, hard_iron, soft_iron, stray_field
 from discsim.effects.setup import BoardRotation, SiteField, field_there, on_board
 from discsim.errors import InputError
-from discsim.frames import body_to_ned, turn
-from discsim.motion import Motion
+from discsim.motion import Motion, State, Surroundings
 from discsim.recording import Samples, SensorSheet
-from discsim.sensors.additions import Addition, added
+from discsim.sensors.additions import Addition, MotionSensor
 from discsim.sensors.sampling import Noise, Sampling, check_lag, digitise, filtered, stated
 
 __all__ = ["Magnetometer"]
 
 
 @dataclass(frozen=True)
-class Magnetometer:
+class Magnetometer(MotionSensor):
     """A three-axis magnetometer; every error starts at zero, so a bare one is ideal.
 
     ``noise``, ``resolution`` and ``range`` are in uT; ``misalignment`` (3,) rad turns its axes. Scale and cross-axis
@@ -49,15 +48,13 @@ class Magnetometer:
         if not self.stray_field.height_m > 0:
             raise InputError(f"stray field dies out over {self.stray_field.height_m:g} m, expected above zero")
 
-    def ideal(self, motion: Motion, t: FloatArray) -> FloatArray:
-        """Return the reading (n, 3) uT before lag and noise at instants t (n,)."""
-        state = motion.at(t)
-        there = field_there(self.site, motion.environment.magnetic_field)
-        field_b = on_board(self.board, state.in_body(there))
-        stray = on_board(self.board, state.in_body(stray_field(self.stray_field, -state.position[:, 2])))
-        bent = hard_iron(self.hard_iron, soft_iron(self.soft_iron, field_b)) + stray
-        reading = bent @ body_to_ned(turn(self.misalignment))
-        return added(self.additions, np.asarray(reading), t, motion)
+    def reading(self, state: State, surroundings: Surroundings) -> FloatArray:
+        """Return the reading (..., n, 3) uT."""
+        m = on_board(self.board, state.in_body(field_there(self.site, surroundings.magnetic_field)))
+        m = hard_iron(self.hard_iron, soft_iron(self.soft_iron, m))
+        if any(self.stray_field[:3]):
+            m = m + on_board(self.board, state.in_body(stray_field(self.stray_field, -state.position[..., 2])))
+        return on_board(BoardRotation(*self.misalignment), m)
 
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
         """Return the samples of a motion, value (n, 3) uT."""

@@ -6,18 +6,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from discsim.arrays import FloatArray
 from discsim.effects.sensors import Latency
 from discsim.errors import InputError
-from discsim.motion import Motion
+from discsim.motion import Motion, State, Surroundings
 from discsim.recording import Samples, SensorSheet
-from discsim.sensors.additions import Addition, added
+from discsim.sensors.additions import Addition, MotionSensor
 from discsim.sensors.sampling import Noise, Sampling
 
 __all__ = ["Gps", "Tracker"]
 
 
 @dataclass(frozen=True)
-class Gps:
+class Gps(MotionSensor):
     """Position and velocity of the centre of mass; noise in m and m/s per axis.
 
     A fix stamped t shows the state at t - delay, and there is none before t = delay.
@@ -34,13 +35,16 @@ class Gps:
         if not 0 <= self.latency.delay_s < np.inf:
             raise InputError(f"gps latency is {self.latency.delay_s:g} s, expected zero or more")
 
+    def reading(self, state: State, surroundings: Surroundings) -> FloatArray:
+        """Return position and velocity, (..., n, 6)."""
+        return np.concatenate((state.position, state.velocity), axis=-1)
+
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
         """Return the fixes of a motion, value (n, 6): position in m, velocity in m/s, in N."""
         written, taken = self.sampling.instants(motion.start, motion.end, rng)
         seen = taken - self.latency.delay_s
         some = seen >= motion.start
-        written, state = written[some], motion.at(seen[some])
-        shown = added(self.additions, np.hstack((state.position, state.velocity)), seen[some], motion)
+        written, shown = written[some], self.ideal(motion, seen[some])
         position = shown[:, :3] + self.position_noise.sample(written, 3, rng)
         velocity = shown[:, 3:] + self.velocity_noise.sample(written, 3, rng)
         fixes = np.hstack((position, velocity)).astype(np.float64)
@@ -55,7 +59,7 @@ class Gps:
 
 
 @dataclass(frozen=True)
-class Tracker:
+class Tracker(MotionSensor):
     """A camera or radar that sees the centre of mass; noise in m per axis, a share ``unseen`` of coordinates lost."""
 
     sampling: Sampling = field(default_factory=lambda: Sampling(30.0))
@@ -68,11 +72,14 @@ class Tracker:
         if not 0 <= self.unseen < 1:
             raise InputError(f"share of coordinates unseen is {self.unseen:g}, expected 0 to below 1")
 
+    def reading(self, state: State, surroundings: Surroundings) -> FloatArray:
+        """Return the position, (..., n, 3)."""
+        return state.position
+
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
         """Return the track of a motion, value (n, 3) m in N, NaN where unseen."""
         written, taken = self.sampling.instants(motion.start, motion.end, rng)
-        shown = added(self.additions, motion.at(taken).position, taken, motion)
-        position = np.add(shown, self.noise.sample(written, 3, rng)).round(9)
+        position = np.add(self.ideal(motion, taken), self.noise.sample(written, 3, rng)).round(9)
         if self.unseen > 0:
             position[rng.random(position.shape) < self.unseen] = np.nan
         return Samples(written, position)

@@ -6,16 +6,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from discsim.motion import Motion
+from discsim.arrays import FloatArray
+from discsim.motion import Motion, State, Surroundings
 from discsim.recording import Samples, SensorSheet
-from discsim.sensors.additions import Addition, added
+from discsim.sensors.additions import Addition, MotionSensor
 from discsim.sensors.sampling import Noise, Sampling, digitise
 
 __all__ = ["RateReference"]
 
 
 @dataclass(frozen=True)
-class RateReference:
+class RateReference(MotionSensor):
     """The rate about z_B; ``noise`` and ``resolution`` in rad/s, ``scale`` its relative error."""
 
     sampling: Sampling = field(default_factory=lambda: Sampling(100.0))
@@ -25,11 +26,16 @@ class RateReference:
     #: what else is added to its readings before lag and noise
     additions: tuple[Addition, ...] = ()
 
+    def reading(self, state: State, surroundings: Surroundings) -> FloatArray:
+        """Return the rate about z_B, (..., n, 1) rad/s."""
+        return np.asarray((1.0 + self.scale) * state.rate[..., 2:])
+
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
         """Return the samples of a motion, value (n,) rad/s."""
         written, taken = self.sampling.instants(motion.start, motion.end, rng)
-        rate = added(self.additions, (1.0 + self.scale) * motion.at(taken).rate[:, 2:], taken, motion)
-        return Samples(written, digitise(rate, written, self.noise, rng, resolution=self.resolution)[:, 0])
+        return Samples(
+            written, digitise(self.ideal(motion, taken), written, self.noise, rng, resolution=self.resolution)[:, 0]
+        )
 
     @property
     def sheet(self) -> SensorSheet:

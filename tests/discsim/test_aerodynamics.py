@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
-from flights import DRIVER, FIELD, throw, with_aero
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from plain_air import plain_wrench
 from scipy.interpolate import RectBivariateSpline
+from support.flights import DRIVER, FIELD, throw, with_aero
+from support.plain_air import plain_wrench
 
 from discsim.aerodynamics import advance_ratio, air_wrench, static_coefficients, yaw_damping
 from discsim.disc import Aero, AeroTable, Disc, YawDampingTable

@@ -12,7 +12,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from flights import DRIVER, FIELD, throw
+from support.flights import DRIVER, FIELD, throw
 
 from discsim.callbacks import compile_model, own_warnings, passive_force
 from discsim.disc import Rig

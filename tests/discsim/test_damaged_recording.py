@@ -10,7 +10,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recording_folder import AERO_TABLE, CNR_TABLE, CSV, HEADER, MATRIX, RATE_TABLE, TOML, line_of, make, refusal
+from support.recording_folder import (
+    AERO_TABLE,
+    CNR_TABLE,
+    CSV,
+    HEADER,
+    MATRIX,
+    RATE_TABLE,
+    TOML,
+    line_of,
+    make,
+    refusal,
+)
 
 from discsim import recording as module
 from discsim.errors import InputError

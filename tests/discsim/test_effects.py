@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from flights import BARE, DRIVER, FIELD, WEIGHTLESS, in_wind, throw
-from plain_air import Change, Coefficients, Flow, plain_wrench
+from support.flights import BARE, DRIVER, FIELD, WEIGHTLESS, in_wind, throw
+from support.plain_air import Change, Coefficients, Flow, plain_wrench
 
 from discsim.aerodynamics import air_wrench, wind
 from discsim.effects import CATALOGUE, Effect, effect

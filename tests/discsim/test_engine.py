@@ -6,9 +6,9 @@ import itertools
 import mujoco
 import numpy as np
 import pytest
-from flights import BARE, DRIVER, FIELD, WEIGHTLESS, attitude, in_wind, mirrored, throw, turned, with_aero
-from plain_air import plain_wrench
 from scipy.spatial.transform import Rotation
+from support.flights import BARE, DRIVER, FIELD, WEIGHTLESS, attitude, in_wind, mirrored, throw, turned, with_aero
+from support.plain_air import plain_wrench
 
 from discsim.disc import Aero, Disc, Release
 from discsim.effects import Effect, effect

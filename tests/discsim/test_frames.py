@@ -3,10 +3,10 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
-from flights import DRIVER, FIELD, attitude, throw
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from support.flights import DRIVER, FIELD, attitude, throw
 
 from discsim.engine import FlyingDisc, fly
 from discsim.frames import (

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flights import DRIVER, FIELD, throw
-from turning import turning
+from support.flights import DRIVER, FIELD, throw
+from support.turning import turning
 
 from discsim.disc import Rig
 from discsim.effects import CATALOGUE, Effect, Row, effect

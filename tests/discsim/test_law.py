@@ -6,9 +6,9 @@ from math import copysign, cos, exp, hypot, sin, sqrt
 
 import numpy as np
 import pytest
-from flights import DRIVER, FIELD, throw
 from hypothesis import given
 from hypothesis import strategies as st
+from support.flights import DRIVER, FIELD, throw
 
 from discsim.engine import fly
 from discsim.errors import InputError

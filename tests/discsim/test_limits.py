@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recording_folder import CSV, HEADER, SPIN_DOWN, TOML, line_of, make, refusal
+from support.recording_folder import CSV, HEADER, SPIN_DOWN, TOML, line_of, make, refusal
 
 from discsim.disc import Release
 from discsim.effects.catalogue import effect

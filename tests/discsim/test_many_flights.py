@@ -8,7 +8,7 @@ from threading import Event, Thread
 import mujoco
 import numpy as np
 import pytest
-from flights import DRIVER, FIELD, throw
+from support.flights import DRIVER, FIELD, throw
 
 from discsim import many_flights
 from discsim.callbacks import passive_force

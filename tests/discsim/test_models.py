@@ -7,7 +7,7 @@ from datetime import date
 import mujoco
 import numpy as np
 import pytest
-from flights import DRIVER
+from support.flights import DRIVER
 
 from discsim.engine import FlyingDisc, check_model, fly
 from discsim.environment import world_magnetic_field

@@ -4,10 +4,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from flights import DRIVER, FIELD, throw
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from support.flights import DRIVER, FIELD, throw
 
 from discsim.engine import fly
 from discsim.frames import body_to_ned, rotation_error

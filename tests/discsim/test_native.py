@@ -12,7 +12,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from flights import DRIVER, FIELD, throw
+from support.flights import DRIVER, FIELD, throw
 
 from discsim import native
 from discsim.callbacks import passive_force, stepped_by_c

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
-from recording_folder import AERO_TABLE, CNR_TABLE, CSV, RATE_TABLE, SPIN_DOWN, TOML, line_of, make, refusal
+from support.recording_folder import AERO_TABLE, CNR_TABLE, CSV, RATE_TABLE, SPIN_DOWN, TOML, line_of, make, refusal
 
 from discsim import recording as module
 from discsim.disc import Aero, AeroTable, Disc, Release, Rig, RollingTable, YawDampingTable, aero_key

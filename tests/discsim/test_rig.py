@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from flights import FIELD
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from turning import field_at
+from support.flights import FIELD
+from support.turning import field_at
 
 from discsim.disc import Rig
 from discsim.effects import CATALOGUE, Effect, effect

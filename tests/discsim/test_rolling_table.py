@@ -7,11 +7,11 @@ import re
 
 import numpy as np
 import pytest
-from flights import DRIVER, FIELD, mirrored, throw
 from hypothesis import given
 from hypothesis import strategies as st
-from recording_folder import TOML, line_of, make, refusal
 from scipy.interpolate import RegularGridInterpolator
+from support.flights import DRIVER, FIELD, mirrored, throw
+from support.recording_folder import TOML, line_of, make, refusal
 
 from discsim.aerodynamics import rolling_coefficient
 from discsim.disc import Disc, RollingTable

@@ -7,11 +7,11 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from flights import BARE, DRIVER, FIELD, throw
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
-from turning import field_at, turning
+from support.flights import BARE, DRIVER, FIELD, throw
+from support.turning import field_at, turning
 
 from discsim.disc import Release
 from discsim.effects import effect

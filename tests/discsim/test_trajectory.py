@@ -5,9 +5,9 @@ import itertools
 
 import numpy as np
 import pytest
-from flights import BARE, DRIVER, FIELD, throw, turned
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.flights import BARE, DRIVER, FIELD, throw, turned
 
 from discsim.disc import YawDampingTable
 from discsim.effects import effect

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from flights import FIELD
+from support.flights import FIELD
 
 from discsim.effects import CATALOGUE, Effect, effect
 from discsim.effects.setup import board_axes, field_there, on_board, permutation

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from spinning_sensor import Spin, record
+from support.spinning_sensor import Spin, record
 
 from discsim.errors import InputError
 from discsim.recording import Samples, SensorSheet

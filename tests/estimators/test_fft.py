@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
-from spinning_sensor import Spin, move, record
+from support.spinning_sensor import Spin, move, record
 
 from discsim.errors import InputError
 from discsim.recording import Samples, read_recording

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from spinning_sensor import Faults, Spin, Truth, move, record
+from support.spinning_sensor import Faults, Spin, Truth, move, record
 
 from discsim.recording import Recording
 from estimators.fusion import fusion

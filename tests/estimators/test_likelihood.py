@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from spinning_sensor import MPU9250, Faults, Spin, move, record, tone
+from support.spinning_sensor import MPU9250, Faults, Spin, move, record, tone
 
 from discsim.errors import InputError
 from discsim.recording import Samples

@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from spinning_sensor import Faults, Spin, move, record, without
+from support.spinning_sensor import Faults, Spin, move, record, without
 
 from discsim.errors import InputError
 from estimators.likelihood import LikelihoodSettings, fit_windows, usable_field

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from spinning_sensor import Faults, Spin, move, record, without
+from support.spinning_sensor import Faults, Spin, move, record, without
 
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from spinning_sensor import MPU9250, Faults, Spin, move, record, without
+from support.spinning_sensor import MPU9250, Faults, Spin, move, record, without
 
 from discsim.recording import Recording, Samples, SensorSheet
 from estimators import METHODS, estimate

@@ -159,7 +159,7 @@ def _grows_with(
     for (index, sensor, axis), value in excess.items():
         linear, chain = linears[index], found.loose.chains[index]
         channel = next(c for c in linear.channels if (c.sensor, c.axis) == (sensor, axis))
-        piece = np.searchsorted(chain.edges, linear.t[channel.rows], side="right") - 1
+        piece = chain.segment_of(linear.t[channel.rows])
         some = [i for i in range(len(chain.states)) if np.any(piece == i)]
         amounts += [float(np.mean(value[piece == i])) for i in some]
         for name, values in chain.plant.grows_with(chain.edges[some], chain.states[some]).items():

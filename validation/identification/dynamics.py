@@ -14,7 +14,7 @@ from discsim.compiled import compiled
 from discsim.law import LAW_WIDTH, SYMBOLS
 from discsim.parameters import PARAMETERS, Tables
 
-__all__ = ["FASTEST", "LAW_PLACES", "ROW", "SIZE", "acting_tables", "to_body"]
+__all__ = ["FASTEST", "LAW_PLACES", "ROW", "SIZE", "acting_tables"]
 
 #: numbers of a row of motion
 ROW = 19
@@ -56,14 +56,3 @@ def acting_tables(given: Tables, flat: FloatArray) -> Tables:
     own = given.own_sizes.size
     sizes = flat[SIZE : SIZE + own].copy().reshape(given.own_sizes.shape)
     return Tables(given.static, given.rate, given.speed, given.spline, _law(flat, SIZE + own), given.own_calls, sizes)
-
-
-def to_body(rows: FloatArray, vector: FloatArray) -> FloatArray:
-    """Return N vectors (..., 3) in B by the attitudes in rows (..., 19)."""
-    w, x, y, z = rows[..., 9], rows[..., 10], rows[..., 11], rows[..., 12]
-    a, b, c = vector[..., 0], vector[..., 1], vector[..., 2]
-    # v' = v + 2 w (v x q) + 2 q x (q x v), the inverse turn
-    tx, ty, tz = 2 * (b * z - c * y), 2 * (c * x - a * z), 2 * (a * y - b * x)
-    return np.stack(
-        [a + w * tx + (ty * z - tz * y), b + w * ty + (tz * x - tx * z), c + w * tz + (tx * y - ty * x)], axis=-1
-    )

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeAlias
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, IntArray
 
-__all__ = ["Channel", "IntArray", "Linear"]
-
-IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
+__all__ = ["Channel", "Linear"]
 
 
 @dataclass(frozen=True)

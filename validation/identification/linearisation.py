@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, IntArray
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.sensors import Lag
 from discsim.parameters import parameter_index, parameters
 from discsim.recording import Recording
 from validation.identification.competing_effects import row_of
 from validation.identification.dynamics import ROW
-from validation.identification.linear import Channel, IntArray, Linear
+from validation.identification.linear import Channel, Linear
 from validation.identification.parameters import Values
 from validation.identification.plants import Plant, plant_of
 from validation.identification.prediction import Sampled
@@ -67,11 +67,10 @@ def linearise(
     jump. Columns are differences of the piece's own motion, chained over the pieces; one-sided ones, where ``central``
     is false, cost half. The pieces are run on so many ``threads``.
     """
-    k = current.states.shape[0]
     around = _Around(current, values, columns, central)
     samples = [Sampled(current, readings, values) for readings in current.readings]
     # the instants of all sensors, each with its neighbours in time for slopes and its past for a lag
-    piece_of = [np.clip(np.searchsorted(current.edges, s.instants, side="right") - 1, 0, k - 1) for s in samples]
+    piece_of = [current.segment_of(s.instants) for s in samples]
     read = _Read(around, samples)
     ends = read.run_all(piece_of, threads)
     chained = _chained(current, around, ends, jumps)
@@ -155,9 +154,9 @@ def reread(current: Chain, values: Values, linear: Linear, threads: int = 1) -> 
     One motion in the place of dozens, for steps within which the slopes hardly change. None where other readings take
     part, or fall into other segments, than in ``linear``.
     """
-    k, d = current.states.shape[0], current.plant.layout.directions
+    d = current.plant.layout.directions
     samples = [Sampled(current, readings, values) for readings in current.readings]
-    segment_of = [np.clip(np.searchsorted(current.edges, s.instants, side="right") - 1, 0, k - 1) for s in samples]
+    segment_of = [current.segment_of(s.instants) for s in samples]
     read = _Read(_Around(current, values, (), None), samples)
     ends = read.run_all(segment_of, threads)[:, 0]
     raw: list[FloatArray] = []

@@ -15,8 +15,8 @@ from scipy.optimize import minimize
 from scipy.signal import lfilter
 from scipy.special import expit, logit
 
-from discsim.arrays import FloatArray
-from validation.identification.linear import Channel, IntArray, Linear
+from discsim.arrays import FloatArray, IntArray
+from validation.identification.linear import Channel, Linear
 
 __all__ = ["GroupNoise", "NoiseModel", "chi_squared", "estimate_noise", "likeliest_noise", "log_likelihood", "whitened"]
 

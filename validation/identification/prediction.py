@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
-from discsim.arrays import FloatArray
-from validation.identification.dynamics import (
-    ROW,
-)
+from discsim.arrays import FloatArray, IntArray
+from validation.identification.dynamics import ROW
 from validation.identification.parameters import Values
 from validation.identification.propagation import Runner, base_flat, runner_of
 from validation.identification.readings import Readings
@@ -64,22 +64,12 @@ class Sampled:
         self, runner: Runner, flat: FloatArray, own: FloatArray, values: Values, current: Chain
     ) -> FloatArray:
         """Return the slopes (m, width) of the ideal readings in time."""
-        slope = np.empty((self.instants.size, self.width))
-        edges = current.edges
-        piece = np.clip(np.searchsorted(edges, self.instants, side="right") - 1, 0, current.states.shape[0] - 1)
-        for i in range(current.states.shape[0]):
-            o = np.flatnonzero(piece == i)
-            if o.size == 0:
-                continue
-            t = np.maximum(self.instants[o], edges[i])
-            early = np.maximum(t - _TIME_STEP, edges[i])
-            late = early + 2.0 * _TIME_STEP
-            both = np.concatenate([late, early])
-            times, last = runner.times(float(edges[i]), float(edges[i + 1]), float(both.max()), current.states[i])
-            rows, _ = runner.run(flat[None], own[None], current.states[i : i + 1], times, last, both)
-            read = predicted(self.sensor, current.recording, values, both, rows[0])
-            slope[o] = (read[: o.size] - read[o.size :]) / (2.0 * _TIME_STEP)
-        return slope
+        segments = current.segment_of(self.instants)
+        early = np.maximum(np.maximum(self.instants, current.edges[segments]) - _TIME_STEP, current.edges[segments])
+        both, twice = np.concatenate([early + 2.0 * _TIME_STEP, early]), np.concatenate([segments, segments])
+        rows = _rows(current, runner, (flat, own), both, twice)
+        read = predicted(self.sensor, current.recording, values, both, rows)
+        return np.asarray((read[: early.size] - read[early.size :]) / (2.0 * _TIME_STEP))
 
     def weighted(self, array: FloatArray) -> FloatArray:
         """Return what the sensor shows of ideal readings (nodes n, ...): itself, or the weighted past."""
@@ -89,20 +79,29 @@ class Sampled:
         return np.asarray(np.einsum("wn,wn...->n...", self.weights, parts))
 
 
+def _rows(
+    current: Chain, runner: Runner, parameters: tuple[FloatArray, FloatArray], t: FloatArray, segments: IntArray
+) -> FloatArray:
+    """Return the rows (n, 19) of a chain's motion at instants t (n,) s of its segments (n,).
+
+    ``parameters`` are those of the physics, laid flat, and the plant's own.
+    """
+    flat, own = parameters
+    rows = np.empty((t.size, ROW))
+    for i, (start, stop) in enumerate(pairwise(current.edges.tolist())):
+        mine = np.flatnonzero(segments == i)
+        if mine.size:
+            out = np.maximum(t[mine], start)
+            times, last = runner.times(start, stop, float(out.max()), current.states[i])
+            rows[mine] = runner.run(flat[None], own[None], current.states[i : i + 1], times, last, out)[0][0]
+    return rows
+
+
 def shown(current: Chain, values: Values, sensor: str, t: FloatArray) -> FloatArray:
     """Return what a sensor would read (n, k) at true instants t (n,) of a chain's motion, before lag and noise."""
     recording = current.recording
-    runner = runner_of(recording, values)
-    flat, own = base_flat(recording, values), current.plant.own_values(values)
-    rows = np.empty((t.size, ROW))
-    piece = np.clip(np.searchsorted(current.edges, t, side="right") - 1, 0, len(current.states) - 1)
-    for i in range(len(current.states)):
-        mine = np.flatnonzero(piece == i)
-        if mine.size:
-            out = np.maximum(t[mine], current.edges[i])
-            start, stop = float(current.edges[i]), float(current.edges[i + 1])
-            times, last = runner.times(start, stop, float(out.max()), current.states[i])
-            rows[mine] = runner.run(flat[None], own[None], current.states[i : i + 1], times, last, out)[0][0]
+    parameters = base_flat(recording, values), current.plant.own_values(values)
+    rows = _rows(current, runner_of(recording, values), parameters, t, current.segment_of(t))
     return predicted(sensor, recording, values, t, rows)
 
 

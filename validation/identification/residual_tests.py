@@ -17,21 +17,47 @@ from discsim.arrays import FloatArray
 from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel, estimate_noise, log_likelihood, whitened
 
-__all__ = ["Remainder", "remainders"]
+__all__ = ["RESIDUAL_TESTS", "Remainder", "ResidualTests", "remainders"]
 
-#: bands of frequency in which the whitened residuals of a group are compared
-BANDS = 24
-#: excess of a band in its own standard errors, and in share of the level, that no noise shows
-BAND_Z, BAND_SHARE = 8.0, 0.2
-#: readings in a window of time, and its excess in standard errors
-WINDOW, WINDOW_Z = 24, 9.0
-#: most that one reading's square counts in a window: two wild readings are outliers, three in a row are not
-WILD = 30.0
-#: terms of a course over time that recordings may have in common, and what it must gain in twice the log likelihood
-COURSE_TERMS, COURSE_GAIN = 5, 90.0
-#: a sensor is no longer merely noisy where its noise is more than this many times as loud as stated, and slower than
-#: this share of the longest recording
-LOUD, SLOW = 10.0, 0.1
+
+@dataclass(frozen=True)
+class ResidualTests:
+    """Limits beyond which what is left is not noise; `benchmarks/thresholds.py` measures what noise alone reaches.
+
+    Attributes
+    ----------
+    bands : int
+        Bands of frequency in which the whitened residuals of a group are compared.
+    band_z, band_share : float
+        Excess of a band over their median, in its standard errors and as a share of the level: beyond both.
+    window : int
+        Readings in a window of time.
+    window_z : float
+        Excess of a window's squares in standard errors.
+    wild : float
+        Most that one reading's square counts in a window: of the limit's excess, 62, two wild readings reach 58.
+    course_terms : int
+        Terms of a course over time that recordings may have in common: a drift that bends, no wave.
+    course_gain : float
+        What such a course must gain, in twice the log likelihood, over slow noise that is each recording's own.
+    loud, slow : float
+        No noise is this many times as loud as stated, with a memory beyond this share of the longest recording: the
+        blind test's loudest noise is three times as loud as stated.
+    """
+
+    bands: int = 24
+    band_z: float = 8.0
+    band_share: float = 0.2
+    window: int = 24
+    window_z: float = 9.0
+    wild: float = 30.0
+    course_terms: int = 5
+    course_gain: float = 90.0
+    loud: float = 10.0
+    slow: float = 0.1
+
+
+RESIDUAL_TESTS = ResidualTests()
 
 
 @dataclass(frozen=True)
@@ -47,23 +73,28 @@ class Remainder:
     axis: str = "all"
 
 
-def remainders(linears: Sequence[Linear], residuals: Sequence[FloatArray], noise: NoiseModel) -> list[Remainder]:
+def remainders(
+    linears: Sequence[Linear],
+    residuals: Sequence[FloatArray],
+    noise: NoiseModel,
+    limits: ResidualTests = RESIDUAL_TESTS,
+) -> list[Remainder]:
     """Return what the residuals (n,) of each recording hold beside noise, strongest first."""
     white = [
         whitened(linear, noise, residual[:, None])[:, 0] for linear, residual in zip(linears, residuals, strict=True)
     ]
     return sorted(
         [
-            *_bands(linears, white),
-            *_windows(linears, white),
-            *_courses(linears, residuals, noise),
-            *_swallowed(linears, noise),
+            *_bands(linears, white, limits),
+            *_windows(linears, white, limits),
+            *_courses(linears, residuals, noise, limits),
+            *_swallowed(linears, noise, limits),
         ],
         key=lambda item: -item.z,
     )
 
 
-def _bands(linears: Sequence[Linear], white: Sequence[FloatArray]) -> list[Remainder]:
+def _bands(linears: Sequence[Linear], white: Sequence[FloatArray], limits: ResidualTests) -> list[Remainder]:
     """Test the flatness of each group's spectrum, pooled over axes and recordings."""
     sums: dict[str, FloatArray] = {}
     counts: dict[str, FloatArray] = {}
@@ -71,14 +102,14 @@ def _bands(linears: Sequence[Linear], white: Sequence[FloatArray]) -> list[Remai
     for linear, x in zip(linears, white, strict=True):
         for channel in linear.channels:
             y = x[channel.rows]
-            if y.size < 4 * BANDS or channel.index.size < 0.8 * (channel.index[-1] - channel.index[0] + 1):
+            if y.size < 4 * limits.bands or channel.index.size < 0.8 * (channel.index[-1] - channel.index[0] + 1):
                 continue
             y = y - y.mean()
             power = np.abs(np.fft.rfft(y)) ** 2 / y.size
-            place = np.minimum((np.arange(1, power.size) * BANDS) // power.size, BANDS - 1)
+            place = np.minimum((np.arange(1, power.size) * limits.bands) // power.size, limits.bands - 1)
             group = channel.group
-            sums.setdefault(group, np.zeros(BANDS))
-            counts.setdefault(group, np.zeros(BANDS))
+            sums.setdefault(group, np.zeros(limits.bands))
+            counts.setdefault(group, np.zeros(limits.bands))
             np.add.at(sums[group], place, power[1:])
             np.add.at(counts[group], place, 1.0)
             ends[group] = max(ends.get(group, 0.0), float(linear.t[channel.rows][-1]))
@@ -89,23 +120,23 @@ def _bands(linears: Sequence[Linear], white: Sequence[FloatArray]) -> list[Remai
         level = float(np.median(mean))
         z = (mean / level - 1.0) * np.sqrt(n)
         worst = int(np.argmax(z))
-        if z[worst] > BAND_Z and mean[worst] > (1.0 + BAND_SHARE) * level:
+        if z[worst] > limits.band_z and mean[worst] > (1.0 + limits.band_share) * level:
             found.append(Remainder(group, None, f"band {worst}", float(z[worst]), 0.0, ends[group]))
     return found
 
 
-def _windows(linears: Sequence[Linear], white: Sequence[FloatArray]) -> list[Remainder]:
+def _windows(linears: Sequence[Linear], white: Sequence[FloatArray], limits: ResidualTests) -> list[Remainder]:
     """Test that the level is the same at all times."""
     found = []
     for index, (linear, x) in enumerate(zip(linears, white, strict=True)):
         for channel in linear.channels:
-            y = np.minimum(x[channel.rows] ** 2, WILD)
-            if y.size < 2 * WINDOW:
+            y = np.minimum(x[channel.rows] ** 2, limits.wild)
+            if y.size < 2 * limits.window:
                 continue
-            total = np.convolve(y, np.ones(WINDOW), mode="valid")
-            z = (total - WINDOW) / np.sqrt(2.0 * WINDOW)
+            total = np.convolve(y, np.ones(limits.window), mode="valid")
+            z = (total - limits.window) / np.sqrt(2.0 * limits.window)
             worst = int(np.argmax(z))
-            if z[worst] > WINDOW_Z:
+            if z[worst] > limits.window_z:
                 t = linear.t[channel.rows]
                 found.append(
                     Remainder(
@@ -114,14 +145,16 @@ def _windows(linears: Sequence[Linear], white: Sequence[FloatArray]) -> list[Rem
                         "window",
                         float(z[worst]),
                         float(t[worst]),
-                        float(t[worst + WINDOW - 1]),
+                        float(t[worst + limits.window - 1]),
                         channel.axis,
                     )
                 )
     return found
 
 
-def _courses(linears: Sequence[Linear], residuals: Sequence[FloatArray], noise: NoiseModel) -> list[Remainder]:
+def _courses(
+    linears: Sequence[Linear], residuals: Sequence[FloatArray], noise: NoiseModel, limits: ResidualTests
+) -> list[Remainder]:
     """Test that slow noise goes its own way in each recording.
 
     A sensor that drifts the same way in all of them leaves residuals that one recording alone cannot tell from slow
@@ -139,15 +172,15 @@ def _courses(linears: Sequence[Linear], residuals: Sequence[FloatArray], noise: 
         before = sum(log_likelihood(linear, own, e) for linear, e in zip(alone, left, strict=True))
         after, now = before, own
         for _ in range(3):
-            left = _without_course(alone, residuals, now, max(ends))
+            left = _without_course(alone, residuals, now, max(ends), limits.course_terms)
             now = estimate_noise(alone, left)
             after = min(after, sum(log_likelihood(linear, now, e) for linear, e in zip(alone, left, strict=True)))
-        if before - after > COURSE_GAIN:
+        if before - after > limits.course_gain:
             found.append(Remainder(group, None, "course", float(np.sqrt(before - after)), 0.0, max(ends)))
     return found
 
 
-def _swallowed(linears: Sequence[Linear], noise: NoiseModel) -> list[Remainder]:
+def _swallowed(linears: Sequence[Linear], noise: NoiseModel, limits: ResidualTests) -> list[Remainder]:
     """Test that no noise so loud and slow was supposed that it has swallowed what is missing."""
     found = []
     for group, slow in noise.items():
@@ -160,24 +193,24 @@ def _swallowed(linears: Sequence[Linear], noise: NoiseModel) -> list[Remainder]:
         times = [linear.t[c.rows] for linear, c in channels]
         interval = float(np.median(np.diff(times[0])))
         longest = max(float(t[-1] - t[0]) for t in times)
-        if slow.sd > LOUD * stated and slow.memory(interval) > SLOW * longest:
+        if slow.sd > limits.loud * stated and slow.memory(interval) > limits.slow * longest:
             found.append(Remainder(group, None, "swallowed", slow.sd / stated, 0.0, max(float(t[-1]) for t in times)))
     return found
 
 
 def _without_course(
-    linears: Sequence[Linear], residuals: Sequence[FloatArray], noise: NoiseModel, end: float
+    linears: Sequence[Linear], residuals: Sequence[FloatArray], noise: NoiseModel, end: float, terms: int
 ) -> list[FloatArray]:
     """Return residuals less the course that each axis has in common in all recordings, estimated in a noise."""
     axes = list(dict.fromkeys(c.axis for linear in linears for c in linear.channels))
     columns = []
     for linear in linears:
-        A = np.zeros((linear.t.size, COURSE_TERMS * len(axes)))
+        A = np.zeros((linear.t.size, terms * len(axes)))
         for c in linear.channels:
-            k = COURSE_TERMS * axes.index(c.axis)
-            A[c.rows, k : k + COURSE_TERMS] = legvander(2.0 * linear.t[c.rows] / end - 1.0, COURSE_TERMS - 1)
+            k = terms * axes.index(c.axis)
+            A[c.rows, k : k + terms] = legvander(2.0 * linear.t[c.rows] / end - 1.0, terms - 1)
         columns.append(A)
-    width = COURSE_TERMS * len(axes)
+    width = terms * len(axes)
     H, right = np.zeros((width, width)), np.zeros(width)
     for linear, A, e in zip(linears, columns, residuals, strict=True):
         white = np.hstack([whitened(linear, noise, A), whitened(linear, noise, e[:, None])])

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, IntArray
 from discsim.recording import Recording
 from validation.identification.observations import readings_of
 from validation.identification.parameters import Values
@@ -34,6 +34,10 @@ class Chain:
         """What kind of experiment it is."""
         return plant_of(self.recording)
 
+    def segment_of(self, t: FloatArray) -> IntArray:
+        """Return the places (n,) of the segments that tell the motion at instants t (n,) s: at a node the later one."""
+        return np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, len(self.states) - 1)
+
 
 def chain(
     recording: Recording, edges: FloatArray, states: FloatArray, lost: Mapping[str, FloatArray] | None = None
@@ -48,8 +52,7 @@ def recut(current: Chain, values: Values, edges: FloatArray) -> Chain:
     runner = runner_of(recording, values)
     flat, own = base_flat(recording, values), current.plant.own_values(values)
     states = np.empty((edges.size - 1, current.states.shape[1]))
-    piece = np.clip(np.searchsorted(current.edges, edges[:-1] + 1e-9, side="right") - 1, 0, len(current.states) - 1)
-    for j, i in enumerate(piece):
+    for j, i in enumerate(current.segment_of(edges[:-1] + 1e-9)):
         start, state = float(current.edges[i]), current.states[i]
         stop = float(edges[j])
         if stop - start < 1e-9:

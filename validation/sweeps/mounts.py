@@ -130,8 +130,8 @@ def look_with_accelerometer(motion: Motion, sensor: Accelerometer, rng: np.rando
 
     def signal(t: FloatArray) -> FloatArray:
         state = motion.at(t)
-        origin = specific_force(state, motion, np.zeros(3))
-        along = [specific_force(state, motion, axis) - origin for axis in np.eye(3)]  # per metre
+        origin = specific_force(state, motion.surroundings, np.zeros(3))
+        along = [specific_force(state, motion.surroundings, axis) - origin for axis in np.eye(3)]  # per metre
         return np.hstack((origin, *along, bias_drift(sensor.drift, t - motion.start)))
 
     # a lag is linear and settled at the start, so it may act before the mount turns and weighs the parts

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made import DRIVER, FIELD, MODULE, RIG, coasting, coasts, tables, throws
+from support.made import DRIVER, FIELD, MODULE, RIG, coasting, coasts, tables, throws
 
 from discsim.disc import Rig
 from discsim.effects import Effect, effect

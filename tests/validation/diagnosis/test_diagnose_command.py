@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from outcomes import OUTCOMES, explained
+from support.outcomes import OUTCOMES, explained
 
 from discsim.disc import Rig
 from discsim.environment import Environment

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from made import tables
+from support.made import tables
 
 from discsim.effects import effect
 from discsim.recording import Recording

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made import DRIVER, FIELD, MODULE, flight, release_of, rows_of
+from support.made import DRIVER, FIELD, MODULE, flight, release_of, rows_of
 
 from discsim.arrays import FloatArray
 from discsim.disc import Release

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.made import DRIVER as DISC
+from support.made import FIELD as SITE
 
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples, SensorSheet
-from tests.validation.diagnosis.made import DRIVER as DISC
-from tests.validation.diagnosis.made import FIELD as SITE
 from validation.diagnosis.inertia import DISC as BARE
 from validation.diagnosis.inertia import with_inertia
 from validation.diagnosis.prepared import FASTEST, prepared

@@ -14,11 +14,12 @@ from scipy.stats import binom, chi2
 from discsim.environment import Environment
 from discsim.recording import PLANTS as NAMES
 from discsim.recording import Recording, Samples, SensorSheet
+from validation.identification.dynamics import ROW
 from validation.identification.gauss_newton import Fit, linearised, open_gaps, refit
 from validation.identification.noise import stated_noise
 from validation.identification.parameters import Jumps, Parameter
 from validation.identification.plants import PLANTS, Plant
-from validation.identification.plants.plant import Durations, Dynamics, Initial, Layout, Sizes, rows_for
+from validation.identification.plants.plant import Durations, Dynamics, Initial, Layout, Sizes
 from validation.identification.segments import chain, recut
 
 ROOT = Path(__file__).parents[3]
@@ -131,13 +132,11 @@ def propagate(given, flats, own, states, times, last, out):
         path[k + 1] = path[k] + h[k] / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
     slopes = np.stack([slope(at) for at in path])
     at = CubicHermiteSpline(times, path, slopes)(out)
-    rows, ends = rows_for(states, out)
-    rows[:] = 0.0
+    rows = np.zeros((states.shape[0], out.size, ROW))
     rows[:, :, 9], rows[:, :, 12] = np.cos(0.5 * at[:, ANGLE].T), np.sin(0.5 * at[:, ANGLE].T)
     rows[:, :, 15] = at[:, RATE].T
     rows[:, :, 18] = acceleration(at[:, ANGLE].T, at[:, RATE].T, damping[:, None])
-    ends[:] = path[last].T
-    return rows, ends
+    return rows, path[last].T.copy()
 
 
 def first_states(recording, t, ratio):

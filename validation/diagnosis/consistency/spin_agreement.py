@@ -11,7 +11,7 @@ Nothing here decides a verdict: sensors that contradict one another are told of,
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ import numpy as np
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import ClockRate, Scale
 from discsim.recording import Recording
+from validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
 from validation.diagnosis.consistency.row_times import Rows, rows_of
 from validation.diagnosis.consistency.settling import Settling, settling_of
 from validation.diagnosis.consistency.turning import (
@@ -234,6 +235,7 @@ class Agreement:
     rows: Rows | None = None
     row_proofs: tuple[RowProof, ...] = ()
     settling: Settling | None = None
+    own_clock: OwnClock | None = None
 
     @property
     def contradiction(self) -> bool:
@@ -257,6 +259,7 @@ class Agreement:
             "rows": None
             if self.rows is None
             else {**self.rows.to_json(), "heldout": [item.to_json() for item in self.row_proofs]},
+            "own_clock": None if self.own_clock is None else self.own_clock.to_json(),
             "settling": None if self.settling is None else self.settling.to_json(),
         }
 
@@ -272,15 +275,22 @@ def agreement_of(recordings: Sequence[Recording], names: Sequence[str]) -> Agree
     known = rate_of(some[0][0])
     assert known is not None
     rows = rows_of([recording for recording, _ in some], [name for _, name in some])
+    own_clock = None if rows is None else own_clock_of([r for r, _ in some], [n for _, n in some], rows)
     # in the times that counted rows give, where there are such
-    timed = [(rows.counted(r, n, rows.tick_s) or r) if rows is not None else r for r, n in some]
+    timed = [r if rows is None else _in_true_time(r, n, rows, own_clock) for r, n in some]
     settling = settling_of(timed, [name for _, name in some])
-    found = Agreement(known[0], comparisons, (), rows, (), settling)
+    found = Agreement(known[0], comparisons, (), rows, (), settling, own_clock)
     if not found.contradiction:
         return found
     causes = [cause for id in _CAUSES if (cause := _cause(id, comparisons, {n: r for r, n in some})) is not None]
     causes.sort(key=lambda cause: cause.heldout_after)
-    return Agreement(known[0], comparisons, tuple(causes), rows, _row_proofs(rows, some), settling)
+    return replace(found, causes=tuple(causes), row_proofs=_row_proofs(rows, some))
+
+
+def _in_true_time(recording: Recording, name: str, rows: Rows, own_clock: OwnClock | None) -> Recording:
+    """Return a recording in the times that counted rows give, by the magnetometer's own clock where it has one."""
+    counted = None if own_clock is None else own_clock.counted(recording, name)
+    return counted or rows.counted(recording, name, rows.tick_s) or recording
 
 
 def _compared(recording: Recording, name: str) -> list[Comparison]:
@@ -470,6 +480,8 @@ def _sentences(found: Agreement) -> list[str]:
             )
             for proof in found.row_proofs
         ]
+    if found.own_clock is not None:
+        said += found.own_clock.sentences
     if found.settling is not None:
         said += found.settling.sentences
     return said

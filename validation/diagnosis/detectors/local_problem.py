@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, IntArray
 from discsim.effects.air import Wind
 from discsim.effects.catalogue import catalogued
 from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
 from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import Fit, linearised
-from validation.identification.linear import IntArray, Linear
+from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel, whitened
 from validation.identification.normal_equations import reduce, unknown_prior
 from validation.identification.parameters import Parameter
@@ -148,8 +148,8 @@ def _grounds(fit: Fit, f: int) -> dict[int, Ground]:
         w, V = np.linalg.eigh(H * np.outer(scale, scale))
         kept = w > 1e-11 * w[-1]
         inverse = ((V[:, kept] / w[kept]) @ V[:, kept].T) * np.outer(scale, scale)
-        piece = np.clip(np.searchsorted(chain.edges, linear.t, side="right") - 1, 0, len(chain.states) - 1)
-        found[i] = Ground(chain, linear, noise, np.where(linear.piece < 0, piece, linear.piece), A, e, inverse, right)
+        piece = np.where(linear.piece < 0, chain.segment_of(linear.t), linear.piece)
+        found[i] = Ground(chain, linear, noise, piece, A, e, inverse, right)
     return found
 
 

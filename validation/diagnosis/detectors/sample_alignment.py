@@ -10,10 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, IntArray
 from discsim.compiled import compiled_nogil
 from discsim.recording import Recording, Samples
-from validation.identification.linear import IntArray
 from validation.identification.prediction import shown
 from validation.identification.segments import Chain
 from validation.identification.sensor_model import Values, delay

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
+from validation.diagnosis.consistency.own_clock import SamplesShown
 from validation.diagnosis.consistency.settling import SettleProof
 from validation.diagnosis.consistency.spin_agreement import Agreement, Cause, RowProof
 from validation.diagnosis.report.wording import plus_minus
@@ -22,6 +23,8 @@ def tables_of(found: Agreement) -> list[Table]:
             tables.append(_proofs(found.causes[0]))
     if found.row_proofs:
         tables.append(_rows(found.row_proofs))
+    if found.own_clock is not None:
+        tables.append(_samples(found.own_clock.shown))
     if found.settling is not None:
         tables.append(_settling(found.settling.proofs))
     return tables
@@ -40,6 +43,27 @@ def _comparisons(found: Agreement) -> Table:
         for item in found.comparisons
     ]
     return "The spin about z by each sensor", ("recording", "signal", f"over the {reference}'s", "rests on", ""), rows
+
+
+def _samples(shown: tuple[SamplesShown, ...]) -> Table:
+    rows: list[tuple[str, ...]] = [
+        (
+            item.recording,
+            f"{1e3 * item.period_of_others_s:.3f} ms",
+            "" if item.loop_s is None else f"{1e3 * item.loop_s:.2f} ms",
+            f"{100.0 * item.lost:.0f} %",
+            *(f"{value:.2f} µT" for value in item.left),
+        )
+        for item in shown
+    ]
+    header = (
+        "recording",
+        "period of the others",
+        "logger's loop",
+        "steps without a row",
+        "field leaves in counted rows",
+    )
+    return "The magnetometer's own clock", (*header, "with the samples shown"), rows
 
 
 def _number(value: float) -> str:

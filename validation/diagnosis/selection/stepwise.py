@@ -51,7 +51,7 @@ from validation.identification.noise import NoiseModel, estimate_noise, robust_n
 from validation.identification.parameters import Parameter
 from validation.identification.stated_parameters import stated_parameters
 
-__all__ = ["search", "tried_without"]
+__all__ = ["screened", "search", "tried_without"]
 
 Report: TypeAlias = Callable[[str, int, int], None]
 #: what is proposed, the fit whose motion a fit of it starts from, and what choosing lost samples costs
@@ -87,7 +87,23 @@ def search(
     free: Sequence[Parameter] = (),
     hints: Sequence[Effect] = (),
 ) -> Search:
-    """Find the effects that explain recordings of one plant.
+    """Find the effects that explain recordings of one plant; what is given is that of `screened`."""
+    found, board = screened(recordings, report, as_stated, followed, free, hints)
+    report("refitting candidates", 3, 4)
+    _settle(found, _grown(found, board))
+    report("done", 4, 4)
+    return found
+
+
+def screened(
+    recordings: Sequence[Recording],
+    report: Report = lambda stage, done, total: None,
+    as_stated: Sequence[Recording] | None = None,
+    followed: Fit | None = None,
+    free: Sequence[Parameter] = (),
+    hints: Sequence[Effect] = (),
+) -> tuple[Search, Board]:
+    """Return where the search begins: the relaxed fit with the board of all candidates about it, the baseline's fit.
 
     ``as_stated`` are the same with nothing that stands in for what they do not state, ``followed`` their relaxed fit
     where it is known already; ``free`` are numbers that every fit may move. ``hints`` are effects of about the right
@@ -122,10 +138,7 @@ def search(
     found = Search(tuple(as_stated or recordings), own, loose, noise, trials, base, base)
     found.outliers = left_out
     found.hints = tuple(hinted(hint) for hint in hints if any(trial.id == hint.id for trial in trials))
-    report("refitting candidates", 3, 4)
-    _settle(found, _grown(found, board))
-    report("done", 4, 4)
-    return found
+    return found, board
 
 
 def _grown(found: Search, board: Board) -> Tied:

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, IntArray
 from validation.diagnosis.selection.constrained_fit import Tied, noise_of, scored
 from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.diagnosis.selection.screening import Board, column_of
 from validation.diagnosis.selection.to_stated import to_baseline
 from validation.diagnosis.unknown_law.terms import SENSORS, SHAPES, SensorTerm
 from validation.identification.gauss_newton import Fit, linearised, mapped
-from validation.identification.linear import IntArray, Linear
+from validation.identification.linear import Linear
 from validation.identification.linearisation import moved
 from validation.identification.noise import whitened
 from validation.identification.normal_equations import local_step, reduce, shared_step

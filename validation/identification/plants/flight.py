@@ -18,13 +18,13 @@ from discsim.effects.air import Wind
 from discsim.effects.catalogue import catalogued
 from discsim.effects.kind import BOARD
 from discsim.errors import InputError
-from discsim.frames import body_to_ned, multiply, quaternion_from_matrix, turn
+from discsim.frames import body_to_ned, multiply, quaternion_from_matrix, to_body, turn
 from discsim.law import WRENCH_TARGETS
 from discsim.parameters import PARAMETERS, Tables
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
 from discsim.trajectory import derivative, evaluate, in_body, interpolant, step
-from validation.identification.dynamics import FASTEST, ROW, SIZE, acting_tables, to_body
+from validation.identification.dynamics import FASTEST, SIZE, acting_tables
 from validation.identification.initial.flight import flight_starts
 from validation.identification.parameters import Jumps, Values
 from validation.identification.plants.law_terms import Term
@@ -39,7 +39,7 @@ from validation.identification.plants.plant import (
     MotionLaws,
     Plant,
     Sizes,
-    rows_for,
+    propagated_by,
 )
 
 __all__ = ["FLIGHT"]
@@ -67,15 +67,6 @@ def _longest_step(given: Given, state: FloatArray, start: float, stop: float) ->
     # a path shows no nutation: 0.04 mm off after 2.5 s at 138 rad/s, by tables and with a wobble of 2 rad/s
     largest = _NUTATION if BOARD.isdisjoint(given.recording.samples) else largest
     return min(_STEP, largest / nutation)
-
-
-def _propagate(
-    given: Given, flats: FloatArray, own: FloatArray, states: FloatArray, times: FloatArray, last: int, out: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    del own
-    rows, ends = rows_for(states, out)
-    flight_pieces(flats, given.tables, states, times, last, out, rows, ends)
-    return rows, ends
 
 
 @compiled_nogil
@@ -171,11 +162,9 @@ _WIND = catalogued(Wind).id
 
 
 def _symbols(recording: Recording, t: FloatArray, states: FloatArray, values: Values) -> dict[str, FloatArray]:
-    rows = np.zeros((t.size, ROW))
-    rows[:, 9:13] = states[:, _ATTITUDE]
     wind = np.array(recording.environment.wind, dtype=float)
     wind[:2] += [values.get((_WIND, name), 0.0) for name in Wind._fields]
-    u, v, w = to_body(rows, states[:, _VELOCITY] - wind).T
+    u, v, w = to_body(states[:, _ATTITUDE], states[:, _VELOCITY] - wind).T
     return {
         "t": t,
         "h": np.maximum(-states[:, _POSITION][:, 2], 0.02),
@@ -283,7 +272,7 @@ FLIGHT = Plant(
     name="flight",
     motion="flight",
     layout=Layout(13, 12, _POSITION, _VELOCITY, _ATTITUDE, _RATE, _SPIN, per_time=(_SPIN,)),
-    dynamics=Dynamics(_propagate, _longest_step),
+    dynamics=Dynamics(propagated_by(flight_pieces), _longest_step),
     initial=Initial(_states, _other_attitudes),
     sizes=Sizes(  # m, m/s, rad, rad/s
         differences=np.repeat([1e-3, 1e-3, 1e-5, 1e-4], 3),

@@ -42,7 +42,7 @@ from validation.identification.plants.plant import (
     Layout,
     Plant,
     Sizes,
-    rows_for,
+    propagated_by,
 )
 from validation.identification.readings import Readings
 
@@ -63,15 +63,6 @@ _STEP, _NUTATION = 0.005, 0.22
 def _longest_step(given: Given, state: FloatArray, start: float, stop: float) -> float:
     del given, start, stop
     return min(_STEP, _NUTATION / max(min(abs(float(state[_SPIN])), FASTEST) * 2.0, 1.0))
-
-
-def _propagate(
-    given: Given, flats: FloatArray, own: FloatArray, states: FloatArray, times: FloatArray, last: int, out: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    del given
-    rows, ends = rows_for(states, out)
-    free_spin_pieces(flats, own, states, times, last, out, rows, ends)
-    return rows, ends
 
 
 @compiled
@@ -381,7 +372,7 @@ FREE_SPIN = Plant(
     name=_NAME,
     motion="free spin",
     layout=Layout(_SIZE, 15, attitude=_ATTITUDE, rate=_RATE, spin=_SPIN, per_time=(_DECAY, _SPIN)),
-    dynamics=Dynamics(_propagate, _longest_step),
+    dynamics=Dynamics(propagated_by(free_spin_pieces, lambda given, own: own), _longest_step),
     initial=Initial(_states, _other_attitudes),
     sizes=Sizes(
         differences=np.array([1e-2, 1e-2, 1e-2, 1e-2, 1e-4, 1e-4, *[1e-5] * 3, *[1e-4] * 3, 1e-3, 3e-3, 3e-3]),

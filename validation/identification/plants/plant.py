@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -25,7 +25,18 @@ from validation.identification.plants.law_terms import Term
 from validation.identification.plants.plan import Plan
 from validation.identification.readings import Readings
 
-__all__ = ["Design", "Durations", "Dynamics", "Given", "Initial", "Layout", "MotionLaws", "Plant", "Sizes", "rows_for"]
+__all__ = [
+    "Design",
+    "Durations",
+    "Dynamics",
+    "Given",
+    "Initial",
+    "Layout",
+    "MotionLaws",
+    "Plant",
+    "Sizes",
+    "propagated_by",
+]
 
 # ------------------------------------------------------------------------------------------ states and their motion
 
@@ -112,9 +123,31 @@ Propagate: TypeAlias = Callable[
 ]
 
 
-def rows_for(states: FloatArray, out: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return room for rows (c, m, 19) at instants out (m,) and for the states (c, s) at the end."""
-    return np.empty((states.shape[0], out.size, ROW)), np.empty(states.shape)
+def _tables(given: Given, own: FloatArray) -> Tables:
+    del own
+    return given.tables
+
+
+def propagated_by(pieces: Callable[..., None], beside: Callable[[Given, FloatArray], Any] = _tables) -> Propagate:
+    """Return a plant's motion by its compiled loop over states, which fills rows (c, m, 19) and ends (c, s).
+
+    ``beside`` gives what the loop takes beside the parameters of the physics, of what is given and the plant's own.
+    """
+
+    def propagate(
+        given: Given,
+        flats: FloatArray,
+        own: FloatArray,
+        states: FloatArray,
+        times: FloatArray,
+        last: int,
+        out: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        rows, ends = np.empty((states.shape[0], out.size, ROW)), np.empty(states.shape)
+        pieces(flats, beside(given, own), states, times, last, out, rows, ends)
+        return rows, ends
+
+    return propagate
 
 
 def _no_corners(given: Given, start: float, stop: float) -> list[float]:

@@ -27,9 +27,9 @@ from validation.identification.plants.plant import (
     Layout,
     Plant,
     Sizes,
-    rows_for,
+    propagated_by,
 )
-from validation.identification.plants.rig import LEAN, YAW, leaning, read_lean, rig_row
+from validation.identification.plants.rig import LEAN, YAW, leaning, read_lean, rig_row_within
 from validation.identification.readings import Readings
 
 __all__ = ["RATE_TABLE"]
@@ -54,15 +54,6 @@ def _longest_step(given: Given, state: FloatArray, start: float, stop: float) ->
 
 def _corners(given: Given, start: float, stop: float) -> list[float]:
     return [float(t) for t in given.knots[0] if start < t < stop]
-
-
-def _propagate(
-    given: Given, flats: FloatArray, own: FloatArray, states: FloatArray, times: FloatArray, last: int, out: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    del own
-    rows, ends = rows_for(states, out)
-    table_pieces(flats, given.knots, states, times, last, out, rows, ends)
-    return rows, ends
 
 
 def _consistent(states: FloatArray) -> FloatArray:
@@ -122,16 +113,10 @@ def table_pieces(
         r[n - 1], slope[n - 1] = _commanded(p, knots, times[n - 1] + 1e-12, turned[n - 1])
         for j in range(out.size):
             k = min(max(np.searchsorted(times, out[j], side="right") - 1, 0), n - 2)
-            x = out[j] - times[k]
             h = times[k + 1] - times[k]
             # the end's rate as this step sees it: a ramp may end there
             end, end_slope = _commanded(p, knots, times[k + 1] - 1e-9 * h, turned[k + 1])
-            s = x / h
-            a, b, da, db = r[k], end, h * slope[k], h * end_slope
-            second, third = 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db
-            rate = a + s * (da + s * (second + s * third))
-            angle = turned[k] + x * (a + s * (da / 2.0 + s * (second / 3.0 + s * third / 4.0)))
-            rig_row(p, yaw + angle, rate, (da + s * (2.0 * second + 3.0 * s * third)) / h, rows[c, j])
+            rig_row_within(p, yaw, turned[k], (r[k], slope[k], end, end_slope), h, out[j] - times[k], rows[c, j])
         ends[c] = 0.0
         ends[c, 0], ends[c, 1] = yaw + turned[last], turned[last]
 
@@ -240,7 +225,9 @@ RATE_TABLE = Plant(
     name="rate_table",
     motion="run of the table",
     layout=Layout(2, 1, yaw=_YAW),
-    dynamics=Dynamics(_propagate, _longest_step, _corners, _consistent),
+    dynamics=Dynamics(
+        propagated_by(table_pieces, lambda given, own: given.knots), _longest_step, _corners, _consistent
+    ),
     initial=Initial(_states),
     sizes=Sizes(  # rad
         differences=np.array([1e-5]),

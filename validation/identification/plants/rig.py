@@ -11,7 +11,7 @@ from discsim.effects.rig import axis
 from discsim.toml_table import TomlTable
 from validation.identification.plants.plan import towards
 
-__all__ = ["LEAN", "YAW", "leaning", "read_lean", "rig_row"]
+__all__ = ["LEAN", "YAW", "leaning", "read_lean", "rig_row_within"]
 
 #: how far a rig's axis is leant, rad; far enough for gravity to show in the disc's plane, and easily done
 LEAN = radians(10.0)
@@ -31,6 +31,28 @@ def rig_row(p: Any, psi: float, r: float, dr: float, row: FloatArray) -> None:
     row[9], row[10], row[11], row[12] = w * c, x * c + y * s, y * c - x * s, w * s
     row[13], row[14], row[15] = 0.0, 0.0, r
     row[16], row[17], row[18] = 0.0, 0.0, dr
+
+
+@compiled
+def rig_row_within(
+    p: Any,
+    yaw: float,
+    turned: float,
+    ends: tuple[float, float, float, float],
+    h: float,
+    x: float,
+    row: FloatArray,
+) -> None:
+    """Write a row (19,) of a rig x s into a step of h s: Hermite's cubic of the rate, and its integral.
+
+    ``ends`` are rate and slope at the step's start, then at its end; the rig's yaw at the start is yaw + turned.
+    """
+    a, first, b, last = ends
+    s, da, db = x / h, h * first, h * last
+    second, third = 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db
+    rate = a + s * (da + s * (second + s * third))
+    angle = turned + x * (a + s * (da / 2.0 + s * (second / 3.0 + s * third / 4.0)))
+    rig_row(p, yaw + angle, rate, (da + s * (2.0 * second + 3.0 * s * third)) / h, row)
 
 
 def leaning(lean: tuple[float, float]) -> str:

@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.bearing import bearing_torque
 from discsim.compiled import compiled, compiled_nogil
 from discsim.effects.events import spin_step
-from discsim.effects.rig import coulomb_friction, quadratic_drag
-from discsim.law import law_wrench
-from discsim.own_wrench import own_wrench
 from discsim.parameters import PARAMETERS, Tables
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
@@ -30,9 +28,9 @@ from validation.identification.plants.plant import (
     MotionLaws,
     Plant,
     Sizes,
-    rows_for,
+    propagated_by,
 )
-from validation.identification.plants.rig import LEAN, YAW, leaning, read_lean, rig_row
+from validation.identification.plants.rig import LEAN, YAW, leaning, read_lean, rig_row_within
 
 __all__ = ["SPIN_DOWN"]
 
@@ -47,25 +45,10 @@ def _longest_step(given: Given, state: FloatArray, start: float, stop: float) ->
     return 0.01
 
 
-def _propagate(
-    given: Given, flats: FloatArray, own: FloatArray, states: FloatArray, times: FloatArray, last: int, out: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    del own
-    rows, ends = rows_for(states, out)
-    spin_down_pieces(flats, given.tables, states, times, last, out, rows, ends)
-    return rows, ends
-
-
 @compiled
 def _friction(p: Any, tables: Tables, t: float, r: float) -> float:
     """Angular acceleration of a rig that runs down, rad/s^2."""
-    torque = -p.rig.viscous * r + coulomb_friction(p.rig_coulomb_friction, r)
-    torque += quadratic_drag(p.rig_quadratic_drag, r)
-    if tables.law.shape[0] > 0:
-        torque += law_wrench(tables.law, t, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, r)[5]
-    if tables.own_calls.size > 0:
-        torque += own_wrench(tables.own_calls, tables.own_sizes, t, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, r)[5]
-    return float(torque / p.rig.Izz + spin_step(p.event_spin_step, t, r))
+    return float(bearing_torque(p, tables, t, r) / p.rig.Izz + spin_step(p.event_spin_step, t, r))
 
 
 @compiled_nogil
@@ -108,13 +91,8 @@ def _between(
     """Write rows (m, 19) at instants out by Hermite's cubics through the steps."""
     for j in range(out.size):
         k = min(max(np.searchsorted(times, out[j], side="right") - 1, 0), times.size - 2)
-        h, x = times[k + 1] - times[k], out[j] - times[k]
-        s = x / h
-        a, b, da, db = r[k], r[k + 1], h * slope[k], h * slope[k + 1]
-        second, third = 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db
-        rate = a + s * (da + s * (second + s * third))
-        angle = psi[k] + x * (a + s * (da / 2.0 + s * (second / 3.0 + s * third / 4.0)))
-        rig_row(p, angle, rate, (da + s * (2.0 * second + 3.0 * s * third)) / h, rows[j])
+        ends = r[k], slope[k], r[k + 1], slope[k + 1]
+        rig_row_within(p, 0.0, psi[k], ends, times[k + 1] - times[k], out[j] - times[k], rows[j])
 
 
 def _states(recording: Recording, t: FloatArray, ratio: float) -> FloatArray:
@@ -184,7 +162,7 @@ SPIN_DOWN = Plant(
     name="spin_down",
     motion="run",
     layout=Layout(2, 2, spin=_SPIN, yaw=_YAW),
-    dynamics=Dynamics(_propagate, _longest_step),
+    dynamics=Dynamics(propagated_by(spin_down_pieces), _longest_step),
     initial=Initial(_states),
     sizes=Sizes(  # rad, rad/s
         differences=np.array([1e-5, 1e-4]),

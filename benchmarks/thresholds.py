@@ -1,0 +1,307 @@
+"""What chance alone reaches against each limit of a diagnosis: data sets in which nothing is hidden.
+
+    python benchmarks/thresholds.py --sets 400 --seed 0 --out docs/thresholds --write
+
+Each set has two or three short recordings of one plant, drawn and simulated as the blind test draws them: in half of
+the sets all is as stated, in a quarter the noise of some sensors is louder, quieter or slower than stated, in a quarter
+stated numbers are off within their sigma where a plant has such numbers. Asked is what the first step of a diagnosis
+asks about the fitted baseline: the largest gain of any effect, event, gust or ripple against its price (by a score
+test; what comes near its price is refitted, as in a diagnosis), and what the tests of the residuals reach against their
+limits. Each set is a row of ``sets.csv`` as soon as it is done: an interrupted run goes on from there.
+
+``--write`` puts the table of rates into docs/thresholds.md and the figure beside the table.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+from scipy.stats import beta
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # a file beside this one is called estimators too
+
+from discsim.arrays import FloatArray
+from discsim.files import write_text
+from discsim.recording import PLANTS, SENSORS, Recording, Samples
+from validation.challenge.cases.case import Case, Coast, Kind, Run, Turning
+from validation.challenge.cases.conceal import recordings as simulated
+from validation.challenge.cases.draw import draw_case
+from validation.diagnosis.consistency.early_verdict import ASTRAY as CONTRADICTED
+from validation.diagnosis.consistency.early_verdict import look_at
+from validation.diagnosis.detectors.events import events
+from validation.diagnosis.detectors.gusts import gusts
+from validation.diagnosis.detectors.local_problem import asked_of
+from validation.diagnosis.detectors.speed_ripple import ripple
+from validation.diagnosis.detectors.time_offsets import time_offsets
+from validation.diagnosis.inertia import with_inertia
+from validation.diagnosis.prepared import prepared
+from validation.diagnosis.relaxed_fit import _ASTRAY as ASTRAY
+from validation.diagnosis.relaxed_fit import FEW
+from validation.diagnosis.selection.candidates import parameters_of
+from validation.diagnosis.selection.constrained_fit import tied_fit
+from validation.diagnosis.selection.evidence import ENTRY, EVENT_ENTRY, GUST_ENTRY, OTHER_DISC, PER_PARAMETER
+from validation.diagnosis.selection.found import _FOLLOWED as FOLLOWED
+from validation.diagnosis.selection.found import FAR, Search, chi2_in, values_of_fit
+from validation.diagnosis.selection.hypothesis import Hypothesis
+from validation.diagnosis.selection.proposals import Proposal, proposals
+from validation.diagnosis.selection.stepwise import screened
+from validation.diagnosis.setup import find_setup_faults
+from validation.identification.competing_effects import row_of
+from validation.identification.noise import robust_noise, stated_noise, whitened
+from validation.identification.residual_tests import RESIDUAL_TESTS, remainders
+from validation.identification.stated_parameters import stated_parameters
+from validation.reporting.figures import new_figure, save_figure
+from validation.reporting.progress import shown
+
+#: what is recorded of a flight or a free spin, of a run-down and of a table, s
+FLIGHT, RUN, TABLE = 1.5, 6.0, 8.0
+#: kinds of set with nothing hidden, in turn
+KINDS: Sequence[Kind] = ("nothing", "noise", "nothing", "within_sigma")
+#: what comes this near its price by algebra is refitted
+NEAR = 12.0
+#: a set's first columns
+HEAD = ("set", "plant", "kind", "recordings", "readings")
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A column of the table, what it is in words, and the limit that a diagnosis has for it."""
+
+    column: str
+    words: str
+    limit: float
+    plants: tuple[str, ...] = PLANTS
+
+
+#: gains are twice the log likelihood, less what is charged for each parameter
+LIMITS = (
+    Limit("effect", "an effect", ENTRY),
+    Limit("other_disc", "a disc's effect in one recording", ENTRY + OTHER_DISC, ("flight", "free_spin")),
+    Limit("event", "an event", EVENT_ENTRY, ("flight", "free_spin", "spin_down")),
+    Limit("gust", "a gust", GUST_ENTRY, ("flight",)),
+    Limit("ripple", "a ripple of a table's speed", ENTRY, ("rate_table",)),
+    Limit("time_offset", "an offset of time on a rig", ENTRY, ("spin_down", "rate_table")),
+    Limit("band", "a band of frequency", RESIDUAL_TESTS.band_z),
+    Limit("window", "a window of time", RESIDUAL_TESTS.window_z),
+    Limit("course", "a course in common", RESIDUAL_TESTS.course_gain),
+    Limit("loudness", "a loud and slow noise", RESIDUAL_TESTS.loud),
+    Limit("far", "χ² per reading, baseline", FAR),
+    Limit("followed", "χ² per reading, relaxed fit", FOLLOWED),
+    Limit("astray", "the same in one recording", ASTRAY),
+    Limit("contradicted", "a contradiction of sensors", CONTRADICTED, ("flight", "spin_down", "rate_table")),
+)
+COLUMNS = (*HEAD, *(limit.column for limit in LIMITS), *(f"{limit.column}_is" for limit in LIMITS[:6]), "setup_faults")
+
+
+def null_set(number: int, seed: int) -> tuple[Case, list[Recording]]:
+    """Return a set with nothing hidden, its plant and kind by its number, and its recordings."""
+    plant, kind = PLANTS[number % len(PLANTS)], KINDS[(number // len(PLANTS)) % len(KINDS)]
+    case = draw_case(100_000 * seed + number, plant, kind=kind)
+    runs = [_cut(run) for run in case.runs[: 2 + number // (len(PLANTS) * len(KINDS)) % 2]]
+    case = replace(case, runs=tuple(runs), stated_releases=case.stated_releases[: len(runs)], longest=FLIGHT)
+    return case, simulated(case)
+
+
+def _cut(run: Run) -> Run:
+    if isinstance(run, Coast):
+        return replace(run, duration=RUN)
+    if isinstance(run, Turning):
+        inside = run.profile.t < TABLE
+        return replace(run, profile=Samples(run.profile.t[inside], run.profile.value[inside]))
+    return run
+
+
+def asked(case: Case, recordings: Sequence[Recording]) -> dict[str, str]:
+    """Return a set's row: what chance reaches in it."""
+    names = [recording.name for recording in recordings]
+    fitted, _ = with_inertia(prepared(recordings, names)[0])
+    found, _ = screened(fitted)
+    base = found.base
+    near = proposals(found.board_of(base.fit), found.trials, Hypothesis(), found.own)
+    odd = [p for p in near if p.trial.recordings is not None and (row := row_of(p.trial.id)) and row.of_disc]
+    best: dict[str, Sequence[Proposal]] = {
+        "effect": [p for p in near if p not in odd],
+        "other_disc": odd,
+        "ripple": ripple(base.fit, base.fit.noise, (), 0.0),
+        "time_offset": time_offsets(base.fit, base.fit.noise, (), 0.0),
+    }
+    if not found.loose.plant.commanded:
+        linears = found.loose.linears
+        steady = robust_noise(linears, [linear.residual for linear in linears])
+        ground = asked_of(found.loose, steady, found.own, Hypothesis())
+        best |= {"event": events(ground, 0.0), "gust": gusts(ground, 0.0)}
+    row = dict(zip(HEAD, (str(case.seed), case.plant, case.kind, str(len(names)), str(base.fit.count)), strict=True))
+    for limit in LIMITS:
+        if some := best.get(limit.column, ()):
+            top = max(some, key=_less)
+            row[limit.column] = f"{_reached(found, top, limit):.3f}"
+            row[f"{limit.column}_is"] = top.trial.name
+    row |= {name: f"{value:.3f}" for name, value in _left(found).items()}
+    if not found.loose.plant.weakly_identified:
+        row["contradicted"] = f"{_contradicted(fitted):.3f}"
+    row["setup_faults"] = str(len(find_setup_faults(recordings).faults))
+    return row
+
+
+def _less(proposal: Proposal) -> float:
+    return proposal.gain - PER_PARAMETER * len(parameters_of(proposal.trial))
+
+
+def _reached(found: Search, top: Proposal, limit: Limit) -> float:
+    """Return the gain of a proposal less what its parameters cost; by a refit where that comes near the limit."""
+    if limit.column != "ripple" and _less(top) < limit.limit - NEAR:
+        return _less(top)
+    base = found.base
+    refitted = tied_fit(
+        found.loose if limit.column in ("event", "gust") else base.fit,
+        Hypothesis((top.trial,)),
+        found.own,
+        base.fit.noise,
+        {**values_of_fit(base), **top.start},
+    )
+    return base.score - refitted.score - PER_PARAMETER * len(parameters_of(top.trial))
+
+
+def _left(found: Search) -> dict[str, float]:
+    """Return what the tests of residuals reach of the fitted baseline, whatever their limits."""
+    base = found.base
+    least = replace(RESIDUAL_TESTS, band_z=-np.inf, band_share=-1.0, window_z=-np.inf, course_gain=0.0, loud=0.0)
+    reached: dict[str, float] = {}
+    for item in remainders(base.fit.linears, base.residuals, base.fit.noise, least):
+        kind = {"course": "course", "window": "window", "swallowed": "loudness"}.get(item.kind, "band")
+        size = item.z**2 if kind == "course" else item.z
+        if kind != "window" or item.from_s > found.loose.plant.durations.settled:
+            reached[kind] = max(reached.get(kind, -np.inf), size)
+    reached["far"] = chi2_in(base, found.loose_noise) / base.fit.count
+    reached["followed"] = found.loose.merit / found.loose.count
+    noise = stated_noise(found.loose.linears)
+    reached["astray"] = max(
+        float(np.sum(whitened(linear, noise, linear.residual[:, None]) ** 2)) / linear.raw.size
+        for linear in found.loose.linears
+    )
+    return reached
+
+
+def _contradicted(recordings: Sequence[Recording]) -> float:
+    """Return what a first look leaves of the sensor that it follows worst, in its noise."""
+    sensors = [name for name in SENSORS if any(name in one for one in recordings)]
+    look = look_at(recordings, stated_parameters(recordings), sensors, FEW)
+    return 0.0 if look is None else max(map(look.level, look.sensors))
+
+
+# ------------------------------------------------------------------------------------------------ rates
+
+
+def beyond(reached: FloatArray, limit: float) -> tuple[int, float, float]:
+    """Return how many of the sets (n,) went beyond a limit, the 95 % bound of that rate, and the rate by the tail.
+
+    The excess over a high level falls off exponentially (peaks over a threshold: S. Coles, An Introduction to
+    Statistical Modeling of Extreme Values, 2001, section 4), here over what one set in ten reaches.
+    """
+    n, over = reached.size, int(np.sum(reached > limit))
+    bound = float(beta.ppf(0.95, over + 1, n - over)) if over < n else 1.0
+    level = float(np.quantile(reached, 0.9))
+    scale = float(np.mean(reached[reached > level] - level))
+    return over, bound, min(0.1 * float(np.exp(-(limit - level) / scale)), 1.0)
+
+
+def columns_of(rows: Sequence[Mapping[str, str]]) -> dict[str, FloatArray]:
+    """Return what the sets reached (n,) by column, of the plants in which it is asked; 0 where nothing was proposed."""
+    return {
+        limit.column: np.array([float(row[limit.column] or 0.0) for row in rows if row["plant"] in limit.plants])
+        for limit in LIMITS
+    }
+
+
+def rates_table(rows: Sequence[Mapping[str, str]]) -> str:
+    """Return the table of rates as the page has it."""
+    lines = [
+        "| what chance may pass for | limit | sets | half of the sets reach | one in a hundred | largest | beyond the "
+        "limit | at most (95 %) | by the tail |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for limit in LIMITS:
+        reached = columns_of(rows)[limit.column]
+        if reached.size < 20:
+            continue
+        over, bound, tail = beyond(reached, limit.limit)
+        half, late = np.quantile(reached, [0.5, 0.99])
+        lines.append(
+            f"| {limit.words} | {limit.limit:g} | {reached.size} | {half:.1f} | {late:.1f} | {reached.max():.1f} | "
+            f"{over} | {100 * bound:.1f} % | {_share(tail)} |"
+        )
+    return "\n".join(lines)
+
+
+def _share(rate: float) -> str:
+    return f"1 in {1.0 / rate:.1g}" if rate > 1e-9 else "never"
+
+
+def draw(rows: Sequence[Mapping[str, str]], path: Path) -> None:
+    """Draw the share of sets beyond each size, and the limits."""
+    reached = columns_of(rows)
+    some = [limit for limit in LIMITS if reached[limit.column].size >= 20]
+    lines = -(-len(some) // 4)
+    figure, axes = new_figure(lines, 4, width=11.0, height=2.4 * lines, squeeze=False)
+    for panel, limit in zip(axes.flat, some, strict=False):
+        x = np.sort(reached[limit.column])
+        panel.step(x, 1.0 - np.arange(x.size) / x.size, where="post", color="#0072b2")
+        level = float(np.quantile(x, 0.9))
+        far = np.linspace(level, max(limit.limit, x[-1]), 20)
+        panel.plot(far, 0.1 * np.exp(-(far - level) / np.mean(x[x > level] - level)), ":", color="#0072b2")
+        panel.axvline(limit.limit, color="#d55e00")
+        panel.set_yscale("log")
+        panel.set_ylim(1e-4, 1.2)
+        panel.set_title(limit.words)
+    for panel in axes.flat[len(some) :]:
+        panel.set_visible(False)
+    for panel in axes[:, 0]:
+        panel.set_ylabel("share of sets beyond")
+    save_figure(figure, path)
+
+
+# ------------------------------------------------------------------------------------------------ running
+
+
+def known_rows(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a table that is there, less a last one that was cut off while it was written."""
+    if not path.exists():
+        return []
+    text = path.read_text(encoding="utf-8")
+    return list(csv.DictReader(text[: text.rfind("\n") + 1].splitlines()))
+
+
+def main() -> None:
+    """Simulate, ask, write."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
+    parser.add_argument("--sets", type=int, default=400)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, required=True, help="folder of sets.csv and thresholds.png")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/thresholds.md")
+    options = parser.parse_args()
+    path = options.out / "sets.csv"
+    options.out.mkdir(parents=True, exist_ok=True)
+    rows = known_rows(path)
+    write_text(path, "\n".join([",".join(COLUMNS), *(",".join(row[name] for name in COLUMNS) for row in rows), ""]))
+    with shown() as report, path.open("a", encoding="utf-8") as stream:
+        for number in range(len(rows), options.sets):
+            report(f"{20 * (number // 20)} of {options.sets} sets", number, options.sets)
+            row = asked(*null_set(number, options.seed))
+            rows.append({name: row.get(name, "") for name in COLUMNS})
+            stream.write(",".join(rows[-1].values()) + "\n")
+            stream.flush()
+    print(rates_table(rows))
+    draw(rows, options.out / "thresholds.png")
+
+
+if __name__ == "__main__":
+    main()

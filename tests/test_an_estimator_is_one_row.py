@@ -1,0 +1,95 @@
+"""An estimator is one file and one row: the diff of docs/architecture.md, applied to a copy, is all that it takes."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+
+ASKED = """
+import json, sys
+from pathlib import Path
+import numpy as np
+import discsim, estimators, validation
+from validation.commands.estimate import command as estimate
+
+t = np.arange(0.0, 3.0, 0.005)
+rate = 40.0 - 2.0 * t
+psi = 40.0 * t - t**2
+noise = np.random.default_rng(1).normal(0.0, 0.3, (t.size, 3))
+field = np.column_stack([20.0 * np.cos(psi), -20.0 * np.sin(psi), np.full(t.size, 45.0)]) + noise
+recording = discsim.recording_from_arrays({"magnetometer": (t, field)})
+found = estimators.estimate(recording, "zero_crossings")
+off = (found.rate - (40.0 - 2.0 * found.t)) / found.sd
+discsim.write_recording(recording, sys.argv[1] + "/recording")
+folder = Path(sys.argv[1])
+estimate(folder / "recording", method="zero_crossings", out=folder / "spin")
+told = {"known": len(found), "rms": float(np.sqrt(np.mean(off**2))), "files": estimators.__file__}
+told["checked"] = "zero_crossings" in str(validation.check(recording).to_json())
+print("TOLD" + json.dumps(told))
+"""
+
+
+def applied(diff: str, folder: Path) -> None:
+    """Apply a diff of new files and of lines that are put behind others that stand there once."""
+    for part in re.split(r"(?m)^--- ", diff)[1:]:
+        target = re.search(r"^\+\+\+ b/(.*)$", part, re.MULTILINE)
+        assert target is not None
+        path = folder / target[1]
+        hunks = re.split(r"(?m)^@@.*\n", part.split("\n", 2)[2])
+        if part.startswith("/dev/null"):
+            path.write_text("".join(line[1:] + "\n" for line in hunks[0].splitlines()), encoding="utf-8")
+            continue
+        text = path.read_text(encoding="utf-8")
+        for hunk in hunks[1:]:
+            lines = hunk.splitlines()
+            before = "\n".join(line[1:] for line in lines if not line.startswith("+"))
+            after = "\n".join(line[1:] for line in lines)
+            assert text.count(before) == 1, before
+            text = text.replace(before, after)
+        path.write_text(text, encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory):
+    """What a copy of the program says, to which the diff of the page was applied."""
+    folder = tmp_path_factory.mktemp("estimator")
+    for package in ("discsim", "estimators", "validation", "models"):
+        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))
+    section = PAGE[PAGE.index("### An estimator") :]
+    (diff,) = re.findall(r"```diff\n(.*?)^```", section[: section.index("### A plant")], re.MULTILINE | re.DOTALL)
+    applied(diff, folder)
+    answer = subprocess.run(
+        [sys.executable, "-c", ASKED, str(folder)],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(folder)},
+    )
+    assert answer.returncode == 0, answer.stdout[-500:] + answer.stderr[-2000:]
+    return folder, json.loads(answer.stdout.partition("TOLD")[2])
+
+
+def test_the_estimator_of_the_page_tells_the_spin_with_an_honest_deviation(told):
+    folder, found = told
+    assert found["files"].startswith(str(folder))
+    assert found["known"] > 15
+    assert 0.5 < found["rms"] < 1.5
+
+
+def test_commands_know_the_estimator_of_the_page_by_its_name(told):
+    folder, found = told
+    rows = np.genfromtxt(folder / "spin" / "rate.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+    assert set(rows["method"]) == {"zero_crossings"}
+    assert found["checked"]

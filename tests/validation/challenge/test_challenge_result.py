@@ -1,0 +1,283 @@
+"""What a challenge adds up to: detection against size, exponents of laws, masks, and what is written into the page."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from discsim.errors import InputError
+from validation.challenge.blind import Request
+from validation.challenge.cases.conceal import Answer
+from validation.challenge.masks import challenge_masks, masked_results
+from validation.challenge.report.document import main as write_document
+from validation.challenge.report.document import masks_text, plain_command, pooled, with_part
+from validation.challenge.report.page import fault_of, goals_met
+from validation.challenge.run import challenge
+from validation.challenge.scores.detection import Sized, allowed, detections, fit_curve, has_curve
+from validation.challenge.scores.result import Scored, rates_of, read_result, times
+from validation.challenge.scores.scoring import score_case
+from validation.reporting.run import start_run
+
+#: a "diagnosis" that finds nothing in anything
+BLIND = """
+import json, sys
+from pathlib import Path
+fit = {"chi2_per_sample": 1.0, "heldout_chi2_per_sample": 1.0}
+out = Path(sys.argv[-1])
+out.mkdir()
+(out / "diagnosis.json").write_text(json.dumps({"verdict": "consistent", "effects": [], "located": [],
+    "recalibrated": {}, "law": None, "fit": {"baseline": fit, "final": fit}}))
+"""
+
+
+@pytest.fixture
+def blind(tmp_path: Path) -> list[str]:
+    script = tmp_path / "blind.py"
+    script.write_text(BLIND)
+    return [sys.executable, str(script)]
+
+
+def drawn(half: float, width: float, cases: int, seed: int = 0) -> list[Sized]:
+    rng = np.random.default_rng(seed)
+    sizes = np.exp(rng.uniform(np.log(0.2), np.log(20.0), cases))
+    named = rng.random(cases) < 1.0 / (1.0 + (sizes / half) ** (-1.0 / width))
+    return [Sized("air.wind", float(size), bool(ok)) for size, ok in zip(sizes, named, strict=True)]
+
+
+@pytest.mark.parametrize("half", [0.8, 1.5, 4.0])
+def test_the_half_detection_size_is_found_with_an_interval_that_holds_it(half):
+    """Of twenty sets of 150 effects the interval of 95 % misses at most three (probability of more: 1.6 %)."""
+    curves = [fit_curve(drawn(half, 0.3, 150, seed)) for seed in range(20)]
+    assert sum(curve is not None and curve.low <= half <= curve.high for curve in curves) >= 17
+    assert np.median([curve.half for curve in curves if curve is not None]) == pytest.approx(half, rel=0.1)
+
+
+def test_a_share_that_is_missed_however_large_does_not_move_the_half_detection_size():
+    rng = np.random.default_rng(1)
+    items = [item._replace(named=item.named and bool(rng.random() < 0.85)) for item in drawn(1.2, 0.2, 600)]
+    curve = fit_curve(items)
+    assert curve is not None
+    assert curve.missed == pytest.approx(0.15, abs=0.06)  # three standard deviations of a share of 400 large ones
+    assert curve.low <= 1.2 <= curve.high
+    assert curve.at(curve.half) == pytest.approx(0.5)
+
+
+def test_what_was_always_or_never_named_has_no_curve_and_few_cases_have_none_of_their_own():
+    named = [Sized("air.wind", size, True) for size in (0.5, 1.0, 2.0)]
+    assert fit_curve(named) is None
+    assert fit_curve([item._replace(named=False) for item in named]) is None
+    assert fit_curve([]) is None
+    assert not has_curve([*named, Sized("air.wind", 0.3, False)])
+    assert has_curve([*named * 2, *[Sized("air.wind", 0.3, False)] * 2])
+
+
+def test_a_bound_that_the_cases_do_not_give_is_not_given():
+    curve = fit_curve([Sized("air.wind", size, size != 5.0) for size in (3.0, 4.0, 5.0, 6.0, 9.0)])
+    assert curve is not None
+    assert curve.low == 0.0
+    assert curve.text.startswith(("below", "unknown")) or "at most" in curve.text
+
+
+def test_an_ideal_test_names_half_of_the_effects_at_the_limit():
+    assert allowed(1.0) == pytest.approx(0.5)
+    assert allowed(0.6) < 0.01
+    assert allowed(1.5) > 0.99
+
+
+def answer(**more: Any) -> Answer:
+    return Answer(**{"seed": 5, "plant": "spin_down", "kind": "one", "verdict": "explained", **more})
+
+
+def diagnosis(verdict: str, *ids: str, law: dict[str, Any] | None = None) -> dict[str, Any]:
+    fit = {"chi2_per_sample": 1.0, "heldout_chi2_per_sample": 1.0}
+    effects = [{"id": id, "recordings": "all", "parameters": {}, "confused_with": []} for id in ids]
+    return {
+        "verdict": verdict,
+        "effects": effects,
+        "located": [],
+        "recalibrated": {},
+        "law": law,
+        "fit": {"baseline": fit, "final": fit},
+    }
+
+
+def scored(given: Answer, found: dict[str, Any] | None, seconds: float = 1.0, **sizes: float) -> Scored:
+    return Scored(given, found, score_case(given, found), None, seconds, "0" * 64, sizes)
+
+
+POWER = answer(
+    kind="off_catalogue", verdict="unexplained", law="a torque", parameters={"coefficient": 1e-9, "exponent": 2.8}
+)
+
+
+def law(text: str, target: str = "moment_z_N_m", **coefficients: tuple[float, float]) -> dict[str, Any]:
+    told = {name: {"value": value, "sd": sd} for name, (value, sd) in coefficients.items()}
+    return {"text": text, "target": target, "coefficients": told, "heldout_delta_log_likelihood": 50.0}
+
+
+def test_the_exponent_of_a_law_is_compared_with_the_concealed_one():
+    found = law("c * |r|^n * sign(r)", n=(2.815, 0.01), c=(-1e-9, 1e-10))
+    item = scored(POWER, diagnosis("unexplained", law=found))
+    assert item.score.right
+    assert item.score.exponent is not None
+    assert item.score.exponent.in_sd == pytest.approx(1.5)
+    rates = rates_of([item, scored(POWER, diagnosis("unexplained"))])
+    assert (rates["law_given_rate"].hits, rates["law_given_rate"].of) == (1, 2)
+    assert (rates["exponent_given_rate"].hits, rates["exponent_given_rate"].of) == (1, 2)
+    assert (rates["exponent_within_2sd_rate"].hits, rates["exponent_within_2sd_rate"].of) == (1, 1)
+
+
+def test_a_power_that_was_not_fitted_has_no_sd_and_a_product_is_read_by_its_symbol():
+    fixed = score_case(POWER, diagnosis("unexplained", law=law("c * |r|^2.5 * sign(r)", c=(-1e-9, 1e-10)))).exponent
+    assert fixed is not None
+    assert (fixed.value, fixed.sd, fixed.in_sd) == (2.5, None, None)
+    both = law("c * |V|^n_V * |r|^n_r * sign(r)", n_V=(0.1, 0.1), n_r=(2.7, 0.1))
+    found = score_case(POWER, diagnosis("unexplained", law=both)).exponent
+    assert found is not None
+    assert found.value == 2.7
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        law("c * |V|^n * sign(r)", n=(2.0, 0.1)),
+        law("c * |r|^n * sign(r)", "force_x_N", n=(2.8, 0.1)),
+        law("c1 * |r|^n1 * sign(r) + c2 * |r|^n2 * sign(r)", n1=(2.0, 0.1), n2=(3.0, 0.1)),
+        law("c * |r|^1 * sign(r) * exp(-t/tau)", tau=(4.0, 1.0)),
+        None,
+    ],
+)
+def test_another_law_has_no_exponent_to_compare(other):
+    assert score_case(POWER, diagnosis("unexplained", law=other)).exponent is None
+
+
+def test_a_catalogued_effect_with_an_exponent_is_no_power_law_of_the_test():
+    shear = answer(effects=("aero.yaw_reynolds",), plant="flight", parameters={"exponent": 0.5})
+    found = diagnosis("unexplained", law=law("c * |r|^n", n=(2.0, 0.1)))
+    assert score_case(shear, found).exponent is None
+
+
+def test_each_way_to_be_wrong_has_its_name():
+    two = answer(kind="two", effects=("mag.lag", "clock.rate"))
+    nothing = answer(kind="nothing", verdict="consistent")
+    told = [
+        (two, diagnosis("explained", "mag.lag"), "one of two effects not named"),
+        (two, diagnosis("explained", "mag.lag", "gyro.bias"), "another effect named"),
+        (two, diagnosis("explained", "mag.lag", "clock.rate", "gyro.bias"), "effects named beside the right ones"),
+        (two, diagnosis("consistent"), "not noticed"),
+        (two, diagnosis("unexplained"), "noticed, called unexplained"),
+        (two, diagnosis("explained", "mag.lag", "clock.rate"), "right effects in another place"),
+        (two, None, "no answer"),
+        (nothing, diagnosis("explained", "mag.lag"), "false alarm"),
+        (nothing, diagnosis("recalibrated"), "consistent and recalibrated confused"),
+        (nothing, diagnosis("consistent"), ""),
+        (POWER, diagnosis("explained", "mag.lag"), "physics of no catalogue named as an effect"),
+        (POWER, diagnosis("consistent"), "physics of no catalogue not noticed"),
+    ]
+    assert [fault_of(scored(given, found)) for given, found, _ in told] == [fault for _, _, fault in told]
+
+
+def test_times_are_those_of_all_diagnoses_also_of_one_that_was_given_up():
+    found = [scored(POWER, diagnosis("unexplained"), seconds=float(s)) for s in range(1, 12)]
+    assert times(found) == (6.0, 10.0, 11.0)
+    assert times([*found, scored(POWER, None, seconds=1800.0)]).longest == 1800.0
+    assert np.isnan(times([]).median)
+
+
+def test_of_two_effects_each_counts_by_its_own_size():
+    two = answer(kind="two", effects=("mag.lag", "clock.rate"))
+    item = scored(two, diagnosis("explained", "mag.lag"), **{"mag.lag": 30.0, "clock.rate": 0.4})
+    assert item.strength == 0.4
+    assert detections([item]) == [Sized("mag.lag", 30.0, True), Sized("clock.rate", 0.4, False)]
+
+
+def test_a_half_detection_size_above_the_goal_misses_it():
+    good = rates_of([scored(answer(kind="nothing", verdict="consistent"), diagnosis("consistent"))])
+    late, early = fit_curve(drawn(6.0, 0.2, 200)), fit_curve(drawn(1.0, 0.2, 200))
+    assert not goals_met(good, late, few=True)
+    assert goals_met(good, early, few=True)
+
+
+PAGE = "top\n<!-- masks -->\nold\n<!-- /masks -->\nmiddle\n<!-- result -->\nold\n<!-- /result -->\nend\n"
+
+
+def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, blind, monkeypatch):
+    """Under two masks of seven, and without any: a page with tables, figures and a command for each failure."""
+    requests = [
+        Request(40, "flight", (), "nothing"),
+        Request(41, "flight", ("air.wind",)),
+        Request(42, "flight", ("lift_hysteresis",)),
+    ]
+    with start_run(tmp_path / "plain", 40) as run:
+        challenge(run, requests, workers=1, command=blind)
+    monkeypatch.setattr("validation.challenge.masks.MASKS", {"short": "short", "few_recordings": "two only"})
+    with start_run(tmp_path / "masks", 40) as run:
+        results = challenge_masks(run, requests, workers=1, command=blind)
+    assert list(results) == ["short", "few_recordings"]
+    assert "few_recordings" in (tmp_path / "masks" / "report.html").read_text()
+    written = json.loads((tmp_path / "masks" / "short" / "challenge.json").read_text())
+    assert written["cases"][1]["reproduce"].endswith("--seed 41 --cases 1 --plant flight "
+                                                     "--effect air.wind --mask short")  # fmt: skip
+    shutil.rmtree(tmp_path / "masks" / "short")
+    assert list(masked_results([tmp_path / "masks"])) == ["few_recordings"]
+
+    page = tmp_path / "docs" / "page.md"
+    page.parent.mkdir()
+    page.write_text(PAGE)
+    given = [str(tmp_path / "plain"), "--masks", str(tmp_path / "masks"), "--page", str(page)]
+    monkeypatch.setattr(sys, "argv", ["document", *given])
+    write_document()
+    text = page.read_text()
+    assert text.startswith("top\n")
+    assert text.endswith("\nend\n")
+    assert "old" not in text
+    assert "1 are answered rightly" in text
+    assert "`discsim challenge --seed 41 --cases 1 --plant flight --effect air.wind`" in text
+    assert "| none (the same seeds) | 3 |" in text
+    assert "| `few_recordings` | 3 |" in text
+    assert "`short`" not in text
+    drawn_there = {path.name for path in (page.parent / "images").iterdir()}
+    assert {f"images/{name}" in text for name in drawn_there} == {True}
+    write_document()
+    assert page.read_text() == text
+
+    # more cases without anything in them count for the false alarms, and only such cases
+    with start_run(tmp_path / "blank", 50) as run:
+        challenge(run, [Request(50, "flight", (), "nothing")], workers=1, command=blind)
+    monkeypatch.setattr(sys, "argv", ["document", *given[:1], "--blank", str(tmp_path / "blank"), *given[-2:]])
+    write_document()
+    (alarms,) = [line for line in page.read_text().splitlines() if line.startswith("| false alarms")]
+    assert "| 0 of 2 |" in alarms
+    monkeypatch.setattr(sys, "argv", ["document", *given[:1], "--blank", str(tmp_path / "plain"), *given[-2:]])
+    with pytest.raises(SystemExit):
+        write_document()
+
+    # effects near their limit count in the curve: the same ones here, so there are twice as many
+    near = tmp_path / "near" / "challenge.json"
+    near.parent.mkdir()
+    near.write_text(
+        json.dumps({**json.loads((tmp_path / "plain" / "challenge.json").read_text()), "mask": "near_limit"})
+    )
+    monkeypatch.setattr("validation.challenge.masks.MASKS", {"near_limit": "near"})
+    assert len(pooled(read_result(tmp_path / "plain"), read_result(near.parent))) == 2
+    monkeypatch.setattr(sys, "argv", ["document", *given[:1], "--masks", str(near.parent), "--page", str(page)])
+    write_document()
+    assert "whose sizes lie near the limit: `discsim" in page.read_text()
+
+
+def test_what_is_not_there_is_not_written(tmp_path):
+    with pytest.raises(InputError, match="no marks <!-- other -->"):
+        with_part(PAGE, "other", "text")
+    with pytest.raises(InputError, match="no finished challenge with a mask"):
+        masks_text([tmp_path], None)
+
+
+def test_a_command_is_told_without_folder_and_cluster():
+    told = "discsim challenge --cases 300 --seed 7 --scheduler tcp://a:1 --workers=2 --anew --out /somewhere/else"
+    assert plain_command(told) == "discsim challenge --cases 300 --seed 7"

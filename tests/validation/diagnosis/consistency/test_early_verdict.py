@@ -1,0 +1,90 @@
+"""Recordings that no motion follows end early, with the sensors that contradict one another."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.made import throws
+
+from validation.diagnosis.consistency.early_verdict import ASTRAY, RECONCILED, contradiction_in
+from validation.diagnosis.consistency.followed import left_of, left_when_shifted, true_noise
+from validation.diagnosis.contradicted import contradicted_outcome
+from validation.diagnosis.relaxed_fit import part_of, relaxed
+from validation.identification.observations import readings_of
+
+
+@pytest.fixture(scope="module")
+def sound():
+    return throws()
+
+
+def exchanged(recordings, sensor):
+    """Return recordings each of which has a sensor of the next."""
+    nexts = [*recordings[1:], recordings[0]]
+    return [
+        replace(one, samples={**one.samples, sensor: other.samples[sensor]})
+        for one, other in zip(recordings, nexts, strict=True)
+    ]
+
+
+@pytest.fixture(scope="module")
+def mixed(sound):
+    return exchanged(sound, "magnetometer")
+
+
+@pytest.fixture(scope="module")
+def contradiction(mixed):
+    return contradiction_in(mixed, ())
+
+
+def test_sound_throws_are_followed_and_nothing_is_said(sound):
+    assert contradiction_in(sound, ()) is None
+
+
+def test_a_magnetometer_of_another_throw_contradicts_the_rest(contradiction):
+    assert contradiction is not None
+    assert "magnetometer" in contradiction.blamed
+    assert any("magnetometer" in one and "contradict" in one for one in contradiction.sentences)
+
+
+def test_the_outcome_is_unexplained_located_by_sensor_and_finite(mixed, contradiction):
+    answer = contradicted_outcome(contradiction, mixed, ["mixed"], ["01", "02"], 0).diagnosis.to_json()
+    assert answer["verdict"] == "unexplained"
+    assert answer["effects"] == []
+    assert {place["sensor"] for place in answer["located"]} == set(contradiction.blamed)
+    assert answer["fit"]["final"]["chi2_per_sample"] > ASTRAY
+    json.dumps(answer, allow_nan=False)
+
+
+def test_noise_is_seen_below_a_signal_that_turns_where_none_is_stated(sound):
+    """The k-th difference of noise s has the level s sqrt(C(2k, k)), a field at 0.7 rad a row 0.69^k of it."""
+    sheets = {
+        **sound[0].sheets,
+        "magnetometer": replace(sound[0].sheets["magnetometer"], noise_rms=None, resolution=None),
+    }
+    unstated = readings_of(replace(sound[0], sheets=sheets))
+    stated = true_noise(readings_of(sound[0]))["magnetometer"].sd
+    assert true_noise(unstated)["magnetometer"].sd == pytest.approx(stated, rel=0.3)
+
+
+def test_a_part_of_a_fit_leaves_what_the_whole_left_of_it(sound):
+    fit = relaxed(sound)
+    noise = true_noise(readings_of(sound[0]))
+    assert left_of(part_of(fit, [1]), noise)[0] == left_of(fit, noise)[1]
+
+
+@pytest.mark.parametrize("sensor", ["magnetometer", "accelerometer"])
+def test_a_delay_and_lost_samples_are_reconciled_and_another_throw_is_not(sound, sensor):
+    fit = relaxed(sound)
+    own, other = (next(r for r in readings_of(one) if r.sensor == sensor) for one in sound)
+    noise = true_noise([own])
+
+    def left(readings):
+        return left_when_shifted(fit.chains[0], fit.values(0), readings, noise)
+
+    kept = np.sort(np.random.default_rng(1).choice(own.t.size, int(0.95 * own.t.size), replace=False))
+    lost = replace(own, t=own.t[: kept.size], value=own.value[kept], good=own.good[kept], clipped=own.clipped[kept])
+    assert left(replace(own, t=own.t + 0.05)) < RECONCILED
+    assert left(lost) < RECONCILED
+    assert left(other) > RECONCILED

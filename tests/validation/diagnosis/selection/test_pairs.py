@@ -1,0 +1,150 @@
+"""Two effects: what algebra expects of every pair, and the search where no effect alone comes near the data."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from support.made import throws
+
+from discsim.effects import Effect, effect
+from validation.diagnosis.design.next_recording import confusions
+from validation.diagnosis.relaxed_fit import relaxed, unknowns
+from validation.diagnosis.selection import stepwise as searching
+from validation.diagnosis.selection.candidates import Trial, trials_for
+from validation.diagnosis.selection.constrained_fit import Tied
+from validation.diagnosis.selection.exchange import exchanged, rivals_of
+from validation.diagnosis.selection.found import Rival, possible
+from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
+from validation.diagnosis.selection.proposals import Pair, Proposal, pairs
+from validation.diagnosis.selection.screening import board_of
+from validation.identification.noise import estimate_noise
+from validation.identification.plants.flight import FLIGHT
+from validation.identification.stated_parameters import stated_parameters
+
+YAW, CLOCK = effect("aero.yaw_reynolds", exponent=0.3), effect("mag.clock_rate", ratio=0.9996)
+
+
+@cache
+def ranked() -> list[Pair]:
+    """Return the pairs for throws with a yaw damping that grows with speed and a magnetometer's clock that is slow."""
+    recordings = throws([YAW], [CLOCK])
+    known = stated_parameters(recordings)
+    loose = relaxed(recordings, known)
+    noise = estimate_noise(loose.linears, [linear.residual for linear in loose.linears])
+    trials = trials_for(recordings)
+    board = board_of(loose, trials, noise, FLIGHT.sizes.continuous)
+    return pairs(board, trials, (*known, *unknowns(recordings)))
+
+
+def named(hidden: list[Effect], errors: list[Effect]) -> list[str]:
+    """Return what a search names in throws."""
+    return sorted(trial.id for trial in searching.search(throws(hidden, errors)).final.hypothesis.trials)
+
+
+def test_the_first_pair_is_the_right_one_and_starts_near_its_numbers():
+    best = ranked()[0]
+    assert {trial.id for trial in best.hypothesis.trials} == {YAW.id, CLOCK.id}
+    assert best.start[(YAW.id, "exponent"), None] == pytest.approx(0.3, rel=0.3)
+    assert best.start[(CLOCK.id, "ratio"), None] - 1.0 == pytest.approx(-4e-4, rel=0.3)
+
+
+def test_every_two_effects_are_asked_once_at_their_best_shape():
+    asked = [frozenset(trial.id for trial in pair.hypothesis.trials) for pair in ranked()]
+    assert all(len(ids) == 2 for ids in asked)
+    assert len(set(asked)) == len(asked)
+    assert [pair.merit for pair in ranked()] == sorted(pair.merit for pair in ranked())
+
+
+def test_a_start_holds_what_shapes_an_effect():
+    for pair in ranked():
+        kept = {q.key for q in fitted_parameters(pair.hypothesis, ())}
+        assert kept <= {key for key, _ in pair.start}
+
+
+def test_where_no_effect_alone_is_worth_its_price_two_are_found_at_once(monkeypatch):
+    monkeypatch.setattr(searching, "_next", lambda *_: None)
+    assert named([YAW], [CLOCK]) == [YAW.id, CLOCK.id]
+
+
+def test_of_two_at_once_the_superfluous_one_goes(monkeypatch):
+    monkeypatch.setattr(searching, "_next", lambda *_: None)
+    assert named([YAW], []) == [YAW.id]
+
+
+def test_two_at_once_are_not_asked_for_near_the_data(monkeypatch):
+    monkeypatch.setattr(searching, "_next", lambda *_: None)
+    monkeypatch.setattr(searching, "_together", lambda *_: pytest.fail("asked"))
+    assert named([], []) == []
+
+
+@cache
+def windy() -> searching.Search:
+    """Return what is found in throws through a wind that is the same at every height."""
+    return searching.search(throws([effect("air.wind", w_north_m_s=-1.4, w_east_m_s=-1.0)], seconds=2.0))
+
+
+def of(id: str) -> Trial:
+    return next(trial for trial in windy().trials if trial.id == id)
+
+
+@cache
+def as_shear() -> Tied:
+    """Return the fit of that wind as one that grows with height."""
+    return searching.tied_fit(windy().loose, Hypothesis((of("air.wind_shear"),)), windy().own, windy().loose_noise, {})
+
+
+def test_an_effect_gives_way_to_one_that_explains_as_much_with_fewer_parameters():
+    sheared = as_shear()
+    found = replace(windy(), final=sheared)
+    found.board = board_of(sheared.fit, found.trials, sheared.fit.noise, FLIGHT.sizes.continuous)
+    found.rivals = rivals_of(found)
+    assert next(rival.trial.id for rival in found.rivals["air.wind_shear"]) == "air.wind"
+    better = exchanged(found)
+    assert better is not None
+    assert [trial.id for trial in better.hypothesis.trials] == ["air.wind"]
+
+
+def test_an_effect_does_not_give_way_to_one_that_needs_more_parameters_for_the_same():
+    assert [trial.id for trial in windy().final.hypothesis.trials] == ["air.wind"]
+    assert exchanged(windy()) is None
+
+
+def test_a_shear_that_is_known_to_have_none_is_not_confused_with_the_wind():
+    (wind,) = windy().final.hypothesis.trials
+    sheared = as_shear()
+    place = [q.name for q in sheared.fit.parameters].index("exponent")
+    assert sheared.fit.covariance[place, place] ** 0.5 < 0.05
+    found = replace(windy(), rivals={wind.name: [Rival(of("air.wind_shear"), 0.0, sheared)]})
+    assert confusions(found, wind) == []
+    # where the exponent is not known, nobody can tell
+    wide = replace(sheared, fit=replace(sheared.fit, covariance=1e4 * sheared.fit.covariance))
+    found = replace(windy(), rivals={wind.name: [Rival(of("air.wind_shear"), 0.0, wide)]})
+    assert [rival.trial.id for rival in confusions(found, wind)] == ["air.wind_shear"]
+
+
+def test_a_sensor_far_off_the_disc_is_impossible():
+    trial = of("accel.position_offset")
+    places = ((trial.id, name) for name in ("dx_m", "dy_m", "dz_m"))
+    values = dict.fromkeys(((key, None) for key in places), 1e-4)
+    fit = searching.tied_fit(
+        windy().loose, Hypothesis((trial,)), windy().own, windy().loose_noise, values, iterations=0, polish=0
+    )
+
+    def with_offset(x: float) -> Tied:
+        at = fit.fit.at.copy()
+        at[[q.name for q in fit.fit.parameters].index("dx_m")] = x
+        return replace(fit, fit=replace(fit.fit, at=at, covariance=1e-6 * np.eye(at.size)))
+
+    assert possible(with_offset(0.1))
+    assert not possible(with_offset(0.2))
+
+
+def test_offers_from_two_fits_come_in_turn_and_lost_samples_first():
+    big, small = of("air.wind"), of("aero.stall")
+    there = [(Proposal(trial, gain, {}), windy().loose, 0.0) for trial, gain in ((big, 1e6), (small, 9e5), (big, 1.0))]
+    here = [(Proposal(small, 5e3, {}), windy().loose, 0.0), (Proposal(big, 1e4, {}), windy().loose, 30.0)]
+    gains = [offer[0].gain for offer in searching._in_turn(there, here)]
+    assert gains == [1e6, 1e4, 9e5, 5e3]

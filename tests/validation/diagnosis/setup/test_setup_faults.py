@@ -1,0 +1,90 @@
+"""Faults of the setup that have a size compete like any effect; settings do not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.made import tables, throws
+
+from discsim.effects import CATALOGUE, Effect, effect
+from discsim.written import as_written
+from validation.diagnosis.selection.candidates import available, parameters_of, trials_for
+from validation.diagnosis.selection.stepwise import search
+from validation.diagnosis.setup import SetupFindings
+from validation.diagnosis.setup_effects import with_reversed_axes
+
+
+def test_a_setting_is_no_trial_of_the_search_and_a_size_is():
+    tried = {trial.id for trial in trials_for(throws(seconds=0.5))}
+    setup = {id for id, row in CATALOGUE.items() if row.setup}
+    assert tried & setup == {id for id in setup if not CATALOGUE[id].settings}
+    assert {"mag.time_offset", "board.rotation", "site.field"} <= tried
+
+
+def test_a_turn_that_nothing_shows_is_held_where_it_is():
+    """A prior of radians keeps normal equations regular where no sensor tells a direction."""
+    trial = next(trial for trial in trials_for(tables()) if trial.id == "board.rotation")
+    for parameter in parameters_of(trial):
+        assert np.pi < parameter.sigma < 100.0
+
+
+def test_what_needs_a_sensor_that_is_not_there_is_not_tried():
+    bare = [
+        replace(one, samples={name: samples for name, samples in one.samples.items() if name != "magnetometer"})
+        for one in tables()
+    ]
+    assert "site.field" in available(tables())
+    assert not {"site.field", "mag.time_offset"} & set(available(bare))
+    assert "board.rotation" in available(bare)
+
+
+@pytest.mark.parametrize(
+    ("fault", "sd"),
+    [
+        (effect("mag.time_offset", offset_s=0.005), {"offset_s": 1e-4}),
+        (effect("board.rotation", rx_rad=0.02, ry_rad=-0.02, rz_rad=0.02), {"rx_rad": 1e-3, "ry_rad": 1e-3}),
+        (effect("site.field", inclination_rad=0.03, ratio=1.03), {"inclination_rad": 1e-3, "ratio": 1e-3}),
+    ],
+    ids=lambda item: item.id if isinstance(item, Effect) else "",
+)
+def test_a_small_fault_on_a_rate_table_is_named_alone_with_its_size(fault: Effect, sd: dict[str, float]):
+    final = search(tables(errors=[fault])).final
+    assert [trial.id for trial in final.hypothesis.trials] == [fault.id]
+    errors = np.sqrt(np.diag(final.fit.covariance))
+    found = {q.name: (v, e) for q, v, e in zip(final.fit.parameters, final.fit.at, errors, strict=True)}
+    for name, largest in sd.items():
+        value, error = found[name]
+        assert error < largest
+        assert value == pytest.approx(fault.sizes[name], abs=4.0 * error)
+
+
+def test_an_offset_of_time_beside_a_place_is_not_told_as_a_turned_board_and_a_scale():
+    """Those two together do to an accelerometer what its place does: with the place in, one of them is superfluous."""
+    errors = [
+        effect("accel.time_offset", offset_s=-0.018),
+        effect("accel.position_offset", dx_m=4e-5, dy_m=-3.6e-4),
+    ]
+    final = search(tables(errors=errors)).final
+    assert {trial.id for trial in final.hypothesis.trials} == {error.id for error in errors}
+    found = {q.name: v for q, v in zip(final.fit.parameters, final.fit.at, strict=True)}
+    assert found["offset_s"] == pytest.approx(-0.018, abs=5e-4)
+    assert found["dy_m"] == pytest.approx(-3.6e-4, abs=3e-5)
+
+
+def test_an_axis_that_the_fit_finds_scaled_by_minus_one_is_a_reversed_column():
+    fault = effect("gyro.axes", axes="x y -z")
+    written = tuple(as_written(one, [fault]) for one in tables())
+    fit = search(written).final.fit
+    findings = with_reversed_axes(SetupFindings((), written), fit)
+    assert findings is not None
+    assert findings.effects == (fault,)
+    assert findings.recordings[0].samples["gyroscope"].value[:, 2] == pytest.approx(
+        tables()[0].samples["gyroscope"].value[:, 2]
+    )
+
+
+def test_a_small_scale_is_no_reversed_column():
+    made = tuple(tables(errors=[effect("gyro.scale", sx=0.0, sy=0.0, sz=0.03)]))
+    assert with_reversed_axes(SetupFindings((), made), search(made).final.fit) is None

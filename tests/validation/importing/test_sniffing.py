@@ -1,0 +1,626 @@
+"""A stranger's log comes in without a map: sensors, units, time and axes are found, whatever the text looks like."""
+
+from __future__ import annotations
+
+import os
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from support.made_logs import DEG, G0, LANDING, RELEASE, SPIN, Log, made_log, three, write_table
+
+from discsim.errors import InputError
+from discsim.recording import read_dataset, read_recording
+from validation.cli import main
+from validation.importing import find_map, import_recording, read_map, read_readings
+from validation.importing.sniffing import Proposal, map_text, opened, recognised, sniff, stretches
+from validation.importing.sniffing.raw_page import envelope
+
+RECORDINGS = Path(os.environ.get("DISCSIM_RECORDINGS") or Path(__file__).parents[3].parent / "shared" / "recordings")
+REAL = RECORDINGS / "real"
+real = pytest.mark.skipif(not REAL.is_dir(), reason="no measured recordings here (DISCSIM_RECORDINGS)")
+XYZ = ("x", "y", "z")
+
+
+def named(pattern: str) -> list[str]:
+    return [pattern.format(axis) for axis in XYZ]
+
+
+def whole(value: np.ndarray) -> np.ndarray:
+    return np.round(value).astype(int)
+
+
+# --------------------------------------------------------------- shapes: each writes the log and returns what to import
+
+
+def plain_names(place: Path, log: Log) -> Path:
+    columns = [("time_s", log.t), *three(named("g{}"), log.gyro / DEG), *three(named("a{}"), log.accel / G0)]
+    return write_table(place / "log.csv", [*columns, *three(named("m{}"), log.mag)])
+
+
+def brackets_and_milliseconds(place: Path, log: Log) -> Path:
+    gyro, accel, mag = log.shown(up=True)
+    columns = [("t (ms)", whole(1000 * log.t)), *three(named("Gyro {} (deg/s)"), gyro / DEG)]
+    columns += [*three(named("acc_{} [g]"), accel / G0), *three(named("mag_{}_uT"), mag)]
+    return write_table(place / "log.csv", columns)
+
+
+def microseconds_and_milligauss(place: Path, log: Log) -> Path:
+    columns = [("timestamp_us", whole(1e6 * log.t) + 4_120_000), *three(named("Accel {} [mg]"), 1000 * log.accel / G0)]
+    columns += [*three(named("Mag {} [mG]"), 10 * log.mag), *three(named("Gyro {} [rad/s]"), log.gyro)]
+    return write_table(place / "log.csv", columns)
+
+
+def german_phyphox(place: Path, log: Log) -> Path:
+    gyro, accel, mag = log.shown(up=True)
+    for file, stem, unit, value in (
+        ("Gyroskop.csv", "Gyroskop", "rad/s", gyro),
+        ("Beschleunigung.csv", "Beschleunigung", "m/s^2", accel),
+        ("Magnetometer.csv", "Magnetfeld", "µT", mag),
+    ):
+        columns = [('"Zeit (s)"', log.t), *three(named(f'"{stem} {{}} ({unit})"'), value)]
+        write_table(place / "phone" / file, columns, separator=";", decimal=",")
+    return place / "phone"
+
+
+def french_phyphox_zip(place: Path, log: Log) -> Path:
+    gyro, accel, mag = log.shown(up=True)
+    for file, unit, value in (
+        ("Gyroscope.csv", "rad/s", gyro),
+        ("Accéléromètre.csv", "m/s^2", accel),
+        ("Magnétomètre.csv", "µT", mag),
+    ):
+        columns = [('"Temps (s)"', log.t), *three([f'"{axis.upper()} ({unit})"' for axis in XYZ], value)]
+        write_table(place / "export" / file, columns, separator="\t", decimal=",")
+    (place / "export" / "meta").mkdir()
+    (place / "export" / "meta" / "device.csv").write_text('"property","value"\n"deviceModel","X"\n')
+    return zipped(place / "vol.zip", place / "export")
+
+
+def english_raw_data(place: Path, log: Log) -> Path:
+    gyro, accel, _ = log.shown(up=True)
+    columns = [('"Time (s)"', log.t), *three(named('"Acceleration {} (m/s^2)"'), accel)]
+    columns += [*three(named('"Gyroscope {} (rad/s)"'), gyro), ('"Absolute (rad/s)"', np.linalg.norm(gyro, axis=1))]
+    return write_table(place / "Raw Data.csv", columns)
+
+
+def sensor_logger_folder(place: Path, log: Log) -> Path:
+    gyro, accel, mag = log.shown(up=True)
+    epoch = [f"{int(1.7e18) + round(1e9 * t)}" for t in log.t]
+    for file, value in (
+        ("Accelerometer.csv", accel - np.median(accel[:200], axis=0)),  # this app takes gravity off here ...
+        ("TotalAcceleration.csv", accel),  # ... and not here
+        ("Gyroscope.csv", gyro),
+        ("Magnetometer.csv", mag),
+    ):
+        columns = [("time", epoch), ("seconds_elapsed", log.t), *[(a, value[:, XYZ.index(a)]) for a in "zyx"]]
+        write_table(place / "app" / file, columns)
+    (place / "app" / "Metadata.csv").write_text("version,device name\n3,telephone\n")
+    return place / "app"
+
+
+def betaflight(place: Path, log: Log) -> Path:
+    gyro, accel, mag = log.shown(up=True)
+    preamble = '"Product","Blackbox flight data recorder"\n"Firmware type","Cleanflight"\n"looptime","5000"\n'
+    columns = [("loopIteration", whole(200 * log.t)), ("time (us)", whole(1e6 * log.t) + 77_000_000)]
+    columns += [(f"gyroADC[{k}] (deg/s)", whole(gyro[:, k] / DEG)) for k in range(3)]
+    columns += [(f"accSmooth[{k}]", whole(2048 * accel[:, k] / G0)) for k in range(3)]
+    columns += [(f"magADC[{k}] (mG)", whole(10 * mag[:, k])) for k in range(3)]
+    return write_table(place / "LOG00001.csv", columns, before=preamble)
+
+
+def counts_of_an_mpu(place: Path, log: Log) -> Path:
+    columns = [
+        ("millis", whole(1000 * log.t)),
+        *three(["ax", "ay", "az"], whole(2048 * log.accel / G0)),
+    ]
+    columns += [
+        *three(["gx", "gy", "gz"], whole(log.gyro / DEG * 14.286)),
+        *three(["mx", "my", "mz"], whole(log.mag / 0.15)),
+    ]
+    return write_table(place / "LOG.TXT", columns)
+
+
+def tabs_without_header(place: Path, log: Log) -> Path:
+    columns = [("t", log.t), *three(XYZ, log.accel / G0), *three(XYZ, log.gyro / DEG), *three(XYZ, log.mag)]
+    return write_table(place / "log.dat", columns, separator="\t", header=False)
+
+
+def blanks_with_a_commented_header(place: Path, log: Log) -> Path:
+    columns = [("# t", log.t), *three(["wx", "wy", "wz"], log.gyro), *three(["bx", "by", "bz"], log.mag)]
+    return write_table(place / "log.txt", columns, separator=" ", before="# numpy\n", digits=8)
+
+
+def pipes(place: Path, log: Log) -> Path:
+    columns = [
+        ("Time [s]", log.t),
+        *three(named("Acc{}[m/s²]"), log.accel),
+        *three(named("Gyr{}[°/s]"), log.gyro / DEG),
+    ]
+    return write_table(place / "log.csv", columns, separator=" | ")
+
+
+def units_on_a_line_of_their_own(place: Path, log: Log) -> Path:
+    columns = [("Time", log.t), *three(named("Rate {}"), log.gyro / DEG), *three(named("Accel {}"), log.accel)]
+    columns = [(name.replace("Rate", "AngularRate"), value) for name, value in columns]
+    path = write_table(place / "log.csv", columns)
+    names, rest = path.read_text().split("\n", 1)
+    path.write_text(f"{names}\ns,deg/s,deg/s,deg/s,m/s2,m/s2,m/s2\n{rest}")
+    return path
+
+
+def preamble_and_latin_1(place: Path, log: Log) -> Path:
+    before = "Gerät: Wurfscheibe\nDatum: 01.06.2025\n\n"
+    columns = [("Zeit / s", log.t), *three(named("Drehrate {} / °/s"), log.gyro / DEG)]
+    columns += three(named("Beschleunigung {} / m/s²"), log.accel)
+    return write_table(place / "messung.csv", columns, separator=";", decimal=",", encoding="latin-1", before=before)
+
+
+def utf_16(place: Path, log: Log) -> Path:
+    columns = [
+        ("Time (s)", log.t),
+        *three(named("Magnetic field {} (µT)"), log.mag),
+        *three(named("Gyro {} (rad/s)"), log.gyro),
+    ]
+    return write_table(place / "log.csv", columns, separator="\t", encoding="utf-16")
+
+
+def utf_8_with_a_mark(place: Path, log: Log) -> Path:
+    columns = [("Zeit (ms)", whole(1000 * log.t)), *three(named("Magnetfeld {} (µT)"), log.mag)]
+    columns += three(named("Gyroskop {} (°/s)"), log.gyro / DEG)
+    return write_table(place / "log.csv", columns, separator=";", decimal=",", encoding="utf-8-sig")
+
+
+def thousands_marks(place: Path, log: Log) -> Path:
+    columns = [("time_us", whole(1e6 * log.t)), *three(named("acc_{}_mg"), 1000 * log.accel / G0)]
+    columns += three(named("gyro_{}_dps"), log.gyro / DEG)
+    return write_table(place / "log.csv", columns, separator=";", decimal=",", mark=".", digits=3)
+
+
+def long_form(place: Path, log: Log) -> Path:
+    lines = ["sensor,time,x,y,z"]
+    for k, t in enumerate(log.t):
+        for sensor, value in (("ACC", log.accel), ("GYR", log.gyro), ("MAG", log.mag)):
+            lines.append(f"{sensor},{t:.4f},{value[k, 0]:.5f},{value[k, 1]:.5f},{value[k, 2]:.5f}")
+    (place / "long.csv").write_text("\n".join(lines))
+    return place / "long.csv"
+
+
+def epoch_milliseconds_and_prefixed_axes(place: Path, log: Log) -> Path:
+    stamps = [str(1_750_000_000_000 + round(1000 * t)) for t in log.t]
+    columns = [("timestamp", stamps), *three(["XAccel", "YAccel", "ZAccel"], log.accel)]
+    return write_table(place / "log.csv", [*columns, *three(["XGyro", "YGyro", "ZGyro"], log.gyro / DEG)])
+
+
+def two_sensors_of_a_kind(place: Path, log: Log) -> Path:
+    columns = [("time_s", log.t), *three(named("imu1_acc_{}"), log.accel), *three(named("imu2_acc_{}"), log.accel + 1)]
+    columns += [*three(named("linear_acc_{}"), log.accel * 0.1), *three(named("imu1_gyr_{}"), log.gyro)]
+    return write_table(place / "log.csv", [*columns, *three(named("imu1_mag_{}"), log.mag)])
+
+
+def meaningless_names(place: Path, log: Log) -> Path:
+    values = np.column_stack([log.mag, log.gyro / DEG, log.accel])
+    return write_table(place / "log.csv", [("ms", whole(1000 * log.t)), *[(f"ch{k}", values[:, k]) for k in range(9)]])
+
+
+def field_in_gauss_with_its_z_reversed(place: Path, log: Log) -> Path:
+    reversed_z = log.mag * np.array([1.0, 1.0, -1.0]) / 100
+    columns = [("t", log.t), *three(["gx", "gy", "gz"], log.gyro), *three(["ax", "ay", "az"], log.accel)]
+    return write_table(place / "log.csv", [*columns, *three(["mx", "my", "mz"], reversed_z)])
+
+
+def spin_about_x(place: Path, log: Log) -> Path:
+    # the board stands on edge: its x is the disc's -z, y the disc's x
+    def turned(value: np.ndarray) -> np.ndarray:
+        return np.column_stack([-value[:, 2], value[:, 0], -value[:, 1]])
+
+    columns = [("t_s", log.t), *three(named("gyr{}_dps"), turned(log.gyro) / DEG)]
+    return write_table(place / "log.csv", [*columns, *three(named("acc{}_g"), turned(log.accel) / G0)])
+
+
+def iso_stamps(place: Path, log: Log) -> Path:
+    day = np.datetime64("2025-06-01T23:59:58.000000")
+    stamps = [f"{day + np.timedelta64(round(1e6 * t), 'us')}Z" for t in log.t]
+    columns = [
+        ("Timestamp", stamps),
+        *three(named("accel_{}"), log.accel / G0),
+        *three(named("gyro_{}"), log.gyro / DEG),
+    ]
+    return write_table(place / "log.csv", columns)
+
+
+def a_gap_word_and_a_trailing_comma(place: Path, log: Log) -> Path:
+    mag = [[f"{v:.3f}" if k % 20 == 0 else "NaN" for k, v in enumerate(log.mag[:, a])] for a in range(3)]
+    columns = [("t_s", log.t), *three(named("gyro_{}_rad_s"), log.gyro)]
+    path = write_table(place / "log.csv", [*columns, *zip(named("mag_{}_uT"), mag, strict=True)])
+    names, rest = path.read_text().split("\n", 1)
+    path.write_text(f"{names}\n{rest.replace(chr(10), ',' + chr(10))}")
+    return path
+
+
+def px4_folder(place: Path, log: Log) -> Path:
+    stamps = [("timestamp", whole(1e6 * log.t) + 3_000_000)]
+    columns = [*stamps, *three([f"gyro_rad[{k}]" for k in range(3)], log.gyro)]
+    columns += [("gyro_integral_dt", whole(0 * log.t) + 5000)]
+    columns += three([f"accelerometer_m_s2[{k}]" for k in range(3)], log.accel)
+    write_table(place / "ulog" / "flight_sensor_combined_0.csv", columns)
+    columns = [*stamps, *three([f"magnetometer_ga[{k}]" for k in range(3)], log.mag / 100)]
+    write_table(place / "ulog" / "flight_vehicle_magnetometer_0.csv", columns)
+    write_table(place / "ulog" / "flight_battery_status_0.csv", [*stamps, ("voltage_v", 11.1 + 0 * log.t)])
+    return place / "ulog"
+
+
+def degrees_written_as_radians(place: Path, log: Log) -> Path:
+    columns = [
+        ("time_s", log.t),
+        *three(named("gyro {} (rad/s)"), log.gyro / DEG),
+        *three(named("mag {} (uT)"), log.mag),
+    ]
+    return write_table(place / "log.csv", columns)
+
+
+ALL = ("gyroscope", "accelerometer", "magnetometer")
+SHAPES: dict[Callable[[Path, Log], Path], tuple[str, ...]] = {
+    plain_names: ALL,
+    brackets_and_milliseconds: ALL,
+    microseconds_and_milligauss: ALL,
+    german_phyphox: ALL,
+    french_phyphox_zip: ALL,
+    english_raw_data: ALL[:2],
+    sensor_logger_folder: ALL,
+    betaflight: ALL,
+    counts_of_an_mpu: ALL,
+    tabs_without_header: ALL,
+    blanks_with_a_commented_header: ("gyroscope", "magnetometer"),
+    pipes: ALL[:2],
+    units_on_a_line_of_their_own: ALL[:2],
+    preamble_and_latin_1: ALL[:2],
+    utf_16: ("gyroscope", "magnetometer"),
+    utf_8_with_a_mark: ("gyroscope", "magnetometer"),
+    thousands_marks: ALL[:2],
+    long_form: ALL,
+    epoch_milliseconds_and_prefixed_axes: ALL[:2],
+    two_sensors_of_a_kind: ALL,
+    meaningless_names: ALL,
+    field_in_gauss_with_its_z_reversed: ALL,
+    spin_about_x: ALL[:2],
+    degrees_written_as_radians: ("gyroscope", "magnetometer"),
+    iso_stamps: ALL[:2],
+    px4_folder: ALL,
+    a_gap_word_and_a_trailing_comma: ("gyroscope", "magnetometer"),
+}
+#: What a reading may be off by: rounding as written above (1/2048 g, 0.15 uT, a whole deg/s), and 0.1 % of a scale.
+TOLERANCE = {"gyroscope": 0.6 * DEG + 0.001, "accelerometer": 0.006, "magnetometer": 0.15}
+
+
+def zipped(path: Path, folder: Path) -> Path:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file in sorted(folder.rglob("*")):
+            archive.write(file, file.relative_to(folder))
+    return path
+
+
+def proposed(raw: Path, place: Path) -> Proposal:
+    proposal = sniff(raw)
+    (place / "map.toml").write_text(map_text(proposal), encoding="utf-8")
+    return proposal
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.__name__)
+def test_sensors_units_time_and_axes_are_found(tmp_path, shape):
+    log = made_log()
+    with opened(shape(tmp_path, log)) as raw:
+        proposed(raw, tmp_path)
+        recording = import_recording(raw, read_map(tmp_path / "map.toml")).recording
+    assert set(recording.samples) == set(SHAPES[shape])
+    for sensor, truth in zip(ALL, (log.gyro, log.accel, log.mag), strict=True):
+        if sensor in recording.samples:
+            samples = recording.samples[sensor]
+            sound = np.isfinite(samples.value).all(axis=1)
+            assert sound.sum() > 0.04 * log.t.size
+            expected = np.column_stack([np.interp(samples.t, log.t, truth[:, k]) for k in range(3)])
+            # stamps are rounded to a millisecond at worst, and a reading goes with the nearest row
+            assert_allclose(samples.t[sound][[0, -1]], log.t[[0, -1]], atol=0.11)
+            assert_allclose(samples.value[sound], expected[sound], atol=TOLERANCE[sensor] + 0.003 * np.abs(truth).max())
+
+
+# ------------------------------------------------------------------------------------------------- the map
+
+
+def test_the_written_map_states_every_decision_with_its_reason_and_reads_to_the_same(tmp_path):
+    log = made_log()
+    raw = brackets_and_milliseconds(tmp_path, log)
+    proposal = proposed(raw, tmp_path)
+    text = (tmp_path / "map.toml").read_text(encoding="utf-8")
+    for decision in proposal.all_decisions:
+        assert f"{decision.sure}: {decision.why}" in text
+    assert {decision.what for decision in proposal.all_decisions} >= {
+        "time",
+        *ALL,
+        *(f"{sensor} unit" for sensor in ALL),
+    }
+    assert {decision.sure for decision in proposal.all_decisions} <= {"certain", "likely", "guess"}
+    assert 'axes = ["x", "-y", "-z"]' in text
+
+
+def test_a_name_with_quotes_brackets_and_signs_of_other_tongues_survives_the_map(tmp_path):
+    log = made_log()
+    odd = [f'gyro "{axis}" \\ é (deg/s)'.replace('"', "") for axis in XYZ]
+    write_table(tmp_path / "in" / "lo[g] #1.csv", [("time_s", log.t), *three(odd, log.gyro / DEG)])
+    proposed(tmp_path / "in", tmp_path)
+    recording = import_recording(tmp_path / "in", read_map(tmp_path / "map.toml")).recording
+    assert_allclose(recording.samples["gyroscope"].value, log.gyro, atol=1e-6)
+
+
+def test_a_log_without_stamps_takes_its_step_from_the_field_that_turns_with_the_gyroscope(tmp_path):
+    log = made_log()
+    columns = [("idx", np.arange(log.t.size)), *three(named("gyro {} (dps)"), log.gyro / DEG)]
+    raw = write_table(tmp_path / "log.csv", [*columns, *three(named("mag {} (uT)"), log.mag)])
+    proposal = sniff(raw)
+    assert proposal.clock.step == pytest.approx(1 / 200, rel=0.02)
+    assert proposal.clock.decision.sure == "likely"
+    alone = sniff(write_table(tmp_path / "alone.csv", columns))
+    assert (alone.clock.step, alone.clock.decision.sure) == (0.01, "guess")
+
+
+def test_what_a_header_says_wrong_is_seen_and_said(tmp_path):
+    proposal = sniff(degrees_written_as_radians(tmp_path, made_log()))
+    (unit,) = [decision for decision in proposal.all_decisions if decision.what == "gyroscope unit"]
+    assert (unit.choice, unit.sure) == ("deg/s", "likely")
+    assert "although the header says rad/s" in unit.why
+
+
+def test_a_second_imu_and_an_acceleration_without_gravity_are_named_and_left_out(tmp_path):
+    notes = sniff(two_sensors_of_a_kind(tmp_path, made_log())).notes
+    assert any("imu2_acc_x" in note and "a second one" in note for note in notes)
+    assert any("linear_acc_x" in note and "without gravity" in note for note in notes)
+
+
+# --------------------------------------------------------------------------------------------------- throws
+
+
+def test_the_throw_is_cut_inside_release_and_impact(tmp_path):
+    raw = plain_names(tmp_path, made_log())
+    proposed(raw, tmp_path)
+    (throw,) = stretches(read_readings(raw, read_map(tmp_path / "map.toml")))
+    assert RELEASE <= throw.start <= RELEASE + 0.1
+    assert LANDING - 0.1 <= throw.end <= LANDING
+    assert throw.first == round(200 * throw.start)
+    assert throw.stop == round(200 * throw.end) + 1
+    assert throw.spin == pytest.approx(SPIN * np.exp(-0.15 * 1.5), rel=0.01)
+
+
+def test_a_magnetometer_alone_finds_the_throw_too(tmp_path):
+    log = made_log()
+    raw = write_table(
+        tmp_path / "log.csv", [("time_s", log.t), *three(named("mag_{}_uT"), log.mag + np.array([15.0, -9.0, 4.0]))]
+    )
+    proposed(raw, tmp_path)
+    (throw,) = stretches(read_readings(raw, read_map(tmp_path / "map.toml")))
+    assert RELEASE - 0.1 < throw.start < RELEASE + 0.5
+    assert LANDING - 0.5 < throw.end < LANDING + 0.1
+    middle = (throw.start + throw.end) / 2
+    assert throw.spin == pytest.approx(SPIN * np.exp(-0.15 * (middle - RELEASE)), rel=0.02)
+
+
+def test_a_swing_of_the_arm_and_a_rest_are_no_throws(tmp_path):
+    log = made_log()
+    before = log.t < RELEASE - 0.2
+    raw = write_table(
+        tmp_path / "log.csv", [("time_s", log.t[before]), *three(named("gyro_{}_rad_s"), log.gyro[before])]
+    )
+    proposed(raw, tmp_path)
+    assert stretches(read_readings(raw, read_map(tmp_path / "map.toml"))) == []
+
+
+# ----------------------------------------------------------------------------------------- the command and refusals
+
+
+def run(monkeypatch: pytest.MonkeyPatch, *arguments: str | Path) -> int:
+    monkeypatch.setattr(sys, "argv", ["discsim", *map(str, arguments)])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    return int(stop.value.code or 0)
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix in (".csv", ".toml")}
+
+
+def test_the_proposed_map_gives_the_same_recording_again(monkeypatch, tmp_path, capsys):
+    raw = german_phyphox(tmp_path, made_log())
+    assert run(monkeypatch, "import", raw, "--out", tmp_path / "a") == 0
+    said = capsys.readouterr()
+    assert "gyroscope unit: rad/s (certain" in said.err
+    assert "throw 1: 4.0" in said.out
+    assert run(monkeypatch, "import", raw, "--map", tmp_path / "a" / "map.toml", "--out", tmp_path / "b") == 0
+    first, second = files(tmp_path / "a"), files(tmp_path / "b")
+    first.pop("map.toml")
+    assert first == second
+
+
+def test_throws_are_taken_by_number_or_all(monkeypatch, tmp_path, capsys):
+    log = made_log()
+    twice = Log(
+        np.concatenate([log.t, log.t + 10.0]), *(np.concatenate([v, v]) for v in (log.gyro, log.accel, log.mag))
+    )
+    raw = plain_names(tmp_path, twice)
+    assert run(monkeypatch, "import", raw, "--throw", "2", "--out", tmp_path / "one") == 0
+    one = read_recording(tmp_path / "one")
+    assert one.samples["gyroscope"].t[0] == 0
+    assert 2.8 < one.end < 3.0
+    assert (
+        run(
+            monkeypatch, "import", raw, "--all-throws", "--write-map", tmp_path / "mine.toml", "--out", tmp_path / "all"
+        )
+        == 0
+    )
+    both = read_dataset(tmp_path / "all")
+    assert [recording.path.name for recording in both] == ["01", "02"]
+    assert_allclose(both[1].samples["gyroscope"].value, one.samples["gyroscope"].value)
+    assert read_map(tmp_path / "mine.toml").plant == "free_spin"
+    assert run(monkeypatch, "import", raw, "--throw", "3", "--out", tmp_path / "no") == 2
+    assert "--throw 3: log.csv has 2 throws; expected 1 to 2" in capsys.readouterr().err
+    assert run(monkeypatch, "import", raw, "--throw", "1", "--rows", "1:9", "--out", tmp_path / "no") == 2
+
+
+def test_the_page_of_a_long_log_stays_small_and_holds_all_of_it(monkeypatch, tmp_path):
+    log = made_log()
+    raw = plain_names(tmp_path, Log(*(v[:1800] for v in (log.t, log.gyro, log.accel, log.mag))))
+    assert run(monkeypatch, "import", raw, "--out", tmp_path / "out") == 0
+    page = (tmp_path / "out" / "raw.html").read_text(encoding="utf-8")
+    assert "All traces" in page
+    assert "How the columns were understood" in page
+    assert "Throw 1:" in page
+    assert "http" not in page.replace("http://www.w3.org", "")
+    t = np.arange(3_600_000) / 1000
+    value = np.sin(t)
+    value[1_234_567] = 99.0
+    shown_t, shown = envelope(t, value)
+    assert shown.size <= 2 * 1650
+    assert shown.max() == 99.0
+    assert abs(shown_t[np.argmax(shown)] - 1234.567) < 3600 / 1650
+
+
+def test_a_shipped_map_that_was_made_for_the_logger_is_taken_and_said(monkeypatch, tmp_path, capsys):
+    log = made_log()
+    columns = [("time_s", log.t), *three(["x_rad_s", "y_rad_s", "z_rad_s"], log.gyro)]
+    raw = write_table(tmp_path / "in" / "gyroscope.csv", columns)
+    assert run(monkeypatch, "import", raw.parent, "--out", tmp_path / "out") == 0
+    assert "taken: the shipped map 'csv', made for these columns" in capsys.readouterr().err
+    assert not (tmp_path / "out" / "map.toml").exists()
+    assert run(monkeypatch, "import", raw.parent, "--map", "sniff", "--out", tmp_path / "out2") == 0
+    assert_allclose(read_recording(tmp_path / "out2").samples["gyroscope"].value, log.gyro, atol=1e-6)
+
+
+def test_columns_like_a_shipped_maps_do_not_bring_its_place_in(tmp_path):
+    log = made_log()
+    path = write_table(tmp_path / "log.csv", [("time", log.t), *three(["mag_x", "mag_y", "mag_z"], log.mag)])
+    assert recognised(path) is None
+    names = [*named("gyr_{}_rad_s"), *named("acc_{}_m_s2"), *named("mag_{}_uT")]
+    values = np.column_stack([log.gyro, log.accel, log.mag])
+    path = write_table(tmp_path / "berlin.csv", [("t_s", log.t), *[(n, values[:, k]) for k, n in enumerate(names)]])
+    assert recognised(path) is None
+
+
+FINANCE = "Date,Open,High,Low,Close,Volume\n" + "".join(
+    f"2025-01-{day:02d},{100 + day}.5,{101 + day}.2,{99 + day}.1,{100 + day}.9,{10000 * day}\n" for day in range(1, 29)
+)
+REFUSED = {
+    "letter.txt": (
+        b"Dear reader,\n\nthis is a letter, and no log.\nIt has, by chance, commas.\n",
+        "no rows of numbers",
+    ),
+    "picture.csv": (b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 4, "is a PNG image"),
+    "empty.csv": (b"", "the file is empty"),
+    "blank.csv": (b"\n \n\n", "the file is empty"),
+    "finance.csv": (FINANCE.encode(), "no sensor of motion found in the columns 'Date', 'Open'"),
+    "prices.csv": (FINANCE.partition("\n")[2].encode(), "no sensor of motion found in the columns 'c1'"),
+    "header.csv": (b"time,ax,ay,az\n", "no rows of numbers"),
+    "short.csv": (b"t_s,gx_dps,gy_dps,gz_dps\n0,1,2,3\n0.1,1,2,4\n", "2 rows of numbers in it"),
+    "binary.bin": (bytes(range(256)) * 40, "is binary, no text"),
+    "book.xlsx": (b"PK\x03\x04" + bytes(100), "export it as CSV"),
+    "broken.zip": (b"PK\x03\x04" + bytes(100), "cannot be unpacked"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_no_log_is_refused_in_one_sentence(monkeypatch, tmp_path, capsys, name):
+    content, sentence = REFUSED[name]
+    (tmp_path / name).write_bytes(content)
+    assert run(monkeypatch, "import", tmp_path / name, "--out", tmp_path / "out") == 2
+    said = capsys.readouterr().err
+    assert sentence in said
+    assert said.count("\n") == 1
+    assert not (tmp_path / "out" / "recording.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("member", "sentence"),
+    [("../out.csv", "leads out of it"), ("/etc/out.csv", "leads out of it"), ("C:\\out.csv", "leads out of it")],
+)
+def test_a_path_out_of_the_archive_is_refused(tmp_path, member, sentence):
+    with zipfile.ZipFile(tmp_path / "bad.zip", "w") as archive:
+        archive.writestr(member, "t,x\n1,2\n")
+    with pytest.raises(InputError, match=sentence), opened(tmp_path / "bad.zip"):
+        pass
+    assert not (tmp_path.parent / "out.csv").exists()
+
+
+def test_a_link_in_an_archive_is_refused(tmp_path):
+    link = zipfile.ZipInfo("log.csv")
+    link.external_attr = 0o120777 << 16
+    with zipfile.ZipFile(tmp_path / "bad.zip", "w") as archive:
+        archive.writestr(link, "/etc/passwd")
+    with pytest.raises(InputError, match="is a link"), opened(tmp_path / "bad.zip"):
+        pass
+
+
+def test_a_zip_bomb_is_refused_before_it_fills_the_disk(tmp_path):
+    with zipfile.ZipFile(tmp_path / "bomb.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("zeros.csv", bytes(1 << 25))
+    with (
+        pytest.raises(InputError, match="unpacks to more than 4 GB and 1000 times its size"),
+        opened(tmp_path / "bomb.zip"),
+    ):
+        pass
+    with zipfile.ZipFile(tmp_path / "many.zip", "w") as archive:
+        for k in range(1001):
+            archive.writestr(f"{k}.csv", "")
+    with pytest.raises(InputError, match="holds 1001 files"), opened(tmp_path / "many.zip"):
+        pass
+
+
+# ------------------------------------------------------------------------------------- measured logs, no shipped map
+
+
+@real
+@pytest.mark.parametrize(
+    ("name", "first", "stop"),
+    [("001-rb", 1590, 1830), ("003-rf", 860, 1125), ("004-rf", 680, 908), ("005-rh", 735, 988)],
+)
+def test_the_flights_of_a_measured_disc_are_found_where_they_are_known_to_be(tmp_path, name, first, stop):
+    raw = REAL / "flatball-ins-ultimate-disc" / f"2025-08-31-{name}.csv"
+    proposal = proposed(raw, tmp_path)
+    (throw,) = stretches(read_readings(raw, read_map(tmp_path / "map.toml")))
+    # a tenth of a second: the rule's own width, and what an eye is good for
+    assert abs(throw.first - first) < 10
+    assert abs(throw.stop - stop) < 10
+    shipped, own = read_map(find_map("flatball")), read_map(tmp_path / "map.toml")
+    for sensor in ALL:
+        assert own.sensors[sensor].factor == shipped.sensors[sensor].factor
+        assert set(own.sensors[sensor].columns) & set(shipped.sensors[sensor].columns)
+    if name != "005-rh":  # a hammer flies upside down, and nothing in it shows which side is the top
+        assert all(own.sensors[sensor].axes == shipped.sensors[sensor].axes for sensor in ALL)
+    assert 0.0115 < proposal.clock.step < 0.0140  # what the shipped map's comments found: 12.2 and 13.3 ms a row
+
+
+@real
+def test_a_rocket_without_header_or_units_is_understood_as_its_shipped_map_does(tmp_path):
+    raw = REAL / "srp-sa-rocket"
+    proposed(raw, tmp_path)
+    shipped, own = read_map(find_map("srp")), read_map(tmp_path / "map.toml")
+    for sensor in ALL:
+        assert own.sensors[sensor].factor == pytest.approx(shipped.sensors[sensor].factor, rel=0.001)
+        assert own.sensors[sensor].axes == shipped.sensors[sensor].axes
+    assert recognised(raw).name == "srp"
+
+
+@real
+@pytest.mark.parametrize(
+    ("raw", "name"),
+    [
+        ("flatball-ins-ultimate-disc/2025-08-31-003-rf.csv", "flatball"),
+        ("cats-euroc21-aris-euler-rocket", "cats"),
+        ("cats-euroc21-skyward-lynx-rocket", "lynx"),
+        ("broad-mocap-rotation/07_undisturbed_fast_rotation_B_30s.csv", "broad"),
+        ("ubsuny-phyphox-roller/z_acc.csv", None),
+    ],
+)
+def test_measured_logs_are_recognised_by_the_maps_that_were_made_for_them(raw, name):
+    found = recognised(REAL / raw)
+    assert (None if found is None else found.name) == name
