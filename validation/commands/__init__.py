@@ -22,7 +22,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "fit": ("fit", "Fit C_Nr to the throws of a data set."),
     "fly": ("fly", "Fly a disc and write what its instruments record."),
     "scatter": ("scatter", "Tell where throws land when release, coefficients and wind are uncertain."),
-    "plan": ("plan", "Tell what recordings could show, before going out."),
+    "plan": (
+        "plan",
+        "Tell what recordings could show, before going out: effects, coefficients, and what would tell more.",
+    ),
     "rate-table": ("rate_table", "Turn a rate table through a profile and score every method against the truth."),
     "sweep": (
         "sweep",

@@ -64,17 +64,14 @@ def write_validation_report(
     verdict = (
         "every score is within its tolerance" if all_ok(scores) else f"{failed} scores are outside their tolerance"
     )
-    rows = [
-        (
-            item.name,
-            f"{item.value:.5g}",
-            item.unit,
-            f"{item.expected:g}",
-            f"{item.tolerance:g}",
-            "ok" if item.ok else "FAIL",
-        )
-        for item in scores
-    ]
+    groups: dict[str, list[tuple[str, ...]]] = {}
+    for item in scores:
+        group, _, name = item.name.partition(": ")
+        unit = "" if item.unit == "1" else f" {item.unit}"
+        row = (name or group, f"{item.value:.5g}{unit}", item.goal, "ok" if item.ok else "FAIL")
+        groups.setdefault(group, []).append(row)
+    header = ("score", "value", "goal", "")
+    scored = [Section(f"Scores: {group}", (), header, rows) for group, rows in groups.items()]
     methods = list(results[0].rates)
     throw_rows = [
         (result.throw.name, *(_cell(np.degrees(rms(result.error(method)))) for method in methods)) for result in results
@@ -83,7 +80,7 @@ def write_validation_report(
     if not waveform[0][1].exists():  # a profile without a plateau
         waveform = []
     sections = [
-        Section("Scores", (), ("score", "value", "unit", "expected", "tolerance", ""), rows),
+        *scored,
         Section(
             "Rate table",
             (

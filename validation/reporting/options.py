@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
+import numpy as np
 import typer
 
 from discsim.arrays import FloatArray, readonly
-from discsim.disc import Disc, Rig
+from discsim.disc import Disc, Release, Rig
 from discsim.effects.catalogue import Effect, by_id, effect, row
 from discsim.effects.own import UserEffect
 from discsim.environment import FIELD_MODEL_SIGMA, Environment, world_magnetic_field
@@ -36,6 +37,7 @@ __all__ = [
     "all_effects",
     "at_place",
     "at_site",
+    "at_wind",
     "disc_to_fly",
     "flight_effects",
     "known_plant",
@@ -45,7 +47,12 @@ __all__ = [
     "parse_sizes",
     "parse_vector",
     "rig_of",
+    "throw_as_said",
 ]
+
+_DEG, _RPM = float(np.radians(1.0)), 2.0 * np.pi / 60.0
+#: a storm that nobody throws in: Beaufort 12 starts at 32.7 m/s
+_STRONGEST_WIND = 33.0
 
 OutOption: TypeAlias = Annotated[Path, typer.Option("--out", help="Folder to write into; created where absent.")]
 SeedOption: TypeAlias = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
@@ -193,6 +200,32 @@ def at_site(environment: Environment, site: str | None) -> Environment:
     if site is None:
         return environment
     return replace(environment, magnetic_field=load_site(site).environment.magnetic_field)
+
+
+def at_wind(environment: Environment, wind: str | None) -> Environment:
+    """Return the environment with the steady wind of ``--wind SPEED,FROM`` (m/s, deg from north), or as it is."""
+    if wind is None:
+        return environment
+    try:
+        speed, origin = (float(part) for part in wind.split(","))
+    except ValueError:
+        raise InputError(f"--wind {wind}: expected SPEED,FROM in m/s and deg, such as 3,270 from the west") from None
+    if not 0.0 <= speed <= _STRONGEST_WIND:
+        raise InputError(f"--wind {wind}: expected a speed from 0 to {_STRONGEST_WIND:g} m/s")
+    towards = np.radians(origin + 180.0)
+    return replace(environment, wind=np.array([speed * np.cos(towards), speed * np.sin(towards), 0.0]))
+
+
+def throw_as_said(throw: Release, said: Mapping[str, float | None]) -> Release:
+    """Return a throw with what was said of it, in people's units, in the place of its own; as it is for nothing."""
+    given = {name: value for name, value in said.items() if value is not None}
+    if not given:
+        return throw
+    from discsim.launch import launch_of, released
+
+    units = {"launch": _DEG, "heading": _DEG, "hyzer": _DEG, "nose": _DEG, "spin": _RPM}
+    words = {name: value * units.get(name, 1.0) for name, value in given.items()}
+    return released(launch_of(throw)._replace(**words), throw)
 
 
 def at_place(environment: Environment, place: str | None, day: str | None) -> Environment:
