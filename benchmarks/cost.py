@@ -85,7 +85,7 @@ def transforms(repetitions: int) -> bool:
     fast = least(lambda: padded_peak(x, total, low, high), repetitions) / count
     method = least(lambda: fft(samples), repetitions) / count
     print(f"padded transform (2^14) and its peak  {1e6 * whole:7.1f} us per window")
-    print(f"the same peak by estimators.fft_fast  {1e6 * fast:7.1f} us per window, {whole / fast:.1f} times less")
+    print(f"the same peak by `fft_fast`            {1e6 * fast:7.1f} us per window, {whole / fast:.1f} times less")
     print(
         f"method fft, all of it                 {1e6 * method:7.1f} us per window, {whole / method:.1f} times less"
         " (peak, noise and leakage tests, standard deviation)"

@@ -27,7 +27,7 @@ from rich.console import Console
 from rich.table import Table
 
 from discsim.callbacks import passive_force
-from discsim.engine import FlyingDisc, fly
+from discsim.engine import FlyingDisc, fly, follow
 from discsim.many_flights import fly_many
 from discsim.shipped import load_disc, load_throw
 
@@ -69,9 +69,9 @@ def with_air(flying: FlyingDisc, steps: int, python: bool) -> float:
 
 
 def whole_flight(steps: int, python: bool = False) -> float:
-    """Seconds per ``steps`` steps of `fly`, which builds the disc, looks for the ground and keeps every state."""
+    """Seconds per ``steps`` steps of a flight, which builds the disc, looks for the ground and keeps every state."""
     start = thread_time()
-    motion = fly(DISC, ENVIRONMENT, THROW, duration=steps * 1e-3, python=python)
+    motion = follow(FlyingDisc(DISC, ENVIRONMENT), THROW, duration=steps * 1e-3, python=python)
     return (thread_time() - start) * steps / (motion.t.size - 1)
 
 

@@ -26,7 +26,7 @@ from discsim.effects.sensors import PositionOffset  # noqa: E402
 from discsim.rig import turn_table  # noqa: E402
 from discsim.sensors import Accelerometer  # noqa: E402
 from estimators.accelerometer import accelerometer  # noqa: E402
-from validation.scenarios.rate_table import errors_within  # noqa: E402
+from validation.scenarios.rate_table import errors_within, true_rate  # noqa: E402
 from validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, segments  # noqa: E402
 from validation.sweeps.plan import Plan, plan_file, read_plan  # noqa: E402
 
@@ -45,7 +45,7 @@ def one_simulation(plan: Plan, number: int, mount: FloatArray) -> FloatArray:
     sensor = replace(sensor, offset=PositionOffset(*mount[:3].tolist()), misalignment=mount[3:])
     stream = np.random.default_rng(np.random.SeedSequence(plan.seed, spawn_key=(2, 0, 0, number))).spawn(2)[1]
     rate = accelerometer(sensor.measure(motion, stream), sensor.sheet)
-    errors = [errors_within(rate, motion, *span) for span in segments(plan, motion, case.settings)]
+    errors = [errors_within(rate, true_rate(motion), *span) for span in segments(plan, motion, case.settings)]
     return np.array([np.degrees(error[known].mean()) if known.any() else np.nan for error, known in errors])
 
 

@@ -19,8 +19,9 @@ from time import perf_counter, process_time, thread_time
 
 import numpy as np
 
+from discsim.parameters import flight_parameters, tables
 from discsim.shipped import load_disc, load_throw
-from discsim.trajectory import Flight, predict, predict_many, release_state
+from discsim.trajectory import Flight, integrate, predict, predict_many, release_state
 from validation.scenarios.engine_comparison import DISCS, compare_engines, strong_throw
 
 DISC, ENVIRONMENT = load_disc("driver")
@@ -96,15 +97,14 @@ def against_frispy(python: str, rounds: int) -> None:
         return took, error
 
     best = predict(DISC, ENVIRONMENT, THROW, rtol=1e-12, atol=1e-12, duration=FLIGHT_S)
-    instants, state = np.linspace(0.0, FLIGHT_S, 100), release_state(THROW)[None]
+    instants, state = np.linspace(0.0, FLIGHT_S, 100), release_state(THROW)
+    flat, lookup = flight_parameters(DISC, ENVIRONMENT), tables(DISC)
     ways: dict[str, Callable[[float], object]] = {
         "its path": lambda tol: predict(DISC, ENVIRONMENT, THROW, rtol=tol, atol=tol, duration=FLIGHT_S),
         "its path at 100 instants": lambda tol: predict(
             DISC, ENVIRONMENT, THROW, rtol=tol, atol=tol, duration=FLIGHT_S
         ).at(instants),
-        "where it ends": lambda tol: predict_many(
-            DISC, ENVIRONMENT, state, rtol=tol, atol=tol, duration=FLIGHT_S, threads=1
-        ),
+        "where it ends": lambda tol: integrate(flat, lookup, state, 0.0, FLIGHT_S, tol, tol, False),
     }
     for tolerance in (1e-6, 1e-8):
         flight = predict(DISC, ENVIRONMENT, THROW, rtol=tolerance, atol=tolerance, duration=FLIGHT_S)
@@ -134,13 +134,13 @@ def bulk(counts: Sequence[int]) -> None:
     states = np.tile(some, (max(counts), 1))
     states[:, 3:6] *= rng.uniform(0.8, 1.1, (max(counts), 1))
     few = states[: min(counts)]
-    exact = predict_many(DISC, ENVIRONMENT, few, rtol=1e-12, atol=1e-12, threads=1).state[:, :3]
+    exact = predict_many(DISC, ENVIRONMENT, few, tolerance=1e-12, threads=1).state[:, :3]
     print(f"landings of {len(few)} throws on one thread: largest error m, landings per second of CPU")
     for tolerance in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8):
         spent = []
         for _ in range(5):
             start = thread_time()
-            found = predict_many(DISC, ENVIRONMENT, few, rtol=tolerance, atol=tolerance, threads=1).state[:, :3]
+            found = predict_many(DISC, ENVIRONMENT, few, tolerance=tolerance, threads=1).state[:, :3]
             spent.append(thread_time() - start)
         error = np.linalg.norm(found - exact, axis=1).max()
         print(f"  tolerance {tolerance:.0e}: {error:8.1e} {len(few) / min(spent):8.0f}")

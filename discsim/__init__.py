@@ -1,14 +1,20 @@
-"""The simulated world: a spinning disc in MuJoCo, its sensors, and recordings of both simulated and real ones.
+"""A spinning flying disc: simulated, recorded, its spin estimated, its missing physics diagnosed; one package.
 
-A whole throw, from a disc and a release to what its sensors write:
+A whole throw, from a disc and a release to the spin that its magnetometer tells:
 
->>> import discsim
->>> disc, environment = discsim.load_disc("driver")
->>> flight = discsim.predict(disc, environment, discsim.load_throw("driver"))
->>> flight.motion().touched_down
+>>> import numpy as np
+>>> import discsim as ds
+>>> disc, environment = ds.load_disc("driver")
+>>> motion = ds.predict(disc, environment, ds.load_throw("driver")).motion()
+>>> motion.touched_down
 True
+>>> board = ds.Instruments.from_parts("mpu9250")
+>>> throw = ds.record(motion, board, np.random.default_rng(0), plant="flight", name="first", disc=disc)
+>>> ds.estimate(throw, "fft")
+<SpinEstimates of 'first': fft>
 
-Each name is loaded when it is first asked for: the import itself takes no time.
+Each name is loaded when it is first asked for: the import itself takes no time. Results have a short repr, a
+``summary()``, ``plot()``, ``to_dataframe()``, ``to_xarray()`` and ``report(folder)``.
 """
 
 from __future__ import annotations
@@ -26,10 +32,20 @@ if TYPE_CHECKING:
     from discsim.motion import Motion
     from discsim.plain_arrays import recording_from_arrays
     from discsim.recording import Recording, Samples, SensorSheet, read_dataset, read_recording, write_recording
+    from discsim.result import Result
     from discsim.sensors.instruments import Instruments, record
     from discsim.sensors.instruments import read_part as load_part
     from discsim.shipped import load_disc, load_site, load_throw
     from discsim.trajectory import predict
+    from estimators.plain_arrays import fft
+    from estimators.rate import YawRate
+    from validation.challenge.challenged import blind_test as challenge
+    from validation.checking.checked import check
+    from validation.diagnosis.diagnosed import diagnose_recordings as diagnose
+    from validation.estimating.spin_estimates import estimate_spin as estimate
+    from validation.importing.imported_log import import_log
+    from validation.sweeps.swept import sweep
+    from validation.yaw_damping.fitted import fit_recordings as fit
 
     __version__: str
 
@@ -41,11 +57,20 @@ __all__ = [
     "Motion",
     "Recording",
     "Release",
+    "Result",
     "Samples",
     "SensorSheet",
+    "YawRate",
     "__version__",
+    "challenge",
+    "check",
+    "diagnose",
     "effect",
+    "estimate",
+    "fft",
+    "fit",
     "fly",
+    "import_log",
     "load_disc",
     "load_part",
     "load_site",
@@ -56,51 +81,57 @@ __all__ = [
     "read_recording",
     "record",
     "recording_from_arrays",
+    "sweep",
     "write_model",
     "write_recording",
 ]
 
-#: name -> where it is, "module" or "module:its name there"
+#: name -> where it is, "module" or "module:its name there"; the door knows the rooms above it by name alone
 _HOMES = {
-    "Disc": "disc",
-    "Environment": "environment",
-    "InputError": "errors",
-    "Instruments": "sensors.instruments",
-    "Motion": "motion",
-    "Recording": "recording",
-    "Release": "disc",
-    "Samples": "recording",
-    "SensorSheet": "recording",
-    "effect": "effects.catalogue",
-    "fly": "engine",
-    "load_disc": "shipped",
-    "load_part": "sensors.instruments:read_part",
-    "load_site": "shipped",
-    "load_throw": "shipped",
-    "predict": "trajectory",
-    "read_dataset": "recording",
-    "read_model": "model_file",
-    "read_recording": "recording",
-    "record": "sensors.instruments",
-    "recording_from_arrays": "plain_arrays",
-    "write_model": "model_file",
-    "write_recording": "recording",
+    "Disc": "discsim.disc",
+    "Environment": "discsim.environment",
+    "InputError": "discsim.errors",
+    "Instruments": "discsim.sensors.instruments",
+    "Motion": "discsim.motion",
+    "Recording": "discsim.recording",
+    "Release": "discsim.disc",
+    "Result": "discsim.result",
+    "Samples": "discsim.recording",
+    "SensorSheet": "discsim.recording",
+    "YawRate": "estimators.rate",
+    "__version__": "discsim.version:version",
+    "challenge": "validation.challenge.challenged:blind_test",
+    "check": "validation.checking.checked",
+    "diagnose": "validation.diagnosis.diagnosed:diagnose_recordings",
+    "effect": "discsim.effects.catalogue",
+    "estimate": "validation.estimating.spin_estimates:estimate_spin",
+    "fft": "estimators.plain_arrays",
+    "fit": "validation.yaw_damping.fitted:fit_recordings",
+    "fly": "discsim.engine",
+    "import_log": "validation.importing.imported_log",
+    "load_disc": "discsim.shipped",
+    "load_part": "discsim.sensors.instruments:read_part",
+    "load_site": "discsim.shipped",
+    "load_throw": "discsim.shipped",
+    "predict": "discsim.trajectory",
+    "read_dataset": "discsim.recording",
+    "read_model": "discsim.model_file",
+    "read_recording": "discsim.recording",
+    "record": "discsim.sensors.instruments",
+    "recording_from_arrays": "discsim.plain_arrays",
+    "sweep": "validation.sweeps.swept",
+    "write_model": "discsim.model_file",
+    "write_recording": "discsim.recording",
 }
 
 
 def __getattr__(name: str) -> Any:
     """Return one of the names above, loaded when it is first asked for."""
-    if name == "__version__":
-        from importlib.metadata import PackageNotFoundError, version
-
-        try:
-            return version("discsim")
-        except PackageNotFoundError:
-            return "unknown"  # run from a bare source tree
     if name not in _HOMES:
         raise AttributeError(f"module 'discsim' has no attribute '{name}'")
     module, _, own = _HOMES[name].partition(":")
-    return getattr(import_module(f"discsim.{module}"), own or name)
+    found = getattr(import_module(module), own or name)
+    return found() if name == "__version__" else found
 
 
 def __dir__() -> list[str]:

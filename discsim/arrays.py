@@ -1,18 +1,19 @@
-"""Array types used throughout, and read-only copies of what is handed in."""
+"""Array types used throughout, read-only copies of what is handed in, and a spread that outliers do not move."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["BoolArray", "FloatArray", "IntArray", "readonly", "vector3"]
+__all__ = ["BoolArray", "ComplexArray", "FloatArray", "IntArray", "readonly", "sd_by_median", "vector3"]
 
 FloatArray: TypeAlias = NDArray[np.float64]
 BoolArray: TypeAlias = NDArray[np.bool_]
 IntArray: TypeAlias = NDArray[np.int64]
+ComplexArray: TypeAlias = NDArray[np.complex128]
 
 
 def readonly(values: ArrayLike) -> FloatArray:
@@ -20,6 +21,14 @@ def readonly(values: ArrayLike) -> FloatArray:
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
     return array
+
+
+def sd_by_median(values: ArrayLike, axis: int | None = None) -> Any:
+    """Return the standard deviation of Gaussian values about zero by the median of their sizes, along an axis or all.
+
+    A median absolute deviation is about the values' own median; of residuals zero is known to be the middle.
+    """
+    return 1.4826 * np.median(np.abs(values), axis=axis)
 
 
 def vector3(values: ArrayLike | Sequence[float], what: str) -> FloatArray:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import weakref
 from math import erf
+from threading import Lock
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -86,6 +87,7 @@ class Limits(NamedTuple):
 _KNOWN: dict[int, tuple[weakref.ref[FloatArray], tuple[float | None, float | None], BoolArray]] = {}
 #: sensors of a recording, as read, made usable, and corrected
 _MOST_KNOWN = 16
+_LOCK = Lock()
 
 
 def clipped(value: FloatArray, stated_range: float | None, resolution: float | None) -> BoolArray:
@@ -100,11 +102,12 @@ def clipped(value: FloatArray, stated_range: float | None, resolution: float | N
         return known[2]
     found = _clipped(value, stated_range, resolution)
     found.flags.writeable = False
-    for key in [key for key, (array, _, _) in _KNOWN.items() if array() is None]:
-        del _KNOWN[key]
-    while len(_KNOWN) >= _MOST_KNOWN:
-        del _KNOWN[next(iter(_KNOWN))]
-    _KNOWN[id(value)] = (weakref.ref(value), (stated_range, resolution), found)
+    with _LOCK:  # recordings are looked at side by side
+        for key in [key for key, (array, _, _) in _KNOWN.items() if array() is None]:
+            del _KNOWN[key]
+        while len(_KNOWN) >= _MOST_KNOWN:
+            del _KNOWN[next(iter(_KNOWN))]
+        _KNOWN[id(value)] = (weakref.ref(value), (stated_range, resolution), found)
     return found
 
 

@@ -237,18 +237,16 @@ def fly(
     timestep: float = 1e-3,
     duration: float = 30.0,
     ground: Literal["stop", "skip"] = "stop",
-    python: bool = False,
     law: Law | Sequence[Law] | None = None,
 ) -> Motion:
     """Fly a disc in MuJoCo and return its true motion.
 
     The flight ends where the centre of mass reaches the ground (found to better than 1e-7 s), or after ``duration``
     (s). With ``ground="skip"`` the rim has contact and friction with the ground, and the disc skips and slides on
-    until it rests or ``duration`` ends. ``python`` takes the callback in Python, as `FlyingDisc.air` does; the motion
-    is the same. Raises `InputError` where it turns by more than `LARGEST_TURN` in a step.
+    until it rests or ``duration`` ends. Raises `InputError` where it turns by more than `LARGEST_TURN` in a step.
     """
     flying = FlyingDisc(disc, environment, effects, timestep=timestep, contacts=ground == "skip", law=law)
-    return follow(flying, release, duration=duration, ground=ground, python=python)
+    return follow(flying, release, duration=duration, ground=ground)
 
 
 def follow(
@@ -259,7 +257,10 @@ def follow(
     ground: Literal["stop", "skip"] = "stop",
     python: bool = False,
 ) -> Motion:
-    """Release a disc that is built and return the true motion of its body ``disc``; see `fly`."""
+    """Release a disc that is built and return the true motion of its body ``disc``; see `fly`.
+
+    ``python`` takes the callback in Python, as `FlyingDisc.air` does; the motion is the same.
+    """
     flying.release(release)
     check_turn(flying.data.qvel[None, :6], flying.model.opt.timestep)
     log = Logbook(flying.model, flying.data, flying.centre_of_mass)

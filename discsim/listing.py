@@ -1,4 +1,4 @@
-"""What is shipped, by kind and name: discs, parts, throws, sites, import maps, sweep plans, and the effects."""
+"""What is shipped, by kind and name: discs, parts, throws, sites, rate tables, import maps, sweep plans, effects."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ KINDS = {
     "parts": "parts",
     "throws": "throws",
     "sites": "sites",
+    "tables": "tables",
     "maps": "imports",
     "sweeps": "sweeps",
     "effects": "",

@@ -93,7 +93,7 @@ def fly_many(
             # each flight from where the round began, so that the state before a step is always there
             path = np.empty((ids.size, length + 1, _WIDTH))
             path[:, 0] = batch.state[ids, :_WIDTH]
-            path[:, 1:] = _advance(flying, batch, ids, length)
+            path[:, 1:] = advance(flying, batch, ids, length)
             done += length
             flies = np.ones(ids.size, dtype=np.bool_)
             for place, k in enumerate(ids.tolist()):
@@ -114,7 +114,7 @@ def fly_many(
     return Ends(centre_state(rows, flying), touched)
 
 
-def _advance(flying: FlyingDisc, batch: Batch, ids: Any, length: int) -> FloatArray:
+def advance(flying: FlyingDisc, batch: Batch, ids: Any, length: int) -> FloatArray:
     """Step some flights ``length`` times and return time, qpos and qvel after each step, (ids, length, WIDTH)."""
     with stepped_by_c() as in_c:
         if in_c:

@@ -22,8 +22,8 @@ from discsim.errors import InputError
 from discsim.files import write_text
 from discsim.law import Law
 from discsim.limits import ANY_NUMBER
-from discsim.recording import disc_toml, environment_toml, rig_toml, toml_lines
 from discsim.toml_table import TomlTable, read_toml
+from discsim.toml_text import disc_toml, environment_toml, rig_toml, toml_lines
 
 __all__ = ["MODEL_FORMAT", "Model", "ModelEffect", "read_model", "write_model"]
 

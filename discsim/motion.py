@@ -4,16 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from pathlib import Path
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from discsim.arrays import FloatArray, readonly, vector3
 from discsim.environment import Environment
+from discsim.files import write_text
 from discsim.frames import conjugate, euler_angles, multiply, rotation_vector, to_body, turn
+from discsim.result import Result
 from discsim.splines import hermite, spline_slopes
 
-__all__ = ["Motion", "State", "Surroundings"]
+__all__ = ["COLUMNS", "Motion", "State", "Surroundings"]
+
+#: columns of a flight's truth: position and velocity in N, attitude, body rates
+COLUMNS = (
+    *("time_s", "north_m", "east_m", "down_m", "v_north_m_s", "v_east_m_s", "v_down_m_s"),
+    *("roll_rad", "pitch_rad", "yaw_rad", "p_rad_s", "q_rad_s", "r_rad_s"),
+)
 
 
 class Surroundings(NamedTuple):
@@ -46,8 +55,8 @@ class State(NamedTuple):
         return to_body(self.attitude, vector_ned)
 
 
-@dataclass(frozen=True)
-class Motion:
+@dataclass(frozen=True, repr=False)
+class Motion(Result):
     """True motion of a disc or a rig.
 
     Attributes
@@ -91,6 +100,30 @@ class Motion:
         object.__setattr__(self, "centre_of_mass", vector3(self.centre_of_mass, "centre of mass (m)"))
         if n < 2 or np.any(np.diff(self.t) <= 0):
             raise ValueError(f"motion: got {n} times, expected at least two, ascending")
+
+    _dimension: ClassVar[str] = "time_s"
+
+    def __repr__(self) -> str:
+        return f"<Motion: {self.summary()}>"
+
+    def summary(self) -> str:
+        """Return how long it lasts, how far it goes, and the spin at both ends: one line."""
+        first, last = np.degrees(self.rate[[0, -1], 2])
+        far = float(np.hypot(*(self.position[-1] - self.position[0])[:2]))
+        ending = ", to the ground" if self.touched_down else ""
+        return f"{self.end - self.start:.4g} s, {far:.4g} m{ending}, spin {first:.5g} to {last:.5g} deg/s"
+
+    def table(self) -> dict[str, FloatArray]:
+        """Return every step: time, position and velocity in N, roll, pitch, yaw, and body rates."""
+        values = (self.t, *self.position.T, *self.velocity.T, *self.euler_angles, *self.rate.T)
+        return dict(zip(COLUMNS, values, strict=True))
+
+    def report(self, folder: Path | str) -> Path:
+        """Write ``truth.csv``, every step of the motion, into ``folder``; return its path."""
+        file, columns = Path(folder) / "truth.csv", self.table()
+        rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+        write_text(file, "\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows), ""]))
+        return file
 
     @property
     def start(self) -> float:

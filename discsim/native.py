@@ -214,13 +214,13 @@ def _bound(function: int, table: int) -> Any:
 def native_callback() -> NativeCallback | None:
     """Return the one callback of this process, tried on live data; None where MuJoCo's memory is not as described."""
     try:
-        callback = NativeCallback(_offsets())
-        return callback if _works(callback) else None
+        callback = NativeCallback(field_offsets())
+        return callback if works(callback) else None
     except Exception:  # whatever is missing or refused on this machine, Python's callback still works
         return None
 
 
-def _offsets() -> list[int]:
+def field_offsets() -> list[int]:
     """Return the offsets of `_FIELDS` in mjData by MuJoCo's own description of it."""
     from mujoco.introspect.structs import STRUCTS
 
@@ -245,7 +245,7 @@ def _structure(name: str, described: Mapping[str, Any]) -> Any:
     return type(name, (ctypes.Structure,), {"_fields_": fields})
 
 
-def _works(callback: NativeCallback) -> bool:
+def works(callback: NativeCallback) -> bool:
     """Call it on two sets of data of a small model: it must find the time and the arrays that MuJoCo shows."""
     # without springs and dampers MuJoCo compiles it whatever callback is installed, see `callbacks.compile_model`
     model = mujoco.MjModel.from_xml_string(

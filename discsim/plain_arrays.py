@@ -44,9 +44,14 @@ def recording_from_arrays(
         What data sheets state, such as the accelerometer's place. A sensor without one gets its sampling rate from the
         times; a rate of NaN is replaced in the same way.
 
-    Raises `InputError` for an unknown sensor and for arrays of other shapes, of times that do not ascend, or of fewer
-    than two rows where no sheet states the rate.
+    Raises
+    ------
+    InputError
+        For an unknown sensor and for arrays of other shapes, of times that do not ascend, or of fewer than two rows
+        where no sheet states the rate.
 
+    Examples
+    --------
     >>> import numpy as np
     >>> t = np.arange(0, 2, 0.01)
     >>> field = 40 * np.column_stack([np.cos(30 * t), -np.sin(30 * t), 0 * t])

@@ -12,7 +12,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -20,16 +20,17 @@ from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from discsim.arrays import BoolArray, FloatArray, readonly
 from discsim.clipping import at_range, clipped
-from discsim.disc import Aero, Disc, Release, Rig, aero_key
+from discsim.disc import Disc, Release, Rig
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import read_text, replacing, write_text
 from discsim.limits import MOST_ROWS, reading_fault, written_time_fault
+from discsim.recorded import Recorded
 from discsim.toml_table import TomlTable, read_toml
+from discsim.toml_text import disc_toml, environment_toml, release_toml, rig_toml, toml_table, toml_value
 
 __all__ = [
     "FORMAT",
@@ -148,7 +149,7 @@ class SensorSheet:
 
 
 @dataclass(frozen=True)
-class Recording:
+class Recording(Recorded):
     """One recording: what is stated about it and a `Samples` per sensor; it never carries the truth."""
 
     plant: Plant
@@ -318,7 +319,7 @@ def read_sheet(table: TomlTable, sensor: str, *, strict: bool, rate_required: bo
 
 _EMPTY_CELL = re.compile(r"(?<=,)[ \t]*(?=,|$)", re.MULTILINE)
 _CELL = re.compile(r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan)", re.ASCII | re.IGNORECASE)
-_BLOCK = 1 << 22  # characters parsed at a time
+BLOCK = 1 << 22  # characters parsed at a time
 
 
 def read_csv(path: Path, header: str, *, gaps_allowed: bool = True) -> Samples:
@@ -366,7 +367,7 @@ def _beyond(samples: Samples, header: str) -> tuple[int, str] | None:
 def _blocks(body: str) -> Iterator[str]:
     start = 0
     while start < len(body):
-        stop = body.find("\n", start + _BLOCK)
+        stop = body.find("\n", start + BLOCK)
         stop = len(body) if stop < 0 else stop
         yield body[start:stop]
         start = stop + 1
@@ -509,9 +510,9 @@ def _csv(samples: Samples, header: str) -> str:
 def recording_toml(recording: Recording) -> str:
     """Return the text of ``recording.toml``."""
     lines = [
-        f"format = {_toml(FORMAT)}",
-        f"plant = {_toml(recording.plant)}",
-        f"name = {_toml(recording.name)}",
+        f"format = {toml_value(FORMAT)}",
+        f"plant = {toml_value(recording.plant)}",
+        f"name = {toml_value(recording.name)}",
     ]
     lines += environment_toml(recording.environment)
     if recording.disc is not None:
@@ -522,76 +523,8 @@ def recording_toml(recording: Recording) -> str:
         lines += release_toml(recording.release)
     lines += ["", "[sensors]"]
     for sensor, sheet in recording.sheets.items():
-        lines += _table(f"sensors.{sensor}", _sheet_keys(sensor, sheet), sheet.sigma)
+        lines += toml_table(f"sensors.{sensor}", _sheet_keys(sensor, sheet), sheet.sigma)
     return "\n".join([*lines, ""])
-
-
-def environment_toml(environment: Environment) -> list[str]:
-    """Return the lines of an ``[environment]`` table."""
-    return _table(
-        "environment",
-        {
-            "gravity_m_s2": environment.gravity,
-            "magnetic_field_ned_uT": environment.magnetic_field,
-            "air_density_kg_m3": environment.air_density,
-            "wind_ned_m_s": environment.wind
-            if np.any(environment.wind) or "wind_ned_m_s" in environment.sigma
-            else None,
-        },
-        environment.sigma,
-    )
-
-
-def disc_toml(disc: Disc) -> list[str]:
-    """Return the lines of a ``[disc]`` table and its sub-tables."""
-    aero_keys = [aero_key(name) for name in Aero._fields]
-    body = {key: value for key, value in disc.sigma.items() if key not in aero_keys}
-    lines = _table(
-        "disc",
-        {"mass_kg": disc.mass, "diameter_m": disc.diameter, "Ixx_kg_m2": disc.Ixx, "Izz_kg_m2": disc.Izz},
-        body,
-    )
-    if disc.aero is not None:
-        lines += _table("disc.aero", {aero_key(k): v for k, v in disc.aero._asdict().items()}, {})
-    if aero_sigma := {key: disc.sigma[key] for key in aero_keys if key in disc.sigma}:
-        if disc.aero is None:
-            raise InputError("[disc.aero_sigma] without [disc.aero]; expected the coefficients it is about")
-        lines += _table("disc.aero_sigma", aero_sigma, {})
-    if (table := disc.aero_table) is not None:
-        lines += _table(
-            "disc.aero_table", {"alpha_rad": table.alpha, "CL": table.CL, "CD": table.CD, "CM": table.CM}, {}
-        )
-    if (rolling := disc.rolling_table) is not None:
-        columns = {"advance_ratio": rolling.advance_ratio, "CR": rolling.CR, "CRp": rolling.CRp}
-        lines += _table("disc.CR_table", {"alpha_rad": rolling.alpha, **columns}, {})
-    if (damping := disc.yaw_damping_table) is not None:
-        lines += _table(
-            "disc.CNr_table",
-            {"rate_deg_s": [_degrees(rate) for rate in damping.rate], "speed_m_s": damping.speed, "CNr": damping.CNr},
-            {},
-        )
-    return lines
-
-
-def rig_toml(rig: Rig) -> list[str]:
-    """Return the lines of a ``[rig]`` table."""
-    return _table("rig", {"Izz_kg_m2": rig.Izz, "viscous_N_m_s": rig.viscous}, rig.sigma)
-
-
-def release_toml(release: Release, name: str = "release") -> list[str]:
-    """Return the lines of a ``[release]`` table."""
-    return _table(
-        name,
-        {
-            "position_ned_m": release.position,
-            "velocity_ned_m_s": release.velocity,
-            "roll_rad": release.roll,
-            "pitch_rad": release.pitch,
-            "yaw_rad": release.yaw,
-            "body_rate_rad_s": release.body_rate,
-        },
-        release.sigma,
-    )
 
 
 def _sheet_keys(sensor: str, sheet: SensorSheet) -> dict[str, Any]:
@@ -609,53 +542,3 @@ def _sheet_keys(sensor: str, sheet: SensorSheet) -> dict[str, Any]:
         f"range_{unit}": sheet.range,
         "position_m": sheet.position,
     }
-
-
-def _degrees(radians: float) -> float:
-    """Return the shortest degrees that read back as ``radians`` to the last bit, where there are any."""
-    exact = float(np.degrees(radians))
-    near = [round(exact, 9), exact, float(np.nextafter(exact, -np.inf)), float(np.nextafter(exact, np.inf))]
-    return next((degrees for degrees in near if np.radians(degrees) == radians), exact)
-
-
-_UNITS = ("kg_m2", "kg_m3", "N_m_s", "rad_s", "m_s2", "m_s", "uT", "kg", "rad", "hz", "m")
-
-
-def sigma_key(key: str) -> str:
-    """Return the key of a quantity's uncertainty: ``sigma`` before the unit, without the frame."""
-    for unit in _UNITS:
-        if key.endswith(f"_{unit}"):
-            return f"{key.removesuffix(f'_{unit}').removesuffix('_ned')}_sigma_{unit}"
-    return f"{key}_sigma"
-
-
-def _table(name: str, values: Mapping[str, Any], sigma: Mapping[str, Any]) -> list[str]:
-    lines = ["", f"[{name}]"] if name else []
-    for key, value in values.items():
-        if value is None:
-            continue
-        lines.append(f"{key} = {_toml(value)}")
-        if key in sigma:
-            lines.append(f"{sigma_key(key)} = {_toml(sigma[key])}")
-    if lost := [key for key in sigma if values.get(key) is None]:
-        raise InputError(f"[{name}]: uncertainty of '{lost[0]}', which is not stated; expected both or neither")
-    return lines
-
-
-def toml_lines(values: Mapping[str, Any]) -> list[str]:
-    """Return one line ``key = value`` for each text, truth value, number, array, or list of texts."""
-    return [f"{key} = {_toml(value)}" for key, value in values.items()]
-
-
-def _toml(value: ArrayLike | str | bool | Sequence[str]) -> str:
-    if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in escaped) + '"'
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_toml(item) for item in value) + "]"
-    array = np.asarray(value, dtype=float)
-    if array.ndim == 0:
-        return repr(float(array))
-    return "[" + ", ".join(_toml(item) for item in array) + "]"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterable, Sequence
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -30,12 +31,15 @@ from discsim.law import Law
 from discsim.limits import FASTEST_SPIN, LONGEST_RUN
 from discsim.motion import Motion
 from discsim.parameters import PARAMETERS, Tables, parameters, tables
-from discsim.recording import COMMAND_HEADER, Samples, read_csv
+from discsim.profiles import read_shape
+from discsim.recording import COMMAND_HEADER, Recording, Samples, read_csv, read_recording
 
-__all__ = ["default_profile", "profile_fault", "read_profile", "spin_down", "turn_table"]
+__all__ = ["default_profile", "measured_profile", "profile_fault", "read_profile", "spin_down", "turn_table"]
 
 #: plateaus of the default profile, deg/s
 PLATEAUS_DEG_S = (0, 300, 600, 1000, 1500, 2000, 2500, 3000, 3500, 4000, 4500, 5000)
+#: parts of a profile, of however many knots, after which progress is told
+PARTS = 23
 #: stiffness of the table's speed loop, 1/s: an error of speed dies out within some 10 ms
 SPEED_LOOP = 100.0
 
@@ -53,7 +57,14 @@ def default_profile(plateaus_deg_s: Sequence[float] = PLATEAUS_DEG_S, hold: floa
 
 
 def read_profile(path: Path) -> Samples:
-    """Read a profile: a CSV file with columns ``time_s,rate_rad_s`` or ``time_s,rate_deg_s``, one row per knot."""
+    """Read a profile: a CSV file of knots, columns ``time_s,rate_rad_s`` or ``time_s,rate_deg_s``, or a TOML shape.
+
+    A recording's folder stands for its rate reference, a log of what a table did.
+    """
+    if path.suffix == ".toml":
+        return _within_limits(path, read_shape(path))
+    if (path / "recording.toml").is_file():
+        return _within_limits(path, measured_profile(read_recording(path)))
     degrees = read_text(path).partition("\n")[0] == "time_s,rate_deg_s"
     knots = read_csv(path, "time_s,rate_deg_s" if degrees else COMMAND_HEADER, gaps_allowed=False)
     knots = Samples(knots.t, np.radians(knots.value)) if degrees else knots
@@ -65,6 +76,26 @@ def read_profile(path: Path) -> Samples:
         knot, message = found
         raise InputError.at(path, 2 + knot, message)
     return knots
+
+
+def _within_limits(path: Path, profile: Samples) -> Samples:
+    if found := profile_fault(profile):
+        raise InputError.at(path, None, found[1])
+    return profile
+
+
+def measured_profile(recording: Recording) -> Samples:
+    """Return a recording's rate reference as a profile from 0 s; gaps are bridged by lines.
+
+    Raises `InputError` where it has none, or no two readings.
+    """
+    reference = recording.need("rate_reference")
+    known = np.isfinite(reference.value)
+    if known.sum() < 2:
+        raise InputError(f"{recording.path or recording.name}: no two readings of the rate reference; expected a log")
+    t, rate = reference.t[known], reference.value[known]
+    t, rate = t[t >= 0.0], rate[t >= 0.0]
+    return Samples(t, rate) if t[0] == 0.0 else Samples(np.append(0.0, t), np.append(rate[0], rate))
 
 
 def profile_fault(knots: Samples) -> tuple[int, str] | None:
@@ -171,13 +202,13 @@ def turn_table(
     yaw: float = 0.0,
     inertia: float = 1.1e-3,
     timestep: float = 1e-3,
-    progress: Callable[[Sequence[float]], Iterable[float]] = iter,
+    progress: Callable[[Sequence[range]], Iterable[range]] = iter,
 ) -> Motion:
     """Turn a rate table through a profile (t (n,) s, rate (n,) rad/s, piecewise linear) and return its true motion.
 
     ``yaw`` is the phase at t = 0 in rad, ``inertia`` the table's in kg m^2. Steps end on the profile's knots, so the
-    table follows ramps without error; `discsim.effects.rig` can add ripple and tilt. ``progress`` is handed the slopes
-    of the profile's segments and yields them one by one, which shows how far it is.
+    table follows ramps without error; `discsim.effects.rig` can add ripple and tilt. ``progress`` is handed at most
+    `PARTS` ranges of the profile's segments and yields them one by one, which shows how far it is.
     """
     if len(profile) < 2 or profile.value.ndim != 1 or np.any(np.isnan(profile.value)):
         raise InputError("profile: expected at least two knots (time, rate) without gaps")
@@ -198,15 +229,21 @@ def turn_table(
         data.qvel[0] += speed_ripple(SpeedRipple(*flat.view(PARAMETERS)[0]["rig_speed_ripple"]), 0.0, 0.0)[0]
     slopes = np.diff(profile.value) / np.diff(profile.t)
     with own_warnings(), passive_force(model, drive):
-        for k, slope in enumerate(progress(slopes.tolist())):
-            if k and profile.value[k] == 0.0 and slope != 0.0:  # it starts to turn, ripple and all
+        for k in chain.from_iterable(progress(_parts(slopes.size))):
+            if k and profile.value[k] == 0.0 and slopes[k] != 0.0:  # it starts to turn, ripple and all
                 turned = float(data.qpos[0]) - yaw
                 data.qvel[0] += speed_ripple(SpeedRipple(*flat.view(PARAMETERS)[0]["rig_speed_ripple"]), turned, 0.0)[0]
-            segment[:] = profile.t[k], profile.value[k], slope, yaw, inertia
+            segment[:] = profile.t[k], profile.value[k], slopes[k], yaw, inertia
             if k == 0:
                 hinge.note()
             hinge.run(float(profile.t[k + 1]), timestep)
     return hinge.motion()
+
+
+def _parts(count: int) -> list[range]:
+    """Return ranges that cover ``count`` segments: each its own where they are few."""
+    ends = np.linspace(0, count, min(count, PARTS) + 1).round().astype(int).tolist()
+    return [range(first, last) for first, last in pairwise(ends)]
 
 
 def spin_down(

@@ -17,11 +17,13 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.compiled import compiled_nogil
+from discsim.dormand_prince import evaluate, interpolant, step
 from discsim.effects.catalogue import CATALOGUE
 from discsim.errors import InputError
+from discsim.flight_equations import WIDTH, derivative, in_body
 from discsim.frames import conjugate, multiply, rotation_vector, turn
 from discsim.parameters import PARAMETERS, Tables, parameter_index
-from discsim.trajectory import WIDTH, Flight, derivative, evaluate, in_body, interpolant, step
+from discsim.trajectory import Flight
 
 __all__ = ["RELEASE_COLUMNS", "Sensitivity", "sensitivities"]
 

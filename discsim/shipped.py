@@ -1,4 +1,4 @@
-"""Discs, throws and places by name or from a file: the shipped ones stand in ``models`` (discs, throws, sites)."""
+"""Discs, throws and places by name or from a file: the shipped ones stand in ``models``."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from discsim.errors import InputError
 from discsim.files import model_file, model_names
 from discsim.toml_table import TomlTable, read_toml
 
-__all__ = ["Site", "load_disc", "load_site", "load_throw"]
+__all__ = ["Site", "load_disc", "load_site", "load_throw", "shipped_or_path"]
 
 
 class Site(NamedTuple):
@@ -32,7 +32,7 @@ def load_disc(name_or_path: str | PathLike[str]) -> tuple[Disc, Environment]:
     The file has the tables ``[disc]`` and ``[environment]`` of a recording, aerodynamics and air included. Raises
     `InputError`: a name that is neither shipped nor a file, or what is wrong in the file.
     """
-    table = read_toml(_find("discs", name_or_path))
+    table = read_toml(shipped_or_path("discs", name_or_path))
     environment = Environment.from_toml(_need(table, "environment"), air_required=True)
     disc = Disc.from_toml(_need(table, "disc"), aero_required=True)
     table.finish()
@@ -45,7 +45,7 @@ def load_throw(name_or_path: str | PathLike[str]) -> Release:
     Raises `InputError`: a name that is neither shipped nor a file, what is wrong in the file, or a throw without
     velocity and body rate.
     """
-    table = read_toml(_find("throws", name_or_path))
+    table = read_toml(shipped_or_path("throws", name_or_path))
     release = Release.from_toml(table)
     for value, key in ((release.velocity, "velocity_ned_m_s"), (release.body_rate, "body_rate_rad_s")):
         if value is None:
@@ -58,7 +58,7 @@ def load_site(name_or_path: str | PathLike[str]) -> Site:
 
     Raises `InputError`: a name that is neither shipped nor a file, or what is wrong in the file.
     """
-    table = read_toml(_find("sites", name_or_path))
+    table = read_toml(shipped_or_path("sites", name_or_path))
     place = _need(table, "site")
     latitude, longitude = place.need("latitude", "deg", minimum=-90.0), place.need("longitude", "deg", minimum=-180.0)
     if latitude > 90.0 or longitude > 360.0:
@@ -79,7 +79,8 @@ def _need(table: TomlTable, name: str) -> TomlTable:
     return part
 
 
-def _find(folder: str, name_or_path: str | PathLike[str]) -> Path:
+def shipped_or_path(folder: str, name_or_path: str | PathLike[str]) -> Path:
+    """Return the file of a shipped name in a folder of ``models``, or the path given; `InputError` where it is none."""
     name = fspath(name_or_path)
     shipped = model_names(folder)
     if name in shipped:

@@ -15,22 +15,9 @@ from typing import Any
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects import setup
 from discsim.effects.catalogue import Effect, by_id
 from discsim.effects.kind import BOARD
-from discsim.effects.setup import (
-    AccelerometerUnit,
-    Axes,
-    BoardRotation,
-    ClockUnit,
-    GpsAxes,
-    GyroscopeUnit,
-    MagnetometerUnit,
-    TimeOffset,
-    board_axes,
-    field_there,
-    permutation,
-    written_per_si,
-)
 from discsim.errors import InputError
 from discsim.limits import time_fault
 from discsim.recording import Recording, Samples, SensorSheet
@@ -82,32 +69,31 @@ def corrected(recording: Recording, effects: Sequence[Effect]) -> Recording:
         samples[sensor] = Samples(faulty.t / _ticks(values) - _offset(sensor, values), meant)
     environment = recording.environment
     if "site.field" in values:
-        environment = replace(environment, magnetic_field=field_there(values["site.field"], environment.magnetic_field))
+        there = setup.field_there(values["site.field"], environment.magnetic_field)
+        environment = replace(environment, magnetic_field=there)
     return replace(recording, samples=samples, environment=environment)
 
 
 def _offset(sensor: str, values: _Values) -> float:
-    offset: TimeOffset = values.get(f"{PREFIX.get(sensor)}.time_offset", TimeOffset())
-    return offset.offset_s
+    return float(values.get(f"{PREFIX.get(sensor)}.time_offset", setup.TimeOffset()).offset_s)
 
 
 def _ticks(values: _Values) -> float:
     """Return the number written for one second, by the clock that all sensors share."""
-    unit: ClockUnit = values.get("clock.units", ClockUnit())
-    return written_per_si(unit)
+    return setup.written_per_si(values.get("clock.units", setup.ClockUnit()))
 
 
 def _unit(sensor: str, values: _Values) -> float:
-    unit: MagnetometerUnit | AccelerometerUnit | GyroscopeUnit | None = values.get(f"{PREFIX.get(sensor)}.units")
-    return 1.0 if unit is None else written_per_si(unit)
+    unit = values.get(f"{PREFIX.get(sensor)}.units")
+    return 1.0 if unit is None else setup.written_per_si(unit)
 
 
 def _permuted(sensor: str, value: FloatArray, values: _Values, *, back: bool = False) -> FloatArray:
     """Return readings (n, 3), or (n, 6) of a gps, along other axes; a gap goes with its axis."""
-    axes: Axes | GpsAxes | None = values.get(f"{PREFIX.get(sensor)}.axes")
+    axes = values.get(f"{PREFIX.get(sensor)}.axes")
     if axes is None:
         return value
-    P = permutation(axes).T if back else permutation(axes)
+    P = setup.permutation(axes).T if back else setup.permutation(axes)
     source, sign = np.argmax(np.abs(P), axis=1), np.sum(P, axis=1)
     three_by_three = value.reshape(len(value), -1, 3)
     return np.asarray((three_by_three[:, :, source] * sign).reshape(value.shape))
@@ -115,10 +101,10 @@ def _permuted(sensor: str, value: FloatArray, values: _Values, *, back: bool = F
 
 def _turned(sensor: str, value: FloatArray, sheet: SensorSheet, values: _Values, *, to_board: bool) -> FloatArray:
     """Return readings (n, 3) of B along the axes of a turned board, or back."""
-    rotation: BoardRotation = values.get("board.rotation", BoardRotation())
+    rotation = values.get("board.rotation", setup.BoardRotation())
     if sensor not in BOARD or not any(rotation):
         return value
-    C = board_axes(rotation)
+    C = setup.board_axes(rotation)
     R = np.where(np.abs(C) > _SHARE, C, 0.0)
     R = R.T if to_board else R
     lost = np.isnan(value)

@@ -14,7 +14,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 
-__all__ = ["ToneBound", "flight_bound", "regular_bound", "tone_bound"]
+__all__ = ["ToneBound", "tone_bound"]
 
 
 @dataclass(frozen=True)
@@ -27,15 +27,6 @@ class ToneBound:
     amplitude: float
 
 
-def regular_bound(n: int, interval: float, amplitude: float, noise: float) -> float:
-    """Return the bound on a constant rate, rad/s, of n equally spaced samples with nothing else than phase unknown.
-
-    ``var(r) >= 12 sigma^2 / (A^2 N (N^2 - 1) T^2)`` with sigma the noise per axis. A linear change of rate does not
-    raise it at the window's centre; hard iron hardly does once the window holds two turns.
-    """
-    return float(np.sqrt(12 / (n * (n * n - 1.0))) * noise / (amplitude * interval))
-
-
 def tone_bound(
     t: FloatArray,
     amplitude: float,
@@ -44,11 +35,10 @@ def tone_bound(
     *,
     degree: int = 1,
     phase: float = 0.0,
-    at: float | None = None,
     hard_iron: bool = True,
     ellipse_sd: float = 0.0,
 ) -> ToneBound:
-    """Return the bound for samples at times t (n,), s, of any spacing.
+    """Return the bound at the mean of times t (n,), s, of any spacing.
 
     Parameters
     ----------
@@ -61,15 +51,13 @@ def tone_bound(
     degree : int
         Of the unknown polynomial of the rate: 0 constant, 1 with chirp, 2 with curvature.
     phase : float
-        Phase at ``at``, rad.
-    at : float or None
-        Instant of the answer, s; the mean of ``t`` if None.
+        Phase at the mean of ``t``, rad.
     hard_iron : bool
         Whether the offset of both axes is unknown.
     ellipse_sd : float
         Prior standard deviation of each part of the relative ellipse c; 0 if c is known.
     """
-    jacobian = _tone_jacobian(t, amplitude, rate, degree, phase, at, hard_iron, ellipse_sd > 0)
+    jacobian = _tone_jacobian(t, amplitude, rate, degree, phase, hard_iron, ellipse_sd > 0)
     # unit columns: the powers of tau differ by orders of magnitude
     scale = np.linalg.norm(jacobian, axis=0)
     fisher = (jacobian / scale).T @ (jacobian / scale) / noise**2
@@ -91,12 +79,11 @@ def _tone_jacobian(
     rate: float,
     degree: int,
     phase: float,
-    at: float | None,
     hard_iron: bool,
     ellipse: bool,
 ) -> FloatArray:
     """Derivatives (2n, m) of both axes by phase, rate, chirp, ..., amplitude, hard iron (2), ellipse (2)."""
-    tau = np.asarray(t, dtype=float) - (float(np.mean(t)) if at is None else at)
+    tau = np.asarray(t, dtype=float) - float(np.mean(t))
     spin = np.exp(1j * (phase - rate * tau))
     columns = [1j * amplitude * spin]
     factorial = 1.0
@@ -110,42 +97,3 @@ def _tone_jacobian(
         columns += [amplitude * np.conj(spin), 1j * amplitude * np.conj(spin)]
     complex_columns = np.stack(columns, axis=1)
     return np.concatenate([complex_columns.real, complex_columns.imag])
-
-
-def flight_bound(
-    t: FloatArray, amplitude: float, noise: float, roughness: float, at: FloatArray, *, step: float = 0.02
-) -> FloatArray:
-    """Return the bound (m,) rad/s at times ``at`` for a smoother that sees a whole recording.
-
-    The phase is measured at times t (n,) with standard deviation noise/amplitude; its rate is an integrated random
-    walk, ``r'' = white noise`` of spectral density ``roughness`` (rad/s^3)^2 s, its start unknown. Bayesian bound
-    (van Trees) of a rate given on a grid of ``step`` s, linear in between.
-    """
-    t = np.asarray(t, dtype=float)
-    nodes = max(4, int(np.ceil((t[-1] - t[0]) / step)) + 1)
-    grid = np.linspace(t[0], t[-1], nodes)
-    h = grid[1] - grid[0]
-    # phase at t: the integral of the hat functions up to t
-    index = np.minimum(((t - t[0]) / h).astype(int), nodes - 2)
-    u = (t - grid[index]) / h
-    full = np.tril(np.ones((nodes, nodes)), -1) * h
-    full[:, 0] *= 0.5
-    integral = full + np.diag(np.full(nodes, 0.5 * h))
-    integral[0] = 0.0
-    jacobian = integral[index].copy()
-    rows = np.arange(t.size)
-    jacobian[rows, index] += h * (u - 0.5 * u * u)
-    jacobian[rows, index + 1] += h * 0.5 * u * u
-    jacobian = np.column_stack((np.ones(t.size), jacobian))
-    second = np.diff(np.eye(nodes), 2, axis=0) / h**2
-    # white noise of density S sampled by its mean over a step has variance S/step
-    prior = np.zeros((nodes + 1, nodes + 1))
-    prior[1:, 1:] = second.T @ second * h / roughness
-    fisher = jacobian.T @ jacobian * (amplitude / noise) ** 2 + prior
-    covariance = np.linalg.inv(fisher)[1:, 1:]
-    where = np.clip(((np.asarray(at) - t[0]) / h).astype(int), 0, nodes - 2)
-    w = (np.asarray(at) - grid[where]) / h
-    weights = np.zeros((len(where), nodes))
-    weights[np.arange(len(where)), where] = 1 - w
-    weights[np.arange(len(where)), where + 1] = w
-    return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", weights, covariance, weights)))

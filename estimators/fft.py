@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.compiled import compiled
 from discsim.errors import InputError
 from discsim.recording import Samples
@@ -16,7 +16,6 @@ from estimators.fft_fast import dirichlet, highest, spectra, transform_at
 from estimators.precession import AxialField, axial_field
 from estimators.rate import YawRate
 from estimators.spin_spline import IndexArray
-from estimators.tone import ComplexArray
 
 __all__ = ["FftSettings", "fft"]
 
@@ -287,7 +286,7 @@ def _uncertainty(
     shown = offset - mean if settings.remove_mean else offset
     leakage = _leakage(omega / bin_width, 2 * shown / amplitude, n) * bin_width
     smear = np.where(share < COHERENT_SHARE, COHERENT_SHARE / np.maximum(share, 1e-3), 0.0) * bin_width
-    certain = (_false_alarm(share, n, settings) < settings.false_alarm) & (leakage < bin_width / 4)
+    certain = (_false_alarm(share, n) < settings.false_alarm) & (leakage < bin_width / 4)
     return np.sqrt(noise**2 + grid**2 + leakage**2 + smear**2), amplitude, certain
 
 
@@ -383,7 +382,7 @@ def _dirichlet_slope(y: FloatArray, n: int) -> FloatArray:
     return np.asarray(np.pi * (np.cos(np.pi * y) / sine - np.sin(np.pi * y) * cosine / (n * sine**2)) / n)
 
 
-def _false_alarm(share: FloatArray, n: int, settings: FftSettings) -> FloatArray:
+def _false_alarm(share: FloatArray, n: int) -> FloatArray:
     """Chance that white noise has a peak that explains ``share`` of the sum of squares about its mean.
 
     At one frequency a fitted sinusoid and offset (three parameters) leave 1 - share or less with the chance

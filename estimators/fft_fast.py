@@ -22,10 +22,9 @@ from functools import lru_cache
 import numpy as np
 import scipy.fft
 
-from discsim.arrays import FloatArray, readonly
+from discsim.arrays import ComplexArray, FloatArray, readonly
 from discsim.compiled import compiled
 from estimators.spin_spline import IndexArray
-from estimators.tone import ComplexArray
 
 __all__ = ["Spectra", "dirichlet", "highest", "padded_peak", "spectra", "transform_at"]
 

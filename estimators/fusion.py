@@ -9,13 +9,16 @@ averaged with it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, sd_by_median
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples, SensorSheet
+from estimators.centripetal import centripetal
 from estimators.likelihood import LEAST, span_of
 from estimators.rate import YawRate
 from estimators.tracking import RateRows, Track, TrackingSettings, joined, plain_tracks, tracks_of
@@ -25,7 +28,6 @@ __all__ = [
     "Agreement",
     "FusionSettings",
     "accelerometer_calibrated",
-    "centripetal",
     "compare_sensors",
     "contradictions",
     "fusion",
@@ -104,110 +106,6 @@ class Agreement:
         )
 
 
-# ---------------------------------------------------------------------------------------------- accelerometer
-
-
-#: A block of the accelerometer that leaves this many times the residual of most blocks does not show the model.
-MISFIT = 4.0
-#: Residual from which on blocks are compared, m/s^2: a few steps of a 16-bit sensor's scale.
-LEAST_RESIDUAL = 0.02
-
-
-@dataclass(frozen=True)
-class Centripetal:
-    """The part of the specific force that stays in the body: t (n,) s, value (n, 2) m/s^2 and sd per axis (n,).
-
-    It is ``(-r^2 + i r') (d_x + i d_y) + bias`` as a complex number.
-    """
-
-    t: FloatArray
-    value: FloatArray
-    sd: FloatArray
-
-
-def centripetal(
-    accelerometer: Samples,
-    sheet: SensorSheet,
-    t: FloatArray,
-    rate: FloatArray,
-    *,
-    turns: float = 2.0,
-    shortest: float = 0.1,
-) -> Centripetal:
-    """Separate the centripetal force from what turns with the spin, block by block.
-
-    In each block of ``turns`` turns, at least ``shortest`` s, ``a_x + i a_y = c + c' t + (f + f' t) exp(-i psi)``
-    is solved by least squares: c is the centripetal part, f gravity and translation, fixed in N and so turning in B.
-    psi is the angle turned by ``rate`` (m,) rad/s given at times ``t``. Blocks with a clipped reading, or outside
-    the known rate, are left out, and so are those that leave more than `MISFIT` times the residual of most and
-    their neighbours: there the sensor does not show this (one that recovers from a throw's jerk drifts for some tenths
-    of a second).
-    """
-    known = np.isfinite(rate)
-    empty = Centripetal(np.zeros(0), np.zeros((0, 2)), np.zeros(0))
-    if np.count_nonzero(known) < 2 or len(accelerometer) < 8:
-        return empty
-    present = np.all(np.isfinite(accelerometer.value[:, :2]), axis=1)
-    times, value = accelerometer.t[present], accelerometer.value[present, :2]
-    if times.size < 8:
-        return empty
-    good = ~np.any(sheet.clipped(accelerometer.value)[present, :2], axis=1)
-    r = np.interp(times, t[known], rate[known], left=np.nan, right=np.nan)
-    # a hole in the known rate is no rate
-    index = np.clip(np.searchsorted(t[known], times), 1, np.count_nonzero(known) - 1)
-    r[np.diff(t[known])[index - 1] > 0.5] = np.nan
-    steps = np.diff(times)
-    psi = np.concatenate([[0.0], np.cumsum(steps * 0.5 * np.nan_to_num(r[1:] + r[:-1]))])
-    # by the angle turned, not by the rate at a block's start: one that starts at rest would last for minutes
-    turned = np.concatenate([[0.0], np.cumsum(steps * 0.5 * np.nan_to_num(np.abs(r[1:]) + np.abs(r[:-1])))])
-    a = value[:, 0] + 1j * value[:, 1]
-    out_t, out_value, out_share, squares, freedoms = [], [], [], [], []
-    start = 0
-    while start < times.size:
-        if not np.isfinite(r[start]) or abs(r[start]) < 1e-3:
-            start += 1
-            continue
-        goal = turned[start] + turns * 2 * np.pi
-        stop = max(int(np.searchsorted(turned, goal)), int(np.searchsorted(times, times[start] + shortest - 1e-9)))
-        if stop >= times.size and turned[-1] < goal - 0.1 * turns * 2 * np.pi:
-            break
-        chosen = np.arange(start, min(stop, times.size))
-        start = max(stop, start + 1)
-        length = float(times[chosen[-1]] - times[chosen[0]]) + accelerometer.interval
-        whole = length >= 0.9 * shortest and chosen.size >= 0.8 * length / accelerometer.interval
-        if chosen.size < 8 or not whole or not np.all(good[chosen]) or not np.all(np.isfinite(r[chosen])):
-            continue
-        centre = float(np.mean(times[chosen]))
-        tau = (times[chosen] - centre) / length
-        turning = np.exp(-1j * (psi[chosen] - psi[chosen[0]]))
-        columns = np.column_stack([np.ones_like(turning), tau, turning, tau * turning])
-        normal = columns.conj().T @ columns
-        if np.linalg.cond(normal) > 1e6:
-            continue
-        inverse = np.linalg.inv(normal)
-        solution = inverse @ (columns.conj().T @ a[chosen])
-        residual = a[chosen] - columns @ solution
-        squares.append(float(np.sum(np.abs(residual) ** 2)))
-        freedoms.append(2 * chosen.size - 8)
-        out_t.append(centre)
-        out_value.append(solution[0])
-        out_share.append(float(np.sqrt(inverse[0, 0].real)))
-    if not out_t:
-        return empty
-    stated = float(np.hypot(sheet.noise_rms or 0.0, (sheet.resolution or 0.0) / np.sqrt(12)))
-    left = np.sqrt(np.array(squares) / np.array(freedoms))
-    misfit = left > MISFIT * max(float(np.median(left)), stated, LEAST_RESIDUAL)
-    # the blocks beside may hold the tail of whatever it was
-    fits = ~(misfit | np.append(misfit[1:], False) | np.append(False, misfit[:-1]))
-    if not np.any(fits):
-        return empty
-    noise = max(float(np.sqrt(np.array(squares)[fits].sum() / np.array(freedoms)[fits].sum())), stated)
-    values = np.array(out_value)[fits]
-    return Centripetal(
-        np.array(out_t)[fits], np.column_stack([values.real, values.imag]), noise * np.array(out_share)[fits]
-    )
-
-
 def _accelerometer_rows(
     recording: Recording, t: FloatArray, rate: FloatArray, settings: FusionSettings
 ) -> RateRows | None:
@@ -251,7 +149,7 @@ def _gyroscope_rows(recording: Recording, settings: FusionSettings) -> RateRows 
     mean_t, mean_z = np.add.reduceat(t, first) / count, np.add.reduceat(z, first) / count
     # noise from second differences of the readings: motion is smooth
     rough = np.diff(z, 2)
-    noise = float(1.4826 * np.median(np.abs(rough)) / np.sqrt(6)) if rough.size else 0.0
+    noise = float(sd_by_median(rough) / np.sqrt(6)) if rough.size else 0.0
     noise = max(noise, float(np.hypot(sheet.noise_rms or 0.0, (sheet.resolution or 0.0) / np.sqrt(12))), 1e-4)
     return RateRows(
         "linear",
@@ -286,6 +184,54 @@ def _reference(recording: Recording, tracks: list[Track], settings: TrackingSett
     return _Reference(whole.t, whole.rate, whole.sd, slope, blur)
 
 
+class _Calibrating(NamedTuple):
+    """A sensor's readings y (k,) as ``design @ calibration``, (k, m), with their sd (k,).
+
+    ``lean`` (k,) is what one sd of the magnetometer's rate does to them, ``difference`` (n,) the sensor's rate as
+    stated less the magnetometer's, and ``rate_left`` the rms rate, rad/s, of what a calibration (m,) leaves, (k,).
+    """
+
+    design: FloatArray
+    y: FloatArray
+    sd: FloatArray
+    lean: FloatArray
+    difference: FloatArray
+    rate_left: Callable[[FloatArray, FloatArray], float]
+
+
+def _linear(row: RateRows, inside: BoolArray, r: FloatArray, sd_r: FloatArray) -> _Calibrating:
+    """Return a gyroscope's readings, (1 + a) r + b."""
+    y = row.value[inside] - r
+    sd = np.hypot(row.sd[inside], sd_r)
+    design = np.column_stack([r, np.ones_like(r)])
+    return _Calibrating(design, y, sd, -sd_r, y, lambda found, error: float(np.sqrt(np.mean(error**2))))
+
+
+def _pulled(row: RateRows, inside: BoolArray, r: FloatArray, sd_r: FloatArray, slope: FloatArray) -> _Calibrating:
+    """Return an accelerometer's centripetal readings, (-r^2 + i r') d + b, real parts above imaginary ones."""
+    shape = -(r**2) + 1j * slope
+    columns = np.column_stack([shape, 1j * shape, np.ones_like(shape), 1j * np.ones_like(shape)])
+    measured = row.value[inside, 0] + 1j * row.value[inside, 1]
+    d = complex(row.calibration[0], row.calibration[1])
+    own = np.hypot(row.sd[inside], 2 * np.abs(r) * abs(d) * sd_r * np.abs(d.real) / abs(d))
+    other = np.hypot(row.sd[inside], 2 * np.abs(r) * abs(d) * sd_r * np.abs(d.imag) / abs(d))
+    radial = -(measured * np.conj(d)).real / abs(d)
+
+    def rate_left(found: FloatArray, error: FloatArray) -> float:
+        half, d = error.size // 2, complex(found[0], found[1])
+        radial_error = (error[:half] * d.real + error[half:] * d.imag) / abs(d)
+        return float(np.sqrt(np.mean((radial_error / (2 * np.abs(r) * abs(d))) ** 2)))
+
+    return _Calibrating(
+        np.concatenate([columns.real, columns.imag]),
+        np.concatenate([measured.real, measured.imag]),
+        np.concatenate([own, other]),
+        np.concatenate([2 * r * sd_r * d.real, 2 * r * sd_r * d.imag]),
+        np.sqrt(np.maximum(radial, 0.0) / abs(d)) - np.abs(r),
+        rate_left,
+    )
+
+
 def _compare(
     sensor: str, row: RateRows, reference: _Reference, settings: FusionSettings
 ) -> tuple[Agreement, RateRows] | None:
@@ -298,56 +244,31 @@ def _compare(
     index = np.clip(np.searchsorted(at, row.t), 1, at.size - 1)
     r[np.diff(at)[index - 1] > 0.5] = np.nan
     inside = np.isfinite(r)
-    # at the ends the smoother knows little
-    sd_r = np.interp(row.t, at, reference.sd[known])
     if np.count_nonzero(inside) < 4:
         return None
-    slope = np.interp(row.t, at, reference.slope[known])
-    r, sd_r, slope = r[inside], sd_r[inside], slope[inside]
-    if row.kind == "linear":
-        design = np.column_stack([r, np.ones_like(r)])
-        y = row.value[inside] - r
-        sd = np.hypot(row.sd[inside], sd_r)
-        lean = -sd_r
-        difference = y
-    else:
-        shape = -(r**2) + 1j * slope
-        design_c = np.column_stack([shape, 1j * shape, np.ones_like(shape), 1j * np.ones_like(shape)])
-        design = np.concatenate([design_c.real, design_c.imag])
-        measured = row.value[inside, 0] + 1j * row.value[inside, 1]
-        y = np.concatenate([measured.real, measured.imag])
-        d = complex(row.calibration[0], row.calibration[1])
-        own = np.hypot(row.sd[inside], 2 * np.abs(r) * abs(d) * sd_r * np.abs(d.real) / abs(d))
-        other = np.hypot(row.sd[inside], 2 * np.abs(r) * abs(d) * sd_r * np.abs(d.imag) / abs(d))
-        sd = np.concatenate([own, other])
-        lean = np.concatenate([2 * r * sd_r * d.real, 2 * r * sd_r * d.imag])
-        radial = -(measured * np.conj(d)).real / abs(d)
-        difference = np.sqrt(np.maximum(radial, 0.0) / abs(d)) - np.abs(r)
+    # at the ends the smoother knows little
+    sd_r = np.interp(row.t, at, reference.sd[known])[inside]
+    slope = np.interp(row.t, at, reference.slope[known])[inside]
+    r = r[inside]
+    told = _linear(row, inside, r, sd_r) if row.kind == "linear" else _pulled(row, inside, r, sd_r, slope)
     precision = np.diag(1 / row.prior**2)
-    weighted = design / sd[:, None]
+    weighted = told.design / told.sd[:, None]
     covariance = np.linalg.inv(weighted.T @ weighted + precision)
-    found = covariance @ (weighted.T @ (y / sd) + precision @ row.calibration)
-    error = y - design @ found
+    found = covariance @ (weighted.T @ (told.y / told.sd) + precision @ row.calibration)
+    error = told.y - told.design @ found
     # the noise that was found may exceed the sensor's own: unmodelled motion; a robust measure of it
-    chi2 = float(np.mean((error / sd) ** 2))
+    chi2 = float(np.mean((error / told.sd) ** 2))
     departure = float(np.max(np.abs(found - row.calibration) / row.prior))
-    if row.kind == "linear":
-        residual = float(np.sqrt(np.mean(error**2)))
-    else:
-        half = error.size // 2
-        d = complex(found[0], found[1])
-        radial_error = (error[:half] * d.real + error[half:] * d.imag) / abs(d)
-        residual = float(np.sqrt(np.mean((radial_error / (2 * np.abs(r) * abs(d))) ** 2)))
+    residual = told.rate_left(found, error)
     # The magnetometer's error (precession, the gain of p and q) may hold throughout: it passes into the calibration.
-    drift = covariance @ (weighted.T @ (lean / sd))
+    drift = covariance @ (weighted.T @ (told.lean / told.sd))
     alike = chi2 <= settings.contradiction**2 or residual <= settings.tolerance * float(np.mean(np.abs(r)))
-    agrees = alike and departure <= settings.contradiction
     agreement = Agreement(
         sensor=sensor,
-        agrees=agrees,
+        agrees=alike and departure <= settings.contradiction,
         readings=int(np.count_nonzero(inside)),
-        difference=float(np.mean(difference)),
-        scatter=float(np.sqrt(np.mean(difference**2))),
+        difference=float(np.mean(told.difference)),
+        scatter=float(np.sqrt(np.mean(told.difference**2))),
         residual=residual,
         chi2=chi2,
         departure=departure,

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, sd_by_median
 from discsim.clipping import SAME, step_of
 from discsim.recording import Samples, SensorSheet
 from estimators.rate import YawRate
 
 __all__ = ["gyroscope", "rate_reference"]
-
-#: Standard deviation of a Gaussian over its median absolute value.
-MEDIAN_TO_SD = 1.4826
 
 
 def gyroscope(samples: Samples, sheet: SensorSheet) -> YawRate:
@@ -50,4 +47,4 @@ def _observed_noise(rate: FloatArray) -> float:
     """
     second = np.diff(rate, 2)
     second = second[np.isfinite(second)]
-    return float(MEDIAN_TO_SD * np.median(np.abs(second)) / np.sqrt(6)) if second.size else 0.0
+    return float(sd_by_median(second) / np.sqrt(6)) if second.size else 0.0

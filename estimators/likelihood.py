@@ -13,13 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples, SensorSheet
 from estimators.precession import AxialField, axial_field, transverse_gyroscope, transverse_rates
 from estimators.rate import YawRate
 from estimators.spin_spline import IndexArray
-from estimators.tone import ComplexArray
 from estimators.window_fit import COLUMNS, search_windows, turn_windows
 
 __all__ = [

@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, sd_by_median
 from discsim.errors import InputError
 from discsim.recording import Recording
+from discsim.threads import one_thread
 from estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors, accelerometer
 from estimators.fft import FftSettings, fft
 from estimators.fusion import accelerometer_calibrated, compare_sensors, contradictions, fusion
@@ -167,6 +168,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 )
 
 
+@one_thread
 def estimate(recording: Recording, name: str, options: Options | None = None) -> YawRate:
     """Spin rate of a recording by the method of that name, or by `best`.
 
@@ -203,6 +205,7 @@ def _clocked(found: YawRate, recording: Recording) -> YawRate:
     return replace(found, sd=np.hypot(found.sd, off / sheet.rate_hz * np.abs(found.rate)))
 
 
+@one_thread
 def all_methods(
     recording: Recording,
     options: Options | None = None,
@@ -245,6 +248,7 @@ def best(recording: Recording, options: Options | None = None) -> YawRate:
     return best_of(recording, options)[0]
 
 
+@one_thread
 def best_of(recording: Recording, options: Options | None = None) -> tuple[YawRate, dict[str, str]]:
     """Return the rate of `best`, and why each method that it prefers to the one taken was passed over."""
     options, sound = options or Options(), usable(recording)
@@ -312,7 +316,7 @@ def clock_notes(recording: Recording) -> list[str]:
     if shares.size < FEWEST_SHARES:
         return []
     share = float(np.median(shares))
-    scatter = 1.4826 * float(np.median(np.abs(shares - share)))
+    scatter = float(sd_by_median(shares - share))
     if not (share > 0 and abs(share - 1) > OFF_CLOCK and scatter < OFF_CLOCK / 3):
         return []
     interval = 1000 * recording.need("magnetometer").interval

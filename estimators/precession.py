@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from discsim.arrays import FloatArray
+from discsim.arrays import ComplexArray, FloatArray
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples
-from estimators.tone import ComplexArray
 from estimators.usable import unclipped
 
 __all__ = ["AxialField", "axial_field", "phase_rate", "transverse_gyroscope", "transverse_rates"]

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from discsim.arrays import FloatArray, readonly
+from discsim.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["YawRate"]
 
 
 @dataclass(frozen=True)
-class YawRate:
+class YawRate(Result):
     """Spin rate over time.
 
     Attributes
@@ -41,6 +46,8 @@ class YawRate:
     lower: FloatArray | None = None
     upper: FloatArray | None = None
 
+    _dimension: ClassVar[str] = "time_s"
+
     def __post_init__(self) -> None:
         for name in ("t", "rate", "sd", "precession_sd", "lower", "upper"):
             value = getattr(self, name)
@@ -67,6 +74,25 @@ class YawRate:
         median, sd = np.degrees([np.median(self.rate[known]), np.median(self.sd[known])])
         sign = "" if self.signed else "magnitude, "
         return f"by {self.method}: {sign}{known.sum()} of {len(self)} known, median {median:.5g} +- {sd:.2g} deg/s"
+
+    def table(self) -> dict[str, FloatArray]:
+        """Return time, rate and standard deviation, and the bounds where the method has them."""
+        columns = {"time_s": self.t, "rate_rad_s": self.rate, "sd_rad_s": self.sd}
+        bounds = {"lower_rad_s": self.lower, "upper_rad_s": self.upper, "precession_sd_rad_s": self.precession_sd}
+        return columns | {name: values for name, values in bounds.items() if values is not None}
+
+    def plot(self) -> Figure:
+        """Return a figure of the rate, deg/s, with a band of one standard deviation."""
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(9.0, 3.5), layout="constrained")
+        axes = figure.subplots()
+        rate, sd = np.degrees(self.rate), np.degrees(self.sd)
+        axes.fill_between(self.t, rate - sd, rate + sd, alpha=0.3, lw=0)
+        axes.plot(self.t, rate, lw=1.0)
+        axes.set(xlabel="time (s)", ylabel="spin rate (deg/s)", title=f"Spin rate by {self.method}")
+        axes.grid(color="#dddddd", lw=0.6)
+        return figure
 
     def at(self, t: FloatArray) -> FloatArray:
         """Return the rate at times t (m,), linear between neighbours; NaN outside and next to unknown values."""

@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import ComplexArray, FloatArray
 from discsim.errors import InputError
 from estimators.likelihood import LikelihoodSettings, fit_windows
 from estimators.precession import STRENGTH_SD
-from estimators.tone import ComplexArray, field_shape, fit_tone
+from estimators.tone import field_shape, fit_tone
 
 __all__ = ["Answer", "StreamingRate"]
 

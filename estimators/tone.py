@@ -11,14 +11,11 @@ from __future__ import annotations
 from math import cos, floor, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-from discsim.arrays import FloatArray
+from discsim.arrays import ComplexArray, FloatArray
 from discsim.compiled import compiled, compiled_sums
 
-__all__ = ["ComplexArray", "field_shape", "fit_tone"]
-
-ComplexArray = NDArray[np.complex128]
+__all__ = ["field_shape", "fit_tone"]
 
 
 @compiled

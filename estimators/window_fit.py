@@ -11,10 +11,10 @@ from math import ceil, cos, log, log2, pi, sin, sqrt
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import ComplexArray, FloatArray
 from discsim.compiled import compiled
 from estimators.spin_spline import IndexArray
-from estimators.tone import ComplexArray, field_shape, fit_tone, turns
+from estimators.tone import field_shape, fit_tone, turns
 
 __all__ = ["COLUMNS", "search_windows", "turn_windows"]
 

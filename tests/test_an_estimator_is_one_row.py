@@ -2,19 +2,9 @@
 
 from __future__ import annotations
 
-import json
-import os
-import re
-import shutil
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-ROOT = Path(__file__).parents[1]
-PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+from support.page_diff import told_by_a_copy
 
 ASKED = """
 import json, sys
@@ -40,45 +30,11 @@ print("TOLD" + json.dumps(told))
 """
 
 
-def applied(diff: str, folder: Path) -> None:
-    """Apply a diff of new files and of lines that are put behind others that stand there once."""
-    for part in re.split(r"(?m)^--- ", diff)[1:]:
-        target = re.search(r"^\+\+\+ b/(.*)$", part, re.MULTILINE)
-        assert target is not None
-        path = folder / target[1]
-        hunks = re.split(r"(?m)^@@.*\n", part.split("\n", 2)[2])
-        if part.startswith("/dev/null"):
-            path.write_text("".join(line[1:] + "\n" for line in hunks[0].splitlines()), encoding="utf-8")
-            continue
-        text = path.read_text(encoding="utf-8")
-        for hunk in hunks[1:]:
-            lines = hunk.splitlines()
-            before = "\n".join(line[1:] for line in lines if not line.startswith("+"))
-            after = "\n".join(line[1:] for line in lines)
-            assert text.count(before) == 1, before
-            text = text.replace(before, after)
-        path.write_text(text, encoding="utf-8")
-
-
 @pytest.fixture(scope="module")
 def told(tmp_path_factory):
     """What a copy of the program says, to which the diff of the page was applied."""
     folder = tmp_path_factory.mktemp("estimator")
-    for package in ("discsim", "estimators", "validation", "models"):
-        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))
-    section = PAGE[PAGE.index("### An estimator") :]
-    (diff,) = re.findall(r"```diff\n(.*?)^```", section[: section.index("### A plant")], re.MULTILINE | re.DOTALL)
-    applied(diff, folder)
-    answer = subprocess.run(
-        [sys.executable, "-c", ASKED, str(folder)],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(folder)},
-    )
-    assert answer.returncode == 0, answer.stdout[-500:] + answer.stderr[-2000:]
-    return folder, json.loads(answer.stdout.partition("TOLD")[2])
+    return folder, told_by_a_copy("An estimator", folder, ASKED)
 
 
 def test_the_estimator_of_the_page_tells_the_spin_with_an_honest_deviation(told):

@@ -10,6 +10,7 @@ from validation.challenge.cases.case import MASKS
 from validation.challenge.cases.sizes import HIDING
 
 PAGE = Path(__file__).parents[1] / "docs" / "challenge.md"
+METHOD = PAGE.with_name("challenge-method.md")
 
 
 def sizes_table() -> str:
@@ -23,7 +24,7 @@ def sizes_table() -> str:
 
 
 def test_the_page_on_the_blind_test_lists_every_size():
-    page = PAGE.read_text(encoding="utf-8")
+    page = METHOD.read_text(encoding="utf-8")
     assert page == with_table(page, "sizes", sizes_table()), (
         "run `python tests/test_challenge_page.py` to renew the table"
     )
@@ -35,5 +36,5 @@ def test_the_page_on_the_blind_test_lists_every_mask():
 
 
 if __name__ == "__main__":
-    page = with_table(PAGE.read_text(encoding="utf-8"), "sizes", sizes_table())
-    PAGE.write_text(page, encoding="utf-8")
+    page = with_table(METHOD.read_text(encoding="utf-8"), "sizes", sizes_table())
+    METHOD.write_text(page, encoding="utf-8")

@@ -10,7 +10,8 @@ import pytest
 import yaml
 
 from discsim.disc import Aero, aero_key
-from discsim.recording import COMMAND_HEADER, PLANTS, SENSORS, read_recording, sigma_key
+from discsim.recording import COMMAND_HEADER, PLANTS, SENSORS, read_recording
+from discsim.toml_text import sigma_key
 from validation.commands.validate import command as validate
 
 ROOT = Path(__file__).parents[1]

@@ -21,10 +21,16 @@ MAY_IMPORT = {
         "discsim.disc",
         "discsim.errors",
         "discsim.recording",
+        "discsim.result",
+        "discsim.threads",
     ),
     "validation": ("discsim", "estimators", "validation"),
 }
-SOURCES = [(package, source) for package in MAY_IMPORT for source in sorted((ROOT / package).rglob("*.py"))]
+#: the door of the whole package names what users call, from every room, and loads it when it is asked for
+DOOR = ROOT / "discsim" / "__init__.py"
+SOURCES = [
+    (package, source) for package in MAY_IMPORT for source in sorted((ROOT / package).rglob("*.py")) if source != DOOR
+]
 
 
 def imported(source: str, module: str, is_package: bool) -> set[str]:
@@ -72,6 +78,7 @@ def test_the_diagnosis_reaches_no_code_that_conceals():
         ".".join((path.parent if path.name == "__init__.py" else path.with_suffix("")).relative_to(ROOT).parts): path
         for package in MAY_IMPORT
         for path in (ROOT / package).rglob("*.py")
+        if path != DOOR
     }
     ahead = {"validation.commands.diagnose", *(name for name in files if name.startswith("validation.diagnosis"))}
     reached: set[str] = set()
@@ -84,6 +91,28 @@ def test_the_diagnosis_reaches_no_code_that_conceals():
         ahead |= (modules & files.keys()) - reached
     assert "discsim.trajectory" in reached
     assert not {name for name in reached if name.startswith("validation.challenge")}
+
+
+def test_the_door_imports_nothing_of_ours_before_it_is_asked():
+    body = ast.parse(DOOR.read_text(encoding="utf-8")).body
+    executed = [node for node in body if isinstance(node, ast.Import | ast.ImportFrom)]
+    assert {getattr(node, "module", None) for node in executed} == {"__future__", "importlib", "typing"}
+
+
+def test_no_room_goes_through_the_door_to_one_above_it():
+    above = {
+        name
+        for node in ast.walk(ast.parse(DOOR.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(("estimators", "validation"))
+        for name in (alias.asname or alias.name for alias in node.names)
+    }
+    assert {"challenge", "diagnose", "estimate", "fft"} <= above
+    for _, source in SOURCES:
+        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "discsim":
+                assert node.attr not in above, source
+            elif isinstance(node, ast.ImportFrom) and node.module == "discsim":
+                assert not above & {alias.name for alias in node.names}, source
 
 
 @pytest.mark.parametrize(

@@ -11,13 +11,8 @@ What the commands do, from Python: each function returns a result with a short r
 
 from __future__ import annotations
 
-import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
-
-# Before numpy is loaded: the matrices here are small, and on busy cores the threads of its linear algebra wait for each
-# other a hundred times as long as they work.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 if TYPE_CHECKING:
     from validation.challenge.challenged import blind_test as challenge

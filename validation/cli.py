@@ -60,6 +60,8 @@ def main() -> None:
         OVERWRITE.set(True)
     sys.argv[1:] = [argument for argument in arguments if argument not in ("--debug", "--force")]
     os.environ.setdefault("MPLBACKEND", "Agg")
+    # this process and its children are the command's own; from Python `discsim.threads` limits them while it is needed
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         # the options that stand before a command take no value, so the first other word is its name
         app.registered_commands.clear()

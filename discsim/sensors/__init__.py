@@ -2,7 +2,7 @@
 
 from discsim.sensors.accelerometer import Accelerometer
 from discsim.sensors.gyroscope import Gyroscope
-from discsim.sensors.instruments import Instruments, record
+from discsim.sensors.instruments import Instruments, Sensor, record
 from discsim.sensors.magnetometer import Magnetometer
 from discsim.sensors.position import Gps, Tracker
 from discsim.sensors.rate_reference import RateReference
@@ -17,6 +17,7 @@ __all__ = [
     "Noise",
     "RateReference",
     "Sampling",
+    "Sensor",
     "Tracker",
     "record",
 ]

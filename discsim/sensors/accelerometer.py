@@ -20,12 +20,26 @@ from discsim.effects.sensors import (
 )
 from discsim.effects.setup import BoardRotation, on_board
 from discsim.errors import InputError
-from discsim.motion import Motion, State, Surroundings
-from discsim.recording import Samples, SensorSheet
-from discsim.sensors.additions import Addition, MotionSensor
-from discsim.sensors.sampling import Noise, Sampling, check_lag, digitise, filtered, stated
+from discsim.motion import State, Surroundings
+from discsim.recording import SensorSheet
+from discsim.sensors.additions import Addition, BoardSensor
+from discsim.sensors.sampling import Noise, Sampling, check_lag, stated
 
-__all__ = ["Accelerometer", "specific_force"]
+__all__ = ["Accelerometer", "force_at", "specific_force"]
+
+
+def force_at(place: FloatArray, force: FloatArray, w: FloatArray, dw: FloatArray) -> FloatArray:
+    """Return the specific force f + w x (w x d) + wdot x d (..., 3), m/s^2, where that at a centre is f (..., 3).
+
+    ``place`` d (3,) m in B is seen from there; rates and their slopes (..., 3) in B.
+    """
+    d, along, squared = place, w @ place, np.sum(w * w, axis=-1)
+    # w x (w x d) = w (w d) - w^2 d
+    f = force + w * along[..., None] - squared[..., None] * d
+    f[..., 0] += dw[..., 1] * d[2] - dw[..., 2] * d[1]
+    f[..., 1] += dw[..., 2] * d[0] - dw[..., 0] * d[2]
+    f[..., 2] += dw[..., 0] * d[1] - dw[..., 1] * d[0]
+    return np.asarray(f)
 
 
 def specific_force(state: State, surroundings: Surroundings, position: FloatArray) -> FloatArray:
@@ -34,20 +48,12 @@ def specific_force(state: State, surroundings: Surroundings, position: FloatArra
     The paper adds g in (1) and in its x row, (6); a sensor at rest reads minus gravity (f_z = -g), as here. d runs
     from the centre of mass, whose acceleration a_N is; ``position`` from the geometric centre.
     """
-    d = position - surroundings.centre_of_mass
     f = state.in_body(state.acceleration - np.array([0.0, 0.0, surroundings.gravity]))
-    w, dw = state.rate, state.angular_acceleration
-    along, squared = w @ d, np.sum(w * w, axis=-1)
-    # w x (w x d) = w (w d) - w^2 d
-    f = f + w * along[..., None] - squared[..., None] * d
-    f[..., 0] += dw[..., 1] * d[2] - dw[..., 2] * d[1]
-    f[..., 1] += dw[..., 2] * d[0] - dw[..., 0] * d[2]
-    f[..., 2] += dw[..., 0] * d[1] - dw[..., 1] * d[0]
-    return np.asarray(f)
+    return force_at(position - surroundings.centre_of_mass, f, state.rate, state.angular_acceleration)
 
 
 @dataclass(frozen=True)
-class Accelerometer(MotionSensor):
+class Accelerometer(BoardSensor):
     """A three-axis accelerometer by (3); every error starts at zero, so a bare one is ideal.
 
     ``position`` (3,) m in B is where it is stated to sit and ``offset`` what that is wrong by; ``misalignment`` (3,)
@@ -88,13 +94,10 @@ class Accelerometer(MotionSensor):
         f = f + np.array(self.bias)
         return np.asarray(f + bias_drift(self.drift, state.t) if any(self.drift) else f)
 
-    def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
-        """Return the samples of a motion, value (n, 3) m/s^2."""
-        written, taken = self.sampling.instants(motion.start, motion.end, rng)
-        value = filtered(self.lag, motion, lambda t: self.ideal(motion, t), taken)
-        limit = min(self.range, self.saturation.limit_m_s2)
-        reading = digitise(value, written, self.noise, rng, resolution=self.resolution, limit=limit)
-        return Samples(written, reading)
+    @property
+    def limit(self) -> float:
+        """Where readings clip, m/s^2."""
+        return min(self.range, self.saturation.limit_m_s2)
 
     @property
     def sheet(self) -> SensorSheet:

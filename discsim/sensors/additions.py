@@ -12,11 +12,13 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect
+from discsim.effects.sensors import Lag
 from discsim.law import Law
 from discsim.motion import Motion, State, Surroundings
-from discsim.recording import SENSORS
+from discsim.recording import SENSORS, Samples, SensorSheet
+from discsim.sensors.sampling import Noise, Sampling, digitise, filtered, stated
 
-__all__ = ["Addition", "MotionSensor", "by_effect", "by_law"]
+__all__ = ["Addition", "BoardSensor", "MotionSensor", "by_effect", "by_law"]
 
 #: readings (n, k), the state they are of, whose times are since the motion's start, and the motion, to new readings
 Addition: TypeAlias = Callable[[FloatArray, State, Motion], FloatArray]
@@ -38,6 +40,35 @@ class MotionSensor:
         for addition in self.additions:
             readings = addition(readings, state, motion)
         return readings
+
+
+class BoardSensor(MotionSensor):
+    """A sensor of the board: its readings lag, are noisy and rounded, and clip at ``limit``."""
+
+    sampling: Sampling
+    lag: Lag
+    noise: Noise
+    resolution: float
+    range: float
+    #: which of x, y, z exist
+    axes: tuple[bool, bool, bool] = (True, True, True)
+
+    @property
+    def limit(self) -> float:
+        """Where readings clip, in the sensor's unit."""
+        return self.range
+
+    def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
+        """Return the samples of a motion, value (n, 3) in the sensor's unit."""
+        written, taken = self.sampling.instants(motion.start, motion.end, rng)
+        value = filtered(self.lag, motion, lambda t: self.ideal(motion, t), taken)
+        step, axes = self.resolution, np.array(self.axes)
+        return Samples(written, digitise(value, written, self.noise, rng, resolution=step, limit=self.limit, axes=axes))
+
+    @property
+    def sheet(self) -> SensorSheet:
+        """What its data sheet states; the hidden errors are not in it."""
+        return stated(self.sampling, self.noise, self.resolution, self.range)
 
 
 def by_effect(effect: Effect) -> Addition:

@@ -9,17 +9,16 @@ import numpy as np
 from discsim.arrays import FloatArray, readonly, vector3
 from discsim.effects.sensors import GSensitivity, GyroscopeBias, Lag, Scale, g_sensitivity
 from discsim.effects.setup import BoardRotation, on_board
-from discsim.motion import Motion, State, Surroundings
-from discsim.recording import Samples, SensorSheet
+from discsim.motion import State, Surroundings
 from discsim.sensors.accelerometer import specific_force
-from discsim.sensors.additions import Addition, MotionSensor
-from discsim.sensors.sampling import Noise, Sampling, check_lag, digitise, filtered, stated
+from discsim.sensors.additions import Addition, BoardSensor
+from discsim.sensors.sampling import Noise, Sampling, check_lag
 
 __all__ = ["Gyroscope"]
 
 
 @dataclass(frozen=True)
-class Gyroscope(MotionSensor):
+class Gyroscope(BoardSensor):
     """A gyroscope of one to three axes; every error starts at zero, so a bare one is ideal.
 
     ``axes`` tells which of x, y, z exist; absent ones read NaN. ``position`` (3,) m in B is the accelerometer's stated
@@ -60,23 +59,3 @@ class Gyroscope(MotionSensor):
                 felt = on_board(self.board, specific_force(state, surroundings, self.position))
             w = w + g_sensitivity(self.g_sensitivity, felt)
         return np.asarray(w)
-
-    def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
-        """Return the samples of a motion, value (n, 3) rad/s."""
-        written, taken = self.sampling.instants(motion.start, motion.end, rng)
-        value = filtered(self.lag, motion, lambda t: self.ideal(motion, t), taken)
-        reading = digitise(
-            value,
-            written,
-            self.noise,
-            rng,
-            resolution=self.resolution,
-            limit=self.range,
-            axes=np.array(self.axes),
-        )
-        return Samples(written, reading)
-
-    @property
-    def sheet(self) -> SensorSheet:
-        """What its data sheet states; the hidden errors are not in it."""
-        return stated(self.sampling, self.noise, self.resolution, self.range)

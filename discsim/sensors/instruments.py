@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeAlias
@@ -11,8 +11,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from discsim.arrays import FloatArray, readonly
-from discsim.disc import Disc, Release, Rig
-from discsim.effects.catalogue import Effect, by_id
+from discsim.disc import Disc, Rig
+from discsim.effects.catalogue import CATALOGUE, Effect, by_id
 from discsim.effects.kind import BOARD
 from discsim.effects.sensors import AccelerometerBias, ClockRate, CrossAxis, GSensitivity, GyroscopeBias, Scale
 from discsim.errors import InputError
@@ -30,34 +30,36 @@ from discsim.sensors.sampling import Noise, Sampling
 from discsim.toml_table import TomlTable, read_toml
 from discsim.written import as_written
 
-__all__ = ["FIELDS", "Instruments", "Sensor", "read_part", "record"]
+__all__ = ["FIELDS", "KINDS", "Instruments", "Sensor", "read_part", "record"]
 
 Sensor: TypeAlias = Accelerometer | Gyroscope | Magnetometer | Gps | RateReference | Tracker
 
-#: where an effect of the catalogue sits in its sensor: id -> field (clocks and losses are the sampling's)
-FIELDS: Mapping[str, str] = MappingProxyType(
+#: sensor -> its type
+KINDS: Mapping[str, type[Sensor]] = MappingProxyType(
     {
-        "mag.hard_iron": "hard_iron",
-        "mag.soft_iron": "soft_iron",
-        "mag.lag": "lag",
-        "mag.stray_field": "stray_field",
-        "accel.lag": "lag",
-        "accel.position_offset": "offset",
-        "accel.bias": "bias",
-        "accel.bias_drift": "drift",
-        "accel.scale": "scale",
-        "accel.cross_axis": "cross_axis",
-        "accel.saturation": "saturation",
-        "gyro.lag": "lag",
-        "gyro.bias": "bias",
-        "gyro.scale": "scale",
-        "gyro.g_sensitivity": "g_sensitivity",
-        "gps.latency": "latency",
-        "site.field": "site",
+        "magnetometer": Magnetometer,
+        "accelerometer": Accelerometer,
+        "gyroscope": Gyroscope,
+        "gps": Gps,
+        "rate_reference": RateReference,
+        "track": Tracker,
     }
 )
-_SAMPLING_FIELDS: Mapping[str, str] = MappingProxyType(
-    {"clock_rate": "clock", "dropped_samples": "dropped", "time_offset": "offset"}
+
+
+def _field_for(kind: type[Any], effect: type[Any]) -> str | None:
+    """Return the field of a sensor's type, or of its sampling's, that holds an effect of a type."""
+    held: dict[Any, str] = {item.default_factory: item.name for item in fields(kind)}
+    return held.get(effect)
+
+
+#: where an effect of the catalogue sits in its sensor: id -> field (clocks, losses and offsets are the sampling's)
+FIELDS: Mapping[str, str] = MappingProxyType(
+    {
+        row.id: place
+        for row in CATALOGUE.values()
+        if row.acts_on in KINDS and (place := _field_for(KINDS[row.acts_on], row.type))
+    }
 )
 
 
@@ -158,12 +160,13 @@ class Instruments:
                     module = module.fitted(name, board=value)
             elif target in module.sensors:
                 if item.applied is not None:
-                    module = module._adding(target, by_effect(item))
+                    module = module.adding(target, by_effect(item))
                 elif id in FIELDS:
                     module = module.fitted(target, **{FIELDS[id]: value})
                 else:
-                    key = _SAMPLING_FIELDS[id.split(".")[1]]
-                    sampling = replace(module.sensors[target].sampling, **{key: value})
+                    place = _field_for(Sampling, type(value))
+                    assert place is not None
+                    sampling = replace(module.sensors[target].sampling, **{place: value})
                     module = module.fitted(target, sampling=sampling)
         return module
 
@@ -173,10 +176,11 @@ class Instruments:
         for law in laws:
             sensor = law.target.partition(".")[0]
             if sensor in module.sensors:
-                module = module._adding(sensor, by_law(law))
+                module = module.adding(sensor, by_law(law))
         return module
 
-    def _adding(self, sensor: str, addition: Addition) -> Instruments:
+    def adding(self, sensor: str, addition: Addition) -> Instruments:
+        """Return the module with one thing more that is added to a sensor's readings, before lag and noise."""
         return self.fitted(sensor, additions=(*self.sensors[sensor].additions, addition))
 
 
@@ -189,12 +193,11 @@ def record(
     name: str,
     disc: Disc | None = None,
     rig: Rig | None = None,
-    release: Release | None = None,
     command: Samples | None = None,
 ) -> Recording:
     """Let the instruments measure a motion, and write it as their logger does.
 
-    Each sensor draws from a random stream of its own.
+    Each sensor draws from a random stream of its own. ``dataclasses.replace`` adds what is stated besides, a release.
     """
     streams = dict(zip(SENSORS, rng.spawn(len(SENSORS)), strict=True))
     samples, sheets = {}, {}
@@ -207,7 +210,7 @@ def record(
         taken = replace(sensor, sampling=shared).measure(motion, streams[sensor_name])
         if len(taken):
             samples[sensor_name], sheets[sensor_name] = taken, sensor.sheet
-    sound = Recording(plant, name, motion.environment, disc, rig, release, sheets, samples, command)
+    sound = Recording(plant, name, motion.environment, disc, rig, None, sheets, samples, command)
     return as_written(sound, instruments.written)
 
 

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from discsim.arrays import FloatArray, readonly, vector3
 from discsim.effects.sensors import HardIron, Lag, SoftIron, StrayField, hard_iron, soft_iron, stray_field
 from discsim.effects.setup import BoardRotation, SiteField, field_there, on_board
 from discsim.errors import InputError
-from discsim.motion import Motion, State, Surroundings
-from discsim.recording import Samples, SensorSheet
-from discsim.sensors.additions import Addition, MotionSensor
-from discsim.sensors.sampling import Noise, Sampling, check_lag, digitise, filtered, stated
+from discsim.motion import State, Surroundings
+from discsim.sensors.additions import Addition, BoardSensor
+from discsim.sensors.sampling import Noise, Sampling, check_lag
 
 __all__ = ["Magnetometer"]
 
 
 @dataclass(frozen=True)
-class Magnetometer(MotionSensor):
+class Magnetometer(BoardSensor):
     """A three-axis magnetometer; every error starts at zero, so a bare one is ideal.
 
     ``noise``, ``resolution`` and ``range`` are in uT; ``misalignment`` (3,) rad turns its axes. Scale and cross-axis
@@ -55,15 +52,3 @@ class Magnetometer(MotionSensor):
         if any(self.stray_field[:3]):
             m = m + on_board(self.board, state.in_body(stray_field(self.stray_field, -state.position[..., 2])))
         return on_board(BoardRotation(*self.misalignment), m)
-
-    def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
-        """Return the samples of a motion, value (n, 3) uT."""
-        written, taken = self.sampling.instants(motion.start, motion.end, rng)
-        value = filtered(self.lag, motion, lambda t: self.ideal(motion, t), taken)
-        reading = digitise(value, written, self.noise, rng, resolution=self.resolution, limit=self.range)
-        return Samples(written, reading)
-
-    @property
-    def sheet(self) -> SensorSheet:
-        """What its data sheet states; the hidden errors are not in it."""
-        return stated(self.sampling, self.noise, self.resolution, self.range)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,7 +15,26 @@ from estimators.spin_spline import SpinSpline
 from estimators.tracking.track import RateRows, TrackingSettings
 from estimators.turning_field import add_normal_equations, integrate
 
-__all__ = ["Linear", "Problem"]
+__all__ = ["Linear", "Problem", "Segment"]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One stretch of readings, m (n, 3) uT at times t (n,) s, and what is known of it.
+
+    ``strength`` is the field's, uT; ``walk`` what the gyroscope's noise adds to the attitude, rad per root second;
+    ``rows`` are other sensors' readings of the rate. ``decaying`` tells that the air slows the spin.
+    """
+
+    t: FloatArray
+    m: FloatArray
+    settings: TrackingSettings
+    gyroscope: Samples | None = None
+    strength: float | None = None
+    fixed_axis: bool = False
+    decaying: bool = True
+    rows: Sequence[RateRows] = ()
+    walk: float = 0.0
 
 
 class _Turned(NamedTuple):
@@ -39,23 +59,11 @@ class Problem:
     field (3), hard iron (3), soft iron (6), calibrations of other sensors' rows.
     """
 
-    def __init__(
-        self,
-        t: FloatArray,
-        m: FloatArray,
-        settings: TrackingSettings,
-        *,
-        gyroscope: Samples | None,
-        strength: float | None,
-        fixed_axis: bool,
-        decaying: bool,
-        rows: list[RateRows],
-        top_rate: float,
-        typical_rate: float = 0.0,
-        walk: float = 0.0,
-    ) -> None:
-        self.t, self.m, self.settings, self.rows = t, m, settings, rows
-        self.strength, self.decaying = strength, decaying
+    def __init__(self, segment: Segment, top_rate: float, typical_rate: float = 0.0) -> None:
+        t, settings, gyroscope = segment.t, segment.settings, segment.gyroscope
+        fixed_axis, walk = segment.fixed_axis, segment.walk
+        self.t, self.m, self.settings, self.rows = t, segment.m, settings, segment.rows
+        self.strength, self.decaying = segment.strength, segment.decaying
         # a quarter of a radian per sub-step: the midpoint rule then errs by 1 % of the wobble's own share
         finest = min(0.005, 0.25 / max(top_rate, 1.0))
         # knots closer than the readings would be told by the prior alone
@@ -82,7 +90,7 @@ class Problem:
             self.slow_first, self.slow_weights = self.slow.local(self.middle)
         self.read = 0 if fixed_axis or gyroscope is None else 4
         transverse = self.read + (0 if self.slow is None else 2 * self.slow.size)
-        sizes = [self.spline.size, transverse, 3, 3, 6] + [row.calibration.size for row in rows]
+        sizes = [self.spline.size, transverse, 3, 3, 6] + [row.calibration.size for row in segment.rows]
         ends = np.cumsum(sizes)
         self.parts = [slice(int(end - size), int(end)) for size, end in zip(sizes, ends, strict=True)]
         self.size = int(ends[-1])

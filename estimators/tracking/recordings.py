@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from math import sqrt
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from discsim.recording import Recording, Samples
 from estimators.likelihood import LEAST, LikelihoodSettings, ToneFit, fit_windows, span_of, usable_field, window_centres
 from estimators.precession import AxialField, axial_field, transverse_gyroscope
 from estimators.rate import YawRate
+from estimators.tracking.problem import Segment
 from estimators.tracking.smoother import track_spin
 from estimators.tracking.track import RateRows, Track, TrackingSettings
 from estimators.usable import remembered, unclipped
@@ -84,22 +85,21 @@ def tracks_of(
             )
             if chosen.stop - chosen.start < LEAST:
                 continue
-            track = _tracked(
+            segment = Segment(
                 t[chosen],
                 m[chosen],
-                rate[chosen.start - first : chosen.stop - first],
                 settings,
                 gyroscope=None if fixed_axis else gyroscope,
                 strength=strength,
                 fixed_axis=fixed_axis,
                 decaying=recording.plant != "rate_table",
-                axial=axial,
                 rows=_between(rows or [], float(t[chosen][0]), float(t[chosen][-1])),
-                noise=noise,
                 walk=_walk(recording, noise, size, stop - start),
             )
-            if track is not None:
-                tracks.append(track)
+            # readings so unlike a turning field that nothing can be solved have no track
+            with suppress(np.linalg.LinAlgError):
+                start_rate = rate[chosen.start - first : chosen.stop - first]
+                tracks.append(track_spin(segment, start_rate, axial=axial, noise=noise))
     return tracks
 
 
@@ -131,14 +131,6 @@ def _walk(recording: Recording, noise: float | None, strength: float, length: fl
         return 0.0
     walk = sheet.noise_rms / sqrt(sheet.rate_hz)
     return walk if walk * strength * sqrt(length) > noise / 3 else 0.0
-
-
-def _tracked(t: FloatArray, *arguments: Any, **options: Any) -> Track | None:
-    """Return the track, or None where the readings are so unlike a turning field that nothing can be solved."""
-    try:
-        return track_spin(t, *arguments, **options)
-    except np.linalg.LinAlgError:
-        return None
 
 
 def _between(rows: list[RateRows], start: float, stop: float) -> list[RateRows]:

@@ -3,43 +3,29 @@
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.recording import Samples
 from estimators.precession import AxialField
 from estimators.spin_spline import SpinSpline
-from estimators.tracking.problem import Linear, Problem
+from estimators.tracking.problem import Linear, Problem, Segment
 from estimators.tracking.solution import adapt, evidence, linearise, solve, with_roughness
-from estimators.tracking.track import RateRows, Track, TrackingSettings
+from estimators.tracking.track import Track
 
 __all__ = ["track_bound", "track_spin"]
 
 
-def track_bound(
-    t: FloatArray,
-    m: FloatArray,
-    rate: FloatArray,
-    noise: float,
-    at: float,
-    settings: TrackingSettings,
-    *,
-    gyroscope: Samples | None,
-    strength: float | None,
-    walk: float = 0.0,
-) -> float:
+def track_bound(segment: Segment, rate: FloatArray, noise: float, at: float) -> float:
     """Return the Bayesian Cramer-Rao bound of the rate at one instant, rad/s, of the whole model of `track_spin`.
 
     The inverse Fisher matrix for a rate that changes steadily (r'' = 0) with field, hard and soft iron, and the
-    gyroscope's bias and gain unknown within their priors. ``m`` (n, 3), ``rate`` (n,) and ``gyroscope`` are true ones;
-    ``walk`` is what the gyroscope's noise adds to the attitude, rad per root second.
+    gyroscope's bias and gain unknown within their priors. The segment's readings and ``rate`` (n,) are true ones.
     """
-    problem = Problem(
-        t, m, settings, gyroscope=gyroscope, strength=strength, fixed_axis=False, decaying=False, rows=[],
-        top_rate=float(np.max(np.abs(rate))), walk=walk,
-    )  # fmt: skip
-    x, linear, *_ = solve(problem, _start(problem, rate, None), noise, np.ones(t.size), 1e-6, settings.precession, 20)
+    problem = Problem(segment, top_rate=float(np.max(np.abs(rate))))
+    ones, precession = np.ones(segment.t.size), segment.settings.precession
+    x, linear, *_ = solve(problem, _start(problem, rate, None), noise, ones, 1e-6, precession, 20)
     information, _, _ = with_roughness(problem, linear, x, np.zeros(problem.spline.size - 2), 1e-10)
     B = np.zeros(problem.size)
     B[problem.parts[0]] = problem.spline.basis(np.array([at]))[0]
@@ -47,40 +33,38 @@ def track_bound(
 
 
 def track_spin(
-    t: FloatArray,
-    m: FloatArray,
-    start_rate: FloatArray,
-    settings: TrackingSettings,
-    *,
-    gyroscope: Samples | None = None,
-    strength: float | None = None,
-    fixed_axis: bool = False,
-    decaying: bool = True,
-    axial: AxialField | None = None,
-    rows: list[RateRows] | None = None,
-    noise: float | None = None,
-    walk: float = 0.0,
+    segment: Segment, start_rate: FloatArray, *, axial: AxialField | None = None, noise: float | None = None
 ) -> Track:
-    """Smooth one segment: field m (n, 3) uT at times t (n,), from a first guess ``start_rate`` (n,) rad/s.
+    """Smooth one segment of n readings, from a first guess ``start_rate`` (n,) rad/s.
 
-    ``strength`` is the field's, uT; ``axial`` a first guess of the hard iron along z; ``noise`` the data sheet's,
-    uT, taken as a floor; ``walk`` what the gyroscope's noise adds to the attitude, rad per root second. ``rows``
-    are other sensors' readings of the rate.
+    ``axial`` is a first guess of the hard iron along z; ``noise`` the data sheet's, uT, taken as a floor.
     """
-    rows = rows or []
-    problem = Problem(
-        t, m, settings, gyroscope=gyroscope, strength=strength, fixed_axis=fixed_axis, decaying=decaying,
-        rows=rows, top_rate=float(np.max(np.abs(start_rate))), typical_rate=float(np.median(np.abs(start_rate))),
-        walk=walk,
-    )  # fmt: skip
-    x = _start(problem, start_rate, axial)
-    precession = settings.precession
-    weights = np.ones(t.size)
-    residual = problem.evaluate(x).residual
-    floor = 0.7 * noise if noise else 1e-6
-    sigma = max(float(np.sqrt(np.mean(residual**2))), floor)
-    roughness = 100.0
-    target = np.zeros(0)
+    size = np.abs(start_rate)
+    problem = Problem(segment, top_rate=float(np.max(size)), typical_rate=float(np.median(size)))
+    fit = _fitted(problem, _start(problem, start_rate, axial), floor=0.7 * noise if noise else 1e-6)
+    return _track(problem, fit)
+
+
+class _Fit(NamedTuple):
+    """The most likely parameters x, the problem about them, residuals (n, 3), phase (n,), and both sizes found.
+
+    ``sigma`` is the readings' noise, uT; ``roughness`` the spectral density of r''; ``target`` (k,) its mean.
+    """
+
+    x: FloatArray
+    linear: Linear
+    residual: FloatArray
+    phase: FloatArray
+    target: FloatArray
+    sigma: float
+    roughness: float
+
+
+def _fitted(problem: Problem, x: FloatArray, floor: float) -> _Fit:
+    """Fit the parameters, and in turn noise, roughness, precession and the weights of bad readings, in 4 rounds."""
+    settings, precession = problem.settings, problem.settings.precession
+    weights, roughness = np.ones(problem.t.size), 100.0
+    sigma = max(float(np.sqrt(np.mean(problem.evaluate(x).residual ** 2))), floor)
     for outer in range(4):
         x, linear, residual, psi, target = solve(problem, x, sigma, weights, roughness, precession, 15)
         length = np.sqrt(np.mean(residual**2, axis=1))
@@ -89,8 +73,7 @@ def track_spin(
         weights = np.sqrt(np.minimum(1.0, 4.0 * sigma / np.maximum(length, 1e-12)))
         precision, mean = problem.prior(precession)
         linear, residual, psi = linearise(problem, x, sigma, weights, precision, mean)
-        previous = roughness
-        roughness = adapt(problem, linear, x, target)
+        previous, roughness = roughness, adapt(problem, linear, x, target)
         if problem.slow is not None and problem.despun:
             # the part of the precession that the field shows tells the size of the part that it does not
             PQ = x[problem.parts[1]]
@@ -100,37 +83,40 @@ def track_spin(
             precession = max(settings.precession, float(np.sqrt(seen)))
         if outer > 0 and abs(np.log(roughness / previous)) < 0.2:
             break
-    mixture = evidence(problem, linear, x, target)
-    coefficients, covariance = mixture.mean, mixture.covariance
-    first = int(np.ceil(t[0] / settings.step - 1e-9))
-    count = int(np.floor(t[-1] / settings.step + 1e-9)) + 1 - first
-    grid = settings.step * (first + np.arange(count, dtype=np.float64))
+    return _Fit(x, linear, residual, psi, target, sigma, roughness)
+
+
+def _track(problem: Problem, fit: _Fit) -> Track:
+    """Return the rate on the grid of answers, integrated over the roughness, with all that is told of the fit."""
+    x, step = fit.x, problem.settings.step
+    mixture = evidence(problem, fit.linear, x, fit.target)
+    first = int(np.ceil(problem.t[0] / step - 1e-9))
+    count = int(np.floor(problem.t[-1] / step + 1e-9)) + 1 - first
+    grid = step * (first + np.arange(count, dtype=np.float64))
     B = problem.spline.basis(grid)
-    inflation = _correlation(problem, residual, x)
-    covariance *= inflation
-    blur = _blur(problem.spline, coefficients, grid)
-    rate_covariance = B @ covariance @ B.T
-    everything = np.linalg.inv(with_roughness(problem, linear, x, target, roughness)[0])
-    parts = problem.parts[5:]
+    rate_covariance = B @ (mixture.covariance * _correlation(problem, fit.residual, x)) @ B.T
+    blur = _blur(problem.spline, mixture.mean, grid)
+    everything = np.linalg.inv(with_roughness(problem, fit.linear, x, fit.target, fit.roughness)[0])
+    calibrations = problem.parts[5:]
     return Track(
         t=grid,
-        rate=B @ coefficients,
+        rate=B @ mixture.mean,
         sd=np.hypot(np.sqrt(np.diag(rate_covariance)), blur),
         blur=blur,
         covariance=rate_covariance,
-        times=t,
-        phase=psi,
-        residual=residual,
-        noise=sigma,
+        times=problem.t,
+        phase=fit.phase,
+        residual=fit.residual,
+        noise=fit.sigma,
         hard_iron=x[problem.parts[3]],
         field=x[problem.parts[2]],
         spline=problem.spline,
-        coefficients=coefficients,
-        roughness=roughness,
-        calibration=[x[part] for part in parts],
-        calibration_sd=[np.sqrt(np.diag(everything)[part]) for part in parts],
+        coefficients=mixture.mean,
+        roughness=fit.roughness,
+        calibration=[x[part] for part in calibrations],
+        calibration_sd=[np.sqrt(np.diag(everything)[part]) for part in calibrations],
         chi2=[float(np.mean(error**2)) for error, _ in problem.evaluate_rows(x)],
-        gyroscope_gain=complex(*x[problem.parts[1]][2:4]) if not problem.despun and not fixed_axis else 0j,
+        gyroscope_gain=complex(*x[problem.parts[1]][2:4]) if problem.read else 0j,
     )
 
 

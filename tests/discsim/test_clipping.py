@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from discsim import clipping
 from discsim.clipping import clipped, constant_axes, dead_axes, limits, step_of
 from discsim.recording import SensorSheet
 
@@ -118,3 +122,23 @@ def test_an_axis_that_never_changes_is_dead_where_others_scatter_and_it_is_small
     assert not dead_axes(value).any()
     ramp = np.stack([0 * np.arange(100.0), 0 * np.arange(100.0), np.arange(100.0)], axis=1)
     assert not dead_axes(ramp).any()  # without noise an axis at rest stands still
+
+
+def test_recordings_that_are_looked_at_side_by_side_do_not_disturb_one_another(monkeypatch):
+    """What is remembered of readings goes with them: threads that drop theirs at once clear one memory."""
+    monkeypatch.setattr(clipping, "_clipped", lambda value, *_: np.zeros(value.shape, dtype=np.bool_))
+
+    def look(number: int) -> int:
+        for _ in range(3000):
+            value = np.zeros((4, 1))
+            value.flags.writeable = False
+            clipped(value, 1e3, 1e-3)
+        return number
+
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(8) as pool:
+            assert list(pool.map(look, range(8))) == list(range(8))
+    finally:
+        sys.setswitchinterval(before)

@@ -126,14 +126,14 @@ def test_a_block_in_python_waits_until_a_round_is_over(alone, monkeypatch):
     done, thread = Event(), Thread(target=open_block)
     monkeypatch.setattr(many_flights, "ROUND", 100 * len(THROWS))
     monkeypatch.setattr(many_flights.Batch, "rollout", rollout)
-    real = many_flights._advance
+    real = many_flights.advance
 
     def advance(*given):
         path = real(*given)
         opened.wait(5.0)
         return path
 
-    monkeypatch.setattr(many_flights, "_advance", advance)
+    monkeypatch.setattr(many_flights, "advance", advance)
     try:
         assert_same(fly_many(DRIVER, FIELD, THROWS, threads=2), alone)
     finally:

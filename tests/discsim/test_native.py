@@ -69,7 +69,10 @@ class TestTheSameFlight:
     def test_c_and_python_fly_the_same_to_the_last_bit(self, disc, name):
         """1e-10 is promised; it is one compiled function, reached by two ways."""
         disc, field = load_disc(disc)
-        flights = [fly(disc, field, throw(), EFFECTS[name], duration=1.5, python=python) for python in (False, True)]
+        flights = [
+            follow(FlyingDisc(disc, field, EFFECTS[name]), throw(), duration=1.5, python=python)
+            for python in (False, True)
+        ]
         assert_same(*flights)
 
     def test_so_do_a_law_and_an_effect_of_the_user_s_own(self, tmp_path):
@@ -78,7 +81,10 @@ class TestTheSameFlight:
         law = Law("-c * r", "moment_z_N_m", {"c": 1e-5})
         push = load_user_effect(path).sized({"size": 0.02})
         plain = fly(DRIVER, FIELD, throw(), duration=1.0)
-        flights = [fly(DRIVER, FIELD, throw(), [push], law=law, duration=1.0, python=way) for way in (False, True)]
+        flights = [
+            follow(FlyingDisc(DRIVER, FIELD, [push], law=law), throw(), duration=1.0, python=way)
+            for way in (False, True)
+        ]
         assert_same(*flights)
         assert np.abs(flights[0].position[-1] - plain.position[-1]).max() > 0.1
 
@@ -190,21 +196,24 @@ class TestWhichCallback:
         assert len(seen) == 1
 
     def test_flights_in_threads_of_both_kinds_are_those_flown_alone(self):
+        def flown(python: bool) -> Motion:
+            return follow(FlyingDisc(DRIVER, FIELD), throw(), duration=0.5, python=python)
+
         alone = fly(DRIVER, FIELD, throw(), duration=0.5)
         with ThreadPoolExecutor(4) as pool:
-            jobs = [pool.submit(fly, DRIVER, FIELD, throw(), duration=0.5, python=k % 3 == 0) for k in range(12)]
+            jobs = [pool.submit(flown, k % 3 == 0) for k in range(12)]
             for job in jobs:
                 assert_same(job.result(), alone)
 
 
 class TestWhereItCannotBe:
     def test_data_that_are_not_where_they_are_said_to_be_are_noticed(self):
-        offsets = native._offsets()
-        assert native._works(NativeCallback(offsets))
+        offsets = native.field_offsets()
+        assert native.works(NativeCallback(offsets))
         for field in range(4):
             wrong = list(offsets)
             wrong[field] += 8
-            assert not native._works(NativeCallback(wrong))
+            assert not native.works(NativeCallback(wrong))
 
     def test_it_is_found_inside_a_block_in_python_too(self):
         """Looking for it compiles a model, which under a callback in Python MuJoCo does only of one without springs."""
@@ -215,7 +224,7 @@ class TestWhereItCannotBe:
 
     def test_without_it_flights_are_the_same(self, monkeypatch):
         with_it = fly(DRIVER, FIELD, throw(), duration=0.3)
-        monkeypatch.setattr(native, "_offsets", lambda: 1 / 0)
+        monkeypatch.setattr(native, "field_offsets", lambda: 1 / 0)
         native_callback.cache_clear()
         try:
             assert native_callback() is None

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.places import ROOT
 
 from discsim.effects.applied import compiled_wrench
 from discsim.effects.own import load_user_effect, load_user_effects
 from discsim.errors import InputError
 from discsim.motion import State
 
-PAGE = (Path(__file__).parents[2] / "docs" / "diagnosing.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "diagnosing.md").read_text(encoding="utf-8")
 SENSOR, MOTION = (block for block in re.findall(r"```python\n(.*?)```", PAGE, re.S) if "NamedTuple" in block)
 
 

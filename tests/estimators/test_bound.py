@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support.bounds import flight_bound, regular_bound
 
-from estimators.bound import flight_bound, regular_bound, tone_bound
+from estimators.bound import tone_bound
 
 
 def test_a_long_window_has_the_closed_form():

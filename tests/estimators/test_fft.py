@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import tracemalloc
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
+from support.places import PRACTICE
 from support.spinning_sensor import Spin, move, record
 
 from discsim.errors import InputError
@@ -368,8 +367,7 @@ def test_an_hour_takes_little_more_memory_than_its_samples():
 
 def test_a_rate_table_is_followed_within_the_stated_deviation():
     """A measured run with the table's own read-out as truth, where its rate was steady over the window."""
-    root = Path(os.environ.get("DISCSIM_RECORDINGS", Path(__file__).parents[3] / "shared" / "recordings"))
-    folder = root / "practice" / "table-b" / "01"
+    folder = PRACTICE / "table-b" / "01"
     if not folder.is_dir():
         pytest.skip("no recordings: set DISCSIM_RECORDINGS to the folder that holds practice/table-b")
     recording = read_recording(folder)

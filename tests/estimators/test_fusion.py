@@ -9,10 +9,10 @@ import pytest
 from support.spinning_sensor import MPU9250, Faults, Spin, move, record, without
 
 from discsim.recording import Recording, Samples, SensorSheet
+from estimators.centripetal import centripetal
 from estimators.fusion import (
     FusionSettings,
     accelerometer_calibrated,
-    centripetal,
     compare_sensors,
     contradictions,
     fusion,

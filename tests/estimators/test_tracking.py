@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support.bounds import flight_bound
 from support.spinning_sensor import Faults, Spin, move, record, without
 
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples
-from estimators.bound import flight_bound
 from estimators.tracking import TrackingSettings, tracking, tracks_of
 
 IRON = Faults(

@@ -8,7 +8,7 @@ import pytest
 from discsim.recording import Samples
 from estimators.precession import transverse_rates
 from estimators.tone import turns
-from estimators.tracking import TrackingSettings
+from estimators.tracking import Segment, TrackingSettings
 from estimators.tracking.problem import Problem
 
 
@@ -48,10 +48,9 @@ def test_normal_equations_are_those_of_the_whole_derivative(case):
     m = 30 * np.stack([np.cos(20 * t), -np.sin(20 * t), 0 * t + 1.2], axis=1) + rng.normal(0, 0.3, (t.size, 3))
     at = np.arange(-0.5, t[-1] + 0.5, 0.005)
     gyroscope = Samples(at, rng.normal(0, 0.1, (at.size, 3))) if case.startswith("gyroscope") else None
-    problem = Problem(
-        t, m, TrackingSettings(), gyroscope=gyroscope, strength=None, fixed_axis=case == "fixed axis", decaying=True,
-        rows=[], top_rate=20.0, typical_rate=20.0, walk=0.01 if "counts" in case else 0.0,
-    )  # fmt: skip
+    walk = 0.01 if "counts" in case else 0.0
+    segment = Segment(t, m, TrackingSettings(), gyroscope, fixed_axis=case == "fixed axis", walk=walk)
+    problem = Problem(segment, top_rate=20.0, typical_rate=20.0)
     x = rng.normal(0, 0.02, problem.size)
     x[problem.parts[0]] += 20 + rng.normal(0, 1, problem.spline.size)
     if problem.read:  # the derivatives are those at no gain and nothing unread: of second order, as both are small

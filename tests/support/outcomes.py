@@ -101,44 +101,78 @@ def recalibrated() -> Outcome:
     return replace(outcome, diagnosis=answer, residuals=residuals(True))
 
 
+#: what is found in `explained`
+WIND = NamedEffect(
+    "air.wind",
+    {"w_north_m_s": ParameterValue(1.091, 0.021), "w_east_m_s": ParameterValue(-0.712, 0.019)},
+    Evidence(5120.0, 640.2, 0.0),
+)
+TOUCH = NamedEffect(
+    "event.impulse",
+    {
+        "t_s": ParameterValue(1.4013, 0.0004),
+        "dv_north_m_s": ParameterValue(0.61, 0.01),
+        "dv_east_m_s": ParameterValue(-0.02, 0.01),
+        "dv_down_m_s": ParameterValue(0.3, 0.012),
+    },
+    Evidence(830.0, 95.0, 1e-180),
+    ("02",),
+)
+OFFSET = NamedEffect(
+    "accel.position_offset",
+    {"dx_m": ParameterValue(0.00121, 0.00002)},
+    Evidence(410.0, 44.0, 1e-90),
+    confused_with=(Confusion("accel.scale", 404.0, "A rate-table run with the sensor at another radius"),),
+)
+LOCATED = (
+    Located(
+        "all",
+        "gps",
+        "v_north_m_s",
+        0.0,
+        7.0,
+        0.61,
+        "velocity drifts along a fixed compass direction whatever the heading of the throw",
+        "time aloft",
+    ),
+    Located("02", "accelerometer", "all", 1.37, 1.43, 0.22, "one blow, felt on all three axes at once"),
+    Located("all", "magnetometer", "x_uT", 0.0, 7.0, 0.05, "the spin phase runs away", "time aloft"),
+)
+RANKING = (
+    Candidate("air.wind", 5141.0, {"w_north_m_s": 1.09, "w_east_m_s": -0.71}, note="named"),
+    Candidate(
+        "air.wind_shear",
+        5140.2,
+        {"w_north_m_s": 1.1, "w_east_m_s": -0.72, "exponent": 0.01},
+        note="no better than the simpler air.wind",
+    ),
+    Candidate("gps.latency", 2201.0, {"delay_s": 0.08}, note="worse on held-out recordings"),
+    Candidate("event.impulse", 842.0, {"t_s": 1.4}, ("02",), "named"),
+    *(
+        Candidate(id, 30.0 - k, note="no better than chance")
+        for k, id in enumerate(
+            (
+                "aero.stall",
+                "mag.lag",
+                "clock.rate",
+                "air.density",
+                "gyro.bias",
+                "gyro.scale",
+                "accel.lag",
+                "mag.soft_iron",
+                "mag.hard_iron",
+                "aero.spin_lift",
+                "aero.spin_drag",
+                "aero.yaw_alpha",
+                "accel.bias",
+            )
+        )
+    ),
+)
+
+
 def explained() -> Outcome:
     """Return an outcome with a wind, a touch in one flight, and a pair that these recordings cannot tell apart."""
-    wind = NamedEffect(
-        "air.wind",
-        {"w_north_m_s": ParameterValue(1.091, 0.021), "w_east_m_s": ParameterValue(-0.712, 0.019)},
-        Evidence(5120.0, 640.2, 0.0),
-    )
-    touch = NamedEffect(
-        "event.impulse",
-        {
-            "t_s": ParameterValue(1.4013, 0.0004),
-            "dv_north_m_s": ParameterValue(0.61, 0.01),
-            "dv_east_m_s": ParameterValue(-0.02, 0.01),
-            "dv_down_m_s": ParameterValue(0.3, 0.012),
-        },
-        Evidence(830.0, 95.0, 1e-180),
-        ("02",),
-    )
-    offset = NamedEffect(
-        "accel.position_offset",
-        {"dx_m": ParameterValue(0.00121, 0.00002)},
-        Evidence(410.0, 44.0, 1e-90),
-        confused_with=(Confusion("accel.scale", 404.0, "A rate-table run with the sensor at another radius"),),
-    )
-    located = (
-        Located(
-            "all",
-            "gps",
-            "v_north_m_s",
-            0.0,
-            7.0,
-            0.61,
-            "velocity drifts along a fixed compass direction whatever the heading of the throw",
-            "time aloft",
-        ),
-        Located("02", "accelerometer", "all", 1.37, 1.43, 0.22, "one blow, felt on all three axes at once"),
-        Located("all", "magnetometer", "x_uT", 0.0, 7.0, 0.05, "the spin phase runs away", "time aloft"),
-    )
     disc, environment = load_disc("driver")
     answer = Diagnosis(
         ("open-field", "second-day"),
@@ -147,8 +181,8 @@ def explained() -> Outcome:
         "explained",
         FitFigures(12.96, 13.02),
         FitFigures(1.00, 1.01),
-        located,
-        (touch, wind, offset),
+        LOCATED,
+        (TOUCH, WIND, OFFSET),
         {"CL0": Recalibration(0.13, 0.0026, 0.1327, 0.0004)},
         noise=NOISE,
         heldout=tuple(HeldOut(name, 9.0 + k, 1.0 + 0.01 * k, 100.0 + k) for k, name in enumerate(NAMES)),
@@ -156,37 +190,6 @@ def explained() -> Outcome:
         next_recordings=("A throw at 20 m/s with half the spin",),
         warnings=(
             "The gyroscope's z axis stands at its range throughout: it says only that the rate is above 34.9 rad/s.",
-        ),
-    )
-    ranking = (
-        Candidate("air.wind", 5141.0, {"w_north_m_s": 1.09, "w_east_m_s": -0.71}, note="named"),
-        Candidate(
-            "air.wind_shear",
-            5140.2,
-            {"w_north_m_s": 1.1, "w_east_m_s": -0.72, "exponent": 0.01},
-            note="no better than the simpler air.wind",
-        ),
-        Candidate("gps.latency", 2201.0, {"delay_s": 0.08}, note="worse on held-out recordings"),
-        Candidate("event.impulse", 842.0, {"t_s": 1.4}, ("02",), "named"),
-        *(
-            Candidate(id, 30.0 - k, note="no better than chance")
-            for k, id in enumerate(
-                (
-                    "aero.stall",
-                    "mag.lag",
-                    "clock.rate",
-                    "air.density",
-                    "gyro.bias",
-                    "gyro.scale",
-                    "accel.lag",
-                    "mag.soft_iron",
-                    "mag.hard_iron",
-                    "aero.spin_lift",
-                    "aero.spin_drag",
-                    "aero.yaw_alpha",
-                    "accel.bias",
-                )
-            )
         ),
     )
     model = Model(
@@ -197,7 +200,7 @@ def explained() -> Outcome:
             ModelEffect(effect("event.impulse", t_s=1.4013, dv_north_m_s=0.61, dv_down_m_s=0.3), recordings=("02",)),
         ),
     )
-    return Outcome(answer, model, residuals(True), ranking, {"pieces": "0.5 s"})
+    return Outcome(answer, model, residuals(True), RANKING, {"pieces": "0.5 s"})
 
 
 def unexplained() -> Outcome:

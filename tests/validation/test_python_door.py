@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 import doctest
+import json
 import subprocess
 import sys
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import discsim
 import validation
 from discsim.recording import Recording, SensorSheet
+from discsim.threads import limited, one_thread
 from estimators import estimate, fft
 from validation.cli import main
+from validation.reporting.run import start_run
+from validation.running.tasks import Task, run_tasks
 from validation.studies.catalogue import STUDIES, run_study
 
 #: modules with examples: each is run as it stands
-EXAMPLES = ("discsim", "discsim.plain_arrays", "validation", "validation.checking.checked")
+EXAMPLES = (
+    *("discsim", "discsim.plain_arrays", "estimators.plain_arrays", "validation", "validation.checking.checked"),
+)
 RATE = 30.0
 
 
@@ -91,6 +99,96 @@ def test_arrays_keep_what_a_sheet_states_and_take_the_rate_from_the_times():
 def test_arrays_that_are_no_recording_are_refused_in_a_sentence(readings, said):
     with pytest.raises(discsim.InputError, match=said):
         discsim.recording_from_arrays(readings)
+
+
+def test_plain_arrays_of_another_shape_are_refused_in_a_sentence():
+    t, field = field_of(RATE)
+    with pytest.raises(discsim.InputError, match=r"got readings \(300, 2\), expected \(n, 3\)"):
+        discsim.fft(t, field[:, :2])
+    with pytest.raises(discsim.InputError, match="fft: samples: got t"):
+        discsim.fft(t[1:], field)
+
+
+def results(recording: Recording) -> list[discsim.Result]:
+    """One result of each kind that takes no minute to make."""
+    disc, environment = discsim.load_disc("driver")
+    flown = discsim.predict(disc, environment, discsim.load_throw("driver"), duration=0.2).motion()
+    return [recording, flown, discsim.fft(*field_of(RATE)), discsim.estimate(recording), discsim.check(recording)]
+
+
+def test_every_result_reads_in_a_line_in_a_table_in_arrays_and_in_a_figure(recording):
+    for result in results(recording):
+        assert repr(result).startswith("<")
+        assert "\n" not in repr(result)
+        assert len(repr(result)) < 200
+        assert result._repr_html_().startswith("<pre>")
+        table = {name: np.asarray(values) for name, values in result.table().items()}
+        frame = result.to_dataframe()
+        assert list(frame) == list(table)
+        assert {len(values) for values in table.values()} == {len(frame)}
+        assert sum(variable.size for variable in result.to_xarray().variables.values()) > 0
+        assert result.plot().axes[0].has_data()
+
+
+def test_labelled_arrays_hold_the_readings_over_the_times_of_their_sensor(recording):
+    arrays = recording.to_xarray()
+    np.testing.assert_array_equal(arrays.magnetometer_y_uT, recording.samples["magnetometer"].value[:, 1])
+    np.testing.assert_array_equal(arrays.magnetometer_time_s, recording.samples["magnetometer"].t)
+    rate = discsim.fft(*field_of(RATE))
+    assert rate.to_xarray().sd_rad_s.dims == ("time_s",)
+
+
+@pytest.mark.parametrize(("package", "call"), [("pandas", "to_dataframe"), ("xarray", "to_xarray")])
+def test_a_package_that_is_missing_is_named_with_the_extra_that_brings_it(recording, monkeypatch, package, call):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(discsim.InputError, match=rf"needs {package}, .* pip install 'discsim\[tables\]'"):
+        getattr(discsim.fft(*field_of(RATE)), call)()
+
+
+def test_a_sweep_and_workers_name_the_extra_that_they_need(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(discsim.InputError, match=r"sweep: needs xarray, .*discsim\[tables\]"):
+        discsim.sweep("installation")
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    tasks = [Task("a", 1), Task("b", 2)]
+    with pytest.raises(discsim.InputError, match=r"--workers 2: needs distributed, .*discsim\[cluster\]"):
+        run_tasks(tasks, lambda argument, shared: argument, tmp_path, workers=2)
+    assert run_tasks(tasks, lambda argument, shared: argument, tmp_path) == [1, 2]
+
+
+def test_linear_algebra_has_one_thread_inside_and_as_many_as_before_outside():
+    def threads() -> set[int]:
+        return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+    import scipy.linalg  # noqa: F401  # its library is limited, too
+
+    with threadpool_limits(2, user_api="blas"):
+        assert threads() == {2}
+        with limited(), limited():
+            assert threads() == {1}
+        assert threads() == {2}
+        with pytest.raises(ZeroDivisionError):
+            one_thread(lambda: 1 / 0)()
+        assert threads() == {2}
+        assert one_thread(threads)() == {1}
+
+
+def test_importing_sets_no_environment_variable():
+    code = "import os; old = dict(os.environ); import discsim, validation, estimators; print(old == os.environ)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "True\n"
+
+
+def test_a_run_names_the_commit_of_its_sources(tmp_path):
+    root = Path(discsim.__file__).parents[1]
+    asked = subprocess.run(
+        ["git", "-C", str(root), "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=False
+    )
+    with start_run(tmp_path):
+        pass
+    written = json.loads((tmp_path / "run.json").read_text())["commit"]
+    inside = (root / ".git").exists()
+    assert written.removesuffix("+") == (asked.stdout.strip() if inside else "unknown")
 
 
 def test_a_recording_and_a_rate_show_themselves_in_a_line(recording):
@@ -190,8 +288,7 @@ def test_a_study_is_run_by_its_name_with_its_own_options(monkeypatch, capsys):
 
 @pytest.mark.parametrize("study", STUDIES.values(), ids=list(STUDIES))
 def test_every_study_is_there_in_a_checkout(study):
-    found = import_module(study.module)
-    assert hasattr(found, "app") or hasattr(found, "main")
+    assert callable(import_module(study.module).command)
 
 
 def test_a_study_that_is_unknown_or_not_installed_is_refused_in_a_sentence(monkeypatch):

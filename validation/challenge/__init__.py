@@ -1,6 +1,6 @@
 """The blind test: effects are concealed in MuJoCo, diagnosed by another process, then opened and scored.
 
-The package itself is called as `validation.challenge.challenged.blind_test` is: ``validation.challenge(cases=20)``.
+The package itself is called as `validation.challenge.challenged.blind_test` is: ``validation.challenge(20)``.
 """
 
 from __future__ import annotations

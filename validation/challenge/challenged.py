@@ -8,10 +8,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
+
+from matplotlib.figure import Figure
 
 from discsim.recording import Plant
+from discsim.result import Result
 from validation.challenge.blind import Request
 from validation.challenge.cases.case import Kind, Mask
+from validation.challenge.report.figures import draw_detection
 from validation.challenge.report.page import goals_met
 from validation.challenge.run import challenge, write_challenge
 from validation.challenge.scores.detection import Curve, detections, fit_curve
@@ -26,7 +31,7 @@ MANY = 300
 
 
 @dataclass(frozen=True)
-class Challenged:
+class Challenged(Result):
     """A finished blind test.
 
     Attributes
@@ -74,6 +79,21 @@ class Challenged:
             lines.append(f"half-detection size, in detection limits: {self.curve.text}")
         return "\n".join([*lines, self._right, f"a diagnosis took {times(self.cases).text}"])
 
+    def table(self) -> dict[str, list[Any]]:
+        """Return a row for each case: seed, plant, what was concealed, what was answered, and whether it is right."""
+        return {
+            "seed": [item.answer.seed for item in self.cases],
+            "plant": [item.answer.plant for item in self.cases],
+            "concealed": [", ".join(item.answer.effects) for item in self.cases],
+            "named": [", ".join(item.score.named) for item in self.cases],
+            "right": [item.score.right for item in self.cases],
+            "time_s": [item.seconds for item in self.cases],
+        }
+
+    def plot(self) -> Figure:
+        """Return the figure of detection: the share of effects that are named over their size."""
+        return draw_detection(detections(self.cases), self.curve)
+
     def report(self, folder: Path | str) -> Path:
         """Write challenge.json and report.html with its figures into ``folder``; return the report's path."""
         out = Path(folder)
@@ -105,7 +125,10 @@ def blind_test(
     folder : Path, optional
         Where finished cases are kept, so that a test that was stopped goes on. By default nothing is kept.
 
-    Raises `InputError` for what does not go together, such as an effect that a plant does not have.
+    Raises
+    ------
+    InputError
+        For what does not go together, such as an effect that a plant does not have.
     """
     requests = [Request(number, plant, tuple(effects), kind, mask) for number in range(seed, seed + cases)]
     requests[0].draw()  # what does not go together is refused before hours are spent

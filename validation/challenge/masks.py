@@ -79,7 +79,7 @@ def mask_row(scored: Sequence[Scored]) -> tuple[str, ...]:
         found = rates[name]
         share, interval = percent(found)
         cells.append(f"{share} ({interval}; {found.hits} of {found.of})" if found.of else "no such case")
-    return (str(len(scored)), *cells, f"{times(scored).median:.0f} s")
+    return (str(len(scored)), *cells, f"{times(scored).median_s:.0f} s")
 
 
 def masked_results(folders: Sequence[Path]) -> dict[Mask, Result]:

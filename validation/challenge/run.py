@@ -96,8 +96,8 @@ def write_challenge(
         "mask": mask,
         "cases": [item.to_json() for item in scored],
         "summary": {name: value.to_json() for name, value in rates_of(scored).items()},
-        "half_detection": curve.to_json() if curve is not None else None,
-        "seconds": times(scored).to_json(),
+        "half_detection": curve._asdict() if curve is not None else None,
+        "seconds": times(scored)._asdict(),
     }
     write_text(out / RESULT, json_text(content))
     write_page(out, scored)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 from discsim.recording import Recording
@@ -70,7 +70,7 @@ class Check:
             "recording": self.name,
             "plant": self.plant,
             "duration_s": self.duration,
-            "sensors": [sensor.to_json() for sensor in self.sensors],
+            "sensors": [asdict(sensor) for sensor in self.sensors],
             "findings": [finding.to_json() for finding in self.findings],
             "methods": list(self.methods),
             "methods_left_out": self.methods_left_out,

@@ -7,12 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
 from rich.console import Console
 
 from discsim.files import write_text
+from discsim.result import Result
+from discsim.threads import one_thread
 from validation.checking.check import Check, check_recording
 from validation.checking.table import print_checks
 from validation.diagnosis.setup import find_setup_faults
+from validation.reporting.figures import COLOURS, new_figure
 from validation.reporting.run import json_text
 from validation.running.given import Given, given_recordings
 
@@ -20,7 +24,7 @@ __all__ = ["Checked", "check"]
 
 
 @dataclass(frozen=True, repr=False)
-class Checked:
+class Checked(Result):
     """What was found in recordings: a `Check` of each, in their order."""
 
     checks: tuple[Check, ...]
@@ -33,6 +37,27 @@ class Checked:
     def ok(self) -> bool:
         """Whether no error was found."""
         return not any(one.of("error") for one in self.checks)
+
+    def table(self) -> dict[str, list[Any]]:
+        """Return a row for each finding: recording, severity, id, where, sentence."""
+        rows = [(one.name, found) for one in self.checks for found in one.findings]
+        return {
+            "recording": [name for name, _ in rows],
+            **{key: [getattr(found, key) for _, found in rows] for key in ("severity", "id", "where", "sentence")},
+        }
+
+    def plot(self) -> Figure:
+        """Return a figure of the span that each sensor of each recording covers, with its silences left out."""
+        rows = [(one, sensor) for one in self.checks for sensor in one.sensors]
+        figure, axes = new_figure(width=9.0, height=1.2 + 0.3 * len(rows))
+        for row, (one, sensor) in enumerate(rows):
+            ends = [0.0, *(edge for start, length in sensor.silent for edge in (start, start + length)), one.duration]
+            bars = [(start, stop - start) for start, stop in zip(ends[::2], ends[1::2], strict=True)]
+            axes.broken_barh(bars, (row - 0.35, 0.7), color=COLOURS["accelerometer"])
+        axes.set_yticks(range(len(rows)), [f"{one.name}: {sensor.sensor}" for one, sensor in rows])
+        axes.invert_yaxis()
+        axes.set_xlabel("time (s)")
+        return figure
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of check.json."""
@@ -51,6 +76,7 @@ class Checked:
         return file
 
 
+@one_thread
 def check(recordings: Given) -> Checked:
     """Say what recordings hold, what is wrong with them, and what they can tell. Nothing is fitted.
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -80,10 +79,6 @@ class SensorCheck:
     silent: tuple[tuple[float, float], ...]
     frozen: tuple[tuple[float, float], ...]
     dead_axes: tuple[str, ...]
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the JSON object."""
-        return asdict(self)
 
 
 def clipped(recording: Recording, sensor: str) -> BoolArray:

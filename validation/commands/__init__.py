@@ -44,6 +44,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "show",
         "Show a disc, part, throw, site, map or sweep as its file has it, or an effect with its parameters.",
     ),
+    "example-log": ("example_log", "Write a CSV log of simulated throws, as a stranger's logger would."),
     "study": (
         "study",
         "Run a study of the documentation. NAME --help shows its options; without NAME all studies are listed.",

@@ -96,11 +96,9 @@ def command(
 
     if scheduler is not None and workers is not None:
         raise InputError("--workers counts local processes, and --scheduler uses none; expected one of the two")
-    chosen: Plant | None = plant.value if plant is not None else None
-    only: Kind | None = kind.value if kind is not None else None
-    over: Mask | None = None
-    if mask is not None and mask is not MaskName.all:
-        over = cast("Mask", mask.value)
+    chosen: Plant | None = None if plant is None else plant.value
+    only: Kind | None = None if kind is None else kind.value
+    over = None if mask in (None, MaskName.all) else cast("Mask", mask.value)
     requests = [Request(number, chosen, tuple(effect or ()), only, over) for number in range(seed, seed + cases)]
     requests[0].draw()  # what does not go together is refused before anything is written
     results: dict[Mask | None, list[Scored]]
@@ -109,13 +107,9 @@ def command(
             results = challenge_masks(run, requests, scheduler=scheduler, workers=workers, anew=anew)
         else:
             results = {over: challenge(run, requests, scheduler=scheduler, workers=workers, anew=anew)}
-    met = True
-    for name, scored in results.items():
-        if mask is MaskName.all:
-            typer.echo(f"\n{name}")
-        found = Challenged(tuple(scored), name)
-        typer.echo(found.summary())
-        met = met and found.goals_met
+    challenged = [Challenged(tuple(scored), name) for name, scored in results.items()]
+    for found in challenged:
+        typer.echo((f"\n{found.mask}\n" if mask is MaskName.all else "") + found.summary())
     typer.echo(f"report: {out / 'report.html'}")
-    if not met:
+    if not all(found.goals_met for found in challenged):
         raise typer.Exit(1)

@@ -60,19 +60,11 @@ def command(
         [replace(one, environment=at_place(one.environment, place, date)) for one in set_] for set_ in recordings
     ]
     need_field(recordings)
-    plans = None
-    if candidates is not None:
-        plans = read_plans(candidates, recordings[0][0].plant)
-        files = [*files, candidates]
-    with start_run(out, seed, [*datasets, *files]) as run:
+    plans = None if candidates is None else read_plans(candidates, recordings[0][0].plant)
+    named = dict(zip(names, recordings, strict=True))
+    with start_run(out, seed, [*datasets, *files, *([candidates] if candidates else [])]) as run:
         with shown() as progress:
-            found = diagnose_named(
-                dict(zip(names, recordings, strict=True)),
-                progress=progress,
-                seed=seed,
-                user_effects=effects,
-                plans=plans,
-            )
+            found = diagnose_named(named, progress=progress, seed=seed, user_effects=effects, plans=plans)
         found.report(out, command=f"discsim {' '.join(run.command)}")
     typer.echo(found.summary())
     typer.echo(f"read {out / 'report.html'}")

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import enum
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,10 +21,16 @@ from validation.reporting.options import (
     at_site,
     at_wind,
     disc_to_fly,
+    given_files,
     laws_upon,
     parse_module,
     throw_as_said,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from discsim.motion import Motion
 
 __all__ = ["command"]
 
@@ -87,8 +94,6 @@ def command(
     """
     from discsim.effects.catalogue import by_id
     from discsim.effects.own import load_user_effects
-    from discsim.engine import fly
-    from discsim.errors import InputError
     from discsim.module import loaded
     from discsim.recording import write_recording
     from discsim.sensors import Instruments, record
@@ -96,8 +101,7 @@ def command(
     from validation.reporting.run import start_run
     from validation.reporting.truth import write_flight_truth
 
-    if engine is Engine.trajectory and ground is Ground.skip:
-        raise InputError("--engine trajectory knows no contact with the ground; expected --ground stop with it")
+    fly = _flown_by(engine, ground)
     mine = load_user_effects(own or [])
     body, surroundings, stated = disc_to_fly(disc, model, mine)
     environment = at_wind(at_site(surroundings, site), wind)
@@ -112,20 +116,31 @@ def command(
         by_id(effects)
     laws, passed = laws_upon(stated, "flight", list(instruments.sensors))
     instruments = instruments.with_effects(effects).with_laws(laws)
-    names = (disc or "", throw, site or "", *parts.split(","))
-    inputs = [*([model] if model else []), *(own or []), *(Path(name) for name in names if name.endswith(".toml"))]
-    with start_run(out, seed, inputs) as run:
-        if engine is Engine.trajectory:
-            from discsim.trajectory import predict
-
-            motion = predict(body, environment, release, effects, duration=duration, law=laws).motion()
-        else:
-            motion = fly(body, environment, release, effects, duration=duration, ground=ground.value, law=laws)
+    with start_run(out, seed, given_files(model, *(own or []), disc, throw, site, *parts.split(","))) as run:
+        motion = fly(body, environment, release, effects, duration=duration, law=laws)
         recording = record(motion, instruments, run.rng, plant="flight", name=out.resolve().name, disc=body)
         write_recording(recording, out)
         write_flight_truth(out / "truth.csv", motion)
-        north, east = motion.position[-1, :2]
-        what = "touches down" if motion.touched_down else "is left"
-        for note in (*notes, *passed):
-            typer.echo(note)
-        typer.echo(f"{out}: {what} after {motion.end:.2f} s, {north:.1f} m north and {east:.1f} m east")
+    for note in (*notes, *passed, f"{out}: {_end(motion)}"):
+        typer.echo(note)
+
+
+def _flown_by(engine: Engine, ground: Ground) -> Callable[..., Motion]:
+    """Return what flies a disc; raises `InputError` where the engine does not know that ground."""
+    from discsim.errors import InputError
+
+    if engine is Engine.mujoco:
+        from discsim.engine import fly
+
+        return partial(fly, ground=ground.value)
+    if ground is Ground.skip:
+        raise InputError("--engine trajectory knows no contact with the ground; expected --ground stop with it")
+    from discsim.trajectory import predict
+
+    return lambda *what, **how: predict(*what, **how).motion()
+
+
+def _end(motion: Motion) -> str:
+    north, east = motion.position[-1, :2]
+    what = "touches down" if motion.touched_down else "is left"
+    return f"{what} after {motion.end:.2f} s, {north:.1f} m north and {east:.1f} m east"

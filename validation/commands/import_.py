@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import typer
 
@@ -20,18 +20,21 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 
+MapOption: TypeAlias = Annotated[
+    str,
+    typer.Option(
+        "--map",
+        help="A shipped map's name, a map of your own (a .toml file), 'sniff': propose one, or 'auto': the shipped "
+        "map that was made for this logger, else propose one.",
+    ),
+]
+
+
 def command(
     raw: Annotated[
         Path, typer.Argument(help="What the logger wrote: a file, a zip, or a folder with one file per sensor.")
     ],
-    map_: Annotated[
-        str,
-        typer.Option(
-            "--map",
-            help="A shipped map's name, a map of your own (a .toml file), 'sniff': propose one, or 'auto': the shipped "
-            "map that was made for this logger, else propose one.",
-        ),
-    ] = "auto",
+    map_: MapOption = "auto",
     rows: Annotated[
         str | None, typer.Option(help="0-based data rows A up to B of the first sensor's file. Default: all.")
     ] = None,
@@ -72,11 +75,11 @@ def command(
     with opened(raw, said.append) as logged:
         known = recognised(logged) if map_ == "auto" else named
         proposal = sniff(logged, plant) if known is None else None
-        decisions = [] if proposal is None else proposal.all_decisions
+        if known is not None and named is None:
+            said.append(f"taken: the shipped map '{known.name}', made for these columns (--map sniff asks anew)")
         with start_run(out, None, [raw, *([known.path] if known else [])]) as run:
-            if known is not None and named is None:
-                said.append(f"taken: the shipped map '{known.name}', made for these columns (--map sniff asks anew)")
             _tell(run, said)
+            decisions = proposal.all_decisions if proposal else []
             import_map = known or _proposed(run, proposal, write_map or out / "map.toml")
             proposal = None  # its table is as large as the one that is read now
             import_map = replace(import_map, environment=at_place(import_map.environment, place, date))

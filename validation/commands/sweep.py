@@ -12,6 +12,8 @@ from validation.reporting.options import OutOption
 if TYPE_CHECKING:
     import xarray as xr
 
+    from validation.sweeps.swept import Swept
+
 __all__ = ["command"]
 
 
@@ -25,15 +27,21 @@ def command(
         int | None, typer.Option(min=1, help="Local processes; 1 works in this one. Default: one per core.")
     ] = None,
     anew: Annotated[bool, typer.Option("--anew", help="Throw away what an earlier sweep left in --out.")] = False,
+    below: Annotated[
+        float | None,
+        typer.Option(min=0.01, max=50.0, help="Also tell which tolerance of mount keeps the error below so many %."),
+    ] = None,
     out: OutOption = Path("sweep"),
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything random. Default: the plan's.")] = None,
 ) -> None:
     """Score estimators over every combination of a plan's axes and mounts, on one truth run for all mounts.
 
-    Writes sweep.nc (labelled arrays, netCDF) and sweep.png into --out. Each finished chunk is kept in
+    Writes sweep.nc (labelled arrays, netCDF), cases.csv and cases.md (a row for each combination and rate) and
+    sweep.png into --out; of a saltelli plan shares.csv and shares.png (which error of the mount makes the scatter),
+    with --below tolerances.csv, tolerances.md and tolerances.png. Each finished chunk is kept in
     --out/checkpoints: stopped at any moment, the same command goes on and gives the same bytes.
 
-    Example: discsim sweep installation --mounts 4096 --out sweep
+    Example: discsim sweep installation --mounts 4096 --below 1 --out sweep
     """
     from discsim.errors import InputError
     from validation.reporting.run import start_run
@@ -56,6 +64,22 @@ def command(
         )
         found.report(out)
     _print(found.scores)
+    if below is not None:
+        _tell(found, below / 100.0, out)
+
+
+def _tell(found: Swept, below: float, out: Path) -> None:
+    """Write and say which tolerance of mount stays below a share of the rate."""
+    from validation.sweeps.tolerance import draw_tolerances, sentences_of, write_tolerances
+
+    told = found.tolerances(below)
+    if not told:
+        typer.echo("no estimator was scored on enough mounts to tell a tolerance; expected 56 or more")
+        return
+    write_tolerances(out, told, below)
+    draw_tolerances(told, below, out / "tolerances.png")
+    for line in sentences_of(told, below):
+        typer.echo(line)
 
 
 def _print(scores: xr.Dataset) -> None:

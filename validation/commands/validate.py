@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from discsim.errors import InputError
-from validation.reporting.options import ModelOption, OutOption, SeedOption
+from validation.reporting.options import ModelOption, OutOption, SeedOption, disc_to_fly, given_files
+
+if TYPE_CHECKING:
+    from validation.experiments.validation_run import Validated
 
 __all__ = ["command"]
 
@@ -52,52 +56,46 @@ def command(
     from discsim.recording import read_dataset
     from validation.experiments.subject import stated_subject
     from validation.experiments.validation_run import Judging, validate
-    from validation.reporting.ci import github_commands, markdown_summary
-    from validation.reporting.options import disc_to_fly
     from validation.reporting.run import start_run
-    from validation.reporting.scores import all_ok
 
-    files = {"--junit": junit, "--summary": summary, "--record-limits": record_limits}
-    for option, file in files.items():
-        if file is not None and (file.is_dir() or file.parent.is_file()):
-            raise InputError(f"{option} {file}: is no place for a file; expected the name of one")
+    _check_places({"--junit": junit, "--summary": summary, "--record-limits": record_limits})
     body, surroundings, stated = disc_to_fly(disc, model)
     names = [part.split(",") if part else [] for part in (parts, throws)]
-    subject = stated_subject(
-        quick,
-        disc=None if disc is None and model is None else (body, surroundings),
-        parts=names[0],
-        throws=names[1],
-        profile=profile,
-    )
+    flown = None if disc is None and model is None else (body, surroundings)
+    subject = stated_subject(quick, disc=flown, parts=names[0], throws=names[1], profile=profile)
     mine = [] if recordings is None else read_dataset(recordings)
     judging = Judging.read(limits, against, record_limits, repeat)
-    given = [disc or "", *names[0], *names[1]]
-    inputs = [path for path in (model, profile, recordings, limits) if path is not None]
     if stated is not None and (stated.effects or stated.laws):
         typer.echo(f"{model}: its effects and laws are passed over; the scores are of its disc")
-    with start_run(out, seed, [*inputs, *(Path(name) for name in given if name.endswith(".toml"))]) as run:
+    inputs = given_files(model, profile, recordings, limits, disc, *names[0], *names[1])
+    with start_run(out, seed, inputs) as run:
         done = validate(run, quick=quick, junit=junit, subject=subject, judging=judging, recordings=mine)
-    text = markdown_summary("discsim validate", done.scores, done.changes)
-    _leave(text, summary)
-    if os.environ.get("GITHUB_ACTIONS") == "true":
-        for line in github_commands(done.scores, done.changes):
-            typer.echo(line)
+    _leave(done, summary)
     for item in done.scores:
         typer.echo(item.text)
-    failed = sum(not item.ok for item in done.scores)
-    count = len(done.scores)
-    typer.echo(f"{count - failed} of {count} scores within tolerance; report: {out / 'report.html'}")
-    if not all_ok(done.scores):
+    within, count = sum(item.ok for item in done.scores), len(done.scores)
+    typer.echo(f"{within} of {count} scores within tolerance; report: {out / 'report.html'}")
+    if within < count:
         raise typer.Exit(1)
 
 
-def _leave(text: str, summary: Path | None) -> None:
-    """Write the summary where it was asked for, and append it to the page of GitHub's job where there is one."""
-    from discsim.files import write_text
+def _check_places(files: Mapping[str, Path | None]) -> None:
+    for option, file in files.items():
+        if file is not None and (file.is_dir() or file.parent.is_file()):
+            raise InputError(f"{option} {file}: is no place for a file; expected the name of one")
 
+
+def _leave(done: Validated, summary: Path | None) -> None:
+    """Write the summary where it was asked for, and where GitHub runs this onto its job's page, with annotations."""
+    from discsim.files import write_text
+    from validation.reporting.ci import github_commands, markdown_summary
+
+    text = markdown_summary("discsim validate", done.scores, done.changes)
     if summary is not None:
         write_text(summary, text)
     if page := os.environ.get("GITHUB_STEP_SUMMARY"):
         with Path(page).open("a", encoding="utf-8") as stream:
             stream.write(text)
+    if os.environ.get("GITHUB_ACTIONS") == "true":
+        for line in github_commands(done.scores, done.changes):
+            typer.echo(line)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from discsim.errors import InputError
-from validation.reporting.options import ModelOption, WithOption, all_effects, disc_to_fly, laws_upon
+from validation.reporting.options import ModelOption, WithOption, all_effects, disc_to_fly, given_files, laws_upon
 
 if TYPE_CHECKING:
     from validation.viewing.replay import Replay
@@ -54,49 +54,52 @@ def command(
 
     Example: discsim view --disc driver --video throw.gif --speed 0.1 --span 0:1
     """
-    if sum(source is not None for source in (recording, disc, model)) != 1:
-        raise InputError("expected either the folder of a recording or --disc NAME or --model FILE")
-    if throw is not None and recording is not None:
-        raise InputError(f"--throw {throw}: a recording has its own motion; expected --disc NAME with it")
-    if video is not None and video.suffix not in ENDINGS:
-        raise InputError(f"--video {video}: expected a name that ends in {', '.join(ENDINGS)}")
-    if at is not None and (video is None or video.suffix != ".png"):
-        raise InputError(f"--at {at}: stills go into a .png; expected --video FILE.png with it")
-    pixels = _pixels(size) if size is not None else None
-    times = _seconds(at, ",", "--at") if at is not None else None
-    cut = _seconds(span, ":", "--span") if span is not None else None
-
-    from validation.viewing.offscreen import opengl
-
+    _check_source(recording, disc, model, throw)
+    _check_video(video, at)
+    pixels = None if size is None else _pixels(size)
+    times = None if at is None else _seconds(at, ",", "--at")
+    cut = None if span is None else _span(span)
     if video is not None:
-        opengl()  # MuJoCo, imported from here on, gives no clear error for a MUJOCO_GL that it does not know
-
+        _check_opengl()
     from validation.reporting.run import start_run
-    from validation.viewing.scene import Look, draw_stills, draw_whole, show, write_picture
+    from validation.viewing.scene import Look, show
 
     replay = _replay(recording, disc, model, throw or "driver", own or [])
-    if cut is not None:
-        if len(cut) != 2:
-            raise InputError(f"--span {span}: expected A:B, two numbers of seconds")
-        replay = replay.between(*cut)
+    replay = replay if cut is None else replay.between(*cut)
     whole = video is not None and video.suffix == ".png" and times is None and replay.travels
     look = Look(*(pixels or ((1200, 500) if whole else (640, 360))), camera, enlarge)
     for note in replay.notes:
         typer.echo(note)
     if video is None:
-        show(replay, look, speed)
-        return
+        return show(replay, look, speed)
     file = out / video
-    names = [Path(name) for name in (disc, throw) if name and name.endswith(".toml")]
-    inputs = [path for path in (recording, model, *(own or [])) if path is not None] + names
-    with start_run(file.parent, None, inputs):
-        if whole:
-            write_picture(file, draw_whole(replay, look))
-        elif file.suffix == ".png":
-            write_picture(file, draw_stills(replay, look, times or [replay.start]))
+    with start_run(file.parent, None, given_files(recording, model, *(own or []), disc, throw)):
+        if file.suffix == ".png":
+            _draw_picture(file, replay, look, None if whole else times or [replay.start])
         else:
             _draw_video(file, replay, look, fps, speed)
     typer.echo(f"{file}")
+
+
+def _check_source(recording: Path | None, disc: str | None, model: Path | None, throw: str | None) -> None:
+    if sum(source is not None for source in (recording, disc, model)) != 1:
+        raise InputError("expected either the folder of a recording or --disc NAME or --model FILE")
+    if throw is not None and recording is not None:
+        raise InputError(f"--throw {throw}: a recording has its own motion; expected --disc NAME with it")
+
+
+def _check_video(video: Path | None, at: str | None) -> None:
+    if video is not None and video.suffix not in ENDINGS:
+        raise InputError(f"--video {video}: expected a name that ends in {', '.join(ENDINGS)}")
+    if at is not None and (video is None or video.suffix != ".png"):
+        raise InputError(f"--at {at}: stills go into a .png; expected --video FILE.png with it")
+
+
+def _check_opengl() -> None:
+    """Refuse a wrong MUJOCO_GL before MuJoCo is imported, which gives no clear error for it."""
+    from validation.viewing.offscreen import opengl
+
+    opengl()
 
 
 def _replay(recording: Path | None, disc: str | None, model: Path | None, throw: str, own: list[Path]) -> Replay:
@@ -112,6 +115,13 @@ def _replay(recording: Path | None, disc: str | None, model: Path | None, throw:
     laws, _ = laws_upon(stated, "flight", ())
     motion = fly(body, environment, load_throw(throw), effects, law=laws)
     return replay_motion(motion, body.diameter, f"flown in MuJoCo: disc {disc or model}, throw {throw}")
+
+
+def _draw_picture(file: Path, replay: Replay, look: Look, times: list[float] | None) -> None:
+    """Draw stills at some times, or the whole flight."""
+    from validation.viewing.scene import draw_stills, draw_whole, write_picture
+
+    write_picture(file, draw_whole(replay, look) if times is None else draw_stills(replay, look, times))
 
 
 def _draw_video(file: Path, replay: Replay, look: Look, fps: float, speed: float) -> None:
@@ -134,6 +144,13 @@ def _pixels(text: str) -> tuple[int, int]:
     if not (width.isdecimal() and height.isdecimal()):
         raise InputError(f"--size {text}: expected WIDTHxHEIGHT in pixels, such as 640x360")
     return int(width), int(height)
+
+
+def _span(text: str) -> tuple[float, float]:
+    cut = _seconds(text, ":", "--span")
+    if len(cut) != 2:
+        raise InputError(f"--span {text}: expected A:B, two numbers of seconds")
+    return cut[0], cut[1]
 
 
 def _seconds(text: str, separator: str, option: str) -> list[float]:

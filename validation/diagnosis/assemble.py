@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from types import MappingProxyType
 
 import numpy as np
 from scipy.stats import chi2 as chi2_law
@@ -12,8 +11,10 @@ from scipy.stats import chi2 as chi2_law
 from discsim.disc import Aero, aero_key
 from discsim.effects.catalogue import effect as catalogued
 from discsim.model_file import Model, ModelEffect
-from validation.diagnosis.design.next_recording import confusions, in_words
-from validation.diagnosis.held_out import heldout_chi2, heldout_gain
+from validation.diagnosis.consistency.spin_agreement import Agreement, agreement_of
+from validation.diagnosis.contradicted import contradicted_outcome
+from validation.diagnosis.design.next_recording import advise, confusions, in_words
+from validation.diagnosis.held_out import Choice, choices_without_each, heldout_chi2, heldout_gain
 from validation.diagnosis.localisation import located_effect, located_rest
 from validation.diagnosis.report.wording import telling_apart
 from validation.diagnosis.result import (
@@ -26,33 +27,44 @@ from validation.diagnosis.result import (
     FitFigures,
     HeldOut,
     Law,
+    Located,
     NamedEffect,
     NoiseNote,
     Outcome,
     Outlier,
     ParameterValue,
+    Recalibration,
     Residuals,
-    Verdict,
 )
 from validation.diagnosis.selection.candidates import Trial, parameters_of
+from validation.diagnosis.selection.constrained_fit import Tied
 from validation.diagnosis.selection.evidence import price
 from validation.diagnosis.selection.found import Considered, Search, chi2_in
 from validation.diagnosis.selection.stepwise import tried_without
+from validation.diagnosis.settings import settings_told
+from validation.diagnosis.setup_effects import SetupAnswer, answer_of_setup, on_board_axes
+from validation.diagnosis.stages import Judged, Question
 from validation.diagnosis.unknown_law.find import FoundLaw
-from validation.diagnosis.verdict import RECALIBRATED_NAMES, recalibrations, standard_errors, verdict_of
-from validation.identification.competing_effects import user_effect
+from validation.diagnosis.verdict import RECALIBRATED_NAMES, recalibrations, standard_errors
 from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel, chi_squared
 from validation.identification.residual_tests import remainders
 
-__all__ = ["assemble"]
+__all__ = ["outcome_of", "reason_for"]
 
 #: a parameter whose error is this share of the room it was given is not determined by the data
 _UNDETERMINED = 0.2
-_NO_ADVICE: Mapping[tuple[str, str], Advice] = MappingProxyType({})
 
 
-def _named(found: Search, trial: Trial, names: Sequence[str], advice: Mapping[tuple[str, str], Advice]) -> NamedEffect:
+def _named(
+    found: Search,
+    trial: Trial,
+    less: Tied,
+    names: Sequence[str],
+    choices: Sequence[Choice],
+    advice: Mapping[tuple[str, str], Advice],
+) -> NamedEffect:
+    """Return an effect as the answer has it; ``less`` is the fit without it, ``choices`` what others choose for it."""
     final = found.final
     errors = standard_errors(final)
     values = {}
@@ -69,12 +81,11 @@ def _named(found: Search, trial: Trial, names: Sequence[str], advice: Mapping[tu
     values.update({name: ParameterValue(value, sd) for name, value, sd in trial.told})
     for name, value in trial.shapes.items():
         values.setdefault(name, ParameterValue(float(value), None))
-    less = tried_without(found, trial)
     gain = max(less.score - final.score, 0.0)
     k = len(parameters_of(trial))
     bic = gain - k * float(np.log(max(final.fit.count, 2)))
     p = float(max(chi2_law.sf(gain, max(k, 1)), SMALLEST_P_VALUE))
-    held = heldout_gain(found, trial)
+    held = heldout_gain(found, trial, choices)
     confused = []
     for rival in confusions(found, trial):
         rival_bic = gain - rival.worse - len(parameters_of(rival.trial)) * float(np.log(max(final.fit.count, 2)))
@@ -142,9 +153,10 @@ def _leaves(law: FoundLaw, names: Sequence[str]) -> str:
     return f"It explains {100.0 * law.share:.0f} % of the excess, and more than noise is left: {listed}{more}."
 
 
-def _figures(found: Search, unexplained: bool) -> tuple[FitFigures, FitFigures, tuple[HeldOut, ...]]:
+def _figures(
+    found: Search, unexplained: bool, choices: Sequence[Choice]
+) -> tuple[FitFigures, FitFigures, tuple[HeldOut, ...]]:
     final, board = found.final, found.board
-    assert board is not None
     white = {group: noise._replace(correlation=0.0) for group, noise in final.fit.noise.items()}
     reference = white if not unexplained else {g: n._replace(correlation=0.0) for g, n in found.loose_noise.items()}
     n = final.fit.count
@@ -156,10 +168,11 @@ def _figures(found: Search, unexplained: bool) -> tuple[FitFigures, FitFigures, 
     before = after = 0.0
     for i in range(board.recordings):
         rows = board.linears[i].raw.size
-        new = max(heldout_chi2(found, final.hypothesis, i), 0.0)
+        new = max(heldout_chi2(found, final.hypothesis, i, choices[i]), 0.0)
         old = chi_squared(found.base.fit.linears[i], reference, found.base.residuals[i])
         before, after = before + old, after + new
-        held.append(HeldOut(str(i), old / rows, new / rows, 0.5 * (old - new)))
+        chosen = tuple(trial.id for trial in choices[i].values() if trial is not None)
+        held.append(HeldOut(str(i), old / rows, new / rows, 0.5 * (old - new), chosen))
     return FitFigures(base, before / n), FitFigures(last, after / n), tuple(held)
 
 
@@ -212,7 +225,7 @@ def _model(found: Search, effects: Sequence[NamedEffect], law: Law | None) -> Mo
     for effect in effects:
         sizes = {name: item.value for name, item in effect.parameters.items()}
         sds = {name: item.sd for name, item in effect.parameters.items() if item.sd is not None}
-        own = user_effect(effect.id)
+        own = found.loose.effects.user_effect(effect.id)
         sized = catalogued(effect.id, **sizes, **effect.setting) if own is None else own.sized(sizes)
         carried.append(ModelEffect(sized, sds, effect.recordings))
     return Model(
@@ -224,13 +237,13 @@ def _model(found: Search, effects: Sequence[NamedEffect], law: Law | None) -> Mo
     )
 
 
-def _next_recordings(found: Search, verdict: Verdict, effects: Sequence[NamedEffect]) -> tuple[str, ...]:
+def _next_recordings(found: Search, unexplained: bool, effects: Sequence[NamedEffect]) -> tuple[str, ...]:
     """Return what to record next, as sentences; what needs no further recording is said, too."""
     told = [telling_apart(effect.id, other) for effect in effects for other in effect.confused_with]
-    if verdict == "explained" and not told:
-        told.append("Nothing more is needed to tell what is named from the other effects that were tried.")
-    elif verdict == "unexplained":
+    if unexplained:
         told.append("Recordings that reach further in what the mismatch grows with: they settle the form of a law.")
+    elif not told and effects:
+        told.append("Nothing more is needed to tell what is named from the other effects that were tried.")
     elif not told:
         told.append("Nothing more is needed: no effect is in doubt.")
     if len(found.recordings) == 1:
@@ -245,73 +258,100 @@ def reason_for(considered: Considered, named: Sequence[Trial]) -> str:
     return "worth less than its price" if considered.gain <= price(considered.trial) else "another explains more"
 
 
-def assemble(
-    found: Search,
-    datasets: Sequence[str],
-    names: Sequence[str],
-    seed: int,
-    law: FoundLaw | None = None,
-    advice: Mapping[tuple[str, str], Advice] = _NO_ADVICE,
-) -> Outcome:
-    """Return the outcome of a search; a law stands for all that was left out.
-
-    ``advice`` is that of `validation.diagnosis.design.next_recording.advise`.
-    """
-    verdict, unexplained = verdict_of(found)
-    if law is not None:
-        verdict, unexplained = "unexplained", True
-    written = None
-    best = found.at_base() if unexplained else found
-    if law is not None:
-        written = replace(law.law, also=law.also, leaves=_leaves(law, names))
-        best = replace(found, final=law.tied)
-    trials = found.final.hypothesis.trials if verdict == "explained" else ()
-    effects = tuple(_named(found, trial, names, advice) for trial in trials)
-    located = [place for trial in trials for place in located_effect(found, trial, names)]
-    moved = recalibrations(best)
-    if verdict == "unexplained":
-        # what is missing, or put into a law that only resembles it, moves them by more than any noise
-        moved = {name: replace(item, sd=None) for name, item in moved.items()}
-    if verdict == "recalibrated":
-        located += [
-            replace(place, text=f"{place.text}; a stated number is off") for place in located_rest(found, names)[:1]
-        ]
-    if unexplained:
-        located = located_rest(found, names)
-    base, final, held = _figures(found, unexplained) if law is None else _with_law(found, law)
-    held = tuple(replace(item, recording=names[int(item.recording)]) for item in held)
-    candidates = tuple(
+def _candidates(found: Search, named: Sequence[Trial], names: Sequence[str]) -> tuple[Candidate, ...]:
+    """Return what was refitted in the order of its gain, and why it is named or not."""
+    return tuple(
         Candidate(
             c.trial.id,
             float(c.gain),
             c.values,
             None if c.trial.recordings is None else tuple(names[i] for i in sorted(c.trial.recordings)),
-            reason_for(c, trials),
+            reason_for(c, named),
         )
         for c in sorted(found.considered, key=lambda c: -c.gain)
         if np.isfinite(c.gain) and all(np.isfinite(v) for v in c.values.values())
     )
+
+
+def outcome_of(judged: Judged, question: Question) -> Outcome:
+    """Return the outcome of what was tried and judged."""
+    tried = judged.tried
+    ready, found = tried.prepared, tried.found
+    setup = answer_of_setup(ready.setup, question.recordings, tried.fit, judged.verdict)
+    warnings, agreement = (*setup.warnings, *ready.notes), agreement_of(ready.meant, question.names, ready.agreeing)
+    if found is not None:
+        return _outcome_of_search(judged, question, found, setup, warnings, agreement)
+    assert tried.contradiction is not None
+    datasets, names, seed = question.datasets, question.names, question.seed
+    return contradicted_outcome(tried.contradiction, ready.meant, datasets, names, seed, warnings, agreement)
+
+
+def _outcome_of_search(
+    judged: Judged,
+    question: Question,
+    found: Search,
+    setup: SetupAnswer,
+    warnings: tuple[str, ...],
+    agreement: Agreement | None,
+) -> Outcome:
+    names, law, unexplained = question.names, judged.law, judged.verdict == "unexplained"
+    trials = () if unexplained else found.final.hypothesis.trials
+    if trials:
+        question.progress("asking what to record next", 4, 5)
+    advice = advise(found, names, question.plans) if trials else {}
+    less = {trial.name: tried_without(found, trial) for trial in trials}
+    choices = [] if unexplained else choices_without_each(found, less)
+    # where nothing explains it, the answer is about the baseline, or about the law that stands for all
+    best = found if not unexplained else found.at_base() if law is None else replace(found, final=law.tied)
+    named = tuple(_named(found, trial, less[trial.name], names, choices, advice) for trial in trials)
+    named = on_board_axes(named, judged.tried.prepared.setup, found.final.fit)
+    moved = recalibrations(best)
+    baseline, final, held = _figures(found, unexplained, choices) if law is None else _with_law(found, law)
     diagnosis = Diagnosis(
-        tuple(datasets),
+        question.datasets,
         found.recordings[0].plant,
-        seed,
-        verdict,
-        base,
+        question.seed,
+        judged.verdict,
+        _raised(baseline, setup.excess),
         final,
-        tuple(located),
-        effects,
-        moved,
-        written,
+        (*setup.located, *_located(found, trials, names, unexplained, moved)),
+        (*setup.effects, *named),
+        # what is missing, or put into a law that only resembles it, moves them by more than any noise
+        {name: replace(item, sd=None) for name, item in moved.items()} if unexplained else moved,
+        None if law is None else replace(law.law, also=law.also, leaves=_leaves(law, names)),
         tuple(
             _noise_beside(found)
             if unexplained and law is None
             else _noise_notes(best.final.fit.linears, best.final.fit.noise)
         ),
-        held,
+        tuple(replace(item, recording=names[int(item.recording)]) for item in held),
         tuple(Outlier(names[i], s, a, t, d) for i, s, a, t, d in found.outliers),
-        _next_recordings(found, verdict, effects),
-        tuple(found.warnings),
+        tuple(dict.fromkeys((*setup.next_recordings, *_next_recordings(found, unexplained, named)))),
+        warnings,
+        agreement,
     )
-    model = _model(best, effects, written)
+    model = _model(best, (*named, *setup.effects), diagnosis.law)
     shown = _residuals(best, names, unexplained and law is None)
-    return Outcome(diagnosis, model, tuple(shown), candidates)
+    return Outcome(diagnosis, model, tuple(shown), _candidates(found, trials, names), settings_told())
+
+
+def _raised(fit: FitFigures, excess: float) -> FitFigures:
+    """Return the figures of a baseline of which every reading misses more of what is written."""
+    held = fit.heldout_chi2_per_sample
+    return FitFigures(fit.chi2_per_sample + excess, None if held is None else held + excess)
+
+
+def _located(
+    found: Search,
+    trials: Sequence[Trial],
+    names: Sequence[str],
+    unexplained: bool,
+    moved: Mapping[str, Recalibration],
+) -> list[Located]:
+    """Return where the recordings part from the baseline: by each effect, by a stated number that is off, or by all."""
+    if unexplained:
+        return located_rest(found, names)
+    if not trials and any(item.beyond for item in moved.values()):
+        worst = located_rest(found, names)[:1]
+        return [replace(place, text=f"{place.text}; a stated number is off") for place in worst]
+    return [place for trial in trials for place in located_effect(found, trial, names)]

@@ -10,7 +10,9 @@ from discsim.arrays import FloatArray
 from discsim.model_file import Model
 from discsim.recording import Recording
 from validation.diagnosis.consistency.early_verdict import Contradiction, Look
+from validation.diagnosis.consistency.spin_agreement import Agreement
 from validation.diagnosis.result import Diagnosis, FitFigures, Located, Outcome, Residuals
+from validation.diagnosis.settings import settings_told
 
 __all__ = ["contradicted_outcome"]
 
@@ -19,12 +21,19 @@ _MOST = 1e6
 
 
 def contradicted_outcome(
-    found: Contradiction, recordings: Sequence[Recording], datasets: Sequence[str], names: Sequence[str], seed: int
+    found: Contradiction,
+    recordings: Sequence[Recording],
+    datasets: Sequence[str],
+    names: Sequence[str],
+    seed: int,
+    warnings: Sequence[str] = (),
+    agreement: Agreement | None = None,
 ) -> Outcome:
     """Return the outcome of recordings that no motion follows: unexplained, located by sensor.
 
     ``recordings`` (called ``names``) are those of the data sets ``datasets``. Baseline and final figures are those of
-    the look at all sensors together, in noise that no misfit has inflated.
+    the look at all sensors together, in noise that no misfit has inflated. ``warnings`` come after what contradicts
+    what, ``agreement`` is that of the spin.
     """
     look = found.whole
     squares = _excess(look)
@@ -47,9 +56,12 @@ def contradicted_outcome(
         figures,
         located,
         next_recordings=("The same again once these sensors agree: until then no effect can be looked for.",),
-        warnings=found.sentences,
+        warnings=(*found.sentences, *warnings),
+        agreement=agreement,
     )
-    return Outcome(diagnosis, Model(first.environment, first.disc, first.rig, (), ()), tuple(shown))
+    return Outcome(
+        diagnosis, Model(first.environment, first.disc, first.rig, (), ()), tuple(shown), (), settings_told()
+    )
 
 
 def _text(found: Contradiction, sensor: str) -> str:

@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
 
 from discsim.effects.own import UserEffect
 from discsim.errors import InputError
 from discsim.model_file import Model
 from discsim.recording import Recording
+from discsim.result import Result
+from discsim.threads import one_thread
 from validation.diagnosis.datasets import need_field
 from validation.diagnosis.pipeline import diagnose
+from validation.diagnosis.report.figures import draw_overview
 from validation.diagnosis.report.files import write_outcome
 from validation.diagnosis.report.page import verdict_sentence
 from validation.diagnosis.result import Diagnosis, NamedEffect, Outcome
+from validation.diagnosis.stages import Progress, silent
 from validation.identification.plants.plan import Plan
 from validation.running.given import Given, given_recordings
 
 __all__ = ["Diagnosed", "diagnose_named", "diagnose_recordings"]
 
 
-def _silent(stage: str, done: int, total: int) -> None:
-    del stage, done, total
-
-
 @dataclass(frozen=True, repr=False)
-class Diagnosed:
+class Diagnosed(Result):
     """A finished diagnosis.
 
     Attributes
@@ -68,6 +71,21 @@ class Diagnosed:
         """Return the verdict and the sentence that explains it, one line."""
         return f"{self.verdict}: {verdict_sentence(self.diagnosis)}"
 
+    def table(self) -> dict[str, list[Any]]:
+        """Return a row for each parameter of each named effect: effect, recordings, parameter, value, sd."""
+        rows = [(effect, name, found) for effect in self.effects for name, found in effect.parameters.items()]
+        return {
+            "effect": [effect.id for effect, *_ in rows],
+            "recordings": [", ".join(effect.recordings or ("all",)) for effect, *_ in rows],
+            "parameter": [name for _, name, _ in rows],
+            "value": [found.value for *_, found in rows],
+            "sd": [float("nan") if found.sd is None else found.sd for *_, found in rows],
+        }
+
+    def plot(self) -> Figure:
+        """Return the figure of residuals over the noise, by recording and axis, before and after."""
+        return draw_overview(self.outcome.residuals)
+
     def report(self, folder: Path | str, command: str = "validation.diagnose") -> Path:
         """Write diagnosis.json, report.html, figures and model.toml into ``folder``; return the report's path.
 
@@ -90,7 +108,7 @@ def diagnose_recordings(
     seed: int = 0,
     user_effects: Sequence[UserEffect] = (),
     plans: Sequence[Plan] | None = None,
-    progress: Callable[[str, int, int], None] = _silent,
+    progress: Progress = silent,
 ) -> Diagnosed:
     """Tell whether the baseline explains recordings down to their noise, and if not, what was left out.
 
@@ -109,7 +127,10 @@ def diagnose_recordings(
     progress
         Called with a stage, the steps done, and the steps in all.
 
-    Raises `InputError` for recordings of different plants, and for a magnetometer in a field that is not stated.
+    Raises
+    ------
+    InputError
+        For recordings of different plants, and for a magnetometer in a field that is not stated.
     """
     if name is None:
         name = Path(recordings).resolve().name if isinstance(recordings, Path | str) else "recordings"
@@ -118,13 +139,14 @@ def diagnose_recordings(
     )
 
 
+@one_thread
 def diagnose_named(
     datasets: Mapping[str, Sequence[Recording]],
     *,
     seed: int = 0,
     user_effects: Sequence[UserEffect] = (),
     plans: Sequence[Plan] | None = None,
-    progress: Callable[[str, int, int], None] = _silent,
+    progress: Progress = silent,
 ) -> Diagnosed:
     """Diagnose several data sets by name together, as `diagnose_recordings` does one."""
     sets = list(datasets.values())

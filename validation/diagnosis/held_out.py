@@ -1,35 +1,102 @@
-"""Evidence on recordings held out: what effects gain where their parameters were not fitted (cross-validation)."""
+"""Evidence on recordings held out (leave-one-out cross-validation): neither choice nor size of an effect saw them.
+
+For each recording the effects are chosen again from the others, among what decides the choice: each named effect, the
+rivals that were refitted in its place, and none. Each is judged by its own fit, to first order about it. What acts in
+one recording alone, as an event does, and what was read off the readings themselves no other recording can choose.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import TypeAlias
+
 import numpy as np
 
+from discsim.arrays import FloatArray
 from validation.diagnosis.selection.candidates import Trial
-from validation.diagnosis.selection.found import Search
+from validation.diagnosis.selection.constrained_fit import Tied
+from validation.diagnosis.selection.evidence import price
+from validation.diagnosis.selection.exchange import takes_its_place
+from validation.diagnosis.selection.found import Search, possible
 from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
+from validation.diagnosis.selection.screening import free_columns
+from validation.identification.gauss_newton import mapped
+from validation.identification.noise import chi_squared, log_likelihood
+from validation.identification.normal_equations import reduce, shared_step
 
-__all__ = ["heldout_chi2", "heldout_gain"]
+__all__ = ["Choice", "choices_without_each", "heldout_chi2", "heldout_gain"]
+
+#: what the other recordings choose in the place of each named effect, by its name: itself, a rival or nothing
+Choice: TypeAlias = Mapping[str, Trial | None]
 
 
-def heldout_gain(found: Search, trial: Trial) -> float | None:
-    """Return the log likelihood that an effect gains on recordings that took no part in its fit."""
-    board, final = found.board, found.final
-    assert board is not None
-    count = board.recordings
-    if count < 2 or not trial.columns or (trial.recordings is not None and len(trial.recordings) < 2):
+def choices_without_each(found: Search, less: Mapping[str, Tied]) -> list[Choice]:
+    """Return for each recording what the others choose; ``less`` are fits without each named effect, by its name."""
+    final, count = found.final, len(found.recordings)
+    choices: list[dict[str, Trial | None]] = [{t.name: t for t in final.hypothesis.trials} for _ in range(count)]
+    if count < 2:
+        return list(choices)
+    here = _scores_without_each(final) if final.hypothesis.trials else np.zeros(count)
+    for trial in final.hypothesis.trials:
+        if not _by_others(trial):
+            continue
+        gain = _scores_without_each(less[trial.name]) - here
+        rivals = [rival for rival in found.rivals.get(trial.name, ()) if possible(rival.tied)]
+        worse = [_scores_without_each(rival.tied) - here for rival in rivals]
+        for i, choice in enumerate(choices):
+            better = [(w[i], rival.trial) for w, rival in zip(worse, rivals, strict=True)]
+            better = [(w, other) for w, other in better if takes_its_place(w, other, trial)]
+            if gain[i] <= price(trial):
+                choice[trial.name] = None
+            elif better:
+                choice[trial.name] = min(better, key=lambda item: item[0])[1]
+    return list(choices)
+
+
+def _by_others(trial: Trial) -> bool:
+    """Tell whether other recordings can speak of an effect that acts in one."""
+    return bool(trial.columns) and (trial.recordings is None or len(trial.recordings) > 1)
+
+
+def _scores_without_each(tied: Tied) -> FloatArray:
+    """Return what the score of a fit (r,) is without each recording, its parameters as the others have them."""
+    fit = tied.fit
+    reduced = mapped(lambda linear, chain: reduce(linear, chain, fit.noise, fit.jumps), fit.linears, fit.chains)
+    total = np.sum([r.gram for r in reduced], axis=0)
+    whole = shared_step(total, fit.parameters, fit.at)[2]
+    scores = []
+    for linear, residual, own in zip(fit.linears, tied.residuals, reduced, strict=True):
+        others = shared_step(total - own.gram, fit.parameters, fit.at)[2]
+        level = log_likelihood(linear, fit.noise, residual) - chi_squared(linear, fit.noise, residual)
+        scores.append(tied.score - (whole - others) - level)
+    return np.array(scores)
+
+
+def heldout_gain(found: Search, trial: Trial, choices: Sequence[Choice]) -> float | None:
+    """Return the log likelihood that recordings gain by what the others choose in an effect's place; None for one."""
+    if len(choices) < 2 or not _by_others(trial):
         return None
-    rest = final.hypothesis.without(trial)
+    rest = found.final.hypothesis.without(trial)
     total = 0.0
-    for i in range(count):
-        total += heldout_chi2(found, rest, i) - heldout_chi2(found, final.hypothesis, i)
+    for i, choice in enumerate(choices):
+        chosen = choice[trial.name]
+        if chosen is not None:
+            total += heldout_chi2(found, rest, i) - heldout_chi2(found, found.final.hypothesis, i, {trial.name: chosen})
     return 0.5 * total
 
 
-def heldout_chi2(found: Search, hypothesis: Hypothesis, i: int) -> float:
-    """Return chi-squared of a recording with the shared parameters as the other recordings have them."""
+def heldout_chi2(found: Search, hypothesis: Hypothesis, i: int, choice: Choice | None = None) -> float:
+    """Return chi-squared of a recording with the shared parameters as the other recordings have them.
+
+    Of the trials of the ``hypothesis`` those in a ``choice`` give way to what it has in their place.
+    """
     board = found.board
-    assert board is not None
-    own = board.columns_of(fitted_parameters(hypothesis, found.own))
+    places = [(trial, trial if choice is None else choice.get(trial.name, trial)) for trial in hypothesis.trials]
+    kept = Hypothesis(tuple(trial for trial, chosen in places if chosen is trial))
+    own = board.columns_of(fitted_parameters(kept, found.own))
+    for trial, chosen in places:
+        if chosen is not None and chosen is not trial:
+            own += free_columns(chosen)
     others = [j for j in range(board.recordings) if j != i]
     answer = board.ask(own, only=others)
     G = board.grams[i]
@@ -48,6 +115,6 @@ def heldout_chi2(found: Search, hypothesis: Hypothesis, i: int) -> float:
         e[:-1] -= G[:-1][:, at] @ v
     if alone:
         free = np.array([board.place[column] for column, _ in alone])
-        H = G[np.ix_(free, free)] + np.diag([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for _, q in alone])
+        H = G[np.ix_(free, free)] + np.diag([q.precision for _, q in alone])
         chi2 -= float(e[free] @ np.linalg.solve(H + 1e-12 * np.diag(np.diag(H)), e[free]))
     return chi2

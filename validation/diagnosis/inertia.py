@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from discsim.arrays import ComplexArray
 from discsim.disc import Disc
 from discsim.errors import InputError
 from discsim.recording import Recording
@@ -19,7 +20,6 @@ from validation.identification.plants import plant_of
 
 __all__ = ["with_inertia"]
 
-ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
 
 #: Izz/Ixx of bare discs and how it spreads: golf discs and Ultimate discs as measured lie between 1.85 and 2
 DISC, DISC_SD = 1.93, 0.05

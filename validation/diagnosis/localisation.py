@@ -11,7 +11,6 @@ from validation.diagnosis.result import Located
 from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.found import Search
 from validation.diagnosis.selection.hypothesis import fitted_parameters
-from validation.identification.competing_effects import row_of, user_effect
 from validation.identification.linear import Linear
 from validation.identification.normal_equations import local_step
 
@@ -39,7 +38,6 @@ def without(found: Search, trial: Trial) -> list[FloatArray]:
     What the recordings' own unknowns and the other effects can take over, they do, to first order.
     """
     board = found.board
-    assert board is not None
     final = found.final
     kept = board.columns_of(fitted_parameters(final.hypothesis.without(trial), found.own))
     whole = board.columns_of(final.fit.parameters)
@@ -61,10 +59,8 @@ def without(found: Search, trial: Trial) -> list[FloatArray]:
 def located_effect(found: Search, trial: Trial, names: Sequence[str]) -> list[Located]:
     """Return where an effect shows: for an event its instant, for a sensor's fault the sensor and axis."""
     sd = {group: noise.sd for group, noise in found.final.fit.noise.items()}
-    assert found.board is not None
     excess = excess_of(without(found, trial), found.final.residuals, found.board.linears, sd)
-    row, own = row_of(trial.id), user_effect(trial.id)
-    assert row is not None
+    row, own = trial.row, trial.user
     grows, text = (row.grows_with, row.trace) if own is None else (None, own.text)
     mine = {key: value for key, value in excess.items() if trial.recordings is None or key[0] in trial.recordings}
     total = sum(max(float(np.sum(value)), 0.0) for value in mine.values())

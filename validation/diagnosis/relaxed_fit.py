@@ -12,12 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, sd_by_median
 from discsim.effects.catalogue import CATALOGUE, catalogued
 from discsim.effects.sensors import ClockRate
 from discsim.frames import conjugate, multiply
 from discsim.recording import Recording
-from validation.diagnosis.consistency.spin_agreement import written_ratios
+from validation.diagnosis.consistency.spin_agreement import Comparison, compared, written_ratios
+from validation.diagnosis.settings import CONSISTENCY, RELAXED_FIT
 from validation.identification.gauss_newton import Fit, linearised, merit_of, refit
 from validation.identification.linear import Linear
 from validation.identification.noise import channel_of, estimate_noise, stated_noise, whitened
@@ -89,13 +90,21 @@ def loose_parameters(recordings: Sequence[Recording], sensors: set[str]) -> tupl
 
 # far from the data a motion may run beyond all numbers: such a step is not finite, and is not taken
 @np.errstate(over="ignore", invalid="ignore")
-def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), iterations: int = 12) -> Fit:
-    """Fit recordings of one plant so loosely that any effect of ordinary size finds room."""
+def relaxed(
+    recordings: Sequence[Recording],
+    known: Sequence[Parameter] = (),
+    iterations: int = 12,
+    agreeing: Sequence[Sequence[Comparison]] | None = None,
+) -> Fit:
+    """Fit recordings of one plant so loosely that any effect of ordinary size finds room.
+
+    ``agreeing`` is what their sensors say of one another (`compared`), where that is known.
+    """
     plant = plant_of(recordings[0])
-    ratio = _wrong_time(recordings)
+    ratio = _wrong_time(recordings, agreeing)
     chains = tuple(first_chain(one) if ratio == 1.0 else chain_in_true_time(one, ratio) for one in recordings)
     sensors = {readings.sensor for one in chains for readings in one.readings}
-    clock = () if ratio == 1.0 else (Parameter(*_CLOCK, 1.0, 1e-6, _TIME_SIGMA),)
+    clock = () if ratio == 1.0 else (Parameter(*_CLOCK, 1.0, 1e-6, RELAXED_FIT.time_sigma),)
     parameters = (*known, *loose_parameters(recordings, sensors), *clock)
     at = np.array([ratio if q.key == _CLOCK else q.stated for q in parameters])
     fit = Fit(chains, parameters, at, plant.sizes.relaxed, {})
@@ -113,22 +122,13 @@ def relaxed(recordings: Sequence[Recording], known: Sequence[Parameter] = (), it
     return replace(fit, linears=linears, merit=merit_of(fit, linears))
 
 
-#: how far a clock may be from right where sensors say that the written time is wrong altogether
-_TIME_SIGMA = 0.3
-#: a clock less wrong than this is found by `_with_clocks`, and may be a sensor's own
-_LEAST_WRONG = 0.03
-
-
-def _wrong_time(recordings: Sequence[Recording]) -> float:
+def _wrong_time(recordings: Sequence[Recording], agreeing: Sequence[Sequence[Comparison]] | None) -> float:
     """Return the ratio of written to true time where most recordings say that it is far from 1, else 1."""
     if not plant_of(recordings[0]).airborne:
         return 1.0
-    ratio = float(np.median(written_ratios(recordings)))
-    return ratio if abs(ratio - 1.0) > _LEAST_WRONG else 1.0
-
-
-#: a relaxed fit of a recording whose chi-squared per reading is above this started wrong
-_ASTRAY = 8.0
+    each = compared(recordings, [one.name for one in recordings]) if agreeing is None else agreeing
+    ratio = float(np.median(written_ratios(each)))
+    return ratio if abs(ratio - 1.0) > RELAXED_FIT.least_wrong else 1.0
 
 
 def _astray(fit: Fit) -> list[int]:
@@ -138,7 +138,7 @@ def _astray(fit: Fit) -> list[int]:
         / max(linear.raw.size, 1)
         for linear in fit.linears
     ]
-    return [i for i in np.argsort(chi2)[::-1].tolist() if chi2[i] > _ASTRAY]
+    return [i for i in np.argsort(chi2)[::-1].tolist() if chi2[i] > RELAXED_FIT.astray]
 
 
 def from_other_starts(fit: Fit) -> Fit:
@@ -147,7 +147,7 @@ def from_other_starts(fit: Fit) -> Fit:
     if attitude is None:
         return fit
     better = dict[int, Chain]()
-    for i in _astray(fit)[:FEW]:
+    for i in _astray(fit)[: CONSISTENCY.few]:
         recording = fit.chains[i].recording
         ratio = fit.values(i).get(_CLOCK, 1.0)
         first = (
@@ -161,19 +161,13 @@ def from_other_starts(fit: Fit) -> Fit:
             states[:, attitude] = multiply(np.broadcast_to(turned, (len(states), 4)), states[:, attitude])
             trial = replace(alone, chains=(replace(fit.chains[i], states=states),))
             trial = refit(trial, iterations=6, tolerance=1e-3 * fit.count)
-            if trial.merit < _RESCUED * alone.merit:
+            if trial.merit < RELAXED_FIT.rescued * alone.merit:
                 alone, better[i] = trial, trial.chains[0]
     if not better:
         return fit
     together = replace(fit, chains=tuple(better.get(i, one) for i, one in enumerate(fit.chains)))
     together = refit(together, iterations=6, tolerance=1e-3 * fit.count)
     return together if together.merit < fit.merit else fit
-
-
-#: so many recordings tell whether something that all share reconciles them
-FEW = 3
-#: another start, or a free clock, is taken up where it leaves less than this share of what was left
-_RESCUED = 0.8
 
 
 def part_of(fit: Fit, chosen: Sequence[int]) -> Fit:
@@ -220,7 +214,7 @@ def _led_by_others(fit: Fit) -> Fit:
     for sensor, clock in _LED.items():
         if sensor not in there or not (there - {sensor}) & {"magnetometer", "gyroscope"}:
             continue
-        some = part_of(fit, _astray(fit)[:FEW])
+        some = part_of(fit, _astray(fit)[: CONSISTENCY.few])
         if len(some.chains) < len(fit.chains) and _astray(_without(some, sensor, few)):
             continue
         led = _without(fit, sensor, few)
@@ -231,7 +225,7 @@ def _led_by_others(fit: Fit) -> Fit:
             replace(new, recording=old.recording, readings=old.readings)
             for new, old in zip(led.chains, fit.chains, strict=True)
         )
-        free = Parameter(*clock, 1.0, 1e-6, _CLOCK_SIGMA)
+        free = Parameter(*clock, 1.0, 1e-6, RELAXED_FIT.clock_sigma)
         both = replace(led, chains=chains, parameters=(*fit.parameters, free), at=np.append(led.at, ratio))
         both = refit(both, iterations=12, tolerance=few)
         if not _astray(both):
@@ -244,12 +238,6 @@ def _led_by_others(fit: Fit) -> Fit:
     return fit
 
 
-#: a gyroscope on a rig whose residual is this many times its stated noise may have a clock far from right
-_LOST = 10.0
-#: a clock is taken up where it leaves less than this share of what was left of its sensor
-_RECONCILED = 0.2
-
-
 def _with_own_clock(fit: Fit) -> Fit:
     """Fit again with a free clock of the gyroscope on a rig where the motion contradicts it and a clock reconciles it.
 
@@ -258,13 +246,13 @@ def _with_own_clock(fit: Fit) -> Fit:
     """
     sensor, clock = "gyroscope", _LED["gyroscope"]
     before = _misfit(fit, sensor)
-    if not before > _LOST:
+    if not before > RELAXED_FIT.lost:
         return fit
     ratio = _clock_read(fit, [one.readings for one in fit.chains], sensor, clock)
-    free = Parameter(*clock, 1.0, 1e-6, _CLOCK_SIGMA)
+    free = Parameter(*clock, 1.0, 1e-6, RELAXED_FIT.clock_sigma)
     timed = replace(fit, parameters=(*fit.parameters, free), at=np.append(fit.at, ratio))
     timed = refit(timed, iterations=8, tolerance=1e-4 * fit.count)
-    return timed if _misfit(timed, sensor) < _RECONCILED * before else fit
+    return timed if _misfit(timed, sensor) < RELAXED_FIT.reconciled * before else fit
 
 
 def _misfit(fit: Fit, sensor: str) -> float:
@@ -309,14 +297,10 @@ def _clock_read(led: Fit, readings: Sequence[Sequence[Readings]], sensor: str, c
     return float(_CLOCKS_TRIED[int(np.argmin(misfit))])
 
 
-#: how far clocks may be wrong where a fit went astray, and how long its first look is, s
-_CLOCK_SIGMA, _FIRST_LOOK = 0.02, 1.3
-
-
 def free_clocks(sensors: set[str]) -> tuple[Parameter, ...]:
     """Return the clocks of sensors on board, free within a few per cent."""
     return tuple(
-        Parameter(catalogued(ClockRate, sensor).id, "ratio", 1.0, 1e-6, _CLOCK_SIGMA)
+        Parameter(catalogued(ClockRate, sensor).id, "ratio", 1.0, 1e-6, RELAXED_FIT.clock_sigma)
         for sensor in ("magnetometer", "accelerometer", "gyroscope")
         if sensor in sensors
     )
@@ -333,7 +317,7 @@ def _with_clocks(fit: Fit) -> Fit:
     parameters = (*fit.parameters, *clocks)
     at = np.array([q.stated for q in parameters])
     free = replace(fit, parameters=parameters, at=at)
-    some = part_of(free, _astray(fit)[:FEW])
+    some = part_of(free, _astray(fit)[: CONSISTENCY.few])
     if len(some.chains) < len(fit.chains) and len(_astray(_first_look(some))) == len(some.chains):
         return fit
     look = _first_look(free)
@@ -345,12 +329,12 @@ def _with_clocks(fit: Fit) -> Fit:
     known = {q.key for q in clocks}
     at = np.array([v if q.key in known else q.stated for q, v in zip(parameters, look.at, strict=True)])
     whole = refit(replace(fit, chains=chains, parameters=parameters, at=at), iterations=12, tolerance=1e-4 * fit.count)
-    return whole if whole.merit < _RESCUED * fit.merit else fit
+    return whole if whole.merit < RELAXED_FIT.rescued * fit.merit else fit
 
 
 def _first_look(fit: Fit) -> Fit:
     """Return a fit to the beginnings of recordings alone, from the start."""
-    short = tuple(beginning(first_chain(one.recording), _FIRST_LOOK) for one in fit.chains)
+    short = tuple(beginning(first_chain(one.recording), RELAXED_FIT.first_look) for one in fit.chains)
     return refit(replace(fit, chains=short), iterations=10)
 
 
@@ -367,12 +351,6 @@ def beginning(current: Chain, length: float) -> Chain:
     return replace(current, edges=edges, states=states, readings=readings, lost=lost)
 
 
-#: a reading this many standard deviations off, alone among its neighbours, is left out and listed
-_OUTLIER, _NEIGHBOUR = 9.0, 4.5
-#: larger shares of a sensor's readings than this are not outliers
-_MOST = 0.03
-
-
 def without_outliers(fit: Fit) -> tuple[Fit, list[tuple[int, str, str, float, float]]]:
     """Leave out single readings far from everything else, as bad GPS fixes are, and fit again.
 
@@ -386,11 +364,13 @@ def without_outliers(fit: Fit) -> tuple[Fit, list[tuple[int, str, str, float, fl
             x = linear.residual[channel.rows]
             if x.size < 8:
                 continue
-            sd = max(1.4826 * float(np.median(np.abs(x))), 1e-12)
+            sd = max(float(sd_by_median(x)), 1e-12)
             z = np.abs(x) / sd
             padded = np.concatenate([[0.0], z, [0.0]])
-            alone = (z > _OUTLIER) & (np.maximum(padded[:-2], padded[2:]) < np.maximum(_NEIGHBOUR, 0.2 * z))
-            if not 0 < np.count_nonzero(alone) <= max(2, _MOST * x.size):
+            alone = (z > RELAXED_FIT.outlier) & (
+                np.maximum(padded[:-2], padded[2:]) < np.maximum(RELAXED_FIT.neighbour, 0.2 * z)
+            )
+            if not 0 < np.count_nonzero(alone) <= max(2, RELAXED_FIT.most_outliers * x.size):
                 continue
             readings = next(r for r in current.readings if r.sensor == channel.sensor)
             axis = readings.axes.index(channel.axis)

@@ -18,25 +18,22 @@ from discsim.effects.catalogue import CATALOGUE, Effect, catalogued, effect, eff
 from discsim.effects.kind import BOARD
 from discsim.effects.sensors import Scale
 from discsim.effects.setup import Axes, BoardRotation, ClockUnit, SiteField, TimeOffset
-from discsim.model_file import ModelEffect
 from discsim.recording import Recording
 from discsim.written import corrected
 from validation.diagnosis.result import (
     SMALLEST_P_VALUE,
     Confusion,
-    Diagnosis,
     Evidence,
-    FitFigures,
     Located,
     NamedEffect,
-    Outcome,
     ParameterValue,
+    Verdict,
 )
 from validation.diagnosis.setup import SetupFault, SetupFindings, said
 from validation.identification.gauss_newton import Fit
 from validation.identification.parameters import Parameter
 
-__all__ = ["free_parameters", "with_reversed_axes", "with_setup"]
+__all__ = ["SetupAnswer", "answer_of_setup", "free_parameters", "on_board_axes", "with_reversed_axes"]
 
 #: how far a number of a fault may be from its first value, one sigma: s; rad; rad and share. Offsets are found to a few
 #: ms, rotations to a tenth of a radian (an accelerometer's place may be 3 mm of 16 off), fields to a few per cent
@@ -77,63 +74,59 @@ def _numbers(value: tuple[float | str, ...]) -> list[float]:
     return [float(item) for item in value if not isinstance(item, str)]
 
 
-def with_setup(outcome: Outcome, findings: SetupFindings, written: Sequence[Recording], fit: Fit | None) -> Outcome:
-    """Return an outcome with the faults of the setup among its effects.
+@dataclass(frozen=True)
+class SetupAnswer:
+    """What the faults of a setup put into an answer: effects, places, what to record, warnings.
+
+    ``excess`` is the chi-squared per reading by which the baseline misses what is written.
+    """
+
+    effects: tuple[NamedEffect, ...] = ()
+    located: tuple[Located, ...] = ()
+    next_recordings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    excess: float = 0.0
+
+
+def answer_of_setup(
+    findings: SetupFindings, written: Sequence[Recording], fit: Fit | None, verdict: Verdict
+) -> SetupAnswer:
+    """Return the faults of a setup as the answer has them.
 
     ``written`` are the recordings as they stand in their files, ``fit`` the final one, of the corrected recordings, or
     None where nothing follows them. The baseline's figures become those of the written readings against the motion that
     the fit found. Where something unexplained is left, the faults stand among the warnings, as the answer names no
     effect then.
     """
-    if not findings.faults:
-        return outcome
-    diagnosis = outcome.diagnosis
-    if diagnosis.verdict == "unexplained" or fit is None:
-        told = tuple(f"corrected before the fit: {fault.id}, {fault.sentence}" for fault in findings.faults)
-        return replace(outcome, diagnosis=replace(diagnosis, warnings=(*diagnosis.warnings, *told)))
+    if verdict == "unexplained" or fit is None:
+        told = (f"corrected before the fit: {fault.id}, {fault.sentence}" for fault in findings.faults)
+        return SetupAnswer(warnings=tuple(told))
     excess = [_excess(fault.effect, written, findings.recordings, fit) for fault in findings.faults]
+    total = sum(excess)
     named = tuple(
         _named(fault, _refined(fault.effect, fit), more, fit, len(written))
         for fault, more in zip(findings.faults, excess, strict=True)
     )
     located = tuple(
-        _located(one, fault, more / max(sum(excess), 1e-300), written)
+        _located(one, fault, more / max(total, 1e-300), written)
         for one, fault, more in zip(named, findings.faults, excess, strict=True)
     )
-    total = sum(excess) / max(fit.count, 1)
-    held = diagnosis.baseline.heldout_chi2_per_sample
-    baseline = FitFigures(diagnosis.baseline.chi2_per_sample + total, None if held is None else held + total)
-    turned = next((Rotation.from_rotvec(_numbers(f.effect.value)) for f in findings.faults if f.id == _TURNED), None)
-    if turned is not None:
-        outcome = _on_board_axes(outcome, turned.as_matrix(), fit)
-        diagnosis = outcome.diagnosis
-    changed = replace(
-        diagnosis,
-        verdict="explained",
-        baseline=baseline,
-        effects=(*named, *diagnosis.effects),
-        located=(*located, *diagnosis.located),
-        next_recordings=_next(diagnosis, named),
-    )
-    carried = tuple(
-        ModelEffect(
-            effect(one.id, **{name: item.value for name, item in one.parameters.items()}, **one.setting),
-            {name: item.sd for name, item in one.parameters.items() if item.sd is not None},
-            None,
-        )
-        for one in named
-    )
-    return replace(outcome, diagnosis=changed, model=replace(outcome.model, effects=(*outcome.model.effects, *carried)))
+    told = (other.next_recording for one in named for other in one.confused_with[:1] if other.next_recording)
+    return SetupAnswer(named, located, tuple(told), (), total / max(fit.count, 1))
 
 
 _TURNED = catalogued(BoardRotation).id
 
 
-def _on_board_axes(outcome: Outcome, C: FloatArray, fit: Fit) -> Outcome:
-    """Return an outcome whose vectors of a sensor are along the axes of a turned board, as they are in its readings.
+def on_board_axes(effects: Sequence[NamedEffect], findings: SetupFindings, fit: Fit) -> tuple[NamedEffect, ...]:
+    """Return effects whose vectors of a sensor are along the axes of a turned board, as they are in its readings.
 
     The fit had readings C (C^T w + b) of a board that is turned by C: what it found is C b.
     """
+    first = next((Rotation.from_rotvec(_numbers(f.effect.value)) for f in findings.faults if f.id == _TURNED), None)
+    if first is None:
+        return tuple(effects)
+    C = first.as_matrix()
 
     def turned(one: NamedEffect) -> NamedEffect:
         names = list(one.parameters)
@@ -147,19 +140,7 @@ def _on_board_axes(outcome: Outcome, C: FloatArray, fit: Fit) -> Outcome:
             sd = np.sqrt(np.diag(C.T @ covariance @ C)).tolist()
         return replace(one, parameters=dict(zip(names, map(ParameterValue, value.tolist(), sd), strict=True)))
 
-    effects = tuple(map(turned, outcome.diagnosis.effects))
-    pairs = zip(outcome.diagnosis.effects, effects, strict=True)
-    changed = {(new.id, new.recordings): new.parameters for old, new in pairs if new is not old}
-
-    def carried(one: ModelEffect) -> ModelEffect:
-        parameters = changed.get((one.effect.id, one.recordings))
-        if parameters is None:
-            return one
-        size = effect(one.effect.id, **{name: item.value for name, item in parameters.items()})
-        return ModelEffect(size, {n: i.sd for n, i in parameters.items() if i.sd is not None}, one.recordings)
-
-    model = replace(outcome.model, effects=tuple(map(carried, outcome.model.effects)))
-    return replace(outcome, diagnosis=replace(outcome.diagnosis, effects=effects), model=model)
+    return tuple(map(turned, effects))
 
 
 def _covariance_of(fit: Fit, id: str, names: Sequence[str]) -> FloatArray | None:
@@ -270,8 +251,3 @@ def _located(named: NamedEffect, fault: SetupFault, share: float, written: Seque
     sensor = "all" if whose.acts_on in ("board", "clock") or whose.type is SiteField else whose.acts_on
     end = max(float(samples.t[-1]) for one in written for samples in one.samples.values())
     return Located("all", sensor, "all", 0.0, end, float(np.clip(share, 0.0, 1.0)), said(fault.effect))
-
-
-def _next(diagnosis: Diagnosis, named: Sequence[NamedEffect]) -> tuple[str, ...]:
-    told = [other.next_recording for one in named for other in one.confused_with[:1] if other.next_recording]
-    return tuple(dict.fromkeys([*told, *diagnosis.next_recordings]))

@@ -1,4 +1,4 @@
-"""From a search to its verdict: explained, consistent or unexplained, and what is recalibrated."""
+"""The verdict: explained, consistent, recalibrated or unexplained, by the one rule that decides it."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ from validation.diagnosis.result import (
 )
 from validation.diagnosis.selection.constrained_fit import Tied
 from validation.diagnosis.selection.found import Search, misses
+from validation.diagnosis.settings import UNKNOWN_LAW
+from validation.diagnosis.stages import Judged, Progress, Tried
+from validation.diagnosis.unknown_law.find import find_law
 from validation.identification.residual_tests import remainders
 
-__all__ = ["RECALIBRATED_NAMES", "standard_errors"]
+__all__ = ["RECALIBRATED_NAMES", "judged", "recalibrations", "standard_errors"]
 
 
 RECALIBRATED_NAMES = {
@@ -30,18 +33,40 @@ RECALIBRATED_NAMES = {
 }
 
 
-def verdict_of(found: Search) -> tuple[Verdict, bool]:
-    """Return the verdict, and whether something is left that is not noise."""
-    final = found.final
+def judged(tried: Tried, progress: Progress) -> Judged:
+    """Return what was tried with its verdict, and the law that stands for all that the catalogue leaves unexplained.
+
+    Unexplained is what no motion follows, what leaves more than noise, and what a law explains better than a stack of
+    effects does. Else effects, or faults of the setup, explain it. Else it is the baseline, recalibrated or not.
+    """
+    found, law = tried.found, None
+    if found is None:
+        return Judged(tried, "unexplained")
+    left = _leaves_more_than_noise(found)
+    if left or _stacked(found):
+        progress("looking for a law", 4, 5)
+        law = find_law(found.loose, found.final, found.own, found.loose_noise, tried.prepared.fitted)
+    verdict: Verdict
+    if left or law is not None:
+        verdict = "unexplained"
+    elif found.final.hypothesis.trials or tried.prepared.setup.faults:
+        verdict = "explained"
+    else:
+        moved = any(item.beyond for item in recalibrations(found).values())
+        verdict = "recalibrated" if moved else "consistent"
+    return Judged(tried, verdict, law)
+
+
+def _leaves_more_than_noise(found: Search) -> bool:
+    final, settled = found.final, found.loose.plant.durations.settled
     left = remainders(final.fit.linears, final.residuals, final.fit.noise)
-    plant = found.loose.plant
-    left = [item for item in left if item.kind != "window" or item.from_s > plant.durations.settled]
-    if left or misses(found, final):
-        return "unexplained", True
-    if final.hypothesis.trials:
-        return "explained", False
-    moved = any(item.beyond for item in recalibrations(found).values())
-    return ("recalibrated" if moved else "consistent"), False
+    return any(item.kind != "window" or item.from_s > settled for item in left) or misses(found, final)
+
+
+def _stacked(found: Search) -> bool:
+    """Tell whether several effects on the motion were found, so that one law is worth comparing with them."""
+    rows = [trial.row for trial in found.final.hypothesis.trials]
+    return sum(row.acts_on == "motion" and not row.brief for row in rows) >= UNKNOWN_LAW.stack
 
 
 def recalibrations(found: Search) -> dict[str, Recalibration]:

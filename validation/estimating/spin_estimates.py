@@ -8,10 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from discsim.errors import InputError
 from discsim.files import write_pieces, write_text
 from discsim.recording import Recording
+from discsim.result import Result
+from discsim.threads import one_thread
 from discsim.written import require_seconds
 from estimators.fusion import contradictions
 from estimators.methods import (
@@ -51,7 +54,7 @@ _ROWS = 50_000
 
 
 @dataclass(frozen=True, repr=False)
-class SpinEstimates:
+class SpinEstimates(Result):
     """Spin rates of one recording.
 
     Attributes
@@ -95,6 +98,19 @@ class SpinEstimates:
         """Return a line for each method, and the remarks."""
         return "\n".join([*(rate.summary() for rate in self.rates), *self.remarks])
 
+    def table(self) -> dict[str, Any]:
+        """Return the rates of all methods in one long table, as rate.csv has them."""
+        return {
+            "time_s": np.concatenate([rate.t for rate in self.rates]),
+            "method": np.repeat([rate.method for rate in self.rates], [len(rate) for rate in self.rates]),
+            "rate_rad_s": np.concatenate([rate.rate for rate in self.rates]),
+            "sd_rad_s": np.concatenate([rate.sd for rate in self.rates]),
+        }
+
+    def plot(self) -> Figure:
+        """Return the figure of rate.png."""
+        return draw_estimates(self.rates, self.recording.name)
+
     def report(self, folder: Path | str) -> Path:
         """Write rate.csv, estimate.json and rate.png into ``folder``; return the path of the first."""
         out = Path(folder)
@@ -105,6 +121,7 @@ class SpinEstimates:
         return out / "rate.csv"
 
 
+@one_thread
 def estimate_spin(
     recording: Given, method: str = "best", options: Options | None = None, *, progress: Progress = silent
 ) -> SpinEstimates:
@@ -125,8 +142,11 @@ def estimate_spin(
     return SpinEstimates(data, method, tuple(rates), left_out, tuple(disagreements(rates)), tuple(notes))
 
 
-def draw_estimates(rates: Sequence[YawRate], name: str, path: Path) -> None:
-    """Draw the rates, and below them their differences from the most preferred method that knows the rate."""
+def draw_estimates(rates: Sequence[YawRate], name: str, path: Path | None = None) -> Figure:
+    """Draw the rates, and below them their differences from the most preferred method that knows the rate.
+
+    Where a path is given the figure is written there.
+    """
     knowing = [rate for rate in rates if np.isfinite(rate.rate).any()]
     if len(knowing) < 2:
         figure, axes = new_figure(width=10.0, height=5.0)
@@ -141,7 +161,7 @@ def draw_estimates(rates: Sequence[YawRate], name: str, path: Path) -> None:
     handles, labels = axes.get_legend_handles_labels()
     axes.get_legend().remove()
     figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 5), fontsize=8)
-    save_figure(figure, path)
+    return save_figure(figure, path)
 
 
 def estimate_all(

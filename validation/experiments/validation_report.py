@@ -13,7 +13,7 @@ from validation.experiments.feedback.scoring import OUTPUT_ERROR
 from validation.reporting.figures import COLOURS, new_figure, save_figure, symmetric_log
 from validation.reporting.html import Section, write_report
 from validation.reporting.run import Run
-from validation.reporting.scores import Score, all_ok
+from validation.reporting.scores import Score
 from validation.scenarios.throws import EDGE_S, ThrowResult, rms
 
 __all__ = ["draw_throws", "write_validation_report"]
@@ -61,9 +61,17 @@ def write_validation_report(
 ) -> None:
     """Write ``report.html`` into the run's folder; its figures are there already."""
     failed = sum(not item.ok for item in scores)
-    verdict = (
-        "every score is within its tolerance" if all_ok(scores) else f"{failed} scores are outside their tolerance"
+    verdict = f"{failed} scores are outside their tolerance" if failed else "every score is within its tolerance"
+    sections = [*_scores(scores), _rate_table(run.out), _throws(results, run.out), _loop(loop, run.out)]
+    write_report(
+        run.out / "report.html",
+        "Validation report",
+        f"{len(scores)} scores, seed {run.seed}: {verdict}.",
+        [*sections, _concealed(concealed)],
     )
+
+
+def _scores(scores: Sequence[Score]) -> list[Section]:
     groups: dict[str, list[tuple[str, ...]]] = {}
     for item in scores:
         group, _, name = item.name.partition(": ")
@@ -71,69 +79,53 @@ def write_validation_report(
         row = (name or group, f"{item.value:.5g}{unit}", item.goal, "ok" if item.ok else "FAIL")
         groups.setdefault(group, []).append(row)
     header = ("score", "value", "goal", "")
-    scored = [Section(f"Scores: {group}", (), header, rows) for group, rows in groups.items()]
-    methods = list(results[0].rates)
-    throw_rows = [
-        (result.throw.name, *(_cell(np.degrees(rms(result.error(method)))) for method in methods)) for result in results
-    ]
-    waveform = [("Waveform and spectrum on the fastest plateau", run.out / "waveform.png")]
-    if not waveform[0][1].exists():  # a profile without a plateau
-        waveform = []
-    sections = [
-        *scored,
-        Section(
-            "Rate table",
-            (
-                "One MPU-9250, drawn within its data sheet, on a table that runs through plateaus; the wide-range "
-                "gyroscope beside it. Envelopes are the accelerometer's worst case for each mount error.",
-            ),
-            figures=[
-                ("All methods against truth", run.out / "rate-table.png"),
-                *waveform,
-            ],
-        ),
-        Section(
-            "Throws",
-            (
-                "The disc with its module, the accelerometer 1 mm off along x and y. Figures are rms "
-                "errors of the spin rate in deg/s away from the ends of the flight; a dash where a method knows "
-                "nothing.",
-            ),
-            ("throw", *methods),
-            throw_rows,
-            figures=[("Flights and errors", run.out / "throws.png")],
-        ),
-        Section(
-            "C_Nr, and the flights that it predicts",
-            (
-                "One C_Nr for all throws, by output error and by straight lines and (26), from each method's spin. "
-                "Errors are those of the first throw flown with the source's C_Nr (output error) and spin at release; "
-                "the last column has the true spin, so that only C_Nr is the source's.",
-            ),
-            ("spin by", "CNr", "sd", "by (26)", "landing, m", "track, m", "landing by CNr alone, m"),
-            _loop_rows(loop),
-            figures=[
-                ("Spin, its models and what they leave", run.out / "cnr.png"),
-                ("C_Nr by source", run.out / "cnr-sources.png"),
-                ("Predicted flights against the truth", run.out / "feedback.png"),
-            ],
-        ),
-        Section(
-            "Concealed cases",
-            (
-                "Drawn and simulated as discsim challenge does, diagnosed by another process that got the recordings "
-                "and nothing else. The command repeats a case alone.",
-            ),
-            ("concealed", "found", "", "command"),
-            [case.row for case in concealed],
-        ),
-    ]
-    write_report(
-        run.out / "report.html",
-        "Validation report",
-        f"{len(scores)} scores, seed {run.seed}: {verdict}.",
-        sections,
+    return [Section(f"Scores: {group}", (), header, rows) for group, rows in groups.items()]
+
+
+def _rate_table(out: Path) -> Section:
+    figures = [("All methods against truth", out / "rate-table.png")]
+    if (waveform := out / "waveform.png").exists():  # not for a profile without a plateau
+        figures.append(("Waveform and spectrum on the fastest plateau", waveform))
+    text = (
+        "One MPU-9250, drawn within its data sheet, on a table that runs through plateaus; the wide-range gyroscope "
+        "beside it. Envelopes are the accelerometer's worst case for each mount error."
     )
+    return Section("Rate table", (text,), figures=figures)
+
+
+def _throws(results: Sequence[ThrowResult], out: Path) -> Section:
+    methods = list(results[0].rates)
+    rows = [(one.throw.name, *(_cell(np.degrees(rms(one.error(method)))) for method in methods)) for one in results]
+    text = (
+        "The disc with its module, the accelerometer 1 mm off along x and y. Figures are rms errors of the spin rate "
+        "in deg/s away from the ends of the flight; a dash where a method knows nothing."
+    )
+    figures = [("Flights and errors", out / "throws.png")]
+    return Section("Throws", (text,), ("throw", *methods), rows, figures)
+
+
+def _loop(loop: Loop, out: Path) -> Section:
+    text = (
+        "One C_Nr for all throws, by output error and by straight lines and (26), from each method's spin. Errors are "
+        "those of the first throw flown with the source's C_Nr (output error) and spin at release; the last column has "
+        "the true spin, so that only C_Nr is the source's."
+    )
+    figures = [
+        ("Spin, its models and what they leave", out / "cnr.png"),
+        ("C_Nr by source", out / "cnr-sources.png"),
+        ("Predicted flights against the truth", out / "feedback.png"),
+    ]
+    header = ("spin by", "CNr", "sd", "by (26)", "landing, m", "track, m", "landing by CNr alone, m")
+    return Section("C_Nr, and the flights that it predicts", (text,), header, _loop_rows(loop), figures)
+
+
+def _concealed(concealed: Sequence[Concealed]) -> Section:
+    text = (
+        "Drawn and simulated as discsim challenge does, diagnosed by another process that got the recordings and "
+        "nothing else. The command repeats a case alone."
+    )
+    rows = [case.row for case in concealed]
+    return Section("Concealed cases", (text,), ("concealed", "found", "", "command"), rows)
 
 
 def _loop_rows(loop: Loop) -> list[tuple[str, ...]]:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
+from validation.identification.competing_effects import Competing
 from validation.identification.linear import Linear
 from validation.identification.linearisation import linearise, moved, reread
 from validation.identification.noise import NoiseModel, chi_squared
@@ -60,6 +61,11 @@ class Fit:
         return self.chains[0].plant
 
     @property
+    def effects(self) -> Competing:
+        """The effects that may act on its recordings."""
+        return self.chains[0].effects
+
+    @property
     def count(self) -> int:
         """Number of scalar readings that take part."""
         return sum(linear.residual.size for linear in self.linears)
@@ -69,7 +75,7 @@ class Fit:
 
 
 def mapped(function: Callable[..., Any], *arguments: Sequence[Any]) -> list[Any]:
-    """Map over recordings, on as many threads as there are cores, each in the context of the call."""
+    """Map over recordings, on as many threads as there are cores, each with the call's `numpy.errstate`."""
     with ThreadPoolExecutor(THREADS) as pool:
         tasks = [pool.submit(copy_context().run, function, *each) for each in zip(*arguments, strict=True)]
         return [task.result() for task in tasks]
@@ -81,9 +87,16 @@ def _spare(recordings: int) -> int:
 
 
 def linearised(
-    fit: Fit, parameters: Sequence[Parameter] | None = None, only: Sequence[int] | None = None
+    fit: Fit,
+    parameters: Sequence[Parameter] | None = None,
+    only: Sequence[int] | None = None,
+    *,
+    central: bool = False,
 ) -> tuple[Linear, ...]:
-    """Linearise all chains where they stand, or ``only`` some; the shared columns are those of ``parameters``."""
+    """Linearise all chains where they stand, or ``only`` some; the shared columns are those of ``parameters``.
+
+    One-sided differences cost half and do for steps; ``central`` ones for what is told of a fit.
+    """
     chosen = fit.parameters if parameters is None else parameters
     which = range(len(fit.chains)) if only is None else only
 
@@ -91,7 +104,7 @@ def linearised(
         columns = [Column(q.group, q.name, q.step if q.acts_in(index) else 0.0) for q in chosen]
         active = [column for column in columns if column.step > 0]
         chain, values = fit.chains[index], fit.values(index)
-        linear = linearise(chain, values, active, fit.jumps.allowed, central=False, threads=_spare(len(which)))
+        linear = linearise(chain, values, active, fit.jumps.allowed, central=central, threads=_spare(len(which)))
         if len(active) < len(columns):
             linear = linear.spread([j for j, column in enumerate(columns) if column.step > 0], len(columns))
         return linear
@@ -99,7 +112,7 @@ def linearised(
     return tuple(mapped(one, which))
 
 
-def _reread(fit: Fit) -> tuple[Linear, ...] | None:
+def repredicted(fit: Fit) -> tuple[Linear, ...] | None:
     """Return the linearisations of a fit with residuals where its chains stand and slopes as they were, if they can."""
 
     def one(index: int) -> Linear | None:
@@ -168,6 +181,40 @@ def refit(
     return fit
 
 
+def polished(fit: Fit) -> tuple[Fit, list[Reduced]]:
+    """Return the optimum beside which a fit has ended, with what its last step solved.
+
+    A fit ends a share of a standard deviation beside it, and slopes by differences to one side are slightly wrong: from
+    there whole steps with slopes by central differences are taken, as long as none leads away.
+    """
+    before: tuple[Fit, list[Reduced]] | None = None
+    for _ in range(_WHOLE_STEPS):
+        linears = linearised(fit, central=True)
+        fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
+        if before is not None and not fit.merit < before[0].merit + _NOTHING:
+            return before
+        reduced, (step, covariance, expected) = _solved(fit, np.full(len(fit.chains), _FREE))
+        before = replace(fit, covariance=covariance), reduced
+        fit = whole_step(before[0], reduced, step)
+        if fit.merit - expected < _NOTHING:
+            break
+    return fit, reduced
+
+
+def whole_step(fit: Fit, reduced: Sequence[Reduced], step: FloatArray) -> Fit:
+    """Return a fit after all of a step of its shared parameters (p,), each recording's own following."""
+    chains = tuple(
+        moved(chain, linear, local_step(r, step), step)
+        for chain, linear, r in zip(fit.chains, fit.linears, reduced, strict=True)
+    )
+    return replace(fit, chains=chains, at=fit.at + step)
+
+
+#: whole steps from the end of a fit, at most; one that gains less is the last: the next would be below a thousandth of
+#: a standard deviation, even where half of the curvature is in the residuals, of which the method knows nothing
+_WHOLE_STEPS, _NOTHING = 8, 1e-6
+
+
 def _solved(fit: Fit, hold: FloatArray) -> tuple[list[Reduced], tuple[FloatArray, FloatArray, float]]:
     """Return what each recording says where a fit stands, and `shared_step` from all of it, held by ``hold`` (c,)."""
     reduced = mapped(_reduced(fit), fit.linears, fit.chains, list(hold))
@@ -203,7 +250,7 @@ def _gone_on(
         least = max(tolerance, 1e-7 * fit.merit)
         if fit.merit - expected < least and not open_gaps(fit):
             return fit, True
-        going = _Going(fit, reduced, step, bounds, expected)
+        going = GaussNewtonStep(fit, reduced, step, bounds, expected)
         if first > _FREE:
             better, rose = going.each_its_share()
             hold = np.where(rose, np.clip(_TIGHTER * hold, _LEAST_HOLD, _MOST_HOLD), _LOOSER * hold)
@@ -248,13 +295,13 @@ _FAR = 3.0
 _RISE = 1.3
 #: a step that is expected to gain less than this, three standard deviations in all, keeps the slopes that it was worked
 #: out with, unless it misses what was expected by more than this share of it
-_CHORD, _CHORD_MISSES = 10.0, 0.1
+CHORD, _CHORD_MISSES = 10.0, 0.1
 #: a rise by more than this is a step that went too far
 _ROSE = 1.02
 
 
 @dataclass(frozen=True)
-class _Going:
+class GaussNewtonStep:
     """A step from where a fit stands, and how much of it is taken."""
 
     fit: Fit
@@ -289,7 +336,7 @@ class _Going:
             )
             trial = replace(fit, chains=chains, at=at)
             if _finite(chains):
-                short = share == 1.0 and fit.merit - self.expected < _CHORD and not open_gaps(fit)
+                short = share == 1.0 and fit.merit - self.expected < CHORD and not open_gaps(fit)
                 new = (self._by_chord(trial) if short else None) or linearised(trial)
                 merit = merit_of(trial, new)
                 # while gaps are open the merit is that of the closed chain to first order only: too good
@@ -304,7 +351,7 @@ class _Going:
 
         What is short is told by what the step gains: in standard deviations it is the root of that.
         """
-        new = _reread(trial)
+        new = repredicted(trial)
         if new is None:
             return None
         missed = merit_of(trial, new) - self.expected

@@ -20,12 +20,11 @@ from discsim.arrays import BoolArray, FloatArray, IntArray
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.sensors import Lag
 from discsim.parameters import parameter_index, parameters
-from discsim.recording import Recording
-from validation.identification.competing_effects import row_of
+from validation.identification.competing_effects import Competing
 from validation.identification.dynamics import ROW
 from validation.identification.linear import Channel, Linear
 from validation.identification.parameters import Values
-from validation.identification.plants import Plant, plant_of
+from validation.identification.plants import Plant
 from validation.identification.prediction import Sampled
 from validation.identification.propagation import (
     EVENT_REACH,
@@ -38,7 +37,7 @@ from validation.identification.propagation import (
 )
 from validation.identification.readings import group_of
 from validation.identification.segments import Chain, stepped
-from validation.identification.sensor_model import CLOCKS, is_motion, predicted, value
+from validation.identification.sensor_model import CLOCKS, is_motion, predicted
 
 __all__ = ["linearise", "moved", "reread"]
 
@@ -89,14 +88,15 @@ class _Around:
     def __init__(self, current: Chain, values: Values, columns: Sequence[Column], central: bool | None) -> None:
         self.chain, self.values, self.columns, self.central = current, values, columns, central
         self.recording, self.plant = recording, plant = current.recording, current.plant
-        self.runner = runner_of(recording, values, columns)
-        self.motion = [j for j, column in enumerate(columns) if _moves(column, plant)]
+        self.effects = effects = current.effects
+        self.runner = runner_of(recording, values, columns, effects)
+        self.motion = [j for j, column in enumerate(columns) if _moves(column, plant, effects)]
         self.d = d = plant.layout.directions
         self.half = d + len(self.motion)
         #: half the differences, and the columns of slopes that they belong to
         self.widths = np.concatenate([plant.sizes.differences, [columns[j].step for j in self.motion]])
         self.places = np.array([*range(d), *(d + j for j in self.motion)])
-        self.flat = base_flat(recording, values, [column.key for column in columns])
+        self.flat = base_flat(recording, values, [column.key for column in columns], effects)
         self.own = plant.own_values(values)
         signs = () if central is None else (1.0, -1.0) if central else (1.0,)
         self.flats = np.repeat(self.flat[None], 1 + len(signs) * self.half, axis=0)
@@ -134,8 +134,26 @@ class _Around:
             self.owns[row, self.plant.own_keys.index(column.key)] += sign * size
             return
         for shape, number in given:
-            self.flats[row, place_in_flat(group, shape)] = number
-        self.flats[row, place_in_flat(group, name)] += sign * size
+            self.flats[row, place_in_flat(group, shape, self.effects)] = number
+        self.flats[row, place_in_flat(group, name, self.effects)] += sign * size
+
+    def current(self, group: str, name: str) -> float:
+        """Return the value a parameter has now: given, or as the recording states it, or the baseline."""
+        if (group, name) in self.values:
+            return self.values[group, name]
+        if (row := self.effects.row(group)) is not None:
+            return row.sizes[name]
+        recording = self.recording
+        if group == "environment" and name.startswith("magnetic_"):
+            return float(recording.environment.magnetic_field[["north", "east", "down"].index(name.split("_")[1])])
+        own = next((q for q in self.plant.own if q.key == (group, name)), None)
+        if own is not None:
+            return own.stated
+        return float(parameters(recording.environment, recording.disc, recording.rig)[parameter_index(group, name)])
+
+    def read(self, sensor: str, values: Values, t: FloatArray, rows: FloatArray) -> FloatArray:
+        """Return what a sensor reads (..., m, k) at true times t (m,) of rows (..., m, 19) under some values."""
+        return predicted(sensor, self.recording, values, t, rows, self.effects)
 
     def slopes(self, values: FloatArray, acting: IntArray | None = None) -> FloatArray:
         """Return slopes (half, ...) from what the motion and its neighbours give (c, ...), or those that are acting."""
@@ -280,7 +298,7 @@ class _Read:
             shown = np.empty((mine.shape[0], o.size, s.width))
             for first in range(0, mine.shape[0], _BATCH):
                 part = slice(first, first + _BATCH)
-                shown[part] = predicted(s.sensor, around.recording, around.values, t, mine[part])
+                shown[part] = around.read(s.sensor, around.values, t, mine[part])
             for neighbour, j in enumerate(around.motion, 1 + around.d):
                 if around.columns[j].key in _ALSO_READ:  # it moves the readings of a given motion, too
                     for other, sign in ((neighbour, 1.0), (neighbour + around.half, -1.0))[: 1 + bool(around.central)]:
@@ -293,9 +311,9 @@ class _Read:
     def _also_moved(self, sensor: str, t: FloatArray, rows: FloatArray, column: Column, sign: float) -> FloatArray:
         """Return what a sensor reads where a parameter moves its readings beside the motion."""
         around = self._around
-        now = _current(around.values, around.recording, *column.key)
+        now = around.current(*column.key)
         moved_values = {**around.values, column.key: now + sign * column.step}
-        return predicted(sensor, around.recording, moved_values, t, rows)
+        return around.read(sensor, moved_values, t, rows)
 
 
 @dataclass(frozen=True)
@@ -342,10 +360,10 @@ def _closing(passes: FloatArray, gaps: FloatArray, forbidden: IntArray) -> Float
 
 def _add_sensor_columns(around: _Around, s: Sampled, rows: FloatArray, M: FloatArray) -> None:
     """Write the slopes by parameters of sensors and clocks into M (m, width, d + p), from the motion as it is."""
-    recording, values = around.recording, around.values
+    values = around.values
     rate: FloatArray | None = None
     for j, (group, name, size, given) in enumerate(around.columns):
-        if j in around.motion or not _concerns(group, s.sensor):
+        if j in around.motion or not _concerns(group, s.sensor, around.effects):
             continue
         here = {**values, **{(group, shape): number for shape, number in given}}
         place = around.d + j
@@ -353,16 +371,16 @@ def _add_sensor_columns(around: _Around, s: Sampled, rows: FloatArray, M: FloatA
             if rate is None:
                 rate = s.time_slope(around.runner, around.flat, around.own, values, around.chain)
             if group in CLOCKS:
-                base = _current(values, recording, group, name)
+                base = around.current(group, name)
                 plus, minus = {**here, (group, name): base + size}, {**here, (group, name): base - size}
                 late = (s.delays(plus) - s.delays(minus)) / (2.0 * size)
             else:
                 late = s.lag_slope
             M[:, :, place] = -rate * late[:, None]
             continue
-        base = _current(values, recording, group, name)
-        up = predicted(s.sensor, recording, {**here, (group, name): base + size}, s.instants, rows)
-        down = predicted(s.sensor, recording, {**here, (group, name): base - size}, s.instants, rows)
+        base = around.current(group, name)
+        up = around.read(s.sensor, {**here, (group, name): base + size}, s.instants, rows)
+        down = around.read(s.sensor, {**here, (group, name): base - size}, s.instants, rows)
         M[:, :, place] = (up - down) / (2.0 * size)
 
 
@@ -375,20 +393,6 @@ _ALSO_READ = {
 _LAGS = {row.id for row in CATALOGUE.values() if row.type is Lag}
 
 
-def _current(values: Values, recording: Recording, group: str, name: str) -> float:
-    """Return the value a parameter has now: given, or as the recording states it, or the baseline."""
-    if (group, name) in values:
-        return values[group, name]
-    if row_of(group) is not None:
-        return value(values, group, name)
-    if group == "environment" and name.startswith("magnetic_"):
-        return float(recording.environment.magnetic_field[["north", "east", "down"].index(name.split("_")[1])])
-    own = next((q for q in plant_of(recording).own if q.key == (group, name)), None)
-    if own is not None:
-        return own.stated
-    return float(parameters(recording.environment, recording.disc, recording.rig)[parameter_index(group, name)])
-
-
 def _instant(column: Column, values: Values) -> float | None:
     """Return when the event is that a column belongs to, s; None of what is no short event."""
     if column.group not in EVENTS:
@@ -396,18 +400,18 @@ def _instant(column: Column, values: Values) -> float | None:
     return dict(column.given).get("t_s", values.get((column.group, "t_s")))
 
 
-def _moves(column: Column, plant: Plant) -> bool:
+def _moves(column: Column, plant: Plant, effects: Competing) -> bool:
     """Tell whether a column is of the motion; the field of the earth is only read."""
     if column.group == "environment":
         return column.key in FLAT_ENVIRONMENT
-    return is_motion(column.group) or column.key in plant.own_keys
+    return is_motion(column.group, effects) or column.key in plant.own_keys
 
 
-def _concerns(group: str, sensor: str) -> bool:
+def _concerns(group: str, sensor: str, effects: Competing) -> bool:
     """Tell whether an effect that is not of the motion can touch a sensor."""
     if group == "environment":
         return sensor == "magnetometer"
-    row = row_of(group)
+    row = effects.row(group)
     return row is not None and row.acts_with((sensor,))
 
 
@@ -419,7 +423,7 @@ def _counted(s: Sampled, prediction: FloatArray, axis: int) -> IntArray:
         good = good & (readings.t > _FORGOTTEN * s.tau)
     if limit is not None:
         # a clipped reading says only that the motion was beyond the range
-        margin = 6.0 * np.nan_to_num(readings.sd[axis])
+        margin = 6.0 * np.nan_to_num(readings.sd[..., axis])
         inside = readings.clipped[:, axis] & (np.abs(prediction[:, axis]) < limit - margin)
         good = good | (inside & np.isfinite(readings.value[:, axis]))
     return np.flatnonzero(good)
@@ -429,7 +433,7 @@ def _stack(
     current: Chain, samples: Sequence[Sampled], read: _Read, piece_of: Sequence[IntArray], chained: _Chained
 ) -> Linear:
     """Put the rows of all sensors together, channel by channel, without those that take no part."""
-    S, closing, gaps, allowed, u = chained.moves, chained.closing, chained.gaps, chained.allowed, chained.unknowns
+    S, closing, u = chained.moves, chained.closing, chained.unknowns
     raw, own, pieces, whole, t, sd, shifts = [], [], [], [], [], [], []
     channels: list[Channel] = []
     at = 0
@@ -441,11 +445,7 @@ def _stack(
         closed = np.einsum("mwd,md->mw", M[:, :, :d], closing[piece])
         spread = s.nodes > 1
         if spread:
-            full = np.empty((*M.shape[:2], u + p))
-            for i in np.unique(piece):
-                full[piece == i] = M[piece == i, :, :d] @ S[i]
-            full[:, :, u:] += M[:, :, d:]
-            M = full
+            M = _by_unknowns(M, piece, chained)
         prediction, slopes, closed = s.weighted(y), s.weighted(M), s.weighted(closed)
         for axis in range(s.width):
             index = _counted(s, prediction, axis)
@@ -461,14 +461,10 @@ def _stack(
                 pieces.append(piece[index])
             shifts.append(closed[index, axis])
             t.append(readings.t[index])
-            sd.append(np.full(index.size, readings.sd[axis]))
+            sd.append(np.broadcast_to(readings.sd, readings.value.shape)[index, axis])
             rows = slice(at, at + index.size)
             channels.append(Channel(s.sensor, readings.axes[axis], group_of(s.sensor, axis), rows, index))
             at += index.size
-    kind, where, jump = np.full(u, -1), np.zeros(u, dtype=np.int64), np.zeros(u)
-    for i in range(gaps.shape[0]):
-        place = slice(d + i * allowed.size, d + (i + 1) * allowed.size)
-        kind[place], where[place], jump[place] = allowed, i + 1, gaps[i, allowed]
 
     def joined(parts: list[Any]) -> Any:
         return np.concatenate(parts) if parts else np.empty(0)
@@ -482,15 +478,33 @@ def _stack(
         joined(t),
         joined(sd),
         tuple(channels),
-        jump,
-        kind,
-        where,
+        *_jumps(chained),
         S,
         chained.passes,
         closing,
-        gaps,
+        chained.gaps,
         joined(shifts),
     )
+
+
+def _by_unknowns(M: FloatArray, piece: IntArray, chained: _Chained) -> FloatArray:
+    """Return slopes (m, width, u + p) by the unknowns of a recording from those by the states of pieces, M."""
+    d, u = chained.moves.shape[1], chained.unknowns
+    full = np.empty((*M.shape[:2], chained.moves.shape[2]))
+    for i in np.unique(piece):
+        full[piece == i] = M[piece == i, :, :d] @ chained.moves[i]
+    full[:, :, u:] += M[:, :, d:]
+    return full
+
+
+def _jumps(chained: _Chained) -> tuple[FloatArray, IntArray, IntArray]:
+    """Return size (u,), direction (-1: none) and piece of the jumps among the unknowns."""
+    d, u, allowed = chained.moves.shape[1], chained.unknowns, chained.allowed
+    jump, kind, where = np.zeros(u), np.full(u, -1), np.zeros(u, dtype=np.int64)
+    for i, gap in enumerate(chained.gaps):
+        place = slice(d + i * allowed.size, d + (i + 1) * allowed.size)
+        jump[place], kind[place], where[place] = gap[allowed], allowed, i + 1
+    return jump, kind, where
 
 
 def moved(current: Chain, linear: Linear, local: FloatArray, shared: FloatArray) -> Chain:

@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 from scipy.signal import lfilter
 from scipy.special import expit, logit
 
-from discsim.arrays import FloatArray, IntArray
+from discsim.arrays import FloatArray, IntArray, sd_by_median
 from validation.identification.linear import Channel, Linear
 
 __all__ = ["GroupNoise", "NoiseModel", "chi_squared", "estimate_noise", "likeliest_noise", "log_likelihood", "whitened"]
@@ -31,12 +31,14 @@ LEAST_CORRELATED = 0.04
 class GroupNoise(NamedTuple):
     """Level (in the sensor's unit), correlation from one sample to the next, share of the variance that has it.
 
-    The rest of the variance is white, as where a slow wander lies under the noise of single readings.
+    The rest of the variance is white, as where a slow wander lies under the noise of single readings. A level that is
+    ``relative`` is a multiple of what is stated of each reading.
     """
 
     sd: float
     correlation: float = 0.0
     share: float = 1.0
+    relative: bool = False
 
     def memory(self, interval: float) -> float:
         """Return the time constant of the correlated part, s, of samples that lie ``interval`` s apart."""
@@ -67,6 +69,8 @@ def whitened(linear: Linear, noise: NoiseModel, columns: FloatArray, piece: IntA
     for channel in linear.channels:
         own = noise[channel.group]
         x = columns[channel.rows] / own.sd
+        if own.relative:
+            x /= linear.sd[channel.rows, None]
         if own.correlation and x.shape[0] > 1:
             pieces = None if piece is None else piece[channel.rows]
             cuts = [] if pieces is None else [*(np.flatnonzero(np.diff(pieces) != 0) + 1)]
@@ -261,11 +265,8 @@ def robust_noise(linears: Sequence[Linear], residuals: Sequence[FloatArray]) -> 
     sizes: dict[str, list[FloatArray]] = {}
     for linear, residual in zip(linears, residuals, strict=True):
         for channel in linear.channels:
-            sizes.setdefault(channel.group, []).append(np.abs(residual[channel.rows]))
-    return {
-        group: GroupNoise(max(1.4826 * float(np.median(np.concatenate(found))), 1e-12))
-        for group, found in sizes.items()
-    }
+            sizes.setdefault(channel.group, []).append(residual[channel.rows])
+    return {group: GroupNoise(max(float(sd_by_median(np.concatenate(found))), 1e-12)) for group, found in sizes.items()}
 
 
 def stated_noise(linears: Sequence[Linear], floor: Mapping[str, float] | None = None) -> dict[str, GroupNoise]:

@@ -16,7 +16,38 @@ from validation.identification.parameters import Jumps, Parameter
 from validation.identification.release_prior import release_rows
 from validation.identification.segments import Chain
 
-__all__ = ["OWN_REACH", "Reduced", "reduce", "unknown_prior"]
+__all__ = [
+    "CUT_OFF",
+    "OWN_REACH",
+    "Reduced",
+    "inverse_of",
+    "known_directions",
+    "local_covariance",
+    "reduce",
+    "unknown_prior",
+]
+
+
+#: the cut-off of every symmetric system of sums of squares: eigenvalues below this share of the largest stand for
+#: combinations of unknowns of which nothing is known. Slopes are differences, good to 1e-5, and the eigenvalues of a
+#: normal matrix are squares of theirs.
+CUT_OFF = 1e-10
+
+
+def known_directions(H: FloatArray, least: float | None = None) -> tuple[FloatArray, FloatArray]:
+    """Return eigenvalues (k,) and vectors (n, k) of a symmetric matrix (n, n) of sums of squares that say something.
+
+    Those are above `CUT_OFF` times the largest, or above ``least``. Columns of several units are to be scaled before.
+    """
+    w, V = np.linalg.eigh(H)
+    kept = w > (CUT_OFF * max(float(w[-1]), 1e-300) if least is None else least)
+    return w[kept], V[:, kept]
+
+
+def inverse_of(H: FloatArray) -> FloatArray:
+    """Return the inverse (n, n) of a symmetric matrix of sums of squares, zero in directions that say nothing."""
+    w, V = known_directions(H)
+    return np.asarray((V / w) @ V.T)
 
 
 @dataclass(frozen=True)
@@ -77,7 +108,7 @@ def unknown_prior(linear: Linear, current: Chain, jumps: Jumps) -> tuple[FloatAr
     u = linear.unknowns
     prior = np.zeros(u)
     first = linear.jump_kind < 0
-    prior[first] = current.plant.sizes.unknown**-2.0
+    prior[first] = (current.plant.sizes.unknown if current.reach is None else current.reach) ** -2.0
     prior[~first] = jumps.sd[linear.jump_kind[~first]] ** -2.0
     # a jump is pulled to zero from where it stands
     H, right, chi2 = np.diag(prior), -prior * linear.jump, float(prior @ linear.jump**2)
@@ -107,7 +138,7 @@ def reduce(linear: Linear, current: Chain, noise: NoiseModel, jumps: Jumps, hold
     scale = 1.0 / np.sqrt(np.maximum(np.diag(G)[:u], 1e-300))
     H = G[:u, :u] * scale[:, None] * scale[None, :]
     H[np.arange(u), np.arange(u)] += 1e-12
-    L = _factor(H)
+    L = lower_root(H)
     cross = G[:u, u:] * scale[:, None]
     half = solve_triangular(L, cross, lower=True, check_finite=False)
     gram = G[u:, u:] - half.T @ half
@@ -118,7 +149,7 @@ def reduce(linear: Linear, current: Chain, noise: NoiseModel, jumps: Jumps, hold
 _ROUNDING = 1e-12
 
 
-def _factor(H: FloatArray) -> FloatArray:
+def lower_root(H: FloatArray) -> FloatArray:
     """Return the lower triangular root of a symmetric matrix (l, l) of sums of squares; NaN where it is not finite.
 
     Sums over segments whose motion grows without bounds lose the last digits of what came before: eigenvalues that are
@@ -142,6 +173,14 @@ def local_step(reduced: Reduced, shared: FloatArray) -> FloatArray:
     return np.asarray(scale * cho_solve((L, True), right, check_finite=False))
 
 
+def local_covariance(reduced: Reduced, covariance: FloatArray) -> FloatArray:
+    """Return the covariance (l, l) of the local unknowns, with the share of the shared ones, whose own is (p, p)."""
+    L, scale = reduced.factor
+    alone = scale[:, None] * cho_solve((L, True), np.eye(scale.size), check_finite=False) * scale
+    way = scale[:, None] * cho_solve((L, True), reduced.cross[:, :-1], check_finite=False)
+    return np.asarray(alone + way @ covariance @ way.T)
+
+
 def shared_step(
     gram: FloatArray, parameters: Sequence[Parameter], at: FloatArray, reach: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, float]:
@@ -151,7 +190,7 @@ def shared_step(
     where the fit has gone where its predictions are not finite.
     """
     p = len(parameters)
-    prior = np.array([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for q in parameters])
+    prior = np.array([q.precision for q in parameters])
     off = np.array([q.stated for q in parameters]) - at
     H = gram[:p, :p] + np.diag(prior if reach is None else prior + reach**-2.0)
     right = gram[:p, -1] + prior * off
@@ -161,10 +200,7 @@ def shared_step(
         return np.full(p, np.nan), np.full((p, p), np.nan), np.nan
     scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
     scaled = H * scale[:, None] * scale[None, :]
-    w, V = np.linalg.eigh(scaled)
-    kept = w > 1e-10 * max(float(w[-1]), 1e-300)
-    inverse = (V[:, kept] / w[kept]) @ V[:, kept].T
-    covariance = inverse * scale[:, None] * scale[None, :]
+    covariance = inverse_of(scaled) * scale[:, None] * scale[None, :]
     step = covariance @ right
     expected = float(gram[-1, -1] + prior @ off**2 - step @ right)
     return step, covariance, expected

@@ -22,7 +22,8 @@ class Parameter:
     """A number that the recordings share.
 
     ``stated`` is where it stands without a fit, ``sigma`` the one-sigma uncertainty with which it is stated (inf:
-    free), ``step`` half the width of its differences. ``recordings`` are those it acts in; None means all.
+    free), ``step`` half the width of its differences. ``recordings`` are those it acts in; None means all. ``offsets``
+    are what recordings that state it differently state beyond that, in their order: all then move by as much.
     """
 
     group: str
@@ -31,11 +32,17 @@ class Parameter:
     step: float
     sigma: float = np.inf
     recordings: frozenset[int] | None = None
+    offsets: tuple[float, ...] = ()
 
     @property
     def key(self) -> tuple[str, str]:
         """Group and name."""
         return self.group, self.name
+
+    @property
+    def precision(self) -> float:
+        """What its prior adds to a normal matrix, one over the variance: zero where it is free."""
+        return float(self.sigma**-2.0)
 
     def acts_in(self, recording: int) -> bool:
         """Tell whether it acts in a recording."""
@@ -61,5 +68,6 @@ def values_of(
     values = dict(fixed)
     for parameter, number in zip(parameters, at, strict=True):
         if parameter.acts_in(recording):
-            values[parameter.key] = float(number)
+            own = parameter.offsets[recording] if parameter.offsets else 0.0
+            values[parameter.key] = float(number) + own
     return values

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from discsim.arrays import FloatArray, IntArray
+from discsim.effects.sensors import Lag
 from validation.identification.dynamics import ROW
+from validation.identification.noise import GroupNoise
 from validation.identification.parameters import Values
 from validation.identification.propagation import Runner, base_flat, runner_of
-from validation.identification.readings import Readings
+from validation.identification.readings import Readings, group_of
 from validation.identification.segments import Chain
-from validation.identification.sensor_model import delay, predicted, value
+from validation.identification.sensor_model import delay, predicted, sized
 
-__all__ = ["Sampled", "read", "shown"]
+__all__ = ["Sampled", "Shiftable", "read", "shiftable", "shown"]
 
 #: half the difference in time by which a reading's slope is taken, s
 _TIME_STEP = 2e-4
@@ -37,8 +41,7 @@ class Sampled:
         self.weights = readings.weights
         written = self.written
         taken = written - self.delays(values)
-        prefix = {"magnetometer": "mag", "accelerometer": "accel", "gyroscope": "gyro"}.get(self.sensor, "")
-        self.tau = value(values, f"{prefix}.lag", "tau_s") if prefix and self.weights is None else 0.0
+        self.tau = sized(values, Lag, self.sensor).tau_s if self.weights is None else 0.0
         self.nodes = 1
         if self.tau > 0:
             self.weights = np.repeat(_LAG_WEIGHTS[:, None], written.size, axis=1)
@@ -68,7 +71,7 @@ class Sampled:
         early = np.maximum(np.maximum(self.instants, current.edges[segments]) - _TIME_STEP, current.edges[segments])
         both, twice = np.concatenate([early + 2.0 * _TIME_STEP, early]), np.concatenate([segments, segments])
         rows = _rows(current, runner, (flat, own), both, twice)
-        read = predicted(self.sensor, current.recording, values, both, rows)
+        read = predicted(self.sensor, current.recording, values, both, rows, current.effects)
         return np.asarray((read[: early.size] - read[early.size :]) / (2.0 * _TIME_STEP))
 
     def weighted(self, array: FloatArray) -> FloatArray:
@@ -100,9 +103,10 @@ def _rows(
 def shown(current: Chain, values: Values, sensor: str, t: FloatArray) -> FloatArray:
     """Return what a sensor would read (n, k) at true instants t (n,) of a chain's motion, before lag and noise."""
     recording = current.recording
-    parameters = base_flat(recording, values), current.plant.own_values(values)
-    rows = _rows(current, runner_of(recording, values), parameters, t, current.segment_of(t))
-    return predicted(sensor, recording, values, t, rows)
+    effects = current.effects
+    parameters = base_flat(recording, values, (), effects), current.plant.own_values(values)
+    rows = _rows(current, runner_of(recording, values, (), effects), parameters, t, current.segment_of(t))
+    return predicted(sensor, recording, values, t, rows, effects)
 
 
 def read(current: Chain, values: Values, readings: Readings) -> FloatArray:
@@ -112,3 +116,28 @@ def read(current: Chain, values: Values, readings: Readings) -> FloatArray:
     """
     sampled = Sampled(current, readings, values)
     return sampled.weighted(shown(current, values, readings.sensor, sampled.instants))
+
+
+class Shiftable(NamedTuple):
+    """Readings beside what a motion shows on a fine grid, both in noise, so that they can be shifted along it.
+
+    ``at`` (n,) s are the true times of readings (n, k), NaN where they do not count; ``shown`` (m, k) is the motion's
+    on the ``grid`` (m,) s.
+    """
+
+    at: FloatArray
+    value: FloatArray
+    grid: FloatArray
+    shown: FloatArray
+
+
+def shiftable(
+    current: Chain, values: Values, readings: Readings, noise: Mapping[str, GroupNoise], step: float
+) -> Shiftable:
+    """Return readings beside what a chain's motion shows on a grid of ``step`` s."""
+    sensor = readings.sensor
+    sd = np.array([noise[group_of(sensor, axis)].sd for axis in range(readings.value.shape[1])])
+    grid = np.arange(float(current.edges[0]), float(current.edges[-1]), step)
+    value = np.where(readings.good, readings.value, np.nan) / sd
+    at = readings.t - delay(values, sensor, readings.t)
+    return Shiftable(at, value, grid, shown(current, values, sensor, grid) / sd)

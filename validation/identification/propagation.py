@@ -13,7 +13,7 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE
 from discsim.parameters import PARAMETERS, parameter_index, parameters, tables
 from discsim.recording import Recording
-from validation.identification.competing_effects import applied_on, row_of
+from validation.identification.competing_effects import CATALOGUED, Competing
 from validation.identification.dynamics import LAW_PLACES, SIZE
 from validation.identification.parameters import Values
 from validation.identification.plants import Plant, plant_of
@@ -37,17 +37,24 @@ class Column(NamedTuple):
         return self.group, self.name
 
 
-def base_flat(recording: Recording, values: Values, columns: Sequence[tuple[str, str]] = ()) -> FloatArray:
+def base_flat(
+    recording: Recording,
+    values: Values,
+    columns: Sequence[tuple[str, str]] = (),
+    effects: Competing = CATALOGUED,
+) -> FloatArray:
     """Return the flat parameter array of a recording's baseline with values in their places.
 
     ``columns`` are keys that need a place, too.
     """
-    flat = np.concatenate([parameters(recording.environment, recording.disc, recording.rig), _own_sizes().ravel()])
+    flat = np.concatenate(
+        [parameters(recording.environment, recording.disc, recording.rig), _own_sizes(effects).ravel()]
+    )
     terms = 1 + max((_term(name) for group, name in (*values, *columns) if group == "law"), default=-1)
     flat = np.concatenate([flat, np.zeros(terms * len(LAW_PLACES))])
     for (group, name), number in values.items():
-        if (is_motion(group) and group != "environment") or (group, name) in FLAT_ENVIRONMENT:
-            flat[place_in_flat(group, name)] = number
+        if (is_motion(group, effects) and group != "environment") or (group, name) in FLAT_ENVIRONMENT:
+            flat[place_in_flat(group, name, effects)] = number
     return flat
 
 
@@ -55,22 +62,20 @@ def _term(name: str) -> int:
     return int(name.partition(".")[0])
 
 
-def place_in_flat(group: str, name: str) -> int:
+def place_in_flat(group: str, name: str, effects: Competing = CATALOGUED) -> int:
     """Return the place of a parameter in a flat array: behind the physics own effects stand, and then a law's terms."""
     if group == "law":
-        behind = SIZE + _own_sizes().size
+        behind = SIZE + _own_sizes(effects).size
         return behind + _term(name) * len(LAW_PLACES) + LAW_PLACES.index(name.partition(".")[2])
-    own = [effect.id for effect in applied_on("motion")]
-    if group in own:
-        row = row_of(group)
-        assert row is not None
-        return int(SIZE + own.index(group) * _own_sizes().shape[1] + row.parameters.index(name))
+    for place, effect in enumerate(effects.called_on("motion")):
+        if effect.id == group:
+            return int(SIZE + place * _own_sizes(effects).shape[1] + effect.row.parameters.index(name))
     return parameter_index(group, name)
 
 
-def _own_sizes() -> FloatArray:
+def _own_sizes(effects: Competing) -> FloatArray:
     """Return the parameters of the effects on motion that are called, at which they do nothing, (effects, k)."""
-    return tables(None, None, applied_on("motion")).own_sizes
+    return tables(None, None, effects.called_on("motion")).own_sizes
 
 
 FLAT_ENVIRONMENT = {("environment", name) for name in PARAMETERS["environment"].names or ()}
@@ -149,11 +154,13 @@ _PER_TURN = tuple((row.id, row.per_turn) for row in CATALOGUE.values() if row.pe
 _UNEVEN_BODY = tuple((row.id, name) for row in CATALOGUE.values() if row.follows_spin for name in row.parameters)
 
 
-def runner_of(recording: Recording, values: Values, columns: Sequence[Column] = ()) -> Runner:
+def runner_of(
+    recording: Recording, values: Values, columns: Sequence[Column] = (), effects: Competing = CATALOGUED
+) -> Runner:
     """Return what runs a recording's segments with values, in steps short enough for ``columns``, too."""
     given = Given(
         recording,
-        tables(recording.disc, None, applied_on("motion")),
+        tables(recording.disc, None, effects.called_on("motion")),
         _knots(recording),
         _order(values, columns),
         any(value(values, *key) != 0.0 for key in _UNEVEN_BODY),

@@ -14,8 +14,8 @@ class Readings:
     """The usable readings of one sensor of a recording.
 
     t (n,) written times; value (n, k); good (n, k) tells which readings count; sd (k,) the stated noise with rounding
-    (NaN where nothing is stated); clipped (n, k) stand at the limit, which is the range unless readings stand still
-    below it.
+    (NaN where nothing is stated), or (n, k) where it is known reading by reading; clipped (n, k) stand at the limit,
+    which is the range unless readings stand still below it.
     """
 
     sensor: str

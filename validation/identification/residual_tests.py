@@ -2,22 +2,26 @@
 
 A sensor whose noise is larger or slower than stated is no physics. What tells the two apart: noise with one level and
 one correlation, once whitened, is flat over frequency and the same at all times; missing physics is neither. And what
-is many times as loud as stated and hardly changes within a recording is no noise.
+is many times as loud as stated and hardly changes within a recording is no noise. Where the level is not in question,
+the test of Ljung and Box ("On a measure of lack of fit in time series models", 1978) finds residuals that remember.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
+from scipy.stats import chi2
 
 from discsim.arrays import FloatArray
 from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel, estimate_noise, log_likelihood, whitened
+from validation.identification.normal_equations import inverse_of
 
-__all__ = ["RESIDUAL_TESTS", "Remainder", "ResidualTests", "remainders"]
+__all__ = ["RESIDUAL_TESTS", "Remainder", "ResidualTests", "Whiteness", "remainders", "whiteness"]
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,8 @@ class ResidualTests:
 
 
 RESIDUAL_TESTS = ResidualTests()
+#: lags that Ljung and Box's test looks at, at most, and how many values a series must have for each
+LAGS, VALUES_PER_LAG = 5, 4
 
 
 @dataclass(frozen=True)
@@ -216,5 +222,32 @@ def _without_course(
         white = np.hstack([whitened(linear, noise, A), whitened(linear, noise, e[:, None])])
         H += white[:, :-1].T @ white[:, :-1]
         right += white[:, :-1].T @ white[:, -1]
-    common = np.linalg.lstsq(H, right, rcond=1e-10)[0]
+    common = inverse_of(H) @ right
     return [e - A @ common for A, e in zip(columns, residuals, strict=True)]
+
+
+class Whiteness(NamedTuple):
+    """Q = n(n + 2) sum rho_k^2/(n - k) summed over series, its degrees of freedom, and the chance of more if white."""
+
+    Q: float
+    lags: int
+    p: float
+
+
+def whiteness(series: Sequence[FloatArray]) -> Whiteness:
+    """Test series of residuals (n_i,) evenly spaced, each for itself (no lag reaches from one to the next).
+
+    Series of fewer than four values, or constant ones, tell nothing; p is NaN where none tells anything. A fit takes
+    parameters out of its residuals, so where series are short p is only a guide.
+    """
+    total, count = 0.0, 0
+    for values in series:
+        x = values[np.isfinite(values)]
+        lags = min(LAGS, x.size // VALUES_PER_LAG)
+        if lags == 0 or np.ptp(x) == 0.0:
+            continue
+        n, x = x.size, x - x.mean()
+        for k in range(1, lags + 1):
+            total += n * (n + 2) * float(x[:-k] @ x[k:] / (x @ x)) ** 2 / (n - k)
+        count += lags
+    return Whiteness(total, count, float(chi2.sf(total, count)) if count else float("nan"))

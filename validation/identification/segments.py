@@ -9,6 +9,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray, IntArray
 from discsim.recording import Recording
+from validation.identification.competing_effects import CATALOGUED, Competing
 from validation.identification.observations import readings_of
 from validation.identification.parameters import Values
 from validation.identification.plants import Plant, plant_of
@@ -20,7 +21,10 @@ __all__ = ["Chain", "chain", "recut", "stepped", "undone"]
 
 @dataclass(frozen=True)
 class Chain:
-    """The pieces of one recording: boundaries (k + 1,) s and the states (k, s) they start from."""
+    """The pieces of one recording: boundaries (k + 1,) s and the states (k, s) they start from.
+
+    ``effects`` are those that may act on them.
+    """
 
     recording: Recording
     readings: tuple[Readings, ...]
@@ -28,6 +32,9 @@ class Chain:
     states: FloatArray
     #: sensor -> samples lost before each of its samples (n,), where some were
     lost: Mapping[str, FloatArray] = field(default_factory=dict)
+    effects: Competing = CATALOGUED
+    #: one sigma (d,) of what a step may move the first state by, where it is not the plant's
+    reach: FloatArray | None = None
 
     @property
     def plant(self) -> Plant:
@@ -39,18 +46,16 @@ class Chain:
         return np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, len(self.states) - 1)
 
 
-def chain(
-    recording: Recording, edges: FloatArray, states: FloatArray, lost: Mapping[str, FloatArray] | None = None
-) -> Chain:
+def chain(recording: Recording, edges: FloatArray, states: FloatArray, effects: Competing = CATALOGUED) -> Chain:
     """Return a recording cut at edges (k + 1,) s with states (k, s) at the starts of its pieces."""
-    return Chain(recording, readings_of(recording), edges, states, dict(lost or {}))
+    return Chain(recording, readings_of(recording), edges, states, effects=effects)
 
 
 def recut(current: Chain, values: Values, edges: FloatArray) -> Chain:
     """Return the chain cut at other edges (k + 1,), its new pieces starting where the old motion was."""
     recording = current.recording
-    runner = runner_of(recording, values)
-    flat, own = base_flat(recording, values), current.plant.own_values(values)
+    runner = runner_of(recording, values, (), current.effects)
+    flat, own = base_flat(recording, values, (), current.effects), current.plant.own_values(values)
     states = np.empty((edges.size - 1, current.states.shape[1]))
     for j, i in enumerate(current.segment_of(edges[:-1] + 1e-9)):
         start, state = float(current.edges[i]), current.states[i]

@@ -7,9 +7,7 @@ are the fit's business.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
-from types import MappingProxyType
+from functools import cache, lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -22,9 +20,9 @@ from discsim.effects.sensors import AccelerometerSaturation, ClockRate, Lag, Lat
 from discsim.effects.setup import BoardRotation, TimeOffset
 from discsim.motion import State, Surroundings
 from discsim.recording import Recording
-from discsim.sensors import Accelerometer, Gps, Gyroscope, Magnetometer, RateReference, Tracker
-from discsim.sensors.instruments import FIELDS, Sensor
-from validation.identification.competing_effects import applied_on, row_of
+from discsim.sensors import Gyroscope
+from discsim.sensors.instruments import FIELDS, KINDS, Sensor
+from validation.identification.competing_effects import CATALOGUED, Competing
 from validation.identification.parameters import Values
 from validation.identification.plants import plant_of
 
@@ -35,26 +33,12 @@ _Kind = TypeVar("_Kind")
 #: the effects that only move the instants at which samples were taken
 CLOCKS = tuple(row.id for row in CATALOGUE.values() if row.moves_time)
 _FIELD = ("magnetic_north", "magnetic_east", "magnetic_down")
-_KINDS: Mapping[str, type[Sensor]] = MappingProxyType(
-    {
-        "magnetometer": Magnetometer,
-        "accelerometer": Accelerometer,
-        "gyroscope": Gyroscope,
-        "gps": Gps,
-        "rate_reference": RateReference,
-        "track": Tracker,
-    }
-)
 _BASELINE = {(row.id, name): none for row in CATALOGUE.values() for name, none in row.sizes.items()}
 
 
 def value(values: Values, group: str, name: str) -> float:
-    """Return a parameter of an effect: as given, or its baseline."""
-    if (group, name) in values:
-        return values[group, name]
-    if (group, name) not in _BASELINE and (row := row_of(group)) is not None:
-        return float(getattr(row.baseline, name))
-    return float(_BASELINE.get((group, name), 0.0))
+    """Return a parameter of the catalogue: as given, or its baseline."""
+    return float(values.get((group, name), _BASELINE.get((group, name), 0.0)))
 
 
 @cache
@@ -77,9 +61,9 @@ def sized(values: Values, kind: type[_Kind], acts_on: str | None = None) -> _Kin
     return effect
 
 
-def is_motion(group: str) -> bool:
+def is_motion(group: str, effects: Competing = CATALOGUED) -> bool:
     """Tell whether a group of parameters acts on the motion (and not on a sensor)."""
-    if (row := row_of(group)) is not None:
+    if (row := effects.row(group)) is not None:
         return row.acts_on == "motion"
     return group in ("aero", "disc", "environment", "rig", "law")
 
@@ -91,7 +75,14 @@ def delay(values: Values, sensor: str, written: FloatArray) -> FloatArray:
     return late + sized(values, Latency, sensor).delay_s
 
 
-def predicted(sensor: str, recording: Recording, values: Values, t: FloatArray, rows: FloatArray) -> FloatArray:
+def predicted(
+    sensor: str,
+    recording: Recording,
+    values: Values,
+    t: FloatArray,
+    rows: FloatArray,
+    effects: Competing = CATALOGUED,
+) -> FloatArray:
     """Return the readings (..., m, k) of a sensor before lag and noise at true times t (m,) for rows (..., m, 19)."""
     state, model, around = _state(t, rows), _model(sensor, recording, values), _surroundings(recording, values)
     if isinstance(model, Gyroscope):
@@ -101,8 +92,8 @@ def predicted(sensor: str, recording: Recording, values: Values, t: FloatArray, 
     if sensor == "accelerometer":
         limit = sized(values, AccelerometerSaturation).limit_m_s2
         readings = np.clip(readings, -limit, limit) if np.isfinite(limit) else readings
-    for effect in applied_on(sensor):
-        sizes = [value(values, effect.id, name) for name in effect.row.parameters]
+    for effect in effects.called_on(sensor):
+        sizes = [values.get((effect.id, name), none) for name, none in effect.row.sizes.items()]
         if sizes != list(effect.value) and effect.applied is not None:
             times = np.broadcast_to(t, rows.shape[:-1]).ravel()
             flat = _state(times, rows.reshape(-1, rows.shape[-1]))
@@ -127,11 +118,17 @@ def _errors(sensor: str) -> tuple[tuple[str, type[Any], str], ...]:
 
 def _model(sensor: str, recording: Recording, values: Values) -> Sensor:
     """Return a sensor with the errors that values have; both sensors on the accelerometer's chip sit where stated."""
-    errors = {place: sized(values, kind, acts_on) for place, kind, acts_on in _errors(sensor)}
+    errors = [(place, sized(values, kind, acts_on)) for place, kind, acts_on in _errors(sensor)]
     if sensor in ("accelerometer", "gyroscope"):
         stated = recording.sheets["accelerometer"].position if "accelerometer" in recording.sheets else None
-        errors["position"] = np.zeros(3) if stated is None else stated
-    return _KINDS[sensor](**errors)
+        errors.append(("position", (0.0, 0.0, 0.0) if stated is None else tuple(stated.tolist())))
+    return _made(sensor, tuple(errors))
+
+
+@lru_cache(256)
+def _made(sensor: str, errors: tuple[tuple[str, Any], ...]) -> Sensor:
+    """Return a sensor with errors by field; a fit asks for the same one for each batch of neighbours."""
+    return KINDS[sensor](**dict(errors))
 
 
 def _surroundings(recording: Recording, values: Values) -> Surroundings:

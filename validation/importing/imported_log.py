@@ -6,16 +6,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from matplotlib.figure import Figure
 
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import write_text
 from discsim.recording import Recording, write_recording
+from discsim.result import Result
+from discsim.threads import one_thread
 from validation.checking import check_recording
 from validation.diagnosis.setup import find_setup_faults
 from validation.importing.conversion import Imported, RawReadings, read_readings, repairs_csv
 from validation.importing.import_map import ImportMap, find_map, read_map
+from validation.importing.raw_table import Repair
 from validation.importing.sniffing import (
     Decision,
     Stretch,
@@ -27,6 +32,9 @@ from validation.importing.sniffing import (
     write_raw_page,
 )
 from validation.importing.sniffing.chosen import chosen_recordings
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["ImportedLog", "LogPart", "import_log", "take"]
 
@@ -50,7 +58,7 @@ class LogPart(NamedTuple):
 
 
 @dataclass(frozen=True, repr=False)
-class ImportedLog:
+class ImportedLog(Result):
     """A raw log as recordings.
 
     Attributes
@@ -118,6 +126,20 @@ class ImportedLog:
         """Return what was decided, the rows of each sensor, the throws, and the remarks: a line each."""
         return "\n".join([*(decision.text for decision in self.decisions), *self.lines, *self.remarks])
 
+    def table(self) -> dict[str, list[Any]]:
+        """Return a row for each repair: recording, and what repairs.csv has."""
+        rows = [(one.recording.name, repair) for one in self.imported for repair in one.repairs]
+        columns = {key: [getattr(repair, key) for _, repair in rows] for key in Repair._fields}
+        return {"recording": [name for name, _ in rows], **columns}
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the readings of the first recording (`Recording.to_xarray`)."""
+        return self.recordings[0].to_xarray()
+
+    def plot(self) -> Figure:
+        """Return a figure of the readings of the first recording."""
+        return self.recordings[0].plot()
+
     def report(self, folder: Path | str) -> Path:
         """Write the recording (of every throw: a data set), repairs.csv, raw.html and a proposed map into ``folder``.
 
@@ -146,6 +168,7 @@ def take(
     return ImportedLog(name, tuple(imported), tuple(throws), import_map, part, read, tuple(decisions))
 
 
+@one_thread
 def import_log(
     raw: Path | str,
     map: str = "auto",
@@ -173,7 +196,10 @@ def import_log(
     environment : Environment, optional
         Where it was recorded, in the place of what the map states.
 
-    Raises `InputError` naming file, line and what was expected.
+    Raises
+    ------
+    InputError
+        With the file, its line, and what was expected.
     """
     path, part = Path(raw), LogPart(rows, throw, every_throw)
     part.check()

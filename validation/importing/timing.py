@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, sd_by_median
 
 __all__ = ["RowTiming", "row_timing"]
 
@@ -72,7 +72,7 @@ def row_timing(t: FloatArray) -> RowTiming:
     after = np.append(ratio[1:], 1.0)
     late_row = (ratio >= MISSING) & (np.abs(ratio + after - 2) <= LATE + rounding)
     # in a log whose every step is uneven, a long step is one of them; six of its scatter are not
-    scatter = 1.4826 * float(np.median(np.abs(ratio - np.median(ratio))))
+    scatter = float(sd_by_median(ratio - np.median(ratio)))
     missing = (ratio >= max(MISSING, 1 + 6 * scatter)) & ~late_row
     twice = int(np.count_nonzero(ratio < TWICE)) if 1 - 6 * scatter > TWICE else 0
     lost = int(np.sum(np.round(ratio[missing]) - 1))

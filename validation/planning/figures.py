@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from validation.identification.competing_effects import row_of
+from discsim.effects.catalogue import CATALOGUE
 from validation.planning.limits import Limits
 from validation.reporting.figures import new_figure, save_figure
 
@@ -17,8 +17,7 @@ def draw_limits(limits: Limits, path: Path) -> None:
     """Draw for each effect its sizes, seen and named, over the small but visible size that the catalogue states."""
     rows = []
     for one in limits.effects:
-        row = row_of(one.id)
-        assert row is not None
+        row = CATALOGUE[one.id]
         scales = np.array([row.scale[row.parameters.index(name)] for name in one.parameters])
         seen, named = np.array(one.seen) / scales, np.array(one.named) / scales
         rows.append((one.id, seen[np.isfinite(seen)], named[np.isfinite(named)]))

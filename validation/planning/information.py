@@ -19,7 +19,6 @@ from discsim.recording import Recording
 from validation.diagnosis.relaxed_fit import unknowns
 from validation.diagnosis.selection.candidates import Trial, available, free_trial, trials_for
 from validation.diagnosis.selection.screening import board_of
-from validation.identification.competing_effects import row_of
 from validation.identification.gauss_newton import Fit, linearised
 from validation.identification.linear import Linear
 from validation.identification.noise import GroupNoise, NoiseModel, stated_noise
@@ -70,16 +69,14 @@ def questions_of(recordings: Sequence[Recording], instant: float) -> Questions:
         )
     trials = [trial for trial in trials_for(recordings) if all(map(_in_reach, trial.columns))]
     silent = []
-    for id in available(recordings):
-        row = row_of(id)
-        assert row is not None
+    for row in available(recordings):
         shape = {"t_s": instant, "width_s": _GUST_S, "order": 1.0, "phase_rad": 0.0}
         given = tuple((name, shape[name]) for name in row.parameters if name in shape)
         if row.event or row.per_turn:
-            trial = free_trial(id, given)
+            trial = free_trial(row.id, given)
             trials.append(replace(trial, recordings=frozenset([0])) if row.event else trial)
-        elif not any(trial.id == id for trial in trials):
-            silent.append(id)
+        elif not any(trial.id == row.id for trial in trials):
+            silent.append(row.id)
     return Questions(known, coefficients, tuple(trials), tuple(silent))
 
 

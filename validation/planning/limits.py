@@ -12,15 +12,13 @@ from scipy.optimize import brentq
 from scipy.stats import ncx2
 
 from discsim.arrays import FloatArray
-from validation.diagnosis.design.next_recording import CONFUSED
 from validation.diagnosis.selection.candidates import Trial, parameters_of
-from validation.diagnosis.selection.evidence import RIVAL, price
+from validation.diagnosis.selection.evidence import price
+from validation.diagnosis.settings import SELECTION
 from validation.planning.information import Information, inverse
 
 __all__ = ["Coefficient", "EffectLimit", "Limits", "Pair", "coefficients_of", "limits_of", "needed"]
 
-#: what a rival is allowed more for each parameter that it has more, as `confusions` of the diagnosis has it
-_PER_PARAMETER = 4.0
 #: a rival that takes all of a trace but this share cannot be told from the effect
 _SAME = 1e-4
 
@@ -132,8 +130,8 @@ def _limit(one: _Asked, others: Sequence[_Asked], H: FloatArray) -> tuple[Effect
         with np.errstate(divide="ignore"):
             # a simpler rival stands unless the effect gains what its further parameters cost
             if more < 0:
-                need = np.maximum(need, RIVAL * -more / left)
-            distance = (CONFUSED + _PER_PARAMETER * max(more, 0)) / left
+                need = np.maximum(need, SELECTION.rival * -more / left)
+            distance = (SELECTION.confused + SELECTION.per_parameter * max(more, 0)) / left
         id = other.trial.id
         apart[id] = np.maximum(apart.get(id, np.zeros(power.size)), distance)
         taken_by[id] = np.maximum(taken_by.get(id, np.zeros(power.size)), taken)

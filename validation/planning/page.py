@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from validation.identification.competing_effects import row_of
+from discsim.effects.catalogue import CATALOGUE
 from validation.planning.figures import draw_limits
 from validation.planning.planned import Planned
 from validation.reporting.html import Section, write_report
@@ -37,8 +37,7 @@ def _factor(value: float) -> str:
 def _effects(found: Planned, out: Path) -> Section:
     rows = []
     for one in found.limits.effects:
-        row = row_of(one.id)
-        assert row is not None
+        row = CATALOGUE[one.id]
         for name, seen, named in zip(one.parameters, one.seen, one.named, strict=True):
             scale = row.scale[row.parameters.index(name)]
             rows.append(

@@ -78,8 +78,10 @@ def new_figure(
     return figure, figure.subplots(rows, columns, **options)
 
 
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as ``path``'s ending says (``.png`` or ``.svg``), without a date; a PNG keeps its numbers."""
+def save_figure(figure: Figure, path: Path | None) -> Figure:
+    """Write a figure as ``path``'s ending says (``.png`` or ``.svg``), without a date, unless it is None; return it."""
+    if path is None:
+        return figure
     kind = path.suffix.removeprefix(".")
     metadata: dict[str, str | None] = {"Date": None} if kind == "svg" else {"Software": None}
     if kind == "png" and (values := drawn_values(figure)):
@@ -87,6 +89,7 @@ def save_figure(figure: Figure, path: Path) -> None:
     buffer = io.BytesIO()
     figure.savefig(buffer, format=kind, dpi=150, metadata=metadata)
     write_bytes(path, buffer.getvalue())
+    return figure
 
 
 def symmetric_log(axes: Axes, *, linear: float, limit: float) -> None:

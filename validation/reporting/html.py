@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from discsim.files import write_text
-from validation.reporting.run import current_run, package_version, source_commit
+from discsim.version import commit
+from validation.reporting.run import current_run, package_version
 
 __all__ = ["Section", "write_page", "write_report"]
 
@@ -58,9 +59,7 @@ def write_page(path: Path, template: str, **content: Any) -> None:
 def made_by() -> str:
     """Return by what a page was made: command and seed of the run if there is one, version, commit if known."""
     run = current_run()
-    made = [f"discsim {package_version()}"]
-    if commit := source_commit():
-        made.append(f"commit {commit}")
+    made = [f"discsim {package_version()}", f"commit {commit()}"]
     if run is not None:
         made.insert(0, f"discsim {' '.join(run.command)}")
         if run.seed is not None:

@@ -40,6 +40,7 @@ __all__ = [
     "at_wind",
     "disc_to_fly",
     "flight_effects",
+    "given_files",
     "known_plant",
     "laws_upon",
     "parse_effects",
@@ -121,6 +122,11 @@ def disc_to_fly(
     if given.disc is None:
         raise InputError(f"{model}: has no [disc]; expected the model of a disc")
     return given.disc, given.environment, given
+
+
+def given_files(*names: str | Path | None) -> list[Path]:
+    """Return the files among what was given: paths, and names that end in .toml (others are shipped ones)."""
+    return [Path(name) for name in names if name is not None and (isinstance(name, Path) or name.endswith(".toml"))]
 
 
 def all_effects(

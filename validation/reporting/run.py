@@ -10,25 +10,25 @@ from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
-import discsim
 from discsim.errors import InputError
 from discsim.files import digest, write_text
+from discsim.version import commit, version
 from validation.reporting.written import watching
 
-__all__ = ["Run", "current_run", "package_version", "source_commit", "source_digest", "start_run"]
+__all__ = ["Run", "current_run", "package_version", "source_digest", "start_run"]
 
 T = TypeVar("T")
 
 
 def package_version() -> str:
     """Return the installed version of discsim ("unknown" when run from a bare source tree)."""
-    return discsim.__version__
+    return version()
 
 
 def source_digest(*places: Path, without: Container[Path] = ()) -> str:
@@ -106,19 +106,6 @@ def current_run() -> Run | None:
     return _CURRENT.get()
 
 
-@cache
-def source_commit() -> str | None:
-    """Return the commit of the sources where they are a git checkout, short; None where installed."""
-    head = Path(discsim.__file__).resolve().parent.parent / ".git"
-    try:
-        text = (head / "HEAD").read_text(encoding="utf-8").strip()
-        if text.startswith("ref: "):
-            text = (head / text[5:]).read_text(encoding="utf-8").strip()
-    except OSError:  # no checkout, or one whose refs are packed
-        return None
-    return text[:10]
-
-
 @contextmanager
 def start_run(out: Path, seed: int | None = None, inputs: Iterable[Path] = ()) -> Iterator[Run]:
     """Open a run that writes into ``out``; ``run.json`` is written when the block ends without an error.
@@ -146,7 +133,7 @@ def start_run(out: Path, seed: int | None = None, inputs: Iterable[Path] = ()) -
         {
             "command": ["discsim", *run.command],
             "version": package_version(),
-            "commit": source_commit(),
+            "commit": commit(),
             "seed": seed,
             "inputs": digests,
             "duration_s": round(time.monotonic() - started, 3),

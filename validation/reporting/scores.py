@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 from discsim.files import write_bytes
 
-__all__ = ["Score", "all_ok", "at_most", "score", "write_junit"]
+__all__ = ["Score", "at_most", "score", "write_junit"]
 
 
 @dataclass(frozen=True)
@@ -53,11 +53,6 @@ def score(name: str, value: float, unit: str, expected: float, tolerance: float)
 def at_most(name: str, value: float, unit: str, limit: float) -> Score:
     """Return a score of an error that should be zero and may reach ``limit``."""
     return score(name, value, unit, 0.0, limit)
-
-
-def all_ok(scores: Sequence[Score]) -> bool:
-    """Tell whether every score is within tolerance."""
-    return all(item.ok for item in scores)
 
 
 def write_junit(path: Path, scores: Sequence[Score], duration_s: float, *, suite: str = "discsim validate") -> None:

@@ -8,13 +8,11 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.files import write_text
-from discsim.motion import Motion
+from discsim.motion import COLUMNS, Motion
 
 __all__ = ["write_csv", "write_flight_truth", "write_rate_truth"]
 
-FLIGHT_HEADER = (
-    "time_s,north_m,east_m,down_m,v_north_m_s,v_east_m_s,v_down_m_s,roll_rad,pitch_rad,yaw_rad,p_rad_s,q_rad_s,r_rad_s"
-)
+FLIGHT_HEADER = ",".join(COLUMNS)
 
 
 def write_csv(path: Path, header: str, table: FloatArray) -> None:
@@ -25,8 +23,7 @@ def write_csv(path: Path, header: str, table: FloatArray) -> None:
 
 def write_flight_truth(path: Path, motion: Motion) -> None:
     """Write every step of a flight; the last row is touch-down where the flight ended on the ground."""
-    table = np.column_stack((motion.t, motion.position, motion.velocity, *motion.euler_angles, motion.rate))
-    write_csv(path, FLIGHT_HEADER, table)
+    write_csv(path, FLIGHT_HEADER, np.column_stack(list(motion.table().values())))
 
 
 def write_rate_truth(path: Path, motion: Motion) -> None:

@@ -24,6 +24,8 @@ import numpy as np
 
 from discsim.errors import InputError
 from discsim.files import read_text, write_bytes, write_text
+from discsim.result import installed, require
+from discsim.threads import limited
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -118,8 +120,9 @@ def run_tasks(
     through its file, so that a run that was stopped and one that was not return the same.
 
     ``scheduler`` is the address of a Dask scheduler; without one there are as many local processes as cores, or
-    ``workers``; one worker works in this process. ``shared`` goes once to each worker. Raises what a task raises, and
-    `InputError` where no scheduler answers. An interrupt leaves the results that are there.
+    ``workers``; one worker works in this process, and so does all where Dask (the extra cluster) is missing. ``shared``
+    goes once to each worker. Raises what a task raises, and `InputError` where no scheduler answers, or Dask is asked
+    for and missing. An interrupt leaves the results that are there.
     """
     names = [task.name for task in tasks]
     if len(set(names)) != len(names):
@@ -129,7 +132,7 @@ def run_tasks(
     done = {name: result for name in names if (result := _read(folder, name)) is not None}
     left = [task for task in tasks if task.name not in done]
     if left:
-        count = workers or len(os.sched_getaffinity(0))
+        count = workers or (len(os.sched_getaffinity(0)) if installed("distributed") else 1)
         results = _results(left, function, shared, scheduler, count)
         for name, result in progress(results, len(left)) if progress else results:
             done[name] = _write(folder, name, result)
@@ -142,8 +145,9 @@ def _results(
     """Yield names and results as they come."""
     if scheduler is None and min(workers, len(tasks)) == 1:
         for task in tasks:
-            yield task.name, function(task.argument, shared)
+            yield _call(function, task, shared)
         return
+    require("distributed", f"--scheduler {scheduler}" if scheduler else f"--workers {workers}", "cluster")
     from distributed import as_completed
 
     with _client(scheduler, min(workers, len(tasks))) as client:
@@ -164,7 +168,7 @@ def _results(
 
 
 def _call(function: Callable[[Any, Any], Any], task: Task, shared: Any) -> tuple[str, Any]:
-    with _one_at_a_time:
+    with _one_at_a_time, limited():
         return task.name, function(task.argument, shared)
 
 

@@ -71,8 +71,7 @@ def fly_chunk(chunk: Sequence[int], throws: Throws) -> dict[str, FloatArray]:
         drawn.states,
         throws.effects,
         parameters=drawn.parameters,
-        rtol=TOLERANCE,
-        atol=TOLERANCE,
+        tolerance=TOLERANCE,
         threads=throws.threads,
     )
     ends = np.column_stack([flown.state[:, :2], flown.end, np.linalg.norm(flown.state[:, 3:6], axis=1)])

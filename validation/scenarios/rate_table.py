@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, readonly
 from discsim.effects.catalogue import Effect
 from discsim.effects.sensors import PositionOffset
 from discsim.environment import Environment
@@ -17,9 +19,9 @@ from discsim.errors import InputError
 from discsim.files import write_text
 from discsim.law import Law
 from discsim.motion import Motion
+from discsim.rate_tables import RateTable
 from discsim.recording import Recording, Samples
-from discsim.rig import turn_table
-from discsim.sensors import Instruments, record
+from discsim.sensors import Instruments, Sensor, record
 from estimators.accelerometer import AccelerometerErrors, accelerometer
 from estimators.fft import FftSettings, fft
 from estimators.gyroscope import gyroscope
@@ -28,13 +30,18 @@ from validation.reporting.scores import Score, at_most, score
 
 __all__ = [
     "MOUNT_ERRORS",
+    "Bench",
     "Plateau",
     "RateTableRun",
     "envelope_on",
     "fft_delay",
+    "papers_rates",
+    "plateau_rows",
     "plateau_table",
     "rate_table_checks",
     "run_rate_table",
+    "true_rate",
+    "with_all_methods",
     "write_plateaus",
 ]
 
@@ -42,24 +49,6 @@ __all__ = [
 MARGIN_S = 0.7
 #: mount errors of the paper's Fig. 7, m
 MOUNT_ERRORS = (0.001, 0.005)
-
-
-@dataclass(frozen=True)
-class RateTableRun:
-    """What one run gave.
-
-    ``recording`` is the module's (MPU-9250 and the table's read-out), ``wide`` that of the wide-range rate sensor
-    beside it; ``rates`` holds each method's estimate by name, ``envelopes`` the accelerometer's by mount error in m.
-    ``mount`` is how far off its stated place the accelerometer truly sits, the larger of x and y, m.
-    """
-
-    profile: Samples
-    motion: Motion
-    recording: Recording
-    wide: Recording
-    rates: Mapping[str, YawRate]
-    envelopes: Mapping[float, YawRate]
-    mount: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -74,76 +63,237 @@ class Plateau:
     worst: float
 
 
+@dataclass(frozen=True)
+class Bench:
+    """What turns and what sits on it: a rate table, the parts on board and where their accelerometer sits.
+
+    ``parts`` None is the paper's module: an MPU-9250 with an ADXRS649 beside it. The accelerometer is stated to sit
+    ``radius`` m from the axis on the negative x axis (None: where its part says), and sits ``mount`` (3,) m off that.
+    A module without a rate reference gets the AC1120S's. ``stated`` takes the place of parts: instruments as they are,
+    of which no specimen is drawn.
+    """
+
+    table: RateTable = field(default_factory=RateTable)
+    parts: tuple[str, ...] | None = None
+    radius: float | None = None
+    mount: FloatArray = field(default_factory=lambda: readonly([0.0, 0.0, 0.0]))
+    stated: Instruments | None = None
+
+    @property
+    def has_papers_module(self) -> bool:
+        """Whether the paper's module is on it, with the wide-range rate sensor beside it."""
+        return self.parts is None and self.stated is None
+
+    @property
+    def is_papers(self) -> bool:
+        """Whether the claims of the paper's Fig. 7 can be asked of it: its module, on a table that obeys."""
+        follows = self.table.drive.is_ideal and self.table.second is None
+        return self.has_papers_module and self.radius is None and follows
+
+    @property
+    def sensors(self) -> Mapping[str, Sensor]:
+        """The sensors on board, as their data sheets say."""
+        return self._module().sensors
+
+    def _module(self) -> Instruments:
+        if self.stated is not None:
+            return self.stated
+        return Instruments.from_parts("ac1120s", *(("mpu9250",) if self.parts is None else self.parts))
+
+    def module(self, rng: np.random.Generator) -> Instruments:
+        """Return a specimen of the module, drawn within its data sheets, where and how it sits; before effects."""
+        module = self._module().drawn(rng)
+        if self.radius is not None or np.any(self.mount):
+            if "accelerometer" not in module.sensors:
+                found = ", ".join(module.sensors)
+                raise InputError(f"no accelerometer among {found}; expected one, to be put where you say")
+            if self.radius is not None:
+                z = float(module.sensors["accelerometer"].position[2])  # type: ignore[union-attr]
+                module = module.fitted("accelerometer", position=readonly([-self.radius, 0.0, z]))
+            if np.any(self.mount):
+                offset = PositionOffset(*(float(x) for x in self.mount))
+                module = module.fitted("accelerometer", offset=offset)
+        return self.table.fit_out(module)
+
+
+@dataclass(frozen=True)
+class RateTableRun:
+    """What one run gave.
+
+    ``recording`` is the module's (and the table's read-out), ``wide`` that of the wide-range rate sensor beside the
+    paper's module; ``rates`` holds each method's estimate by name, ``envelopes`` the accelerometer's by mount error in
+    m. ``bench`` is what turned, ``mount`` how far off its stated place the accelerometer truly sits, the larger of x
+    and y, m.
+    """
+
+    profile: Samples
+    motion: Motion
+    recording: Recording
+    wide: Recording | None
+    rates: Mapping[str, YawRate]
+    envelopes: Mapping[float, YawRate]
+    mount: float = 0.0
+    bench: Bench = field(default_factory=Bench)
+
+    def truth(self, t: FloatArray) -> FloatArray:
+        """Return the true rate about z_B, rad/s, at times t (n,) s."""
+        return true_rate(self.motion)(t)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last instant of the truth, s."""
+        return self.motion.start, self.motion.end
+
+
 def run_rate_table(
     profile: Samples,
     environment: Environment,
     rng: np.random.Generator,
     *,
-    mount: FloatArray | None = None,
+    bench: Bench | None = None,
     effects: tuple[Effect, ...] = (),
     laws: tuple[Law, ...] = (),
     name: str = "rate-table",
-    progress: Callable[[Sequence[float]], Iterable[float]] = iter,
+    progress: Callable[[Sequence[range]], Iterable[range]] = iter,
 ) -> RateTableRun:
-    """Turn the table through ``profile`` and estimate its rate by each method of the paper.
+    """Turn the table through ``profile`` and estimate its rate by each method of the paper that the parts allow.
 
-    The module is one MPU-9250 drawn within its data sheet; its accelerometer sits ``mount`` (3,) m off its stated
-    place. The yaw phase at the start is drawn too. An effect on a sensor takes the place of what was drawn of its
-    kind; ``laws`` about sensors come on top. ``progress`` is `turn_table`'s. Raises `InputError` where both ``mount``
-    and ``effects`` move the accelerometer.
+    The module is one specimen drawn within its data sheet; the yaw phase at the start is drawn too. An effect on a
+    sensor takes the place of what was drawn of its kind; ``laws`` about sensors come on top. ``progress`` is
+    `turn_table`'s. Raises `InputError` where both the bench's mount and ``effects`` move the accelerometer.
     """
-    if mount is not None and np.any(mount) and any(isinstance(item.value, PositionOffset) for item in effects):
+    bench = bench or Bench()
+    if np.any(bench.mount) and any(isinstance(item.value, PositionOffset) for item in effects):
         raise InputError("a mount error and accel.position_offset both move the accelerometer; expected one of them")
     draw_module, draw_wide, draw_yaw, noise_module, noise_wide = rng.spawn(5)
-    motion = turn_table(profile, environment, effects, yaw=float(draw_yaw.uniform(0, 2 * np.pi)), progress=progress)
-    module = Instruments.from_parts("mpu9250", "ac1120s").drawn(draw_module)
-    if mount is not None:
-        module = module.fitted("accelerometer", offset=PositionOffset(*(float(x) for x in mount)))
-    module = module.with_effects(effects).with_laws(laws)
+    yaw = float(draw_yaw.uniform(0, 2 * np.pi))
+    module = bench.module(draw_module).with_effects(effects).with_laws(laws)
+    motion = bench.table.run(profile, environment, effects, yaw=yaw, progress=progress)
     recording = record(motion, module, noise_module, plant="rate_table", name=name, command=profile)
-    wide_module = Instruments.from_parts("adxrs649").drawn(draw_wide)
-    wide = record(motion, wide_module, noise_wide, plant="rate_table", name=f"{name}-adxrs649", command=profile)
-
-    rates = {
-        "fft": fft(recording.need("magnetometer"), fixed_axis=True),
-        "accelerometer": accelerometer(recording.need("accelerometer"), recording.sheets["accelerometer"]),
-        "gyroscope": gyroscope(recording.need("gyroscope"), recording.sheets["gyroscope"]),
-        "adxrs649": replace(gyroscope(wide.need("gyroscope"), wide.sheets["gyroscope"]), method="adxrs649"),
-    }
-    envelopes = {
-        error: accelerometer(
-            recording.need("accelerometer"), recording.sheets["accelerometer"], AccelerometerErrors(mount=error)
-        )
-        for error in MOUNT_ERRORS
-    }
-    off = float(np.abs(module.sensors["accelerometer"].offset[:2]).max())  # type: ignore[union-attr]
-    return RateTableRun(profile, motion, recording, wide, rates, envelopes, off)
+    wide = None
+    if bench.has_papers_module:
+        wide_module = Instruments.from_parts("adxrs649").drawn(draw_wide)
+        wide = record(motion, wide_module, noise_wide, plant="rate_table", name=f"{name}-adxrs649", command=profile)
+    rates = papers_rates(recording, fixed_axis=bench.table.second is None)
+    if wide is not None:
+        rates["adxrs649"] = replace(gyroscope(wide.need("gyroscope"), wide.sheets["gyroscope"]), method="adxrs649")
+    off = 0.0
+    if "accelerometer" in rates:
+        off = float(np.abs(module.sensors["accelerometer"].offset[:2]).max())  # type: ignore[union-attr]
+    return RateTableRun(profile, motion, recording, wide, rates, _envelopes(recording, rates), off, bench)
 
 
-def plateaus(profile: Samples) -> list[tuple[float, float, float]]:
-    """Return (start s, stop s, rate rad/s) of the level stretches of a profile that outlast their margins."""
-    knots = list(zip(profile.t.tolist(), profile.value.tolist(), strict=True))
-    return [
-        (a[0] + MARGIN_S, b[0] - MARGIN_S, a[1])
-        for a, b in pairwise(knots)
-        if a[1] == b[1] and b[0] - a[0] > 2 * MARGIN_S
-    ]
+def papers_rates(recording: Recording, *, fixed_axis: bool = True) -> dict[str, YawRate]:
+    """Return the rate by each of the paper's methods for which the recording has the sensor."""
+    rates = {}
+    if "magnetometer" in recording:
+        rates["fft"] = fft(recording.need("magnetometer"), fixed_axis=fixed_axis)
+    if "accelerometer" in recording and np.hypot(*np.asarray(recording.sheets["accelerometer"].position)[:2]) > 0:
+        rates["accelerometer"] = accelerometer(recording.need("accelerometer"), recording.sheets["accelerometer"])
+    if "gyroscope" in recording:
+        rates["gyroscope"] = gyroscope(recording.need("gyroscope"), recording.sheets["gyroscope"])
+    return rates
 
 
-def errors_within(rate: YawRate, motion: Motion, start: float, stop: float) -> tuple[FloatArray, BoolArray]:
-    """Return errors (n,) rad/s against truth of the estimates from start to stop, and which of them are known."""
+def _envelopes(recording: Recording, rates: Mapping[str, YawRate]) -> dict[float, YawRate]:
+    if "accelerometer" not in rates:
+        return {}
+    samples, sheet = recording.need("accelerometer"), recording.sheets["accelerometer"]
+    return {error: accelerometer(samples, sheet, AccelerometerErrors(mount=error)) for error in MOUNT_ERRORS}
+
+
+def with_all_methods(run: RateTableRun) -> RateTableRun:
+    """Return the run with the rates of every method that its sensors allow, the paper's ones as they are."""
+    from estimators.methods import all_methods
+
+    found, _ = all_methods(run.recording)
+    others = {rate.method: rate for rate in found if rate.method not in (*run.rates, "rate_reference")}
+    return replace(run, rates={**run.rates, **others})
+
+
+def plateaus(profile: Samples, tolerance: float = 0.0) -> list[tuple[float, float, float]]:
+    """Return (start s, stop s, rate rad/s) of the level stretches of a profile that outlast their margins.
+
+    A stretch is level where no two of its rates are further apart than twice the tolerance (rad/s); its rate is their
+    median. Of stretches that overlap the longest is taken.
+    """
+    t, rate = profile.t, profile.value
+    reach = _level_until(rate, 2.0 * tolerance)
+    found = []
+    ranges = [(0, t.size - 1)]
+    while ranges:
+        first, last = ranges.pop()
+        if t[last] - t[first] <= 2 * MARGIN_S:
+            continue
+        ends = np.minimum(reach[first : last + 1], last)
+        start = first + int(np.argmax(t[ends] - t[first : last + 1]))
+        stop = int(ends[start - first])
+        if t[stop] - t[start] <= 2 * MARGIN_S:
+            continue
+        level = float(np.median(rate[start : stop + 1]))
+        found.append((float(t[start]) + MARGIN_S, float(t[stop]) - MARGIN_S, level))
+        ranges += [(first, start), (stop, last)]
+    return sorted(found)
+
+
+def _level_until(rate: FloatArray, width: float) -> NDArray[np.int64]:
+    """Return for each of rates (n,) the last index up to which all that follow lie within ``width`` of one another."""
+    highest: deque[int] = deque()
+    lowest: deque[int] = deque()
+    reach = np.empty(rate.size, dtype=np.int64)
+    values = rate.tolist()
+    first = 0
+    for k, value in enumerate(values):
+        while highest and values[highest[-1]] <= value:
+            highest.pop()
+        highest.append(k)
+        while lowest and values[lowest[-1]] >= value:
+            lowest.pop()
+        lowest.append(k)
+        while values[highest[0]] - values[lowest[0]] > width:
+            reach[first] = k - 1
+            first += 1
+            if highest[0] < first:
+                highest.popleft()
+            if lowest[0] < first:
+                lowest.popleft()
+    reach[first:] = rate.size - 1
+    return reach
+
+
+def true_rate(motion: Motion) -> Callable[[FloatArray], FloatArray]:
+    """Return the function that tells a motion's rate about z_B, rad/s, at times (n,) s."""
+    return lambda t: motion.at(t).rate[:, 2]
+
+
+def errors_within(
+    rate: YawRate, truth: Callable[[FloatArray], FloatArray], start: float, stop: float
+) -> tuple[FloatArray, BoolArray]:
+    """Return errors (n,) rad/s against truth of the estimates from start to stop, and which of them are known.
+
+    Of magnitudes where the method tells no direction.
+    """
     chosen = (rate.t >= start) & (rate.t <= stop)
-    truth = motion.at(rate.t[chosen]).rate[:, 2]
-    error = rate.rate[chosen] - (truth if rate.signed else np.abs(truth))
+    true = truth(rate.t[chosen])
+    error = rate.rate[chosen] - (true if rate.signed else np.abs(true))
     return error, np.isfinite(error)
 
 
-def plateau_table(run: RateTableRun) -> list[Plateau]:
-    """Return the errors of each method on each plateau."""
+def plateau_table(run: RateTableRun, tolerance: float = 0.0) -> list[Plateau]:
+    """Return the errors of each method on each plateau of the profile."""
+    return plateau_rows(run.rates, run.truth, plateaus(run.profile, tolerance))
+
+
+def plateau_rows(
+    rates: Mapping[str, YawRate],
+    truth: Callable[[FloatArray], FloatArray],
+    spans: Sequence[tuple[float, float, float]],
+) -> list[Plateau]:
+    """Return the errors of each method against a truth on stretches (start s, stop s, rate rad/s)."""
     table = []
-    for start, stop, rate in plateaus(run.profile):
-        for method, estimate in run.rates.items():
-            error, known = errors_within(estimate, run.motion, start, stop)
+    for start, stop, rate in spans:
+        for method, estimate in rates.items():
+            error, known = errors_within(estimate, truth, start, stop)
             share = float(np.mean(known)) if known.size else 0.0
             seen = error[known]
             figures = (seen.mean(), seen.std(), np.abs(seen).max()) if seen.size else (np.nan,) * 3
@@ -167,8 +317,11 @@ def rate_table_checks(run: RateTableRun, table: list[Plateau]) -> list[Score]:
 
     Its words: the gyroscope saturates; the wide-range one is noisy; the FFT is the most accurate at high rates, with
     a small distortion even at a static rate, a delay of half its window, and nothing below its threshold; the
-    accelerometer's envelope widens with the mount error, and holds the truth.
+    accelerometer's envelope widens with the mount error, and holds the truth. Of other modules and tables it says
+    nothing.
     """
+    if not run.bench.is_papers:
+        return []
 
     def of(method: str, above: float, below: float = np.inf) -> list[Plateau]:
         """Return the method's plateaus with a rate between, either way round, deg/s."""

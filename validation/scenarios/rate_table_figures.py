@@ -7,10 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from estimators.fft import FftSettings
-from validation.reporting.figures import COLOURS, new_figure, save_figure, symmetric_log
+from validation.reporting.figures import COLOURS, colour, new_figure, save_figure, symmetric_log
 from validation.scenarios.rate_table import RateTableRun, errors_within, plateaus
 
 __all__ = ["draw_methods", "draw_waveform"]
+
+#: width of a method's line, in the order in which they are drawn; errors are drawn the scattered ones first
+_WIDTHS = {"adxrs649": 0.5, "gyroscope": 1.6, "accelerometer": 0.8, "fft": 1.2}
+_ERRORS = ("adxrs649", "accelerometer", "gyroscope", "fft")
 
 
 def draw_methods(run: RateTableRun, path: Path) -> None:
@@ -18,20 +22,21 @@ def draw_methods(run: RateTableRun, path: Path) -> None:
     rows = 2 + len(run.envelopes)
     figure, axes = new_figure(rows, 1, width=10.0, height=3.1 * rows, sharex=True)
     truth_t, truth = run.motion.t[::20], np.degrees(run.motion.rate[::20, 2])
-    fft = run.rates["fft"]
+    names = [method for method in _WIDTHS if method in run.rates]
+    names += [method for method in run.rates if method not in _WIDTHS]
 
     top = axes[0]
-    for method, width in (("adxrs649", 0.5), ("gyroscope", 1.6), ("accelerometer", 0.8), ("fft", 1.2)):
+    for method in names:
         rate = run.rates[method]
-        label = {"adxrs649": "ADXRS649", "gyroscope": "MPU-9250 gyroscope"}.get(method, method)
-        top.plot(rate.t, np.degrees(rate.rate), color=COLOURS[method], lw=width, label=label)
+        label = {"adxrs649": "ADXRS649"}.get(method, method)
+        top.plot(rate.t, np.degrees(rate.rate), color=colour(method, names), lw=_WIDTHS.get(method, 1.0), label=label)
     top.plot(truth_t, truth, color=COLOURS["truth"], lw=0.9, ls="--", label="truth")
     top.set_title("All methods on one profile")
     top.legend(loc="upper left", ncols=5, fontsize=8)
     if spans := plateaus(run.profile):
         start, stop, level = max(spans, key=lambda span: abs(span[2]))
         inset = top.inset_axes((0.66, 0.07, 0.33, 0.34))
-        for method in ("accelerometer", "fft"):
+        for method in [name for name in names if name in ("accelerometer", "fft")]:
             rate = run.rates[method]
             inset.plot(rate.t, np.degrees(rate.rate), color=COLOURS[method], lw=0.9)
         inset.plot(truth_t, np.abs(truth), color=COLOURS["truth"], lw=0.9, ls="--")
@@ -52,17 +57,18 @@ def draw_methods(run: RateTableRun, path: Path) -> None:
             lw=0,
             label="accelerometer, worst case (11)",
         )
-        panel.plot(fft.t, np.degrees(fft.rate), color=COLOURS["fft"], lw=1.2, label="fft")
+        if (fft := run.rates.get("fft")) is not None:
+            panel.plot(fft.t, np.degrees(fft.rate), color=COLOURS["fft"], lw=1.2, label="fft")
         panel.plot(truth_t, np.abs(truth), color=COLOURS["truth"], lw=0.9, ls="--", label="truth")
         panel.set_title(f"Envelope for a mount error of {1000 * mount:g} mm")
         panel.legend(loc="upper left", fontsize=8)
 
     bottom = axes[-1]
-    for method in ("adxrs649", "accelerometer", "gyroscope", "fft"):
+    for method in [name for name in _ERRORS if name in names] + [name for name in names if name not in _ERRORS]:
         rate = run.rates[method]
-        error, _ = errors_within(rate, run.motion, run.motion.start, run.motion.end)
+        error, _ = errors_within(rate, run.truth, *run.span)
         inside = (rate.t >= run.motion.start) & (rate.t <= run.motion.end)
-        bottom.plot(rate.t[inside], np.degrees(error), color=COLOURS[method], lw=0.7)
+        bottom.plot(rate.t[inside], np.degrees(error), color=colour(method, names), lw=0.7)
     symmetric_log(bottom, linear=10.0, limit=300.0)
     bottom.set_title("Error of each method (logarithmic beyond 10 deg/s)")
     bottom.set_ylabel("error, deg/s")
@@ -87,8 +93,8 @@ def draw_waveform(run: RateTableRun, path: Path) -> None:
     amplitude = np.abs(np.fft.rfft(window, settings.window + settings.pad)) * 2 / settings.window
 
     figure, axes = new_figure(1, 2, width=10.0, height=3.6)
-    for axis, colour, name in ((0, COLOURS["fft"], "x"), (1, COLOURS["accelerometer"], "y")):
-        axes[0].plot(shown.t, shown.value[:, axis], color=colour, marker=".", ms=4, lw=0.8, label=name)
+    for axis, shade, name in ((0, COLOURS["fft"], "x"), (1, COLOURS["accelerometer"], "y")):
+        axes[0].plot(shown.t, shown.value[:, axis], color=shade, marker=".", ms=4, lw=0.8, label=name)
     axes[0].set_title("Magnetometer on the turning table")
     axes[0].set_xlabel("time, s")
     axes[0].set_ylabel("field, uT")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from typing import NamedTuple
+
+import typer
 
 from discsim.errors import InputError
 
@@ -14,21 +15,21 @@ __all__ = ["STUDIES", "Study", "run_study"]
 
 
 class Study(NamedTuple):
-    """A study: its module, which has an ``app`` or a ``main`` of its own, and a line on it."""
+    """A study: its module, whose function ``command`` is what typer calls, and a line on it."""
 
     module: str
     line: str
 
 
 STUDIES = {
-    "paper": Study("validation.studies.paper.__main__", "the paper's equations, numbers and figures beside ours"),
-    "feedback": Study("validation.experiments.feedback.__main__", "flights predicted by C_Nr of each source of spin"),
-    "bias": Study("validation.yaw_damping.__main__", "the bias of the paper's way to C_Nr, against the truth"),
-    "conceal": Study("validation.challenge.cases.conceal", "conceal effects in recordings, without diagnosing them"),
-    "blind-test": Study("validation.challenge.report.document", "write finished challenges into their page"),
-    "real-recordings": Study("validation.studies.real_recordings.__main__", "the methods on measured recordings"),
-    "real-diagnosis": Study("validation.studies.real_diagnosis.__main__", "the diagnosis of measured recordings"),
-    "golf-throws": Study("validation.studies.golf_throws.__main__", "three tracked golf throws beside their flights"),
+    "paper": Study("validation.studies.paper.command", "the paper's equations, numbers and figures beside ours"),
+    "feedback": Study("validation.experiments.feedback.command", "flights predicted by C_Nr of each source of spin"),
+    "bias": Study("validation.studies.bias", "the bias of the paper's way to C_Nr, against the truth"),
+    "conceal": Study("validation.studies.conceal", "conceal effects in recordings, without diagnosing them"),
+    "blind-test": Study("validation.studies.blind_test", "write finished challenges into their page"),
+    "real-recordings": Study("validation.studies.real_recordings.command", "the methods on measured recordings"),
+    "real-diagnosis": Study("validation.studies.real_diagnosis.command", "the diagnosis of measured recordings"),
+    "golf-throws": Study("validation.studies.golf_throws.command", "three tracked golf throws beside their flights"),
 }
 
 
@@ -45,9 +46,6 @@ def run_study(name: str, arguments: Sequence[str]) -> None:
             f"study '{name}' is about particular data sets and not part of an installed discsim; expected a checkout "
             "of the sources: in it, pip install -e ."
         )
-    found = import_module(module)
-    if hasattr(found, "app"):
-        found.app(list(arguments), prog_name=f"discsim study {name}", standalone_mode=False)
-        return
-    sys.argv = [f"discsim study {name}", *arguments]
-    found.main()
+    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+    app.command(context_settings={"help_option_names": ["-h", "--help"]})(import_module(module).command)
+    app(list(arguments), prog_name=f"discsim study {name}", standalone_mode=False)

@@ -141,7 +141,8 @@ class _Bench:
 
     def module(self, number: int, mount: FloatArray) -> Instruments:
         """Return a mount's module: its specimen, the effects, where and how it sits."""
-        module = self.sheet_module.drawn(self._rng(1, number)) if self.plan.drawn else self.sheet_module
+        own = self._rng(1, self.plan.mounts.module_of(number))
+        module = self.sheet_module.drawn(own) if self.plan.drawn else self.sheet_module
         module = module.with_effects(self.effects)
         for name in module.sensors:
             module = module.fitted(name, misalignment=mount[3:])
@@ -159,7 +160,8 @@ class _Bench:
             return YawRate(name, none, none, none)
 
     def _estimate(self, name: str, number: int, module: Instruments) -> YawRate:
-        streams = dict(zip(SENSORS, self._rng(0, number).spawn(len(SENSORS)), strict=True))  # as `record` does
+        noise = self._rng(0, self.plan.mounts.module_of(number))
+        streams = dict(zip(SENSORS, noise.spawn(len(SENSORS)), strict=True))  # as `record` does
         if name == "accelerometer":
             felt = module.sensors["accelerometer"]
             assert isinstance(felt, Accelerometer)
@@ -179,9 +181,8 @@ class _Bench:
         disc = None
         if self.plan.plant == "flight":
             disc = self.case.settings["disc"][0] if "disc" in self.case.settings else load_disc("driver")[0]
-        return record(
-            self.motion, module, self._rng(0, number), plant=self.plan.plant, name=f"mount {number}", disc=disc
-        )
+        noise = self._rng(0, self.plan.mounts.module_of(number))
+        return record(self.motion, module, noise, plant=self.plan.plant, name=f"mount {number}", disc=disc)
 
 
 def _timed(module: Instruments, name: str) -> Any:

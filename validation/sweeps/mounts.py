@@ -11,6 +11,7 @@ from math import prod
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from discsim.arrays import FloatArray, readonly
@@ -42,14 +43,17 @@ class MountDesign:
     """A set of mounts between ``lower`` and ``upper`` (6,), in the order of `MOUNT_FIELDS`.
 
     ``design`` "random" draws evenly, "sobol" fills evenly (Sobol' points, scrambled); both have ``count`` mounts.
-    "grid" has ``points`` (6,) values along each field, ends included (one point: the middle).
+    "grid" has ``points`` (6,) values along each field, ends included (one point: the middle). "saltelli" is what shares
+    of variance are told from: blocks of ``base`` mounts, A, B, for each field that varies A with that field of B, and A
+    again, whose modules are those of B. ``count`` is what all blocks hold.
     """
 
-    design: Literal["grid", "random", "sobol"] = "sobol"
+    design: Literal["grid", "random", "sobol", "saltelli"] = "sobol"
     count: int = 1
     lower: FloatArray = field(default_factory=lambda: np.zeros(6))
     upper: FloatArray = field(default_factory=lambda: np.zeros(6))
     points: tuple[int, ...] = (1, 1, 1, 1, 1, 1)
+    base: int = 0
 
     def __post_init__(self) -> None:
         for name in ("lower", "upper"):
@@ -60,8 +64,27 @@ class MountDesign:
             raise InputError("mounts: a range runs backwards; expected the smaller number first")
         if self.design == "grid":
             object.__setattr__(self, "count", prod(self.points))
+        if self.design == "saltelli":
+            if self.base < 2 or self.base & (self.base - 1):
+                raise InputError(f"mounts: a saltelli design of {self.base}; expected a power of two, from 2")
+            object.__setattr__(self, "count", self.base * (self.varied.size + 3))
         if self.count < 1:
             raise InputError(f"mounts: got {self.count}, expected at least one")
+
+    @property
+    def varied(self) -> NDArray[np.int64]:
+        """Places in `MOUNT_FIELDS` of the fields that vary."""
+        return np.flatnonzero(self.upper > self.lower)
+
+    def module_of(self, mount: int) -> int:
+        """Return the number of the module, with its errors and its noise, that sits in a mount.
+
+        Each mount has its own, but for blocks of a saltelli design.
+        """
+        if self.design != "saltelli":
+            return mount
+        block, place = divmod(mount, self.base)
+        return place + (self.base if block in (1, self.varied.size + 2) else 0)
 
     def mounts(self, seed: int) -> FloatArray:
         """Return the mounts, (count, 6)."""
@@ -73,6 +96,8 @@ class MountDesign:
             ]
             return np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, 6)
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0,)))
+        if self.design == "saltelli":
+            return self._blocks(rng)
         varied = np.flatnonzero(width > 0)
         unit = np.full((self.count, 6), 0.5)
         if varied.size and self.design == "random":
@@ -82,6 +107,19 @@ class MountDesign:
             power = int(np.ceil(np.log2(self.count)))
             unit[:, varied] = qmc.Sobol(varied.size, rng=rng).random_base2(power)[: self.count]
         return np.asarray(self.lower + width * unit)
+
+    def _blocks(self, rng: np.random.Generator) -> FloatArray:
+        """Return the mounts of a saltelli design, (count, 6): two halves of Sobol' points, and their mixtures."""
+        varied = self.varied
+        points = qmc.Sobol(2 * varied.size, rng=rng).random_base2(self.base.bit_length() - 1)
+        halves = np.full((2, self.base, 6), 0.5)
+        halves[:, :, varied] = points.reshape(self.base, 2, varied.size).transpose(1, 0, 2)
+        blocks = [halves[0], halves[1]]
+        for k in varied:
+            mixed = halves[0].copy()
+            mixed[:, k] = halves[1][:, k]
+            blocks.append(mixed)
+        return np.asarray(self.lower + (self.upper - self.lower) * np.concatenate([*blocks, halves[0]]))
 
 
 def closed_form(rate: FloatArray, position: FloatArray, offset: FloatArray) -> FloatArray:
@@ -119,8 +157,7 @@ class AccelerometerView(NamedTuple):
         force = self.origin + x * self.gradient[:, :, 0] + y * self.gradient[:, :, 1] + z * self.gradient[:, :, 2]
         chain = body_to_ned(turn(sensor.misalignment)) @ sensitivity(sensor.scale, sensor.cross_axis).T
         value = _times(force, chain) + np.array(sensor.bias) + self.drift
-        limit = min(sensor.range, sensor.saturation.limit_m_s2)
-        reading = digitise(value, self.t, sensor.noise, rng, resolution=sensor.resolution, limit=limit)
+        reading = digitise(value, self.t, sensor.noise, rng, resolution=sensor.resolution, limit=sensor.limit)
         return Samples(self.t, reading)
 
 

@@ -170,6 +170,7 @@ class Plan:
                 "lower": self.mounts.lower.tolist(),
                 "upper": self.mounts.upper.tolist(),
                 "points": list(self.mounts.points),
+                **({"base": self.mounts.base} if self.mounts.base else {}),
             },
             "estimators": dict(self.estimators),
             "seed": self.seed,
@@ -271,7 +272,7 @@ def read_plan(path: Path, *, count: int | None = None, seed: int | None = None) 
     if count is not None:
         if mounts.design == "grid":
             raise InputError.at(path, None, f"--mounts {count}: a grid's mounts are counted by its points")
-        mounts = replace(mounts, count=count)
+        mounts = replace(mounts, base=count) if mounts.design == "saltelli" else replace(mounts, count=count)
     estimators = _read_estimators(_need(top, "estimators"), mounts.count)
     top.finish()
     assert name is not None
@@ -426,8 +427,11 @@ def _read_effect(table: TomlTable, key: str, plant: str) -> Axis:
 def _read_mounts(table: TomlTable | None) -> MountDesign:
     if table is None:
         return MountDesign()
-    design = cast(Literal["grid", "random", "sobol"], table.text("design", choices=("grid", "random", "sobol")))
+    designs = ("grid", "random", "sobol", "saltelli")
+    design = cast(Literal["grid", "random", "sobol", "saltelli"], table.text("design", choices=designs))
     count = _whole(table, "count", 1) if design != "grid" else 1
+    if design == "saltelli" and (count < 2 or count & (count - 1)):
+        raise table.error("count", f"'mounts.count' is {count}, expected a power of two for a saltelli design")
     lower, upper, points = np.zeros(6), np.zeros(6), [1] * 6
     for k, name in enumerate(MOUNT_FIELDS):
         angle = name.startswith("about")
@@ -442,7 +446,9 @@ def _read_mounts(table: TomlTable | None) -> MountDesign:
         if design == "grid":
             points[k] = _whole(table, f"{name}_points", 1, default=1 if lower[k] == upper[k] else 5)
     table.finish()
-    return MountDesign(design, count, lower, upper, tuple(points))
+    if design == "saltelli" and not np.any(upper > lower):
+        raise table.error("design", "[mounts] varies nothing; expected a range for a saltelli design, such as x_m")
+    return MountDesign(design, count, lower, upper, tuple(points), count if design == "saltelli" else 0)
 
 
 def _read_estimators(table: TomlTable, count: int) -> dict[str, int]:

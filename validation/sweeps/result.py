@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from discsim.arrays import FloatArray
 from discsim.files import write_bytes
 from validation.sweeps.chunks import SCORES, Sweep, segments
 from validation.sweeps.mounts import MOUNT_FIELDS, closed_form
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["labelled", "write_netcdf"]
 
@@ -77,6 +80,8 @@ def labelled(sweep: Sweep, chunks: Sequence[FloatArray]) -> xr.Dataset:
         values = np.degrees(sweep.mounts[:, k]) if angle else sweep.mounts[:, k]
         what = f"misalignment {name.replace('_', ' ')}" if angle else f"offset along {name}"
         coordinates[f"{name}_{'deg' if angle else 'm'}"] = ("mount", values, {"long_name": what})
+    import xarray as xr
+
     return xr.Dataset(
         {
             **variables,

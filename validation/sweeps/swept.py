@@ -7,18 +7,25 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
+from matplotlib.figure import Figure
 
+from discsim.result import Result, require
 from validation.reporting.run import package_version
 from validation.running.progress import Progress, silent
 from validation.running.tasks import Task, claim, discard, run_tasks
+from validation.sweeps.cases import landing_of, rows_of, write_rows
 from validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, truth_tasks
 from validation.sweeps.figures import draw_sweep
 from validation.sweeps.plan import Plan, plan_file, read_plan
 from validation.sweeps.result import labelled, write_netcdf
+from validation.sweeps.shares import draw_shares, shares_of, write_shares
+from validation.sweeps.tolerance import Tolerance, tolerances_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["CHECKPOINTS", "Swept", "error_rows", "sweep"]
 
@@ -28,7 +35,7 @@ CHECKPOINTS = "checkpoints"
 
 
 @dataclass(frozen=True, repr=False)
-class Swept:
+class Swept(Result):
     """A finished sweep.
 
     Attributes
@@ -54,13 +61,37 @@ class Swept:
             for name, scored, known, median, most in error_rows(self.scores)
         )
 
+    def table(self) -> dict[str, Any]:
+        """Return a row for each estimator, case, mount and segment: what was varied, and the scores."""
+        frame = self.scores.to_dataframe().reset_index()
+        return {str(name): frame[name].to_numpy() for name in frame}
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the scores."""
+        return self.scores
+
+    def plot(self) -> Figure:
+        """Return the figure of sweep.png."""
+        return draw_sweep(self.scores, self.sweep)
+
     def report(self, folder: Path | str) -> Path:
-        """Write sweep.nc (netCDF) and sweep.png into ``folder``; return the path of the first."""
+        """Write sweep.nc (netCDF), the tables cases.csv and cases.md, and sweep.png; return the path of the first.
+
+        Of a saltelli design also the shares of variance, shares.csv and shares.png.
+        """
         out = Path(folder)
         out.mkdir(parents=True, exist_ok=True)
         write_netcdf(out / "sweep.nc", self.scores)
+        write_rows(out, rows_of(self.scores, landing_of()))
         draw_sweep(self.scores, self.sweep, out / "sweep.png")
+        if shares := shares_of(self.scores, self.sweep):
+            write_shares(out / "shares.csv", shares)
+            draw_shares(shares, out / "shares.png")
         return out / "sweep.nc"
+
+    def tolerances(self, below: float) -> list[Tolerance]:
+        """Return what each case allows for 95 % of all mounts to err by less than a share of the rate."""
+        return tolerances_of(self.scores, self.sweep, below)
 
 
 def error_rows(scores: xr.Dataset) -> list[tuple[str, str, str, str, str]]:
@@ -99,8 +130,13 @@ def sweep(
     anew : bool
         Whether to throw away what an earlier sweep left there.
 
-    Raises `InputError` for a plan that cannot be read, and for checkpoints of another plan.
+    Raises
+    ------
+    InputError
+        For a plan that cannot be read, for checkpoints of another plan, and where xarray (the extra tables) is not
+        installed.
     """
+    require("xarray", "sweep", "tables")
     asked = plan if isinstance(plan, Plan) else read_plan(plan_file(str(plan)))
     identity = {**asked.identity, "versions": {"discsim": package_version(), "numpy": np.__version__}}
     with ExitStack() as stack:

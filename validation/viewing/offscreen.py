@@ -49,11 +49,11 @@ def opengl() -> str:
     Raises `InputError` saying what to install where none works.
     """
     asked = os.environ.get("MUJOCO_GL", "").strip().lower()
-    return _working(asked)
+    return working_opengl(asked)
 
 
 @cache
-def _working(asked: str) -> str:
+def working_opengl(asked: str) -> str:
     candidates: tuple[str, ...]
     if asked in ("", "enable", "enabled", "on", "true", "1"):
         candidates = {"linux": ("egl", "osmesa"), "darwin": ("cgl",)}.get(sys.platform, ())

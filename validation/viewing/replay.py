@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray, readonly
 from discsim.engine import RELEASE_HEIGHT
@@ -213,7 +214,7 @@ def _estimated_rate(recording: Recording) -> tuple[Samples | None, str]:
 def _integrated(rate: Samples, t: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return rates (n,) at t, the nearest known outside, and attitudes (n, 4) turned by them about z_B."""
     known = np.interp(t, rate.t, rate.value)
-    angle = np.concatenate(([0.0], np.cumsum(np.diff(t) * (known[1:] + known[:-1]) / 2)))
+    angle = cumulative_trapezoid(known, t, initial=0)
     return known, turn(angle[:, None] * np.array([0.0, 0.0, 1.0]))
 
 

@@ -401,7 +401,7 @@ def _ffmpeg(path: Path) -> str:
 
         return str(imageio_ffmpeg.get_ffmpeg_exe())
     raise InputError(
-        f"--video {path}: an MP4 needs ffmpeg, from the system or from `pip install imageio-ffmpeg`; a .gif needs none"
+        f"--video {path}: an MP4 needs ffmpeg, from the system or by `pip install 'discsim[video]'`; a .gif needs none"
     )
 
 
@@ -431,7 +431,7 @@ def show(replay: Replay, look: Look, speed: float) -> None:
         window = mujoco.viewer.launch_passive(scene.model, scene.data, show_left_ui=False, show_right_ui=False)
     except RuntimeError as error:
         if sys.platform == "darwin":
-            raise InputError(f"on macOS the viewer needs `mjpython -m validation.cli view ...`, or {remedy}") from error
+            raise InputError(f"on macOS it needs `mjpython -m validation.cli view ...`, or {remedy}") from error
         raise
     with window as viewer:
         with viewer.lock():

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from validation.reporting.figures import COLOURS, new_figure, save_figure
 from validation.yaw_damping.compared import Compared
@@ -19,8 +20,11 @@ __all__ = ["draw_fit", "draw_sources", "draw_surface", "draw_surface_on"]
 _SHADES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#6a3d9a", "#8c6d31")
 
 
-def draw_fit(throws: Sequence[Throw], fit: Fit, paper: PaperTable, path: Path) -> None:
-    """Draw the spin of each throw with the model flight and the paper's line, and what each leaves."""
+def draw_fit(throws: Sequence[Throw], fit: Fit, paper: PaperTable, path: Path | None = None) -> Figure:
+    """Draw the spin of each throw with the model flight and the paper's line, and what each leaves.
+
+    Where a path is given the figure is written there.
+    """
     figure, axes = new_figure(1, 3, width=13.0, height=4.4)
     for number, (throw, fitted, line) in enumerate(zip(throws, fit.throws, paper.slopes, strict=True)):
         shade, first = _SHADES[number % len(_SHADES)], number == 0
@@ -42,7 +46,7 @@ def draw_fit(throws: Sequence[Throw], fit: Fit, paper: PaperTable, path: Path) -
     axes[2].set_ylim(bottom=0)
     if any(throw.path_t.size for throw in throws):
         axes[2].legend(fontsize=6, ncols=2)
-    save_figure(figure, path)
+    return save_figure(figure, path)
 
 
 def draw_surface(paper: PaperTable, fit: Fit | None, path: Path) -> None:

@@ -7,10 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
+
 from discsim.errors import InputError
 from discsim.files import write_text
 from discsim.model_file import Model, write_model
 from discsim.recording import Recording
+from discsim.result import Result
+from discsim.threads import one_thread
 from estimators.methods import METHODS
 from validation.reporting.run import json_text
 from validation.running.given import Given, given_recordings
@@ -26,7 +30,7 @@ __all__ = ["FittedYawDamping", "check_method", "cnr_json", "fit_recordings", "no
 
 
 @dataclass(frozen=True, repr=False)
-class FittedYawDamping:
+class FittedYawDamping(Result):
     """C_Nr fitted to throws.
 
     Attributes
@@ -86,6 +90,19 @@ class FittedYawDamping:
             lines.append(f"spin by {item.source.label}: {found}")
         return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
 
+    def table(self) -> dict[str, list[Any]]:
+        """Return a row for each source of spin: source, C_Nr and its standard deviation (NaN where it gives none)."""
+        fits = [item.fit for item in self.sources]
+        return {
+            "source": [item.source.label for item in self.sources],
+            "CNr": [float("nan") if fit is None else fit.CNr for fit in fits],
+            "sd": [float("nan") if fit is None else fit.sd for fit in fits],
+        }
+
+    def plot(self) -> Figure:
+        """Return the figure of fit.png: the spin of each throw beside the model flight, and what is left."""
+        return draw_fit(self.throws, self.fit, self.paper)
+
     def to_json(self) -> dict[str, Any]:
         """Return the content of cnr.json."""
         return cnr_json(self.fit, self.sources)
@@ -109,6 +126,7 @@ def check_method(method: str) -> None:
         raise InputError(f"--method {method}: unknown; expected one of best, {', '.join(METHODS)}")
 
 
+@one_thread
 def fit_recordings(
     recordings: Given,
     method: str = "best",

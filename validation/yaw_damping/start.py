@@ -21,7 +21,7 @@ _ALPHA = np.radians(np.arange(-30.0, 60.5, 0.5))
 
 
 def release_candidates(throw: Throw) -> Iterator[FloatArray]:
-    """Yield states (14,) as `discsim.trajectory.release_state` gives them: what is stated, the rest from the path.
+    """Yield release states (13,), position, velocity, attitude, body rates: what is stated, the rest from the path.
 
     The tilt of a disc whose attitude is not stated follows from its lift: upright first, then upside down. Raises
     `InputError` where neither is enough.
@@ -54,7 +54,7 @@ def release_candidates(throw: Throw) -> Iterator[FloatArray]:
     else:
         attitudes = _tilts(throw, velocity, acceleration)
     for C_NB in attitudes:
-        yield np.concatenate([position, velocity, quaternion_from_matrix(C_NB), rate, [0.0]])
+        yield np.concatenate([position, velocity, quaternion_from_matrix(C_NB), rate])
 
 
 def _early(throw: Throw) -> tuple[FloatArray, FloatArray, FloatArray] | None:

@@ -15,7 +15,6 @@ from discsim.errors import InputError
 from validation.challenge.blind import Request
 from validation.challenge.cases.conceal import Answer
 from validation.challenge.masks import challenge_masks, masked_results
-from validation.challenge.report.document import main as write_document
 from validation.challenge.report.document import masks_text, plain_command, pooled, with_part
 from validation.challenge.report.page import fault_of, goals_met
 from validation.challenge.run import challenge
@@ -23,6 +22,7 @@ from validation.challenge.scores.detection import Sized, allowed, detections, fi
 from validation.challenge.scores.result import Scored, rates_of, read_result, times
 from validation.challenge.scores.scoring import score_case
 from validation.reporting.run import start_run
+from validation.studies.catalogue import run_study
 
 #: a "diagnosis" that finds nothing in anything
 BLIND = """
@@ -36,9 +36,9 @@ out.mkdir()
 """
 
 
-@pytest.fixture
-def blind(tmp_path: Path) -> list[str]:
-    script = tmp_path / "blind.py"
+def blind(folder: Path) -> list[str]:
+    """Return the command of that diagnosis, written into a folder."""
+    script = folder / "blind.py"
     script.write_text(BLIND)
     return [sys.executable, str(script)]
 
@@ -50,12 +50,14 @@ def drawn(half: float, width: float, cases: int, seed: int = 0) -> list[Sized]:
     return [Sized("air.wind", float(size), bool(ok)) for size, ok in zip(sizes, named, strict=True)]
 
 
-@pytest.mark.parametrize("half", [0.8, 1.5, 4.0])
-def test_the_half_detection_size_is_found_with_an_interval_that_holds_it(half):
+def test_the_half_detection_size_is_found_with_an_interval_that_holds_it():
     """Of twenty sets of 150 effects the interval of 95 % misses at most three (probability of more: 1.6 %)."""
-    curves = [fit_curve(drawn(half, 0.3, 150, seed)) for seed in range(20)]
-    assert sum(curve is not None and curve.low <= half <= curve.high for curve in curves) >= 17
-    assert np.median([curve.half for curve in curves if curve is not None]) == pytest.approx(half, rel=0.1)
+    halves = np.tile([0.8, 1.5, 4.0, 1.5], 5)
+    curves = [fit_curve(drawn(half, 0.3, 150, seed)) for seed, half in enumerate(halves)]
+    held = [curve is not None and curve.low <= half <= curve.high for curve, half in zip(curves, halves, strict=True)]
+    assert sum(held) >= 17
+    found = [curve.half / half for curve, half in zip(curves, halves, strict=True) if curve is not None]
+    assert np.median(found) == pytest.approx(1.0, rel=0.1)
 
 
 def test_a_share_that_is_missed_however_large_does_not_move_the_half_detection_size():
@@ -186,8 +188,8 @@ def test_each_way_to_be_wrong_has_its_name():
 def test_times_are_those_of_all_diagnoses_also_of_one_that_was_given_up():
     found = [scored(POWER, diagnosis("unexplained"), seconds=float(s)) for s in range(1, 12)]
     assert times(found) == (6.0, 10.0, 11.0)
-    assert times([*found, scored(POWER, None, seconds=1800.0)]).longest == 1800.0
-    assert np.isnan(times([]).median)
+    assert times([*found, scored(POWER, None, seconds=1800.0)]).longest_s == 1800.0
+    assert np.isnan(times([]).median_s)
 
 
 def test_of_two_effects_each_counts_by_its_own_size():
@@ -207,36 +209,58 @@ def test_a_half_detection_size_above_the_goal_misses_it():
 PAGE = "top\n<!-- masks -->\nold\n<!-- /masks -->\nmiddle\n<!-- result -->\nold\n<!-- /result -->\nend\n"
 
 
-def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, blind, monkeypatch):
-    """Under two masks of seven, and without any: a page with tables, figures and a command for each failure."""
-    requests = [
-        Request(40, "flight", (), "nothing"),
-        Request(41, "flight", ("air.wind",)),
-        Request(42, "flight", ("lift_hysteresis",)),
-    ]
-    with start_run(tmp_path / "plain", 40) as run:
-        challenge(run, requests, workers=1, command=blind)
-    monkeypatch.setattr("validation.challenge.masks.MASKS", {"short": "short", "few_recordings": "two only"})
-    with start_run(tmp_path / "masks", 40) as run:
-        results = challenge_masks(run, requests, workers=1, command=blind)
-    assert list(results) == ["short", "few_recordings"]
-    assert "few_recordings" in (tmp_path / "masks" / "report.html").read_text()
-    written = json.loads((tmp_path / "masks" / "short" / "challenge.json").read_text())
-    assert written["cases"][1]["reproduce"].endswith("--seed 41 --cases 1 --plant flight "
-                                                     "--effect air.wind --mask short")  # fmt: skip
+REQUESTS = [
+    Request(40, "flight", (), "nothing"),
+    Request(41, "flight", ("air.wind",)),
+    Request(42, "flight", ("lift_hysteresis",)),
+]
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory) -> Path:
+    """The folder of a challenge that nobody answers."""
+    folder = tmp_path_factory.mktemp("challenge")
+    with start_run(folder / "plain", 40) as run:
+        challenge(run, REQUESTS, workers=1, command=blind(folder))
+    return folder / "plain"
+
+
+@pytest.fixture(scope="module")
+def masked(tmp_path_factory) -> Path:
+    """The same under two masks of seven."""
+    folder = tmp_path_factory.mktemp("masked")
+    with pytest.MonkeyPatch.context() as patch, start_run(folder / "masks", 40) as run:
+        patch.setattr("validation.challenge.masks.MASKS", {"short": "short", "few_recordings": "two only"})
+        assert list(challenge_masks(run, REQUESTS, workers=1, command=blind(folder))) == ["short", "few_recordings"]
+    return folder / "masks"
+
+
+def documented(page: Path, plain: Path, *more: object) -> str:
+    """Write a challenge into a page of documents, and return its text."""
+    if not page.exists():
+        page.parent.mkdir()
+        page.write_text(PAGE)
+    run_study("blind-test", [str(plain), *map(str, more), "--page", str(page)])
+    return page.read_text()
+
+
+def test_a_challenge_under_masks_leaves_a_report_and_a_command_for_each_case(masked):
+    assert "few_recordings" in (masked / "report.html").read_text()
+    written = json.loads((masked / "short" / "challenge.json").read_text())
+    told = "--seed 41 --cases 1 --plant flight --effect air.wind --mask short"
+    assert written["cases"][1]["reproduce"].endswith(told)
+
+
+def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, plain, masked):
+    """A page with tables, figures and a command for each failure; a mask without a result is left out."""
+    shutil.copytree(masked, tmp_path / "masks")
     shutil.rmtree(tmp_path / "masks" / "short")
     assert list(masked_results([tmp_path / "masks"])) == ["few_recordings"]
-
     page = tmp_path / "docs" / "page.md"
-    page.parent.mkdir()
-    page.write_text(PAGE)
-    given = [str(tmp_path / "plain"), "--masks", str(tmp_path / "masks"), "--page", str(page)]
-    monkeypatch.setattr(sys, "argv", ["document", *given])
-    write_document()
-    text = page.read_text()
+    text = documented(page, plain, "--masks", tmp_path / "masks")
     assert text.startswith("top\n")
     assert text.endswith("\nend\n")
-    assert "old" not in text
+    assert "\nold\n" not in text
     assert "1 are answered rightly" in text
     assert "`discsim challenge --seed 41 --cases 1 --plant flight --effect air.wind`" in text
     assert "| none (the same seeds) | 3 |" in text
@@ -244,31 +268,29 @@ def test_a_result_is_written_between_its_marks_and_nowhere_else(tmp_path, blind,
     assert "`short`" not in text
     drawn_there = {path.name for path in (page.parent / "images").iterdir()}
     assert {f"images/{name}" in text for name in drawn_there} == {True}
-    write_document()
-    assert page.read_text() == text
+    assert documented(page, plain, "--masks", tmp_path / "masks") == text
 
-    # more cases without anything in them count for the false alarms, and only such cases
+
+def test_more_cases_without_anything_in_them_count_for_the_false_alarms_and_only_such_cases(tmp_path, plain):
     with start_run(tmp_path / "blank", 50) as run:
-        challenge(run, [Request(50, "flight", (), "nothing")], workers=1, command=blind)
-    monkeypatch.setattr(sys, "argv", ["document", *given[:1], "--blank", str(tmp_path / "blank"), *given[-2:]])
-    write_document()
-    (alarms,) = [line for line in page.read_text().splitlines() if line.startswith("| false alarms")]
+        challenge(run, [Request(50, "flight", (), "nothing")], workers=1, command=blind(tmp_path))
+    page = tmp_path / "docs" / "page.md"
+    text = documented(page, plain, "--blank", tmp_path / "blank")
+    (alarms,) = [line for line in text.splitlines() if line.startswith("| false alarms")]
     assert "| 0 of 2 |" in alarms
-    monkeypatch.setattr(sys, "argv", ["document", *given[:1], "--blank", str(tmp_path / "plain"), *given[-2:]])
-    with pytest.raises(SystemExit):
-        write_document()
+    with pytest.raises(InputError, match="conceals something"):
+        documented(page, plain, "--blank", plain)
 
-    # effects near their limit count in the curve: the same ones here, so there are twice as many
+
+def test_effects_near_their_limit_count_in_the_curve(tmp_path, plain, monkeypatch):
+    """The same ones here, so there are twice as many."""
     near = tmp_path / "near" / "challenge.json"
     near.parent.mkdir()
-    near.write_text(
-        json.dumps({**json.loads((tmp_path / "plain" / "challenge.json").read_text()), "mask": "near_limit"})
-    )
+    near.write_text(json.dumps({**json.loads((plain / "challenge.json").read_text()), "mask": "near_limit"}))
     monkeypatch.setattr("validation.challenge.masks.MASKS", {"near_limit": "near"})
-    assert len(pooled(read_result(tmp_path / "plain"), read_result(near.parent))) == 2
-    monkeypatch.setattr(sys, "argv", ["document", *given[:1], "--masks", str(near.parent), "--page", str(page)])
-    write_document()
-    assert "whose sizes lie near the limit: `discsim" in page.read_text()
+    assert len(pooled(read_result(plain), read_result(near.parent))) == 2
+    text = documented(tmp_path / "docs" / "page.md", plain, "--masks", near.parent)
+    assert "whose sizes lie near the limit: `discsim" in text
 
 
 def test_what_is_not_there_is_not_written(tmp_path):

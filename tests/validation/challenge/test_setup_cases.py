@@ -261,9 +261,8 @@ def test_a_fault_that_other_physics_hides_from_the_sensors_relations_is_supposed
     """Stray iron at the ground spoils what the field says of a gyroscope whose columns are mixed up."""
     case = draw_case(93002, kind="setup")
     assert [item.effect.id for item in case.concealed] == ["gyro.axes", "mag.stray_field"]
-    findings = find_setup_faults(
-        recordings(replace(case, runs=case.runs[:4], stated_releases=case.stated_releases[:4]))
-    )
+    some = replace(case, runs=case.runs[:3], stated_releases=case.stated_releases[:3])
+    findings = find_setup_faults(recordings(some))
     assert findings.faults == ()
     supposed = with_likeliest_fault(findings)
     assert supposed is not None
@@ -278,15 +277,14 @@ def test_of_sound_recordings_no_fault_is_supposed():
 def test_a_turned_board_is_told_by_what_all_sensors_say_though_physics_spoils_the_first_look_at_the_air():
     case = draw_case(93014, kind="setup")
     assert [item.effect.id for item in case.concealed] == ["board.rotation", "aero.spin_drag"]
-    some = replace(case, runs=case.runs[:4], stated_releases=case.stated_releases[:4])
+    some = replace(case, runs=case.runs[:2], stated_releases=case.stated_releases[:2])
     (found,) = find_setup_faults(recordings(some)).effects
     true, told = (Rotation.from_rotvec([*one.value]) for one in (case.concealed[0].effect, found))
     assert (true.inv() * told).magnitude() < 0.1
 
 
-@pytest.mark.parametrize("seed", [93006, 93012])
-def test_where_the_field_alone_is_read_a_tilt_of_the_axis_and_another_field_stand_beside_each_other(seed):
-    case = draw_case(seed, kind="setup")
+def test_where_the_field_alone_is_read_a_tilt_of_the_axis_and_another_field_stand_beside_each_other():
+    case = draw_case(93006, kind="setup")
     assert case.concealed[1].effect.id == "rig.axis_tilt"
     made = [corrected(one, [case.concealed[0].effect]) for one in recordings(case)]
     found = search(made)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import io
 import json
-import os
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from rich.console import Console
+from support.places import PRACTICE
 
 from discsim.disc import Disc, Release
 from discsim.environment import Environment
@@ -24,8 +23,6 @@ from validation.checking.table import print_checks
 from validation.commands.check import command
 from validation.diagnosis.setup import find_setup_faults
 
-RECORDINGS = Path(os.environ.get("DISCSIM_RECORDINGS") or Path(__file__).parents[3].parent / "shared" / "recordings")
-PRACTICE = RECORDINGS / "practice"
 practice = pytest.mark.skipif(not PRACTICE.is_dir(), reason="no practice sets here (DISCSIM_RECORDINGS)")
 
 G = 9.798

@@ -7,15 +7,15 @@ import os
 import re
 import shlex
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from support.own_log import write_own_log
+from support.places import ROOT
 
 from validation.cli import main
+from validation.scenarios.example_log import write_example_log
 
-PAGE = (Path(__file__).parents[3] / "docs" / "your-own-log.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "your-own-log.md").read_text(encoding="utf-8")
 
 
 def commands() -> list[tuple[str, list[str]]]:
@@ -27,7 +27,7 @@ def commands() -> list[tuple[str, list[str]]]:
 def test_the_three_commands_of_the_page_give_the_lines_it_shows_and_the_true_rate(monkeypatch, tmp_path, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(os.environ, "COLUMNS", "80")
-    truth = write_own_log(tmp_path / "LOG_0042.CSV")
+    (truth,) = write_example_log(tmp_path / "LOG_0042.CSV")
     assert (tmp_path / "LOG_0042.CSV").read_text().splitlines()[:3] == PAGE.split("```\n")[1].splitlines()[:3]
     assert len(commands()) == 3
     for command, shown in commands():

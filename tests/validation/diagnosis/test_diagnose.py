@@ -6,16 +6,15 @@ The fit integrates another way than MuJoCo does; what is hidden is known to the 
 from __future__ import annotations
 
 import json
-import os
 import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from support.made import DRIVER, FIELD, MODULE, RIG, coasting, coasts, tables, throws
+from support.places import PRACTICE
 
 from discsim.disc import Rig
 from discsim.effects import Effect, effect
@@ -268,8 +267,7 @@ def test_the_same_recordings_give_the_same_answer():
 
 @pytest.mark.parametrize(("name", "count"), [("table-a", 3)])
 def test_a_practice_set_is_answered_as_its_key_says(name: str, count: int):
-    root = Path(os.environ.get("DISCSIM_RECORDINGS", Path(__file__).parents[4] / "shared" / "recordings"))
-    folder = root / "practice" / name
+    folder = PRACTICE / name
     if not (folder / "answer.toml").is_file():
         pytest.skip(f"no recordings at {folder}; set DISCSIM_RECORDINGS")
     key = tomllib.loads((folder / "answer.toml").read_text())

@@ -19,7 +19,7 @@ from validation.diagnosis.relaxed_fit import first_chain, relaxed, unknowns
 from validation.diagnosis.selection.constrained_fit import Tied, tied_fit
 from validation.diagnosis.selection.found import possible
 from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.identification.gauss_newton import Fit, _Going, linearised, linearised_columns
+from validation.identification.gauss_newton import Fit, GaussNewtonStep, linearised, linearised_columns
 from validation.identification.noise import estimate_noise, stated_noise, whitened
 from validation.identification.normal_equations import reduce
 from validation.identification.parameters import Jumps, Parameter
@@ -140,11 +140,11 @@ def test_a_recording_that_a_step_leads_astray_takes_less_of_it_and_the_other_all
         np.testing.assert_array_equal(taken.chains[1].states, alone.chains[1].states)
 
 
-def going(fit: Fit, too_far: float) -> _Going:
+def going(fit: Fit, too_far: float) -> GaussNewtonStep:
     """Return the next step of a fit that in the first recording goes so many times as far as it should."""
     fit = replace(fit, linears=linearised(fit))
     reduced = [
         reduce(linear, chain, fit.noise, fit.jumps) for linear, chain in zip(fit.linears, fit.chains, strict=True)
     ]
     reduced[0] = replace(reduced[0], cross=too_far * reduced[0].cross)
-    return _Going(fit, reduced, np.empty(0), {}, fit.merit)
+    return GaussNewtonStep(fit, reduced, np.empty(0), {}, fit.merit)

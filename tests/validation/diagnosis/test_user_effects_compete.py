@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.places import ROOT
 
 from discsim.disc import Rig
 from discsim.effects.catalogue import CATALOGUE
@@ -31,17 +32,16 @@ from validation.diagnosis.pipeline import diagnose
 from validation.diagnosis.relaxed_fit import first_chain
 from validation.diagnosis.result import Diagnosis
 from validation.diagnosis.selection.candidates import available, parameters_of, trials_for
-from validation.identification.competing_effects import competing, row_of, rows
-from validation.identification.gauss_newton import mapped
+from validation.identification.competing_effects import Competing
 from validation.identification.linearisation import linearise
 from validation.identification.prediction import shown
 from validation.identification.propagation import Column
 from validation.identification.segments import chain
-from validation.identification.sensor_model import is_motion, predicted, value
+from validation.identification.sensor_model import is_motion, predicted
 
 FIELD, RIG = Environment(air_density=None), Rig(1e-3, 8e-5)
 MODULE = Instruments.from_parts("mpu9250")
-PAGE = Path(__file__).parents[3] / "docs" / "diagnosing.md"
+PAGE = ROOT / "docs" / "diagnosing.md"
 #: a law of no size, which stands behind a user's own numbers
 LAW = {("law", "0.target"): 5.0, ("law", "0.coefficient"): 0.0}
 
@@ -171,23 +171,17 @@ def test_an_effect_that_is_not_there_is_not_named(tmp_path):
     assert found.effects == ()
 
 
-def test_an_effect_competes_within_its_call_only(tmp_path):
+def test_an_effect_competes_beside_the_catalogue_s(tmp_path):
     effect = loaded(tmp_path, SUPPLY)
-    recordings = [run_down(60.0)]
-    with competing([effect]):
-        assert row_of("my.supply") is effect.row
-        assert [row.id for row in rows()] == [*CATALOGUE, "my.supply"]
-        assert not is_motion("my.supply")
-        assert value({}, "my.supply", "k_uT_s2") == 0.0
-        assert "my.supply" in available(recordings)
-        (trial,) = (trial for trial in trials_for(recordings) if trial.id == "my.supply")
-        assert [(q.name, q.stated) for q in parameters_of(trial)] == [("k_uT_s2", 0.0)]
-        # and in the threads that share the work
-        assert mapped(lambda id: row_of(id) is not None, ["my.supply", "mag.lag", "law"]) == [True, True, False]
-    with pytest.raises(ZeroDivisionError), competing([effect]):
-        _ = 1 / 0
-    assert row_of("my.supply") is None
-    assert "my.supply" not in available(recordings)
+    recordings, effects = [run_down(60.0)], Competing((effect,))
+    assert effects.row("my.supply") is effect.row
+    assert [effects.row(id) is not None for id in ("mag.lag", "law")] == [True, False]
+    assert [row.id for row in effects.rows] == [*CATALOGUE, "my.supply"]
+    assert not is_motion("my.supply", effects)
+    assert effect.row in available(recordings, effects)
+    assert effect.row not in available(recordings)
+    (trial,) = (trial for trial in trials_for(recordings, effects) if trial.id == "my.supply")
+    assert [(q.name, q.stated) for q in parameters_of(trial)] == [("k_uT_s2", 0.0)]
 
 
 def test_an_effect_acts_on_every_neighbour_of_a_motion_by_its_own_state(tmp_path):
@@ -200,21 +194,20 @@ def test_an_effect_acts_on_every_neighbour_of_a_motion_by_its_own_state(tmp_path
     base = run_down(60.0)
     recording = replace(base, environment=replace(base.environment, magnetic_field=np.array([20.0, 1.0, 45.0])))
     bare = predicted("magnetometer", recording, {}, t, motions)
-    with competing([effect]):
-        read = predicted("magnetometer", recording, {("my.supply", "k_uT_s2"): 0.1}, t, motions)
-        alone = predicted("magnetometer", recording, {("my.supply", "k_uT_s2"): 0.1}, t, motions[1])
-        assert predicted("gyroscope", recording, {}, t, motions[1]).shape == (3, 3)
+    effects, values = Competing((effect,)), {("my.supply", "k_uT_s2"): 0.1}
+    read = predicted("magnetometer", recording, values, t, motions, effects)
+    alone = predicted("magnetometer", recording, values, t, motions[1], effects)
+    assert predicted("gyroscope", recording, {}, t, motions[1], effects).shape == (3, 3)
     np.testing.assert_allclose(read, bare * (1.0 + 0.1 * t[:, None]), rtol=1e-12, atol=1e-12)
     np.testing.assert_array_equal(read[1], alone)
 
 
 def test_the_column_of_an_effects_shape_is_that_of_its_form_whatever_its_name(tmp_path):
     effect = loaded(tmp_path, WARMTH)
-    current = first_chain(run_down(60.0))
+    current = replace(first_chain(run_down(60.0)), effects=Competing((effect,)))
     values = {("my.warmth", "a_uT"): 3.0, ("my.warmth", "tau_s"): 4.0}
     columns = [Column("my.warmth", name, 1e-3) for name in ("a_uT", "tau_s")]
-    with competing([effect]):
-        linear = linearise(current, values, columns, np.ones(current.plant.layout.directions, dtype=np.bool_))
+    linear = linearise(current, values, columns, np.ones(current.plant.layout.directions, dtype=np.bool_))
     for channel in linear.channels:
         t, warms = linear.t[channel.rows], (channel.sensor, channel.axis) == ("magnetometer", "y_uT")
         expected = np.stack([-np.expm1(-t / 4.0), -3.0 * t / 16.0 * np.exp(-t / 4.0)], axis=1)
@@ -278,13 +271,11 @@ def test_both_engines_and_the_pieces_of_a_fit_fly_one_wrench(tmp_path):
 
     recording = record(truth, MODULE, np.random.default_rng(1), plant="flight", name="throw", disc=disc)
     state = np.concatenate([*(getattr(truth, name)[0] for name in ("position", "velocity", "attitude", "rate"))])
-    whole = chain(recording, np.array([0.0, 1.0]), state[None])
+    whole = chain(recording, np.array([0.0, 1.0]), state[None], Competing((effect,)))
     values = {("my.both", "k"): 2e-3, ("my.both", "c"): 1.0 + 2e-5, **LAW}
     t = np.array([1.0])
-    with competing([effect]):
-        there = shown(whole, values, "gyroscope", t)
-        np.testing.assert_allclose(there, truth.rate[-1:], atol=1e-3)
-        linear = linearise(whole, values, [Column("my.both", "c", 1e-7)], np.ones(12, dtype=np.bool_))
+    np.testing.assert_allclose(shown(whole, values, "gyroscope", t), truth.rate[-1:], atol=1e-3)
+    linear = linearise(whole, values, [Column("my.both", "c", 1e-7)], np.ones(12, dtype=np.bool_))
     # more brake, less spin: dr/dc = -int r dt / Izz, but for what the air makes of it
     rows = next(channel.rows for channel in linear.channels if channel.axis == "z_rad_s")
     spin = np.trapezoid(truth.rate[:, 2], truth.t) / disc.Izz

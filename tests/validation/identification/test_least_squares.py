@@ -14,7 +14,15 @@ from discsim.arrays import FloatArray
 from discsim.effects import effect
 from validation.diagnosis.relaxed_fit import first_chain
 from validation.identification import gauss_newton, normal_equations
-from validation.identification.gauss_newton import Fit, _Going, linearised, merit_of, open_gaps, refit, residuals_after
+from validation.identification.gauss_newton import (
+    Fit,
+    GaussNewtonStep,
+    linearised,
+    merit_of,
+    open_gaps,
+    refit,
+    residuals_after,
+)
 from validation.identification.noise import stated_noise, whitened
 from validation.identification.normal_equations import local_step, normal_matrix, reduce, shared_step, unknown_prior
 from validation.identification.parameters import Jumps, Parameter, values_of
@@ -107,7 +115,7 @@ def test_correlated_noise_weighs_tied_pieces_by_their_dense_covariance():
     A = np.hstack([linear.local, linear.shared, linear.residual[:, None]])
     G = np.zeros((A.shape[1],) * 2)
     for channel in linear.channels:
-        sd, phi, _ = fit.noise[channel.group]
+        sd, phi, *_ = fit.noise[channel.group]
         C = sd**2 * phi ** np.abs(channel.index[:, None] - channel.index[None, :])
         G += A[channel.rows].T @ np.linalg.solve(C, A[channel.rows])
     size = np.sqrt(np.maximum(np.diag(G), 1e-300))
@@ -143,12 +151,12 @@ def test_sums_that_rounding_has_made_indefinite_still_have_a_root():
     H = columns @ columns.T - 1e-10 * np.eye(5)
     with pytest.raises(np.linalg.LinAlgError):
         np.linalg.cholesky(H)
-    L = normal_equations._factor(H)
+    L = normal_equations.lower_root(H)
     assert np.array_equal(L, np.tril(L))
     np.testing.assert_allclose(L @ L.T, H, atol=1e-9)
     sound = H + np.eye(5)
-    np.testing.assert_array_equal(normal_equations._factor(sound), np.linalg.cholesky(sound))
-    assert np.all(np.isnan(normal_equations._factor(np.full((2, 2), np.inf))))
+    np.testing.assert_array_equal(normal_equations.lower_root(sound), np.linalg.cholesky(sound))
+    assert np.all(np.isnan(normal_equations.lower_root(np.full((2, 2), np.inf))))
 
 
 def test_values_hold_in_the_recordings_of_their_parameter():
@@ -238,15 +246,15 @@ def test_a_fit_that_ends_with_its_pieces_apart_goes_back_to_where_they_hung_toge
     fit = refit(replace(fit, noise=stated_noise(linearised(fit))))
     assert not open_gaps(fit)
 
-    def apart(self: _Going) -> Fit:
+    def apart(self: GaussNewtonStep) -> Fit:
         first, *others = self.fit.chains
         tangents = np.zeros((len(first.states), first.plant.layout.directions))
         tangents[-1, -1] = 1.0
         trial = replace(self.fit, chains=(stepped(first, tangents), *others))
         return replace(trial, linears=linearised(trial), merit=0.9 * self.fit.merit)
 
-    assert open_gaps(apart(_Going(fit, (), np.empty(0), {}, fit.merit)))
-    monkeypatch.setattr(_Going, "all_by_one_share", apart)
+    assert open_gaps(apart(GaussNewtonStep(fit, (), np.empty(0), {}, fit.merit)))
+    monkeypatch.setattr(GaussNewtonStep, "all_by_one_share", apart)
     again = refit(fit, iterations=3, tolerance=-np.inf)
     assert not open_gaps(again)
     for before, after in zip(fit.chains, again.chains, strict=True):
@@ -268,7 +276,7 @@ def test_residuals_by_a_chord_are_those_of_a_full_linearisation():
     fit = loose()
     moved = replace(fit, chains=tuple(stepped(c, np.full((len(c.states), 2), 1e-4)) for c in fit.chains))
     full = linearised(moved)
-    for linear, chord, before in zip(full, gauss_newton._reread(moved), fit.linears, strict=True):
+    for linear, chord, before in zip(full, gauss_newton.repredicted(moved), fit.linears, strict=True):
         np.testing.assert_allclose(chord.residual, linear.residual, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(chord.jump, linear.jump, atol=1e-12)
         assert chord.own is before.own
@@ -281,7 +289,7 @@ def test_there_is_no_chord_where_other_readings_take_part():
     good = first.good.copy()
     good[5:8] = False
     fewer = replace(fit.chains[0], readings=(replace(first, good=good), *fit.chains[0].readings[1:]))
-    assert gauss_newton._reread(replace(fit, chains=(fewer, *fit.chains[1:]))) is None
+    assert gauss_newton.repredicted(replace(fit, chains=(fewer, *fit.chains[1:]))) is None
 
 
 def test_short_steps_by_chords_end_where_full_ones_do(monkeypatch):
@@ -292,7 +300,7 @@ def test_short_steps_by_chords_end_where_full_ones_do(monkeypatch):
     monkeypatch.setattr(gauss_newton, "linearised", lambda *given, **named: runs.append(1) or run(*given, **named))
 
     def ended(chord: float) -> tuple[Fit, int]:
-        monkeypatch.setattr(gauss_newton, "_CHORD", chord)
+        monkeypatch.setattr(gauss_newton, "CHORD", chord)
         runs.clear()
         fit = refit(start, iterations=10, tolerance=1e-6)
         return refit(replace(fit, noise=dict(fit.noise)), iterations=4, tolerance=1e-9, moved_on=False), len(runs)

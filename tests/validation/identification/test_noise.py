@@ -96,7 +96,7 @@ def test_the_likelihood_is_that_of_the_dense_covariance():
     e = rng.standard_normal(linear.raw.size)
     expected = 0.0
     for channel in linear.channels:
-        sd, phi, _ = noise[channel.group]
+        sd, phi, *_ = noise[channel.group]
         apart = np.abs(channel.index[:, None] - channel.index[None, :])
         covariance = sd**2 * (phi**apart if phi else np.eye(channel.index.size))
         dense = multivariate_normal(np.zeros(channel.index.size), covariance)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import ast
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 from scipy.stats import binom, chi2
+from support.places import ROOT
 
 from discsim.environment import Environment
 from discsim.recording import PLANTS as NAMES
@@ -22,7 +22,6 @@ from validation.identification.plants import PLANTS, Plant
 from validation.identification.plants.plant import Durations, Dynamics, Initial, Layout, Sizes
 from validation.identification.segments import chain, recut
 
-ROOT = Path(__file__).parents[3]
 ROOMS = [ROOT / "validation" / "diagnosis", ROOT / "validation" / "identification"]
 #: source -> (name, why it may stand there)
 EXCEPTIONS: dict[str, tuple[str, str]] = {}

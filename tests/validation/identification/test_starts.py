@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from functools import cache
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 import pytest
+from support.places import PRACTICE
 
 from discsim.disc import Release, Rig
 from discsim.effects.catalogue import Effect, effect
@@ -286,11 +285,6 @@ def test_a_table_that_stands_still_and_turns_both_ways_shows_its_angle():
     assert np.max(np.abs(np.angle(np.exp(1j * (psi - yaw))))) < 0.2
     # the corners of a ramp of 90 rad/s^2 are rounded over a tenth of a second
     np.testing.assert_allclose(r, truth.rate[:, 2], atol=5.0)
-
-
-PRACTICE = (
-    Path(os.environ.get("DISCSIM_RECORDINGS") or Path(__file__).parents[4] / "shared" / "recordings") / "practice"
-)
 
 
 @pytest.mark.skipif(not PRACTICE.is_dir(), reason="no practice recordings: set DISCSIM_RECORDINGS")

@@ -19,6 +19,7 @@ from validation.reporting.options import parse_vector
 from validation.reporting.scores import Score
 from validation.scenarios.rate_table import (
     MARGIN_S,
+    Bench,
     Plateau,
     RateTableRun,
     errors_within,
@@ -59,7 +60,7 @@ def test_every_check_is_ok_on_a_specimen_within_its_data_sheet(run):
 def test_other_specimens_pass_too_and_their_envelopes_hold_the_truth(seed):
     """Every error drawn anew, and 1 mm of mount error along x and y that the envelopes allow for."""
     profile = Samples(np.array([0.0, 0.8, 3.2]), np.radians([2500.0, 4500.0, 4500.0]))
-    run = run_rate_table(profile, FIELD, np.random.default_rng(seed), mount=np.array([0.001, -0.001, 0.0]))
+    run = run_rate_table(profile, FIELD, np.random.default_rng(seed), bench=Bench(mount=np.array([0.001, -0.001, 0.0])))
     scores = scored(run)
     assert [item.text for item in scores.values() if not item.ok] == []
     assert scores["share of truth outside the envelopes"].value == 0.0
@@ -191,7 +192,7 @@ class TestOtherProfiles:
 
     def test_a_mount_error_beyond_an_envelope_s_is_not_held_against_it(self):
         profile = Samples(np.array([0.0, 2.2]), np.radians([4000.0, 4000.0]))
-        run = run_rate_table(profile, FIELD, np.random.default_rng(0), mount=np.array([0.004, 0.0, 0.0]))
+        run = run_rate_table(profile, FIELD, np.random.default_rng(0), bench=Bench(mount=np.array([0.004, 0.0, 0.0])))
         assert run.mount == 0.004
         scores = scored(run)
         assert scores["share of truth outside the envelopes"].ok
@@ -223,7 +224,9 @@ class TestOtherProfiles:
     def test_two_places_for_one_accelerometer_are_refused(self):
         moved = (effect("accel.position_offset", dx_m=0.001),)
         with pytest.raises(InputError, match="both move the accelerometer"):
-            run_rate_table(PROFILE, FIELD, np.random.default_rng(0), mount=np.array([0.001, 0, 0]), effects=moved)
+            run_rate_table(
+                PROFILE, FIELD, np.random.default_rng(0), bench=Bench(mount=np.array([0.001, 0, 0])), effects=moved
+            )
 
 
 class TestTable:
@@ -237,7 +240,7 @@ class TestTable:
         rate = YawRate(
             "made", t, exact + np.array([0.1, -0.2, np.nan, 9.0]), np.array([1.0, 1.0, np.nan, 1.0]), signed=True
         )
-        error, known = errors_within(rate, run.motion, 2.4, 3.4)
+        error, known = errors_within(rate, run.truth, 2.4, 3.4)
         np.testing.assert_allclose(error, [0.1, -0.2, np.nan], atol=1e-12)
         np.testing.assert_array_equal(known, [True, True, False])
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
+from support.places import REAL
 
 from discsim.frames import body_to_ned
 from discsim.shipped import load_disc
@@ -15,8 +13,7 @@ from validation.studies.golf_throws.page import write_page
 from validation.studies.golf_throws.prediction import INPUTS, THROWS, predict_throw
 from validation.studies.golf_throws.prediction import drawn as drawn_inputs
 
-RECORDINGS = Path(os.environ.get("DISCSIM_RECORDINGS") or Path(__file__).parents[4] / "shared" / "recordings") / "real"
-FOLDER = RECORDINGS / "shotshaper-dd2-drone-tracked-throws"
+FOLDER = REAL / "shotshaper-dd2-drone-tracked-throws"
 tracked = pytest.mark.skipif(not FOLDER.is_dir(), reason="needs the measured recordings (DISCSIM_RECORDINGS)")
 
 DISC, AIR = load_disc("dd2")
@@ -73,7 +70,7 @@ class TestThrows:
         monkeypatch.setattr("validation.studies.golf_throws.page.DRAWS", 33)
         texts = []
         for folder in ("a", "b"):
-            write_page(RECORDINGS, tmp_path / folder / "golf-throws.md", seed=3)
+            write_page(REAL, tmp_path / folder / "golf-throws.md", seed=3)
             texts.append((tmp_path / folder / "golf-throws.md").read_bytes())
             assert (tmp_path / folder / "golf-throws" / "tracks.png").stat().st_size > 1000
         assert texts[0] == texts[1]

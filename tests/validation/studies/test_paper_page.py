@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import inspect
 import json
-from pathlib import Path
+import re
 
 import numpy as np
 import pytest
+from support.places import ROOT
 
 from discsim.shipped import load_disc
-from validation.studies.paper.__main__ import SEED, read_numbers
 from validation.studies.paper.beside import BLOCKS, FIGURES
+from validation.studies.paper.command import SEED, read_numbers
 from validation.studies.paper.distance import UNKNOWNS
-from validation.studies.paper.equations import EQUATIONS, STEPS, cited, find
+from validation.studies.paper.equations import EQUATIONS, STEPS, find
 from validation.studies.paper.figures import draw_fig_9
 from validation.studies.paper.modules import compare_modules
 from validation.studies.paper.numbers import compute
@@ -22,9 +24,26 @@ from validation.studies.paper.releases import carry
 from validation.studies.paper.spectrum import whole_flight
 from validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S
 
-PAGE = Path(__file__).parents[3] / "docs" / "paper.md"
+PAGE = ROOT / "docs" / "paper.md"
 NUMBERS = read_numbers(PAGE.parent / PAGE.stem)
 DISC, AIR = load_disc("driver")
+
+_ITEM = r"(?:PE?-?\d|A[12]|\d{1,2})"
+_CITED = re.compile(rf"(?<![\w\]])\(({_ITEM})\)(?:\s*(?:-|to)\s*\(({_ITEM})\))?|Eq\. ({_ITEM})\b")
+
+
+def cited(name: str) -> set[str]:
+    """Return the numbers of equations and steps that a function cites: in its docstring, and where it computes them."""
+    thing = find(name)
+    found: set[str] = set()
+    for first, last, alone in _CITED.findall(inspect.getsource(getattr(thing, "py_func", thing))):
+        if not last:
+            found.add(first or alone)
+            continue
+        stem = first.rstrip("0123456789")
+        numbers = range(int(first.removeprefix(stem)), int(last.removeprefix(stem)) + 1)
+        found |= {f"{stem}{number}" for number in numbers}
+    return found
 
 
 @pytest.mark.parametrize(
@@ -55,7 +74,7 @@ def test_what_stands_for_a_figure_is_there(name):
 
 def test_shapes_and_counts_are_no_citations():
     assert "3" not in cited("discsim.frames.C1")
-    assert cited("discsim.trajectory.derivative") == {"18", "19", "22", "23"}
+    assert cited("discsim.flight_equations.derivative") == {"18", "19", "22", "23"}
 
 
 def test_the_page_is_made_from_its_numbers():

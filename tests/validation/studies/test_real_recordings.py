@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
-from typer.testing import CliRunner
+from support.places import REAL, RECORDINGS, real
 
 from discsim.errors import InputError
 from discsim.recording import Samples
@@ -19,7 +17,6 @@ from estimators.rate import YawRate
 from validation.cli import main
 from validation.studies.catalogue import run_study
 from validation.studies.real_recordings import road
-from validation.studies.real_recordings.__main__ import app
 from validation.studies.real_recordings.agreement import LOWERED, Attempt, agreement, attempts, mean_between
 from validation.studies.real_recordings.findings import SHIFTS, shifted_rms, turns_of
 from validation.studies.real_recordings.optical import HALF, optical_rate
@@ -28,9 +25,6 @@ from validation.studies.real_recordings.road import LOGS, Answers, Log, Said, ro
 from validation.studies.real_recordings.sources import SOURCES, find_recordings, load
 from validation.studies.real_recordings.turns import field_phase, phase_rate, turned, turned_by_rate
 
-RECORDINGS = Path(os.environ.get("DISCSIM_RECORDINGS") or Path(__file__).parents[3].parent / "shared" / "recordings")
-REAL = RECORDINGS / "real"
-real = pytest.mark.skipif(not REAL.is_dir(), reason="no measured recordings here (DISCSIM_RECORDINGS)")
 SOURCE = {source.key: source for source in SOURCES}
 DEG = np.pi / 180
 
@@ -211,8 +205,7 @@ def test_the_rolling_rocket_makes_seven_turns_by_its_field():
 def test_the_command_writes_the_page_with_every_figure(tmp_path):
     out = tmp_path / "real-recordings"
     arguments = ["--recordings", str(RECORDINGS), "--out", str(out), "--also", "accelerometer", "--no-walk"]
-    result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == 0, result.output
+    run_study("real-recordings", arguments)
     text = (tmp_path / "real-recordings.md").read_text(encoding="utf-8")
     assert sorted(file.name for file in out.iterdir()) == sorted(f"{key}.png" for key in SOURCE)
     assert max(file.stat().st_size for file in out.iterdir()) < 150_000
@@ -302,7 +295,7 @@ def test_a_walk_that_was_broken_off_goes_on_where_it_stopped(tmp_path, monkeypat
         ran.append(command[1])
         return Said(0 if command[1] == "import" else 3, 1.0, "")
 
-    monkeypatch.setattr(road, "_run", run)
+    monkeypatch.setattr(road, "run_command", run)
     first = road.walk(SPUN, tmp_path, tmp_path / "logs")
     again = road.walk(SPUN, tmp_path, tmp_path / "logs")
     assert ran == ["import", "check", "estimate", "diagnose"]

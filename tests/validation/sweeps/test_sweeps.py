@@ -22,7 +22,7 @@ from discsim.sensors import Accelerometer, Instruments, Magnetometer, Noise, Sam
 from discsim.shipped import load_disc, load_throw
 from estimators.accelerometer import accelerometer
 from estimators.fft import FftSettings, fft
-from validation.scenarios.rate_table import errors_within
+from validation.scenarios.rate_table import errors_within, true_rate
 from validation.sweeps import chunks as chunks_module
 from validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, segments
 from validation.sweeps.figures import draw_sweep
@@ -131,7 +131,7 @@ def test_a_mount_of_a_sweep_scores_as_in_a_simulation_of_its_own(small):
     }
     for name, rate in rates.items():
         for k, (start, stop) in enumerate(segments(plan, motion, case.settings)):
-            error, known = errors_within(rate, motion, start, stop)
+            error, known = errors_within(rate, true_rate(motion), start, stop)
             place = {"estimator": name, "radius_m": 0.02, "mount": number, "segment": k}
             # a reading next to the edge of a converter's step may fall on its other side: one of 200 samples by 2e-5
             assert float(result.bias_deg_s.sel(place)) == pytest.approx(np.degrees(error[known].mean()), rel=1e-5)

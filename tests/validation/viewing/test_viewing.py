@@ -322,7 +322,7 @@ def test_a_video_of_no_frames_or_backwards_is_refused(fps, speed):
 def test_an_mp4_without_ffmpeg_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setattr(viewing.shutil, "which", lambda name: None)
     monkeypatch.setattr(viewing, "find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"needs ffmpeg.*imageio-ffmpeg.*\.gif needs none"):
+    with pytest.raises(InputError, match=r"needs ffmpeg.*discsim\[video\].*\.gif needs none"):
         write_mp4(tmp_path / "a.mp4", iter([Image.new("RGB", (8, 8))]), 30.0)
 
 
@@ -347,9 +347,9 @@ def test_without_a_display_the_viewer_points_to_video(monkeypatch):
 
 @pytest.fixture
 def fresh_choice():
-    offscreen._working.cache_clear()
+    offscreen.working_opengl.cache_clear()
     yield
-    offscreen._working.cache_clear()
+    offscreen.working_opengl.cache_clear()
 
 
 def test_without_opengl_it_says_what_to_install(monkeypatch, fresh_choice):

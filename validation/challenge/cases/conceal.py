@@ -1,37 +1,32 @@
 """Conceal: simulate a case in MuJoCo, write plain recordings, and seal the answer away from them.
 
-``discsim study conceal --seed 1 --cases 3 --out DIR`` writes ``DIR/<case>/<01..>/``
-(recordings), ``DIR/answers/<case>.toml`` (answers) and ``DIR/sealed.json`` (digests of both,
-published before anybody diagnoses).
+``discsim study conceal`` does so for cases by their seeds.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from discsim.disc import Release
 from discsim.effects.catalogue import Effect
 from discsim.engine import follow
-from discsim.errors import InputError
 from discsim.files import digest, write_text
 from discsim.motion import Motion
-from discsim.recording import PLANTS, Plant, Recording, toml_lines, write_recording
+from discsim.recording import Plant, Recording, write_recording
 from discsim.rig import turn_table
 from discsim.sensors import record
 from discsim.toml_table import read_toml
-from validation.challenge.cases.case import Case, Coast, Kind, Mask, Run, Turning
-from validation.challenge.cases.draw import draw_case
+from discsim.toml_text import toml_lines
+from validation.challenge.cases.case import Case, Coast, Kind, Run, Turning
 from validation.challenge.cases.off_catalogue import HiddenDisc, coast, haunted
 from validation.challenge.cases.setups import equivalents
 
-__all__ = ["Answer", "conceal", "read_answer", "recordings", "seal", "write_recordings"]
+__all__ = ["Answer", "conceal", "read_answer", "recordings", "write_recordings"]
 
 
 @dataclass(frozen=True)
@@ -152,11 +147,11 @@ def recordings(case: Case) -> list[Recording]:
             name=f"concealed-{number + 1:02d}",
             disc=_stated_disc(case),
             rig=case.stated_rig,
-            release=case.stated_releases[number] if case.stated_releases else None,
             command=run.profile if isinstance(run, Turning) else None,
         )
         sheets = {name: case.sheets_of.sensors[name].sheet for name in taken.samples}
-        made.append(replace(taken, sheets=sheets))
+        release = case.stated_releases[number] if case.stated_releases else None
+        made.append(replace(taken, sheets=sheets, release=release))
     return made
 
 
@@ -217,44 +212,3 @@ def conceal(case: Case, folder: Path, answer: Path) -> dict[str, str]:
     write_recordings(case, folder)
     write_text(answer, Answer.of(case).text)
     return {"recordings": digest(folder), "answer": digest(answer)}
-
-
-def seal(
-    out: Path,
-    seed: int,
-    cases: int,
-    plant: Plant | None = None,
-    effects: Sequence[str] = (),
-    kind: Kind | None = None,
-    mask: Mask | None = None,
-) -> dict[str, dict[str, str]]:
-    """Conceal the cases of ``cases`` seeds from ``seed`` on in ``out``; return (and write) the digests by case."""
-    digests = {}
-    for number in range(seed, seed + cases):
-        case = draw_case(number, plant, effects, kind, mask)
-        name = f"case-{number:05d}"
-        digests[name] = conceal(case, out / name, out / "answers" / f"{name}.toml")
-        print(f"{name}: {case.plant}, {len(case.runs)} recordings", flush=True)
-        write_text(out / "sealed.json", json.dumps(digests, indent=2) + "\n")
-    return digests
-
-
-def main() -> None:
-    """Conceal cases from the command line."""
-    parser = argparse.ArgumentParser(prog="discsim study conceal", description=__doc__)
-    parser.add_argument("--seed", type=int, default=0, help="seed of the first case; case k has seed + k")
-    parser.add_argument("--cases", type=int, default=1)
-    parser.add_argument("--plant", choices=PLANTS)
-    parser.add_argument("--effects", nargs="*", default=[], help="ids of the catalogue, or one off-catalogue name")
-    parser.add_argument("--kind", choices=get_args(Kind))
-    parser.add_argument("--mask", choices=get_args(Mask))
-    parser.add_argument("--out", type=Path, required=True)
-    given = parser.parse_args()
-    try:
-        seal(given.out, given.seed, given.cases, given.plant, given.effects, given.kind, given.mask)
-    except InputError as error:
-        parser.error(str(error))
-
-
-if __name__ == "__main__":
-    main()

@@ -394,22 +394,7 @@ def coast(
     the solver), a tilt turns the body that carries the hinge: none of it is the catalogue's formula. Only a kick is.
     """
     given = by_id(effects)
-    spec = mujoco.MjSpec.from_string(_SPINNER)
-    spec.option.gravity = [0.0, 0.0, -environment.gravity]
-    joint, rotor = spec.joint("spin"), spec.body("rotor")
-    quadratic = given["rig.quadratic_drag"].coefficient_N_m_s2 if "rig.quadratic_drag" in given else 0.0
-    joint.damping = [rig.viscous, quadratic, 0.0]
-    joint.frictionloss = given["rig.coulomb_friction"].torque_N_m if "rig.coulomb_friction" in given else 0.0
-    rotor.inertia = [rig.Izz, rig.Izz, rig.Izz]
-    if isinstance(secret, LoosePart):
-        secret.attach(rotor)
-    tilt = np.array([1.0, 0.0, 0.0, 0.0])
-    if "rig.axis_tilt" in given:
-        n, e, d = axis(given["rig.axis_tilt"])
-        across = np.hypot(n, e)
-        tilt = turn(np.array([-e, n, 0.0]) * np.arctan2(across, d) / across)
-        spec.body("axis").quat = [tilt[0], *flip_yz(tilt[1:])]
-    model = compile_model(spec)
+    model, tilt = _spinner(rig, environment, given, secret)
     data = mujoco.MjData(model)
     check_model(model)
     data.qpos[0], data.qvel[0] = yaw, rate
@@ -447,6 +432,28 @@ def coast(
         angular_acceleration=log[:, 3:4] * down,
         environment=environment,
     )
+
+
+def _spinner(
+    rig: Rig, environment: Environment, given: Mapping[str, Any], secret: OffCatalogue | None
+) -> tuple[mujoco.MjModel, FloatArray]:
+    """Return the rig's model, its bearing's friction in the joint, and the quaternion (4,) by which its axis tilts."""
+    spec = mujoco.MjSpec.from_string(_SPINNER)
+    spec.option.gravity = [0.0, 0.0, -environment.gravity]
+    joint, rotor = spec.joint("spin"), spec.body("rotor")
+    quadratic = given["rig.quadratic_drag"].coefficient_N_m_s2 if "rig.quadratic_drag" in given else 0.0
+    joint.damping = [rig.viscous, quadratic, 0.0]
+    joint.frictionloss = given["rig.coulomb_friction"].torque_N_m if "rig.coulomb_friction" in given else 0.0
+    rotor.inertia = [rig.Izz, rig.Izz, rig.Izz]
+    if isinstance(secret, LoosePart):
+        secret.attach(rotor)
+    tilt = np.array([1.0, 0.0, 0.0, 0.0])
+    if "rig.axis_tilt" in given:
+        n, e, d = axis(given["rig.axis_tilt"])
+        across = np.hypot(n, e)
+        tilt = turn(np.array([-e, n, 0.0]) * np.arctan2(across, d) / across)
+        spec.body("axis").quat = [tilt[0], *flip_yz(tilt[1:])]
+    return compile_model(spec), tilt
 
 
 # ---------------------------------------------------------------------------------------------- haunted sensors

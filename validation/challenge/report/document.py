@@ -1,17 +1,11 @@
-"""Write finished challenges into the page on the blind test.
+"""What the page on the blind test says of finished challenges: result, confusions, failures, masks.
 
-    discsim study blind-test challenge --masks challenge-masks
-
-puts result, confusions, failures (each with the command that reproduces it) and figures of the challenge in the folder
-``challenge`` into docs/challenge.md, and of each mask finished in ``challenge-masks`` a row into its table of masks;
-the detection curve counts the effects of the mask near_limit, too. ``--blank DIR`` names challenges in which nothing is
-concealed: the share of false alarms counts them as well, since an upper bound of 3 % takes 122 such cases and more.
-Only what stands between the page's marks is replaced.
+The detection curve counts the effects of the mask near_limit, too. Challenges in which nothing is concealed count for
+the share of false alarms, since an upper bound of 3 % takes 122 such cases and more.
 """
 
 from __future__ import annotations
 
-import argparse
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -20,17 +14,16 @@ from pathlib import Path
 import numpy as np
 
 from discsim.errors import InputError
-from discsim.files import read_text, write_text
 from validation.challenge.cases.draw import KINDS, PLANT_SHARES
 from validation.challenge.masks import MASK_HEADER, mask_row, masked_results
-from validation.challenge.report.page import deviates_of, draw_all, fault_of, found_of, goal_rows, hidden_of, percent
+from validation.challenge.report.page import deviates_of, fault_of, found_of, goal_rows, hidden_of, percent
 from validation.challenge.scores.detection import Sized, detections, fit_curve
-from validation.challenge.scores.result import Result, Scored, rates_of, read_result, times
-from validation.challenge.scores.scoring import NOTHING, confusion, has_power_law
+from validation.challenge.scores.result import Result, Scored, rates_of, times
+from validation.challenge.scores.scoring import confusion, has_power_law
+from validation.reporting.markdown import table
 
 __all__ = ["masks_text", "result_text", "with_part"]
 
-PAGE = Path("docs/challenge.md")
 #: beginning of the names of the page's figures
 PREFIX = "challenge-"
 #: figures of the page, and what they show
@@ -54,17 +47,6 @@ def with_part(page: str, name: str, text: str) -> str:
     if not (mark and closed):
         raise InputError(f"the page has no marks {start.strip()} and {end}; expected both, each on a line of its own")
     return f"{before}{start}{text.strip()}\n{end}{after}"
-
-
-def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table of Markdown."""
-    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    lines += ["| " + " | ".join(_cell(cell) for cell in row) + " |" for row in rows]
-    return "\n".join(lines)
-
-
-def _cell(text: str) -> str:
-    return re.sub(r"\s+", " ", text).replace("|", "\\|")
 
 
 def plain_command(command: str) -> str:
@@ -247,48 +229,3 @@ def masks_text(folders: Sequence[Path], plain: Result | None) -> str:
     commands = "\n".join(f"- `{mask}`: {made_by(result)}" for mask, result in results.items())
     lead = "Shares with their intervals of 95 %; time is the median of a diagnosis, wall clock."
     return f"{lead}\n\n{table(('mask', *MASK_HEADER), rows)}\n\n{commands}"
-
-
-def _blank(folder: Path, plain: Result) -> Result:
-    """Read a challenge that may count for the false alarms of another one; raises `InputError` where it may not."""
-    result = read_result(folder)
-    if result.mask is not None or any(item.answer.kind not in NOTHING for item in result.scored):
-        raise InputError(f"{folder}: conceals something; expected a challenge of --kind {', '.join(NOTHING)}")
-    if {item.answer.seed for item in result.scored} & {item.answer.seed for item in plain.scored}:
-        raise InputError(f"{folder}: has seeds of the challenge itself; expected others")
-    return result
-
-
-def main() -> None:
-    """Write results into the page from the command line."""
-    parser = argparse.ArgumentParser(
-        prog="discsim study blind-test",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("out", type=Path, nargs="?", help="folder of a finished challenge without a mask")
-    parser.add_argument("--masks", type=Path, nargs="+", default=[], help="folders of challenges with a mask")
-    parser.add_argument("--blank", type=Path, nargs="+", default=[], help="folders of challenges that conceal nothing")
-    parser.add_argument("--page", type=Path, default=PAGE)
-    given = parser.parse_args()
-    if given.out is None and not given.masks:
-        parser.error("nothing to write; expected the folder of a challenge, or --masks")
-    try:
-        page = read_text(given.page)
-        plain = read_result(given.out) if given.out is not None else None
-        if plain is not None:
-            if plain.mask is not None:
-                raise InputError(f"{given.out}: was made under the mask {plain.mask}; expected it under --masks")
-            blank = [_blank(folder, plain) for folder in given.blank]
-            near = masked_results(given.masks).get("near_limit")
-            drawn = draw_all(plain.scored, given.page.parent / "images", PREFIX, pooled(plain, near))
-            page = with_part(page, "result", result_text(plain, list(drawn), near, blank))
-        if given.masks:
-            page = with_part(page, "masks", masks_text(given.masks, plain))
-        write_text(given.page, page)
-    except (InputError, FileNotFoundError) as error:
-        parser.error(str(error))
-
-
-if __name__ == "__main__":
-    main()

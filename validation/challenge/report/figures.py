@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from discsim.arrays import FloatArray
@@ -65,7 +66,7 @@ def draw_deviates(deviates: FloatArray, path: Path) -> None:
     save_figure(figure, path)
 
 
-def draw_detection(items: Sequence[Sized], curve: Curve | None, path: Path) -> None:
+def draw_detection(items: Sequence[Sized], curve: Curve | None, path: Path | None = None) -> Figure:
     """Draw the share of effects named by size: bins with exact intervals, the fitted curve, what information allows."""
     edges = np.array([0.0, 0.7, 1.0, 1.5, 2.0, 4.0, 10.0, 30.0, 100.0, np.inf])
     sizes, named = np.array([item.size for item in items]), np.array([item.named for item in items])
@@ -97,7 +98,7 @@ def draw_detection(items: Sequence[Sized], curve: Curve | None, path: Path) -> N
     axes.set_xlabel(f"size / detection limit (dashed: the limit; dotted: {HALF_GOAL:g} times the limit)")
     axes.set_ylabel("share named")
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.08))
-    save_figure(figure, path)
+    return save_figure(figure, path)
 
 
 def draw_effects(items: Sequence[Sized], path: Path) -> None:

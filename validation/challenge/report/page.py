@@ -104,7 +104,7 @@ def write_page(out: Path, scored: Sequence[Scored]) -> None:
         caption = "Errors of parameters in their own standard deviations"
         sections.append(Section("Are the standard errors honest?", (text,), figures=[(caption, figures["deviates"])]))
     if items:
-        sections.append(_detection(items, curve, figures))
+        sections.append(_detection(curve, figures))
     if any(has_power_law(item.answer) for item in scored):
         sections.append(_exponents(scored, figures))
     sections.append(_failures(scored))
@@ -268,7 +268,7 @@ def _by_effect(scored: Sequence[Scored]) -> Section:
     return Section("By effect", (text,), header, rows)
 
 
-def _detection(items: Sequence[Sized], curve: Curve | None, figures: Mapping[str, Path]) -> Section:
+def _detection(curve: Curve | None, figures: Mapping[str, Path]) -> Section:
     text = [
         "Size of each concealed effect in units of its detection limit: the size at which the recordings of that very "
         "case, with everything fitted that is unknown in them, hold just enough information for a gain in chi2 that "
@@ -361,8 +361,8 @@ def _failures(scored: Sequence[Scored]) -> Section:
         what = (fault_of(item), hidden_of(item), size, found_of(item), (item.error or "")[-200:], item.reproduce)
         rows.append((str(item.answer.seed), *what))
     text = (
-        "Each is reproduced alone by its command; its recordings and its answer are written by python -m "
-        "validation.challenge.cases.conceal --seed SEED --out DIR with the same options. Size is that of the least "
+        "Each is reproduced alone by its command; its recordings and its answer are written by "
+        "discsim study conceal --seed SEED --out DIR with the same options. Size is that of the least "
         "concealed effect in units of its detection limit."
     )
     header = ("seed", "fault", "concealed", "size", "found", "error", "command")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from math import inf, sqrt
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -70,10 +70,6 @@ class Curve(NamedTuple):
             return f"{self.half:.2g} (95 %: at most {self.high:.2g})"
         reach = f"{self.high:.2g}" if np.isfinite(self.high) else "any"
         return f"{self.half:.2g} (95 %: {self.low:.2g} to {reach})"
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the entry of ``challenge.json``."""
-        return self._asdict()
 
 
 def detections(scored: Iterable[Scored]) -> list[Sized]:

@@ -107,18 +107,15 @@ class Scored:
 class Times(NamedTuple):
     """Seconds of wall clock that diagnoses took: the median, what nine in ten do not exceed, the longest."""
 
-    median: float
-    most: float
-    longest: float
+    median_s: float
+    nine_in_ten_s: float
+    longest_s: float
 
     @property
     def text(self) -> str:
         """The three in words."""
-        return f"{self.median:.0f} s (median), nine in ten within {self.most:.0f} s, longest {self.longest:.0f} s"
-
-    def to_json(self) -> dict[str, float]:
-        """Return the entry of ``challenge.json``."""
-        return {"median_s": self.median, "nine_in_ten_s": self.most, "longest_s": self.longest}
+        most = f"nine in ten within {self.nine_in_ten_s:.0f} s, longest {self.longest_s:.0f} s"
+        return f"{self.median_s:.0f} s (median), {most}"
 
 
 def times(scored: Sequence[Scored]) -> Times:

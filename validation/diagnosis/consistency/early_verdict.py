@@ -22,8 +22,8 @@ from discsim.effects.sensors import Lag
 from discsim.recording import SENSORS, Recording
 from validation.diagnosis.consistency.followed import left_of, left_when_shifted, true_noise
 from validation.diagnosis.consistency.spin_rates import RatesApart, rates_apart
+from validation.diagnosis.detectors.speed_ripple import ripple
 from validation.diagnosis.relaxed_fit import (
-    FEW,
     beginning,
     first_chain,
     free_clocks,
@@ -31,6 +31,7 @@ from validation.diagnosis.relaxed_fit import (
     loose_parameters,
 )
 from validation.diagnosis.selection.evidence import BOUNDS
+from validation.diagnosis.settings import CONSISTENCY
 from validation.identification.gauss_newton import Fit, refit
 from validation.identification.noise import GroupNoise
 from validation.identification.observations import readings_of
@@ -40,8 +41,6 @@ from validation.identification.readings import group_of
 from validation.identification.segments import Chain
 
 __all__ = [
-    "ASTRAY",
-    "RECONCILED",
     "Contradiction",
     "Look",
     "contradiction_after",
@@ -51,22 +50,6 @@ __all__ = [
 
 #: most steps of one look, and of one that serves for figures alone
 _STEPS, _STEPS_OF_FIGURES = 8, 2
-#: a robust root mean square of what is left of a sensor, in its noise, above which a look does not follow it. Of 44
-#: sound flights and runs (``discsim study conceal --seed 70000 --cases 40``, and flights with
-#: ``--effects`` of each clock, lag and loss of samples) the median recording leaves 0.7 to 6.3 (physics of no
-#: catalogue), and up to 15 to 31 where three or five samples in a hundred were lost, which a shift reconciles: none is
-#: contradicted. Noise that is three times what is stated leaves 3, sensors of different throws or runs 17 and more
-ASTRAY = 12.0
-#: what a sensor may leave of the motion that others tell when it is late, lags or lost samples: with one sample in
-#: twenty lost 1.7 (magnetometer) and 4 (accelerometer), while sensors of another throw or run leave 9 to 40
-RECONCILED = 6.0
-#: share of its rate by which a table's speed may pulse: one of another run is off by as much as rates differ
-_RIPPLE = 0.1
-#: two sensors of a free spin that are both astray, one of them by this much, follow no motion: sensors of other throws
-#: leave 300 and more, a clock or lost samples of one sensor below it
-LOST = 100.0
-#: recordings that are looked at again without some of their sensors
-_AGAIN = 2
 
 
 @dataclass(frozen=True)
@@ -89,7 +72,7 @@ class Look:
     @property
     def follows(self) -> bool:
         """Whether the sensors are followed, all of them in half of the recordings or more."""
-        lost = [any(level > ASTRAY for level in one.values()) for one in self.left]
+        lost = [any(level > CONSISTENCY.astray for level in one.values()) for one in self.left]
         return 2 * sum(lost) <= len(lost)
 
 
@@ -178,12 +161,12 @@ def contradiction_in(recordings: Sequence[Recording], known: Sequence[Parameter]
     sensors = [name for name in SENSORS if any(name in one for one in recordings)]
     if plant_of(recordings[0]).weakly_identified:
         apart_by = rates_apart(recordings)
-        figures = None if apart_by is None else look_at(recordings, known, sensors, FEW)
+        figures = None if apart_by is None else look_at(recordings, known, sensors, CONSISTENCY.few)
         if apart_by is None or figures is None:
             return None
         pairs = {s: tuple(o for o in apart_by.sensors if o != s) for s in apart_by.sensors}
         return Contradiction(figures, (), pairs, rates=apart_by)
-    whole = look_at(recordings, known, sensors, FEW)
+    whole = look_at(recordings, known, sensors, CONSISTENCY.few)
     if whole is None or whole.follows:
         return None
     sensors = [name for name in sensors if name in whole.sensors]
@@ -196,7 +179,7 @@ def contradiction_in(recordings: Sequence[Recording], known: Sequence[Parameter]
     apart: dict[str, tuple[str, ...]] = {}
     for sensor in sensors:
         others = tuple(other for other in sensors if other != sensor)
-        look = look_at(recordings, known, others, _AGAIN)
+        look = look_at(recordings, known, others, CONSISTENCY.again)
         if look is None or not look.follows:
             continue
         if _reconciled(recordings, look, sensor) or _follows_lagging(recordings, known, sensors, sensor):
@@ -204,6 +187,8 @@ def contradiction_in(recordings: Sequence[Recording], known: Sequence[Parameter]
         if _pulses(recordings, whole, sensor):
             return None
         apart[sensor] = others
+    if _follows_pulsing(recordings, known, whole):
+        return None
     if apart:
         # each of several may be left out: it is they that contradict one another
         guilty = tuple(apart)
@@ -214,7 +199,7 @@ def contradiction_in(recordings: Sequence[Recording], known: Sequence[Parameter]
 
 def _follows(recordings: Sequence[Recording], known: Sequence[Parameter], sensors: Sequence[str]) -> bool:
     """Tell whether a motion follows some of the sensors, or none of them has a reading."""
-    look = look_at(recordings, known, sensors, _AGAIN)
+    look = look_at(recordings, known, sensors, CONSISTENCY.again)
     return look is None or look.follows
 
 
@@ -233,8 +218,32 @@ def _follows_lagging(
     if lagging not in lags:
         return False
     lag = Parameter(lags[lagging], "tau_s", 0.0, _LAG_STEP, _LAG_SIGMA)
-    look = look_at(recordings, known, sensors, _AGAIN, {lag: _LAG})
+    look = look_at(recordings, known, sensors, CONSISTENCY.again, {lag: _LAG})
     return look is not None and look.follows
+
+
+#: half the widths of a ripple's differences: of its order, amplitude (rad/s) and phase (rad)
+_RIPPLE_STEPS = {"order": 1e-6, "amplitude_rad_s": 1e-3, "phase_rad": 1e-4}
+
+
+def _follows_pulsing(recordings: Sequence[Recording], known: Sequence[Parameter], whole: Look) -> bool:
+    """Tell whether a motion follows all sensors of a table where its speed may ripple.
+
+    Of a strong ripple not the rate reference alone tells: the accelerometer feels how it turns faster and slower, so
+    that each contradicts what the others tell of a table without one.
+    """
+    for proposal in ripple(whole.fit, whole.noise)[: CONSISTENCY.ripples]:
+        starts = {name: number for ((_, name), _), number in proposal.start.items()}
+        free = {
+            Parameter(proposal.trial.id, name, 0.0, step): float(starts[name]) for name, step in _RIPPLE_STEPS.items()
+        }
+        look = look_at(recordings, known, whole.sensors, CONSISTENCY.few, free)
+        if look is not None and all(
+            look.level(sensor) <= max(CONSISTENCY.astray, CONSISTENCY.left_of_ripple * whole.level(sensor))
+            for sensor in whole.sensors
+        ):
+            return True
+    return False
 
 
 def contradiction_after(fit: Fit) -> Contradiction | None:
@@ -249,8 +258,8 @@ def contradiction_after(fit: Fit) -> Contradiction | None:
     look = Look(sensors, tuple(range(len(fit.chains))), fit, noise, tuple(left_of(fit, noise)))
     if look.follows:
         return None
-    astray = [sensor for sensor in look.sensors if look.level(sensor) > ASTRAY]
-    if len(astray) < 2 or max(map(look.level, astray)) < LOST:
+    astray = [sensor for sensor in look.sensors if look.level(sensor) > CONSISTENCY.astray]
+    if len(astray) < 2 or max(map(look.level, astray)) < CONSISTENCY.lost:
         return None
     return Contradiction(look, (), {}, ())
 
@@ -279,7 +288,7 @@ def _pulses(recordings: Sequence[Recording], whole: Look, sensor: str) -> bool:
         if sensor in level and sensor in recordings[place]:
             left.append(level[sensor] * whole.noise[group_of(sensor, 0)].sd)
             rate.append(float(np.nanmedian(np.abs(recordings[place].samples[sensor].value))))
-    return bool(left) and float(np.median(left)) < _RIPPLE * float(np.median(rate))
+    return bool(left) and float(np.median(left)) < CONSISTENCY.ripple * float(np.median(rate))
 
 
 def _reconciled(recordings: Sequence[Recording], look: Look, sensor: str) -> bool:
@@ -290,7 +299,7 @@ def _reconciled(recordings: Sequence[Recording], look: Look, sensor: str) -> boo
         if readings is not None:
             found.append(left_when_shifted(chain, look.fit.values(i), readings, true_noise([readings])))
     levels = [level for level in found if np.isfinite(level)]
-    return not levels or float(np.median(levels)) <= RECONCILED
+    return not levels or float(np.median(levels)) <= CONSISTENCY.reconciled
 
 
 def look_at(

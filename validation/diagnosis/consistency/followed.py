@@ -12,13 +12,13 @@ from math import comb
 import numpy as np
 from scipy.signal import lfilter
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, sd_by_median
 from validation.identification.gauss_newton import Fit
 from validation.identification.noise import DEFAULT, GroupNoise
-from validation.identification.prediction import shown
+from validation.identification.prediction import shiftable
 from validation.identification.readings import Readings, group_of
 from validation.identification.segments import Chain
-from validation.identification.sensor_model import Values, delay
+from validation.identification.sensor_model import Values
 
 __all__ = ["left_of", "left_when_shifted", "true_noise"]
 
@@ -73,9 +73,9 @@ def left_of(fit: Fit, noise: Mapping[str, GroupNoise]) -> list[dict[str, float]]
     for linear in fit.linears:
         sizes: dict[str, list[FloatArray]] = {}
         for channel in linear.channels:
-            left = np.abs(linear.residual[channel.rows]) / noise[channel.group].sd
+            left = linear.residual[channel.rows] / noise[channel.group].sd
             sizes.setdefault(channel.sensor, []).append(np.nan_to_num(left, nan=1e9))
-        found.append({sensor: 1.4826 * float(np.median(np.concatenate(each))) for sensor, each in sizes.items()})
+        found.append({sensor: float(sd_by_median(np.concatenate(each))) for sensor, each in sizes.items()})
     return found
 
 
@@ -94,15 +94,11 @@ def left_when_shifted(chain: Chain, values: Values, readings: Readings, noise: M
     A wrong clock, a delay, a lag and lost samples do that; a sensor of another motion they do not reconcile. A robust
     root mean square in the median window, each at the shift that leaves least, with the best lag; NaN without readings.
     """
-    sd = np.array([noise[group_of(readings.sensor, axis)].sd for axis in range(readings.value.shape[1])])
-    at = readings.t - delay(values, readings.sensor, readings.t)
+    at, value, grid, told = shiftable(chain, values, readings, noise, _GRID)
     start, end = float(chain.edges[0]), float(chain.edges[-1])
-    grid = np.arange(start, end, _GRID)
-    value = np.where(readings.good, readings.value, np.nan) / sd
     used = np.flatnonzero((at >= start) & (at < end) & np.isfinite(value).any(axis=1))
     if grid.size < 2 or used.size < 4:
         return np.nan
-    told = shown(chain, values, readings.sensor, grid) / sd
     window = np.floor((at[used] - start) / chain.plant.durations.window).astype(int)
     parts = [part for k in np.unique(window) if (part := used[window == k]).size >= 4]
     parts = [part[:: 1 + part.size // _READINGS] for part in parts[:: 1 + len(parts) // _WINDOWS]]
@@ -120,4 +116,4 @@ def left_when_shifted(chain: Chain, values: Values, readings: Readings, noise: M
                 off = np.nanmedian(np.abs(value[part] - late[place]).reshape(_SHIFTS.size, -1), axis=1)
                 left[part[0]] = min(left.get(part[0], np.inf), float(np.min(off)))
         levels.append(float(np.median(list(left.values()))) if left else np.nan)
-    return 1.4826 * float(np.nanmin(levels)) if np.any(np.isfinite(levels)) else np.nan
+    return float(sd_by_median(np.nanmin(levels))) if np.any(np.isfinite(levels)) else np.nan

@@ -16,16 +16,13 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import BSpline
 
-from discsim.arrays import FloatArray
+from discsim.arrays import ComplexArray, FloatArray, IntArray
 from discsim.compiled import compiled
 from discsim.recording import Recording
 from validation.diagnosis.consistency.row_times import Rows
 from validation.diagnosis.consistency.turning import rate_of, retimed, signals_of
 
 __all__ = ["OwnClock", "SamplesShown", "own_clock_of"]
-
-ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
-IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 #: knots of the field's slow turn and of the wobble's amplitude: one per so many seconds (a
 #: wobble halves in 0.3 s or more)

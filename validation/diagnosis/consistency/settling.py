@@ -7,7 +7,7 @@ beyond the pull towards the axis falls off as exp(-t/tau), the same in every rec
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -50,22 +50,11 @@ class SettleProof:
     """A recording's own time constant, that of the others, and what that leaves of this one, rms m/s^2 of an axis."""
 
     recording: str
-    own: float
-    own_sd: float
-    others: float
-    before: float
-    after: float
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the JSON object."""
-        return {
-            "recording": self.recording,
-            "tau_s": self.own,
-            "tau_sd_s": self.own_sd,
-            "tau_of_others_s": self.others,
-            "left_m_s2_before": self.before,
-            "left_m_s2_after": self.after,
-        }
+    tau_s: float
+    tau_sd_s: float
+    tau_of_others_s: float
+    left_m_s2_before: float
+    left_m_s2_after: float
 
 
 @dataclass(frozen=True)
@@ -74,15 +63,15 @@ class Settling:
 
     tau_s: float
     sd_s: float
-    proofs: tuple[SettleProof, ...]
+    heldout: tuple[SettleProof, ...]
 
     @property
     def sentences(self) -> list[str]:
         """What there is to say, in words."""
         proofs = "; ".join(
-            f"{proof.recording}: own {1e3 * proof.own:.0f} ± {1e3 * proof.own_sd:.0f} ms, with that of the others "
-            f"{proof.before:.2f} m/s² become {proof.after:.2f}"
-            for proof in self.proofs
+            f"{proof.recording}: own {1e3 * proof.tau_s:.0f} ± {1e3 * proof.tau_sd_s:.0f} ms, with that of the others "
+            f"{proof.left_m_s2_before:.2f} m/s² become {proof.left_m_s2_after:.2f}"
+            for proof in self.heldout
         )
         return [
             f"At first the accelerometer contradicts the gyroscope: what it reads beyond the pull towards the axis "
@@ -93,12 +82,7 @@ class Settling:
 
     def to_json(self) -> dict[str, Any]:
         """Return the JSON object."""
-        return {
-            "id": _LAG,
-            "tau_s": self.tau_s,
-            "sd_s": self.sd_s,
-            "heldout": [proof.to_json() for proof in self.proofs],
-        }
+        return {"id": _LAG, **asdict(self)}
 
 
 def settling_of(recordings: Sequence[Recording], names: Sequence[str]) -> Settling | None:
@@ -130,10 +114,10 @@ def settling_of(recordings: Sequence[Recording], names: Sequence[str]) -> Settli
                 float(np.sqrt(own[place] / numbers)),
             )
         )
-    if np.median([(proof.after / proof.before) ** 2 for proof in proofs]) > _LEFT:
+    if np.median([(proof.left_m_s2_after / proof.left_m_s2_before) ** 2 for proof in proofs]) > _LEFT:
         return None
     tau = float(_TAUS[int(np.argmin(np.sum([np.log(own) for own in squares.values()], axis=0)))])
-    return Settling(tau, float(np.std([proof.own for proof in proofs], ddof=1) / np.sqrt(len(proofs))), tuple(proofs))
+    return Settling(tau, float(np.std([proof.tau_s for proof in proofs], ddof=1) / np.sqrt(len(proofs))), tuple(proofs))
 
 
 def _lowest(squares: FloatArray, readings: int) -> tuple[float, float]:

@@ -11,7 +11,7 @@ Nothing here decides a verdict: sensors that contradict one another are told of,
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,7 +34,7 @@ from validation.diagnosis.consistency.turning import (
     tone,
 )
 
-__all__ = ["Agreement", "Cause", "Comparison", "Proof", "RowProof", "agreement_of", "written_ratios"]
+__all__ = ["Agreement", "Cause", "Comparison", "Proof", "RowProof", "agreement_of", "compared", "written_ratios"]
 
 #: how far apart, in its logarithm, what is compared may be in a sound recording: precession bends the field's phase by
 #: up to 15 deg/s, a mount that is 1 mm off moves the pull by 3 %, an inertia without its electronics the wobble by 5 %
@@ -90,7 +90,8 @@ _CAUSES: Mapping[str, _Claim] = {
 class Comparison:
     """What one signal says of the spin over what the sensor of the rate says: 1 where they agree.
 
-    ``timed`` tells that the written time enters; ``share`` is how much of the signal turns with the spin.
+    ``needs_time`` tells that the written time enters; ``share_that_turns`` is how much of the signal turns with the
+    spin.
     """
 
     recording: str
@@ -98,8 +99,8 @@ class Comparison:
     sensor: str
     ratio: float
     sd: float
-    share: float
-    timed: bool
+    share_that_turns: float
+    needs_time: bool
 
     @property
     def off(self) -> float:
@@ -111,50 +112,23 @@ class Comparison:
         """Whether both agree."""
         return abs(self.off) < CONTRADICTION
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the JSON object."""
-        return {
-            "recording": self.recording,
-            "signal": self.signal,
-            "sensor": self.sensor,
-            "ratio": float(self.ratio),
-            "sd": float(self.sd),
-            "share_that_turns": float(self.share),
-            "needs_time": self.timed,
-            "agrees": self.agrees,
-        }
-
 
 @dataclass(frozen=True)
 class Proof:
     """A cause on a recording that took no part: its size there and elsewhere, chi-squared of what is compared.
 
-    ``field_before`` and ``field_after`` are what is left of the field's turning, uT rms, None without a magnetometer.
+    ``field_left_uT_...`` are what is left of the field's turning, rms, None without a magnetometer.
     """
 
     recording: str
-    own: float
+    own_value: float
     own_sd: float
-    others: float
-    others_sd: float
-    before: float
-    after: float
-    field_before: float | None
-    field_after: float | None
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the JSON object."""
-        return {
-            "recording": self.recording,
-            "own_value": self.own,
-            "own_sd": self.own_sd,
-            "value_of_others": self.others,
-            "sd_of_others": self.others_sd,
-            "chi2_before": self.before,
-            "chi2_after": self.after,
-            "field_left_uT_before": self.field_before,
-            "field_left_uT_after": self.field_after,
-        }
+    value_of_others: float
+    sd_of_others: float
+    chi2_before: float
+    chi2_after: float
+    field_left_uT_before: float | None
+    field_left_uT_after: float | None
 
 
 @dataclass(frozen=True)
@@ -165,27 +139,20 @@ class Cause:
     parameter: str
     value: float
     sd: float
-    before: float
-    after: float
-    proofs: tuple[Proof, ...]
+    chi2_before: float
+    chi2_after: float
+    heldout: tuple[Proof, ...]
 
     @property
     def heldout_after(self) -> float:
         """Chi-squared of the recordings, each when it took no part."""
-        return sum(proof.after for proof in self.proofs) if self.proofs else self.after
+        return sum(proof.chi2_after for proof in self.heldout) if self.heldout else self.chi2_after
 
     def to_json(self) -> dict[str, Any]:
         """Return the JSON object."""
-        return {
-            "id": self.id,
-            "parameter": self.parameter,
-            "value": self.value,
-            "sd": self.sd,
-            "chi2_before": self.before,
-            "chi2_after": self.after,
-            "heldout_chi2_after": self.heldout_after,
-            "heldout": [proof.to_json() for proof in self.proofs],
-        }
+        kept = asdict(self)
+        heldout = kept.pop("heldout")
+        return {**kept, "heldout_chi2_after": self.heldout_after, "heldout": heldout}
 
 
 @dataclass(frozen=True)
@@ -254,7 +221,7 @@ class Agreement:
             "reference": self.reference,
             "contradiction": self.contradiction,
             "text": list(self.sentences),
-            "comparisons": [item.to_json() for item in self.comparisons],
+            "comparisons": [{**asdict(item), "agrees": item.agrees} for item in self.comparisons],
             "causes": [item.to_json() for item in self.causes],
             "rows": None
             if self.rows is None
@@ -264,14 +231,26 @@ class Agreement:
         }
 
 
-def agreement_of(recordings: Sequence[Recording], names: Sequence[str]) -> Agreement | None:
-    """Compare the sensors of recordings (called ``names``) with one another; None where none shows the spin itself."""
-    some = [(r, n) for r, n in zip(recordings, names, strict=True) if rate_of(r) is not None]
-    if not some:
-        return None
-    comparisons = tuple(item for recording, name in some for item in _compared(recording, name))
+def compared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[tuple[Comparison, ...], ...]:
+    """Return each recording's comparisons of its sensors (called ``names``); none where no rate is known."""
+    return tuple(
+        () if rate_of(recording) is None else tuple(_compared(recording, name))
+        for recording, name in zip(recordings, names, strict=True)
+    )
+
+
+def agreement_of(
+    recordings: Sequence[Recording], names: Sequence[str], known_already: Sequence[Sequence[Comparison]] | None = None
+) -> Agreement | None:
+    """Compare the sensors of recordings (called ``names``) with one another; None where none shows the spin itself.
+
+    ``known_already`` is what `compared` says of them, where that is known.
+    """
+    each = compared(recordings, names) if known_already is None else known_already
+    comparisons = tuple(item for one in each for item in one)
     if not comparisons:
         return None
+    some = [(r, n) for r, n in zip(recordings, names, strict=True) if rate_of(r) is not None]
     known = rate_of(some[0][0])
     assert known is not None
     rows = rows_of([recording for recording, _ in some], [name for _, name in some])
@@ -446,7 +425,7 @@ def _sentences(found: Agreement) -> list[str]:
         if not some:
             continue
         verb = "agrees with" if all(item.agrees for item in some) else "contradicts"
-        timed = "over the written time" if some[0].timed else "and no time enters that"
+        timed = "over the written time" if some[0].needs_time else "and no time enters that"
         ratios = ", ".join(f"{item.ratio:.3f} ± {item.sd:.3f} in {item.recording}" for item in some)
         said.append(
             f"{words[:1].upper()}{words[1:]} {verb} the {found.reference.replace('_', ' ')} about z: "
@@ -454,17 +433,18 @@ def _sentences(found: Agreement) -> list[str]:
         )
     if found.causes and any(not item.agrees for item in found.comparisons):
         best = found.causes[0]
-        held = sum(proof.before for proof in best.proofs)
-        own = ", ".join(f"{proof.own:.4f} ± {proof.own_sd:.4f} in {proof.recording}" for proof in best.proofs)
+        held = sum(proof.chi2_before for proof in best.heldout)
+        own = ", ".join(f"{proof.own_value:.4f} ± {proof.own_sd:.4f} in {proof.recording}" for proof in best.heldout)
         said.append(
             f"The single cause that reconciles most is {_CAUSES[best.id].words} ({best.id}, {best.parameter} = "
-            f"{best.value:.4f} ± {best.sd:.4f}): χ² of the comparisons falls from {best.before:.3g} to {best.after:.3g}"
-            + (f", on recordings set aside from {held:.3g} to {best.heldout_after:.3g}" if best.proofs else "")
+            f"{best.value:.4f} ± {best.sd:.4f}): χ² of the comparisons falls from {best.chi2_before:.3g} to "
+            f"{best.chi2_after:.3g}"
+            + (f", on recordings set aside from {held:.3g} to {best.heldout_after:.3g}" if best.heldout else "")
             + (f". By themselves the recordings ask for {own}." if own else ".")
         )
         said += [
-            f"{_CAUSES[other.id].words.capitalize()} ({other.id}) leaves {other.after:.3g}, {other.heldout_after:.3g} "
-            "on recordings set aside."
+            f"{_CAUSES[other.id].words.capitalize()} ({other.id}) leaves {other.chi2_after:.3g}, "
+            f"{other.heldout_after:.3g} on recordings set aside."
             for other in found.causes[1:3]
         ]
     if found.rows is not None:
@@ -487,14 +467,15 @@ def _sentences(found: Agreement) -> list[str]:
     return said
 
 
-def written_ratios(recordings: Sequence[Recording]) -> list[float]:
+def written_ratios(each: Sequence[Sequence[Comparison]]) -> list[float]:
     """Return each recording's ratio of written to true time by field and gyroscope, 1 where that is not in question.
+
+    ``each`` is what `compared` says of the recordings.
 
     A place for a fit to start from: whether it is the clock that is wrong, and not a sensor, remains to be seen.
     """
     ratios = []
-    for recording in recordings:
-        found = () if rate_of(recording) is None else _compared(recording, recording.name)
+    for found in each:
         field = next((item for item in found if item.signal == "field"), None)
         pull = next((item for item in found if item.signal == "pull to the axis"), None)
         wrong = field is not None and not field.agrees and (pull is None or pull.agrees)

@@ -12,9 +12,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
-from discsim.arrays import FloatArray
+from discsim.arrays import ComplexArray, FloatArray, sd_by_median
 from discsim.recording import Recording, Samples
+from discsim.sensors.accelerometer import force_at
 
 __all__ = [
     "Signal",
@@ -33,7 +35,6 @@ __all__ = [
     "tone",
 ]
 
-ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
 
 #: length of a segment, s, and the fewest readings of one
 SEGMENT, FEWEST = 0.8, 24
@@ -104,7 +105,7 @@ def angle_turned(recording: Recording, at: FloatArray) -> FloatArray:
     known = rate_of(recording)
     assert known is not None
     _, t, r = known
-    psi = np.concatenate([[0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(t))])
+    psi = cumulative_trapezoid(r, t, initial=0)
     return np.asarray(
         np.interp(at, t, psi) + np.where(at < t[0], (at - t[0]) * r[0], np.maximum(at - t[-1], 0) * r[-1])
     )
@@ -240,7 +241,7 @@ def pull_of(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray] |
     if gyro is not None:
         w[:, :2] = np.column_stack([np.interp(t, gyro.t, np.nan_to_num(gyro.value[:, k])) for k in range(2)])
     w[:, 2] = np.interp(t, known[1], known[2])
-    return t, f[:, :2], np.cross(w, np.cross(w, place))[:, :2]
+    return t, f[:, :2], force_at(place, np.zeros(3), w, np.zeros_like(w))[:, :2]
 
 
 def centripetal(recording: Recording) -> Tone | None:
@@ -263,7 +264,7 @@ def centripetal(recording: Recording) -> Tone | None:
     if len(ratios) < 3:
         return None
     middle = float(np.median(ratios))
-    scatter = 1.4826 * float(np.median(np.abs(np.array(ratios) - middle)))
+    scatter = float(sd_by_median(np.array(ratios) - middle))
     return Tone(middle, 1.25 * scatter / np.sqrt(len(ratios)), 1.0)
 
 

@@ -15,7 +15,7 @@ from math import ceil
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import catalogued
+from discsim.effects.catalogue import CATALOGUE, catalogued
 from discsim.effects.rig import AxisTilt
 from discsim.recording import SENSORS, Recording, Samples
 from validation.diagnosis.design.plans import plans_about
@@ -24,7 +24,7 @@ from validation.diagnosis.result import Advice, Separation
 from validation.diagnosis.selection.candidates import Trial, parameters_of
 from validation.diagnosis.selection.evidence import BOUNDS
 from validation.diagnosis.selection.found import Rival, Search
-from validation.identification.competing_effects import row_of
+from validation.diagnosis.settings import SELECTION
 from validation.identification.gauss_newton import Fit, mapped
 from validation.identification.linearisation import linearise, moved
 from validation.identification.noise import NoiseModel
@@ -39,8 +39,6 @@ from validation.identification.segments import Chain, chain, recut
 
 __all__ = ["ENOUGH", "advise", "confusions", "expected_evidence", "in_words"]
 
-#: hypotheses whose scores differ by less than this cannot be told apart
-CONFUSED = 12.0
 #: expected evidence that settles a question: noise alters it by twice its root, so the other way round is rare
 ENOUGH = 25.0
 #: recordings of one kind that a person may be asked for
@@ -56,8 +54,7 @@ _SETTLED = 0.01
 
 def _once(id: str) -> bool:
     """Tell whether an effect happened once, and will not happen again in a new recording."""
-    row = row_of(id)
-    return row is not None and row.event
+    return id in CATALOGUE and CATALOGUE[id].event
 
 
 def in_words(id: str, advice: Advice | None) -> str:
@@ -93,7 +90,8 @@ def confusions(found: Search, trial: Trial) -> list[Rival]:
     return [
         rival
         for rival in found.rivals.get(trial.name, [])
-        if rival.worse < CONFUSED + 4.0 * max(0, len(parameters_of(rival.trial)) - size) and not _become(rival, trial)
+        if rival.worse < SELECTION.confused + SELECTION.per_parameter * max(0, len(parameters_of(rival.trial)) - size)
+        and not _become(rival, trial)
     ]
 
 
@@ -103,8 +101,8 @@ _KNOWN = 0.1
 
 def _become(rival: Rival, trial: Trial) -> bool:
     """Tell whether the recordings shape a rival so that it is the effect in whose place it stands."""
-    row = row_of(rival.trial.id)
-    if row is None or row.becomes is None or row.becomes[0] != trial.id:
+    row = rival.trial.row
+    if row.becomes is None or row.becomes[0] != trial.id:
         return False
     _, name, value = row.becomes
     known, fit = _KNOWN * row.grid_sigma[name], rival.tied.fit
@@ -199,7 +197,7 @@ def _recorded(found: Search, plan: Plan, own: Sequence[Parameter], like: int) ->
     plant = old.plant
     state = plan.state if plant.design is None else plant.design.as_in_hand(plan.state, old.states)
     bare = replace(old.recording, command=plan.command, release=None, name="planned", path=None, samples={})
-    whole = chain(bare, np.array([0.0, plan.duration]), state[None])
+    whole = chain(bare, np.array([0.0, plan.duration]), state[None], old.effects)
     end = _landing(whole, values) if plant.follows_path else plan.duration
     count = max(1, round(end / plant.durations.segment))
     cut = recut(whole, values, np.linspace(0.0, end + 1e-6, count + 1))
@@ -210,7 +208,7 @@ def _recorded(found: Search, plan: Plan, own: Sequence[Parameter], like: int) ->
     sheets = dict(bare.sheets)
     if "accelerometer" in sheets:  # readings that stand still for want of noise are no limit
         sheets["accelerometer"] = replace(sheets["accelerometer"], noise_rms=0.0)
-    return chain(replace(bare, samples=samples, sheets=sheets), cut.edges, cut.states)
+    return chain(replace(bare, samples=samples, sheets=sheets), cut.edges, cut.states, old.effects)
 
 
 def _landing(whole: Chain, values: Values) -> float:

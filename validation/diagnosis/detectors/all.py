@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from validation.diagnosis.detectors.dropped_samples import Shifted, Slips, dropped_accelerometer
+from validation.diagnosis.detectors.dropped_samples import Shifted, dropped_accelerometer
 from validation.diagnosis.detectors.events import events
 from validation.diagnosis.detectors.gusts import gusts
 from validation.diagnosis.detectors.local_problem import asked_of
@@ -16,6 +16,7 @@ from validation.diagnosis.detectors.speed_ripple import ripple
 from validation.diagnosis.detectors.time_offsets import time_offsets
 from validation.diagnosis.selection.constrained_fit import Tied
 from validation.diagnosis.selection.proposals import Proposal
+from validation.diagnosis.settings import DETECTORS
 from validation.identification.gauss_newton import Fit
 from validation.identification.noise import NoiseModel
 from validation.identification.parameters import Parameter
@@ -27,13 +28,18 @@ __all__ = ["searched"]
 
 
 def searched(
-    loose: Fit, tied: Tied, own: Sequence[Parameter], noise: NoiseModel, slips: Slips, least: float = 25.0
+    loose: Fit,
+    tied: Tied,
+    own: Sequence[Parameter],
+    noise: NoiseModel,
+    lost: Sequence[Shifted] = (),
+    least: float = DETECTORS.least,
 ) -> list[Proposal | Shifted]:
     """Return what all searches propose upon a hypothesis, best first.
 
     ``loose`` is the relaxed fit with its ``noise``, ``tied`` the fit under the hypothesis so far, ``own`` the stated
-    parameters and each recording's unknowns, ``slips`` what a search remembers of lost samples. Without a hypothesis
-    what is missing may have bent the tied fit, and events are looked for from the relaxed one.
+    parameters and each recording's unknowns, ``lost`` the magnetometer's lost samples as its phase tells them. Without
+    a hypothesis what is missing may have bent the tied fit, and events are looked for from the relaxed one.
     """
     taken = tied.hypothesis.trials
     fit, level = (loose, noise) if not taken else (tied.fit, tied.fit.noise)
@@ -43,8 +49,7 @@ def searched(
         found += events(asked, least)
         found += gusts(asked, least)
     found += ripple(tied.fit, tied.fit.noise, taken, least)
-    known = [q for q in own if q.key not in loose.plant.own_keys]
-    found += slips.found(loose, known, taken)
+    found += lost
     found += saturation(tied.fit, tied.fit.noise, taken)
     found += time_offsets(tied.fit, tied.fit.noise, taken)
     if loose.plant.path_known:  # else an accelerometer counts by its means over turns

@@ -14,15 +14,13 @@ from validation.diagnosis.detectors.sample_alignment import first_yaw, lost_alon
 from validation.diagnosis.relaxed_fit import relaxed
 from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.proposals import Proposal
+from validation.diagnosis.settings import DETECTORS
 from validation.identification.gauss_newton import Fit, mapped, refit
 from validation.identification.noise import NoiseModel
 from validation.identification.parameters import Parameter
 from validation.identification.segments import Chain, recut
 
 __all__ = ["Shifted", "Slips", "dropped_accelerometer", "dropped_magnetometer"]
-
-#: fewest steps of the magnetometer's phase, over all recordings, that are followed up
-_FEWEST_STEPS = 3
 
 
 @dataclass(frozen=True)
@@ -56,24 +54,19 @@ def _losses(id: str, chains: Sequence[Chain], sensor: str) -> tuple[Trial, float
     return Trial(id, (), None, (("fraction", share, sd),)), cost
 
 
+@dataclass(frozen=True)
 class Slips:
-    """Lost samples of the magnetometer as its phase tells them, worked out once for each relaxed fit."""
+    """Lost samples of the magnetometer as its phase tells them about a relaxed fit; about none before it is asked."""
 
-    def __init__(self) -> None:
-        self._known: list[tuple[Fit, list[Shifted]]] = []
+    fit: Fit | None = None
+    found: tuple[Shifted, ...] = ()
 
-    def found(self, fit: Fit, known: Sequence[Parameter], taken: Sequence[Trial]) -> list[Shifted]:
-        """Return `dropped_magnetometer` of a relaxed fit, unless it is among the effects that are ``taken`` already."""
-        if any(trial.id == catalogued(DroppedSamples, "magnetometer").id for trial in taken):
-            return []
-        for asked, answer in self._known:
-            if asked is fit:
-                return answer
-        self._known.append((fit, dropped_magnetometer(fit, known)))
-        return self._known[-1][1]
+    def about(self, fit: Fit, known: Sequence[Parameter]) -> Slips:
+        """Return what is found about a fit, which is worked out once."""
+        return self if self.fit is fit else Slips(fit, tuple(dropped_magnetometer(fit, known)))
 
 
-def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = 40.0) -> list[Shifted]:
+def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = DETECTORS.least_dropped) -> list[Shifted]:
     """Return lost samples of the magnetometer as a proposal where its phase shows steps.
 
     The motion of a loose fit follows the magnetometer; with steps found it is fitted anew with the samples at their
@@ -86,7 +79,7 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = 40
         phase_counts(chain.recording) if chain.recording.get(sensor) is not None else np.zeros(0) for chain in chains
     ]
     steps = sum(float(c[-1]) for c in counts if c.size)
-    if steps < _FEWEST_STEPS:
+    if steps < DETECTORS.fewest_steps:
         return []
     fixed = [
         repaired(chain.recording, sensor, c) if c.size else chain.recording
@@ -148,11 +141,11 @@ def _own_times(anew: Chain, old: Chain, lost: Mapping[str, FloatArray]) -> Chain
     some = {sensor: counts for sensor, counts in lost.items() if counts.size}
     written = {readings.sensor: readings.t for readings in old.readings}
     readings = tuple(replace(r, t=written[r.sensor]) for r in anew.readings)
-    return replace(anew, recording=old.recording, readings=readings, lost={**old.lost, **some})
+    return replace(anew, recording=old.recording, readings=readings, lost={**old.lost, **some}, effects=old.effects)
 
 
 def dropped_accelerometer(
-    fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: float = 40.0
+    fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: float = DETECTORS.least_dropped
 ) -> list[Shifted]:
     """Return lost samples of the accelerometer as a proposal where the motion tells that its readings slip."""
     sensor = "accelerometer"

@@ -13,6 +13,7 @@ from discsim.effects.events import Impulse, SpinStep
 from validation.diagnosis.detectors.local_problem import Asked, Ground, gain_of, peaks
 from validation.diagnosis.selection.candidates import Trial, detected
 from validation.diagnosis.selection.proposals import Proposal
+from validation.diagnosis.settings import DETECTORS
 from validation.identification.gauss_newton import Fit, mapped
 from validation.identification.linearisation import linearise
 from validation.identification.plants.plant import Layout
@@ -26,9 +27,6 @@ _MOVES: Mapping[type[Any], Callable[[Layout], slice | int | None]] = {
     Impulse: lambda layout: layout.velocity,
     SpinStep: lambda layout: layout.spin,
 }
-
-#: how many recordings and kinds of event are followed up at a time: the strongest, the others come after them
-_FOLLOWED = 3
 
 
 def _jumps(ground: Ground, directions: Sequence[int]) -> FloatArray:
@@ -70,7 +68,7 @@ def _events_at(ground: Ground, fit: Fit, recording: int, trial: Trial, instants:
     return found
 
 
-def events(asked: Asked, least: float = 25.0) -> list[Proposal]:
+def events(asked: Asked, least: float = DETECTORS.least) -> list[Proposal]:
     """Return events, at most one of each kind per recording, that would gain more than ``least``, best first.
 
     A jump of velocity or spin is asked for at every boundary of finely cut motion, which costs no simulation; the
@@ -109,6 +107,6 @@ def events(asked: Asked, least: float = 25.0) -> list[Proposal]:
     tasks = [(i, kind) for i in asked.grounds for kind in kinds]
     gains = mapped(scanned, tasks)
     promising = [(t, g) for t, g in zip(tasks, gains, strict=True) if g.size and g.max() >= least - 10.0]
-    promising = sorted(promising, key=lambda item: -float(item[1].max()))[:_FOLLOWED]
+    promising = sorted(promising, key=lambda item: -float(item[1].max()))[: DETECTORS.followed]
     found = mapped(one, [t for t, _ in promising], [g for _, g in promising])
     return sorted((p for p in found if p is not None), key=gain_of, reverse=True)

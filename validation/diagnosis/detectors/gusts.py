@@ -9,6 +9,7 @@ import numpy as np
 from validation.diagnosis.detectors.local_problem import WIND, Asked, Ground, gain_of
 from validation.diagnosis.selection.candidates import Trial, detected
 from validation.diagnosis.selection.proposals import Proposal
+from validation.diagnosis.settings import DETECTORS
 from validation.identification.gauss_newton import mapped
 from validation.identification.propagation import Column
 from validation.identification.segments import undone
@@ -19,7 +20,7 @@ __all__ = ["gusts"]
 _WIDTHS, _EVERY = (0.1, 0.2, 0.4, 0.8), 0.1
 
 
-def gusts(asked: Asked, least: float = 25.0) -> list[Proposal]:
+def gusts(asked: Asked, least: float = DETECTORS.least) -> list[Proposal]:
     """Return gusts, at most one per recording, that would gain more than ``least``, best first.
 
     A gust is a sum of winds that blow for one piece of motion each, so any instant and width is asked for by algebra.

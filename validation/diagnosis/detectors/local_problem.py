@@ -16,7 +16,7 @@ from validation.diagnosis.selection.proposals import Proposal
 from validation.identification.gauss_newton import Fit, linearised
 from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel, whitened
-from validation.identification.normal_equations import reduce, unknown_prior
+from validation.identification.normal_equations import inverse_of, known_directions, reduce, unknown_prior
 from validation.identification.parameters import Parameter
 from validation.identification.segments import Chain, recut
 
@@ -24,6 +24,11 @@ __all__ = ["WIND", "Asked", "Ground", "asked_of", "gain_of", "peaks"]
 
 #: spacing of the boundaries at which a jump is asked for, s
 _FINE = 0.1
+
+
+#: less than this share of a column's square, a thousandth of the column, is nothing: what the unknowns leave of it once
+#: they have had their say is the difference of what they were solved with
+_LEFT = 1e-6
 
 
 #: the parameters of a steady wind
@@ -57,12 +62,8 @@ class Ground:
         b = pull - cross.T @ self.inverse @ self.right
         size = np.sqrt(np.maximum(np.diag(own), 0.0))
         scale = np.divide(1.0, size, out=np.zeros_like(size), where=size > 1e-100)
-        w, V = np.linalg.eigh(H * np.outer(scale, scale))
-        # what is left of a column once the unknowns have had their say may be nothing
-        kept = w > 1e-6
-        if not np.any(kept):
-            return 0.0, np.zeros(b.size)
-        value = scale * (V[:, kept] @ ((V[:, kept].T @ (scale * b)) / w[kept]))
+        w, V = known_directions(H * np.outer(scale, scale), _LEFT)
+        value = scale * (V @ ((V.T @ (scale * b)) / w))
         return float(b @ value), np.asarray(value)
 
     def ask(self, columns: FloatArray) -> tuple[float, FloatArray]:
@@ -129,7 +130,7 @@ def _grounds(fit: Fit, f: int) -> dict[int, Ground]:
         grams.append((G[:f, :f], back[:f]))
     total = np.sum([g for g, _ in grams], axis=0)
     pulled = np.sum([b for _, b in grams], axis=0)
-    prior = np.array([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for q in parameters])
+    prior = np.array([q.precision for q in parameters])
     off = prior * (np.array([q.stated for q in parameters]) - at[:f])
     found = {}
     for i, (linear, chain) in enumerate(zip(linears, fit.chains, strict=True)):
@@ -145,9 +146,7 @@ def _grounds(fit: Fit, f: int) -> dict[int, Ground]:
         H[own:, own:] += total - grams[i][0] + np.diag(prior)
         right[own:] += pulled - grams[i][1] + off
         scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
-        w, V = np.linalg.eigh(H * np.outer(scale, scale))
-        kept = w > 1e-11 * w[-1]
-        inverse = ((V[:, kept] / w[kept]) @ V[:, kept].T) * np.outer(scale, scale)
+        inverse = inverse_of(H * np.outer(scale, scale)) * np.outer(scale, scale)
         piece = np.where(linear.piece < 0, chain.segment_of(linear.t), linear.piece)
         found[i] = Ground(chain, linear, noise, piece, A, e, inverse, right)
     return found

@@ -10,14 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from discsim.arrays import FloatArray, IntArray
+from discsim.arrays import ComplexArray, FloatArray, IntArray, sd_by_median
 from discsim.compiled import compiled_nogil
 from discsim.recording import Recording, Samples
 from validation.identification.prediction import shown
 from validation.identification.segments import Chain
 from validation.identification.sensor_model import Values, delay
 
-__all__ = ["first_yaw", "likeliest_counts", "lost_along", "phase_counts", "repaired"]
+__all__ = ["circle_through", "first_yaw", "likeliest_counts", "lost_along", "phase_counts", "repaired"]
 
 #: most samples lost in a row that are looked for
 _IN_A_ROW = 4
@@ -84,8 +84,8 @@ def phase_counts(recording: Recording) -> FloatArray:
     usable = np.flatnonzero(np.all(np.isfinite(samples.value[:, :2]), axis=1))
     if usable.size < 4 * _NEIGHBOURS:
         return lost
-    x, y = samples.value[usable, 0], samples.value[usable, 1]
-    z = x + 1j * y - _centre(x, y)
+    z = samples.value[usable, 0] + 1j * samples.value[usable, 1]
+    z = z - _centre(z)
     place = grid_of(samples, rate_hz)[usable]
     turn = np.angle(z[1:] * np.conj(z[:-1]))
     plain = np.diff(place) == 1
@@ -96,7 +96,7 @@ def phase_counts(recording: Recording) -> FloatArray:
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(steps, _NEIGHBOURS, mode="reflect"), 2 * _NEIGHBOURS + 1)
     usual = np.median(windows, axis=1)
     # a straight line through the neighbours that turned as usual: the spin changes, and so does a tilted field
-    scatter = np.maximum(1.4826 * np.median(np.abs(windows - usual[:, None]), axis=1), 1e-4)
+    scatter = np.maximum(sd_by_median(windows - usual[:, None], axis=1), 1e-4)
     offset = np.arange(-_NEIGHBOURS, _NEIGHBOURS + 1)
     near = (np.abs(windows - usual[:, None]) < 4.0 * scatter[:, None]) & (offset != 0)
     weight = near.astype(float)
@@ -117,13 +117,18 @@ def phase_counts(recording: Recording) -> FloatArray:
     return np.cumsum(lost)
 
 
-def _centre(x: FloatArray, y: FloatArray) -> complex:
-    """Return the centre of the circle nearest to points, or zero where they lie on no circle."""
-    A = np.stack([2.0 * x, 2.0 * y, np.ones_like(x)], axis=1)
-    (a, b, c), *_ = np.linalg.lstsq(A, x * x + y * y, rcond=None)
-    radius = np.sqrt(max(c + a * a + b * b, 0.0))
-    turned = np.abs(np.sum(np.exp(1j * np.angle(x + 1j * y - complex(a, b))))) / x.size
-    return complex(a, b) if np.hypot(a, b) < 2.0 * radius and turned < 0.5 else 0j
+def circle_through(z: ComplexArray) -> tuple[complex, float]:
+    """Return the centre and the radius of the circle nearest to points x + i y (n,), by algebraic least squares."""
+    A = np.stack([2.0 * z.real, 2.0 * z.imag, np.ones(z.size)], axis=1)
+    (a, b, c), *_ = np.linalg.lstsq(A, z.real * z.real + z.imag * z.imag, rcond=None)
+    return complex(a, b), float(np.sqrt(max(c + a * a + b * b, 0.0)))
+
+
+def _centre(z: ComplexArray) -> complex:
+    """Return the centre of the circle nearest to points (n,), or zero where they lie on no circle."""
+    centre, radius = circle_through(z)
+    turned = np.abs(np.sum(np.exp(1j * np.angle(z - centre)))) / z.size
+    return centre if abs(centre) < 2.0 * radius and turned < 0.5 else 0j
 
 
 def lost_along(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
@@ -12,6 +13,7 @@ from discsim.effects.rig import SpeedRipple
 from validation.diagnosis.detectors.local_problem import gain_of, peaks
 from validation.diagnosis.selection.candidates import Trial
 from validation.diagnosis.selection.proposals import Proposal
+from validation.diagnosis.settings import DETECTORS
 from validation.identification.gauss_newton import Fit
 from validation.identification.noise import NoiseModel
 from validation.identification.propagation import Column
@@ -24,7 +26,7 @@ _ID = catalogued(SpeedRipple).id
 _ORDERS, _BIN = (0.1, 40.0), 0.02
 
 
-def ripple(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: float = 25.0) -> list[Proposal]:
+def ripple(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: float = DETECTORS.least) -> list[Proposal]:
     """Return ripples of a table's speed as proposals, best first: several orders where they are near in gain.
 
     The rate's residual (rate reference, else gyroscope, else the magnetometer's phase) is transformed over the angle
@@ -32,13 +34,22 @@ def ripple(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: floa
     """
     if not fit.plant.commanded or any(trial.id == _ID for trial in taken):
         return []
-    told = [_rate_residual(fit, i, noise) for i in range(len(fit.chains))]
+    found = _ripples(fit, noise, least, 0.0)
+    if not found:
+        return []
+    # what is told first slows the table: over the angle that it then has turned a strong ripple is a line
+    amplitude = found[0].start[((_ID, "amplitude_rad_s"), None)]
+    return _ripples(fit, noise, least, amplitude) or found
+
+
+def _ripples(fit: Fit, noise: NoiseModel, least: float, amplitude: float) -> list[Proposal]:
+    """Return what `ripple` does, of a table that one of this amplitude (rad/s) slows."""
+    told = [_rate_residual(fit, i, noise, amplitude) for i in range(len(fit.chains))]
     parts = [part for part in told if part is not None]
     if not parts:
         return []
     psi, e, weight = (np.concatenate([part[j] for part in parts]) for j in range(3))
-    width = float(np.ptp(psi))
-    if psi.size < 32 or width < 2.0 * np.pi:
+    if psi.size < 32 or (width := float(np.ptp(psi))) < 2.0 * np.pi:
         return []
     bins = int(width / _BIN) + 1
     size = 1 << int(np.ceil(np.log2(4 * bins)))
@@ -82,8 +93,13 @@ def _sine(psi: FloatArray, e: FloatArray, weight: FloatArray, order: float) -> t
     return float(a * es + b * ec), float(order), float(np.hypot(a, b)), float(np.arctan2(b, a))
 
 
-def _rate_residual(fit: Fit, i: int, noise: NoiseModel) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """Return angle turned, residual of the rate and its weight (n,) of a recording, from the sensor that tells best."""
+def _rate_residual(
+    fit: Fit, i: int, noise: NoiseModel, amplitude: float
+) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Return angle turned, residual of the rate and its weight (n,) of a recording, from the sensor that tells best.
+
+    A table of rate c + a sin(order psi) takes 2 pi / sqrt(c^2 - a^2) for a turn: it turns slower than its command.
+    """
     linear, chain = fit.linears[i], fit.chains[i]
     command = chain.recording.command
     assert command is not None
@@ -94,7 +110,8 @@ def _rate_residual(fit: Fit, i: int, noise: NoiseModel) -> tuple[FloatArray, Flo
         t = np.concatenate([linear.t[c.rows] for c in channels])
         t = t - delay(fit.values(i), sensor, t)
         rate = np.interp(t, command.t, command.value)
-        psi = _turned(command.t, command.value, t)
+        mean = np.sign(command.value) * np.sqrt(np.maximum(command.value**2 - amplitude**2, 0.0))
+        psi = _turned(command.t, mean, t)
         e = np.concatenate([linear.residual[c.rows] for c in channels])
         sd = np.concatenate([np.full(c.index.size, noise[c.group].sd) for c in channels])
         moving = np.abs(rate) > 0.5
@@ -128,7 +145,7 @@ def _phase_rate(
 
 def _turned(t: FloatArray, rate: FloatArray, at: FloatArray) -> FloatArray:
     """Return the angle (n,) that a table has turned at instants by its command's knots."""
-    until = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t))])
+    until = cumulative_trapezoid(rate, t, initial=0)
     inside = np.clip(at, t[0], t[-1])
     k = np.clip(np.searchsorted(t, inside, side="right") - 1, 0, t.size - 2)
     x = inside - t[k]

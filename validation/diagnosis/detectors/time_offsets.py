@@ -18,12 +18,11 @@ from discsim.effects.sensors import Lag
 from discsim.effects.setup import TimeOffset
 from validation.diagnosis.selection.candidates import Trial, free_trial
 from validation.diagnosis.selection.proposals import Proposal
+from validation.diagnosis.settings import DETECTORS
 from validation.identification.gauss_newton import Fit
 from validation.identification.noise import NoiseModel
-from validation.identification.prediction import shown
-from validation.identification.readings import group_of
+from validation.identification.prediction import shiftable
 from validation.identification.segments import Chain
-from validation.identification.sensor_model import delay
 
 __all__ = ["time_offsets"]
 
@@ -36,7 +35,9 @@ _LEAST = 0.01
 _LONGEST_LAG = 0.15
 
 
-def time_offsets(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: float = 25.0) -> list[Proposal]:
+def time_offsets(
+    fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: float = DETECTORS.least
+) -> list[Proposal]:
     """Return offsets of time, and lags, of the sensors of a rig whose readings do not turn with the field.
 
     What is gained is in chi-squared in ``noise``; effects that are ``taken`` already are not proposed.
@@ -69,15 +70,11 @@ def _left(chain: Chain, values: dict[tuple[str, str], float], sensor: str, noise
     readings = next((r for r in chain.readings if r.sensor == sensor), None)
     if readings is None or readings.taken is not None:
         return np.zeros(1)
-    good = readings.good & np.isfinite(readings.value)
-    used = np.flatnonzero(good.any(axis=1))
-    grid = np.arange(float(chain.edges[0]), float(chain.edges[-1]), _GRID)
+    at, value, grid, told = shiftable(chain, values, readings, noise, _GRID)
+    used = np.flatnonzero(np.isfinite(value).any(axis=1))
     if used.size == 0 or grid.size < 2:
         return np.zeros(1)
-    sd = np.array([noise[group_of(sensor, axis)].sd for axis in range(readings.value.shape[1])])
-    told = shown(chain, values, sensor, grid) / sd
-    value = np.where(good, readings.value, np.nan)[used] / sd
-    at = (readings.t - delay(values, sensor, readings.t))[used]
+    at, value = at[used], value[used]
     left = np.empty(_TRIED.size)
     for k, offset in enumerate(_TRIED):
         there = at - offset

@@ -19,14 +19,14 @@ def tables_of(found: Agreement) -> list[Table]:
     tables = [_comparisons(found)]
     if any(not item.agrees for item in found.comparisons) and found.causes:
         tables.append(_causes(found.causes))
-        if found.causes[0].proofs:
+        if found.causes[0].heldout:
             tables.append(_proofs(found.causes[0]))
     if found.row_proofs:
         tables.append(_rows(found.row_proofs))
     if found.own_clock is not None:
         tables.append(_samples(found.own_clock.shown))
     if found.settling is not None:
-        tables.append(_settling(found.settling.proofs))
+        tables.append(_settling(found.settling.heldout))
     return tables
 
 
@@ -37,7 +37,7 @@ def _comparisons(found: Agreement) -> Table:
             item.recording,
             f"{item.signal} ({item.sensor})",
             plus_minus(item.ratio, item.sd),
-            "the written time" if item.timed else "no time",
+            "the written time" if item.needs_time else "no time",
             "agrees" if item.agrees else "contradicts",
         )
         for item in found.comparisons
@@ -75,9 +75,9 @@ def _causes(causes: tuple[Cause, ...]) -> Table:
         (
             cause.id,
             f"{cause.parameter} = {plus_minus(cause.value, cause.sd)}",
-            _number(cause.before),
-            _number(cause.after),
-            _number(cause.heldout_after) if cause.proofs else "",
+            _number(cause.chi2_before),
+            _number(cause.chi2_after),
+            _number(cause.heldout_after) if cause.heldout else "",
         )
         for cause in causes
     ]
@@ -89,14 +89,14 @@ def _proofs(cause: Cause) -> Table:
     rows: list[tuple[str, ...]] = [
         (
             proof.recording,
-            plus_minus(proof.own, proof.own_sd),
-            plus_minus(proof.others, proof.others_sd),
-            f"{_number(proof.before)} → {_number(proof.after)}",
+            plus_minus(proof.own_value, proof.own_sd),
+            plus_minus(proof.value_of_others, proof.sd_of_others),
+            f"{_number(proof.chi2_before)} → {_number(proof.chi2_after)}",
             ""
-            if proof.field_before is None or proof.field_after is None
-            else f"{proof.field_before:.1f} → {proof.field_after:.1f} µT",
+            if proof.field_left_uT_before is None or proof.field_left_uT_after is None
+            else f"{proof.field_left_uT_before:.1f} → {proof.field_left_uT_after:.1f} µT",
         )
-        for proof in cause.proofs
+        for proof in cause.heldout
     ]
     header = ("recording set aside", "asks for", "value of the others", "χ² with that", "what the field leaves")
     return f"{cause.id} on recordings that took no part", header, rows
@@ -127,9 +127,9 @@ def _settling(proofs: tuple[SettleProof, ...]) -> Table:
     rows: list[tuple[str, ...]] = [
         (
             proof.recording,
-            f"{plus_minus(1e3 * proof.own, 1e3 * proof.own_sd)} ms",
-            f"{1e3 * proof.others:.0f} ms",
-            f"{proof.before:.2f} → {proof.after:.2f} m/s²",
+            f"{plus_minus(1e3 * proof.tau_s, 1e3 * proof.tau_sd_s)} ms",
+            f"{1e3 * proof.tau_of_others_s:.0f} ms",
+            f"{proof.left_m_s2_before:.2f} → {proof.left_m_s2_after:.2f} m/s²",
         )
         for proof in proofs
     ]

@@ -99,7 +99,13 @@ def write_diagnosis_report(
         agreement=_agreement(diagnosis.agreement),
         overview=[(caption, base64.b64encode(file.read_bytes()).decode()) for caption, file in figures],
         heldout=[
-            (item.recording, f"{item.baseline:.2f}", f"{item.final:.2f}", _signed(item.delta_log_likelihood, 1))
+            (
+                item.recording,
+                "all saw it" if item.chosen is None else ", ".join(item.chosen) or "nothing",
+                f"{item.baseline:.2f}",
+                f"{item.final:.2f}",
+                _signed(item.delta_log_likelihood, 1),
+            )
             for item in diagnosis.heldout
         ],
         candidates=_ranking(outcome),
@@ -162,7 +168,8 @@ def _key_figures(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     ]
     if _held_out(diagnosis.baseline) and _held_out(diagnosis.final):
         text = pair(lambda fit: fit.heldout_chi2_per_sample)
-        figures.append(("the same on recordings set aside", text, "they took no part in the fit"))
+        seen = "a law's form was chosen with them" if diagnosis.law is not None else "neither fit nor choice saw them"
+        figures.append(("the same on recordings set aside", text, seen))
     if diagnosis.effects:
         figures.append(("effects named", str(len(diagnosis.effects)), "strongest evidence first"))
     elif diagnosis.verdict in ("consistent", "recalibrated"):
@@ -184,8 +191,8 @@ def _effect(item: NamedEffect) -> dict[str, Any]:
     ]
     if evidence.heldout_delta_log_likelihood is not None:
         sentences.append(
-            f"Recordings set aside become more likely by {evidence.heldout_delta_log_likelihood:,.1f} "
-            "in natural logarithm."
+            f"Recordings that took no part in its choice nor its size become more likely by "
+            f"{evidence.heldout_delta_log_likelihood:,.1f} in natural logarithm."
         )
     chance = f"{max(evidence.p_value, 1e-300):.0e}" if evidence.p_value < 0.001 else f"{evidence.p_value:.2g}"
     bound = "less than " if evidence.p_value <= 1e-300 else "about "
@@ -242,7 +249,8 @@ def _law(law: Law) -> dict[str, Any]:
         "leaves": law.leaves,
         "evidence": "No recording could be set aside to test it."
         if gain is None
-        else f"With it, recordings set aside become more likely by {gain:,.1f} in natural logarithm.",
+        else f"With it, recordings set aside become more likely by {gain:,.1f} in natural logarithm: its form was "
+        "chosen with all of them, its numbers were fitted to the others.",
     }
 
 

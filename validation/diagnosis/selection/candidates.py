@@ -7,11 +7,12 @@ tried at some values first and freed once the effect is taken up.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from discsim.effects.catalogue import Row
+from discsim.effects.catalogue import CATALOGUE, Row
+from discsim.effects.own import UserEffect
 from discsim.recording import Recording
-from validation.identification.competing_effects import row_of, rows
+from validation.identification.competing_effects import CATALOGUED, Competing
 from validation.identification.parameters import Parameter
 from validation.identification.propagation import Column
 
@@ -22,13 +23,20 @@ __all__ = ["Trial", "free_trial", "parameters_of", "trials_for"]
 class Trial:
     """An effect as a hypothesis: free columns, and the recordings it acts in (None: all).
 
-    ``told`` are parameters (name, value, sd) that a search has found and that no fit moves.
+    ``told`` are parameters (name, value, sd) that a search has found and that no fit moves; ``user`` is an effect of
+    the user's own, None for one of the catalogue.
     """
 
     id: str
     columns: tuple[Column, ...]
     recordings: frozenset[int] | None = None
     told: tuple[tuple[str, float, float], ...] = ()
+    user: UserEffect | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def row(self) -> Row:
+        """What is known of the effect."""
+        return CATALOGUE[self.id] if self.user is None else self.user.row
 
     @property
     def name(self) -> str:
@@ -50,9 +58,7 @@ _ANGLE = 0.1
 _STEP = 0.1
 
 
-def _step(id: str, name: str) -> float:
-    row = row_of(id)
-    assert row is not None
+def _step(row: Row, name: str) -> float:
     if name == row.per_turn:
         return 1e-6  # times the angle turned, hundreds of turns, this is what moves the phase
     return _STEP * row.scale[row.parameters.index(name)]
@@ -64,52 +70,47 @@ def _loose(row: Row, column: Column) -> float:
     return min(_LOOSE * column.step, _ANGLE if held else float("inf"))
 
 
-def available(recordings: Sequence[Recording]) -> list[str]:
-    """Return the ids of effects that can act on these recordings and have a size that a fit can move."""
+def available(recordings: Sequence[Recording], effects: Competing = CATALOGUED) -> list[Row]:
+    """Return the effects that can act on these recordings and have a size that a fit can move."""
     plant = recordings[0].plant
     sensors = {sensor for recording in recordings for sensor in recording.samples}
     found = []
-    for row in rows():
+    for row in effects.rows:
         if plant not in row.plants or plant in row.unseen_on:
             continue
         if not row.settings and row.acts_with(sensors):
-            found.append(row.id)
+            found.append(row)
     return found
 
 
 def detected(recordings: Sequence[Recording], detector: str) -> list[Row]:
     """Return the effects that can act on these recordings and that a detector is named for."""
-    found = [row_of(id) for id in available(recordings)]
-    return [row for row in found if row is not None and row.detector == detector]
+    return [row for row in available(recordings) if row.detector == detector]
 
 
-def trials_for(recordings: Sequence[Recording]) -> tuple[Trial, ...]:
+def trials_for(recordings: Sequence[Recording], effects: Competing = CATALOGUED) -> tuple[Trial, ...]:
     """Return the trials of all effects that enter linearly, at each of their shapes."""
     trials = []
-    for id in available(recordings):
-        row = row_of(id)
-        assert row is not None
+    for row in available(recordings, effects):
         if row.detector or any(sensor not in recordings[0].sheets for sensor in row.needs):
             continue
         shapes: list[tuple[tuple[str, float], ...]] = [()]
         for name, values in row.grid.items():
             shapes = [(*shape, (name, value)) for shape in shapes for value in values]
-        trials += [free_trial(id, shape) for shape in shapes]
+        trials += [free_trial(row.id, shape, effects.user_effect(row.id)) for shape in shapes]
     return tuple(trials)
 
 
-def free_trial(id: str, shape: tuple[tuple[str, float], ...] = ()) -> Trial:
+def free_trial(id: str, shape: tuple[tuple[str, float], ...] = (), user: UserEffect | None = None) -> Trial:
     """Return the trial of an effect in all recordings with every parameter free but those of its ``shape``."""
-    row = row_of(id)
-    assert row is not None
+    row = CATALOGUE[id] if user is None else user.row
     free = [name for name in row.parameters if name not in {name for name, _ in shape}]
-    return Trial(id, tuple(Column(id, name, _step(id, name), shape) for name in free))
+    return Trial(id, tuple(Column(id, name, _step(row, name), shape) for name in free), user=user)
 
 
 def parameters_of(trial: Trial, *, shaped: bool = True) -> tuple[Parameter, ...]:
     """Return the parameters of a trial for a fit, its shapes among them where ``shaped``."""
-    row = row_of(trial.id)
-    assert row is not None
+    row = trial.row
     baseline = row.sizes
     found = [
         Parameter(c.group, c.name, float(baseline[c.name]), c.step, _loose(row, c), trial.recordings)
@@ -118,5 +119,5 @@ def parameters_of(trial: Trial, *, shaped: bool = True) -> tuple[Parameter, ...]
     if shaped:
         for name, value in trial.shapes.items():
             sigma = row.grid_sigma.get(name, float("inf"))
-            found.append(Parameter(trial.id, name, value, _step(trial.id, name), sigma, trial.recordings))
+            found.append(Parameter(trial.id, name, value, _step(row, name), sigma, trial.recordings))
     return tuple(found)

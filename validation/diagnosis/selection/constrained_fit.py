@@ -65,7 +65,8 @@ def tied_fit(
         plain = np.array([v if q.group in effects else q.stated for q, v in zip(parameters, at, strict=True)])
         fit = refit(replace(begun, at=plain), iterations=iterations, bounds=BOUNDS, bar=bar)
     for _ in range(polish if fit.merit < bar else 0):
-        fit = replace(fit, noise=noise_of(fit))
+        # a sensor of which a lag or an offset has left no reading keeps the noise that it had: it may come back
+        fit = replace(fit, noise={**noise, **noise_of(fit)})
         fit = refit(fit, iterations=2, bounds=BOUNDS, moved_on=False)
     return scored(hypothesis, fit)
 

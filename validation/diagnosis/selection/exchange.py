@@ -9,21 +9,15 @@ from dataclasses import replace
 
 from validation.diagnosis.selection.candidates import Trial, parameters_of
 from validation.diagnosis.selection.constrained_fit import Tied, tied_fit
-from validation.diagnosis.selection.evidence import RIVAL, price
+from validation.diagnosis.selection.evidence import price
 from validation.diagnosis.selection.found import Rival, Search, from_here, lost, possible, values_of_fit
 from validation.diagnosis.selection.hypothesis import fitted_parameters
 from validation.diagnosis.selection.proposals import Proposal, scope_price, start_of
 from validation.diagnosis.selection.screening import free_columns
-from validation.identification.competing_effects import row_of
+from validation.diagnosis.settings import SELECTION
 from validation.identification.gauss_newton import merit_of
 
-__all__ = ["OUT_OF_REACH", "exchanged", "pruned", "rivals_of", "widened"]
-
-#: by how much a rival must be better than chance makes it: where it has fewer parameters, and where as many or more
-_SIMPLER, _BETTER = 2.0, 20.0
-#: a refit which expects to stay so much worse than the fit beside it, in chi-squared in the noise of that, is no match
-#: for it: no price nor tie comes near
-OUT_OF_REACH = 500.0
+__all__ = ["exchanged", "pruned", "rivals_of", "takes_its_place", "widened"]
 
 
 def widened(found: Search, final: Tied) -> Tied:
@@ -35,8 +29,7 @@ def widened(found: Search, final: Tied) -> Tied:
     if lost(found, final):
         return final
     for trial in final.hypothesis.trials:
-        row = row_of(trial.id)
-        if trial.recordings is None or trial.told or row is None or row.event:
+        if trial.recordings is None or trial.told or trial.row.event:
             continue
         everywhere = replace(trial, recordings=None)
         present = values_of_fit(final)
@@ -47,12 +40,11 @@ def widened(found: Search, final: Tied) -> Tied:
             found.own,
             final.fit.noise,
             start,
-            bar=merit_of(final.fit, final.fit.linears) + OUT_OF_REACH,
+            bar=merit_of(final.fit, final.fit.linears) + SELECTION.out_of_reach,
         )
         wide = replace(wide, score=wide.score + found.cost)
         if wide.score - final.score < scope_price(len(found.recordings)) and possible(wide):
             final = wide
-            found.steps.append(final)
     return final
 
 
@@ -69,7 +61,7 @@ def pruned(found: Search, current: Tied, kept: Trial | None = None) -> Tied:
                 found.own,
                 current.fit.noise,
                 values_of_fit(current),
-                bar=merit_of(current.fit, current.fit.linears) + OUT_OF_REACH,
+                bar=merit_of(current.fit, current.fit.linears) + SELECTION.out_of_reach,
             )
             less = replace(less, score=less.score + found.cost)
             if less.score - current.score < price(trial) and (weakest is None or less.score < weakest.score):
@@ -80,15 +72,10 @@ def pruned(found: Search, current: Tied, kept: Trial | None = None) -> Tied:
     return current
 
 
-#: rivals that algebra finds worse than this in chi-squared, and than this share of what the effect gains, are none
-_WORST, _WORST_SHARE = 60.0, 0.05
-
-
 def rivals_of(found: Search) -> dict[str, list[Rival]]:
     """Return the effects that could stand in for a named one, by its name."""
     final = found.final
     board = found.board
-    assert board is not None
     rivals: dict[str, list[Rival]] = {}
     for trial in final.hypothesis.trials:
         if trial.told:  # found in the readings themselves, and kept in the chains: nothing else could do it from there
@@ -98,7 +85,7 @@ def rivals_of(found: Search) -> dict[str, list[Rival]]:
         best = board.ask(board.columns_of(fitted_parameters(final.hypothesis, found.own))).chi2
         # of a large effect algebra knows the last percents badly
         without = board.ask(taken).chi2
-        worst = max(_WORST, _WORST_SHARE * (without - best))
+        worst = max(SELECTION.worst, SELECTION.worst_share * (without - best))
         near = []
         for other in found.trials:
             if other.id == trial.id or any(other.id == t.id for t in rest.trials):
@@ -123,11 +110,22 @@ def rivals_of(found: Search) -> dict[str, list[Rival]]:
                 found.own,
                 final.fit.noise,
                 from_here(proposal, final).start,
-                bar=merit_of(final.fit, final.fit.linears) + OUT_OF_REACH,
+                bar=merit_of(final.fit, final.fit.linears) + SELECTION.out_of_reach,
             )
             other_fit = replace(other_fit, score=other_fit.score + found.cost)
             rivals[trial.name].append(Rival(scoped, other_fit.score - final.score, other_fit))
     return rivals
+
+
+def _merit(worse: float, rival: Trial, trial: Trial) -> float:
+    """Return by how much a rival's score is worse than that of an effect, each charged for its parameters."""
+    return worse + SELECTION.rival * (len(parameters_of(rival)) - len(parameters_of(trial)))
+
+
+def takes_its_place(worse: float, rival: Trial, trial: Trial) -> bool:
+    """Tell whether a rival explains more for its parameters than an effect, whose score it is ``worse`` than."""
+    simpler = len(parameters_of(rival)) < len(parameters_of(trial))
+    return _merit(worse, rival, trial) < -(SELECTION.simpler if simpler else SELECTION.better)
 
 
 def exchanged(found: Search) -> Tied | None:
@@ -142,13 +140,11 @@ def exchanged(found: Search) -> Tied | None:
         for rival in found.rivals.get(trial.name, []):
             if not possible(rival.tied):
                 continue
-            more = len(parameters_of(rival.trial)) - len(parameters_of(trial))
-            merit = rival.worse + RIVAL * more
-            if merit < -(_SIMPLER if more < 0 else _BETTER):
-                better.append((merit, rival.tied))
-            elif size > 1 and rival.worse < _BETTER:
+            if takes_its_place(rival.worse, rival.trial, trial):
+                better.append((_merit(rival.worse, rival.trial, trial), rival.tied))
+            elif size > 1 and rival.worse < SELECTION.better:
                 fewer = pruned(found, rival.tied, kept=rival.trial)
-                merit = fewer.score - found.final.score + RIVAL * (fewer.hypothesis.size - size)
-                if len(fewer.hypothesis.trials) < len(found.final.hypothesis.trials) and merit < -_SIMPLER:
+                merit = fewer.score - found.final.score + SELECTION.rival * (fewer.hypothesis.size - size)
+                if len(fewer.hypothesis.trials) < len(found.final.hypothesis.trials) and merit < -SELECTION.simpler:
                     better.append((merit, fewer))
     return min(better, key=lambda item: item[0])[1] if better else None

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from discsim.effects.catalogue import catalogued
+from discsim.effects.catalogue import CATALOGUE, catalogued
 from discsim.effects.events import SpinStep
 from discsim.recording import Recording
 from validation.diagnosis.detectors.dropped_samples import Slips
@@ -17,14 +17,13 @@ from validation.diagnosis.selection.evidence import ONE_SIDED
 from validation.diagnosis.selection.hypothesis import Start
 from validation.diagnosis.selection.proposals import Proposal
 from validation.diagnosis.selection.screening import Board, board_of
-from validation.identification.competing_effects import row_of
+from validation.diagnosis.settings import SELECTION
 from validation.identification.gauss_newton import Fit
 from validation.identification.noise import NoiseModel, chi_squared
 from validation.identification.parameters import Parameter
 from validation.identification.residual_tests import remainders
 
 __all__ = [
-    "FAR",
     "Considered",
     "Rival",
     "Search",
@@ -41,8 +40,6 @@ __all__ = [
 
 #: when a kick changed the spin
 _KICK = (catalogued(SpinStep).id, "t_s")
-#: a fit whose chi-squared per reading, in the noise of the relaxed fit, is above this is far from the data
-FAR = 1.6
 
 
 @dataclass(frozen=True)
@@ -64,9 +61,33 @@ class Rival:
     tied: Tied
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class Search:
-    """What the search found: fits of the baseline and of the final hypothesis, and what was considered."""
+    """A selection of effects, as far as it has come: each step returns another.
+
+    Attributes
+    ----------
+    recordings, own
+        The recordings as they are stated, and the parameters that they leave open without any effect.
+    loose, loose_noise, loose_board
+        The relaxed fit, its noise, and what every effect would do to it.
+    trials
+        The effects that compete, at each of their shapes.
+    base, final
+        The fits of the baseline and of the effects so far.
+    board, asked
+        What every effect would do to a fit, in its own noise, and which fit that is: in the end the final one.
+    steps, considered, rivals
+        Fits on the way; trials that were refitted; what could stand in for a named effect, by its name.
+    outliers
+        Readings that were left out: (recording, sensor, axis, time, deviations).
+    hints
+        What relations between sensors had asked for before any fit, with its values to start from.
+    cost : float
+        What choosing the samples that were lost has cost, in twice the log likelihood.
+    slips
+        What the magnetometer's phase told of lost samples.
+    """
 
     recordings: tuple[Recording, ...]
     own: tuple[Parameter, ...]
@@ -75,26 +96,26 @@ class Search:
     trials: tuple[Trial, ...]
     base: Tied
     final: Tied
-    steps: list[Tied] = field(default_factory=list)
-    considered: list[Considered] = field(default_factory=list)
-    rivals: dict[str, list[Rival]] = field(default_factory=dict)
-    board: Board | None = None
-    #: readings that were left out: (recording, sensor, axis, time, deviations)
-    outliers: list[tuple[int, str, str, float, float]] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
-    #: what the magnetometer's phase told of lost samples, by the relaxed fit that it was asked of
-    slips: Slips = field(default_factory=Slips)
-    #: what relations between sensors had asked for before any fit, with its values to start from
+    loose_board: Board
+    board: Board
+    asked: Fit
+    steps: tuple[Tied, ...] = ()
+    considered: tuple[Considered, ...] = ()
+    rivals: Mapping[str, Sequence[Rival]] = field(default_factory=dict)
+    outliers: tuple[tuple[int, str, str, float, float], ...] = ()
     hints: tuple[Proposal, ...] = ()
-    #: what choosing the samples that were lost has cost, in twice the log likelihood
     cost: float = 0.0
-    _asked: tuple[Fit, Board] | None = None
+    slips: Slips = field(default_factory=Slips)
 
-    def board_of(self, fit: Fit) -> Board:
-        """Return what every effect would do to a fit, in its own noise; of the last fit that was asked it is known."""
-        if self._asked is None or self._asked[0] is not fit:
-            self._asked = fit, board_of(fit, self.trials, fit.noise, fit.plant.sizes.continuous)
-        return self._asked[1]
+    def about(self, fit: Fit) -> Search:
+        """Return the search with its board about a fit, which is worked out once."""
+        if self.asked is fit:
+            return self
+        return replace(self, board=board_of(fit, self.trials, fit.noise, fit.plant.sizes.continuous), asked=fit)
+
+    def with_step(self, tied: Tied) -> Search:
+        """Return the search with one more fit on the way."""
+        return replace(self, steps=(*self.steps, tied))
 
     def at_base(self) -> Search:
         """Return the search as if nothing had been found."""
@@ -115,7 +136,7 @@ def chi2_in(tied: Tied, noise: NoiseModel) -> float:
 
 def far(found: Search, tied: Tied) -> bool:
     """Tell whether a fit is far from the data."""
-    return chi2_in(tied, found.loose_noise) > FAR * tied.fit.count
+    return chi2_in(tied, found.loose_noise) > SELECTION.far * tied.fit.count
 
 
 def lost(found: Search, tied: Tied) -> bool:
@@ -123,23 +144,14 @@ def lost(found: Search, tied: Tied) -> bool:
     return far(found, tied) and bool(remainders(tied.fit.linears, tied.residuals, tied.fit.noise))
 
 
-#: chi-squared per reading, in the noise that it shows, up to which the relaxed fit follows the data
-_FOLLOWED = 2.0
-
-
-#: an effect that leaves more than this share of the baseline's chi-squared leads no nearer to the data: of two that
-#: are hidden the larger leaves half of it, or less
-_NO_NEARER = 0.7
-
-
 def no_nearer(found: Search, before: Tied, after: Tied) -> bool:
     """Tell whether one fit is not much nearer to the data than another."""
-    return chi2_in(after, found.loose_noise) > _NO_NEARER * chi2_in(before, found.loose_noise)
+    return chi2_in(after, found.loose_noise) > SELECTION.no_nearer * chi2_in(before, found.loose_noise)
 
 
 def misses(found: Search, tied: Tied) -> bool:
     """Tell whether a fit is far from data that the relaxed fit follows: whatever it holds, something is missing."""
-    return far(found, tied) and found.loose.merit < _FOLLOWED * found.loose.count
+    return far(found, tied) and found.loose.merit < SELECTION.followed * found.loose.count
 
 
 def on_the_disc(found: Search, start: Start) -> bool:
@@ -157,7 +169,7 @@ def _is_place(id: str, acts_on: str | None = None) -> bool:
 
     With ``acts_on`` only where it acts on that.
     """
-    row = row_of(id)
+    row = CATALOGUE.get(id)
     return row is not None and row.on_disc and acts_on in (None, row.acts_on)
 
 

@@ -10,9 +10,10 @@ import numpy as np
 
 from discsim.effects import Effect
 from validation.diagnosis.selection.candidates import Trial, free_trial, parameters_of
-from validation.diagnosis.selection.evidence import ONE_SIDED, RIVAL
+from validation.diagnosis.selection.evidence import ONE_SIDED
 from validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
 from validation.diagnosis.selection.screening import Answer, Board, free_columns
+from validation.diagnosis.settings import SELECTION
 from validation.identification.parameters import Parameter
 from validation.identification.propagation import Column
 
@@ -59,7 +60,7 @@ def proposals(
                 best = proposal
         if best is not None:
             found.append(best)
-    return sorted(found, key=lambda p: RIVAL * len(parameters_of(p.trial)) - p.gain)
+    return sorted(found, key=lambda p: SELECTION.rival * len(parameters_of(p.trial)) - p.gain)
 
 
 def hinted(effect: Effect) -> Proposal:
@@ -116,7 +117,7 @@ def pairs(board: Board, trials: Sequence[Trial], own: Sequence[Parameter]) -> li
         asked = [*((c, q) for c, q in taken if q.key not in {p.key for _, p in freed}), *freed]
         answer = board.ask(asked)
         hypothesis = Hypothesis(both)
-        merit = answer.chi2 + RIVAL * hypothesis.size
+        merit = answer.chi2 + SELECTION.rival * hypothesis.size
         if merit < (found[ids].merit if ids in found else np.inf) and not _backwards(freed, answer):
             found[ids] = Pair(hypothesis, merit, start_of(asked, answer, both))
     return sorted(found.values(), key=lambda pair: pair.merit)

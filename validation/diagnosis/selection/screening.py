@@ -14,10 +14,11 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.errors import InputError
 from validation.diagnosis.selection.candidates import Trial, parameters_of
+from validation.diagnosis.selection.to_stated import to_baseline
 from validation.identification.gauss_newton import Fit, linearised_columns, mapped
 from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel
-from validation.identification.normal_equations import Reduced, reduce
+from validation.identification.normal_equations import Reduced, inverse_of, reduce
 from validation.identification.parameters import Jumps, Parameter
 from validation.identification.plants import PLANTS
 from validation.identification.propagation import Column
@@ -71,12 +72,10 @@ class Board:
             H += G[np.ix_(free, free)] * np.outer(active, active)
             right += G[free, -1] * active
             chi2 += float(G[-1, -1])
-        H = H + np.diag([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for _, q in parameters])
+        H = H + np.diag([q.precision for _, q in parameters])
         # what nothing shows stays at its baseline
         scale = np.where(np.diag(H) > 0.0, 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300)), 0.0)
-        w, V = np.linalg.eigh(H * np.outer(scale, scale))
-        kept = w > 1e-9 * max(float(w[-1]), 1e-300)
-        covariance = ((V[:, kept] / w[kept]) @ V[:, kept].T) * np.outer(scale, scale)
+        covariance = inverse_of(H * np.outer(scale, scale)) * np.outer(scale, scale)
         value = covariance @ right
         return Answer(chi2 - float(value @ right), value, covariance)
 
@@ -103,14 +102,7 @@ def board_of(fit: Fit, trials: Sequence[Trial], noise: NoiseModel, jumps: Jumps)
             "(a free spin turns by itself, driven by nothing); expected the part of the log in which it does: "
             "discsim import RAW --throw N or --rows A:B takes it out"
         )
-    for i, G in enumerate(grams):
-        away = np.zeros(len(columns))
-        for q, number in zip(fit.parameters, fit.at, strict=True):
-            if q.acts_in(i):
-                away[place[column_of(q)]] = number - q.stated
-        e, chi2 = G[:-1, -1].copy(), float(G[-1, -1])
-        G[-1, -1] = chi2 + float(2.0 * away @ e + away @ G[:-1, :-1] @ away)
-        G[:-1, -1] = G[-1, :-1] = e + G[:-1, :-1] @ away
+    to_baseline(grams, fit, [place[column_of(q)] for q in fit.parameters])
     return Board(columns, grams, place, linears, tuple(reduced))
 
 

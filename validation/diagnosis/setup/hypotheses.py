@@ -19,6 +19,7 @@ from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.setup import Axes, BoardRotation, axes_of
 from discsim.recording import Recording
 from discsim.written import corrected
+from validation.diagnosis.settings import RELAXED_FIT
 from validation.diagnosis.setup.relations import Columns, misfit, wanted_force
 from validation.diagnosis.setup.rotation import board_turns, spin_axis
 from validation.diagnosis.setup.spin_signals import SpinSignals, spin_signals
@@ -33,9 +34,8 @@ BOARD = ("magnetometer", "gyroscope", "accelerometer")
 MOST = 4
 #: largest offset of time that is looked for, s, and how far the phase turns between two that are tried, rad
 LATEST, PHASE_STEP = 0.15, 0.25
-#: lags that are tried as rivals, as phases, rad; and how wrong a clock may be, as far as a relaxed fit lets one go
+#: lags that are tried as rivals, as phases, rad; clocks are tried as far as a relaxed fit lets one go
 LAGS = np.array([0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.2, 3.3, 5.0, 8.0])
-MOST_CLOCK = 0.02
 #: a board nearer to a right angle than this (root sum of squares of the matrix) stands at it
 SNAP = 0.15
 #: what a statement costs that a hypothesis takes back (as readings that clip become gaps in a turned board): half of
@@ -254,7 +254,7 @@ def _rivals(base: _Base) -> Iterator[Hypothesis]:
     longest = max(float(one.grid[-1]) for one in base.signals)
     for sensor in _shifting(base):
         step = PHASE_STEP / (fastest * longest)
-        count = int(MOST_CLOCK / step)
+        count = int(RELAXED_FIT.clock_sigma / step)
         sizes = {
             "lag": LAGS / fastest,
             "clock": step * np.arange(-count, count + 1),

@@ -25,8 +25,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from discsim.arrays import FloatArray
-from validation.diagnosis.setup.spin_signals import STEP, ComplexArray, Locked, SpinSignals
+from discsim.arrays import ComplexArray, FloatArray
+from validation.diagnosis.setup.spin_signals import STEP, Locked, SpinSignals
 from validation.identification.ordinary_errors import ordinary_sigma
 from validation.identification.plants import plant_of
 

@@ -8,19 +8,8 @@ from typing import TypeAlias
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.effects import setup
 from discsim.effects.catalogue import Effect
-from discsim.effects.setup import (
-    AccelerometerUnit,
-    Axes,
-    BoardRotation,
-    ClockUnit,
-    GpsAxes,
-    GyroscopeUnit,
-    MagnetometerUnit,
-    TimeOffset,
-    board_axes,
-    permutation,
-)
 
 __all__ = ["remedy"]
 
@@ -41,19 +30,19 @@ def remedy(fault: Effect, axes: Mapping[str, MapAxes] | None = None) -> str:
     ``axes`` are those that the map has now, by sensor; without them the columns are taken as they stand.
     """
     sensor, value = fault.row.acts_on, fault.value
-    if isinstance(value, GpsAxes):
+    if isinstance(value, setup.GpsAxes):
         return "to mend it, swap the columns of the file, or give them in the map in the order north, east, down"
-    if isinstance(value, Axes):
-        return f"to mend it, write into the import map: {_axes_line(sensor, permutation(value).T, axes)}"
-    if isinstance(value, ClockUnit):
+    if isinstance(value, setup.Axes):
+        return f"to mend it, write into the import map: {_axes_line(sensor, setup.permutation(value).T, axes)}"
+    if isinstance(value, setup.ClockUnit):
         return f'to mend it, write into the import map: [time] unit = "{value.written_in}"'
-    if isinstance(value, MagnetometerUnit | AccelerometerUnit | GyroscopeUnit):
+    if type(value) in setup.UNITS:
         unit = _MAP_UNITS.get(value.written_in, value.written_in)
         return f'to mend it, write into the import map: [sensors.{sensor}] unit = "{unit}"'
-    if isinstance(value, TimeOffset):
+    if isinstance(value, setup.TimeOffset):
         return f"to mend it, subtract {1e3 * value.offset_s:.1f} ms from the times of {sensor}.csv"
-    if isinstance(value, BoardRotation):
-        matrix = board_axes(value)
+    if isinstance(value, setup.BoardRotation):
+        matrix = setup.board_axes(value)
         right = np.round(matrix)
         if np.linalg.norm(matrix - right) < _RIGHT and abs(float(np.linalg.det(right))) > 0.5:
             lines = "; ".join(_axes_line(name, right, axes) for name in _BOARD)

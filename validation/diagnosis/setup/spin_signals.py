@@ -12,17 +12,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
-from discsim.arrays import FloatArray
+from discsim.arrays import ComplexArray, FloatArray
 from discsim.recording import Recording
 from validation.diagnosis.consistency.turning import rate_of
 from validation.identification.initial.path import local_cubics, path_fixes
 from validation.identification.initial.spin_phase import field_spin
 from validation.identification.plants import plant_of
 
-__all__ = ["ComplexArray", "FlightPath", "Locked", "SpinSignals", "averages", "spin_signals", "turning_line", "usable"]
+__all__ = ["FlightPath", "Locked", "SpinSignals", "averages", "spin_signals", "turning_line", "usable"]
 
-ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
 
 #: spacing of the grid, and the one sigma of the averaging, s: a turn or more at 50 rad/s, slow beside precession
 STEP, SIGMA = 0.05, 0.12
@@ -227,8 +227,7 @@ def _reference(recording: Recording, end: float) -> tuple[FloatArray, FloatArray
     # between knots a rate is linear and the angle quadratic: summed on a fine grid
     fine = np.arange(t[0], max(end, float(t[-1])) + 1.0, 0.2 * STEP)
     rate = np.interp(fine, t, r)
-    angle = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * 0.2 * STEP)])
-    return fine, angle, rate
+    return fine, cumulative_trapezoid(rate, dx=0.2 * STEP, initial=0), rate
 
 
 def _signs(value: FloatArray) -> FloatArray:
@@ -253,7 +252,7 @@ def _phase(recording: Recording) -> tuple[str, Callable[[FloatArray], FloatArray
     if known is None:
         return None
     source, t, r = known
-    psi = np.concatenate([[0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(t))])
+    psi = cumulative_trapezoid(r, t, initial=0)
     return source, lambda at: -np.interp(at, t, psi), float(t[0]), float(t[-1])
 
 

@@ -17,27 +17,20 @@ from discsim.effects.kind import BOARD
 from discsim.recording import Recording
 from validation.diagnosis.result import Law
 from validation.diagnosis.selection.constrained_fit import Tied, tied_fit
-from validation.diagnosis.selection.evidence import ENTRY, PER_PARAMETER
 from validation.diagnosis.selection.hypothesis import Hypothesis
+from validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
 from validation.diagnosis.unknown_law.formula import as_laws, as_sensor_laws
 from validation.diagnosis.unknown_law.motion_law import candidate_laws, fitted_law, reference_of, state_of
 from validation.diagnosis.unknown_law.sensor_law import asked_of_sensors, fitted_sensor_law, sensor_library
-from validation.diagnosis.unknown_law.terms import FITTED, SensorTerm
+from validation.diagnosis.unknown_law.terms import SensorTerm
 from validation.identification.gauss_newton import Fit, mapped, refit
-from validation.identification.noise import GroupNoise, NoiseModel, chi_squared, log_likelihood, whitened
+from validation.identification.noise import GroupNoise, NoiseModel, chi_squared, log_likelihood
 from validation.identification.normal_equations import local_step, reduce, shared_step
 from validation.identification.parameters import Parameter
 from validation.identification.plants.law_terms import Term
 from validation.identification.residual_tests import remainders
 
 __all__ = ["FoundLaw", "find_law"]
-
-#: share of the best candidate's gain below which another is not fitted
-_WORTH = 0.7
-#: share of the excess that a law must explain, and twice the log likelihood it must gain on held-out recordings
-_SHARE, _HELD_OUT = 0.5, 12.0
-#: share of the excess beyond which no other candidate is fitted
-_ALL = 0.98
 
 
 @dataclass(frozen=True)
@@ -167,7 +160,7 @@ def find_law(
             continue
         if found is None or _priced(tied) < _priced(found[0]):
             found = tied, term
-        if _share(base.fit, tied.fit, start.noise) > _ALL:
+        if _share(base.fit, tied.fit, start.noise) > UNKNOWN_LAW.all:
             break
     if found is None:
         return None
@@ -201,13 +194,19 @@ def _more_terms(
     for _, further, term in _spread(candidate_laws(beside, (*own, *held), others, at)):
         assert isinstance(term, Term)
         both = fitted_law(start, own, own_at, [settled, term], [coefficient, further], at)
-        if _priced(both) + ENTRY > _priced(best):
+        if _priced(both) + SELECTION.entry > _priced(best):
             continue
         gains, _ = _held_out(tied.fit, both.fit)
-        if gains and (2.0 * sum(gains.values()) < _HELD_OUT or np.mean(np.array([*gains.values()]) > 0.0) < 0.5):
+        if not _holds(gains):
             continue
         best, chosen = both, (settled, term)
     return best, chosen
+
+
+def _holds(heldout: Mapping[int, float]) -> bool:
+    """Tell whether recordings held out gain enough, half of them anything; where none could be held out it may."""
+    gains = np.array([*heldout.values()])
+    return not heldout or bool(2.0 * np.sum(gains) >= UNKNOWN_LAW.held_out and np.mean(gains > 0.0) >= 0.5)
 
 
 def _key(term: Term | SensorTerm) -> tuple[object, ...]:
@@ -220,36 +219,31 @@ def _spread(ranked: Sequence[tuple[float, float, Term | SensorTerm]]) -> list[tu
     """Return the best few of a ranking, one of each set of symbols: the exponents are the fit's business."""
     chosen: dict[tuple[object, ...], tuple[float, float, Term | SensorTerm]] = {}
     for item in ranked:
-        if item[0] > max(ENTRY, _WORTH * ranked[0][0]):
+        if item[0] > max(SELECTION.entry, UNKNOWN_LAW.worth * ranked[0][0]):
             chosen.setdefault(_key(item[2]), item)
-    return list(chosen.values())[:FITTED]
+    return list(chosen.values())[: UNKNOWN_LAW.fitted]
 
 
 def _share(base: Fit, fit: Fit, noise: NoiseModel) -> float:
     """Return the part of the excess of chi2 over the number of readings that a fit takes away."""
-    before, after = (
-        sum(float(np.sum(whitened(linear, noise, linear.residual[:, None]) ** 2)) for linear in one.linears)
-        for one in (base, fit)
-    )
+    before, after = (sum(chi_squared(linear, noise, linear.residual) for linear in one.linears) for one in (base, fit))
     return (before - after) / max(before - base.count, 1.0)
 
 
 def _priced(tied: Tied) -> float:
     """Return a fit's score with what the numbers of its law cost: of laws that do as well the simpler one is taken."""
-    return tied.score + PER_PARAMETER * sum(q.group in ("law", "term") for q in tied.fit.parameters)
+    return tied.score + SELECTION.per_parameter * sum(q.group in ("law", "term") for q in tied.fit.parameters)
 
 
 def _believed(
     tied: Tied, terms: tuple[Term, ...] | SensorTerm, base: Tied, best: Tied, at: Mapping[str, float], noise: NoiseModel
 ) -> FoundLaw | None:
     """Return the law if it gains what it costs, explains most of the excess, and recordings that took no part."""
-    if _priced(tied) + ENTRY > min(base.score, best.score):
+    if _priced(tied) + SELECTION.entry > min(base.score, best.score):
         return None
     share = _share(base.fit, tied.fit, noise)
     heldout, chi2 = _held_out(base.fit, tied.fit)
-    if heldout and (2.0 * sum(heldout.values()) < _HELD_OUT or np.mean(np.array([*heldout.values()]) > 0.0) < 0.5):
-        return None
-    if share < _SHARE:
+    if not _holds(heldout) or share < UNKNOWN_LAW.share:
         return None
     total = sum(heldout.values()) if heldout else None
     if isinstance(terms, SensorTerm):

@@ -8,9 +8,10 @@ from math import exp, log
 import numpy as np
 
 from validation.diagnosis.result import Law, ParameterValue
-from validation.diagnosis.selection.evidence import PER_PARAMETER
+from validation.diagnosis.settings import SELECTION
 from validation.diagnosis.unknown_law.terms import SensorTerm
 from validation.identification.gauss_newton import Fit
+from validation.identification.normal_equations import inverse_of
 from validation.identification.plants.law_terms import Term
 
 __all__ = ["as_laws", "as_sensor_laws"]
@@ -28,7 +29,7 @@ def as_sensor_laws(term: SensorTerm, fit: Fit, heldout: float | None) -> tuple[t
         values, block = fit.at[js], C[np.ix_(js, js)]
         if not np.any(np.diag(block) > 0):
             continue
-        z2 = float(values @ np.linalg.pinv(block) @ values)
+        z2 = float(values @ inverse_of(block) @ values)
         sds = np.sqrt(np.diag(block))
         if term.kind == "turning":
             text = "a * cos(k * psi) + b * sin(k * psi)"
@@ -56,7 +57,7 @@ def as_sensor_laws(term: SensorTerm, fit: Fit, heldout: float | None) -> tuple[t
             }
         ranked.append((z2, Law(text, f"{term.sensor}.{axis}", coefficients, heldout)))
     ranked.sort(key=lambda item: -item[0])
-    laws = tuple(law for z2, law in ranked if z2 > PER_PARAMETER * 4.0 or law is ranked[0][1])
+    laws = tuple(law for z2, law in ranked if z2 > 4.0 * SELECTION.per_parameter or law is ranked[0][1])
     return laws, f"{term.kind} of the {term.sensor}, {shape:.4g} ± {shape_sd:.2g}"
 
 

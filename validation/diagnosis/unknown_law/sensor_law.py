@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from discsim.arrays import FloatArray, IntArray
@@ -14,11 +15,10 @@ from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.diagnosis.selection.screening import Board, column_of
 from validation.diagnosis.selection.to_stated import to_baseline
 from validation.diagnosis.unknown_law.terms import SENSORS, SHAPES, SensorTerm
-from validation.identification.gauss_newton import Fit, linearised, mapped
+from validation.identification.gauss_newton import Fit, linearised, mapped, whole_step
 from validation.identification.linear import Linear
-from validation.identification.linearisation import moved
-from validation.identification.noise import whitened
-from validation.identification.normal_equations import local_step, reduce, shared_step
+from validation.identification.noise import chi_squared
+from validation.identification.normal_equations import reduce, shared_step
 from validation.identification.parameters import Parameter
 from validation.identification.propagation import Column
 from validation.identification.segments import Chain
@@ -48,7 +48,7 @@ def turned(chain: Chain) -> Turned:
         # piecewise linear, so its integral is exact on its knots and parabolas between
         grid = np.union1d(np.linspace(0.0, chain.edges[-1], 20 * t.size), np.clip(command.t, 0.0, chain.edges[-1]))
         r = np.interp(grid, command.t, command.value)
-        psi = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(grid) * (r[1:] + r[:-1]))])
+        psi = cumulative_trapezoid(r, grid, initial=0)
         rate = CubicHermiteSpline(grid, r, np.gradient(r, grid))
         return Turned(rate, CubicHermiteSpline(grid, psi, r))
     r = np.zeros(t.size) if spin is None else chain.states[:, spin]
@@ -216,7 +216,7 @@ def fitted_sensor_law(start: Fit, own: Sequence[Parameter], own_at: FloatArray, 
             less = replace(linear, raw=linear.raw - here @ c)
             linears.append(_widened(less, np.hstack([here, slope[:, None] / (2.0 * h)])))
         fit = replace(fit, linears=tuple(linears))
-        merit = sum(_squares(fit, i) for i in range(len(linears)))
+        merit = sum(chi_squared(linear, fit.noise, linear.residual) for linear in linears)
         reduced = mapped(lambda linear, chain, f=fit: reduce(linear, chain, f.noise, f.jumps), linears, fit.chains)
         gram = np.sum([r.gram for r in reduced], axis=0)
         free = [*range(p + len(names))] if not np.any(c) else [*range(len(parameters))]
@@ -232,20 +232,6 @@ def fitted_sensor_law(start: Fit, own: Sequence[Parameter], own_at: FloatArray, 
             break
         if round == 11 or not np.all(np.isfinite(full)):
             break
-        fit = replace(
-            fit,
-            merit=merit,
-            noise=noise_of(fit) if round > 3 else fit.noise,
-            chains=tuple(
-                moved(chain, linear, local_step(r, full), full)
-                for chain, linear, r in zip(fit.chains, linears, reduced, strict=True)
-            ),
-            at=fit.at + full,
-        )
+        fit = replace(fit, merit=merit, noise=noise_of(fit) if round > 3 else fit.noise)
+        fit = whole_step(fit, reduced, full)
     return scored(Hypothesis(), fit) if np.all(np.isfinite(fit.at)) and fit.covariance.size else None
-
-
-def _squares(fit: Fit, i: int) -> float:
-    linear = fit.linears[i]
-    white = whitened(linear, fit.noise, linear.residual[:, None])
-    return float(np.sum(white**2))

@@ -8,10 +8,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 
-__all__ = ["FITTED", "SENSORS", "SHAPES", "SensorTerm"]
-
-#: candidates that are fitted
-FITTED = 2
+__all__ = ["SENSORS", "SHAPES", "SensorTerm"]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,9 @@ from math import cos, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
-from discsim.arrays import FloatArray
+from discsim.arrays import ComplexArray, FloatArray
 from discsim.compiled import compiled
 from discsim.disc import Release
 from discsim.frames import attitude_matrix, body_to_ned, multiply, quaternion_from_matrix, rotation_vector, turn
@@ -16,9 +17,7 @@ from validation.identification.initial.smoothing import (
     GRID,
     SLOW,
     TUMBLING,
-    ComplexArray,
     Readings,
-    integral_of,
     median_of,
     readings_for,
     smoothed,
@@ -129,7 +128,7 @@ def frame_of(recording: Recording) -> Attitude:
         r = np.zeros(grid.size) if expected is None else expected(grid)
         if expected is None and (centripetal := centripetal_rate(recording)) is not None:
             r = _sign(recording) * centripetal(grid)
-        psi = integral_of(grid, r)
+        psi = cumulative_trapezoid(r, grid, initial=0)
     else:
         psi, r = -spin.phase_at(grid), -np.interp(grid, spin.grid, spin.turning)
     if gyroscope is None:
@@ -143,8 +142,8 @@ def frame_of(recording: Recording) -> Attitude:
         if expected is not None:
             # what the field adds to the gyroscope's own angle is slow: its gain and its clock
             coarse, own = np.linspace(grid[0], grid[-1], max(2, int((grid[-1] - grid[0]) / 0.05))), expected(grid)
-            added = smoothed(grid, psi - integral_of(grid, own), coarse, 0.3)
-            psi = integral_of(grid, own) + np.interp(grid, coarse, added)
+            added = smoothed(grid, psi - cumulative_trapezoid(own, grid, initial=0), coarse, 0.3)
+            psi = cumulative_trapezoid(own, grid, initial=0) + np.interp(grid, coarse, added)
             r = own + np.interp(grid, coarse, np.gradient(added, coarse))
     return Attitude(grid, psi, _calm(grid, r), _despun(grid, psi, w), w, field)
 
@@ -152,7 +151,7 @@ def frame_of(recording: Recording) -> Attitude:
 def _slow_frame(recording: Recording, gyroscope: Readings, r: FloatArray) -> Attitude:
     """Return the frame of a disc that turns slowly, from the gyroscope alone; iron from a field that stands still."""
     grid, w = gyroscope.t, gyroscope.value[:, 0] + 1j * gyroscope.value[:, 1]
-    psi = integral_of(grid, r)
+    psi = cumulative_trapezoid(r, grid, initial=0)
     frame = Attitude(grid, psi, r, _despun(grid, psi, w), w, None, tumbling=True)
     readings = readings_for(recording, "magnetometer")
     if readings is None:
@@ -213,7 +212,7 @@ def _without_precession(
     m_z = np.clip(np.interp(grid, spin.grid[::10], along), -strength, strength)
     # below a tenth of the field the phase is noise and the term has a pole
     eta = (w * np.exp(1j * psi)).real * m_z / np.maximum(across, 0.1 * strength)
-    added = np.concatenate([[0.0], np.cumsum(0.5 * (eta[1:] + eta[:-1]) * np.diff(grid))])
+    added = cumulative_trapezoid(eta, grid, initial=0)
     step = float(np.median(np.diff(grid)))
     kernel = gaussian_kernel(PHASE_SIGMA, step)
     if kernel.size < grid.size:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import ComplexArray, FloatArray
 from discsim.errors import InputError
 from discsim.frames import body_to_ned, turn
 from discsim.recording import Recording
@@ -40,7 +40,7 @@ from validation.identification.initial.path import (
     path_fixes,
     path_states,
 )
-from validation.identification.initial.smoothing import GRID, ComplexArray
+from validation.identification.initial.smoothing import GRID
 
 __all__ = ["Starts", "flight_starts", "spin_starts"]
 

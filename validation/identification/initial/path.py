@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import BoolArray, FloatArray
 from discsim.frames import body_to_ned, multiply, turn
 from discsim.recording import Recording
+from discsim.sensors.accelerometer import force_at
 from validation.identification.initial.attitude import VECTOR_SIGMA, Attitude
 from validation.identification.initial.smoothing import FEWEST, median_of, readings_for
 
@@ -124,7 +126,7 @@ def _felt_tumbling(recording: Recording, frame: Attitude) -> Felt | None:
     w = np.column_stack([frame.transverse.real, frame.transverse.imag, frame.r])
     w = np.column_stack([np.interp(readings.t, frame.grid, column) for column in w.T])
     # (1): what is left of the reading at the centre
-    force = readings.value - np.cross(w, np.cross(w, d)) - np.cross(np.gradient(w, readings.t, axis=0), d)
+    force = force_at(-d, readings.value, w, np.gradient(w, readings.t, axis=0))
     about = frame.psi_at(readings.t)[:, None] * np.array([0.0, 0.0, 1.0])
     C = body_to_ned(multiply(frame.D_at(readings.t), turn(about)))
     return integrated(readings.t, np.einsum("nij,nj->ni", C, force))
@@ -133,7 +135,7 @@ def _felt_tumbling(recording: Recording, frame: Attitude) -> Felt | None:
 def integrated(grid: FloatArray, force: FloatArray) -> Felt:
     """Return a force (n, 3) on a grid (n,) with its first and second integrals."""
     step = np.diff(grid)[:, None]
-    gained = np.concatenate([np.zeros((1, 3)), np.cumsum(0.5 * (force[1:] + force[:-1]) * step, axis=0)])
+    gained = cumulative_trapezoid(force, grid, axis=0, initial=0)
     # trapezoids of the first integral, with the parabola that a straight force makes
     steps = gained[:-1] * step + (2 * force[:-1] + force[1:]) * step**2 / 6
     return Felt(grid, force, gained, np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]))

@@ -6,12 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import ComplexArray, FloatArray
 from discsim.recording import Recording
 
-__all__ = ["Readings", "integral_of", "median_of", "readings_for", "smoothed"]
-
-ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
+__all__ = ["Readings", "median_of", "readings_for", "smoothed"]
 
 
 #: spacing of the instants at which attitudes are found before they are smoothed, s
@@ -72,8 +70,3 @@ def smoothed(t: FloatArray, value: FloatArray | ComplexArray, at: FloatArray, si
 def median_of(value: FloatArray) -> float:
     """Return the median size of values (n,)."""
     return float(np.median(np.abs(value)))
-
-
-def integral_of(grid: FloatArray, r: FloatArray) -> FloatArray:
-    """Return the integral (n,) of r over a grid (n,), by trapezoids."""
-    return np.concatenate([[0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(grid))])

@@ -8,17 +8,16 @@ from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import solveh_banded
 from scipy.ndimage import median_filter
 
-from discsim.arrays import FloatArray
+from discsim.arrays import ComplexArray, FloatArray
 from discsim.recording import Recording
 from validation.identification.initial.smoothing import (
     FEWEST,
     SLOW,
-    ComplexArray,
-    integral_of,
     median_of,
     readings_for,
     smoothed,
@@ -69,7 +68,7 @@ def rig_starts(recording: Recording, t: FloatArray) -> tuple[FloatArray, FloatAr
     if spin is None:
         grid = np.arange(0.0, max(recording.end, float(np.max(t, initial=0.0))) + 0.02, 0.01)
         r = np.zeros(grid.size) if expected is None else expected(grid)
-        psi = integral_of(grid, r)
+        psi = cumulative_trapezoid(r, grid, initial=0)
         return np.interp(t, grid, psi), np.interp(t, grid, r)
     north, east, _ = recording.environment.magnetic_field
     # m_B = C3(psi) B: the complex field in B is that in N times exp(-i psi)
@@ -213,15 +212,12 @@ def phase_spin(
         return None
     field = float(np.linalg.norm(recording.environment.magnetic_field)) if sensor == "magnetometer" else 10.0
     rough = -expected(grid) if expected is not None else _rough_rate(grid, t, z - np.mean(z), step)
-    typical = float(np.median(np.abs(rough)))
     if sensor == "magnetometer":
+        typical = float(np.median(np.abs(rough)))
         knots = t[-1] - t[0] if steady else max(0.5, 4 * np.pi / max(typical, 0.1))
         plane, _ = _conic(t, z, knots, field)
     else:
-        # a straight line for what stands still in B: it changes as the spin decays
-        coarse = np.arange(grid[0], grid[-1] + 0.05, 0.05)
-        still = smoothed(t, z, coarse, 0.3)
-        plane = z - np.interp(t, coarse, still.real) - 1j * np.interp(t, coarse, still.imag)
+        plane = _less_what_stands(t, z)
     rate = rough if expected is not None else _rough_rate(grid, t, plane, step)
     # the rate's course where another reading shows it better than the phase of a force that may vanish
     shape = rough if expected is not None and sensor == "accelerometer" else None
@@ -241,7 +237,7 @@ def phase_spin(
     # a force across the axis passes through zero and points the other way after: its square has no sign
     order, sigmas = (1, (3.0, 1.0, 1.0)) if sensor == "magnetometer" else (2, (2.0, 4.0, 6.0))
     for sigma in sigmas:
-        turned = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)])
+        turned = cumulative_trapezoid(rate, dx=step, initial=0)
         base = plane * np.exp(-1j * _curve(grid, turned, rate, t))
         smooth, weight = _spread(grid, t, base**order, max(sigma * PHASE_SIGMA, 1.5 * step))
         delta = np.unwrap(np.angle(np.where(np.abs(smooth) > 0, smooth, 1.0))) / order
@@ -250,10 +246,17 @@ def phase_spin(
     amplitude = (np.abs(smooth) / np.maximum(weight, 1e-9)) ** (1 / order)
     if shape is not None and np.all(np.abs(shape) > SLOW):
         rate = shape * _weighted_median(rate / shape, amplitude)
-        turned = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)])
+        turned = cumulative_trapezoid(rate, dx=step, initial=0)
         phase = turned + _weighted_median(phase - turned, amplitude)
         return Spin(grid, phase, rate, rate, amplitude, t, plane)
     return Spin(grid, phase, rate, _without_steps(grid, rate, t, plane, step), amplitude, t, plane)
+
+
+def _less_what_stands(t: FloatArray, z: ComplexArray) -> ComplexArray:
+    """Return what turns of a vector z (n,), less what stands still in B: that changes as the spin decays."""
+    coarse = np.arange(t[0], t[-1] + 0.05, 0.05)
+    still = smoothed(t, z, coarse, 0.3)
+    return np.asarray(z - np.interp(t, coarse, still.real) - 1j * np.interp(t, coarse, still.imag))
 
 
 def _weighted_median(value: FloatArray, weight: FloatArray) -> float:

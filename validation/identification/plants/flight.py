@@ -14,16 +14,17 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.compiled import compiled_nogil
 from discsim.disc import Release
+from discsim.dormand_prince import evaluate, interpolant, step
 from discsim.effects.air import Wind
 from discsim.effects.catalogue import catalogued
 from discsim.effects.kind import BOARD
 from discsim.errors import InputError
+from discsim.flight_equations import derivative, in_body
 from discsim.frames import body_to_ned, multiply, quaternion_from_matrix, to_body, turn
 from discsim.law import WRENCH_TARGETS
 from discsim.parameters import PARAMETERS, Tables
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
-from discsim.trajectory import derivative, evaluate, in_body, interpolant, step
 from validation.identification.dynamics import FASTEST, SIZE, acting_tables
 from validation.identification.initial.flight import flight_starts
 from validation.identification.parameters import Jumps, Values

@@ -20,6 +20,7 @@ from math import atan2, copysign, cos, degrees, hypot, radians, sin, sqrt
 from typing import Any
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray
 from discsim.compiled import compiled, compiled_nogil
@@ -287,7 +288,7 @@ def _over_turns(recording: Recording, one: Readings) -> list[Readings]:
     """
     grid = np.linspace(0.0, recording.end, max(int(recording.end / 0.05), 2))
     rate = spin_starts(recording, grid).rate[:, 2]
-    phase = np.interp(one.t, grid, np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(grid))]))
+    phase = np.interp(one.t, grid, cumulative_trapezoid(rate, grid, initial=0))
     phase = np.abs(phase) / (2.0 * np.pi)
     centres = np.arange(phase[0] + _TURNS / 2, phase[-1] - _TURNS / 2, _TURNS / 2)
     first, last = np.searchsorted(phase, centres - _TURNS / 2), np.searchsorted(phase, centres + _TURNS / 2)

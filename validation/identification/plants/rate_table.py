@@ -106,10 +106,10 @@ def table_pieces(
             inside = 1e-9 * h  # a step that starts on a knot belongs to the segment after it
             first, slope[k] = _commanded(p, knots, times[k] + inside, turned[k])
             r[k] = first
-            middle, _ = _commanded(p, knots, times[k] + 0.5 * h, turned[k] + 0.5 * h * first)
-            middle, _ = _commanded(p, knots, times[k] + 0.5 * h, turned[k] + 0.5 * h * middle)
-            end, _ = _commanded(p, knots, times[k + 1] - inside, turned[k] + h * middle)
-            turned[k + 1] = turned[k] + h / 6.0 * (first + 4.0 * middle + end)
+            second, _ = _commanded(p, knots, times[k] + 0.5 * h, turned[k] + 0.5 * h * first)
+            third, _ = _commanded(p, knots, times[k] + 0.5 * h, turned[k] + 0.5 * h * second)
+            end, _ = _commanded(p, knots, times[k + 1] - inside, turned[k] + h * third)
+            turned[k + 1] = turned[k] + h / 6.0 * (first + 2.0 * second + 2.0 * third + end)
         r[n - 1], slope[n - 1] = _commanded(p, knots, times[n - 1] + 1e-12, turned[n - 1])
         for j in range(out.size):
             k = min(max(np.searchsorted(times, out[j], side="right") - 1, 0), n - 2)

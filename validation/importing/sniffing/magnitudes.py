@@ -227,11 +227,11 @@ def gyroscope_unit(value: FloatArray, stated: Reading | None, turned: float | No
     if near is not None and stated is None:
         return Unit(near, 1.0, _said(name, near, "likely", "the field turns as fast in this unit"))
     if _whole(value) and (peak > 5000 or stated is not None):
-        return _gyroscope_counts(peak, turned)
+        return _gyroscope_counts(turned)
     return _by_size(value, peak)
 
 
-def _gyroscope_counts(peak: float, turned: float | None) -> Unit:
+def _gyroscope_counts(turned: float | None) -> Unit:
     name = "gyroscope"
     if turned is not None:
         per = min(PER_DEG_S, key=lambda per: abs(np.log(turned / (_RAD / per))))

@@ -12,6 +12,7 @@ from itertools import permutations, product
 from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray
 
@@ -66,8 +67,7 @@ def steps_between(t_gyro: FloatArray, gyro: FloatArray, t_vector: FloatArray, ve
     t_gyro, gyro, t_vector, vector = t_gyro[sound], gyro[sound], t_vector[fresh], vector[fresh]
     order = np.argsort(t_gyro, kind="stable")
     t_gyro, gyro = t_gyro[order], gyro[order]
-    step = np.diff(t_gyro)[:, None]
-    integral = np.concatenate([np.zeros((1, 3)), np.cumsum(step * (gyro[1:] + gyro[:-1]) / 2, axis=0)])
+    integral = cumulative_trapezoid(gyro, t_gyro, axis=0, initial=0)
     at = np.column_stack([np.interp(t_vector, t_gyro, integral[:, axis]) for axis in range(3)])
     # where it may stand at its range it tells no turn
     extreme = np.abs(gyro) >= 0.999 * np.abs(gyro).max(axis=0)

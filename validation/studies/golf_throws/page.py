@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from discsim.files import write_text
+from validation.reporting import markdown
 from validation.reporting.figures import COLOURS, new_figure, save_figure
 from validation.studies.golf_throws.prediction import THROWS, Prediction, predict_throw
 
@@ -30,7 +30,8 @@ def write_page(recordings: Path, page: Path, seed: int = 0) -> list[Prediction]:
     found = [predict_throw(name, folder, DRAWS, stream) for name, stream in zip(THROWS, streams, strict=True)]
     figure = page.parent / page.stem / "tracks.png"
     draw(found, figure)
-    write_text(page, _text(found, f"{page.stem}/{figure.name}"))
+    template = Path(__file__).with_name("page.md.j2")
+    markdown.write_page(page, template, figure=f"{page.stem}/{figure.name}", **_content(found))
     return found
 
 
@@ -60,103 +61,35 @@ def draw(found: Sequence[Prediction], path: Path) -> None:
     save_figure(figure, path)
 
 
-def _text(found: Sequence[Prediction], figure: str) -> str:
-    lines = [
-        "# Three tracked golf throws",
-        "",
-        _wrapped(
-            "Throws of a distance driver that a drone filmed from above, flown by the standalone model with the "
-            "tabulated coefficients of `models/discs/dd2.toml` from the release that was measured. Made by"
-        ),
-        "",
-        "```sh",
-        "discsim study golf-throws",
-        "```",
-        "",
-        _wrapped(
-            "from the source `shotshaper` (K.E.T. Giljarhus, M.T. Gooding, J. Njaerheim, Sports Engineering 25:26, "
-            "2022; see [Importing](importing.md) for its angles). The band is a Monte Carlo of "
-            f"{DRAWS - 1} flights: speed, pitch, yaw, roll, nose, spin, wobble, height and wind are drawn from their "
-            "stated sigmas. The source states none for its coefficients, so the band has none of theirs; it did not "
-            "film heights, so the track's end is taken for the touch-down."
-        ),
-        "",
-        f"![Tracks, flights as stated, and their bands]({figure})",
-        "",
-        "## Where they come down",
-        "",
-        _table(
-            (
-                "throw",
-                "track ends at, m",
-                "predicted, m",
-                "miss north, m",
-                "miss east, m",
-                "band north, east (1 sd), m",
-                "miss in sd",
-                "share of band inside",
-            ),
-            [
-                (
-                    throw.name,
-                    f"{throw.track[-1, 0]:.1f}, {throw.track[-1, 1]:.1f} at {throw.t[-1]:.1f} s",
-                    f"{throw.nominal_end[0]:.1f}, {throw.nominal_end[1]:.1f} at {throw.nominal_end[2]:.1f} s",
-                    f"{throw.miss[0]:+.1f}",
-                    f"{throw.miss[1]:+.1f}",
-                    f"{throw.band[0]:.1f}, {throw.band[1]:.1f}",
-                    f"{throw.excess:.1f}",
-                    f"{100 * throw.beyond:.1f} %",
-                )
-                for throw in found
-            ],
-        ),
-        "",
-        _wrapped(
-            "Places are north (down range) and east; a miss is predicted less tracked. *Miss in sd* is the distance of "
-            "the track's end from the middle of the drawn touch-downs in their standard deviations, both axes "
-            "together; the last column says how many of the drawn flights come down nearer to the middle than that."
-        ),
-        "",
-        *_reading(found),
-        "",
-        "## On the way",
-        "",
-        "Distance in plan between flight as stated and track, m:",
-        "",
-        _table(
-            ("throw", *(f"{t:g} s" for t in INSTANTS)),
-            [(throw.name, *(_apart(throw, t) for t in INSTANTS)) for throw in found],
-        ),
-        "",
-        "## What the band is made of",
-        "",
-        "Shift of the touch-down by one sigma more of one input alone, north and east, m:",
-        "",
-        _table(
-            ("input", *(throw.name for throw in found)),
-            [
-                (name, *(f"{throw.shifts[name][0]:+.1f}, {throw.shifts[name][1]:+.1f}" for throw in found))
-                for name in found[0].shifts
-            ],
-        ),
-        "",
-    ]
-    return "\n".join(lines)
-
-
-def _reading(found: Sequence[Prediction]) -> list[str]:
-    outside = [throw.name for throw in found if throw.beyond > 0.95]
-    short = [throw for throw in found if throw.miss[0] < 0]
+def _content(found: Sequence[Prediction]) -> dict[str, Any]:
+    """Return what the page's template is filled with."""
     worst = max(found, key=lambda throw: float(np.linalg.norm(throw.miss)))
-    where = f"outside the 95 % band for {', '.join(outside)}" if outside else "inside the 95 % band for every throw"
-    verdict = "what is stated does not explain them" if outside else "what is stated can explain them"
+    return {
+        "flights": DRAWS - 1,
+        "names": [throw.name for throw in found],
+        "instants": [f"{t:g} s" for t in INSTANTS],
+        "places": [_place_cells(throw) for throw in found],
+        "outside": [throw.name for throw in found if throw.beyond > 0.95],
+        "short": sum(throw.miss[0] < 0 for throw in found),
+        "worst": f"{np.linalg.norm(worst.miss):.1f} m ({worst.name})",
+        "on_the_way": [(throw.name, *(_apart(throw, t) for t in INSTANTS)) for throw in found],
+        "shifts": [
+            (name, *(f"{throw.shifts[name][0]:+.1f}, {throw.shifts[name][1]:+.1f}" for throw in found))
+            for name in found[0].shifts
+        ],
+    }
+
+
+def _place_cells(throw: Prediction) -> list[str]:
     return [
-        _wrapped(
-            f"The track's end is {where}: {verdict}. {len(short)} of {len(found)} flights come down short of the "
-            f"track; the largest miss is {np.linalg.norm(worst.miss):.1f} m ({worst.name}). What is not in the band: "
-            "the coefficients (CFD of a disc that does not spin, rate derivatives of another disc), how the wind grows "
-            "with height, and the disc itself (discs of one mould differed by 3 mm in the height of the nose)."
-        )
+        throw.name,
+        f"{throw.track[-1, 0]:.1f}, {throw.track[-1, 1]:.1f} at {throw.t[-1]:.1f} s",
+        f"{throw.nominal_end[0]:.1f}, {throw.nominal_end[1]:.1f} at {throw.nominal_end[2]:.1f} s",
+        f"{throw.miss[0]:+.1f}",
+        f"{throw.miss[1]:+.1f}",
+        f"{throw.band[0]:.1f}, {throw.band[1]:.1f}",
+        f"{throw.excess:.1f}",
+        f"{100 * throw.beyond:.1f} %",
     ]
 
 
@@ -164,11 +97,3 @@ def _apart(throw: Prediction, t: float) -> str:
     k = int(np.argmin(np.abs(throw.t - t)))
     apart = float(np.linalg.norm(throw.nominal[k] - throw.track[k]))
     return f"{apart:.1f}" if np.isfinite(apart) else ""
-
-
-def _wrapped(text: str) -> str:
-    return textwrap.fill(text, 118, break_long_words=False, break_on_hyphens=False)
-
-
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    return "\n".join(f"| {' | '.join(line)} |" for line in (header, ["---"] * len(header), *rows))

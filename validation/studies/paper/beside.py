@@ -46,7 +46,7 @@ BLOCKS: tuple[tuple[str, str], ...] = (
     ("of roll", "discsim.aerodynamics.rolling_coefficient"),
     ("of yaw, constant or from the table", "discsim.aerodynamics.yaw_damping"),
     ("force and moment in W, turned into B and N", "discsim.aerodynamics.air_wrench"),
-    ("equations of motion", "discsim.trajectory.derivative"),
+    ("equations of motion", "discsim.flight_equations.derivative"),
     ("the same, integrated by MuJoCo", "discsim.engine.fly"),
 )
 
@@ -102,7 +102,7 @@ def _of_flights(numbers: Mapping[str, Any]) -> list[tuple[str, ...]]:
     return [
         (
             "Fig. 3", "dominant frequency, Hz", "9 to 10", f"{three['dominant_hz'][0]:.1f} to "
-            "{three['dominant_hz'][1]:.1f}",
+            f"{three['dominant_hz'][1]:.1f}",
             "spin at release taken as 3600 deg/s; the width is the decay",
         ),
         (

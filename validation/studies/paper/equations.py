@@ -7,7 +7,7 @@ import re
 from importlib import import_module
 from typing import Any, NamedTuple
 
-__all__ = ["EQUATIONS", "STEPS", "Row", "cited", "find", "summary"]
+__all__ = ["EQUATIONS", "STEPS", "Row", "find", "summary"]
 
 
 class Row(NamedTuple):
@@ -19,7 +19,7 @@ class Row(NamedTuple):
     departs: str = ""
 
 
-_FLIGHT = "discsim.trajectory.derivative"
+_FLIGHT = "discsim.flight_equations.derivative"
 _AIR = "discsim.aerodynamics.air_wrench"
 _METHOD = "estimators.accelerometer.accelerometer"
 _KNOWN = "estimators.accelerometer.rate_with_known_terms"
@@ -86,28 +86,11 @@ STEPS = (
     Row("P-7", "shift the window", (_SETTINGS, _FFT), "unknown where the line does not stand out"),
 )
 
-_ITEM = r"(?:PE?-?\d|A[12]|\d{1,2})"
-_CITED = re.compile(rf"(?<![\w\]])\(({_ITEM})\)(?:\s*(?:-|to)\s*\(({_ITEM})\))?|Eq\. ({_ITEM})\b")
-
 
 def find(name: str) -> Any:
     """Return what a full name stands for; raises where there is no such thing."""
     module, _, own = name.rpartition(".")
     return getattr(import_module(module), own)
-
-
-def cited(name: str) -> set[str]:
-    """Return the numbers of equations and steps that a function cites: in its docstring, and where it computes them."""
-    thing = find(name)
-    found: set[str] = set()
-    for first, last, alone in _CITED.findall(inspect.getsource(getattr(thing, "py_func", thing))):
-        if not last:
-            found.add(first or alone)
-            continue
-        stem = first.rstrip("0123456789")
-        numbers = range(int(first.removeprefix(stem)), int(last.removeprefix(stem)) + 1)
-        found |= {f"{stem}{number}" for number in numbers}
-    return found
 
 
 def summary(name: str) -> str:

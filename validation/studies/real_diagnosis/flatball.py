@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray
 from discsim.recording import Recording, Samples
@@ -96,7 +97,7 @@ def wobble_rate(gyroscope: Samples, excess: float) -> tuple[float, float, float]
     t = gyroscope.t - gyroscope.t[0]
     early = t <= WOBBLE_SPAN
     r = gyroscope.value[early, 2]
-    angle = np.concatenate(([0.0], np.cumsum((r[1:] + r[:-1]) / 2.0 * np.diff(t[early]))))
+    angle = cumulative_trapezoid(r, t[early], initial=0)
     across = gyroscope.value[early, 0] + 1j * gyroscope.value[early, 1]
     across = across - np.mean(across)
     # a taper, for the wobble dies and a tilt's remainder at rate zero must not leak

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, sd_by_median
 from discsim.recording import Recording, Samples, SensorSheet
 from validation.importing import ImportMap, find_map, import_recording, read_map
 
@@ -120,9 +120,9 @@ def quiet_noise(samples: Samples) -> float:
     count = max(round(QUIET / samples.interval), 12)
     if len(samples) < count + 3:
         return float("nan")
-    third = np.abs(np.diff(value, 3, axis=0))
+    third = np.diff(value, 3, axis=0)
     found = [
-        np.sqrt(np.mean((1.4826 * np.median(third[k : k + count], axis=0)) ** 2 / THIRD))
+        np.sqrt(np.mean(sd_by_median(third[k : k + count], axis=0) ** 2 / THIRD))
         for k in range(0, len(third) - count + 1, count // 4)
     ]
     return float(np.min(found))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray
 from discsim.errors import InputError
@@ -194,7 +195,7 @@ def mean_between(rate: YawRate, start: FloatArray, stop: FloatArray) -> FloatArr
     gap = ~np.isfinite(rate.rate)
     value = np.where(gap, 0.0, rate.rate)
     pieces = np.diff(rate.t)
-    total = np.concatenate(([0.0], np.cumsum((value[1:] + value[:-1]) / 2 * pieces)))
+    total = cumulative_trapezoid(value, rate.t, initial=0)
     gaps = np.concatenate(([0.0], np.cumsum((gap[1:] | gap[:-1]) * pieces)))
     inside = (start >= rate.t[0] - pieces[0]) & (stop <= rate.t[-1] + pieces[-1])
     start, stop = np.maximum(start, rate.t[0]), np.minimum(stop, rate.t[-1])

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from discsim.files import write_text
 from discsim.recording import SENSORS
 from estimators.fft import FftSettings
+from validation.reporting import markdown
 from validation.studies.real_recordings.agreement import LOWERED, PHASE_WINDOW, RATIO_FROM, Agreement, attempts, held
 from validation.studies.real_recordings.charts import draw
 from validation.studies.real_recordings.findings import FINDINGS
@@ -35,7 +35,7 @@ def write_page(
     Raises `InputError` as importing and `attempts` do.
     """
     summary: list[Sequence[str]] = []
-    sections: list[str] = []
+    sections = []
     for source in sources:
         say(source.title)
         cuts = [load(source, cut, real) for cut in source.cuts]
@@ -46,121 +46,38 @@ def write_page(
         for cut, agreements in zip(cuts, found, strict=True):
             core = [one for one in agreements if one.method in _SUMMED]
             summary += [[f"[{cut.cut.label}](#{source.key})", *_summary_cells(one)] for one in core]
-        sections.append(_section(source, cuts, found, f"{out.name}/{figure.name}"))
+        sections.append({**_section(source, cuts, found), "figure": f"{out.name}/{figure.name}"})
     page = out.parent / f"{out.name}.md"
-    road = [*road_section(walked), ""] if walked else []
-    write_text(page, "\n".join([_lead(), *road, _summed(), _table(_SUMMARY, summary), "", *sections]))
+    markdown.write_page(
+        page,
+        Path(__file__).with_name("page.md.j2"),
+        road="\n".join(road_section(walked)) if walked else "",
+        ratio_from=RATIO_FROM,
+        paper=FftSettings(),
+        lowered=LOWERED,
+        phase_window=PHASE_WINDOW,
+        summary=summary,
+        sections=sections,
+    )
     return page
 
 
 _SUMMED = ("fft", LOWERED, "accelerometer", "gyroscope", "gyroscope, size")
-_SUMMARY = ("recording", "method", "against", "known", "ratio", "rms difference, deg/s", "remark")
-_DETAIL = (
-    "method",
-    "against",
-    "answers",
-    "known",
-    "median",
-    "reference's",
-    "ratio",
-    "rms difference",
-    "beyond 3 sd",
-    "remark",
-)
 
 
-def _lead() -> str:
-    what = (
-        "What the commands make of logs that nobody here wrote, and how far each method's rate is from a reference "
-        "sensor. Every number in the tables and findings is computed by the command below from the recordings in "
-        "`DISCSIM_RECORDINGS` (or `--recordings DIR`), and the same recordings give the same bytes, but for processor "
-        "times. Whatever disagrees is stated with its size and left standing."
-    )
-    lines = [
-        "# Real recordings",
-        "",
-        _wrapped(what),
-        "",
-        "```sh",
-        "discsim study real-recordings",
-        "```",
-        "",
-    ]
-    return "\n".join(
-        [
-            *lines,
-            "To import and estimate such data yourself: [Importing](importing.md), [Estimators](estimators.md).",
-            "",
-        ]
-    )
-
-
-def _summed() -> str:
-    paper = FftSettings()
-    lines = ["## The methods against a reference", "", "How to read it:", ""]
-    entries = (
-        "*known*: share of a method's answers that are numbers; it is silent where it cannot tell.",
-        f"*ratio*: median of method over reference, where the reference turns at {np.degrees(RATIO_FROM):.0f} deg/s "
-        "or faster. *rms difference*: in deg/s, over all times at which both are known. Both are of magnitudes where "
-        "one of the two has no sign.",
-        "`fft` and `field's phase` are held against the reference's mean over their window, other methods against "
-        "its value at the time: a ripple of the reference that a method averages away counts as a difference.",
-        "*beyond 3 sd*: share of the differences larger than three of the method's own standard deviations.",
-        f"`fft` has the paper's settings: window {paper.window} samples, threshold {np.degrees(paper.threshold):.0f} "
-        f"deg/s. `{LOWERED}` is the same method with a lower threshold and another window, stated in each section, "
-        "and with each window's mean taken off.",
-        "`field's phase` is no method of the program: the slope of the field's angle about the centre of a fitted "
-        f"circle, over {PHASE_WINDOW} s, for bodies too slow for a spectrum.",
-        "A reference is a sensor and not the truth; and what a method that takes the gyroscope in says against the "
-        "gyroscope is no test of it.",
-    )
-    lines += [*(_wrapped(entry, "- ") for entry in entries), "", "### Summary", ""]
-    return "\n".join([*lines, "The paper's two methods, and the gyroscope where something else can judge it.", ""])
-
-
-def _wrapped(text: str, bullet: str = "") -> str:
-    return textwrap.fill(
-        text,
-        118,
-        initial_indent=bullet,
-        subsequent_indent=" " * len(bullet),
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-
-
-def _section(source: Source, cuts: Sequence[Measured], found: Sequence[Sequence[Agreement]], figure: str) -> str:
-    findings = FINDINGS[source.key](source, cuts, found)
-    lines = [
-        f'<a id="{source.key}"></a>',
-        "",
-        f"## {source.title}",
-        "",
-        _wrapped(source.about),
-        "",
-        _wrapped(f"*Source:* {source.terms}"),
-        "",
-    ]
-    lines += [_table(("sensor", "samples read", "median rate, Hz", "longest step, ms"), _sampling(cuts)), ""]
-    if source.lowered is not None and "magnetometer" in cuts[0].recording:
-        lowered, interval = source.lowered, cuts[0].recording.need("magnetometer").interval
-        lines += [
-            f"`{LOWERED}`: window {lowered.window} samples ({lowered.window * interval:.2f} s), threshold "
-            f"{np.degrees(lowered.threshold):.0f} deg/s ({np.degrees(lowered.threshold) / 360:.2f} Hz).",
-            "",
-        ]
-    for cut, agreements in zip(cuts, found, strict=True):
-        lines += [
-            f"**{cut.cut.label}**{_span(cut)}",
-            "",
-            _table(_DETAIL, [_detail_cells(one) for one in agreements]),
-            "",
-        ]
-    lines += [f"![{source.title}: spin rate by each method]({figure})", "", "What is found:", ""]
-    lines += [_wrapped(sentence, "- ") for sentence in findings.sentences]
-    if findings.rows:
-        lines += ["", _table(findings.header, findings.rows)]
-    return "\n".join([*lines, ""])
+def _section(source: Source, cuts: Sequence[Measured], found: Sequence[Sequence[Agreement]]) -> dict[str, Any]:
+    """Return what the template's part about a source is filled with."""
+    tried = source.lowered is not None and "magnetometer" in cuts[0].recording
+    return {
+        "source": source,
+        "sampling": _sampling(cuts),
+        "interval": cuts[0].recording.need("magnetometer").interval if tried else None,
+        "cuts": [
+            (cut.cut.label, _span(cut), [_detail_cells(one) for one in agreements])
+            for cut, agreements in zip(cuts, found, strict=True)
+        ],
+        "findings": FINDINGS[source.key](source, cuts, found),
+    }
 
 
 def _span(cut: Measured) -> str:
@@ -215,8 +132,3 @@ def _ratio(one: Agreement) -> str:
 
 def _deg(rate: float) -> str:
     return f"{np.degrees(rate):.1f}" if np.isfinite(rate) else ""
-
-
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -20,6 +20,7 @@ from typing import Any, Literal
 import numpy as np
 
 from discsim.files import write_text
+from validation.reporting.markdown import table
 
 __all__ = ["LOGS", "Answers", "Log", "Said", "answers", "road_section", "walk"]
 
@@ -131,7 +132,7 @@ def walk(log: Log, real: Path, folder: Path, say: Callable[[str], None] = lambda
         note = home / f"{step[1]}.json"
         if not note.is_file():
             say(f"{log.key}: {step[1]}")
-            write_text(note, json.dumps(asdict(_run(step, home)), indent=1) + "\n")
+            write_text(note, json.dumps(asdict(run_command(step, home)), indent=1) + "\n")
         if step[1] == "import" and json.loads(note.read_text(encoding="utf-8"))["status"] != 0:
             break
     return answers(log, folder)
@@ -164,7 +165,7 @@ def _steps(log: Log, real: Path, home: Path) -> list[list[str]]:
     ]
 
 
-def _run(command: Sequence[str], home: Path) -> Said:
+def run_command(command: Sequence[str], home: Path) -> Said:
     home.mkdir(parents=True, exist_ok=True)
     if "--out" in command:
         shutil.rmtree(command[-1], ignore_errors=True)
@@ -188,10 +189,8 @@ _HEADER = ("log", "import", "check", "estimate: best of its methods", "diagnose"
 
 def road_section(found: Sequence[Answers]) -> list[str]:
     """Return the lines of the table, and a list of what is known of each log."""
-    lines = [f"| {' | '.join(_HEADER)} |", "| --- | --- | --- | --- | --- | --- | --- |"]
-    lines += [f"| {' | '.join(_row(one))} |" for one in found]
     known = [f"- *{one.log.label}*: {one.log.truth}." for one in found]
-    return [*lines, "", "What is known of them:", "", *known]
+    return [*table(_HEADER, map(_row, found)).splitlines(), "", "What is known of them:", "", *known]
 
 
 def _row(one: Answers) -> list[str]:

@@ -7,9 +7,10 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
+import typer
 
 from discsim.arrays import FloatArray
 from discsim.errors import InputError
@@ -20,7 +21,7 @@ from estimators.rate import YawRate
 from validation.importing import find_map, import_recording, read_map
 from validation.studies.real_recordings.optical import optical_rate
 
-__all__ = ["SOURCES", "Cut", "Measured", "Source", "find_recordings", "load", "raw_columns"]
+__all__ = ["SOURCES", "Cut", "Measured", "RecordingsOption", "Source", "find_recordings", "load", "raw_columns"]
 
 
 @dataclass(frozen=True)
@@ -211,6 +212,15 @@ SOURCES = (
         cuts=(Cut("phyphox, z_acc", "z_acc.csv", "phyphox"), Cut("phyphox, z_cir", "z_cir.csv", "phyphox")),
     ),
 )
+
+
+RecordingsOption: TypeAlias = Annotated[
+    Path | None,
+    typer.Option(
+        "--recordings",
+        help="Folder of recordings with 'real' in it. Default: DISCSIM_RECORDINGS, or beside the checkout.",
+    ),
+]
 
 
 def find_recordings(chosen: Path | None = None) -> Path:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray
 from discsim.recording import Samples
 from estimators.rate import YawRate
+from validation.diagnosis.detectors.sample_alignment import circle_through
 
 __all__ = ["field_phase", "phase_rate", "turned", "turned_by_rate"]
 
@@ -23,8 +25,8 @@ def field_phase(field: FloatArray, shape: Literal["circle", "ellipse"] = "circle
     scale = field[:, :2].std()
     x, y = (field[:, :2] - mean).T / scale
     if shape == "circle":
-        centre = np.linalg.lstsq(np.column_stack((2 * x, 2 * y, np.ones_like(x))), x**2 + y**2, rcond=None)[0][:2]
-        level = np.column_stack((x, y)) - centre
+        middle, _ = circle_through(x + 1j * y)
+        level = np.column_stack((x - middle.real, y - middle.imag))
     else:
         a, b, c, d, e = np.linalg.lstsq(np.column_stack((x * x, x * y, y * y, x, y)), np.ones_like(x), rcond=None)[0]
         form = np.array([[a, b / 2], [b / 2, c]])
@@ -45,7 +47,7 @@ def turned_by_rate(rate: YawRate, start: float, stop: float) -> float:
     """Turns by the integral of a rate between two times; what is unknown is bridged linearly."""
     known = np.isfinite(rate.rate)
     t, value = rate.t[known], rate.rate[known]
-    total = np.concatenate(([0.0], np.cumsum((value[1:] + value[:-1]) / 2 * np.diff(t))))
+    total = cumulative_trapezoid(value, t, initial=0)
     return float(np.interp(stop, t, total) - np.interp(start, t, total)) / (2 * np.pi)
 
 

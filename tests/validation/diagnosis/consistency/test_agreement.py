@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 from support.made import MODULE, throws
+from support.places import REAL
 
 from discsim.effects import Effect, effect
 from discsim.recording import Recording, Samples
 from validation.diagnosis import diagnose
-from validation.diagnosis.consistency.spin_agreement import Agreement, agreement_of, written_ratios
+from validation.diagnosis.consistency.spin_agreement import Agreement, agreement_of, compared, written_ratios
 from validation.diagnosis.report.consistency_tables import tables_of
 from validation.importing import find_map, import_recording, read_map
 
 #: a gyroscope that shows the spin, which an MPU-9250 does not
 BOARD = MODULE.without("gps").fitted("gyroscope", range=100.0)
-SHARED = Path(os.environ.get("DISCSIM_RECORDINGS", Path(__file__).parents[5] / "shared" / "recordings"))
-REAL = SHARED / "real" / "flatball-ins-ultimate-disc"
+FLATBALL = REAL / "flatball-ins-ultimate-disc"
 FLIGHTS = {"001-rb": (1590, 1830), "003-rf": (860, 1125), "004-rf": (680, 908), "005-rh": (735, 988)}
 
 
@@ -44,7 +42,7 @@ def test_sensors_that_agree_are_not_said_to_contradict():
     assert found.sentences == ()
     # the tolerances are those of the comparisons: 1 % for a field, whose phase precession bends
     assert all(abs(item.ratio - 1.0) < 0.01 for item in found.comparisons)
-    assert written_ratios(spins()) == [1.0, 1.0]
+    assert written_ratios(compared(spins(), ["a", "b"])) == [1.0, 1.0]
 
 
 @pytest.mark.parametrize("ratio", [0.82, 1.15])
@@ -57,12 +55,12 @@ def test_a_wrong_time_leaves_the_pull_to_the_axis_alone_and_bends_what_turns(rat
     # the magnetometer's own clock would do the same where no wobble can be heard
     assert {cause.id for cause in found.causes[:2]} == {"clock.rate", "mag.clock_rate"}
     assert found.causes[0].value == pytest.approx(ratio, rel=0.01)
-    for proof in found.causes[0].proofs:
-        assert proof.others == pytest.approx(ratio, rel=0.01)
-        assert proof.after < 0.01 * proof.before
-        assert proof.field_after is not None
-        assert proof.field_before is not None
-        assert proof.field_after < 0.2 * proof.field_before
+    for proof in found.causes[0].heldout:
+        assert proof.value_of_others == pytest.approx(ratio, rel=0.01)
+        assert proof.chi2_after < 0.01 * proof.chi2_before
+        assert proof.field_left_uT_after is not None
+        assert proof.field_left_uT_before is not None
+        assert proof.field_left_uT_after < 0.2 * proof.field_left_uT_before
     assert found.rows is None
 
 
@@ -71,7 +69,7 @@ def test_a_gyroscope_of_wrong_sensitivity_contradicts_the_accelerometer_too():
     assert found.causes[0].id == "gyro.scale"
     # 1 % of the field, 3 % of a mount: what sound recordings show
     assert found.causes[0].value == pytest.approx(-0.16, abs=0.02)
-    assert written_ratios(spins(effect("gyro.scale", sz=-0.16))) == [1.0, 1.0]
+    assert written_ratios(compared(spins(effect("gyro.scale", sz=-0.16)), ["a", "b"])) == [1.0, 1.0]
 
 
 def late(recording: Recording, seed: int) -> Recording:
@@ -110,7 +108,7 @@ def test_an_accelerometer_that_still_holds_the_throw_is_found_by_the_others_time
     assert found.settling is not None
     # what turns with the spin blurs it by a few per cent
     assert found.settling.tau_s == pytest.approx(0.14, rel=0.1)
-    assert all(proof.after < 0.5 * proof.before for proof in found.settling.proofs)
+    assert all(proof.left_m_s2_after < 0.5 * proof.left_m_s2_before for proof in found.settling.heldout)
     assert told(spins()).settling is None
 
 
@@ -137,11 +135,11 @@ def test_a_time_base_that_is_a_fifth_wrong_is_found_as_the_clock():
     assert answer.agreement.contradiction
 
 
-@pytest.mark.skipif(not REAL.is_dir(), reason="the recordings are not there")
+@pytest.mark.skipif(not FLATBALL.is_dir(), reason="the recordings are not there")
 def test_the_throws_of_an_ultimate_disc_agree_once_their_rows_are_counted():
     recordings = []
     for name, (first, last) in FLIGHTS.items():
-        raw = next(REAL.glob(f"*{name}.csv"))
+        raw = next(FLATBALL.glob(f"*{name}.csv"))
         recordings.append(import_recording(raw, read_map(find_map("flatball")), slice(first, last)).recording)
     found = agreement_of(recordings, list(FLIGHTS))
     assert found is not None
@@ -159,8 +157,8 @@ def test_the_throws_of_an_ultimate_disc_agree_once_their_rows_are_counted():
         assert proof.wobble is not None
         assert proof.wobble > 0.5
     assert found.settling is not None
-    for settled in found.settling.proofs:
-        assert settled.after < 0.1 * settled.before
+    for settled in found.settling.heldout:
+        assert settled.left_m_s2_after < 0.1 * settled.left_m_s2_before
     # a part with a clock of its own, of which each row shows the mean of two samples: what is left is near its noise
     assert found.own_clock is not None
     assert found.own_clock.period_s == pytest.approx(0.00943, rel=2e-3)

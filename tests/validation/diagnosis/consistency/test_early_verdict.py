@@ -7,10 +7,16 @@ import numpy as np
 import pytest
 from support.made import throws
 
-from validation.diagnosis.consistency.early_verdict import ASTRAY, RECONCILED, contradiction_in
+from discsim.effects import effect
+from discsim.environment import Environment
+from discsim.recording import Samples
+from discsim.rig import default_profile, turn_table
+from discsim.sensors import Instruments, record
+from validation.diagnosis.consistency.early_verdict import contradiction_in
 from validation.diagnosis.consistency.followed import left_of, left_when_shifted, true_noise
 from validation.diagnosis.contradicted import contradicted_outcome
 from validation.diagnosis.relaxed_fit import part_of, relaxed
+from validation.diagnosis.settings import CONSISTENCY
 from validation.identification.observations import readings_of
 
 
@@ -53,7 +59,7 @@ def test_the_outcome_is_unexplained_located_by_sensor_and_finite(mixed, contradi
     assert answer["verdict"] == "unexplained"
     assert answer["effects"] == []
     assert {place["sensor"] for place in answer["located"]} == set(contradiction.blamed)
-    assert answer["fit"]["final"]["chi2_per_sample"] > ASTRAY
+    assert answer["fit"]["final"]["chi2_per_sample"] > CONSISTENCY.astray
     json.dumps(answer, allow_nan=False)
 
 
@@ -85,6 +91,20 @@ def test_a_delay_and_lost_samples_are_reconciled_and_another_throw_is_not(sound,
 
     kept = np.sort(np.random.default_rng(1).choice(own.t.size, int(0.95 * own.t.size), replace=False))
     lost = replace(own, t=own.t[: kept.size], value=own.value[kept], good=own.good[kept], clipped=own.clipped[kept])
-    assert left(replace(own, t=own.t + 0.05)) < RECONCILED
-    assert left(lost) < RECONCILED
-    assert left(other) > RECONCILED
+    assert left(replace(own, t=own.t + 0.05)) < CONSISTENCY.reconciled
+    assert left(lost) < CONSISTENCY.reconciled
+    assert left(other) > CONSISTENCY.reconciled
+
+
+@pytest.mark.parametrize(("order", "amplitude"), [(1.0, 0.05), (3.0, 0.6), (6.0, 1.2)])
+def test_a_table_whose_speed_ripples_is_no_contradiction(order, amplitude):
+    """Of a strong one the accelerometer tells, too: it and the reference each contradict a table without a ripple."""
+    profile = default_profile((1000, 3000, 5000), hold=3.0)
+    ripples = effect("rig.speed_ripple", order=order, amplitude_rad_s=amplitude)
+    motion = turn_table(profile, Environment(), (ripples,), yaw=0.3)
+    parts = Instruments.from_parts("mpu9250", "ac1120s")
+    run = record(motion, parts, np.random.default_rng(3), plant="rate_table", name="run", command=profile)
+    assert contradiction_in([run], ()) is None
+    # the reference of a table that turns at another rate is no ripple
+    other = Samples(run.need("rate_reference").t, 0.8 * run.need("rate_reference").value)
+    assert contradiction_in([replace(run, samples={**run.samples, "rate_reference": other})], ()) is not None

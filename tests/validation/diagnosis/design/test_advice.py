@@ -12,16 +12,19 @@ from support.made import FIELD, RIG, coasting, coasts, tables, throws
 from discsim.effects import effect
 from discsim.errors import InputError
 from discsim.rig import spin_down
-from validation.diagnosis.assemble import assemble
+from validation.diagnosis.assemble import outcome_of
 from validation.diagnosis.design.next_recording import ENOUGH, advise, confusions, expected_evidence, in_words
 from validation.diagnosis.design.plans import plans_about, read_plans
 from validation.diagnosis.relaxed_fit import relaxed
-from validation.diagnosis.result import Advice, Separation
+from validation.diagnosis.result import Advice, Diagnosis, Separation
 from validation.diagnosis.selection.candidates import Trial, trials_for
 from validation.diagnosis.selection.constrained_fit import tied_fit
 from validation.diagnosis.selection.found import Rival, Search, values_of_fit
 from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.diagnosis.selection.stepwise import search
+from validation.diagnosis.setup import SetupFindings
+from validation.diagnosis.stages import Prepared, Question, Tried, silent
+from validation.diagnosis.verdict import judged
 from validation.identification.plants import PLANTS
 from validation.identification.plants.plan import Plan
 from validation.identification.plants.rig import LEAN
@@ -33,6 +36,13 @@ STRETCHED = effect("accel.scale", sx=0.02, sy=0.02, sz=0.0)
 def stretched() -> Search:
     """Two run-downs with an accelerometer that reads 2 % too much: as if it sat 2 % further out."""
     return search(coasts((), [STRETCHED]))
+
+
+def answer_of(found: Search) -> Diagnosis:
+    """What is answered where a search has found this in two recordings that were set up well."""
+    ready = Prepared(SetupFindings((), found.recordings), found.recordings, found.recordings, (), ((), ()))
+    question = Question(found.recordings, ("01", "02"), ("set",))
+    return outcome_of(judged(Tried(ready, None, found), silent), question).diagnosis
 
 
 def the_rival(found: Search) -> Rival:
@@ -99,7 +109,7 @@ def test_longer_recordings_of_a_kind_are_expected_to_say_more():
 
 def test_the_answer_says_what_to_record_next():
     found = stretched()
-    diagnosis = assemble(found, ["set"], ["01", "02"], 0, None, advise(found, ["01", "02"])).diagnosis
+    diagnosis = answer_of(found)
     (told,) = diagnosis.to_json()["effects"][0]["confused_with"]
     assert set(told["separated_by"]) == {"recording", "expected_chi2"}
     assert (
@@ -115,7 +125,7 @@ def test_the_answer_says_what_to_record_next():
 def test_where_nothing_is_confused_the_answer_says_so():
     found = search(coasts([effect("rig.coulomb_friction", torque_N_m=1e-4)]))
     assert advise(found, ["01", "02"]) == {}
-    (sentence,) = assemble(found, ["set"], ["01", "02"], 0).diagnosis.next_recordings
+    (sentence,) = answer_of(found).next_recordings
     assert sentence.startswith("Nothing more is needed")
 
 

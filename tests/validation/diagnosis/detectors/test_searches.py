@@ -230,6 +230,21 @@ def test_a_steady_table_has_no_ripple() -> None:
     assert ripple(tied.fit, tied.fit.noise) == []
 
 
+def test_a_table_that_stands_still_has_no_ripple() -> None:
+    """A ripple repeats over the angle turned: none is turned, and there is nothing to ask."""
+    still = Samples(np.array([0.0, 2.0]), np.zeros(2))
+    made = record(
+        turn_table(still, FIELD),
+        Instruments.from_parts("mpu9250"),
+        np.random.default_rng(4),
+        plant="rate_table",
+        name="still",
+        command=still,
+    )
+    fit = relaxed([made])
+    assert ripple(fit, shown_noise(fit)) == []
+
+
 def test_a_table_with_ripple_turns_as_in_the_engine() -> None:
     motion = turn_table(PROFILE, FIELD, [RIPPLE])
     chain = first_chain(table(RIPPLE))

@@ -64,19 +64,25 @@ def test_a_start_holds_what_shapes_an_effect():
         assert kept <= {key for key, _ in pair.start}
 
 
-def test_where_no_effect_alone_is_worth_its_price_two_are_found_at_once(monkeypatch):
-    monkeypatch.setattr(searching, "_next", lambda *_: None)
+@pytest.fixture
+def none_alone(monkeypatch):
+    """Leave the search no effect alone that it could find worth its price."""
+    monkeypatch.setattr(searching, "SELECTION", replace(searching.SELECTION, refitted=0, refitted_at_most=0))
+
+
+@pytest.mark.usefixtures("none_alone")
+def test_where_no_effect_alone_is_worth_its_price_two_are_found_at_once():
     assert named([YAW], [CLOCK]) == [YAW.id, CLOCK.id]
 
 
-def test_of_two_at_once_the_superfluous_one_goes(monkeypatch):
-    monkeypatch.setattr(searching, "_next", lambda *_: None)
+@pytest.mark.usefixtures("none_alone")
+def test_of_two_at_once_the_superfluous_one_goes():
     assert named([YAW], []) == [YAW.id]
 
 
+@pytest.mark.usefixtures("none_alone")
 def test_two_at_once_are_not_asked_for_near_the_data(monkeypatch):
-    monkeypatch.setattr(searching, "_next", lambda *_: None)
-    monkeypatch.setattr(searching, "_together", lambda *_: pytest.fail("asked"))
+    monkeypatch.setattr(searching, "pairs", lambda *_: pytest.fail("asked"))
     assert named([], []) == []
 
 
@@ -98,9 +104,8 @@ def as_shear() -> Tied:
 
 def test_an_effect_gives_way_to_one_that_explains_as_much_with_fewer_parameters():
     sheared = as_shear()
-    found = replace(windy(), final=sheared)
-    found.board = board_of(sheared.fit, found.trials, sheared.fit.noise, FLIGHT.sizes.continuous)
-    found.rivals = rivals_of(found)
+    found = replace(windy(), final=sheared).about(sheared.fit)
+    found = replace(found, rivals=rivals_of(found))
     assert next(rival.trial.id for rival in found.rivals["air.wind_shear"]) == "air.wind"
     better = exchanged(found)
     assert better is not None
@@ -146,5 +151,5 @@ def test_offers_from_two_fits_come_in_turn_and_lost_samples_first():
     big, small = of("air.wind"), of("aero.stall")
     there = [(Proposal(trial, gain, {}), windy().loose, 0.0) for trial, gain in ((big, 1e6), (small, 9e5), (big, 1.0))]
     here = [(Proposal(small, 5e3, {}), windy().loose, 0.0), (Proposal(big, 1e4, {}), windy().loose, 30.0)]
-    gains = [offer[0].gain for offer in searching._in_turn(there, here)]
+    gains = [offer[0].gain for offer in searching.in_turn(there, here)]
     assert gains == [1e6, 1e4, 9e5, 5e3]

@@ -28,6 +28,8 @@ from validation.identification.plants.spin_down import SPIN_DOWN
 #: what algebra ranks, best first; none but the seventh comes near the data
 RANKED = [Trial(id, ()) for id, row in CATALOGUE.items() if id.startswith(("mag.", "gyro.")) and not row.event]
 RIGHT = RANKED[6]
+#: the normal equations about the relaxed fit, about another, and which: nothing asks them here
+UNASKED = (None, None, None)
 #: readings of the run-downs
 COUNT = 1812
 
@@ -66,8 +68,10 @@ def step(
     monkeypatch.setattr(searching, "proposals", lambda *_: [])
     ranked = [Proposal(trial, 1e6 - rank, {}) for rank, trial in enumerate(RANKED)]
     monkeypatch.setattr(searching, "one_per_effect", lambda _: ranked)
-    found = finding.Search(tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base, hints=tuple(hints))
-    best = searching._next(found, None, base, 0)  # type: ignore[arg-type]
+    found = finding.Search(
+        tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base, *UNASKED, hints=tuple(hints)
+    )
+    _, best = searching.next_effect(found, base, 0)
     assert best is not None
     return best.hypothesis.trials[-1].id, refitted, bars
 
@@ -114,8 +118,8 @@ def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present
     monkeypatch.setattr(searching, "searched", lambda *_: [])
     monkeypatch.setattr(searching, "proposals", lambda *_: [])
     monkeypatch.setattr(searching, "one_per_effect", lambda _: [Proposal(tilt, 1e6, {size: 0.3})])
-    found = finding.Search(tuple(recordings), (), fit, fit.noise, (tilt,), base, base)
-    best = searching._next(found, None, base, 0)  # type: ignore[arg-type]
+    found = finding.Search(tuple(recordings), (), fit, fit.noise, (tilt,), base, base, *UNASKED)
+    _, best = searching.next_effect(found, base, 0)
     assert best is not None
     assert best.hypothesis.trials == (tilt,)
 
@@ -146,10 +150,10 @@ def exchanged(monkeypatch: pytest.MonkeyPatch, without_scale: float) -> set[str]
     monkeypatch.setattr(exchange, "possible", lambda _: True)
     final = Tied(Hypothesis((offset, scale, board)), fit, 40.0)
     base = Tied(Hypothesis(), fit, 1e6)
-    found = finding.Search(tuple(recordings), (), fit, fit.noise, (), base, final)
+    found = finding.Search(tuple(recordings), (), fit, fit.noise, (), base, final, *UNASKED)
     with_place = Tied(Hypothesis((offset, scale, place)), fit, 42.0)
-    found.rivals = {board.name: [finding.Rival(place, 2.0, with_place)]}
-    better = exchange.exchanged(found)
+    rivals = {board.name: [finding.Rival(place, 2.0, with_place)]}
+    better = exchange.exchanged(replace(found, rivals=rivals))
     return None if better is None else {trial.id for trial in better.hypothesis.trials}
 
 
@@ -176,7 +180,7 @@ def scope(monkeypatch: pytest.MonkeyPatch, everywhere: float) -> frozenset[int] 
     monkeypatch.setattr(exchange, "possible", lambda _: True)
     monkeypatch.setattr(exchange, "lost", lambda *_: False)
     base, final = Tied(Hypothesis(), fit, 1e6), Tied(Hypothesis((stall,)), fit, 40.0)
-    found = finding.Search(tuple(recordings), (), fit, fit.noise, (), base, final)
+    found = finding.Search(tuple(recordings), (), fit, fit.noise, (), base, final, *UNASKED)
     (trial,) = exchange.widened(found, final).hypothesis.trials
     return trial.recordings
 
@@ -194,7 +198,7 @@ def test_a_centre_of_mass_off_the_disc_is_not_refitted_and_a_sensor_s_unknown_pl
     """Where a path alone is recorded algebra asks for metres of the one; along the axis nothing shows the other."""
     recordings = throws(seconds=0.3)
     base = Tied(Hypothesis(), Fit((), (), np.empty(0), FLIGHT.sizes.continuous, {}), 0.0)
-    found = finding.Search(tuple(recordings), (), base.fit, {}, (), base, base)
+    found = finding.Search(tuple(recordings), (), base.fit, {}, (), base, base, *UNASKED)
     radius = 0.5 * recordings[0].disc.diameter
 
     def tried(id: str, name: str, value: float) -> bool:

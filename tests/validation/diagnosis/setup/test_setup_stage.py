@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from support.places import ROOT
 
 from discsim.disc import Release
 from discsim.effects import Effect, effect
@@ -19,7 +19,7 @@ from validation.challenge.cases.draw import draw_case
 from validation.commands.import_ import command as import_
 from validation.diagnosis.setup import SetupFault, find_setup_faults
 
-MAP = Path(__file__).parents[4] / "models" / "imports" / "csv.toml"
+MAP = ROOT / "models" / "imports" / "csv.toml"
 
 
 def small(plant: str) -> Case:

@@ -8,23 +8,19 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from validation.reporting.options import SeedOption
 from validation.studies.golf_throws.page import write_page
-from validation.studies.real_recordings.sources import find_recordings
+from validation.studies.real_recordings.sources import RecordingsOption, find_recordings
 
-__all__ = ["app", "command"]
+__all__ = ["command"]
 
 
 def command(
-    recordings: Annotated[
-        Path | None,
-        typer.Option(
-            help="Folder of recordings with 'real' in it. Default: DISCSIM_RECORDINGS, or beside the checkout."
-        ),
-    ] = None,
+    recordings: RecordingsOption = None,
     page: Annotated[Path, typer.Option(help="The page; its figure goes into a folder of its name.")] = Path(
         "docs/golf-throws.md"
     ),
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the drawn flights.")] = 0,
+    seed: SeedOption = 0,
 ) -> None:
     """Fly three measured throws, compare them with their tracks, and write a page with a table and a figure.
 
@@ -36,10 +32,3 @@ def command(
             f"{throw.name}: misses by {np.linalg.norm(throw.miss):.1f} m, band (1 sd) {throw.band[0]:.1f} m north and "
             f"{throw.band[1]:.1f} m east, {throw.excess:.1f} sd"
         )
-
-
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
-app.command()(command)
-
-if __name__ == "__main__":
-    app()

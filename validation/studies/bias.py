@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import typer
 
 from discsim.shipped import load_disc
 from validation.scenarios.throws import FULL_SET
 from validation.yaw_damping.bias import paper_biases
 
-__all__ = ["app", "command"]
+__all__ = ["command"]
 
 
 def command(disc: str = "driver") -> None:
@@ -22,10 +21,3 @@ def command(disc: str = "driver") -> None:
         table = f"{100 * low:+.0f} to {100 * high:+.0f} %" if np.isfinite(low) else "outside"
         parts = " | ".join(f"{100 * value:+.1f} %" for value in (bias.rolling, bias.slope, bias.both))
         print(f"| {bias.name} | {parts} | {table} |")
-
-
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
-app.command()(command)
-
-if __name__ == "__main__":
-    app()

@@ -18,7 +18,7 @@ from validation.reporting.run import Run, start_run
 from validation.reporting.scores import at_most
 from validation.yaw_damping.figures import draw_sources
 
-__all__ = ["app", "command"]
+__all__ = ["command"]
 
 
 def command(out: OutOption = Path("feedback"), seed: SeedOption = 0) -> None:
@@ -96,10 +96,3 @@ def _print(name: str, predicted: tuple[Predicted, ...]) -> None:
         CNr = f"{item.damping.CNr:.6f}" if item.damping.table is None else "table"
         table.add_row(item.damping.source, item.damping.way, CNr, f"{np.degrees(item.rate):.1f}", *cells)
     Console(width=120).print(table)
-
-
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
-app.command()(command)
-
-if __name__ == "__main__":
-    app()

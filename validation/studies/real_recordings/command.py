@@ -10,18 +10,13 @@ import typer
 
 from validation.studies.real_recordings.page import write_page
 from validation.studies.real_recordings.road import LOGS, walk
-from validation.studies.real_recordings.sources import find_recordings
+from validation.studies.real_recordings.sources import RecordingsOption, find_recordings
 
-__all__ = ["app", "command"]
+__all__ = ["command"]
 
 
 def command(
-    recordings: Annotated[
-        Path | None,
-        typer.Option(
-            help="Folder of recordings with 'real' in it. Default: DISCSIM_RECORDINGS, or beside the checkout."
-        ),
-    ] = None,
+    recordings: RecordingsOption = None,
     out: Annotated[Path, typer.Option(help="Folder of the figures; the page is beside it, with .md.")] = Path(
         "docs/real-recordings"
     ),
@@ -48,10 +43,3 @@ def command(
 
 def _say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
-
-
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
-app.command()(command)
-
-if __name__ == "__main__":
-    app()

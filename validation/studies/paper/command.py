@@ -9,11 +9,12 @@ from typing import Annotated, Any
 import typer
 
 from discsim.files import write_text
+from validation.reporting.options import SeedOption
 from validation.reporting.run import json_text
 from validation.studies.paper.numbers import compute
 from validation.studies.paper.page import page_text
 
-__all__ = ["NUMBERS", "SEED", "app", "command", "read_numbers"]
+__all__ = ["NUMBERS", "SEED", "command", "read_numbers"]
 
 #: seed of the page in the documentation
 SEED = 0
@@ -25,7 +26,7 @@ def command(
     page: Annotated[Path, typer.Option(help="The page; figures and numbers go into a folder of its name.")] = Path(
         "docs/paper.md"
     ),
-    seed: Annotated[int, typer.Option(min=0, help="Seed of sensors and their noise.")] = SEED,
+    seed: SeedOption = SEED,
     text: Annotated[bool, typer.Option("--text", help="Write the page anew from numbers that are there.")] = False,
 ) -> None:
     """Compute every number and figure that can be set beside the paper's, and write the page.
@@ -44,10 +45,3 @@ def read_numbers(folder: Path) -> dict[str, Any]:
     """Return the numbers that a page was made from."""
     found: dict[str, Any] = json.loads((folder / NUMBERS).read_text(encoding="utf-8"))
     return found
-
-
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
-app.command()(command)
-
-if __name__ == "__main__":
-    app()

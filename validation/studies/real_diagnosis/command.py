@@ -8,19 +8,15 @@ from typing import Annotated
 
 import typer
 
+from validation.reporting.options import SeedOption
 from validation.studies.real_diagnosis.page import write_page
-from validation.studies.real_recordings.sources import find_recordings
+from validation.studies.real_recordings.sources import RecordingsOption, find_recordings
 
-__all__ = ["app", "command"]
+__all__ = ["command"]
 
 
 def command(
-    recordings: Annotated[
-        Path | None,
-        typer.Option(
-            help="Folder of recordings with 'real' in it. Default: DISCSIM_RECORDINGS, or beside the checkout."
-        ),
-    ] = None,
+    recordings: RecordingsOption = None,
     page: Annotated[Path, typer.Option(help="The page; its figures go into a folder of its name.")] = Path(
         "docs/real-diagnosis.md"
     ),
@@ -28,7 +24,7 @@ def command(
         Path,
         typer.Option(help="Folder of the diagnoses. One of the same recordings, seed and code is taken as it is."),
     ] = Path("real-diagnosis"),
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the diagnoses.")] = 0,
+    seed: SeedOption = 0,
 ) -> None:
     """Diagnose measured recordings and write a page with tables and figures.
 
@@ -37,10 +33,3 @@ def command(
     found = find_recordings(recordings)
     written = write_page(found, page, work, seed, lambda text: print(text, file=sys.stderr, flush=True))
     typer.echo(f"{written}")
-
-
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
-app.command()(command)
-
-if __name__ == "__main__":
-    app()

@@ -1,0 +1,81 @@
+"""What passes from stage to stage of a diagnosis: each is made by the stage before, and none is changed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from discsim.recording import Recording
+from validation.diagnosis.consistency.early_verdict import Contradiction
+from validation.diagnosis.consistency.spin_agreement import Comparison
+from validation.diagnosis.result import Verdict
+from validation.diagnosis.selection.found import Search
+from validation.diagnosis.setup import SetupFindings
+from validation.diagnosis.unknown_law.find import FoundLaw
+from validation.identification.competing_effects import CATALOGUED, Competing
+from validation.identification.gauss_newton import Fit
+from validation.identification.plants.plan import Plan
+
+__all__ = ["Judged", "Prepared", "Progress", "Question", "Tried", "silent"]
+
+#: called with a stage, the steps done, and the steps in all
+Progress: TypeAlias = Callable[[str, int, int], None]
+
+
+def silent(stage: str, done: int, total: int) -> None:
+    """Report no progress."""
+    del stage, done, total
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What is asked: recordings of one plant, what each and each data set is called, the effects that compete.
+
+    ``plans`` are the recordings that could be made next, None for such as are made easily.
+    """
+
+    recordings: tuple[Recording, ...]
+    names: tuple[str, ...]
+    datasets: tuple[str, ...]
+    effects: Competing = CATALOGUED
+    plans: Sequence[Plan] | None = None
+    seed: int = 0
+    progress: Progress = silent
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Recordings under a supposed setup: as they were ``meant``, and as they are ``fitted``; what must be known.
+
+    ``agreeing`` are the comparisons of each recording's sensors with one another.
+    """
+
+    setup: SetupFindings
+    meant: tuple[Recording, ...]
+    fitted: tuple[Recording, ...]
+    notes: tuple[str, ...]
+    agreeing: tuple[tuple[Comparison, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A setup put to the proof: either sensors contradict one another under it, or effects were searched."""
+
+    prepared: Prepared
+    contradiction: Contradiction | None = None
+    found: Search | None = None
+
+    @property
+    def fit(self) -> Fit | None:
+        """The fit of the effects that were found; None where sensors contradict one another."""
+        return None if self.found is None else self.found.final.fit
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What was tried, with its verdict; a ``law`` stands for all that was left out."""
+
+    tried: Tried
+    verdict: Verdict
+    law: FoundLaw | None = None

@@ -1,0 +1,58 @@
+"""``discsim study blind-test``: write finished challenges into the page on the blind test."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from discsim.errors import InputError
+from discsim.files import read_text, write_text
+from validation.challenge.masks import masked_results
+from validation.challenge.report.document import PREFIX, masks_text, pooled, result_text, with_part
+from validation.challenge.report.page import draw_all
+from validation.challenge.scores.result import Result, read_result
+from validation.challenge.scores.scoring import NOTHING
+
+__all__ = ["command"]
+
+
+def command(
+    out: Annotated[Path | None, typer.Argument(help="Folder of a finished challenge without a mask.")] = None,
+    masks: Annotated[list[Path] | None, typer.Option(help="Challenges with a mask; may repeat.")] = None,
+    blank: Annotated[list[Path] | None, typer.Option(help="Challenges that conceal nothing; may repeat.")] = None,
+    page: Annotated[Path, typer.Option(help="The page; its figures go into images beside it.")] = Path(
+        "docs/challenge.md"
+    ),
+) -> None:
+    """Put result, confusions, failures and figures of a challenge into its page, and a row for each mask.
+
+    Only what stands between the page's marks is replaced.
+
+    Example: discsim study blind-test challenge --masks challenge-masks
+    """
+    if out is None and not masks:
+        raise InputError("nothing to write; expected the folder of a challenge, or --masks")
+    text = read_text(page)
+    plain = None if out is None else read_result(out)
+    if plain is not None:
+        if plain.mask is not None:
+            raise InputError(f"{out}: was made under the mask {plain.mask}; expected it under --masks")
+        without = [_blank(folder, plain) for folder in blank or ()]
+        near = masked_results(masks or ()).get("near_limit")
+        drawn = draw_all(plain.scored, page.parent / "images", PREFIX, pooled(plain, near))
+        text = with_part(text, "result", result_text(plain, list(drawn), near, without))
+    if masks:
+        text = with_part(text, "masks", masks_text(masks, plain))
+    write_text(page, text)
+
+
+def _blank(folder: Path, plain: Result) -> Result:
+    """Read a challenge that may count for the false alarms of another one; raises `InputError` where it may not."""
+    result = read_result(folder)
+    if result.mask is not None or any(item.answer.kind not in NOTHING for item in result.scored):
+        raise InputError(f"{folder}: conceals something; expected a challenge of --kind {', '.join(NOTHING)}")
+    if {item.answer.seed for item in result.scored} & {item.answer.seed for item in plain.scored}:
+        raise InputError(f"{folder}: has seeds of the challenge itself; expected others")
+    return result
