@@ -18,7 +18,7 @@ from typing import Any, TypeVar, cast
 import numba
 import numba.core.config
 
-__all__ = ["compiled", "compiled_address", "compiled_nogil", "compiled_sums", "inlined"]
+__all__ = ["compiled", "compiled_address", "compiled_before", "compiled_nogil", "compiled_sums", "inlined"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -34,6 +34,12 @@ def _cache_folder() -> Path:
                 digest.update(text)
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(base) / "discsim" / digest.hexdigest()[:16]
+
+
+def compiled_before() -> bool:
+    """Return whether anything has been compiled on this installation: if not, the first call takes its time."""
+    folder = _cache_folder()
+    return folder.is_dir() and any(folder.iterdir())
 
 
 def compiled(function: F) -> F:

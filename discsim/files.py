@@ -6,14 +6,56 @@ import codecs
 import hashlib
 import os
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import Protocol
 
 from discsim.errors import InputError
 
-__all__ = ["digest", "model_file", "model_names", "read_text", "write_bytes", "write_pieces", "write_text"]
+__all__ = [
+    "Guard",
+    "digest",
+    "guarding",
+    "model_file",
+    "model_names",
+    "read_text",
+    "replacing",
+    "write_bytes",
+    "write_pieces",
+    "write_text",
+]
+
+
+class Guard(Protocol):
+    """Is asked before a file is written or taken away; raises `InputError` where it must stay."""
+
+    def __call__(self, path: Path) -> None:
+        """Refuse, or take note of a file that is written."""
+        ...
+
+
+_GUARD: ContextVar[Guard | None] = ContextVar("guard", default=None)
+
+
+@contextmanager
+def guarding(guard: Guard) -> Iterator[None]:
+    """Ask ``guard`` before each file that is written within the block."""
+    token = _GUARD.set(guard)
+    try:
+        yield
+    finally:
+        _GUARD.reset(token)
+
+
+def replacing(path: Path) -> None:
+    """Say that a file is about to be written or taken away; raises `InputError` where it must stay."""
+    guard = _GUARD.get()
+    if guard is not None:
+        guard(path)
 
 
 def read_text(path: Path) -> str:
@@ -43,6 +85,7 @@ def write_pieces(path: Path, pieces: Iterable[str]) -> None:
 
 
 def _write(path: Path, pieces: Iterable[bytes]) -> None:
+    replacing(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:

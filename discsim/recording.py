@@ -26,7 +26,7 @@ from discsim.clipping import at_range, clipped
 from discsim.disc import Disc, Release, Rig
 from discsim.environment import Environment
 from discsim.errors import InputError
-from discsim.files import read_text, write_text
+from discsim.files import read_text, replacing, write_text
 from discsim.limits import MOST_ROWS, reading_fault, written_time_fault
 from discsim.recorded import Recorded
 from discsim.toml_table import TomlTable, read_toml
@@ -446,6 +446,8 @@ def write_recording(recording: Recording, folder: Path | str) -> None:
             umask = os.umask(0)
             os.umask(umask)
             stage.chmod(0o777 & ~umask)
+            for name in texts:
+                replacing(folder / name)
             stage.rename(folder)
     finally:
         shutil.rmtree(stage, ignore_errors=True)
@@ -463,8 +465,12 @@ def _refuse_strangers(folder: Path) -> None:
 
 
 def _replace_files(stage: Path, folder: Path) -> None:
+    names = [*(f"{sensor}.csv" for sensor in SENSORS), "command.csv", "recording.toml"]
+    for name in names:
+        if (stage / name).exists() or (folder / name).exists():
+            replacing(folder / name)
     (folder / "recording.toml").unlink(missing_ok=True)
-    for name in [*(f"{sensor}.csv" for sensor in SENSORS), "command.csv", "recording.toml"]:
+    for name in names:
         if (stage / name).exists():
             (stage / name).replace(folder / name)
         else:

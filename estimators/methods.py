@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import NamedTuple
@@ -206,15 +206,21 @@ def _clocked(found: YawRate, recording: Recording) -> YawRate:
 
 
 @one_thread
-def all_methods(recording: Recording, options: Options | None = None) -> tuple[list[YawRate], dict[str, str]]:
+def all_methods(
+    recording: Recording,
+    options: Options | None = None,
+    *,
+    each: Callable[[Iterable[str]], Iterable[str]] = iter,
+) -> tuple[list[YawRate], dict[str, str]]:
     """Return what every method gives, and the methods left out, each with the reason in a sentence.
 
+    ``each`` passes the names of the methods through as they are tried, to show how far it is.
     Raises `InputError` where no method can be used.
     """
     options, sound = options or Options(), usable(recording)
     rates: list[YawRate] = []
     left_out: dict[str, str] = {}
-    for name in METHODS:
+    for name in each(METHODS):
         if absent := missing_sensors(recording, name):
             left_out[name] = f"no {', '.join(absent)} in the recording"
             continue

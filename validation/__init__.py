@@ -18,12 +18,26 @@ if TYPE_CHECKING:
     from validation.challenge.challenged import blind_test as challenge
     from validation.checking.checked import check
     from validation.diagnosis.diagnosed import diagnose_recordings as diagnose
+    from validation.estimating.scored import score_rates
     from validation.estimating.spin_estimates import estimate_spin as estimate
     from validation.importing.imported_log import import_log
+    from validation.planning.planned import plan
+    from validation.scattering.scattered import scatter
     from validation.sweeps.swept import sweep
     from validation.yaw_damping.fitted import fit_recordings as fit_yaw_damping
 
-__all__ = ["challenge", "check", "diagnose", "estimate", "fit_yaw_damping", "import_log", "sweep"]
+__all__ = [
+    "challenge",
+    "check",
+    "diagnose",
+    "estimate",
+    "fit_yaw_damping",
+    "import_log",
+    "plan",
+    "scatter",
+    "score_rates",
+    "sweep",
+]
 
 #: name -> module and its name there. `challenge` is a package, too, so that package is called (see there).
 _HOMES = {
@@ -32,6 +46,9 @@ _HOMES = {
     "estimate": ("validation.estimating.spin_estimates", "estimate_spin"),
     "fit_yaw_damping": ("validation.yaw_damping.fitted", "fit_recordings"),
     "import_log": ("validation.importing.imported_log", "import_log"),
+    "plan": ("validation.planning.planned", "plan"),
+    "scatter": ("validation.scattering.scattered", "scatter"),
+    "score_rates": ("validation.estimating.scored", "score_rates"),
     "sweep": ("validation.sweeps.swept", "sweep"),
 }
 

@@ -19,9 +19,9 @@ __all__ = ["app", "main"]
 
 app = typer.Typer(
     name="discsim",
-    help="Physics validation testbed for a flying disc. --debug shows the traceback of an error.",
+    help="Physics validation testbed for a flying disc. --debug shows the traceback of an error; --force overwrites "
+    "files in --out that discsim did not write.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -43,19 +43,31 @@ def _common(
     """Physics validation testbed for a flying disc."""
 
 
+def _completed() -> list[str]:
+    """Return the words behind the command that a shell asks to complete; none where it asks nothing."""
+    if "_DISCSIM_COMPLETE" not in os.environ:
+        return []
+    return os.environ.get("_TYPER_COMPLETE_ARGS", os.environ.get("COMP_WORDS", "")).split()[1:]
+
+
 def main() -> None:
     """Run the command line."""
     arguments = sys.argv[1:]
     debug = "--debug" in arguments
-    sys.argv[1:] = [argument for argument in arguments if argument != "--debug"]
+    if "--force" in arguments:
+        from validation.reporting.written import OVERWRITE
+
+        OVERWRITE.set(True)
+    sys.argv[1:] = [argument for argument in arguments if argument not in ("--debug", "--force")]
     os.environ.setdefault("MPLBACKEND", "Agg")
     # this process and its children are the command's own; from Python `discsim.threads` limits them while it is needed
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         # the options that stand before a command take no value, so the first other word is its name
         app.registered_commands.clear()
-        register(app, next((argument for argument in sys.argv[1:] if not argument.startswith("-")), None))
-        status = app(standalone_mode=False)
+        words = _completed() or sys.argv[1:]
+        register(app, next((argument for argument in words if not argument.startswith("-")), None))
+        status = app(standalone_mode=False, prog_name="discsim")
     except (InputError, typer.TyperException) as error:
         if debug:
             traceback.print_exc()

@@ -18,8 +18,14 @@ COMMANDS: dict[str, tuple[str, str]] = {
     ),
     "challenge": ("challenge", "Put discsim diagnose to a blind test and score it."),
     "estimate": ("estimate", "Estimate the spin rate of a recording and its standard deviation over time."),
+    "score": ("score", "Score rates that something computed, a firmware say, against the truth."),
     "fit": ("fit", "Fit C_Nr to the throws of a data set."),
     "fly": ("fly", "Fly a disc and write what its instruments record."),
+    "scatter": ("scatter", "Tell where throws land when release, coefficients and wind are uncertain."),
+    "plan": (
+        "plan",
+        "Tell what recordings could show, before going out: effects, coefficients, and what would tell more.",
+    ),
     "rate-table": ("rate_table", "Turn a rate table through a profile and score every method against the truth."),
     "sweep": (
         "sweep",

@@ -10,13 +10,16 @@ import typer
 from validation.reporting.options import DateOption, OutOption, PlaceOption
 
 if TYPE_CHECKING:
+    from discsim.recording import Recording
     from validation.estimating.spin_estimates import SpinEstimates
 
 __all__ = ["command"]
 
 
 def command(
-    recording: Annotated[Path, typer.Argument(help="A recording folder (with recording.toml).", show_default=False)],
+    recording: Annotated[
+        Path, typer.Argument(help="A recording folder, or a data set: each of it into a folder.", show_default=False)
+    ],
     method: Annotated[
         str, typer.Option(help="A method's name, 'best' that the sensors allow, or 'all' whose sensors are present.")
     ] = "best",
@@ -49,24 +52,37 @@ def command(
 
     import numpy as np
 
-    from discsim.recording import read_recording
+    from discsim.recording import read_dataset
     from estimators.accelerometer import AccelerometerErrors
     from estimators.fft import FftSettings
     from estimators.methods import Options
     from validation.estimating.spin_estimates import estimate_spin
     from validation.reporting.options import at_place
-    from validation.reporting.run import start_run
+    from validation.reporting.run import Run, start_run
 
     zeros = max(0, 2**14 - window) if pad is None else pad
     options = Options(
         FftSettings(window, zeros, float(np.radians(threshold)), step, stamp, remove_mean),
         AccelerometerErrors(mount=mount_error / 1000),
     )
-    data = read_recording(recording)
-    found = estimate_spin(replace(data, environment=at_place(data.environment, place, date)), method, options)
+    given = read_dataset(recording)
+    placed = [replace(one, environment=at_place(one.environment, place, date)) for one in given]
+    shown = Run(out, [], None)  # what fails leaves no folder behind
+    found = []
+    for number, one in enumerate(placed, start=1):
+        if len(placed) > 1:
+            shown.step(f"recording {number} of {len(placed)}: {_called(one)}")
+        found.append(estimate_spin(one, method, options, progress=shown.progress))
     with start_run(out, inputs=[recording]):
-        found.report(out)
-    _print(found)
+        for one, rates in zip(placed, found, strict=True):
+            rates.report(out / _called(one) if len(placed) > 1 else out)
+            if len(placed) > 1:
+                typer.echo(f"{_called(one)}:")
+            _print(rates)
+
+
+def _called(recording: Recording) -> str:
+    return recording.name if recording.path is None else recording.path.name
 
 
 def _print(found: SpinEstimates) -> None:

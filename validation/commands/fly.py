@@ -19,10 +19,12 @@ from validation.reporting.options import (
     WithOption,
     all_effects,
     at_site,
+    at_wind,
     disc_to_fly,
     given_files,
     laws_upon,
     parse_module,
+    throw_as_said,
 )
 
 if TYPE_CHECKING:
@@ -56,6 +58,17 @@ def command(
     throw: Annotated[
         str, typer.Option(help="A shipped throw's name, or a TOML file with the keys of [release].")
     ] = "driver",
+    speed: Annotated[float | None, typer.Option(help="In the place of the throw's: speed, m/s.")] = None,
+    launch: Annotated[float | None, typer.Option(help="... launch angle of the velocity, deg up.")] = None,
+    heading: Annotated[float | None, typer.Option(help="... heading, deg clockwise from north.")] = None,
+    hyzer: Annotated[float | None, typer.Option(help="... hyzer, deg of lean to the side it fades to.")] = None,
+    nose: Annotated[float | None, typer.Option(help="... nose angle, deg of the disc's plane above its path.")] = None,
+    spin: Annotated[float | None, typer.Option(help="... spin, rpm, clockwise from above if positive.")] = None,
+    height: Annotated[float | None, typer.Option(help="... height of the release, m.")] = None,
+    wind: Annotated[
+        str | None,
+        typer.Option(metavar="SPEED,FROM", help="Known wind: m/s, and where it comes from, deg from north."),
+    ] = None,
     parts: Annotated[
         str, typer.Option(help="Sensor parts on board, shipped names or TOML files, separated by commas.")
     ] = "mpu9250,neo_m8n",
@@ -75,7 +88,8 @@ def command(
 
     Writes a recording folder (recording.toml and one CSV file per sensor) and truth.csv into --out.
 
-    Example: discsim fly --disc driver --effect air.wind:w_north_m_s=2 --out flight
+    Example: discsim fly --speed 26 --launch 12 --hyzer 15 --spin 900 --wind 3,270 --out flight
+    or: discsim fly --disc driver --effect air.wind:w_north_m_s=2 --out flight
     or, with what a diagnosis or a fit has written: discsim fly --model model.toml --engine trajectory --out flight
     """
     from discsim.effects.catalogue import by_id
@@ -90,8 +104,10 @@ def command(
     fly = _flown_by(engine, ground)
     mine = load_user_effects(own or [])
     body, surroundings, stated = disc_to_fly(disc, model, mine)
-    environment = at_site(surroundings, site)
-    release = load_throw(throw)
+    environment = at_wind(at_site(surroundings, site), wind)
+    said = {"speed": speed, "launch": launch, "heading": heading, "hyzer": hyzer, "nose": nose, "spin": spin,
+            "height": height}  # fmt: skip
+    release = throw_as_said(load_throw(throw), said)
     instruments = Instruments.from_parts(*parts.split(","))
     effects, notes = all_effects(stated, effect, "flight", list(instruments.sensors), out.resolve().name, mine)
     if module is not None:

@@ -35,6 +35,7 @@ from validation.diagnosis.setup import find_setup_faults
 from validation.reporting.figures import draw_differences, draw_rates, new_figure, save_figure
 from validation.reporting.run import json_text
 from validation.running.given import Given, given_recordings
+from validation.running.progress import Progress, silent
 from validation.scenarios.method_disagreement import Disagreement, disagreements
 
 __all__ = [
@@ -121,7 +122,9 @@ class SpinEstimates(Result):
 
 
 @one_thread
-def estimate_spin(recording: Given, method: str = "best", options: Options | None = None) -> SpinEstimates:
+def estimate_spin(
+    recording: Given, method: str = "best", options: Options | None = None, *, progress: Progress = silent
+) -> SpinEstimates:
     """Estimate the spin rate of one recording by a method, by the best that its sensors allow, or by all.
 
     Setup faults (an axis, a unit, an offset in time) are mended first, and noted; `estimators.estimate` does without.
@@ -133,7 +136,7 @@ def estimate_spin(recording: Given, method: str = "best", options: Options | Non
     setup = find_setup_faults(given)
     data = setup.recordings[0]
     require_seconds(data)
-    rates, left_out = estimate_all(data, method, options or Options())
+    rates, left_out = estimate_all(data, method, options or Options(), progress)
     notes = [f"{fault.sentence}; the estimates are of the readings so corrected" for fault in setup.faults]
     notes += all_notes(data)
     return SpinEstimates(data, method, tuple(rates), left_out, tuple(disagreements(rates)), tuple(notes))
@@ -161,13 +164,15 @@ def draw_estimates(rates: Sequence[YawRate], name: str, path: Path | None = None
     return save_figure(figure, path)
 
 
-def estimate_all(recording: Recording, name: str, options: Options) -> tuple[list[YawRate], dict[str, str]]:
+def estimate_all(
+    recording: Recording, name: str, options: Options, progress: Progress = silent
+) -> tuple[list[YawRate], dict[str, str]]:
     """Return what the named method gives (of all for "all"), and with the reason those left out or passed over.
 
     Raises `InputError` for an unknown name, or where nothing can be estimated.
     """
     if name == "all":
-        return all_methods(recording, options)
+        return all_methods(recording, options, each=lambda names: progress(names, len(METHODS), "method"))
     if name == "best":
         found, passed_over = best_of(recording, options)
         return [found], passed_over

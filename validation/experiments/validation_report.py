@@ -62,7 +62,7 @@ def write_validation_report(
     """Write ``report.html`` into the run's folder; its figures are there already."""
     failed = sum(not item.ok for item in scores)
     verdict = f"{failed} scores are outside their tolerance" if failed else "every score is within its tolerance"
-    sections = [_scores(scores), _rate_table(run.out), _throws(results, run.out), _loop(loop, run.out)]
+    sections = [*_scores(scores), _rate_table(run.out), _throws(results, run.out), _loop(loop, run.out)]
     write_report(
         run.out / "report.html",
         "Validation report",
@@ -71,19 +71,15 @@ def write_validation_report(
     )
 
 
-def _scores(scores: Sequence[Score]) -> Section:
-    rows = [
-        (
-            item.name,
-            f"{item.value:.5g}",
-            item.unit,
-            f"{item.expected:g}",
-            f"{item.tolerance:g}",
-            "ok" if item.ok else "FAIL",
-        )
-        for item in scores
-    ]
-    return Section("Scores", (), ("score", "value", "unit", "expected", "tolerance", ""), rows)
+def _scores(scores: Sequence[Score]) -> list[Section]:
+    groups: dict[str, list[tuple[str, ...]]] = {}
+    for item in scores:
+        group, _, name = item.name.partition(": ")
+        unit = "" if item.unit == "1" else f" {item.unit}"
+        row = (name or group, f"{item.value:.5g}{unit}", item.goal, "ok" if item.ok else "FAIL")
+        groups.setdefault(group, []).append(row)
+    header = ("score", "value", "goal", "")
+    return [Section(f"Scores: {group}", (), header, rows) for group, rows in groups.items()]
 
 
 def _rate_table(out: Path) -> Section:

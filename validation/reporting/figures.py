@@ -19,6 +19,7 @@ from discsim.arrays import FloatArray
 from discsim.files import write_bytes
 from estimators.rate import YawRate
 from estimators.spin_spline import IndexArray
+from validation.reporting.drawn_values import KEY, drawn_values
 
 __all__ = ["COLOURS", "STYLE", "colour", "draw_differences", "draw_rates", "new_figure", "save_figure", "symmetric_log"]
 
@@ -82,7 +83,9 @@ def save_figure(figure: Figure, path: Path | None) -> Figure:
     if path is None:
         return figure
     kind = path.suffix.removeprefix(".")
-    metadata = {"Date": None} if kind == "svg" else {"Software": None}
+    metadata: dict[str, str | None] = {"Date": None} if kind == "svg" else {"Software": None}
+    if kind == "png" and (values := drawn_values(figure)):
+        metadata[KEY] = values
     buffer = io.BytesIO()
     figure.savefig(buffer, format=kind, dpi=150, metadata=metadata)
     write_bytes(path, buffer.getvalue())

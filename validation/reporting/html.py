@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import platform
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,7 +12,7 @@ from typing import Any
 
 from discsim.files import write_text
 from discsim.version import commit
-from validation.reporting.run import package_version
+from validation.reporting.run import current_run, package_version
 
 __all__ = ["Section", "write_page", "write_report"]
 
@@ -42,12 +43,26 @@ def write_report(path: Path, title: str, lead: str, sections: Sequence[Section])
 def write_page(path: Path, template: str, **content: Any) -> None:
     """Write a page to ``path`` from one of ``validation/templates``; raises where the template lacks some content."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
 
     environment = Environment(
         loader=PackageLoader("validation"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
     environment.tests["number_cell"] = lambda cell: bool(_NUMBER.match(str(cell)))
-    page = environment.get_template(template).render(
-        footer=f"discsim {package_version()}, commit {commit()}", **content
-    )
+    loader = environment.loader
+    assert loader is not None
+    script = Markup(loader.get_source(environment, "page.js")[0].rstrip())
+    page = environment.get_template(template).render(footer=made_by(), script=script, **content)
     write_text(path, page)
+
+
+def made_by() -> str:
+    """Return by what a page was made: command and seed of the run if there is one, version, commit if known."""
+    run = current_run()
+    made = [f"discsim {package_version()}", f"commit {commit()}"]
+    if run is not None:
+        made.insert(0, f"discsim {' '.join(run.command)}")
+        if run.seed is not None:
+            made.append(f"seed {run.seed}")
+        made.append(f"on {platform.node()} ({platform.machine()}, Python {platform.python_version()})")
+    return " · ".join(made)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
+import numpy as np
 import typer
 
 from discsim.arrays import FloatArray, readonly
-from discsim.disc import Disc
+from discsim.disc import Disc, Release, Rig
 from discsim.effects.catalogue import Effect, by_id, effect, row
 from discsim.effects.own import UserEffect
 from discsim.environment import FIELD_MODEL_SIGMA, Environment, world_magnetic_field
@@ -20,7 +21,7 @@ from discsim.law import WRENCH_TARGETS, Law
 from discsim.limits import limit_of
 from discsim.model_file import Model, read_model
 from discsim.module import Module
-from discsim.recording import Plant
+from discsim.recording import PLANTS, Plant
 from discsim.shipped import load_disc, load_site
 
 __all__ = [
@@ -36,13 +37,23 @@ __all__ = [
     "all_effects",
     "at_place",
     "at_site",
+    "at_wind",
     "disc_to_fly",
+    "flight_effects",
     "given_files",
+    "known_plant",
     "laws_upon",
     "parse_effects",
     "parse_module",
+    "parse_sizes",
     "parse_vector",
+    "rig_of",
+    "throw_as_said",
 ]
+
+_DEG, _RPM = float(np.radians(1.0)), 2.0 * np.pi / 60.0
+#: a storm that nobody throws in: Beaufort 12 starts at 32.7 m/s
+_STRONGEST_WIND = 33.0
 
 OutOption: TypeAlias = Annotated[Path, typer.Option("--out", help="Folder to write into; created where absent.")]
 SeedOption: TypeAlias = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
@@ -142,6 +153,28 @@ def all_effects(
     return effects, notes
 
 
+def flight_effects(
+    model: Model | None, texts: Sequence[str] | None
+) -> tuple[list[Effect], dict[tuple[str, str], float], list[str]]:
+    """Return the effects of a model and of ``--effect`` upon a flight, one sigma of the model's by (id, parameter).
+
+    Beside them a line for each that is passed over. Raises `InputError` for a model with a law about the motion, which
+    the flights of many throws do not know.
+    """
+    if model is not None and any(law.target in WRENCH_TARGETS for law in model.laws):
+        raise InputError("the model has a law about the motion; expected one without (discsim fly takes it)")
+    effects, notes = all_effects(model, texts, "flight", (), None)
+    held = () if model is None else model.effects
+    sigma = {
+        (item.effect.id, name): size
+        for item in held
+        if item.effect in effects and item.effect.own is None and item.effect.row.apply is None
+        for name, size in item.sigma.items()
+        if size > 0.0
+    }
+    return effects, sigma, notes
+
+
 def laws_upon(model: Model | None, plant: Plant, sensors: Sequence[str]) -> tuple[list[Law], list[str]]:
     """Return a model's laws that act on a plant with these sensors, and one line for each that is passed over."""
     acting, notes = [], []
@@ -173,6 +206,32 @@ def at_site(environment: Environment, site: str | None) -> Environment:
     if site is None:
         return environment
     return replace(environment, magnetic_field=load_site(site).environment.magnetic_field)
+
+
+def at_wind(environment: Environment, wind: str | None) -> Environment:
+    """Return the environment with the steady wind of ``--wind SPEED,FROM`` (m/s, deg from north), or as it is."""
+    if wind is None:
+        return environment
+    try:
+        speed, origin = (float(part) for part in wind.split(","))
+    except ValueError:
+        raise InputError(f"--wind {wind}: expected SPEED,FROM in m/s and deg, such as 3,270 from the west") from None
+    if not 0.0 <= speed <= _STRONGEST_WIND:
+        raise InputError(f"--wind {wind}: expected a speed from 0 to {_STRONGEST_WIND:g} m/s")
+    towards = np.radians(origin + 180.0)
+    return replace(environment, wind=np.array([speed * np.cos(towards), speed * np.sin(towards), 0.0]))
+
+
+def throw_as_said(throw: Release, said: Mapping[str, float | None]) -> Release:
+    """Return a throw with what was said of it, in people's units, in the place of its own; as it is for nothing."""
+    given = {name: value for name, value in said.items() if value is not None}
+    if not given:
+        return throw
+    from discsim.launch import launch_of, released
+
+    units = {"launch": _DEG, "heading": _DEG, "hyzer": _DEG, "nose": _DEG, "spin": _RPM}
+    words = {name: value * units.get(name, 1.0) for name, value in given.items()}
+    return released(launch_of(throw)._replace(**words), throw)
 
 
 def at_place(environment: Environment, place: str | None, day: str | None) -> Environment:
@@ -245,6 +304,36 @@ def parse_module(text: str) -> Module:
     if "mass" not in sizes:
         raise InputError(f"--module {text}: has no mass; expected mass_kg=NUMBER, such as mass_kg=0.015")
     return Module(**sizes)
+
+
+def known_plant(text: str) -> Plant:
+    """Return the plant of that name; raises `InputError` where there is none."""
+    for plant in PLANTS:
+        if plant == text:
+            return plant
+    raise InputError(f"--plant {text}: unknown; expected one of {', '.join(PLANTS)}")
+
+
+def rig_of(model: Path | None, plant: Plant) -> Rig | None:
+    """Return the rig of ``--model`` for a run-down, None for other plants; raises `InputError` where it has none."""
+    if plant != "spin_down":
+        return None
+    rig = None if model is None else read_model(model).rig
+    if rig is None:
+        raise InputError("--plant spin_down: needs a rig; expected --model with [rig] (Izz_kg_m2, viscous_N_m_s)")
+    return rig
+
+
+def parse_sizes(text: str, option: str) -> dict[str, float]:
+    """Return the numbers of NAME=NUMBER,NAME=NUMBER; raises `InputError` for what is none."""
+    sizes: dict[str, float] = {}
+    for item in filter(None, text.split(",")):
+        name, _, value = (part.strip() for part in item.partition("="))
+        try:
+            sizes[name] = float(value)
+        except ValueError:
+            raise InputError(f"{option} {text}: '{item}' is no NAME=NUMBER; expected NAME=NUMBER,...") from None
+    return sizes
 
 
 def parse_vector(text: str, option: str, unit: str, largest: float) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeAlias
@@ -20,9 +21,11 @@ def shown() -> Iterator[Progress]:
         yield _Lines()
         return
     from rich.console import Console
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bars
 
-    with Bars(console=Console(stderr=True), transient=True) as bars:
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"))
+    with Bars(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as bars:
         task = bars.add_task("", total=None)
 
         def report(stage: str, done: int, total: int) -> None:
@@ -32,12 +35,16 @@ def shown() -> Iterator[Progress]:
 
 
 class _Lines:
-    """Writes a line when a stage begins."""
+    """Writes a line when a stage begins: what is done, which step of how many it is, and the time so far."""
 
     def __init__(self) -> None:
         self._stage = ""
+        self._started = time.monotonic()
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         if stage != self._stage:
             self._stage = stage
-            print(f"{stage} ({total})" if total > 1 else stage, file=sys.stderr, flush=True)
+            step = f" (step {min(done + 1, total)} of {total})" if total > 1 else ""
+            spent = time.monotonic() - self._started
+            so_far = f", {spent:.0f} s so far" if spent >= 1 else ""
+            print(f"{stage}{step}{so_far}", file=sys.stderr, flush=True)

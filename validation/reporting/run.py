@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -18,8 +19,9 @@ import numpy as np
 from discsim.errors import InputError
 from discsim.files import digest, write_text
 from discsim.version import commit, version
+from validation.reporting.written import watching
 
-__all__ = ["Run", "package_version", "source_digest", "start_run"]
+__all__ = ["Run", "current_run", "package_version", "source_digest", "start_run"]
 
 T = TypeVar("T")
 
@@ -96,9 +98,20 @@ class Run:
             yield item
 
 
+_CURRENT: ContextVar[Run | None] = ContextVar("run", default=None)
+
+
+def current_run() -> Run | None:
+    """Return the run that is in progress; None where a page is made from Python."""
+    return _CURRENT.get()
+
+
 @contextmanager
 def start_run(out: Path, seed: int | None = None, inputs: Iterable[Path] = ()) -> Iterator[Run]:
-    """Open a run that writes into ``out``; ``run.json`` is written when the block ends without an error."""
+    """Open a run that writes into ``out``; ``run.json`` is written when the block ends without an error.
+
+    What is there and was not written by discsim stays as it is: an `InputError` names it, unless --force was given.
+    """
     if out.exists() and not out.is_dir():
         raise InputError(f"--out {out}: is a file; expected a folder (it is created where absent)")
     paths = list(inputs)
@@ -108,7 +121,13 @@ def start_run(out: Path, seed: int | None = None, inputs: Iterable[Path] = ()) -
     run = Run(out, sys.argv[1:], seed, paths)
     started = time.monotonic()
     digests = {str(path): digest(path) for path in run.inputs}
-    yield run
+    _say_compiling(run)
+    token = _CURRENT.set(run)
+    try:
+        with watching(out) as written:
+            yield run
+    finally:
+        _CURRENT.reset(token)
     run.write_json(
         "run.json",
         {
@@ -118,5 +137,15 @@ def start_run(out: Path, seed: int | None = None, inputs: Iterable[Path] = ()) -
             "seed": seed,
             "inputs": digests,
             "duration_s": round(time.monotonic() - started, 3),
+            "files": written.digests(),
         },
     )
+
+
+def _say_compiling(run: Run) -> None:
+    """Say that the first call on an installation takes longer, where what is about to run is compiled."""
+    if "numba" in sys.modules:
+        from discsim.compiled import compiled_before
+
+        if not compiled_before():
+            run.step("compiling, once per installation: about a minute of one core")

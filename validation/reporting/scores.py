@@ -28,10 +28,21 @@ class Score:
         return asdict(self)
 
     @property
+    def goal(self) -> str:
+        """What is asked of the value, one-sided where it can only be off to one side."""
+        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        if self.expected == 0.0 and self.value >= 0.0:
+            return f"<= {self.tolerance:g}{unit}"
+        if self.expected == 1.0 and self.unit in ("", "1") and self.value <= 1.0:
+            return f">= {self.expected - self.tolerance:g}"
+        return f"{self.expected:g} ± {self.tolerance:g}{unit}"
+
+    @property
     def text(self) -> str:
         """One line for a log."""
         verdict = "ok  " if self.ok else "FAIL"
-        return f"{verdict} {self.name}: {self.value:.6g} {self.unit} (expected {self.expected:g} +- {self.tolerance:g})"
+        value = f"{self.value:.6g} {self.unit}".rstrip()
+        return f"{verdict} {self.name}: {value} (expected {self.expected:g} +- {self.tolerance:g})"
 
 
 def score(name: str, value: float, unit: str, expected: float, tolerance: float) -> Score:
@@ -44,12 +55,12 @@ def at_most(name: str, value: float, unit: str, limit: float) -> Score:
     return score(name, value, unit, 0.0, limit)
 
 
-def write_junit(path: Path, scores: Sequence[Score], duration_s: float) -> None:
+def write_junit(path: Path, scores: Sequence[Score], duration_s: float, *, suite: str = "discsim validate") -> None:
     """Write the scores as a JUnit XML file: one test case each, a failure where one is outside tolerance."""
     failures = sum(not item.ok for item in scores)
-    suite = ElementTree.Element(
+    tests = ElementTree.Element(
         "testsuite",
-        name="discsim validate",
+        name=suite,
         tests=str(len(scores)),
         failures=str(failures),
         errors="0",
@@ -58,12 +69,12 @@ def write_junit(path: Path, scores: Sequence[Score], duration_s: float) -> None:
     )
     for item in scores:
         group, _, name = item.name.partition(": ")
-        case = ElementTree.SubElement(suite, "testcase", classname=f"discsim.{group}", name=name or group, time="0")
+        case = ElementTree.SubElement(tests, "testcase", classname=f"discsim.{group}", name=name or group, time="0")
         if not item.ok:
             failure = ElementTree.SubElement(case, "failure", message=item.text, type="OutsideTolerance")
             failure.text = item.text
         ElementTree.SubElement(case, "system-out").text = item.text
     root = ElementTree.Element("testsuites", tests=str(len(scores)), failures=str(failures))
-    root.append(suite)
+    root.append(tests)
     ElementTree.indent(root)
     write_bytes(path, ElementTree.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")

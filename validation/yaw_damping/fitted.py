@@ -160,6 +160,7 @@ def cnr_json(fit: Fit, found: Sequence[Compared]) -> dict[str, Any]:
         "method": f"output error, spin by {fit.method}",
         "recordings": [throw.name for throw in fit.throws],
         "refined": {name: {"value": value, "sd": sd} for name, (value, sd) in fit.others.items()},
+        "covariance": {"names": ["CNr", *fit.others], "matrix": fit.covariance},
         "residuals": {
             "spin_over_stated": fit.spin_scale,
             "path_over_stated": fit.path_scale,

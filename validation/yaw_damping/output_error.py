@@ -103,7 +103,8 @@ class Fit:
     ``others`` are the shared parameters that had a sigma, by label: fitted value and standard deviation. The scales
     are by how much the residuals of spin and path exceed what is stated of them; where above one, standard deviations
     were raised by them. ``by_26`` is what the paper's (26) gives with these flights' own r, V and rdot: mean over the
-    throws of the C_Nr at the mean rate and airspeed of each.
+    throws of the C_Nr at the mean rate and airspeed of each. ``covariance`` is that of C_Nr and of ``others`` in their
+    order.
     """
 
     CNr: float
@@ -116,6 +117,7 @@ class Fit:
     spin_whiteness: Whiteness
     path_whiteness: Whiteness
     by_26: float
+    covariance: FloatArray
 
 
 def fit_yaw_damping(throws: Sequence[Throw], start: Sequence[FloatArray] | None = None) -> Fit:
@@ -326,6 +328,7 @@ def _result(throws: Sequence[Throw], fit: Solution, reduced: Sequence[Reduced]) 
         spin_whiteness=whiteness([_thinned(throw, one.spin_z) for throw, one in zip(throws, fitted, strict=True)]),
         path_whiteness=whiteness([column for one in fitted for column in one.path_z.T]),
         by_26=float(np.mean([_by_26(throw, one.speed) for throw, one in zip(throws, fitted, strict=True)])),
+        covariance=readonly(covariance),
     )
 
 

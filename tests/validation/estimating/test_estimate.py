@@ -10,7 +10,7 @@ import pytest
 
 from discsim.environment import Environment
 from discsim.errors import InputError
-from discsim.recording import Recording, Samples, SensorSheet, write_recording
+from discsim.recording import Recording, Samples, SensorSheet, read_recording, write_recording
 from estimators import YawRate
 from validation.commands.estimate import command
 from validation.scenarios.method_disagreement import compare
@@ -131,3 +131,16 @@ def test_times_that_only_one_method_knows_are_not_compared():
     ramp = np.arange(0.0, 4.0, 0.09)
     truth = YawRate("b", ramp, np.where(ramp < 2, 40.0, 60.0), np.full(ramp.size, 0.01))
     assert compare(gap, truth) is None
+
+
+def test_of_a_data_set_each_recording_is_estimated_into_a_folder_of_its_own(folder, tmp_path, capsys):
+    again = tmp_path / "again"
+    write_recording(read_recording(folder), again)
+    (tmp_path / "set").mkdir()
+    folder.rename(tmp_path / "set" / "01")
+    again.rename(tmp_path / "set" / "02")
+    command(tmp_path / "set", method="fft", out=tmp_path / "out", pad=None, step=5)
+    assert (tmp_path / "out" / "01" / "rate.csv").read_bytes() == (tmp_path / "out" / "02" / "rate.csv").read_bytes()
+    shown = capsys.readouterr()
+    assert "recording 2 of 2: 02" in shown.err
+    assert "02:" in shown.out

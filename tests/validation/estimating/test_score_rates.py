@@ -1,0 +1,140 @@
+"""Rates that something else computed, against a truth: figures in closed form, limits, files that are wrong."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from discsim.errors import InputError
+from estimators.rate import YawRate
+from validation.cli import main
+from validation.estimating.rate_files import read_rates, read_truth
+from validation.estimating.scored import score_rates
+
+T = np.linspace(0.0, 10.0, 1001)
+SPIN = 50.0 + 5.0 * np.sin(T)
+
+
+def rate(t: np.ndarray, value: np.ndarray, sd: float = 0.0, signed: bool = True) -> YawRate:
+    return YawRate("firmware", t, value, np.full(t.size, sd), signed=signed)
+
+
+TRUTH = rate(T, SPIN)
+
+
+def command(monkeypatch: pytest.MonkeyPatch, *words: str) -> int:
+    monkeypatch.setattr(sys, "argv", ["discsim", "score", *words])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    return int(stop.value.code or 0)
+
+
+def write(path: Path, header: str, *columns: np.ndarray) -> Path:
+    rows = "\n".join(",".join(f"{x:.9g}" for x in row) for row in np.column_stack(columns))
+    path.write_text(f"{header}\n{rows}\n")
+    return path
+
+
+def test_a_bias_and_a_noise_are_told_in_degrees_per_second():
+    noise = np.random.default_rng(0).normal(0.0, 0.02, T.size)
+    (found,) = score_rates([rate(T, SPIN + 0.01 + noise, sd=0.02)], TRUTH).errors
+    assert found.bias == pytest.approx(np.degrees(0.01), abs=np.degrees(3 * 0.02 / np.sqrt(T.size)))
+    assert found.rms == pytest.approx(np.degrees(np.hypot(0.01, 0.02)), rel=0.05)
+    assert 0.9 < found.within < 0.97  # a bias of half an sd: 92.9 %
+    assert found.known == 1.0
+
+
+def test_a_rate_that_is_late_is_told_by_how_much():
+    (found,) = score_rates([rate(T, 50.0 + 5.0 * np.sin(T - 0.02))], TRUTH).errors
+    assert found.delay == pytest.approx(0.02, rel=1e-2)  # to first order in the delay
+    (steady,) = score_rates([rate(T, np.full(T.size, 50.1))], rate(T, np.full(T.size, 50.0))).errors
+    assert np.isnan(steady.delay)
+
+
+def test_a_rate_without_a_sign_is_compared_by_its_magnitude():
+    backwards = rate(T, -SPIN)
+    (found,) = score_rates([rate(T, SPIN, signed=False)], backwards).errors
+    assert found.worst == 0.0
+    (wrong,) = score_rates([rate(T, SPIN)], backwards).errors
+    assert wrong.bias == pytest.approx(np.degrees(2 * SPIN.mean()))
+
+
+def test_values_that_are_unknown_count_against_what_is_known_and_nothing_else():
+    value = SPIN.copy()
+    value[::4] = np.nan
+    gaps = YawRate("firmware", T, value, np.where(np.isfinite(value), 0.0, np.nan), signed=True)
+    (found,) = score_rates([gaps], TRUTH).errors
+    assert found.known == pytest.approx(0.75, abs=1e-3)
+    assert found.rms == 0.0
+    (none,) = score_rates([YawRate("firmware", T, T * np.nan, T * np.nan)], TRUTH, {"rms": 1.0}).errors
+    assert none.known == 0.0
+    assert np.isnan(none.rms)
+
+
+def test_a_figure_that_is_not_known_is_within_no_limit():
+    found = score_rates([YawRate("firmware", T, T * np.nan, T * np.nan)], TRUTH, {"rms": 1.0})
+    assert not found.ok
+
+
+@pytest.mark.parametrize(("header", "factor"), [("rate_deg_s", 180 / np.pi), ("rate_rpm", 30 / np.pi), ("r_rad_s", 1)])
+def test_a_file_may_be_in_the_units_of_who_wrote_it(tmp_path, header, factor):
+    (found,) = read_rates(write(tmp_path / "mine.csv", f"time_s,{header}", T, factor * SPIN))
+    np.testing.assert_allclose(found.rate, SPIN, rtol=1e-7)
+    assert found.method == "mine"
+
+
+def test_each_method_of_a_file_is_scored_and_the_paper_s_have_no_sign(tmp_path):
+    path = tmp_path / "rate.csv"
+    path.write_text("time_s,method,rate_rad_s,sd_rad_s\n0,fft,50,0.1\n1,fft,,\n0,best,-50,0.1\n1,best,-51,0.1\n")
+    fft, best = read_rates(path)
+    assert (fft.signed, best.signed) == (False, True)
+    assert np.isnan(fft.rate[1])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("t,rate\n0,1\n", r":1: .*expected time_s and one of"),
+        ("time_s,rate_rad_s\n0,1\n0,2\n", r":3: time 0 s does not ascend"),
+        ("time_s,rate_rad_s\n0,x\n", r":2: 'x' is no number"),
+        ("time_s,rate_rad_s\n0,inf\n", r":2: 'inf' is not finite"),
+        ("time_s,rate_rad_s\n0\n", r":2: has 1 cells; expected 2"),
+        ("time_s,rate_rad_s\n", "holds no row"),
+    ],
+)
+def test_a_file_that_is_wrong_is_refused_by_its_line(tmp_path, text, said):
+    path = tmp_path / "rate.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=said):
+        read_rates(path)
+
+
+def test_times_that_have_nothing_in_common_are_told():
+    with pytest.raises(InputError, match="expected times in common"):
+        score_rates([rate(T + 100.0, SPIN)], TRUTH)
+
+
+def test_the_command_keeps_limits_in_junit_and_in_its_exit_status(tmp_path, monkeypatch, capsys):
+    truth = write(tmp_path / "truth.csv", "time_s,rate_rad_s", T, SPIN)
+    mine = write(tmp_path / "mine.csv", "time_s,rate_rad_s", T, SPIN + np.radians(0.3))
+    out, junit = str(tmp_path / "out"), tmp_path / "score.xml"
+    words = [str(mine), "--against", str(truth), "--out", out, "--junit", str(junit), "--limit"]
+    assert command(monkeypatch, *words, "rms=0.5") == 0
+    assert command(monkeypatch, *words, "rms=0.2", "--limit", "known=0.9") == 1
+    suite = ElementTree.parse(junit).getroot()[0]
+    assert (suite.get("name"), suite.get("tests"), suite.get("failures")) == ("discsim score", "2", "1")
+    assert "&lt;= 0.2 deg/s" in (tmp_path / "out" / "report.html").read_text()
+    assert "FAIL rms: 0.3 deg/s" in capsys.readouterr().out
+    assert command(monkeypatch, *words, "rsm=1") == 2
+    assert "--limit rsm: unknown" in capsys.readouterr().err
+
+
+def test_a_truth_is_one_rate_over_time(tmp_path):
+    path = tmp_path / "truth.csv"
+    path.write_text("time_s,rate_rad_s\n0,1\n")
+    with pytest.raises(InputError, match="fewer than two"):
+        read_truth(path)

@@ -1,0 +1,90 @@
+"""``discsim plan``: what recordings could show, before anybody goes out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from validation.reporting.options import ModelOption, OutOption
+
+if TYPE_CHECKING:
+    from discsim.recording import Recording
+    from validation.identification.plants.plan import Plan
+
+__all__ = ["command"]
+
+
+def command(
+    plan: Annotated[
+        Path | None,
+        typer.Argument(help="A TOML file of recordings, [[recording]]. Default: --throws like --throw."),
+    ] = None,
+    like: Annotated[
+        Path | None, typer.Option(help="A data set: recordings like these again, with their hardware.")
+    ] = None,
+    throws: Annotated[int, typer.Option(min=1, help="So many throws like --throw, headings round the compass.")] = 6,
+    throw: Annotated[str, typer.Option(help="A shipped throw's name, or a TOML file.")] = "driver",
+    disc: Annotated[str | None, typer.Option(help="A shipped disc's name, or a TOML file. Default: driver.")] = None,
+    model: ModelOption = None,
+    plant: Annotated[
+        str, typer.Option(help="flight, free_spin, spin_down or rate_table, of the file's recordings.")
+    ] = ("flight"),
+    parts: Annotated[str, typer.Option(help="Sensor parts, names or TOML files, separated by commas.")] = (
+        "mpu9250,neo_m8n"
+    ),
+    instead: Annotated[
+        list[str] | None, typer.Option("--instead", metavar="PARTS", help="Other parts to compare; may repeat.")
+    ] = None,
+    times: Annotated[int, typer.Option(min=1, help="How often each recording is made.")] = 1,
+    candidates: Annotated[
+        Path | None, typer.Option(help="A TOML file of recordings that could be added. Default: ordinary ones.")
+    ] = None,
+    out: OutOption = Path("plan"),
+) -> None:
+    """Tell what recordings could show, before going out: effects, coefficients, and what would tell more.
+
+    Writes plan.json, plan.png and report.html into --out: the size of each effect that would be seen and named, pairs
+    that could not be told apart, the sd of C_Nr and every coefficient, the best next recordings, and what better
+    sensors would buy. Nothing is fitted: all of it comes from the information of simulated recordings.
+
+    Example: discsim plan --throws 6 --disc driver --parts mpu9250,neo_m8n --out plan
+    """
+    from discsim.errors import InputError
+    from discsim.recording import read_dataset
+    from discsim.shipped import load_throw
+    from validation.diagnosis.design.plans import read_plans
+    from validation.planning.planned import plan as tell
+    from validation.reporting.options import disc_to_fly, known_plant, rig_of
+    from validation.reporting.run import start_run
+
+    if like is not None and plan is not None:
+        raise InputError(f"{plan} and --like {like} both say what is recorded; expected one of them")
+    kind = known_plant(plant)
+    rig = rig_of(model, kind)
+    body, place, _ = disc_to_fly(disc, None if rig is not None else model)
+    named = [Path(name) for name in (disc or "", throw, *parts.split(",")) if name.endswith(".toml")]
+    asked: Sequence[Plan] | Sequence[Recording] | int = throws if plan is None else read_plans(plan, plant)
+    if like is not None:
+        asked, named = read_dataset(like), [*named, like]
+    further = None if candidates is None else read_plans(candidates, plant)
+    release = load_throw(throw)
+    with start_run(out, inputs=[*filter(None, (plan, model, candidates)), *named]) as run:
+        found = tell(
+            asked,
+            body,
+            parts.split(","),
+            environment=place,
+            throw=release,
+            plant=kind,
+            rig=rig,
+            times=times,
+            candidates=further,
+            instead=[other.split(",") for other in instead or ()],
+            say=run.step,
+        )
+        found.report(out, command=f"discsim {' '.join(run.command)}")
+    typer.echo(found.summary())
+    typer.echo(f"read {out / 'report.html'}")

@@ -1,0 +1,100 @@
+"""Rates and truths in CSV files, whoever wrote them: discsim, a firmware, a reference."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.errors import InputError
+from discsim.files import read_text
+from estimators.rate import YawRate
+
+__all__ = ["read_rates", "read_truth"]
+
+_DEG, _RPM = float(np.radians(1.0)), 2.0 * np.pi / 60.0
+#: columns that hold a rate, and rad/s per unit of each; a flight's truth has its rate about z_B as r_rad_s
+_RATES: Mapping[str, float] = MappingProxyType(
+    {"rate_rad_s": 1.0, "r_rad_s": 1.0, "rate_deg_s": _DEG, "rate_rpm": _RPM, "yaw_rate_deg_s": _DEG}
+)
+_SDS: Mapping[str, float] = MappingProxyType({"sd_rad_s": 1.0, "sd_deg_s": _DEG, "sd_rpm": _RPM})
+#: methods that give magnitudes, as `estimate` writes them
+_UNSIGNED = ("fft", "accelerometer")
+
+
+def read_rates(path: Path, *, magnitude: bool = False) -> list[YawRate]:
+    """Read rates over time, one for each name in a column ``method`` if there is one.
+
+    Columns: ``time_s``, one of ``rate_rad_s``, ``rate_deg_s``, ``rate_rpm``; if present ``method`` and ``sd_...``.
+    An empty cell is a value that is not known. ``magnitude`` says that the rates have no sign. Raises `InputError`
+    naming file, line and what was expected.
+    """
+    return [
+        YawRate(name, t, rate, sd, signed=not (magnitude or name in _UNSIGNED)) for name, t, rate, sd in _groups(path)
+    ]
+
+
+def read_truth(path: Path) -> YawRate:
+    """Read a true rate: truth.csv of a rate table or a flight, rate_reference.csv, or ``time_s`` with a rate.
+
+    Raises `InputError` for several methods, for fewer than two values, and as `read_rates`.
+    """
+    found = list(_groups(path))
+    if len(found) != 1:
+        raise InputError.at(path, None, f"holds {len(found)} methods; expected one truth")
+    _, t, rate, _ = found[0]
+    if np.count_nonzero(np.isfinite(rate)) < 2:
+        raise InputError.at(path, None, "holds fewer than two known rates; expected a truth over time")
+    return YawRate("truth", t, rate, np.where(np.isfinite(rate), 0.0, np.nan), signed=True)
+
+
+def _groups(path: Path) -> Iterator[tuple[str, FloatArray, FloatArray, FloatArray]]:
+    """Yield name, times, rates and sds (n,) of each method of a file, in the order of the file."""
+    lines = read_text(path).splitlines()
+    rows = list(csv.reader(lines))
+    header = [cell.strip() for cell in rows[0]] if rows else []
+    rate_column = next((name for name in _RATES if name in header), None)
+    if "time_s" not in header or rate_column is None:
+        raise InputError.at(
+            path, 1, f"header {', '.join(header) or 'is empty'}; expected time_s and one of {', '.join(_RATES)}"
+        )
+    sd_column = next((name for name in _SDS if name in header), None)
+    method = header.index("method") if "method" in header else None
+    tables: dict[str, list[tuple[float, float, float]]] = {}
+    for number, row in enumerate(rows[1:], start=2):
+        if not row or not any(cell.strip() for cell in row):
+            continue
+        if len(row) != len(header):
+            raise InputError.at(path, number, f"has {len(row)} cells; expected {len(header)}")
+        name = path.stem if method is None else row[method].strip()
+        time = _number(path, number, row[header.index("time_s")])
+        if not np.isfinite(time):
+            raise InputError.at(path, number, "has no time; expected a number of seconds")
+        rate = _number(path, number, row[header.index(rate_column)]) * _RATES[rate_column]
+        sd = 0.0 if sd_column is None else _number(path, number, row[header.index(sd_column)]) * _SDS[sd_column]
+        table = tables.setdefault(name, [])
+        if table and time <= table[-1][0]:
+            raise InputError.at(path, number, f"time {time:g} s does not ascend (before it {table[-1][0]:g})")
+        table.append((time, rate, sd))
+    if not tables:
+        raise InputError.at(path, None, "holds no row; expected rates over time")
+    for name, table in tables.items():
+        t, rate_rad_s, sd_rad_s = np.array(table).T
+        known = np.isfinite(rate_rad_s)
+        # an sd that is not told is none
+        yield name, t, rate_rad_s, np.where(known, np.nan_to_num(sd_rad_s), np.nan)
+
+
+def _number(path: Path, line: int, cell: str) -> float:
+    text = cell.strip()
+    try:
+        value = float(text) if text else np.nan
+    except ValueError:
+        raise InputError.at(path, line, f"'{text[:40]}' is no number; expected one, or nothing") from None
+    if np.isinf(value):
+        raise InputError.at(path, line, f"'{text[:40]}' is not finite; expected a number, or nothing")
+    return value

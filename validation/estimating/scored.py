@@ -1,0 +1,188 @@
+"""`score_rates` and what it gives: how far rates are from the truth, and whether that is within limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from discsim.errors import InputError
+from discsim.files import write_text
+from estimators.rate import YawRate
+from validation.reporting.figures import draw_differences, draw_rates, new_figure, save_figure
+from validation.reporting.html import Section, write_report
+from validation.reporting.run import json_text
+from validation.reporting.scores import Score, at_most, score
+
+__all__ = ["FIGURES", "RateErrors", "ScoredRates", "score_rates"]
+
+
+class RateErrors(NamedTuple):
+    """How far one rate is from the truth, deg/s where no unit is named.
+
+    ``known`` is the share of its values, within the truth's time, that are known; ``delay`` how late it follows
+    changes of the truth, s (NaN where that does not change). ``within`` is the share of its errors within two of its
+    own standard deviations, NaN where it states none.
+    """
+
+    method: str
+    values: int
+    known: float
+    bias: float
+    rms: float
+    worst: float
+    p95: float
+    delay: float
+    within: float
+
+
+#: figures that may be limited, and what each limit means
+FIGURES: Mapping[str, str] = {
+    "bias": "mean error, deg/s, either way",
+    "rms": "root mean square error, deg/s",
+    "worst": "largest error, deg/s",
+    "p95": "error that 95 % stay below, deg/s",
+    "delay": "delay, s, either way",
+    "known": "share of values known, at least",
+    "within": "share of errors within two stated sds, at least",
+}
+_AT_LEAST = ("known", "within")
+
+
+@dataclass(frozen=True, repr=False)
+class ScoredRates:
+    """Rates against a truth: the errors of each, and the scores that limits make of them."""
+
+    errors: tuple[RateErrors, ...]
+    scores: tuple[Score, ...]
+    rates: tuple[YawRate, ...]
+    truth: YawRate
+
+    def __repr__(self) -> str:
+        failed = sum(not item.ok for item in self.scores)
+        return f"<ScoredRates: {len(self.errors)} rates, {failed} of {len(self.scores)} limits exceeded>"
+
+    @property
+    def ok(self) -> bool:
+        """Whether all is within the limits."""
+        return all(item.ok for item in self.scores)
+
+    def summary(self) -> str:
+        """Return a line for each rate, and for each limit."""
+        lines = [
+            f"{one.method}: rms {one.rms:.4g} deg/s, bias {one.bias:+.4g}, 95 % below {one.p95:.4g}, worst "
+            f"{one.worst:.4g}, {100 * one.known:.0f} % known"
+            + (f", {1000 * one.delay:+.1f} ms late" if np.isfinite(one.delay) else "")
+            for one in self.errors
+        ]
+        return "\n".join([*lines, *map(_line, self.scores)])
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of score.json."""
+        return {
+            "format": "discsim-score/1",
+            "rates": [one._asdict() for one in self.errors],
+            "scores": [item.as_dict() for item in self.scores],
+            "ok": self.ok,
+        }
+
+    def report(self, folder: Path | str) -> Path:
+        """Write score.json, score.png and report.html into ``folder``; return the path of the page."""
+        out = Path(folder)
+        write_text(out / "score.json", json_text(self.to_json()))
+        figure, axes = new_figure(2, 1, height=6.0, sharex=True)
+        draw_rates(axes[0], [*self.rates, self.truth])
+        draw_differences(axes[1], self.rates, self.truth)
+        save_figure(figure, out / "score.png")
+        header = ("rate", "values", "known", "bias", "rms", "95 % below", "worst", "delay, ms", "within 2 sd")
+        rows = [
+            (one.method, str(one.values), f"{100 * one.known:.1f} %", *(f"{v:.4g}" for v in (one.bias, one.rms)),
+             *(f"{v:.4g}" for v in (one.p95, one.worst)), _or_dash(1000 * one.delay), _or_dash(100 * one.within))
+            for one in self.errors
+        ]  # fmt: skip
+        limits = [(item.name, f"{item.value:.4g} {item.unit}", item.goal, "ok" if item.ok else "FAIL")
+                  for item in self.scores]  # fmt: skip
+        lead = (
+            f"{sum(item.ok for item in self.scores)} of {len(self.scores)} limits are kept."
+            if self.scores
+            else "No limit was asked for."
+        )
+        figures = [("Rates, and what they differ from the truth by", out / "score.png")]
+        sections = [Section("Errors in deg/s", (), header, rows, figures)]
+        if limits:
+            sections.insert(0, Section("Limits", (), ("figure", "value", "goal", ""), limits))
+        write_report(out / "report.html", "Rates against the truth", lead, sections)
+        return out / "report.html"
+
+
+def _line(item: Score) -> str:
+    return f"{'ok  ' if item.ok else 'FAIL'} {item.name}: {item.value:.4g} {item.unit}".rstrip() + f" ({item.goal})"
+
+
+def _or_dash(value: float) -> str:
+    return f"{value:.3g}" if np.isfinite(value) else "–"
+
+
+def score_rates(rates: Sequence[YawRate], truth: YawRate, limits: Mapping[str, float] | None = None) -> ScoredRates:
+    """Compare rates with a truth, each where both are known.
+
+    ``limits`` are by the names of `FIGURES`; each holds for every rate. Where a rate has no sign magnitudes are
+    compared. Raises `InputError` for an unknown limit, and where a rate and the truth have no time in common.
+    """
+    for name in limits or {}:
+        if name not in FIGURES:
+            raise InputError(f"--limit {name}: unknown; expected some of {', '.join(FIGURES)}")
+    errors = tuple(_errors(rate, truth) for rate in rates)
+    scores = tuple(
+        _limited(one, name, limit, several=len(errors) > 1) for one in errors for name, limit in (limits or {}).items()
+    )
+    return ScoredRates(errors, scores, tuple(rates), truth)
+
+
+def _limited(one: RateErrors, name: str, limit: float, *, several: bool) -> Score:
+    label = f"{one.method}: {name}" if several else name
+    value = float(getattr(one, name))
+    if name in _AT_LEAST:
+        return score(label, value, "", 1.0, 1.0 - limit)
+    return at_most(label, value, "s" if name == "delay" else "deg/s", limit)
+
+
+def _errors(rate: YawRate, truth: YawRate) -> RateErrors:
+    t, true = rate.t, truth.at(rate.t)
+    covered = (t >= truth.t[0]) & (t <= truth.t[-1])
+    if not np.any(covered):
+        raise InputError(
+            f"{rate.method}: times {t[0]:g} to {t[-1]:g} s, the truth's {truth.t[0]:g} to {truth.t[-1]:g} s; "
+            "expected times in common, from the same zero"
+        )
+    both = np.isfinite(rate.rate) & np.isfinite(true)
+    known = float(np.count_nonzero(np.isfinite(rate.rate[covered])) / np.count_nonzero(covered))
+    if not np.any(both):
+        nothing = (np.nan,) * 6
+        return RateErrors(rate.method, int(covered.sum()), known, *nothing)
+    measured, actual = (rate.rate[both], true[both]) if rate.signed else (np.abs(rate.rate[both]), np.abs(true[both]))
+    error = measured - actual
+    size = np.degrees(np.abs(error))
+    # e(t) = r(t - delay) - r(t) = -delay dr/dt to first order, beside a constant
+    slope = np.gradient(truth.rate, truth.t)
+    slope = np.interp(t[both], truth.t, slope if rate.signed else slope * np.sign(truth.rate))
+    spread = slope - slope.mean()
+    moves = float(spread @ spread)
+    still = np.ptp(actual) < 1e-3 * max(float(np.abs(actual).max()), 1e-12)
+    delay = float("nan") if still or moves == 0.0 else -float(spread @ error) / moves
+    sd = rate.sd[both]
+    within = float(np.mean(np.abs(error)[sd > 0] <= 2 * sd[sd > 0])) if np.any(sd > 0) else float("nan")
+    return RateErrors(
+        rate.method,
+        int(covered.sum()),
+        known,
+        float(np.degrees(error.mean())),
+        float(np.sqrt(np.mean(size**2))),
+        float(size.max()),
+        float(np.percentile(size, 95)),
+        delay,
+        within,
+    )

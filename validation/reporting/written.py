@@ -1,0 +1,90 @@
+"""What a run writes into its folder, so that nothing there is overwritten that discsim did not write."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from discsim.errors import InputError
+from discsim.files import digest, guarding
+
+__all__ = ["OVERWRITE", "Written", "watching"]
+
+#: whether files may be overwritten whoever wrote them: what --force says
+OVERWRITE: ContextVar[bool] = ContextVar("overwrite", default=False)
+#: what a run that did not end has written, in place of the run.json that it would have left
+_UNFINISHED = ".discsim-unfinished.json"
+#: kept by their own rules: results of single tasks, which another run refuses or goes on with
+_OWN_RULES = ("checkpoints",)
+
+
+@dataclass
+class Written:
+    """The files of a folder by their digests: those of an earlier run (None: it kept no list), and of this one."""
+
+    out: Path
+    before: dict[str, str] | None
+    now: set[str] = field(default_factory=set)
+
+    def __call__(self, path: Path) -> None:
+        """Take note of a file that is about to be written; raises `InputError` where somebody else wrote it."""
+        try:
+            name = path.resolve().relative_to(self.out.resolve()).as_posix()
+        except ValueError:
+            return  # it was asked for by its own name
+        if name.split("/")[0] in _OWN_RULES or name in (_UNFINISHED, "run.json"):
+            return
+        if name not in self.now and path.is_file() and not self._ours(name, path):
+            raise InputError(
+                f"{path}: is there, and discsim did not write it, or it was changed since; expected another --out, or "
+                "--force to overwrite it"
+            )
+        self.now.add(name)
+
+    def _ours(self, name: str, path: Path) -> bool:
+        if OVERWRITE.get() or self.before is None:
+            return True
+        return self.before.get(name) == digest(path)
+
+    def digests(self) -> dict[str, str]:
+        """Return the digests of what this run has written, and of what an earlier one had and is as it was."""
+        kept = {
+            name: value
+            for name, value in (self.before or {}).items()
+            if name not in self.now and (self.out / name).is_file()
+        }
+        mine = {name: digest(self.out / name) for name in self.now if (self.out / name).is_file()}
+        return dict(sorted({**kept, **mine}.items()))
+
+
+@contextmanager
+def watching(out: Path) -> Iterator[Written]:
+    """Take note of what is written into a folder while the block runs, and refuse what must stay as it is."""
+    written = Written(out, _before(out))
+    try:
+        with guarding(written):
+            yield written
+    except BaseException:
+        if written.now:
+            (out / _UNFINISHED).write_text(json.dumps(written.digests()) + "\n", encoding="utf-8")
+        raise
+    (out / _UNFINISHED).unlink(missing_ok=True)
+
+
+def _before(out: Path) -> dict[str, str] | None:
+    """Return what earlier runs wrote; None where one did that kept no list."""
+    found: dict[str, str] = {}
+    for name in ("run.json", _UNFINISHED):
+        try:
+            content = json.loads((out / name).read_bytes())
+        except (OSError, ValueError):
+            continue
+        files = content.get("files") if name == "run.json" and isinstance(content, dict) else content
+        if not isinstance(files, dict):
+            return None
+        found |= files
+    return found
