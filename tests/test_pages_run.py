@@ -47,7 +47,9 @@ class Block:
         """The commands of the block, continued lines joined, comments left out."""
         text = self.text.replace("\\\n", " ")
         lines = [line.removeprefix("$ ") for line in text.splitlines() if self.kind == "sh" or line.startswith("$ ")]
-        return [shlex.join(words) for line in lines if (words := shlex.split(line, comments=True))]
+        said = [(line, shlex.split(line, comments=True)) for line in lines]
+        # what is not ours is the shell's: a redirection is no word
+        return [shlex.join(words) if words[0] == "discsim" else line for line, words in said if words]
 
 
 def blocks(page: Path) -> list[Block]:
