@@ -31,7 +31,7 @@ from validation.diagnosis.pipeline import diagnose  # noqa: E402
 from validation.identification.plants.plan import Plan  # noqa: E402
 from validation.planning.information import information_of, questions_of  # noqa: E402
 from validation.planning.limits import limits_of  # noqa: E402
-from validation.planning.recordings import Bench, planned_chain  # noqa: E402
+from validation.planning.recordings import Bench, planned_trajectory  # noqa: E402
 
 EFFECTS = ("air.wind", "aero.spin_lift", "aero.yaw_reynolds", "mag.hard_iron", "accel.bias", "gps.latency")
 
@@ -40,14 +40,14 @@ def foretold(case: Case) -> float:
     """Return the concealed effect's size over the one at which half of the diagnoses name it."""
     sheets = {name: part.sheet for name, part in case.sheets_of.sensors.items()}
     bench = Bench(case.plant, case.environment, case.stated_disc, case.stated_rig, sheets)
-    chains = []
+    trajectories = []
     for run in case.runs:
         assert isinstance(run, Release)
-        made = planned_chain(Plan("", release_state(run)[:13], case.longest), bench)
+        made = planned_trajectory(Plan("", release_state(run)[:13], case.longest), bench)
         assert made is not None
-        chains.append(made)
-    asked = questions_of([one.recording for one in chains], 1.0)
-    limits = limits_of(information_of(chains, asked))
+        trajectories.append(made)
+    asked = questions_of([one.recording for one in trajectories], 1.0)
+    limits = limits_of(information_of(trajectories, asked))
     hidden = case.concealed[0].effect
     limit = next(one for one in limits.effects if one.id == hidden.id)
     about = hiding_of(hidden.id).about

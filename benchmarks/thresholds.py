@@ -38,21 +38,21 @@ from validation.challenge.cases.conceal import recordings as simulated
 from validation.challenge.cases.draw import draw_case
 from validation.diagnosis.detectors.events import events
 from validation.diagnosis.detectors.gusts import gusts
-from validation.diagnosis.detectors.local_problem import asked_of
+from validation.diagnosis.detectors.local_problem import local_problems
 from validation.diagnosis.detectors.speed_ripple import ripple
 from validation.diagnosis.detectors.time_offsets import time_offsets
 from validation.diagnosis.inertia import with_inertia
 from validation.diagnosis.pipeline import diagnose
 from validation.diagnosis.prepared import prepared
 from validation.diagnosis.selection.candidates import parameters_of
-from validation.diagnosis.selection.constrained_fit import tied_fit
-from validation.diagnosis.selection.found import Search, chi2_in, values_of_fit
+from validation.diagnosis.selection.continuous_fit import continuous_fit
 from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.selection.proposals import Proposal, proposals
+from validation.diagnosis.selection.score_tests import ScreenedCandidate, screened_candidates
+from validation.diagnosis.selection.search_state import Search, chi2_in, values_of_fit
 from validation.diagnosis.selection.stepwise import screened
 from validation.diagnosis.settings import RELAXED_FIT, SELECTION
 from validation.identification.noise import robust_noise, stated_noise, whitened
-from validation.identification.residual_tests import RESIDUAL_TESTS, remainders
+from validation.identification.residual_tests import RESIDUAL_TESTS, unmodelled_residuals
 from validation.reporting.figures import new_figure, save_figure
 from validation.reporting.progress import shown
 
@@ -129,18 +129,18 @@ def asked(case: Case, recordings: Sequence[Recording]) -> dict[str, str]:
     fitted, _ = with_inertia(prepared(recordings, names)[0])
     found = screened(fitted)
     base = found.base
-    near = proposals(found.about(base.fit).board, found.trials, Hypothesis(), found.own)
+    near = screened_candidates(found.about(base.fit).board, found.trials, Hypothesis(), found.own)
     odd = [p for p in near if p.trial.recordings is not None and p.trial.row.of_disc]
-    best: dict[str, Sequence[Proposal]] = {
+    best: dict[str, Sequence[ScreenedCandidate]] = {
         "effect": [p for p in near if p not in odd],
         "other_disc": odd,
         "ripple": ripple(base.fit, base.fit.noise, (), 0.0),
         "time_offset": time_offsets(base.fit, base.fit.noise, (), 0.0),
     }
-    if not found.loose.plant.commanded:
-        linears = found.loose.linears
+    if not found.relaxed_fit.plant.commanded:
+        linears = found.relaxed_fit.linears
         steady = robust_noise(linears, [linear.residual for linear in linears])
-        ground = asked_of(found.loose, steady, found.own, Hypothesis())
+        ground = local_problems(found.relaxed_fit, steady, found.own, Hypothesis())
         best |= {"event": events(ground, 0.0), "gust": gusts(ground, 0.0)}
     row = dict(zip(HEAD, (str(case.seed), case.plant, case.kind, str(len(names)), str(base.fit.count)), strict=True))
     for limit in LIMITS:
@@ -162,17 +162,17 @@ def verdict_on(number: int, seed: int) -> str:
     return diagnose([null_set(number, seed)[1]], ["null"]).diagnosis.verdict
 
 
-def _less(proposal: Proposal) -> float:
-    return proposal.gain - SELECTION.per_parameter * len(parameters_of(proposal.trial))
+def _less(screened: ScreenedCandidate) -> float:
+    return screened.gain - SELECTION.per_parameter * len(parameters_of(screened.trial))
 
 
-def _reached(found: Search, top: Proposal, limit: Limit) -> float:
+def _reached(found: Search, top: ScreenedCandidate, limit: Limit) -> float:
     """Return the gain of a proposal less what its parameters cost; by a refit where that comes near the limit."""
     if limit.column != "ripple" and _less(top) < limit.limit - NEAR:
         return _less(top)
     base = found.base
-    refitted = tied_fit(
-        found.loose if limit.column in ("event", "gust") else base.fit,
+    refitted = continuous_fit(
+        found.relaxed_fit if limit.column in ("event", "gust") else base.fit,
         Hypothesis((top.trial,)),
         found.own,
         base.fit.noise,
@@ -186,16 +186,16 @@ def _left(found: Search) -> dict[str, float]:
     base = found.base
     least = replace(RESIDUAL_TESTS, band_z=-np.inf, band_share=-1.0, window_z=-np.inf, course_gain=0.0, loud=0.0)
     reached: dict[str, float] = {}
-    for item in remainders(base.fit.linears, base.residuals, base.fit.noise, least):
+    for item in unmodelled_residuals(base.fit.linears, base.residuals, base.fit.noise, least):
         kind = {"course": "course", "window": "window", "swallowed": "loudness"}.get(item.kind, "band")
         size = item.z**2 if kind == "course" else item.z
-        if kind != "window" or item.from_s > found.loose.plant.durations.settled:
+        if kind != "window" or item.from_s > found.relaxed_fit.plant.durations.settled:
             reached[kind] = max(reached.get(kind, -np.inf), size)
-    reached["far"] = chi2_in(base, found.loose_noise) / base.fit.count
-    noise = stated_noise(found.loose.linears)
+    reached["far"] = chi2_in(base, found.relaxed_noise) / base.fit.count
+    noise = stated_noise(found.relaxed_fit.linears)
     reached["astray"] = max(
         float(np.sum(whitened(linear, noise, linear.residual[:, None]) ** 2)) / linear.raw.size
-        for linear in found.loose.linears
+        for linear in found.relaxed_fit.linears
     )
     return reached
 

@@ -103,9 +103,9 @@ from validation.challenge.cases.conceal import Answer, recordings
 from validation.challenge.cases.draw import draw_case
 from validation.challenge.cases.sizes import conceivable
 from validation.commands.fly import command as fly
-from validation.diagnosis.relaxed_fit import first_chain
+from validation.diagnosis.relaxed_fit import first_trajectory
 from validation.diagnosis.report.wording import form, name_of
-from validation.diagnosis.selection.candidates import trials_for
+from validation.diagnosis.selection.candidates import candidates_for
 from validation.identification.linearisation import linearise
 from validation.identification.plants.flight import FLIGHT
 
@@ -133,10 +133,10 @@ sound, bent = (
 told["bent"] = np.max(np.abs(sound)), np.max(np.abs(bent - sound - 1e-3 * sound * np.abs(sound)))
 
 # diagnose
-trials = {trial.id: trial for trial in trials_for([plain]) if trial.id in ids}
-told["trials"] = sorted(trials)
-columns = [column for trial in trials.values() for column in trial.columns]
-slopes = linearise(first_chain(plain), {}, columns, FLIGHT.sizes.continuous.allowed).shared
+candidates = {candidate.id: candidate for candidate in candidates_for([plain]) if candidate.id in ids}
+told["candidates"] = sorted(candidates)
+columns = [column for candidate in candidates.values() for column in candidate.columns]
+slopes = linearise(first_trajectory(plain), {}, columns, FLIGHT.sizes.continuous.allowed).shared
 told["slopes"] = {c.group: float(np.max(np.abs(slopes[:, k]))) for k, c in enumerate(columns)}
 
 # challenge

@@ -15,7 +15,7 @@ from validation.diagnosis.consistency.spin_agreement import Agreement, agreement
 from validation.diagnosis.contradicted import contradicted_outcome
 from validation.diagnosis.design.next_recording import advise, confusions, in_words
 from validation.diagnosis.held_out import Choice, choices_without_each, heldout_chi2, heldout_gain
-from validation.diagnosis.localisation import located_effect, located_rest
+from validation.diagnosis.localisation import located_effect, located_unmodelled
 from validation.diagnosis.report.wording import telling_apart
 from validation.diagnosis.result import (
     SMALLEST_P_VALUE,
@@ -36,10 +36,10 @@ from validation.diagnosis.result import (
     Recalibration,
     Residuals,
 )
-from validation.diagnosis.selection.candidates import Trial, parameters_of
-from validation.diagnosis.selection.constrained_fit import Tied
+from validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
+from validation.diagnosis.selection.continuous_fit import ContinuousFit
 from validation.diagnosis.selection.evidence import price
-from validation.diagnosis.selection.found import Considered, Search, chi2_in
+from validation.diagnosis.selection.search_state import Considered, Search, chi2_in
 from validation.diagnosis.selection.stepwise import tried_without
 from validation.diagnosis.settings import settings_told
 from validation.diagnosis.setup_effects import SetupAnswer, answer_of_setup, on_board_axes
@@ -48,7 +48,7 @@ from validation.diagnosis.unknown_law.find import FoundLaw
 from validation.diagnosis.verdict import RECALIBRATED_NAMES, recalibrations, standard_errors
 from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel, chi_squared
-from validation.identification.residual_tests import remainders
+from validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = ["outcome_of", "reason_for"]
 
@@ -58,8 +58,8 @@ _UNDETERMINED = 0.2
 
 def _named(
     found: Search,
-    trial: Trial,
-    less: Tied,
+    candidate: CandidateEffect,
+    less: ContinuousFit,
     names: Sequence[str],
     choices: Sequence[Choice],
     advice: Mapping[tuple[str, str], Advice],
@@ -68,9 +68,9 @@ def _named(
     final = found.final
     errors = standard_errors(final)
     values = {}
-    width = {q.key: q.sigma for q in parameters_of(trial)}
+    width = {q.key: q.sigma for q in parameters_of(candidate)}
     for q, value, error in zip(final.fit.parameters, final.fit.at, errors, strict=True):
-        if q.group != trial.id or q.recordings != trial.recordings:
+        if q.group != candidate.id or q.recordings != candidate.recordings:
             continue
         room = width.get(q.key, np.inf)
         known = np.isfinite(error) and error <= _UNDETERMINED * room
@@ -78,21 +78,21 @@ def _named(
             # where nothing shows it, a fit leaves it anywhere within its prior: the baseline says as much
             value = q.stated
         values[q.name] = ParameterValue(float(value), float(error) if known else None)
-    values.update({name: ParameterValue(value, sd) for name, value, sd in trial.told})
-    for name, value in trial.shapes.items():
+    values.update({name: ParameterValue(value, sd) for name, value, sd in candidate.fixed_values})
+    for name, value in candidate.shape_grid.items():
         values.setdefault(name, ParameterValue(float(value), None))
     gain = max(less.score - final.score, 0.0)
-    k = len(parameters_of(trial))
+    k = len(parameters_of(candidate))
     bic = gain - k * float(np.log(max(final.fit.count, 2)))
     p = float(max(chi2_law.sf(gain, max(k, 1)), SMALLEST_P_VALUE))
-    held = heldout_gain(found, trial, choices)
+    held = heldout_gain(found, candidate, choices)
     confused = []
-    for rival in confusions(found, trial):
-        rival_bic = gain - rival.worse - len(parameters_of(rival.trial)) * float(np.log(max(final.fit.count, 2)))
-        told = advice.get((trial.name, rival.trial.name))
-        confused.append(Confusion(rival.trial.id, float(rival_bic), in_words(trial.id, told), told))
-    where = None if trial.recordings is None else tuple(names[i] for i in sorted(trial.recordings))
-    return NamedEffect(trial.id, values, Evidence(bic, held, p), where, tuple(confused))
+    for rival in confusions(found, candidate):
+        rival_bic = gain - rival.worse - len(parameters_of(rival.candidate)) * float(np.log(max(final.fit.count, 2)))
+        told = advice.get((candidate.name, rival.candidate.name))
+        confused.append(Confusion(rival.candidate.id, float(rival_bic), in_words(candidate.id, told), told))
+    where = None if candidate.recordings is None else tuple(names[i] for i in sorted(candidate.recordings))
+    return NamedEffect(candidate.id, values, Evidence(bic, held, p), where, tuple(confused))
 
 
 def _noise_notes(linears: Sequence[Linear], found: NoiseModel) -> list[NoiseNote]:
@@ -115,31 +115,31 @@ def _noise_beside(found: Search) -> list[NoiseNote]:
 
     The relaxed fit follows the data; a sensor that it leaves more than noise on says nothing of its noise.
     """
-    linears = found.loose.linears
-    left = remainders(linears, [linear.residual for linear in linears], found.loose_noise)
+    linears = found.relaxed_fit.linears
+    left = unmodelled_residuals(linears, [linear.residual for linear in linears], found.relaxed_noise)
     spoilt = {item.group for item in left}
-    return _noise_notes(linears, {group: noise for group, noise in found.loose_noise.items() if group not in spoilt})
+    return _noise_notes(linears, {group: noise for group, noise in found.relaxed_noise.items() if group not in spoilt})
 
 
 def _with_law(found: Search, law: FoundLaw) -> tuple[FitFigures, FitFigures, tuple[HeldOut, ...]]:
     """Return the figures of the baseline and of the fit with a law, and what recordings gain that were set aside."""
-    reference = {group: noise._replace(correlation=0.0) for group, noise in law.tied.fit.noise.items()}
-    rows = [linear.raw.size for linear in law.tied.fit.linears]
-    before, after = chi2_in(found.base, reference), chi2_in(law.tied, reference)
+    reference = {group: noise._replace(correlation=0.0) for group, noise in law.fitted.fit.noise.items()}
+    rows = [linear.raw.size for linear in law.fitted.fit.linears]
+    before, after = chi2_in(found.base, reference), chi2_in(law.fitted, reference)
     held = tuple(
         HeldOut(str(i), old / rows[i], new / rows[i], law.heldout[i]) for i, (old, new) in sorted(law.chi2.items())
     )
     sides = [sum(pair[side] for pair in law.chi2.values()) / sum(rows) if held else None for side in (0, 1)]
     return (
         FitFigures(before / found.base.fit.count, sides[0]),
-        FitFigures(after / law.tied.fit.count, sides[1]),
+        FitFigures(after / law.fitted.fit.count, sides[1]),
         held,
     )
 
 
 def _leaves(law: FoundLaw, names: Sequence[str]) -> str:
     """Return in words what is left once a law is in."""
-    left = remainders(law.tied.fit.linears, law.tied.residuals, law.tied.fit.noise)
+    left = unmodelled_residuals(law.fitted.fit.linears, law.fitted.residuals, law.fitted.fit.noise)
     if not left:
         return "With it nothing but noise is left."
     places = []
@@ -156,22 +156,22 @@ def _leaves(law: FoundLaw, names: Sequence[str]) -> str:
 def _figures(
     found: Search, unexplained: bool, choices: Sequence[Choice]
 ) -> tuple[FitFigures, FitFigures, tuple[HeldOut, ...]]:
-    final, board = found.final, found.board
+    final, equations = found.final, found.equations
     white = {group: noise._replace(correlation=0.0) for group, noise in final.fit.noise.items()}
-    reference = white if not unexplained else {g: n._replace(correlation=0.0) for g, n in found.loose_noise.items()}
+    reference = white if not unexplained else {g: n._replace(correlation=0.0) for g, n in found.relaxed_noise.items()}
     n = final.fit.count
     base = chi2_in(found.base, reference) / found.base.fit.count
     last = chi2_in(found.base if unexplained else final, reference) / n
-    if board.recordings < 2 or unexplained:
+    if equations.recordings < 2 or unexplained:
         return FitFigures(base, None), FitFigures(last, None), ()
     held = []
     before = after = 0.0
-    for i in range(board.recordings):
-        rows = board.linears[i].raw.size
+    for i in range(equations.recordings):
+        rows = equations.linears[i].raw.size
         new = max(heldout_chi2(found, final.hypothesis, i, choices[i]), 0.0)
         old = chi_squared(found.base.fit.linears[i], reference, found.base.residuals[i])
         before, after = before + old, after + new
-        chosen = tuple(trial.id for trial in choices[i].values() if trial is not None)
+        chosen = tuple(candidate.id for candidate in choices[i].values() if candidate is not None)
         held.append(HeldOut(str(i), old / rows, new / rows, 0.5 * (old - new), chosen))
     return FitFigures(base, before / n), FitFigures(last, after / n), tuple(held)
 
@@ -179,7 +179,7 @@ def _figures(
 def _residuals(found: Search, names: Sequence[str], unexplained: bool) -> list[Residuals]:
     shown = []
     after_fit = found.final
-    noise = found.loose_noise if unexplained else after_fit.fit.noise
+    noise = found.relaxed_noise if unexplained else after_fit.fit.noise
     for i, name in enumerate(names):
         before_linear, after_linear = found.base.fit.linears[i], after_fit.fit.linears[i]
         for channel in after_linear.channels:
@@ -225,7 +225,7 @@ def _model(found: Search, effects: Sequence[NamedEffect], law: Law | None) -> Mo
     for effect in effects:
         sizes = {name: item.value for name, item in effect.parameters.items()}
         sds = {name: item.sd for name, item in effect.parameters.items() if item.sd is not None}
-        own = found.loose.effects.user_effect(effect.id)
+        own = found.relaxed_fit.effects.user_effect(effect.id)
         sized = catalogued(effect.id, **sizes, **effect.setting) if own is None else own.sized(sizes)
         carried.append(ModelEffect(sized, sds, effect.recordings))
     return Model(
@@ -251,21 +251,21 @@ def _next_recordings(found: Search, unexplained: bool, effects: Sequence[NamedEf
     return tuple(dict.fromkeys(told))
 
 
-def reason_for(considered: Considered, named: Sequence[Trial]) -> str:
-    """Return why a trial that was refitted is ``named``, or is not."""
-    if any(considered.trial.id == trial.id for trial in named):
+def reason_for(considered: Considered, named: Sequence[CandidateEffect]) -> str:
+    """Return why a candidate that was refitted is ``named``, or is not."""
+    if any(considered.candidate.id == candidate.id for candidate in named):
         return "named"
-    return "worth less than its price" if considered.gain <= price(considered.trial) else "another explains more"
+    return "worth less than its price" if considered.gain <= price(considered.candidate) else "another explains more"
 
 
-def _candidates(found: Search, named: Sequence[Trial], names: Sequence[str]) -> tuple[Candidate, ...]:
+def _candidates(found: Search, named: Sequence[CandidateEffect], names: Sequence[str]) -> tuple[Candidate, ...]:
     """Return what was refitted in the order of its gain, and why it is named or not."""
     return tuple(
         Candidate(
-            c.trial.id,
+            c.candidate.id,
             float(c.gain),
             c.values,
-            None if c.trial.recordings is None else tuple(names[i] for i in sorted(c.trial.recordings)),
+            None if c.candidate.recordings is None else tuple(names[i] for i in sorted(c.candidate.recordings)),
             reason_for(c, named),
         )
         for c in sorted(found.considered, key=lambda c: -c.gain)
@@ -295,15 +295,15 @@ def _outcome_of_search(
     agreement: Agreement | None,
 ) -> Outcome:
     names, law, unexplained = question.names, judged.law, judged.verdict == "unexplained"
-    trials = () if unexplained else found.final.hypothesis.trials
-    if trials:
+    candidates = () if unexplained else found.final.hypothesis.candidates
+    if candidates:
         question.progress("asking what to record next", 4, 5)
-    advice = advise(found, names, question.plans) if trials else {}
-    less = {trial.name: tried_without(found, trial) for trial in trials}
+    advice = advise(found, names, question.plans) if candidates else {}
+    less = {candidate.name: tried_without(found, candidate) for candidate in candidates}
     choices = [] if unexplained else choices_without_each(found, less)
     # where nothing explains it, the answer is about the baseline, or about the law that stands for all
-    best = found if not unexplained else found.at_base() if law is None else replace(found, final=law.tied)
-    named = tuple(_named(found, trial, less[trial.name], names, choices, advice) for trial in trials)
+    best = found if not unexplained else found.at_base() if law is None else replace(found, final=law.fitted)
+    named = tuple(_named(found, candidate, less[candidate.name], names, choices, advice) for candidate in candidates)
     named = on_board_axes(named, judged.tried.prepared.setup, found.final.fit)
     moved = recalibrations(best)
     baseline, final, held = _figures(found, unexplained, choices) if law is None else _with_law(found, law)
@@ -314,7 +314,7 @@ def _outcome_of_search(
         judged.verdict,
         _raised(baseline, setup.excess),
         final,
-        (*setup.located, *_located(found, trials, names, unexplained, moved)),
+        (*setup.located, *_located(found, candidates, names, unexplained, moved)),
         (*setup.effects, *named),
         # what is missing, or put into a law that only resembles it, moves them by more than any noise
         {name: replace(item, sd=None) for name, item in moved.items()} if unexplained else moved,
@@ -332,7 +332,7 @@ def _outcome_of_search(
     )
     model = _model(best, (*named, *setup.effects), diagnosis.law)
     shown = _residuals(best, names, unexplained and law is None)
-    return Outcome(diagnosis, model, tuple(shown), _candidates(found, trials, names), settings_told())
+    return Outcome(diagnosis, model, tuple(shown), _candidates(found, candidates, names), settings_told())
 
 
 def _raised(fit: FitFigures, excess: float) -> FitFigures:
@@ -343,15 +343,15 @@ def _raised(fit: FitFigures, excess: float) -> FitFigures:
 
 def _located(
     found: Search,
-    trials: Sequence[Trial],
+    candidates: Sequence[CandidateEffect],
     names: Sequence[str],
     unexplained: bool,
     moved: Mapping[str, Recalibration],
 ) -> list[Located]:
     """Return where the recordings part from the baseline: by each effect, by a stated number that is off, or by all."""
     if unexplained:
-        return located_rest(found, names)
-    if not trials and any(item.beyond for item in moved.values()):
-        worst = located_rest(found, names)[:1]
+        return located_unmodelled(found, names)
+    if not candidates and any(item.beyond for item in moved.values()):
+        worst = located_unmodelled(found, names)[:1]
         return [replace(place, text=f"{place.text}; a stated number is off") for place in worst]
-    return [place for trial in trials for place in located_effect(found, trial, names)]
+    return [place for candidate in candidates for place in located_effect(found, candidate, names)]

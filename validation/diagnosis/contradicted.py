@@ -38,7 +38,7 @@ def contradicted_outcome(
     look = found.whole
     squares = _excess(look)
     total = sum(squares.values()) or 1.0
-    end = max(float(chain.edges[-1]) for chain in look.fit.chains)
+    end = max(float(trajectory.nodes[-1]) for trajectory in look.fit.trajectories)
     located = tuple(
         Located("all", sensor, "all", 0.0, end, min(squares[sensor] / total, 1.0), _text(found, sensor))
         for sensor in sorted(found.blamed, key=lambda one: -squares[one])

@@ -1,8 +1,6 @@
-"""Evidence on recordings held out (leave-one-out cross-validation): neither choice nor size of an effect saw them.
+"""Evidence on recordings held out: what effects gain where their parameters were not fitted.
 
-For each recording the effects are chosen again from the others, among what decides the choice: each named effect, the
-rivals that were refitted in its place, and none. Each is judged by its own fit, to first order about it. What acts in
-one recording alone, as an event does, and what was read off the readings themselves no other recording can choose.
+Takes what a search found; gives gains and chi-squared of each recording set aside (cross-validation: Stone, 1974).
 """
 
 from __future__ import annotations
@@ -13,92 +11,101 @@ from typing import TypeAlias
 import numpy as np
 
 from discsim.arrays import FloatArray
-from validation.diagnosis.selection.candidates import Trial
-from validation.diagnosis.selection.constrained_fit import Tied
+from validation.diagnosis.selection.candidates import CandidateEffect
+from validation.diagnosis.selection.continuous_fit import ContinuousFit
 from validation.diagnosis.selection.evidence import price
 from validation.diagnosis.selection.exchange import takes_its_place
-from validation.diagnosis.selection.found import Search, possible
 from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
 from validation.diagnosis.selection.screening import free_columns
+from validation.diagnosis.selection.search_state import Search, possible
 from validation.identification.gauss_newton import mapped
 from validation.identification.noise import chi_squared, log_likelihood
-from validation.identification.normal_equations import reduce, shared_step
+from validation.identification.normal_equations import common_step, reduce
 
 __all__ = ["Choice", "choices_without_each", "heldout_chi2", "heldout_gain"]
 
 #: what the other recordings choose in the place of each named effect, by its name: itself, a rival or nothing
-Choice: TypeAlias = Mapping[str, Trial | None]
+Choice: TypeAlias = Mapping[str, CandidateEffect | None]
 
 
-def choices_without_each(found: Search, less: Mapping[str, Tied]) -> list[Choice]:
+def choices_without_each(found: Search, less: Mapping[str, ContinuousFit]) -> list[Choice]:
     """Return for each recording what the others choose; ``less`` are fits without each named effect, by its name."""
     final, count = found.final, len(found.recordings)
-    choices: list[dict[str, Trial | None]] = [{t.name: t for t in final.hypothesis.trials} for _ in range(count)]
+    choices: list[dict[str, CandidateEffect | None]] = [
+        {t.name: t for t in final.hypothesis.candidates} for _ in range(count)
+    ]
     if count < 2:
         return list(choices)
-    here = _scores_without_each(final) if final.hypothesis.trials else np.zeros(count)
-    for trial in final.hypothesis.trials:
-        if not _by_others(trial):
+    here = _scores_without_each(final) if final.hypothesis.candidates else np.zeros(count)
+    for candidate in final.hypothesis.candidates:
+        if not _by_others(candidate):
             continue
-        gain = _scores_without_each(less[trial.name]) - here
-        rivals = [rival for rival in found.rivals.get(trial.name, ()) if possible(rival.tied)]
-        worse = [_scores_without_each(rival.tied) - here for rival in rivals]
+        gain = _scores_without_each(less[candidate.name]) - here
+        rivals = [rival for rival in found.rivals.get(candidate.name, ()) if possible(rival.fitted)]
+        worse = [_scores_without_each(rival.fitted) - here for rival in rivals]
         for i, choice in enumerate(choices):
-            better = [(w[i], rival.trial) for w, rival in zip(worse, rivals, strict=True)]
-            better = [(w, other) for w, other in better if takes_its_place(w, other, trial)]
-            if gain[i] <= price(trial):
-                choice[trial.name] = None
+            better = [(w[i], rival.candidate) for w, rival in zip(worse, rivals, strict=True)]
+            better = [(w, other) for w, other in better if takes_its_place(w, other, candidate)]
+            if gain[i] <= price(candidate):
+                choice[candidate.name] = None
             elif better:
-                choice[trial.name] = min(better, key=lambda item: item[0])[1]
+                choice[candidate.name] = min(better, key=lambda item: item[0])[1]
     return list(choices)
 
 
-def _by_others(trial: Trial) -> bool:
+def _by_others(candidate: CandidateEffect) -> bool:
     """Tell whether other recordings can speak of an effect that acts in one."""
-    return bool(trial.columns) and (trial.recordings is None or len(trial.recordings) > 1)
+    return bool(candidate.columns) and (candidate.recordings is None or len(candidate.recordings) > 1)
 
 
-def _scores_without_each(tied: Tied) -> FloatArray:
+def _scores_without_each(fitted: ContinuousFit) -> FloatArray:
     """Return what the score of a fit (r,) is without each recording, its parameters as the others have them."""
-    fit = tied.fit
-    reduced = mapped(lambda linear, chain: reduce(linear, chain, fit.noise, fit.jumps), fit.linears, fit.chains)
+    fit = fitted.fit
+    reduced = mapped(
+        lambda linear, trajectory: reduce(linear, trajectory, fit.noise, fit.defects), fit.linears, fit.trajectories
+    )
     total = np.sum([r.gram for r in reduced], axis=0)
-    whole = shared_step(total, fit.parameters, fit.at)[2]
+    whole = common_step(total, fit.parameters, fit.at)[2]
     scores = []
-    for linear, residual, own in zip(fit.linears, tied.residuals, reduced, strict=True):
-        others = shared_step(total - own.gram, fit.parameters, fit.at)[2]
+    for linear, residual, own in zip(fit.linears, fitted.residuals, reduced, strict=True):
+        others = common_step(total - own.gram, fit.parameters, fit.at)[2]
         level = log_likelihood(linear, fit.noise, residual) - chi_squared(linear, fit.noise, residual)
-        scores.append(tied.score - (whole - others) - level)
+        scores.append(fitted.score - (whole - others) - level)
     return np.array(scores)
 
 
-def heldout_gain(found: Search, trial: Trial, choices: Sequence[Choice]) -> float | None:
+def heldout_gain(found: Search, candidate: CandidateEffect, choices: Sequence[Choice]) -> float | None:
     """Return the log likelihood that recordings gain by what the others choose in an effect's place; None for one."""
-    if len(choices) < 2 or not _by_others(trial):
+    if len(choices) < 2 or not _by_others(candidate):
         return None
-    rest = found.final.hypothesis.without(trial)
+    rest = found.final.hypothesis.without(candidate)
     total = 0.0
     for i, choice in enumerate(choices):
-        chosen = choice[trial.name]
+        chosen = choice[candidate.name]
         if chosen is not None:
-            total += heldout_chi2(found, rest, i) - heldout_chi2(found, found.final.hypothesis, i, {trial.name: chosen})
+            total += heldout_chi2(found, rest, i) - heldout_chi2(
+                found, found.final.hypothesis, i, {candidate.name: chosen}
+            )
     return 0.5 * total
 
 
 def heldout_chi2(found: Search, hypothesis: Hypothesis, i: int, choice: Choice | None = None) -> float:
     """Return chi-squared of a recording with the shared parameters as the other recordings have them.
 
-    Of the trials of the ``hypothesis`` those in a ``choice`` give way to what it has in their place.
+    Of the candidates of the ``hypothesis`` those in a ``choice`` give way to what it has in their place.
     """
-    board = found.board
-    places = [(trial, trial if choice is None else choice.get(trial.name, trial)) for trial in hypothesis.trials]
-    kept = Hypothesis(tuple(trial for trial, chosen in places if chosen is trial))
+    board = found.equations
+    places = [
+        (candidate, candidate if choice is None else choice.get(candidate.name, candidate))
+        for candidate in hypothesis.candidates
+    ]
+    kept = Hypothesis(tuple(candidate for candidate, chosen in places if chosen is candidate))
     own = board.columns_of(fitted_parameters(kept, found.own))
-    for trial, chosen in places:
-        if chosen is not None and chosen is not trial:
+    for candidate, chosen in places:
+        if chosen is not None and chosen is not candidate:
             own += free_columns(chosen)
     others = [j for j in range(board.recordings) if j != i]
-    answer = board.ask(own, only=others)
+    answer = board.solve(own, only=others)
     G = board.grams[i]
     fixed = [
         (board.place[column], float(v))

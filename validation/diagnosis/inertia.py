@@ -15,7 +15,7 @@ from discsim.arrays import ComplexArray
 from discsim.disc import Disc
 from discsim.errors import InputError
 from discsim.recording import Recording
-from validation.diagnosis.consistency.turning import angle_turned, rate_of
+from validation.diagnosis.consistency.phase_regression import angle_turned, rate_of
 from validation.identification.plants import plant_of
 
 __all__ = ["with_inertia"]

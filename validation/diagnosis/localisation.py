@@ -1,4 +1,4 @@
-"""Where the mismatch is: which recordings, sensors, axes and times carry it, and what state it grows with."""
+"""Residual localisation: which recordings, sensors, axes and times carry the mismatch, and what state it grows with."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from validation.diagnosis.result import Located
-from validation.diagnosis.selection.candidates import Trial
-from validation.diagnosis.selection.found import Search
+from validation.diagnosis.selection.candidates import CandidateEffect
 from validation.diagnosis.selection.hypothesis import fitted_parameters
+from validation.diagnosis.selection.search_state import Search
 from validation.identification.linear import Linear
-from validation.identification.normal_equations import local_step
+from validation.identification.normal_equations import nuisance_step
 
-__all__ = ["located_effect", "located_rest"]
+__all__ = ["located_effect", "located_unmodelled"]
 
 #: share of the excess that is worth a line
 _WORTH = 0.05
@@ -32,17 +32,17 @@ def excess_of(
     return found
 
 
-def without(found: Search, trial: Trial) -> list[FloatArray]:
+def without(found: Search, candidate: CandidateEffect) -> list[FloatArray]:
     """Return the residuals (n,) of each recording if an effect of the final hypothesis were left out.
 
     What the recordings' own unknowns and the other effects can take over, they do, to first order.
     """
-    board = found.board
+    board = found.equations
     final = found.final
-    kept = board.columns_of(fitted_parameters(final.hypothesis.without(trial), found.own))
+    kept = board.columns_of(fitted_parameters(final.hypothesis.without(candidate), found.own))
     whole = board.columns_of(final.fit.parameters)
     stood = {(q.key, q.recordings): at - q.stated for q, at in zip(final.fit.parameters, final.fit.at, strict=True)}
-    value = board.ask(kept).value
+    value = board.solve(kept).value
     residuals = []
     for i, linear in enumerate(board.linears):
         step = np.zeros(len(board.columns))
@@ -52,17 +52,19 @@ def without(found: Search, trial: Trial) -> list[FloatArray]:
         for (column, q), v in zip(kept, value, strict=True):
             if q.acts_in(i):
                 step[board.place[column]] += v
-        residuals.append(linear.after(local_step(board.reduced[i], step), step))
+        residuals.append(linear.after(nuisance_step(board.reduced[i], step), step))
     return residuals
 
 
-def located_effect(found: Search, trial: Trial, names: Sequence[str]) -> list[Located]:
+def located_effect(found: Search, candidate: CandidateEffect, names: Sequence[str]) -> list[Located]:
     """Return where an effect shows: for an event its instant, for a sensor's fault the sensor and axis."""
     sd = {group: noise.sd for group, noise in found.final.fit.noise.items()}
-    excess = excess_of(without(found, trial), found.final.residuals, found.board.linears, sd)
-    row, own = trial.row, trial.user
+    excess = excess_of(without(found, candidate), found.final.residuals, found.equations.linears, sd)
+    row, own = candidate.row, candidate.user
     grows, text = (row.grows_with, row.trace) if own is None else (None, own.text)
-    mine = {key: value for key, value in excess.items() if trial.recordings is None or key[0] in trial.recordings}
+    mine = {
+        key: value for key, value in excess.items() if candidate.recordings is None or key[0] in candidate.recordings
+    }
     total = sum(max(float(np.sum(value)), 0.0) for value in mine.values())
     traced = total > 0
     if not traced:
@@ -79,31 +81,31 @@ def located_effect(found: Search, trial: Trial, names: Sequence[str]) -> list[Lo
             continue
         start, stop = 0.0, max(recording.end for recording in found.recordings)
         if traced:
-            start, stop = _span({k: v for k, v in mine.items() if k[1:] == (sensor, axis)}, found.board.linears)
+            start, stop = _span({k: v for k, v in mine.items() if k[1:] == (sensor, axis)}, found.equations.linears)
         if event:
-            instant = _instant(found, trial)
-            width = 2.0 * abs(_value(found, trial, row.lasts)) if isinstance(row.lasts, str) else 3.0 * row.lasts
+            instant = _instant(found, candidate)
+            width = 2.0 * abs(_value(found, candidate, row.lasts)) if isinstance(row.lasts, str) else 3.0 * row.lasts
             start, stop = max(instant - width, 0.0), instant + width
-        where = "all" if trial.recordings is None else ", ".join(names[i] for i in sorted(trial.recordings))
-        said = f"{text} (at {_instant(found, trial):.3f} s)" if event else text
+        where = "all" if candidate.recordings is None else ", ".join(names[i] for i in sorted(candidate.recordings))
+        said = f"{text} (at {_instant(found, candidate):.3f} s)" if event else text
         places.append(Located(where, sensor, axis, start, stop, min(max(share, 0.0), 1.0), said, grows))
     return places
 
 
-def _value(found: Search, trial: Trial, name: str) -> float:
+def _value(found: Search, candidate: CandidateEffect, name: str) -> float:
     for q, at in zip(found.final.fit.parameters, found.final.fit.at, strict=True):
-        if q.key == (trial.id, name) and q.recordings == trial.recordings:
+        if q.key == (candidate.id, name) and q.recordings == candidate.recordings:
             return float(at)
-    return float(trial.shapes.get(name, 0.0))
+    return float(candidate.shape_grid.get(name, 0.0))
 
 
-def _instant(found: Search, trial: Trial) -> float:
-    return _value(found, trial, "t_s")
+def _instant(found: Search, candidate: CandidateEffect) -> float:
+    return _value(found, candidate, "t_s")
 
 
-def located_rest(found: Search, names: Sequence[str]) -> list[Located]:
+def located_unmodelled(found: Search, names: Sequence[str]) -> list[Located]:
     """Return where the baseline fails when nothing explains it: sensors and axes, and what the excess grows with."""
-    noise = {group: found.loose_noise[group].sd for group in found.loose_noise}
+    noise = {group: found.relaxed_noise[group].sd for group in found.relaxed_noise}
     linears = found.base.fit.linears
     zero = [np.zeros_like(residual) for residual in found.base.residuals]
     excess = {key: value - 1.0 for key, value in excess_of(found.base.residuals, zero, linears, noise).items()}
@@ -149,16 +151,16 @@ def _span(excess: Mapping[tuple[int, str, str], FloatArray], linears: Sequence[L
 def _grows_with(
     found: Search, excess: Mapping[tuple[int, str, str], FloatArray], linears: Sequence[Linear]
 ) -> str | None:
-    """Return the state with which the excess, piece by piece, goes up most plainly."""
+    """Return the state with which the excess, segment by segment, goes up most plainly."""
     rows: dict[str, list[float]] = {}
     amounts: list[float] = []
     for (index, sensor, axis), value in excess.items():
-        linear, chain = linears[index], found.loose.chains[index]
+        linear, trajectory = linears[index], found.relaxed_fit.trajectories[index]
         channel = next(c for c in linear.channels if (c.sensor, c.axis) == (sensor, axis))
-        piece = chain.segment_of(linear.t[channel.rows])
-        some = [i for i in range(len(chain.states)) if np.any(piece == i)]
-        amounts += [float(np.mean(value[piece == i])) for i in some]
-        for name, values in chain.plant.grows_with(chain.edges[some], chain.states[some]).items():
+        segment = trajectory.segment_of(linear.t[channel.rows])
+        some = [i for i in range(len(trajectory.states)) if np.any(segment == i)]
+        amounts += [float(np.mean(value[segment == i])) for i in some]
+        for name, values in trajectory.plant.grows_with(trajectory.nodes[some], trajectory.states[some]).items():
             rows.setdefault(name, []).extend(values.tolist())
     if len(amounts) < 8:
         return None

@@ -1,8 +1,9 @@
-"""The relaxed fit: motion that follows the data whatever physics is missing.
+"""The fit with relaxed continuity: motion that follows the data whatever physics is missing.
 
-Pieces may jump and the sensors may be wrong by anything ordinary, each within a wide prior, so that the fit stays
-beside the truth under any hidden effect. What is learned there is not the effect but a point about which the questions
-that decide, asked by algebra, are nearly linear.
+Takes recordings; gives a `Fit`. Segments may part from one another and the sensors may be wrong by anything ordinary,
+each within a wide prior, so that the fit stays beside the truth under any hidden effect (weak-constraint estimation, as
+in data assimilation: Tremolet, 2006). What is learned there is not the effect but a point about which the questions
+that decide are nearly linear.
 """
 
 from __future__ import annotations
@@ -27,13 +28,13 @@ from validation.identification.parameters import Parameter
 from validation.identification.plants import plant_of
 from validation.identification.prediction import shown
 from validation.identification.readings import Readings
-from validation.identification.segments import Chain, chain
+from validation.identification.segments import Trajectory, trajectory_of
 from validation.identification.sensor_model import delay
 
 __all__ = [
     "beginning",
-    "first_chain",
-    "from_other_starts",
+    "first_trajectory",
+    "from_other_initial_states",
     "relaxed",
     "without_outliers",
 ]
@@ -48,22 +49,22 @@ def nodes_of(recording: Recording) -> FloatArray:
     return plant.nodes(recording, plant.durations.segment)
 
 
-def chain_in_true_time(recording: Recording, ratio: float) -> Chain:
-    """Return the first chain of a recording all of whose times are written as ``ratio`` times the true ones."""
-    first = first_chain(recording)
+def trajectory_in_true_time(recording: Recording, ratio: float) -> Trajectory:
+    """Return the first trajectory of a recording all of whose times are written as ``ratio`` times the true ones."""
+    first = first_trajectory(recording)
     states = first.states.copy()
     states[:, list(first.plant.layout.per_time)] *= ratio
-    return replace(first, edges=first.edges / ratio, states=states)
+    return replace(first, nodes=first.nodes / ratio, states=states)
 
 
-def first_chain(recording: Recording, ratio: float = 1.0, edges: FloatArray | None = None) -> Chain:
-    """Return a recording's chain of pieces with starts from the data; ``ratio`` is that of the magnetometer's clock.
+def first_trajectory(recording: Recording, ratio: float = 1.0, nodes: FloatArray | None = None) -> Trajectory:
+    """Return a recording's trajectory, started from the data; ``ratio`` is that of the magnetometer's clock.
 
-    Starts stand in the time that the magnetometer writes. ``edges`` (k + 1,) are the boundaries of the pieces, s, where
-    they are not those that `nodes_of` a recording takes.
+    Starts stand in the time that the magnetometer writes. ``nodes`` (k + 1,) are the boundaries of the segments, s,
+    where they are not those that `nodes_of` a recording takes.
     """
-    edges = nodes_of(recording) if edges is None else edges
-    return chain(recording, edges, plant_of(recording).initial.states(recording, edges[:-1], ratio))
+    nodes = nodes_of(recording) if nodes is None else nodes
+    return trajectory_of(recording, nodes, plant_of(recording).initial.states(recording, nodes[:-1], ratio))
 
 
 def ordinary(sensors: set[str], plant: str) -> tuple[Parameter, ...]:
@@ -83,7 +84,7 @@ def unknowns(recordings: Sequence[Recording]) -> tuple[Parameter, ...]:
     return tuple(replace(q, recordings=frozenset([i])) for i in range(len(recordings)) for q in own)
 
 
-def loose_parameters(recordings: Sequence[Recording], sensors: set[str]) -> tuple[Parameter, ...]:
+def relaxed_parameters(recordings: Sequence[Recording], sensors: set[str]) -> tuple[Parameter, ...]:
     """Return all that a relaxed fit of recordings with some sensors sets free beside stated numbers."""
     return (*unknowns(recordings), *ordinary(sensors, recordings[0].plant))
 
@@ -102,22 +103,26 @@ def relaxed(
     """
     plant = plant_of(recordings[0])
     ratio = _wrong_time(recordings, agreeing)
-    chains = tuple(first_chain(one) if ratio == 1.0 else chain_in_true_time(one, ratio) for one in recordings)
-    sensors = {readings.sensor for one in chains for readings in one.readings}
+    trajectories = tuple(
+        first_trajectory(one) if ratio == 1.0 else trajectory_in_true_time(one, ratio) for one in recordings
+    )
+    sensors = {readings.sensor for one in trajectories for readings in one.readings}
     clock = () if ratio == 1.0 else (Parameter(*_CLOCK, 1.0, 1e-6, RELAXED_FIT.time_sigma),)
-    parameters = (*known, *loose_parameters(recordings, sensors), *clock)
+    parameters = (*known, *relaxed_parameters(recordings, sensors), *clock)
     at = np.array([ratio if q.key == _CLOCK else q.stated for q in parameters])
-    fit = Fit(chains, parameters, at, plant.sizes.relaxed, {})
+    fit = Fit(trajectories, parameters, at, plant.sizes.relaxed, {})
     bare = linearised(fit, ())
     fit = replace(fit, noise=stated_noise(bare))
     fit = refit(fit, iterations=iterations, tolerance=1e-4 * sum(linear.raw.size for linear in bare))
-    fit = from_other_starts(fit)
+    fit = from_other_initial_states(fit)
     if not plant.airborne:
         fit = _with_own_clock(fit)
     if ratio == 1.0:
         fit = _with_clocks(_led_by_others(fit))
-    chains = tuple(within_range(chain, linear) for chain, linear in zip(fit.chains, fit.linears, strict=True))
-    fit = replace(fit, chains=chains)
+    trajectories = tuple(
+        within_range(trajectory, linear) for trajectory, linear in zip(fit.trajectories, fit.linears, strict=True)
+    )
+    fit = replace(fit, trajectories=trajectories)
     linears = linearised(fit)
     return replace(fit, linears=linears, merit=merit_of(fit, linears))
 
@@ -141,31 +146,33 @@ def _astray(fit: Fit) -> list[int]:
     return [i for i in np.argsort(chi2)[::-1].tolist() if chi2[i] > RELAXED_FIT.astray]
 
 
-def from_other_starts(fit: Fit) -> Fit:
+def from_other_initial_states(fit: Fit) -> Fit:
     """Try other attitudes at release for recordings whose fit went astray, each by itself."""
     attitude = fit.plant.layout.attitude
     if attitude is None:
         return fit
-    better = dict[int, Chain]()
+    better = dict[int, Trajectory]()
     for i in _astray(fit)[: CONSISTENCY.few]:
-        recording = fit.chains[i].recording
+        recording = fit.trajectories[i].recording
         ratio = fit.values(i).get(_CLOCK, 1.0)
         first = (
-            first_chain(recording, edges=fit.chains[i].edges) if ratio == 1.0 else chain_in_true_time(recording, ratio)
+            first_trajectory(recording, nodes=fit.trajectories[i].nodes)
+            if ratio == 1.0
+            else trajectory_in_true_time(recording, ratio)
         )
         alone = part_of(fit, [i])
         alone = replace(alone, merit=merit_of(alone, alone.linears))
         for other in fit.plant.initial.other_attitudes(recording)[:3]:
             turned = multiply(other, conjugate(first.states[0, attitude]))
-            states = first.states[: len(fit.chains[i].states)].copy()
+            states = first.states[: len(fit.trajectories[i].states)].copy()
             states[:, attitude] = multiply(np.broadcast_to(turned, (len(states), 4)), states[:, attitude])
-            trial = replace(alone, chains=(replace(fit.chains[i], states=states),))
-            trial = refit(trial, iterations=6, tolerance=1e-3 * fit.count)
-            if trial.merit < RELAXED_FIT.rescued * alone.merit:
-                alone, better[i] = trial, trial.chains[0]
+            candidate = replace(alone, trajectories=(replace(fit.trajectories[i], states=states),))
+            candidate = refit(candidate, iterations=6, tolerance=1e-3 * fit.count)
+            if candidate.merit < RELAXED_FIT.rescued * alone.merit:
+                alone, better[i] = candidate, candidate.trajectories[0]
     if not better:
         return fit
-    together = replace(fit, chains=tuple(better.get(i, one) for i, one in enumerate(fit.chains)))
+    together = replace(fit, trajectories=tuple(better.get(i, one) for i, one in enumerate(fit.trajectories)))
     together = refit(together, iterations=6, tolerance=1e-3 * fit.count)
     return together if together.merit < fit.merit else fit
 
@@ -186,7 +193,7 @@ def part_of(fit: Fit, chosen: Sequence[int]) -> Fit:
     columns = [j for j, _ in kept]
     return replace(
         fit,
-        chains=tuple(fit.chains[i] for i in chosen),
+        trajectories=tuple(fit.trajectories[i] for i in chosen),
         parameters=tuple(q for _, q in kept),
         at=fit.at[columns],
         linears=tuple(fit.linears[i] for i in chosen) if fit.linears else (),
@@ -207,7 +214,7 @@ def _led_by_others(fit: Fit) -> Fit:
     Its clock is read off the motion that the others tell. Where that reconciles it, all are fitted together; where it
     does not, the motion is left as the others tell it, for a search to find what the sensor has.
     """
-    there = {readings.sensor for one in fit.chains for readings in one.readings}
+    there = {readings.sensor for one in fit.trajectories for readings in one.readings}
     if not fit.plant.follows_path or not _astray(fit):
         return fit
     few = 1e-4 * fit.count
@@ -215,22 +222,22 @@ def _led_by_others(fit: Fit) -> Fit:
         if sensor not in there or not (there - {sensor}) & {"magnetometer", "gyroscope"}:
             continue
         some = part_of(fit, _astray(fit)[: CONSISTENCY.few])
-        if len(some.chains) < len(fit.chains) and _astray(_without(some, sensor, few)):
+        if len(some.trajectories) < len(fit.trajectories) and _astray(_without(some, sensor, few)):
             continue
         led = _without(fit, sensor, few)
         if _astray(led):
             continue
-        ratio = _clock_read(led, [one.readings for one in fit.chains], sensor, clock)
-        chains = tuple(
+        ratio = _clock_read(led, [one.readings for one in fit.trajectories], sensor, clock)
+        trajectories = tuple(
             replace(new, recording=old.recording, readings=old.readings)
-            for new, old in zip(led.chains, fit.chains, strict=True)
+            for new, old in zip(led.trajectories, fit.trajectories, strict=True)
         )
         free = Parameter(*clock, 1.0, 1e-6, RELAXED_FIT.clock_sigma)
-        both = replace(led, chains=chains, parameters=(*fit.parameters, free), at=np.append(led.at, ratio))
+        both = replace(led, trajectories=trajectories, parameters=(*fit.parameters, free), at=np.append(led.at, ratio))
         both = refit(both, iterations=12, tolerance=few)
         if not _astray(both):
             return both
-        kept = replace(led, chains=chains)
+        kept = replace(led, trajectories=trajectories)
         linears = linearised(kept)
         level = estimate_noise(linears, [linear.residual for linear in linears], coloured=False)[sensor]
         kept = replace(kept, linears=linears, noise={**kept.noise, sensor: level})
@@ -248,7 +255,7 @@ def _with_own_clock(fit: Fit) -> Fit:
     before = _misfit(fit, sensor)
     if not before > RELAXED_FIT.lost:
         return fit
-    ratio = _clock_read(fit, [one.readings for one in fit.chains], sensor, clock)
+    ratio = _clock_read(fit, [one.readings for one in fit.trajectories], sensor, clock)
     free = Parameter(*clock, 1.0, 1e-6, RELAXED_FIT.clock_sigma)
     timed = replace(fit, parameters=(*fit.parameters, free), at=np.append(fit.at, ratio))
     timed = refit(timed, iterations=8, tolerance=1e-4 * fit.count)
@@ -266,27 +273,27 @@ def _misfit(fit: Fit, sensor: str) -> float:
     return float(np.sqrt(np.mean(np.concatenate(left) ** 2))) if left else np.nan
 
 
-def _silenced(recording: Recording, sensor: str) -> Chain:
-    """Return a recording's first chain as if it had not a sensor."""
+def _silenced(recording: Recording, sensor: str) -> Trajectory:
+    """Return a recording's first trajectory as if it had not a sensor."""
     samples = {name: own for name, own in recording.samples.items() if name != sensor}
-    return first_chain(replace(recording, samples=samples), edges=nodes_of(recording))
+    return first_trajectory(replace(recording, samples=samples), nodes=nodes_of(recording))
 
 
 def _without(fit: Fit, sensor: str, tolerance: float) -> Fit:
     """Return a fit from the start to recordings as if they had not a sensor."""
-    chains = tuple(_silenced(one.recording, sensor) for one in fit.chains)
+    trajectories = tuple(_silenced(one.recording, sensor) for one in fit.trajectories)
     at = np.array([q.stated for q in fit.parameters])
-    return refit(replace(fit, chains=chains, at=at), iterations=12, tolerance=tolerance)
+    return refit(replace(fit, trajectories=trajectories, at=at), iterations=12, tolerance=tolerance)
 
 
 def _clock_read(led: Fit, readings: Sequence[Sequence[Readings]], sensor: str, clock: tuple[str, str]) -> float:
     """Return the clock by which a sensor's readings fit a motion best."""
     misfit = np.zeros(_CLOCKS_TRIED.size)
-    for i, (one, own) in enumerate(zip(led.chains, readings, strict=True)):
+    for i, (one, own) in enumerate(zip(led.trajectories, readings, strict=True)):
         told = next((r for r in own if r.sensor == sensor), None)
         if told is None:
             continue
-        end = one.edges[-1]
+        end = one.nodes[-1]
         for k, ratio in enumerate(_CLOCKS_TRIED):
             values = {**led.values(i), clock: float(ratio)}
             at = told.t - delay(values, sensor, told.t)
@@ -313,42 +320,44 @@ def _with_clocks(fit: Fit) -> Fit:
     """
     if not fit.plant.airborne or not _astray(fit):
         return fit
-    clocks = free_clocks({readings.sensor for one in fit.chains for readings in one.readings})
+    clocks = free_clocks({readings.sensor for one in fit.trajectories for readings in one.readings})
     parameters = (*fit.parameters, *clocks)
     at = np.array([q.stated for q in parameters])
     free = replace(fit, parameters=parameters, at=at)
     some = part_of(free, _astray(fit)[: CONSISTENCY.few])
-    if len(some.chains) < len(fit.chains) and len(_astray(_first_look(some))) == len(some.chains):
+    if len(some.trajectories) < len(fit.trajectories) and len(_astray(_first_look(some))) == len(some.trajectories):
         return fit
     look = _first_look(free)
-    if len(_astray(look)) == len(look.chains):
+    if len(_astray(look)) == len(look.trajectories):
         return fit
     ratio = look.values(0).get((catalogued(ClockRate, "magnetometer").id, "ratio"), 1.0)
-    chains = tuple(first_chain(one.recording, ratio) for one in fit.chains)
+    trajectories = tuple(first_trajectory(one.recording, ratio) for one in fit.trajectories)
     # what the first look says of the rest is little: only the clocks are taken over
     known = {q.key for q in clocks}
     at = np.array([v if q.key in known else q.stated for q, v in zip(parameters, look.at, strict=True)])
-    whole = refit(replace(fit, chains=chains, parameters=parameters, at=at), iterations=12, tolerance=1e-4 * fit.count)
+    whole = refit(
+        replace(fit, trajectories=trajectories, parameters=parameters, at=at), iterations=12, tolerance=1e-4 * fit.count
+    )
     return whole if whole.merit < RELAXED_FIT.rescued * fit.merit else fit
 
 
 def _first_look(fit: Fit) -> Fit:
     """Return a fit to the beginnings of recordings alone, from the start."""
-    short = tuple(beginning(first_chain(one.recording), RELAXED_FIT.first_look) for one in fit.chains)
-    return refit(replace(fit, chains=short), iterations=10)
+    short = tuple(beginning(first_trajectory(one.recording), RELAXED_FIT.first_look) for one in fit.trajectories)
+    return refit(replace(fit, trajectories=short), iterations=10)
 
 
-def beginning(current: Chain, length: float) -> Chain:
-    """Return the pieces of a chain's first ``length`` s and the readings within them."""
-    count = min(max(1, int(np.searchsorted(current.edges, length))), len(current.states))
-    within = {r.sensor: r.t < float(current.edges[count]) - 0.03 for r in current.readings}
+def beginning(current: Trajectory, length: float) -> Trajectory:
+    """Return the segments of a trajectory's first ``length`` s and the readings within them."""
+    count = min(max(1, int(np.searchsorted(current.nodes, length))), len(current.states))
+    within = {r.sensor: r.t < float(current.nodes[count]) - 0.03 for r in current.readings}
     lost = {
         sensor: counts[within[sensor]] if counts.size == within[sensor].size else counts
         for sensor, counts in current.lost.items()
     }
     readings = tuple(r.at(within[r.sensor]) for r in current.readings)
-    edges, states = current.edges[: count + 1], current.states[:count]
-    return replace(current, edges=edges, states=states, readings=readings, lost=lost)
+    nodes, states = current.nodes[: count + 1], current.states[:count]
+    return replace(current, nodes=nodes, states=states, readings=readings, lost=lost)
 
 
 def without_outliers(fit: Fit) -> tuple[Fit, list[tuple[int, str, str, float, float]]]:
@@ -357,8 +366,8 @@ def without_outliers(fit: Fit) -> tuple[Fit, list[tuple[int, str, str, float, fl
     Returns the fit and what was left out: (recording, sensor, axis, time s, standard deviations).
     """
     found: list[tuple[int, str, str, float, float]] = []
-    chains = []
-    for index, (current, linear) in enumerate(zip(fit.chains, fit.linears, strict=True)):
+    trajectories = []
+    for index, (current, linear) in enumerate(zip(fit.trajectories, fit.linears, strict=True)):
         kept = {readings.sensor: readings.good.copy() for readings in current.readings}
         for channel in linear.channels:
             x = linear.residual[channel.rows]
@@ -377,14 +386,14 @@ def without_outliers(fit: Fit) -> tuple[Fit, list[tuple[int, str, str, float, fl
             for k in np.flatnonzero(alone):
                 kept[channel.sensor][channel.index[k], axis] = False
                 found.append((index, channel.sensor, channel.axis, float(linear.t[channel.rows][k]), float(z[k])))
-        chains.append(replace(current, readings=tuple(replace(r, good=kept[r.sensor]) for r in current.readings)))
+        trajectories.append(replace(current, readings=tuple(replace(r, good=kept[r.sensor]) for r in current.readings)))
     if not found:
         return fit, found
-    return refit(replace(fit, chains=tuple(chains)), iterations=4, tolerance=1e-4 * fit.count), found
+    return refit(replace(fit, trajectories=tuple(trajectories)), iterations=4, tolerance=1e-4 * fit.count), found
 
 
-def within_range(current: Chain, linear: Linear) -> Chain:
-    """Return the chain without readings whose noise a range may have cut off, by what the fit expects of them.
+def within_range(current: Trajectory, linear: Linear) -> Trajectory:
+    """Return the trajectory without readings whose noise a range may have cut off, by what the fit expects of them.
 
     Leaving out readings by their own value would bias what remains.
     """

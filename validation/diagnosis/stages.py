@@ -10,7 +10,7 @@ from discsim.recording import Recording
 from validation.diagnosis.consistency.early_verdict import Contradiction
 from validation.diagnosis.consistency.spin_agreement import Comparison
 from validation.diagnosis.result import Verdict
-from validation.diagnosis.selection.found import Search
+from validation.diagnosis.selection.search_state import Search
 from validation.diagnosis.setup import SetupFindings
 from validation.diagnosis.unknown_law.find import FoundLaw
 from validation.identification.competing_effects import CATALOGUED, Competing

@@ -11,12 +11,12 @@ from validation.diagnosis.result import (
     Recalibration,
     Verdict,
 )
-from validation.diagnosis.selection.constrained_fit import Tied
-from validation.diagnosis.selection.found import Search, misses
+from validation.diagnosis.selection.continuous_fit import ContinuousFit
+from validation.diagnosis.selection.search_state import Search, misses
 from validation.diagnosis.settings import UNKNOWN_LAW
 from validation.diagnosis.stages import Judged, Progress, Tried
 from validation.diagnosis.unknown_law.find import find_law
-from validation.identification.residual_tests import remainders
+from validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = ["RECALIBRATED_NAMES", "judged", "recalibrations", "standard_errors"]
 
@@ -45,11 +45,11 @@ def judged(tried: Tried, progress: Progress) -> Judged:
     left = _leaves_more_than_noise(found)
     if left or _stacked(found):
         progress("looking for a law", 4, 5)
-        law = find_law(found.loose, found.final, found.own, found.loose_noise, tried.prepared.fitted)
+        law = find_law(found.relaxed_fit, found.final, found.own, found.relaxed_noise, tried.prepared.fitted)
     verdict: Verdict
     if left or law is not None:
         verdict = "unexplained"
-    elif found.final.hypothesis.trials or tried.prepared.setup.faults:
+    elif found.final.hypothesis.candidates or tried.prepared.setup.faults:
         verdict = "explained"
     else:
         moved = any(item.beyond for item in recalibrations(found).values())
@@ -58,14 +58,14 @@ def judged(tried: Tried, progress: Progress) -> Judged:
 
 
 def _leaves_more_than_noise(found: Search) -> bool:
-    final, settled = found.final, found.loose.plant.durations.settled
-    left = remainders(final.fit.linears, final.residuals, final.fit.noise)
+    final, settled = found.final, found.relaxed_fit.plant.durations.settled
+    left = unmodelled_residuals(final.fit.linears, final.residuals, final.fit.noise)
     return any(item.kind != "window" or item.from_s > settled for item in left) or misses(found, final)
 
 
 def _stacked(found: Search) -> bool:
     """Tell whether several effects on the motion were found, so that one law is worth comparing with them."""
-    rows = [trial.row for trial in found.final.hypothesis.trials]
+    rows = [candidate.row for candidate in found.final.hypothesis.candidates]
     return sum(row.acts_on == "motion" and not row.brief for row in rows) >= UNKNOWN_LAW.stack
 
 
@@ -91,9 +91,9 @@ def recalibrations(found: Search) -> dict[str, Recalibration]:
     return result
 
 
-def standard_errors(tied: Tied) -> FloatArray:
+def standard_errors(fitted: ContinuousFit) -> FloatArray:
     """Return the standard errors (p,) of a fit's parameters, NaN where it has no covariance."""
-    covariance = tied.fit.covariance
-    if covariance.shape[0] != len(tied.fit.parameters):
-        return np.full(len(tied.fit.parameters), np.nan)
+    covariance = fitted.fit.covariance
+    if covariance.shape[0] != len(fitted.fit.parameters):
+        return np.full(len(fitted.fit.parameters), np.nan)
     return np.sqrt(np.maximum(np.diag(covariance), 0.0))

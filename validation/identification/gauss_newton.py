@@ -1,7 +1,9 @@
-"""Weighted least squares over all recordings: states and jumps of each, parameters they share.
+"""Gauss-Newton iteration over all recordings: nuisance unknowns of each, and common parameters.
 
-Local unknowns are eliminated recording by recording (Schur complement), so the cost grows linearly with their number,
-and what is left, small matrices over the shared parameters, answers every question about subsets of them by algebra.
+Takes a `Fit` where it stands; gives it where chi-squared with priors is least, with the covariance of the common
+parameters. Nuisance unknowns are eliminated recording by recording (Schur complement), so cost grows linearly with
+their number. Steps are shortened where they do not improve, and damped where the readings say little (Levenberg,
+"A method for the solution of certain non-linear problems in least squares", 1944).
 """
 
 from __future__ import annotations
@@ -20,12 +22,12 @@ from validation.identification.competing_effects import Competing
 from validation.identification.linear import Linear
 from validation.identification.linearisation import linearise, moved, reread
 from validation.identification.noise import NoiseModel, chi_squared
-from validation.identification.normal_equations import OWN_REACH, Reduced, local_step, reduce, shared_step
-from validation.identification.parameters import Jumps, Parameter, Values, values_of
+from validation.identification.normal_equations import OWN_TRUST_RADIUS, Reduced, common_step, nuisance_step, reduce
+from validation.identification.parameters import AllowedDefects, Parameter, Values, values_of
 from validation.identification.plants import Plant
 from validation.identification.propagation import Column
 from validation.identification.release_prior import release_rows
-from validation.identification.segments import Chain, stepped
+from validation.identification.segments import Trajectory, stepped
 
 __all__ = ["Fit", "linearised_columns", "refit"]
 
@@ -35,15 +37,15 @@ THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 
 
 @dataclass(frozen=True)
 class Fit:
-    """Where a fit stands: the chains, the shared parameters and their values (p,), the last linearisations.
+    """Where a fit stands: the trajectories, the shared parameters and their values (p,), the last linearisations.
 
     ``fixed`` are values that take part without being fitted.
     """
 
-    chains: tuple[Chain, ...]
+    trajectories: tuple[Trajectory, ...]
     parameters: tuple[Parameter, ...]
     at: FloatArray
-    jumps: Jumps
+    defects: AllowedDefects
     noise: NoiseModel
     fixed: Values = field(default_factory=dict)
     linears: tuple[Linear, ...] = ()
@@ -58,12 +60,12 @@ class Fit:
     @property
     def plant(self) -> Plant:
         """The plant of its recordings, which is one for all."""
-        return self.chains[0].plant
+        return self.trajectories[0].plant
 
     @property
     def effects(self) -> Competing:
         """The effects that may act on its recordings."""
-        return self.chains[0].effects
+        return self.trajectories[0].effects
 
     @property
     def count(self) -> int:
@@ -93,18 +95,18 @@ def linearised(
     *,
     central: bool = False,
 ) -> tuple[Linear, ...]:
-    """Linearise all chains where they stand, or ``only`` some; the shared columns are those of ``parameters``.
+    """Linearise all trajectories where they stand, or ``only`` some; the shared columns are those of ``parameters``.
 
     One-sided differences cost half and do for steps; ``central`` ones for what is told of a fit.
     """
     chosen = fit.parameters if parameters is None else parameters
-    which = range(len(fit.chains)) if only is None else only
+    which = range(len(fit.trajectories)) if only is None else only
 
     def one(index: int) -> Linear:
         columns = [Column(q.group, q.name, q.step if q.acts_in(index) else 0.0) for q in chosen]
         active = [column for column in columns if column.step > 0]
-        chain, values = fit.chains[index], fit.values(index)
-        linear = linearise(chain, values, active, fit.jumps.allowed, central=central, threads=_spare(len(which)))
+        trajectory, values = fit.trajectories[index], fit.values(index)
+        linear = linearise(trajectory, values, active, fit.defects.allowed, central=central, threads=_spare(len(which)))
         if len(active) < len(columns):
             linear = linear.spread([j for j, column in enumerate(columns) if column.step > 0], len(columns))
         return linear
@@ -113,40 +115,40 @@ def linearised(
 
 
 def repredicted(fit: Fit) -> tuple[Linear, ...] | None:
-    """Return the linearisations of a fit with residuals where its chains stand and slopes as they were, if they can."""
+    """Return linearisations with residuals where a fit's trajectories stand and slopes as they were, if known."""
 
     def one(index: int) -> Linear | None:
-        return reread(fit.chains[index], fit.values(index), fit.linears[index], _spare(len(fit.chains)))
+        return reread(fit.trajectories[index], fit.values(index), fit.linears[index], _spare(len(fit.trajectories)))
 
-    found = mapped(one, range(len(fit.chains)))
+    found = mapped(one, range(len(fit.trajectories)))
     return None if any(linear is None for linear in found) else tuple(found)
 
 
 def linearised_columns(fit: Fit, columns: Sequence[Column]) -> tuple[Linear, ...]:
-    """Linearise all chains where they stand, with any columns; one that is another recording's own is zero."""
+    """Linearise all trajectories where they stand, with any columns; one that is another recording's own is zero."""
 
     def one(index: int) -> Linear:
         active = [j for j, c in enumerate(columns) if dict(c.given).get("recording", index) == index]
         own = [columns[j] for j in active]
-        threads = _spare(len(fit.chains))
-        linear = linearise(fit.chains[index], fit.values(index), own, fit.jumps.allowed, threads=threads)
+        threads = _spare(len(fit.trajectories))
+        linear = linearise(fit.trajectories[index], fit.values(index), own, fit.defects.allowed, threads=threads)
         return linear.spread(active, len(columns)) if len(active) < len(columns) else linear
 
-    return tuple(mapped(one, range(len(fit.chains))))
+    return tuple(mapped(one, range(len(fit.trajectories))))
 
 
 def merit_of(fit: Fit, linears: Sequence[Linear]) -> float:
-    """Return chi-squared with priors where a fit stands: what jumps may not close is charged, too."""
+    """Return chi-squared with priors where a fit stands: what defects may not close is charged, too."""
     chi2 = sum(chi_squared(linear, fit.noise, linear.residual) for linear in linears)
     return chi2 + penalty_of(fit, linears)
 
 
 def penalty_of(fit: Fit, linears: Sequence[Linear]) -> float:
-    """Return what a fit is charged beside its readings: its jumps, its distance from what is stated."""
+    """Return what a fit is charged beside its readings: its defects, its distance from what is stated."""
     total = 0.0
-    for current, linear in zip(fit.chains, linears, strict=True):
-        some = linear.jump_kind >= 0
-        total += float(np.sum((linear.jump[some] / fit.jumps.sd[linear.jump_kind[some]]) ** 2))
+    for current, linear in zip(fit.trajectories, linears, strict=True):
+        some = linear.defect_kind >= 0
+        total += float(np.sum((linear.defect[some] / fit.defects.sd[linear.defect_kind[some]]) ** 2))
         stated, _ = release_rows(current)
         total += float(stated @ stated)
     for q, number in zip(fit.parameters, fit.at, strict=True):
@@ -161,22 +163,22 @@ def refit(
     iterations: int = 8,
     tolerance: float = 0.05,
     bounds: Mapping[tuple[str, str], tuple[float, float]] | None = None,
-    moved_on: bool = True,
+    relinearise: bool = True,
     bar: float = np.inf,
 ) -> Fit:
     """Go on from where a fit stands by Gauss-Newton steps, halved where they do not improve.
 
-    Stops when the gain, expected or found, is below ``tolerance`` of chi-squared. ``moved_on`` is false where only the
-    noise has changed since the last linearisation. A fit that after its first steps expects to stay above ``bar`` is
-    of no use to the caller, and is left where it stands.
+    Stops when the gain, expected or found, is below ``tolerance`` of chi-squared. ``relinearise`` is false where only
+    the noise has changed since the last linearisation. A fit that after its first steps expects to stay above ``bar``
+    is of no use to the caller, and is left where it stands.
     """
-    linears = linearised(fit) if moved_on else fit.linears
+    linears = linearised(fit) if relinearise else fit.linears
     fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
-    fit, settled = _gone_on(fit, iterations, tolerance, bounds or {}, _FREE, bar)
-    if not settled and iterations >= _LONG and open_gaps(fit) and fit.plant.weakly_identified:
+    fit, settled = _iterated(fit, iterations, tolerance, bounds or {}, _FREE, bar)
+    if not settled and iterations >= _LONG and discontinuous(fit) and fit.plant.weakly_identified:
         # free steps hop about where the readings say little: short ones, and what held them back is not known
-        fit, _ = _gone_on(fit, _HELD * iterations, tolerance, bounds or {}, _FIRST_HOLD, bar)
-        _, (_, covariance, _) = _solved(fit, np.full(len(fit.chains), _FREE))
+        fit, _ = _iterated(fit, _HELD * iterations, tolerance, bounds or {}, _FIRST_DAMPING, bar)
+        _, (_, covariance, _) = _solved(fit, np.full(len(fit.trajectories), _FREE))
         fit = replace(fit, covariance=covariance)
     return fit
 
@@ -193,7 +195,7 @@ def polished(fit: Fit) -> tuple[Fit, list[Reduced]]:
         fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
         if before is not None and not fit.merit < before[0].merit + _NOTHING:
             return before
-        reduced, (step, covariance, expected) = _solved(fit, np.full(len(fit.chains), _FREE))
+        reduced, (step, covariance, expected) = _solved(fit, np.full(len(fit.trajectories), _FREE))
         before = replace(fit, covariance=covariance), reduced
         fit = whole_step(before[0], reduced, step)
         if fit.merit - expected < _NOTHING:
@@ -203,11 +205,11 @@ def polished(fit: Fit) -> tuple[Fit, list[Reduced]]:
 
 def whole_step(fit: Fit, reduced: Sequence[Reduced], step: FloatArray) -> Fit:
     """Return a fit after all of a step of its shared parameters (p,), each recording's own following."""
-    chains = tuple(
-        moved(chain, linear, local_step(r, step), step)
-        for chain, linear, r in zip(fit.chains, fit.linears, reduced, strict=True)
+    trajectories = tuple(
+        moved(trajectory, linear, nuisance_step(r, step), step)
+        for trajectory, linear, r in zip(fit.trajectories, fit.linears, reduced, strict=True)
     )
-    return replace(fit, chains=chains, at=fit.at + step)
+    return replace(fit, trajectories=trajectories, at=fit.at + step)
 
 
 #: whole steps from the end of a fit, at most; one that gains less is the last: the next would be below a thousandth of
@@ -215,18 +217,18 @@ def whole_step(fit: Fit, reduced: Sequence[Reduced], step: FloatArray) -> Fit:
 _WHOLE_STEPS, _NOTHING = 8, 1e-6
 
 
-def _solved(fit: Fit, hold: FloatArray) -> tuple[list[Reduced], tuple[FloatArray, FloatArray, float]]:
-    """Return what each recording says where a fit stands, and `shared_step` from all of it, held by ``hold`` (c,)."""
-    reduced = mapped(_reduced(fit), fit.linears, fit.chains, list(hold))
+def _solved(fit: Fit, damping: FloatArray) -> tuple[list[Reduced], tuple[FloatArray, FloatArray, float]]:
+    """Return what each recording says where a fit stands, and the `common_step` of all, held by ``damping`` (c,)."""
+    reduced = mapped(_reduced(fit), fit.linears, fit.trajectories, list(damping))
     gram = np.sum([r.gram for r in reduced], axis=0)
-    return reduced, shared_step(gram, fit.parameters, fit.at, _reach(fit, hold))
+    return reduced, common_step(gram, fit.parameters, fit.at, _trust_radii(fit, damping))
 
 
 #: steps of a fit that is to end where it is best, not only to follow a change of the noise
 _LONG = 5
 
 
-def _gone_on(
+def _iterated(
     fit: Fit,
     iterations: int,
     tolerance: float,
@@ -236,44 +238,44 @@ def _gone_on(
 ) -> tuple[Fit, bool]:
     """Return a fit after up to so many steps, and whether no more are wanted. ``first`` is how hard they are held.
 
-    Where the steps end with pieces that do not hang together though they did on the way, the best such fit counts.
+    Where the steps end with segments that do not are continuous though they did on the way, the best such fit counts.
     """
-    hold = np.full(len(fit.chains), first)
+    damping = np.full(len(fit.trajectories), first)
     closed: Fit | None = None
     settled, stuck, hops = False, 0, 0
     for done in range(iterations):
-        reduced, (step, covariance, expected) = _solved(fit, hold)
+        reduced, (step, covariance, expected) = _solved(fit, damping)
         fit = replace(fit, covariance=covariance)
         if done >= _LOOKED and expected > bar:
             return fit, True
-        closed = _better_closed(closed, fit)
+        closed = _better_continuous(closed, fit)
         least = max(tolerance, 1e-7 * fit.merit)
-        if fit.merit - expected < least and not open_gaps(fit):
+        if fit.merit - expected < least and not discontinuous(fit):
             return fit, True
         going = GaussNewtonStep(fit, reduced, step, bounds, expected)
         if first > _FREE:
-            better, rose = going.each_its_share()
-            hold = np.where(rose, np.clip(_TIGHTER * hold, _LEAST_HOLD, _MOST_HOLD), _LOOSER * hold)
+            better, rose = going.with_own_fractions()
+            damping = np.where(rose, np.clip(_TIGHTER * damping, _LEAST_DAMPING, _MOST_DAMPING), _LOOSER * damping)
             stuck = stuck + 1 if better is None else 0
-            better = better or going.all_by_one_share()
+            better = better or going.with_one_fraction()
         else:
-            better = going.all_by_one_share()
+            better = going.with_one_fraction()
             hops = hops + 1 if better is not None and _hopped(fit, better) else 0
-        settled = better is None or (not open_gaps(fit) and fit.merit - better.merit < least)
+        settled = better is None or (not discontinuous(fit) and fit.merit - better.merit < least)
         fit = better or fit
         if settled or stuck == _STUCK or hops == _HOPS:
             break
-    return (closed if closed is not None and open_gaps(fit) else fit), settled
+    return (closed if closed is not None and discontinuous(fit) else fit), settled
 
 
 def _hopped(fit: Fit, better: Fit) -> bool:
-    """Tell whether a free step has neither closed pieces whose data say little nor brought them much nearer these."""
-    return fit.plant.weakly_identified and open_gaps(better) and better.merit > _NO_NEARER * fit.merit
+    """Tell whether a free step has neither closed segments whose data say little nor brought them much nearer these."""
+    return fit.plant.weakly_identified and discontinuous(better) and better.merit > _NO_NEARER * fit.merit
 
 
-def _better_closed(known: Fit | None, fit: Fit) -> Fit | None:
-    """Return the better one of two fits whose pieces hang together; ``fit`` may be one whose pieces do not."""
-    if open_gaps(fit) or (known is not None and known.merit <= fit.merit):
+def _better_continuous(known: Fit | None, fit: Fit) -> Fit | None:
+    """Return the better one of two fits whose segments are continuous; ``fit`` may be one whose segments do not."""
+    if discontinuous(fit) or (known is not None and known.merit <= fit.merit):
         return known
     return fit
 
@@ -283,7 +285,7 @@ _LOOKED = 2
 #: held steps, which are short, as a multiple of free ones
 _HELD = 3
 #: a free step that leaves more than this share of the merit brings a free spin no nearer; after so many in turn short
-#: steps are taken (a fit that tied its pieces in free steps alone did so with at most one of them)
+#: steps are taken (a fit that tied its segments in free steps alone did so with at most one of them)
 _NO_NEARER, _HOPS = 0.98, 2
 #: so many held steps in turn of which no share served every recording lead nowhere
 _STUCK = 4
@@ -291,7 +293,7 @@ _STUCK = 4
 _TRIES, _SHORTER = 5, 0.4
 #: a recording whose chi-squared per reading is above this is far from its data
 _FAR = 3.0
-#: by how much chi-squared may rise while pieces hang together to first order only
+#: by how much chi-squared may rise while segments are continuous to first order only
 _RISE = 1.3
 #: a step that is expected to gain less than this, three standard deviations in all, keeps the slopes that it was worked
 #: out with, unless it misses what was expected by more than this share of it
@@ -322,28 +324,28 @@ class GaussNewtonStep:
             ]
         )
 
-    def all_by_one_share(self) -> Fit | None:
+    def with_one_fraction(self) -> Fit | None:
         """Return the fit after the largest share of the step that improves it, the same for all; None if none does."""
-        fit, share = self.fit, 1.0
+        fit, fraction = self.fit, 1.0
         for _ in range(_TRIES):
-            at = self._bounded(fit.at + share * self.step)
+            at = self._bounded(fit.at + fraction * self.step)
             taken = at - fit.at
-            chains = tuple(
-                moved(chain, linear, local_step(r, taken), taken)
-                if share == 1.0
-                else _part(chain, linear, local_step(r, self.step), self.step, share)
-                for chain, linear, r in zip(fit.chains, fit.linears, self.reduced, strict=True)
+            trajectories = tuple(
+                moved(trajectory, linear, nuisance_step(r, taken), taken)
+                if fraction == 1.0
+                else _part(trajectory, linear, nuisance_step(r, self.step), self.step, fraction)
+                for trajectory, linear, r in zip(fit.trajectories, fit.linears, self.reduced, strict=True)
             )
-            trial = replace(fit, chains=chains, at=at)
-            if _finite(chains):
-                short = share == 1.0 and fit.merit - self.expected < CHORD and not open_gaps(fit)
+            trial = replace(fit, trajectories=trajectories, at=at)
+            if _finite(trajectories):
+                short = fraction == 1.0 and fit.merit - self.expected < CHORD and not discontinuous(fit)
                 new = (self._by_chord(trial) if short else None) or linearised(trial)
                 merit = merit_of(trial, new)
-                # while gaps are open the merit is that of the closed chain to first order only: too good
-                bar = fit.merit * (1.0 + 1e-9) if not open_gaps(fit) else 1.5 * fit.merit + 10.0 * fit.count
+                # while gaps are open the merit is that of the closed trajectory to first order only: too good
+                bar = fit.merit * (1.0 + 1e-9) if not discontinuous(fit) else 1.5 * fit.merit + 10.0 * fit.count
                 if np.isfinite(merit) and merit < bar:
                     return replace(trial, linears=new, merit=merit, iterations=fit.iterations + 1)
-            share *= _SHORTER
+            fraction *= _SHORTER
         return None
 
     def _by_chord(self, trial: Fit) -> tuple[Linear, ...] | None:
@@ -357,33 +359,33 @@ class GaussNewtonStep:
         missed = merit_of(trial, new) - self.expected
         return new if missed < _CHORD_MISSES * (self.fit.merit - self.expected) else None
 
-    def each_its_share(self) -> tuple[Fit | None, BoolArray]:
+    def with_own_fractions(self) -> tuple[Fit | None, BoolArray]:
         """Return the fit after a step of which each recording takes as much as leads it nearer, what they share whole.
 
         What recordings share changes little here, and their own unknowns far from linearly. None where no share serves.
         Beside it which of them (c,) the whole step led astray, or nearly.
         """
-        fit, count = self.fit, len(self.fit.chains)
+        fit, count = self.fit, len(self.fit.trajectories)
         own = [np.array([q.recordings == frozenset([i]) for q in fit.parameters], dtype=bool) for i in range(count)]
-        shares, again = np.ones(count), list(range(count))
-        at, chains, new = fit.at, list(fit.chains), list(fit.linears)
+        fractions, again = np.ones(count), list(range(count))
+        at, trajectories, new = fit.at, list(fit.trajectories), list(fit.linears)
         for _ in range(_TRIES):
             wanted = self.step.copy()
             for i in range(count):
-                wanted[own[i]] *= shares[i]
+                wanted[own[i]] *= fractions[i]
             at = self._bounded(fit.at + wanted)
             taken = at - fit.at
             for i in again:
-                linear, r, share = fit.linears[i], self.reduced[i], shares[i]
+                linear, r, fraction = fit.linears[i], self.reduced[i], fractions[i]
                 # a share of the way at once, and all that what is shared asks for
-                still = local_step(r, np.zeros_like(taken))
-                local = share * still + (local_step(r, taken) - still)
-                tangents = linear.moves @ np.concatenate([local, taken]) + share * linear.closing
-                chains[i] = stepped(fit.chains[i], tangents)
-            if not _finite(chains):
-                shares[again] *= _SHORTER
+                still = nuisance_step(r, np.zeros_like(taken))
+                nuisance = fraction * still + (nuisance_step(r, taken) - still)
+                tangents = linear.sensitivities @ np.concatenate([nuisance, taken]) + fraction * linear.matching
+                trajectories[i] = stepped(fit.trajectories[i], tangents)
+            if not _finite(trajectories):
+                fractions[again] *= _SHORTER
                 continue
-            trial = replace(fit, chains=tuple(chains), at=at)
+            trial = replace(fit, trajectories=tuple(trajectories), at=at)
             for i, linear in zip(again, linearised(trial, only=again), strict=True):
                 new[i] = linear
             again = [i for i in again if not self._nearer(i, trial, new[i])]
@@ -393,9 +395,9 @@ class GaussNewtonStep:
                     self._own_merit(i, new_fit, new[i]) > _ROSE * self._own_merit(i, fit, fit.linears[i])
                     for i in range(count)
                 ]
-                return new_fit, (shares < 1.0) | np.array(rose)
-            shares[again] *= _SHORTER
-        return None, shares < 1.0
+                return new_fit, (fractions < 1.0) | np.array(rose)
+            fractions[again] *= _SHORTER
+        return None, fractions < 1.0
 
     def _nearer(self, i: int, trial: Fit, new: Linear) -> bool:
         """Tell whether a step has not led a recording astray."""
@@ -407,58 +409,62 @@ class GaussNewtonStep:
         return bool(now < bar)
 
     def _own_merit(self, i: int, fit: Fit, linear: Linear) -> float:
-        """Return the chi-squared of one recording, its jumps included."""
-        one = replace(fit, chains=(fit.chains[i],), parameters=(), at=np.empty(0))
+        """Return the chi-squared of one recording, its defects included."""
+        one = replace(fit, trajectories=(fit.trajectories[i],), parameters=(), at=np.empty(0))
         return merit_of(one, (linear,))
 
 
-def _finite(chains: Sequence[Chain]) -> bool:
+def _finite(trajectories: Sequence[Trajectory]) -> bool:
     """Tell whether all states are numbers."""
-    return all(bool(np.all(np.isfinite(chain.states))) for chain in chains)
+    return all(bool(np.all(np.isfinite(trajectory.states))) for trajectory in trajectories)
 
 
 #: how hard steps are held to that: not at all, at first, at least after a step that went too far, and at most; what it
 #: is multiplied by after a step that went too far, and after one that did not
-_FREE, _FIRST_HOLD, _LEAST_HOLD, _MOST_HOLD = 0.0, 0.3, 0.1, 3.0
+_FREE, _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 0.0, 0.3, 0.1, 3.0
 _TIGHTER, _LOOSER = 5.0, 0.7
 
 
-def _reach(fit: Fit, hold: FloatArray) -> FloatArray | None:
+def _trust_radii(fit: Fit, damping: FloatArray) -> FloatArray | None:
     """Return how far one step takes each parameter (p,) of which the readings say little; None where steps are free.
 
-    ``hold`` (c,) is how hard each recording's own are held to it. Where a fit ends does not depend on it.
+    ``damping`` (c,) is how hard each recording's own are held to it. Where a fit ends does not depend on it.
     """
-    if not np.any(hold):
+    if not np.any(damping):
         return None
-    reach = np.full(len(fit.parameters), np.inf)
+    radius = np.full(len(fit.parameters), np.inf)
     for j, q in enumerate(fit.parameters):
         if q.key in fit.plant.own_keys and q.recordings is not None:
-            reach[j] = OWN_REACH * q.sigma / np.sqrt(np.max(hold[list(q.recordings)]))
-    return reach
+            radius[j] = OWN_TRUST_RADIUS * q.sigma / np.sqrt(np.max(damping[list(q.recordings)]))
+    return radius
 
 
-#: gaps of a chain below this share of the steps of its differences are closed
+#: gaps of a trajectory below this share of the steps of its differences are closed
 _CLOSED = 20.0
 
 
-def open_gaps(fit: Fit) -> bool:
-    """Tell whether pieces that may not jump still do."""
-    forbidden = ~fit.jumps.allowed
+def discontinuous(fit: Fit) -> bool:
+    """Tell whether segments that may not jump still do."""
+    forbidden = ~fit.defects.allowed
     steps = fit.plant.sizes.differences
-    return any(bool(np.any(np.abs(linear.gaps[:, forbidden]) > _CLOSED * steps[forbidden])) for linear in fit.linears)
+    return any(
+        bool(np.any(np.abs(linear.mismatch[:, forbidden]) > _CLOSED * steps[forbidden])) for linear in fit.linears
+    )
 
 
-def _reduced(fit: Fit) -> Callable[[Linear, Chain, float], Reduced]:
-    """Return `reduce` with the noise and the jumps of a fit."""
-    return lambda linear, chain, hold: reduce(linear, chain, fit.noise, fit.jumps, hold)
+def _reduced(fit: Fit) -> Callable[[Linear, Trajectory, float], Reduced]:
+    """Return `reduce` with the noise and the defects of a fit."""
+    return lambda linear, trajectory, damping: reduce(linear, trajectory, fit.noise, fit.defects, damping)
 
 
-def _part(chain: Chain, linear: Linear, local: FloatArray, shared: FloatArray, share: float) -> Chain:
-    """Return the chain after a share of a step, the closing of gaps included."""
-    tangents = share * (linear.moves @ np.concatenate([local, shared]) + linear.closing)
-    return stepped(chain, tangents)
+def _part(
+    trajectory: Trajectory, linear: Linear, nuisance: FloatArray, common: FloatArray, fraction: float
+) -> Trajectory:
+    """Return the trajectory after a share of a step, the closing of gaps included."""
+    tangents = fraction * (linear.sensitivities @ np.concatenate([nuisance, common]) + linear.matching)
+    return stepped(trajectory, tangents)
 
 
 def residuals_after(fit: Fit, reduced: Sequence[Reduced], step: FloatArray) -> list[FloatArray]:
     """Return the residuals (n,) of each recording that a step of the shared parameters is expected to leave."""
-    return [linear.after(local_step(r, step), step) for linear, r in zip(fit.linears, reduced, strict=True)]
+    return [linear.after(nuisance_step(r, step), step) for linear, r in zip(fit.linears, reduced, strict=True)]

@@ -1,9 +1,9 @@
-"""A recording as a chain of short pieces of motion, and how its readings depend on every unknown: one linearisation.
+"""Multiple shooting: a recording as a trajectory of short segments, and how its readings depend on every unknown.
 
-One long simulation from the release has many wrong minima: a spin phase that is off by a turn is one. Here each piece
+One long simulation from the release has many wrong minima: a spin phase that is off by a turn is one. Here each segment
 of half a second starts from a state of its own, so that it stays beside the data whatever physics is missing. The
-unknowns of a recording are the first state and the jumps between pieces; where jumps are not allowed, the step of a
-fit closes them (multiple shooting; Bock, "Recent advances in parameter identification", 1983).
+unknowns of a recording are the first state and the defects between segments; where defects are not allowed, the step of
+a fit closes them (multiple shooting; Bock, "Recent advances in parameter identification", 1983).
 """
 
 from __future__ import annotations
@@ -36,57 +36,57 @@ from validation.identification.propagation import (
     runner_of,
 )
 from validation.identification.readings import group_of
-from validation.identification.segments import Chain, stepped
+from validation.identification.segments import Trajectory, stepped
 from validation.identification.sensor_model import CLOCKS, is_motion, predicted
 
 __all__ = ["linearise", "moved", "reread"]
 
 #: neighbours simulated at a time, to bound memory
 _BATCH = 16
-#: instants of several pieces that are read together
+#: instants of several segments that are read together
 _INSTANTS = 256
-#: fewest pieces that are worth a thread of their own
+#: fewest segments that are worth a thread of their own
 _SHARE = 3
 #: a lagged sensor has forgotten its start after this many time constants
 _FORGOTTEN = 8.0
 
 
 def linearise(
-    current: Chain,
+    current: Trajectory,
     values: Values,
     columns: Sequence[Column],
-    jumps: BoolArray,
+    defects: BoolArray,
     *,
     central: bool = True,
     threads: int = 1,
 ) -> Linear:
-    """Linearise the readings of a chain about its states and values.
+    """Linearise the readings of a trajectory about its states and values.
 
-    ``columns`` are parameters with the step of their differences; ``jumps`` (d,) tells in which directions pieces may
-    jump. Columns are differences of the piece's own motion, chained over the pieces; one-sided ones, where ``central``
-    is false, cost half. The pieces are run on so many ``threads``.
+    ``columns`` are parameters with the step of their differences; ``defects`` (d,) tells in which directions segments
+    may jump. Columns are differences of the segment's own motion, chained over the segments; one-sided ones, where
+    ``central`` is false, cost half. The segments are run on so many ``threads``.
     """
     around = _Around(current, values, columns, central)
     samples = [Sampled(current, readings, values) for readings in current.readings]
     # the instants of all sensors, each with its neighbours in time for slopes and its past for a lag
-    piece_of = [current.segment_of(s.instants) for s in samples]
+    segment_of = [current.segment_of(s.instants) for s in samples]
     read = _Read(around, samples)
-    ends = read.run_all(piece_of, threads)
-    chained = _chained(current, around, ends, jumps)
+    ends = read.run_all(segment_of, threads)
+    continuity = _continuity(current, around, ends, defects)
     for s, M, rows in zip(samples, read.slopes, read.rows, strict=True):
         _add_sensor_columns(around, s, rows, M)
-    return _stack(current, samples, read, piece_of, chained)
+    return _stack(current, samples, read, segment_of, continuity)
 
 
 class _Around:
-    """The neighbours of a chain's motion: one per direction of a state and per parameter of the motion, or two.
+    """The neighbours of a trajectory's motion: one per direction of a state and per parameter of the motion, or two.
 
     Row 0 is the motion itself; then come ``half`` neighbours ahead and, where differences are central, as many behind;
     none at all where ``central`` is None.
     """
 
-    def __init__(self, current: Chain, values: Values, columns: Sequence[Column], central: bool | None) -> None:
-        self.chain, self.values, self.columns, self.central = current, values, columns, central
+    def __init__(self, current: Trajectory, values: Values, columns: Sequence[Column], central: bool | None) -> None:
+        self.trajectory, self.values, self.columns, self.central = current, values, columns, central
         self.recording, self.plant = recording, plant = current.recording, current.plant
         self.effects = effects = current.effects
         self.runner = runner_of(recording, values, columns, effects)
@@ -166,8 +166,8 @@ class _Around:
         return np.asarray((ahead - behind) / span.reshape(-1, *(1,) * (values.ndim - 1)))
 
 
-def reread(current: Chain, values: Values, linear: Linear, threads: int = 1) -> Linear | None:
-    """Return a linearisation with the residuals where a chain stands now, and its slopes as they were (a chord).
+def reread(current: Trajectory, values: Values, linear: Linear, threads: int = 1) -> Linear | None:
+    """Return a linearisation with the residuals where a trajectory stands now, and its slopes as they were (a chord).
 
     One motion in the place of dozens, for steps within which the slopes hardly change. None where other readings take
     part, or fall into other segments, than in ``linear``.
@@ -188,27 +188,27 @@ def reread(current: Chain, values: Values, linear: Linear, threads: int = 1) -> 
             channel = next(channels, None)
             if channel is None or not np.array_equal(channel.index, index):
                 return None
-            if not np.array_equal(linear.piece[channel.rows], segment[index] if s.nodes == 1 else -1 + 0 * index):
+            if not np.array_equal(linear.segment[channel.rows], segment[index] if s.nodes == 1 else -1 + 0 * index):
                 return None
             raw.append(s.readings.value[index, axis] - prediction[index, axis])
     if next(channels, None) is not None:
         return None
-    gaps = current.plant.layout.difference(current.states[1:], ends[:-1])
-    closing = _closing(linear.passes, gaps, np.setdiff1d(np.arange(d), linear.jump_kind))
-    jump, some = np.zeros_like(linear.jump), linear.jump_kind >= 0
-    jump[some] = gaps[linear.jump_piece[some] - 1, linear.jump_kind[some]]
+    mismatch = current.plant.layout.difference(current.states[1:], ends[:-1])
+    matching = _matching(linear.transitions, mismatch, np.setdiff1d(np.arange(d), linear.defect_kind))
+    defect, some = np.zeros_like(linear.defect), linear.defect_kind >= 0
+    defect[some] = mismatch[linear.defect_segment[some] - 1, linear.defect_kind[some]]
     return replace(
         linear,
         raw=np.concatenate([np.empty(0), *raw]),
-        jump=jump,
-        closing=closing,
-        gaps=gaps,
-        shifts=np.einsum("nd,nd->n", linear.own[:, :d], closing[linear.piece]),
+        defect=defect,
+        matching=matching,
+        mismatch=mismatch,
+        shifts=np.einsum("nd,nd->n", linear.own[:, :d], matching[linear.segment]),
     )
 
 
 class _Read:
-    """What each sensor reads of a chain's motion, and its slopes by the state of its piece and by the parameters.
+    """What each sensor reads of a trajectory's motion, and its slopes by its segment's state and the parameters.
 
     Attributes
     ----------
@@ -226,35 +226,35 @@ class _Read:
         self.ideal = [np.empty((s.instants.size, s.width)) for s in samples]
         self.slopes = [np.zeros((s.instants.size, s.width, columns)) for s in samples]
 
-    def run_all(self, piece_of: Sequence[IntArray], threads: int) -> FloatArray:
-        """Run all pieces and read the sensors; return the states (k, c, s) at the ends of the pieces.
+    def run_all(self, segment_of: Sequence[IntArray], threads: int) -> FloatArray:
+        """Run all segments and read the sensors; return the states (k, c, s) at the ends of the segments.
 
-        Each piece starts from a state of its own, so that shares of them run side by side on ``threads``.
+        Each segment starts from a state of its own, so that shares of them run side by side on ``threads``.
         """
         ends = np.empty(self._around.states.shape)
         shares = np.array_split(np.arange(len(ends)), max(1, min(threads, len(ends) // _SHARE)))
         if len(shares) == 1:
-            self._run(shares[0], piece_of, ends)
+            self._run(shares[0], segment_of, ends)
             return ends
         with ThreadPoolExecutor(len(shares)) as pool:
-            tasks = [pool.submit(copy_context().run, self._run, share, piece_of, ends) for share in shares]
+            tasks = [pool.submit(copy_context().run, self._run, share, segment_of, ends) for share in shares]
             for task in tasks:
                 task.result()
         return ends
 
-    def _run(self, share: IntArray, piece_of: Sequence[IntArray], ends: FloatArray) -> None:
-        """Run a share of the pieces, read the sensors there, and write the states (c, s) at its ends into ``ends``."""
-        around, edges = self._around, self._around.chain.edges
+    def _run(self, share: IntArray, segment_of: Sequence[IntArray], ends: FloatArray) -> None:
+        """Run a share of the segments, read the sensors, and write the states (c, s) at its ends into ``ends``."""
+        around, nodes = self._around, self._around.trajectory.nodes
         waiting: list[tuple[list[IntArray], IntArray, FloatArray]] = []
         acted, flats, owns = around.everyone, around.flats, around.owns
         for i in share:
-            start, stop = float(edges[i]), float(edges[i + 1])
-            own = [np.flatnonzero(piece == i) for piece in piece_of]
+            start, stop = float(nodes[i]), float(nodes[i + 1])
+            own = [np.flatnonzero(segment == i) for segment in segment_of]
             instants = [s.instants[o] for s, o in zip(self._samples, own, strict=True)]
             # sensors of one board share their instants: the motion at each is worked out once
             out, place = np.unique(np.concatenate([np.empty(0), *instants]), return_inverse=True)
             last_instant = float(out[-1]) if out.size else stop
-            times, last = around.runner.times(start, stop, last_instant, around.chain.states[i])
+            times, last = around.runner.times(start, stop, last_instant, around.trajectory.states[i])
             acting = around.acting(start, float(times[-1]))
             if not np.array_equal(acting, acted):
                 self._read(waiting, acted)
@@ -275,22 +275,22 @@ class _Read:
                 waiting = []
         self._read(waiting, acted)
 
-    def _read(self, pieces: Sequence[tuple[list[IntArray], IntArray, FloatArray]], acting: IntArray) -> None:
-        """Read the sensors in the rows of pieces, which are those of the neighbours that are ``acting`` there.
+    def _read(self, segments: Sequence[tuple[list[IntArray], IntArray, FloatArray]], acting: IntArray) -> None:
+        """Read the sensors in the rows of segments, which are those of the neighbours that are ``acting`` there.
 
-        A piece is the readings of each sensor in it, the place of each among its instants, and its rows.
+        A segment is the readings of each sensor in it, the place of each among its instants, and its rows.
         """
-        if not pieces:
+        if not segments:
             return
         around = self._around
         row_of_neighbour = {int(neighbour): row for row, neighbour in enumerate(acting)}
-        bounds = [np.cumsum([0, *(o.size for o in own)]) for own, *_ in pieces]
+        bounds = [np.cumsum([0, *(o.size for o in own)]) for own, *_ in segments]
         for which, s in enumerate(self._samples):
-            o = np.concatenate([own[which] for own, *_ in pieces])
+            o = np.concatenate([own[which] for own, *_ in segments])
             if o.size == 0:
                 continue
             mine = np.concatenate(
-                [rows[:, place[b[which] : b[which + 1]]] for b, (_, place, rows) in zip(bounds, pieces, strict=True)],
+                [rows[:, place[b[which] : b[which + 1]]] for b, (_, place, rows) in zip(bounds, segments, strict=True)],
                 axis=1,
             )
             t = s.instants[o]
@@ -317,45 +317,45 @@ class _Read:
 
 
 @dataclass(frozen=True)
-class _Chained:
-    """How the pieces follow the unknowns and one another; as the attributes of `Linear` of these names."""
+class _Continuity:
+    """How the segments follow the unknowns and one another; as the attributes of `Linear` of these names."""
 
-    moves: FloatArray
-    passes: FloatArray
-    closing: FloatArray
-    gaps: FloatArray
+    sensitivities: FloatArray
+    transitions: FloatArray
+    matching: FloatArray
+    mismatch: FloatArray
     allowed: IntArray
     unknowns: int
 
 
-def _chained(current: Chain, around: _Around, ends: FloatArray, jumps: BoolArray) -> _Chained:
-    """Chain the pieces: their states as functions of [first state | jumps | parameters]."""
+def _continuity(current: Trajectory, around: _Around, ends: FloatArray, defects: BoolArray) -> _Continuity:
+    """Chain the segments: their states as functions of [first state | defects | parameters]."""
     layout, d, k, p = current.plant.layout, around.d, current.states.shape[0], len(around.columns)
-    allowed, forbidden = np.flatnonzero(jumps), np.flatnonzero(~jumps)
+    allowed, forbidden = np.flatnonzero(defects), np.flatnonzero(~defects)
     u = d + (k - 1) * allowed.size
     S = np.zeros((k, d, u + p))
     S[0, :, :d] = np.eye(d)
-    passes = np.zeros((max(k - 1, 0), d, d + p))
+    transitions = np.zeros((max(k - 1, 0), d, d + p))
     nominal = ends[:-1, 0]
-    gaps = layout.difference(current.states[1:], nominal)
+    mismatch = layout.difference(current.states[1:], nominal)
     reached = layout.difference(ends[:-1], np.broadcast_to(nominal[:, None], ends[:-1].shape))
-    passes[:, :, around.places] = np.moveaxis(around.slopes(np.moveaxis(reached, 1, 0)), 0, 2)
+    transitions[:, :, around.places] = np.moveaxis(around.slopes(np.moveaxis(reached, 1, 0)), 0, 2)
     for i in range(k - 1):
-        Phi, first = passes[i, :, :d], d + i * allowed.size
+        Phi, first = transitions[i, :, :d], d + i * allowed.size
         S[i + 1, :, :first] = Phi @ S[i, :, :first]
-        S[i + 1, :, u:] = Phi @ S[i, :, u:] + passes[i, :, d:]
+        S[i + 1, :, u:] = Phi @ S[i, :, u:] + transitions[i, :, d:]
         S[i + 1, allowed, first + np.arange(allowed.size)] = 1.0
-    return _Chained(S, passes, _closing(passes, gaps, forbidden), gaps, allowed, u)
+    return _Continuity(S, transitions, _matching(transitions, mismatch, forbidden), mismatch, allowed, u)
 
 
-def _closing(passes: FloatArray, gaps: FloatArray, forbidden: IntArray) -> FloatArray:
-    """Return how the states of the pieces (k, d) move to close the jumps that are not allowed."""
-    d = gaps.shape[1]
-    closing = np.zeros((gaps.shape[0] + 1, d))
-    for i, gap in enumerate(gaps):
-        closing[i + 1] = passes[i, :, :d] @ closing[i]
-        closing[i + 1, forbidden] -= gap[forbidden]
-    return closing
+def _matching(transitions: FloatArray, mismatch: FloatArray, forbidden: IntArray) -> FloatArray:
+    """Return how the states of the segments (k, d) move to close the defects that are not allowed."""
+    d = mismatch.shape[1]
+    matching = np.zeros((mismatch.shape[0] + 1, d))
+    for i, gap in enumerate(mismatch):
+        matching[i + 1] = transitions[i, :, :d] @ matching[i]
+        matching[i + 1, forbidden] -= gap[forbidden]
+    return matching
 
 
 def _add_sensor_columns(around: _Around, s: Sampled, rows: FloatArray, M: FloatArray) -> None:
@@ -369,7 +369,7 @@ def _add_sensor_columns(around: _Around, s: Sampled, rows: FloatArray, M: FloatA
         place = around.d + j
         if group in CLOCKS or group in _LAGS:
             if rate is None:
-                rate = s.time_slope(around.runner, around.flat, around.own, values, around.chain)
+                rate = s.time_slope(around.runner, around.flat, around.own, values, around.trajectory)
             if group in CLOCKS:
                 base = around.current(group, name)
                 plus, minus = {**here, (group, name): base + size}, {**here, (group, name): base - size}
@@ -430,22 +430,26 @@ def _counted(s: Sampled, prediction: FloatArray, axis: int) -> IntArray:
 
 
 def _stack(
-    current: Chain, samples: Sequence[Sampled], read: _Read, piece_of: Sequence[IntArray], chained: _Chained
+    current: Trajectory,
+    samples: Sequence[Sampled],
+    read: _Read,
+    segment_of: Sequence[IntArray],
+    continuity: _Continuity,
 ) -> Linear:
     """Put the rows of all sensors together, channel by channel, without those that take no part."""
-    S, closing, u = chained.moves, chained.closing, chained.unknowns
-    raw, own, pieces, whole, t, sd, shifts = [], [], [], [], [], [], []
+    S, matching, u = continuity.sensitivities, continuity.matching, continuity.unknowns
+    raw, own, segments, whole, t, sd, shifts = [], [], [], [], [], [], []
     channels: list[Channel] = []
     at = 0
     d = current.plant.layout.directions
     p = S.shape[2] - u
-    for s, y, M, piece in zip(samples, read.ideal, read.slopes, piece_of, strict=True):
+    for s, y, M, segment in zip(samples, read.ideal, read.slopes, segment_of, strict=True):
         readings = s.readings
-        # what the closing of forbidden jumps adds
-        closed = np.einsum("mwd,md->mw", M[:, :, :d], closing[piece])
+        # what the closing of forbidden defects adds
+        closed = np.einsum("mwd,md->mw", M[:, :, :d], matching[segment])
         spread = s.nodes > 1
         if spread:
-            M = _by_unknowns(M, piece, chained)
+            M = _by_unknowns(M, segment, continuity)
         prediction, slopes, closed = s.weighted(y), s.weighted(M), s.weighted(closed)
         for axis in range(s.width):
             index = _counted(s, prediction, axis)
@@ -455,10 +459,10 @@ def _stack(
             if spread:
                 whole.append(slopes[index, axis])
                 own.append(np.zeros((index.size, d + p)))
-                pieces.append(np.full(index.size, -1))
+                segments.append(np.full(index.size, -1))
             else:
                 own.append(slopes[index, axis])
-                pieces.append(piece[index])
+                segments.append(segment[index])
             shifts.append(closed[index, axis])
             t.append(readings.t[index])
             sd.append(np.broadcast_to(readings.sd, readings.value.shape)[index, axis])
@@ -473,40 +477,40 @@ def _stack(
     return Linear(
         joined(raw),
         rows_of,
-        joined(pieces).astype(np.int64),
+        joined(segments).astype(np.int64),
         joined(whole) if whole else np.empty((0, u + p)),
         joined(t),
         joined(sd),
         tuple(channels),
-        *_jumps(chained),
+        *_jumps(continuity),
         S,
-        chained.passes,
-        closing,
-        chained.gaps,
+        continuity.transitions,
+        matching,
+        continuity.mismatch,
         joined(shifts),
     )
 
 
-def _by_unknowns(M: FloatArray, piece: IntArray, chained: _Chained) -> FloatArray:
-    """Return slopes (m, width, u + p) by the unknowns of a recording from those by the states of pieces, M."""
-    d, u = chained.moves.shape[1], chained.unknowns
-    full = np.empty((*M.shape[:2], chained.moves.shape[2]))
-    for i in np.unique(piece):
-        full[piece == i] = M[piece == i, :, :d] @ chained.moves[i]
+def _by_unknowns(M: FloatArray, segment: IntArray, continuity: _Continuity) -> FloatArray:
+    """Return slopes (m, width, u + p) by the unknowns of a recording from those by the states of segments, M."""
+    d, u = continuity.sensitivities.shape[1], continuity.unknowns
+    full = np.empty((*M.shape[:2], continuity.sensitivities.shape[2]))
+    for i in np.unique(segment):
+        full[segment == i] = M[segment == i, :, :d] @ continuity.sensitivities[i]
     full[:, :, u:] += M[:, :, d:]
     return full
 
 
-def _jumps(chained: _Chained) -> tuple[FloatArray, IntArray, IntArray]:
-    """Return size (u,), direction (-1: none) and piece of the jumps among the unknowns."""
-    d, u, allowed = chained.moves.shape[1], chained.unknowns, chained.allowed
-    jump, kind, where = np.zeros(u), np.full(u, -1), np.zeros(u, dtype=np.int64)
-    for i, gap in enumerate(chained.gaps):
+def _jumps(continuity: _Continuity) -> tuple[FloatArray, IntArray, IntArray]:
+    """Return size (u,), direction (-1: none) and segment of the defects among the unknowns."""
+    d, u, allowed = continuity.sensitivities.shape[1], continuity.unknowns, continuity.allowed
+    defect, kind, where = np.zeros(u), np.full(u, -1), np.zeros(u, dtype=np.int64)
+    for i, gap in enumerate(continuity.mismatch):
         place = slice(d + i * allowed.size, d + (i + 1) * allowed.size)
-        jump[place], kind[place], where[place] = gap[allowed], allowed, i + 1
-    return jump, kind, where
+        defect[place], kind[place], where[place] = gap[allowed], allowed, i + 1
+    return defect, kind, where
 
 
-def moved(current: Chain, linear: Linear, local: FloatArray, shared: FloatArray) -> Chain:
-    """Return the chain after a step of its unknowns: local (l,) and shared (p,)."""
-    return stepped(current, linear.moves @ np.concatenate([local, shared]) + linear.closing)
+def moved(current: Trajectory, linear: Linear, nuisance: FloatArray, common: FloatArray) -> Trajectory:
+    """Return the trajectory after a step of its unknowns: local (l,) and shared (p,)."""
+    return stepped(current, linear.sensitivities @ np.concatenate([nuisance, common]) + linear.matching)

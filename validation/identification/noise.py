@@ -1,7 +1,8 @@
-"""Noise as it is: level and correlation of each sensor from residuals, and the whitening that follows.
+"""Noise as it is: level and first-order correlation of each sensor from residuals, and the whitening that follows.
 
-Each group (a sensor; gps.position and gps.velocity apart) has one level and one first-order correlation for all its
-axes and recordings. What a sheet states is a first guess and a thing to compare with.
+Takes residuals; gives a `NoiseModel` and whitened rows (Cochrane and Orcutt, 1949). Each group (a sensor; gps.position
+and gps.velocity apart) has one level and one correlation for all its axes and recordings. What a sheet states is a
+first guess and a thing to compare with.
 """
 
 from __future__ import annotations
@@ -59,10 +60,10 @@ class GroupNoise(NamedTuple):
 NoiseModel = Mapping[str, GroupNoise]
 
 
-def whitened(linear: Linear, noise: NoiseModel, columns: FloatArray, piece: IntArray | None = None) -> FloatArray:
+def whitened(linear: Linear, noise: NoiseModel, columns: FloatArray, segment: IntArray | None = None) -> FloatArray:
     """Return columns (n, c) with rows divided by the noise and freed of its correlation.
 
-    With ``piece`` (n,) rows of different pieces stay apart: the first of a piece keeps its correlated part.
+    With ``segment`` (n,) rows of different segments stay apart: the first of a segment keeps its correlated part.
     Rows of no channel become zero.
     """
     result = np.zeros_like(columns)
@@ -72,8 +73,8 @@ def whitened(linear: Linear, noise: NoiseModel, columns: FloatArray, piece: IntA
         if own.relative:
             x /= linear.sd[channel.rows, None]
         if own.correlation and x.shape[0] > 1:
-            pieces = None if piece is None else piece[channel.rows]
-            cuts = [] if pieces is None else [*(np.flatnonzero(np.diff(pieces) != 0) + 1)]
+            segments = None if segment is None else segment[channel.rows]
+            cuts = [] if segments is None else [*(np.flatnonzero(np.diff(segments) != 0) + 1)]
             for start, stop in pairwise([0, *cuts, x.shape[0]]):
                 x[start:stop] = _freed(x[start:stop], own, channel.index[start:stop])
         result[channel.rows] = x

@@ -1,4 +1,7 @@
-"""Normal equations with each recording's own unknowns eliminated (Schur complement), and their solution."""
+"""Normal equations with each recording's nuisance unknowns eliminated (Schur complement), and their solution.
+
+Takes a `Linear`, its noise and priors; gives the reduced normal matrix of the common parameters, and steps of both.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +15,13 @@ from scipy.linalg import cho_solve, solve_triangular
 from discsim.arrays import FloatArray
 from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel, whitened
-from validation.identification.parameters import Jumps, Parameter
+from validation.identification.parameters import AllowedDefects, Parameter
 from validation.identification.release_prior import release_rows
-from validation.identification.segments import Chain
+from validation.identification.segments import Trajectory
 
 __all__ = [
     "CUT_OFF",
-    "OWN_REACH",
+    "OWN_TRUST_RADIUS",
     "Reduced",
     "inverse_of",
     "known_directions",
@@ -66,36 +69,36 @@ class Reduced:
 
 def normal_matrix(linear: Linear, noise: NoiseModel) -> FloatArray:
     """Return the normal matrix (l + p + 1, l + p + 1) over [local | shared | residual] of whitened rows."""
-    u, d = linear.unknowns, linear.moves.shape[1]
+    u, d = linear.unknowns, linear.sensitivities.shape[1]
     if u == d:
-        A = whitened(linear, noise, np.hstack([linear.local, linear.shared, linear.residual[:, None]]))
+        A = whitened(linear, noise, np.hstack([linear.nuisance, linear.common, linear.residual[:, None]]))
         return np.asarray(A.T @ A)
-    # with jumps the full rows are long and mostly empty: what later pieces say of a state is summed backwards, and a
-    # jump meets the unknowns before it through the state that it moves
-    rows = whitened(linear, noise, np.hstack([linear.own, linear.residual[:, None]]), linear.piece)
-    k, width = linear.moves.shape[0], linear.moves.shape[2] + 1
+    # with defects the full rows are long and mostly empty: what later segments say of a state is summed backwards, and
+    # a jump meets the unknowns before it through the state that it moves
+    rows = whitened(linear, noise, np.hstack([linear.own, linear.residual[:, None]]), linear.segment)
+    k, width = linear.sensitivities.shape[0], linear.sensitivities.shape[2] + 1
     p = width - 1 - u
     G = np.zeros((width, width))
     later = np.zeros((d + p + 1, d + p + 1))
     passing = np.eye(d + p + 1)
     for i in reversed(range(k)):
         if i + 1 < k:
-            passing[:d, :-1] = linear.passes[i]
+            passing[:d, :-1] = linear.transitions[i]
             later = passing.T @ later @ passing
-        mine = rows[linear.piece == i]
+        mine = rows[linear.segment == i]
         later += mine.T @ mine
-        unknown = np.flatnonzero(linear.jump_piece == i)
-        moved = np.arange(d) if i == 0 else linear.jump_kind[unknown]
+        unknown = np.flatnonzero(linear.defect_segment == i)
+        moved = np.arange(d) if i == 0 else linear.defect_kind[unknown]
         told = later[moved]
         places = np.r_[: unknown[-1] + 1 if unknown.size else 0, u : width - 1]
-        G[unknown[:, None], places] = told[:, :d] @ linear.moves[i][:, places]
+        G[unknown[:, None], places] = told[:, :d] @ linear.sensitivities[i][:, places]
         G[unknown, u:] += told[:, d:]
     G[u:, u:] = later[d:, d:]
     G[:u, :u] = np.tril(G[:u, :u]) + np.tril(G[:u, :u], -1).T
     G[u:, :u] = G[:u, u:].T
     if linear.whole.size:
-        # readings that hang on several pieces come in whole channels
-        spread = linear.piece < 0
+        # readings that hang on several segments come in whole channels
+        spread = linear.segment < 0
         columns = np.zeros((linear.raw.size, width))
         columns[spread, :-1], columns[spread, -1] = linear.whole, linear.residual[spread]
         A = whitened(linear, noise, columns)[spread]
@@ -103,15 +106,15 @@ def normal_matrix(linear: Linear, noise: NoiseModel) -> FloatArray:
     return G
 
 
-def unknown_prior(linear: Linear, current: Chain, jumps: Jumps) -> tuple[FloatArray, FloatArray, float]:
+def unknown_prior(linear: Linear, current: Trajectory, defects: AllowedDefects) -> tuple[FloatArray, FloatArray, float]:
     """Return what is known of a recording's own unknowns beside its readings: normal matrix (l, l), pull (l,), chi2."""
     u = linear.unknowns
     prior = np.zeros(u)
-    first = linear.jump_kind < 0
-    prior[first] = (current.plant.sizes.unknown if current.reach is None else current.reach) ** -2.0
-    prior[~first] = jumps.sd[linear.jump_kind[~first]] ** -2.0
-    # a jump is pulled to zero from where it stands
-    H, right, chi2 = np.diag(prior), -prior * linear.jump, float(prior @ linear.jump**2)
+    first = linear.defect_kind < 0
+    prior[first] = (current.plant.sizes.unknown if current.trust_radius is None else current.trust_radius) ** -2.0
+    prior[~first] = defects.sd[linear.defect_kind[~first]] ** -2.0
+    # a defect is pulled to zero from where it stands
+    H, right, chi2 = np.diag(prior), -prior * linear.defect, float(prior @ linear.defect**2)
     stated, rows = release_rows(current)
     if stated.size:
         d = rows.shape[1]
@@ -122,15 +125,17 @@ def unknown_prior(linear: Linear, current: Chain, jumps: Jumps) -> tuple[FloatAr
     return H, right, chi2
 
 
-def reduce(linear: Linear, current: Chain, noise: NoiseModel, jumps: Jumps, hold: float = 0.0) -> Reduced:
-    """Eliminate the local unknowns of a recording; ``hold`` keeps its attitude from turning far in one step."""
+def reduce(
+    linear: Linear, current: Trajectory, noise: NoiseModel, defects: AllowedDefects, damping: float = 0.0
+) -> Reduced:
+    """Eliminate the local unknowns of a recording; ``damping`` keeps its attitude from turning far in one step."""
     u = linear.unknowns
     G = normal_matrix(linear, noise)
-    H, right, chi2 = unknown_prior(linear, current, jumps)
+    H, right, chi2 = unknown_prior(linear, current, defects)
     attitude = current.plant.layout.attitude
-    if hold and attitude is not None:
+    if damping and attitude is not None:
         turns = list(current.plant.layout.directions_of(attitude))
-        H[turns, turns] += hold * _ATTITUDE_REACH**-2.0
+        H[turns, turns] += damping * _ATTITUDE_TRUST_RADIUS**-2.0
     G[:u, :u] += H
     G[:u, -1] += right
     G[-1, :u] += right
@@ -166,10 +171,10 @@ def lower_root(H: FloatArray) -> FloatArray:
         return np.asarray(upper.T)
 
 
-def local_step(reduced: Reduced, shared: FloatArray) -> FloatArray:
+def nuisance_step(reduced: Reduced, common: FloatArray) -> FloatArray:
     """Return the step of the local unknowns that goes with a step of the shared ones (p,)."""
     L, scale = reduced.factor
-    right = reduced.cross[:, -1] - reduced.cross[:, :-1] @ shared
+    right = reduced.cross[:, -1] - reduced.cross[:, :-1] @ common
     return np.asarray(scale * cho_solve((L, True), right, check_finite=False))
 
 
@@ -181,10 +186,10 @@ def local_covariance(reduced: Reduced, covariance: FloatArray) -> FloatArray:
     return np.asarray(alone + way @ covariance @ way.T)
 
 
-def shared_step(
-    gram: FloatArray, parameters: Sequence[Parameter], at: FloatArray, reach: FloatArray | None = None
+def common_step(
+    gram: FloatArray, parameters: Sequence[Parameter], at: FloatArray, trust_radius: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Solve for the shared parameters from a summed gram (p + 1, p + 1), each held back to its ``reach`` (p,).
+    """Solve for the shared parameters from a summed gram (p + 1, p + 1), each held back to its ``trust_radius`` (p,).
 
     Returns the step (p,), its covariance (p, p) and what chi-squared is expected to become, priors included; all NaN
     where the fit has gone where its predictions are not finite.
@@ -192,7 +197,7 @@ def shared_step(
     p = len(parameters)
     prior = np.array([q.precision for q in parameters])
     off = np.array([q.stated for q in parameters]) - at
-    H = gram[:p, :p] + np.diag(prior if reach is None else prior + reach**-2.0)
+    H = gram[:p, :p] + np.diag(prior if trust_radius is None else prior + trust_radius**-2.0)
     right = gram[:p, -1] + prior * off
     if p == 0:
         return np.empty(0), np.empty((0, 0)), float(gram[-1, -1])
@@ -209,4 +214,4 @@ def shared_step(
 #: how far one step goes where the readings say little, beyond which motion is far from linear: shares of the sigma of
 #: a plant's own parameters, as how a free spin's wobble dies and turns, and rad of its attitude, which may turn about
 #: the field
-OWN_REACH, _ATTITUDE_REACH = 1.0 / 15.0, 0.02
+OWN_TRUST_RADIUS, _ATTITUDE_TRUST_RADIUS = 1.0 / 15.0, 0.02

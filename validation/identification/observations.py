@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from discsim.recording import SENSORS, Recording
-from validation.identification.clipping import plateau
+from validation.identification.clipping import clipping_level
 from validation.identification.plants import plant_of
 from validation.identification.readings import Readings
 
@@ -29,7 +29,7 @@ def readings_of(recording: Recording) -> tuple[Readings, ...]:
             # a noise of zero is none: nobody knows it
             sd = np.full(measured.shape[1], level if level > 0.0 else np.nan)
             clipped, limit = sheet.clipped(measured), sheet.range
-            lower = plateau(recording) if sensor == "accelerometer" else None
+            lower = clipping_level(recording) if sensor == "accelerometer" else None
             if lower is not None:
                 clipped, limit = np.abs(measured) >= lower - 1e-9 * lower, lower
         good = np.isfinite(measured) & ~clipped

@@ -10,7 +10,7 @@ import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
 
-__all__ = ["Jumps", "Parameter", "Values", "values_of"]
+__all__ = ["AllowedDefects", "Parameter", "Values", "values_of"]
 
 #: parameters that differ from their baseline, by (group, name); groups are effect ids, or aero, disc, environment, rig,
 #: or a plant with parameters of its own; a law's are called TERM.PLACE, as in 0.power_r
@@ -50,14 +50,14 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Jumps:
-    """How far pieces may jump: one-sigma size (d,) in each direction of the state, zero where they may not."""
+class AllowedDefects:
+    """How far segments may jump: one-sigma size (d,) in each direction of the state, zero where they may not."""
 
     sd: FloatArray
 
     @property
     def allowed(self) -> BoolArray:
-        """Directions in which pieces may jump."""
+        """Directions in which segments may jump."""
         return np.asarray(self.sd > 0)
 
 

@@ -1,4 +1,8 @@
-"""Prediction of readings from segments of motion: clocks, lags and what a sensor would show."""
+"""Prediction of readings from shooting segments: clocks, lags and what a sensor would show.
+
+Takes a trajectory and values of parameters; gives readings when they are written. A low-pass is a weighted mean over
+earlier instants (Gauss-Laguerre quadrature of its exponential memory).
+"""
 
 from __future__ import annotations
 
@@ -15,7 +19,7 @@ from validation.identification.noise import GroupNoise
 from validation.identification.parameters import Values
 from validation.identification.propagation import Runner, base_flat, runner_of
 from validation.identification.readings import Readings, group_of
-from validation.identification.segments import Chain
+from validation.identification.segments import Trajectory
 from validation.identification.sensor_model import delay, predicted, sized
 
 __all__ = ["Sampled", "Shiftable", "read", "shiftable", "shown"]
@@ -31,7 +35,7 @@ _LAG_NODES, _LAG_WEIGHTS = np.polynomial.laguerre.laggauss(8)
 class Sampled:
     """The instants at which one sensor's readings show the motion."""
 
-    def __init__(self, current: Chain, readings: Readings, values: Values) -> None:
+    def __init__(self, current: Trajectory, readings: Readings, values: Values) -> None:
         self.readings, self.sensor = readings, readings.sensor
         self.width = readings.value.shape[1]
         self.rate_hz = current.recording.sheets[readings.sensor].rate_hz
@@ -64,11 +68,11 @@ class Sampled:
         return late
 
     def time_slope(
-        self, runner: Runner, flat: FloatArray, own: FloatArray, values: Values, current: Chain
+        self, runner: Runner, flat: FloatArray, own: FloatArray, values: Values, current: Trajectory
     ) -> FloatArray:
         """Return the slopes (m, width) of the ideal readings in time."""
         segments = current.segment_of(self.instants)
-        early = np.maximum(np.maximum(self.instants, current.edges[segments]) - _TIME_STEP, current.edges[segments])
+        early = np.maximum(np.maximum(self.instants, current.nodes[segments]) - _TIME_STEP, current.nodes[segments])
         both, twice = np.concatenate([early + 2.0 * _TIME_STEP, early]), np.concatenate([segments, segments])
         rows = _rows(current, runner, (flat, own), both, twice)
         read = predicted(self.sensor, current.recording, values, both, rows, current.effects)
@@ -83,15 +87,15 @@ class Sampled:
 
 
 def _rows(
-    current: Chain, runner: Runner, parameters: tuple[FloatArray, FloatArray], t: FloatArray, segments: IntArray
+    current: Trajectory, runner: Runner, parameters: tuple[FloatArray, FloatArray], t: FloatArray, segments: IntArray
 ) -> FloatArray:
-    """Return the rows (n, 19) of a chain's motion at instants t (n,) s of its segments (n,).
+    """Return the rows (n, 19) of a trajectory's motion at instants t (n,) s of its segments (n,).
 
     ``parameters`` are those of the physics, laid flat, and the plant's own.
     """
     flat, own = parameters
     rows = np.empty((t.size, ROW))
-    for i, (start, stop) in enumerate(pairwise(current.edges.tolist())):
+    for i, (start, stop) in enumerate(pairwise(current.nodes.tolist())):
         mine = np.flatnonzero(segments == i)
         if mine.size:
             out = np.maximum(t[mine], start)
@@ -100,8 +104,8 @@ def _rows(
     return rows
 
 
-def shown(current: Chain, values: Values, sensor: str, t: FloatArray) -> FloatArray:
-    """Return what a sensor would read (n, k) at true instants t (n,) of a chain's motion, before lag and noise."""
+def shown(current: Trajectory, values: Values, sensor: str, t: FloatArray) -> FloatArray:
+    """Return what a sensor would read (n, k) at true instants t (n,) of a trajectory's motion, before lag and noise."""
     recording = current.recording
     effects = current.effects
     parameters = base_flat(recording, values, (), effects), current.plant.own_values(values)
@@ -109,8 +113,8 @@ def shown(current: Chain, values: Values, sensor: str, t: FloatArray) -> FloatAr
     return predicted(sensor, recording, values, t, rows, effects)
 
 
-def read(current: Chain, values: Values, readings: Readings) -> FloatArray:
-    """Return what a sensor would read (n, width) of a chain's motion when `readings` are written, clocks and lag too.
+def read(current: Trajectory, values: Values, readings: Readings) -> FloatArray:
+    """Return what a sensor would read (n, width) when `readings` are written, clocks and lag too.
 
     Noise, rounding and range are left to whoever asks.
     """
@@ -132,12 +136,12 @@ class Shiftable(NamedTuple):
 
 
 def shiftable(
-    current: Chain, values: Values, readings: Readings, noise: Mapping[str, GroupNoise], step: float
+    current: Trajectory, values: Values, readings: Readings, noise: Mapping[str, GroupNoise], step: float
 ) -> Shiftable:
-    """Return readings beside what a chain's motion shows on a grid of ``step`` s."""
+    """Return readings beside what a trajectory's motion shows on a grid of ``step`` s."""
     sensor = readings.sensor
     sd = np.array([noise[group_of(sensor, axis)].sd for axis in range(readings.value.shape[1])])
-    grid = np.arange(float(current.edges[0]), float(current.edges[-1]), step)
+    grid = np.arange(float(current.nodes[0]), float(current.nodes[-1]), step)
     value = np.where(readings.good, readings.value, np.nan) / sd
     at = readings.t - delay(values, sensor, readings.t)
     return Shiftable(at, value, grid, shown(current, values, sensor, grid) / sd)

@@ -1,4 +1,4 @@
-"""What a recording states of its release, as rows of a prior upon the first state."""
+"""What a recording states of its release, as rows of a Gaussian prior upon the first state (maximum a posteriori)."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.frames import euler_angles
-from validation.identification.segments import Chain
+from validation.identification.segments import Trajectory
 
 __all__ = []
 
 
-def release_rows(current: Chain) -> tuple[FloatArray, FloatArray]:
+def release_rows(current: Trajectory) -> tuple[FloatArray, FloatArray]:
     """Return what a recording states of its release: residuals (m,) in sigmas and rows (m, d) upon the first state."""
     release, layout, d = current.recording.release, current.plant.layout, current.plant.layout.directions
     if release is None or layout.attitude is None or layout.rate is None:

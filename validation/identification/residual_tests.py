@@ -1,9 +1,10 @@
-"""Is what is left noise? Tests of residuals that no first-order noise could have made.
+"""Residual whiteness tests: whether what is left is noise.
 
-A sensor whose noise is larger or slower than stated is no physics. What tells the two apart: noise with one level and
-one correlation, once whitened, is flat over frequency and the same at all times; missing physics is neither. And what
-is many times as loud as stated and hardly changes within a recording is no noise. Where the level is not in question,
-the test of Ljung and Box ("On a measure of lack of fit in time series models", 1978) finds residuals that remember.
+Takes residuals and their noise model; gives what no first-order noise could have made (model validation as in Ljung,
+"System Identification", 1999, chapter 16). A sensor whose noise is larger or slower than stated is no physics. What
+tells the two apart: noise with one level and one correlation, once whitened, is flat over frequency and the same at all
+times; missing physics is neither. And what is many times as loud as stated and hardly changes within a recording is no
+noise.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel, estimate_noise, log_likelihood, whitened
 from validation.identification.normal_equations import inverse_of
 
-__all__ = ["RESIDUAL_TESTS", "Remainder", "ResidualTests", "Whiteness", "remainders", "whiteness"]
+__all__ = ["RESIDUAL_TESTS", "ResidualTests", "UnmodelledResidual", "Whiteness", "unmodelled_residuals", "whiteness"]
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ LAGS, VALUES_PER_LAG = 5, 4
 
 
 @dataclass(frozen=True)
-class Remainder:
+class UnmodelledResidual:
     """Something left that is not noise: in which group, which recording (None: all), when, how strong."""
 
     group: str
@@ -79,12 +80,12 @@ class Remainder:
     axis: str = "all"
 
 
-def remainders(
+def unmodelled_residuals(
     linears: Sequence[Linear],
     residuals: Sequence[FloatArray],
     noise: NoiseModel,
     limits: ResidualTests = RESIDUAL_TESTS,
-) -> list[Remainder]:
+) -> list[UnmodelledResidual]:
     """Return what the residuals (n,) of each recording hold beside noise, strongest first."""
     white = [
         whitened(linear, noise, residual[:, None])[:, 0] for linear, residual in zip(linears, residuals, strict=True)
@@ -93,14 +94,14 @@ def remainders(
         [
             *_bands(linears, white, limits),
             *_windows(linears, white, limits),
-            *_courses(linears, residuals, noise, limits),
-            *_swallowed(linears, noise, limits),
+            *_common_trends(linears, residuals, noise, limits),
+            *_absorbed_by_noise(linears, noise, limits),
         ],
         key=lambda item: -item.z,
     )
 
 
-def _bands(linears: Sequence[Linear], white: Sequence[FloatArray], limits: ResidualTests) -> list[Remainder]:
+def _bands(linears: Sequence[Linear], white: Sequence[FloatArray], limits: ResidualTests) -> list[UnmodelledResidual]:
     """Test the flatness of each group's spectrum, pooled over axes and recordings."""
     sums: dict[str, FloatArray] = {}
     counts: dict[str, FloatArray] = {}
@@ -127,11 +128,11 @@ def _bands(linears: Sequence[Linear], white: Sequence[FloatArray], limits: Resid
         z = (mean / level - 1.0) * np.sqrt(n)
         worst = int(np.argmax(z))
         if z[worst] > limits.band_z and mean[worst] > (1.0 + limits.band_share) * level:
-            found.append(Remainder(group, None, f"band {worst}", float(z[worst]), 0.0, ends[group]))
+            found.append(UnmodelledResidual(group, None, f"band {worst}", float(z[worst]), 0.0, ends[group]))
     return found
 
 
-def _windows(linears: Sequence[Linear], white: Sequence[FloatArray], limits: ResidualTests) -> list[Remainder]:
+def _windows(linears: Sequence[Linear], white: Sequence[FloatArray], limits: ResidualTests) -> list[UnmodelledResidual]:
     """Test that the level is the same at all times."""
     found = []
     for index, (linear, x) in enumerate(zip(linears, white, strict=True)):
@@ -145,7 +146,7 @@ def _windows(linears: Sequence[Linear], white: Sequence[FloatArray], limits: Res
             if z[worst] > limits.window_z:
                 t = linear.t[channel.rows]
                 found.append(
-                    Remainder(
+                    UnmodelledResidual(
                         channel.group,
                         index,
                         "window",
@@ -158,9 +159,9 @@ def _windows(linears: Sequence[Linear], white: Sequence[FloatArray], limits: Res
     return found
 
 
-def _courses(
+def _common_trends(
     linears: Sequence[Linear], residuals: Sequence[FloatArray], noise: NoiseModel, limits: ResidualTests
-) -> list[Remainder]:
+) -> list[UnmodelledResidual]:
     """Test that slow noise goes its own way in each recording.
 
     A sensor that drifts the same way in all of them leaves residuals that one recording alone cannot tell from slow
@@ -178,15 +179,15 @@ def _courses(
         before = sum(log_likelihood(linear, own, e) for linear, e in zip(alone, left, strict=True))
         after, now = before, own
         for _ in range(3):
-            left = _without_course(alone, residuals, now, max(ends), limits.course_terms)
+            left = _without_trend(alone, residuals, now, max(ends), limits.course_terms)
             now = estimate_noise(alone, left)
             after = min(after, sum(log_likelihood(linear, now, e) for linear, e in zip(alone, left, strict=True)))
         if before - after > limits.course_gain:
-            found.append(Remainder(group, None, "course", float(np.sqrt(before - after)), 0.0, max(ends)))
+            found.append(UnmodelledResidual(group, None, "course", float(np.sqrt(before - after)), 0.0, max(ends)))
     return found
 
 
-def _swallowed(linears: Sequence[Linear], noise: NoiseModel, limits: ResidualTests) -> list[Remainder]:
+def _absorbed_by_noise(linears: Sequence[Linear], noise: NoiseModel, limits: ResidualTests) -> list[UnmodelledResidual]:
     """Test that no noise so loud and slow was supposed that it has swallowed what is missing."""
     found = []
     for group, slow in noise.items():
@@ -200,11 +201,13 @@ def _swallowed(linears: Sequence[Linear], noise: NoiseModel, limits: ResidualTes
         interval = float(np.median(np.diff(times[0])))
         longest = max(float(t[-1] - t[0]) for t in times)
         if slow.sd > limits.loud * stated and slow.memory(interval) > limits.slow * longest:
-            found.append(Remainder(group, None, "swallowed", slow.sd / stated, 0.0, max(float(t[-1]) for t in times)))
+            found.append(
+                UnmodelledResidual(group, None, "swallowed", slow.sd / stated, 0.0, max(float(t[-1]) for t in times))
+            )
     return found
 
 
-def _without_course(
+def _without_trend(
     linears: Sequence[Linear], residuals: Sequence[FloatArray], noise: NoiseModel, end: float, terms: int
 ) -> list[FloatArray]:
     """Return residuals less the course that each axis has in common in all recordings, estimated in a noise."""

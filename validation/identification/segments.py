@@ -1,4 +1,4 @@
-"""Shooting segments of a recording's motion: states at nodes, how they are moved, cut and compared."""
+"""Shooting segments of a recording's motion (multiple shooting): states at nodes, how they are moved, cut, compared."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from validation.identification.plants import Plant, plant_of
 from validation.identification.propagation import base_flat, runner_of
 from validation.identification.readings import Readings
 
-__all__ = ["Chain", "chain", "recut", "stepped", "undone"]
+__all__ = ["Trajectory", "resegmented", "stepped", "trajectory_of", "undone"]
 
 
 @dataclass(frozen=True)
-class Chain:
-    """The pieces of one recording: boundaries (k + 1,) s and the states (k, s) they start from.
+class Trajectory:
+    """The segments of one recording: boundaries (k + 1,) s and the states (k, s) they start from.
 
     ``effects`` are those that may act on them.
     """
 
     recording: Recording
     readings: tuple[Readings, ...]
-    edges: FloatArray
+    nodes: FloatArray
     states: FloatArray
     #: sensor -> samples lost before each of its samples (n,), where some were
     lost: Mapping[str, FloatArray] = field(default_factory=dict)
     effects: Competing = CATALOGUED
     #: one sigma (d,) of what a step may move the first state by, where it is not the plant's
-    reach: FloatArray | None = None
+    trust_radius: FloatArray | None = None
 
     @property
     def plant(self) -> Plant:
@@ -43,41 +43,43 @@ class Chain:
 
     def segment_of(self, t: FloatArray) -> IntArray:
         """Return the places (n,) of the segments that tell the motion at instants t (n,) s: at a node the later one."""
-        return np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, len(self.states) - 1)
+        return np.clip(np.searchsorted(self.nodes, t, side="right") - 1, 0, len(self.states) - 1)
 
 
-def chain(recording: Recording, edges: FloatArray, states: FloatArray, effects: Competing = CATALOGUED) -> Chain:
-    """Return a recording cut at edges (k + 1,) s with states (k, s) at the starts of its pieces."""
-    return Chain(recording, readings_of(recording), edges, states, effects=effects)
+def trajectory_of(
+    recording: Recording, nodes: FloatArray, states: FloatArray, effects: Competing = CATALOGUED
+) -> Trajectory:
+    """Return a recording cut at edges (k + 1,) s with states (k, s) at the starts of its segments."""
+    return Trajectory(recording, readings_of(recording), nodes, states, effects=effects)
 
 
-def recut(current: Chain, values: Values, edges: FloatArray) -> Chain:
-    """Return the chain cut at other edges (k + 1,), its new pieces starting where the old motion was."""
+def resegmented(current: Trajectory, values: Values, nodes: FloatArray) -> Trajectory:
+    """Return the trajectory cut at other edges (k + 1,), its new segments starting where the old motion was."""
     recording = current.recording
     runner = runner_of(recording, values, (), current.effects)
     flat, own = base_flat(recording, values, (), current.effects), current.plant.own_values(values)
-    states = np.empty((edges.size - 1, current.states.shape[1]))
-    for j, i in enumerate(current.segment_of(edges[:-1] + 1e-9)):
-        start, state = float(current.edges[i]), current.states[i]
-        stop = float(edges[j])
+    states = np.empty((nodes.size - 1, current.states.shape[1]))
+    for j, i in enumerate(current.segment_of(nodes[:-1] + 1e-9)):
+        start, state = float(current.nodes[i]), current.states[i]
+        stop = float(nodes[j])
         if stop - start < 1e-9:
             states[j] = state
             continue
         times, last = runner.times(start, stop, stop, state)
         _, ends = runner.run(flat[None], own[None], state[None], times, last, np.empty(0))
         states[j] = ends[0]
-    return replace(current, edges=edges, states=states)
+    return replace(current, nodes=nodes, states=states)
 
 
-def stepped(current: Chain, tangents: FloatArray) -> Chain:
-    """Return the chain with its states moved by tangents (k, d)."""
+def stepped(current: Trajectory, tangents: FloatArray) -> Trajectory:
+    """Return the trajectory with its states moved by tangents (k, d)."""
     plant = current.plant
     return replace(current, states=plant.dynamics.consistent(plant.layout.moved(current.states, tangents)))
 
 
-def undone(moves: FloatArray, change: FloatArray) -> FloatArray:
+def undone(sensitivities: FloatArray, change: FloatArray) -> FloatArray:
     """Return the change (d, c) of a first state that amounts to a change (d, c) of a later one, moved there by (d, d).
 
     What motion has damped beyond double precision cannot be undone; of that the least is taken.
     """
-    return np.asarray(np.linalg.lstsq(moves, change, rcond=1e-13)[0])
+    return np.asarray(np.linalg.lstsq(sensitivities, change, rcond=1e-13)[0])

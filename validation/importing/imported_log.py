@@ -210,8 +210,8 @@ def import_log(
         text = ""
         decisions: tuple[Decision, ...] = ()
         if known is None:
-            proposal = sniff(logged, plant)
-            text, decisions = map_text(proposal), tuple(proposal.all_decisions)
+            screened = sniff(logged, plant)
+            text, decisions = map_text(screened), tuple(screened.all_decisions)
             write_text(Path(place) / "map.toml", text)
             known = read_map(Path(place) / "map.toml")
         if environment is not None:

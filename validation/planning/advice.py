@@ -12,7 +12,7 @@ from validation.identification.plants.plan import Plan
 from validation.identification.readings import group_of
 from validation.planning.information import Information, information_of
 from validation.planning.limits import Limits, coefficients_of, limits_of
-from validation.planning.recordings import Bench, planned_chain
+from validation.planning.recordings import Bench, planned_trajectory
 
 __all__ = ["Bought", "NextThrow", "bought", "next_throws"]
 
@@ -56,7 +56,7 @@ def next_throws(information: Information, limits: Limits, plans: Sequence[Plan],
     found = []
     before = coefficients_of(information)
     for plan in plans:
-        made = planned_chain(plan, bench)
+        made = planned_trajectory(plan, bench)
         if made is None:
             continue
         gram = information_of([made], information.questions, information.noise).grams[0]

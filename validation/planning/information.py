@@ -17,15 +17,15 @@ from discsim.disc import Aero
 from discsim.errors import InputError
 from discsim.recording import Recording
 from validation.diagnosis.relaxed_fit import unknowns
-from validation.diagnosis.selection.candidates import Trial, available, free_trial, trials_for
-from validation.diagnosis.selection.screening import board_of
+from validation.diagnosis.selection.candidates import CandidateEffect, available, candidates_for, free_candidate
+from validation.diagnosis.selection.screening import normal_equations_of
 from validation.identification.gauss_newton import Fit, linearised
 from validation.identification.linear import Linear
 from validation.identification.noise import GroupNoise, NoiseModel, stated_noise
 from validation.identification.normal_equations import reduce
 from validation.identification.parameters import Parameter
 from validation.identification.propagation import Column
-from validation.identification.segments import Chain
+from validation.identification.segments import Trajectory
 from validation.identification.stated_parameters import stated_parameters
 
 __all__ = ["Information", "Questions", "information_of", "inverse", "questions_of"]
@@ -47,14 +47,16 @@ class Questions:
 
     known: tuple[Parameter, ...]
     coefficients: tuple[Parameter, ...]
-    trials: tuple[Trial, ...]
+    candidates: tuple[CandidateEffect, ...]
     silent: tuple[str, ...]
 
     @property
     def columns(self) -> tuple[Column, ...]:
         """The columns of all that is asked, each once."""
         asked = [_column(q) for q in (*self.known, *self.coefficients)]
-        return tuple(dict.fromkeys((*asked, *(column for trial in self.trials for column in trial.columns))))
+        return tuple(
+            dict.fromkeys((*asked, *(column for candidate in self.candidates for column in candidate.columns)))
+        )
 
 
 def questions_of(recordings: Sequence[Recording], instant: float) -> Questions:
@@ -67,17 +69,17 @@ def questions_of(recordings: Sequence[Recording], instant: float) -> Questions:
             Parameter("aero", name, float(getattr(one.disc.aero, name)), _STEP * _ORDINARY[name])
             for name in Aero._fields
         )
-    trials = [trial for trial in trials_for(recordings) if all(map(_in_reach, trial.columns))]
+    candidates = [candidate for candidate in candidates_for(recordings) if all(map(_in_reach, candidate.columns))]
     silent = []
     for row in available(recordings):
         shape = {"t_s": instant, "width_s": _GUST_S, "order": 1.0, "phase_rad": 0.0}
         given = tuple((name, shape[name]) for name in row.parameters if name in shape)
         if row.event or row.per_turn:
-            trial = free_trial(row.id, given)
-            trials.append(replace(trial, recordings=frozenset([0])) if row.event else trial)
-        elif not any(trial.id == row.id for trial in trials):
+            candidate = free_candidate(row.id, given)
+            candidates.append(replace(candidate, recordings=frozenset([0])) if row.event else candidate)
+        elif not any(candidate.id == row.id for candidate in candidates):
             silent.append(row.id)
-    return Questions(known, coefficients, tuple(trials), tuple(silent))
+    return Questions(known, coefficients, tuple(candidates), tuple(silent))
 
 
 def _in_reach(column: Column) -> bool:
@@ -99,14 +101,14 @@ class Information:
         What each recording says of the columns of the questions, its own unknowns eliminated.
     noise : mapping
         Noise of each group of readings.
-    chains, linears
+    trajectories, linears
         The recordings and how their readings depend on everything, to ask again in other noise.
     """
 
     questions: Questions
     grams: FloatArray
     noise: NoiseModel
-    chains: tuple[Chain, ...]
+    trajectories: tuple[Trajectory, ...]
     linears: tuple[Linear, ...]
 
     def times(self, count: int) -> Information:
@@ -121,7 +123,8 @@ class Information:
         """Return the information of the same recordings with the noise of groups multiplied by ``factors``."""
         noise = {name: GroupNoise(item.sd * factors.get(name, 1.0)) for name, item in self.noise.items()}
         grams = [
-            _gram(linear, one, noise, self.questions) for linear, one in zip(self.linears, self.chains, strict=True)
+            _gram(linear, one, noise, self.questions)
+            for linear, one in zip(self.linears, self.trajectories, strict=True)
         ]
         repeats = len(self.grams) // len(grams)
         return replace(self, grams=np.concatenate([np.stack(grams)] * repeats), noise=noise)
@@ -134,10 +137,10 @@ class Information:
     def summed(self) -> FloatArray:
         """Return the matrix (c, c) of all recordings; what happens in one of them only is asked of that one."""
         total = np.sum(self.grams, axis=0)
-        for trial in self.questions.trials:
-            if trial.recordings is not None:
-                some = self.places(trial.columns)
-                only = np.sum(self.grams[sorted(trial.recordings)], axis=0)
+        for candidate in self.questions.candidates:
+            if candidate.recordings is not None:
+                some = self.places(candidate.columns)
+                only = np.sum(self.grams[sorted(candidate.recordings)], axis=0)
                 total[some], total[:, some] = only[some], only[:, some]
         return np.asarray(total)
 
@@ -160,34 +163,36 @@ def inverse(H: FloatArray) -> FloatArray:
     return np.asarray(((V[:, kept] / w[kept]) @ V[:, kept].T) * np.outer(scale, scale))
 
 
-def information_of(chains: Sequence[Chain], questions: Questions, noise: NoiseModel | None = None) -> Information:
-    """Return what recordings tell about where their chains stand; ``noise`` is by default what their sheets state.
+def information_of(
+    trajectories: Sequence[Trajectory], questions: Questions, noise: NoiseModel | None = None
+) -> Information:
+    """Return what recordings tell where their trajectories stand; ``noise`` is by default that of their sheets.
 
     Raises `InputError` where the readings' slopes are not finite.
     """
-    own = unknowns([chains[0].recording])
+    own = unknowns([trajectories[0].recording])
     linears, grams = [], []
-    for one in chains:
+    for one in trajectories:
         parameters = tuple(replace(q, recordings=None) for q in own)
         fit = Fit((one,), parameters, np.array([q.stated for q in parameters]), one.plant.sizes.continuous, {})
         if noise is None:
             noise = stated_noise(linearised(fit, ()))
-        board = board_of(replace(fit, noise=noise), _asked(questions), noise, one.plant.sizes.continuous)
+        equations = normal_equations_of(replace(fit, noise=noise), _asked(questions), noise, one.plant.sizes.continuous)
         # the board's columns start with the recording's own unknowns; the rest stands in the order of the questions
-        linears.append(board.linears[0])
-        grams.append(_gram(board.linears[0], one, noise, questions))
+        linears.append(equations.linears[0])
+        grams.append(_gram(equations.linears[0], one, noise, questions))
     assert noise is not None
     if not np.all(np.isfinite(grams)):
         raise InputError("a planned recording leaves what is finite; expected throws that a disc can fly")
-    return Information(questions, np.stack(grams), noise, tuple(chains), tuple(linears))
+    return Information(questions, np.stack(grams), noise, tuple(trajectories), tuple(linears))
 
 
-def _asked(questions: Questions) -> list[Trial]:
-    """Return trials that hold the columns of all questions in their order."""
-    return [Trial("", questions.columns)]
+def _asked(questions: Questions) -> list[CandidateEffect]:
+    """Return candidates that hold the columns of all questions in their order."""
+    return [CandidateEffect("", questions.columns)]
 
 
-def _gram(linear: Linear, one: Chain, noise: NoiseModel, questions: Questions) -> FloatArray:
+def _gram(linear: Linear, one: Trajectory, noise: NoiseModel, questions: Questions) -> FloatArray:
     """Return what one recording says of the questions (c, c), its states and own unknowns eliminated."""
     G = reduce(linear, one, noise, one.plant.sizes.continuous).gram[:-1, :-1]
     own = unknowns([one.recording])

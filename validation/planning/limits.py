@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from scipy.stats import ncx2
 
 from discsim.arrays import FloatArray
-from validation.diagnosis.selection.candidates import Trial, parameters_of
+from validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from validation.diagnosis.selection.evidence import price
 from validation.diagnosis.settings import SELECTION
 from validation.planning.information import Information, inverse
@@ -85,39 +85,39 @@ def needed(price: float, parameters: int) -> float:
 
 def limits_of(information: Information) -> Limits:
     """Return what recordings show of every effect that is asked about, and which they do not tell apart."""
-    trials = information.questions.trials
+    candidates = information.questions.candidates
     H = information.left(information.questions.known)
-    asked = [_Asked.of(trial, information, H) for trial in trials]
+    asked = [_Asked.of(candidate, information, H) for candidate in candidates]
     found, pairs = [], []
-    for id in dict.fromkeys(trial.id for trial in trials):
-        shapes = [one for one in asked if one.trial.id == id]
-        middle = shapes[len(shapes) // 2]
-        limit, mine = _limit(middle, [one for one in asked if one.trial.id != id], H)
+    for id in dict.fromkeys(candidate.id for candidate in candidates):
+        shape_grid = [one for one in asked if one.candidate.id == id]
+        middle = shape_grid[len(shape_grid) // 2]
+        limit, mine = _limit(middle, [one for one in asked if one.candidate.id != id], H)
         found.append(limit)
         pairs += mine
     return Limits(tuple(found), tuple(sorted(pairs, key=lambda pair: -pair.apart)))
 
 
 class _Asked(NamedTuple):
-    """A trial, where its columns stand, and the inverse of its information, its own priors included."""
+    """A candidate, where its columns stand, and the inverse of its information, its own priors included."""
 
-    trial: Trial
+    candidate: CandidateEffect
     places: list[int]
     inverse: FloatArray
 
     @classmethod
-    def of(cls, trial: Trial, information: Information, H: FloatArray) -> _Asked:
-        places = information.places(trial.columns)
-        some = parameters_of(trial, shaped=False)
+    def of(cls, candidate: CandidateEffect, information: Information, H: FloatArray) -> _Asked:
+        places = information.places(candidate.columns)
+        some = parameters_of(candidate, shaped=False)
         prior = np.array([q.sigma**-2.0 if np.isfinite(q.sigma) else 0.0 for q in some])
-        return cls(trial, places, inverse(H[np.ix_(places, places)] + np.diag(prior)))
+        return cls(candidate, places, inverse(H[np.ix_(places, places)] + np.diag(prior)))
 
 
 def _limit(one: _Asked, others: Sequence[_Asked], H: FloatArray) -> tuple[EffectLimit, list[Pair]]:
     """Return what is shown of an effect, and the rivals that it is not told from at the size that is named."""
     own = H[np.ix_(one.places, one.places)]
-    power, count = np.maximum(np.diag(own), 0.0), len(parameters_of(one.trial))
-    least = needed(price(one.trial), len(one.places))
+    power, count = np.maximum(np.diag(own), 0.0), len(parameters_of(one.candidate))
+    least = needed(price(one.candidate), len(one.places))
     need = np.full(power.size, least)
     apart: dict[str, FloatArray] = {}
     taken_by: dict[str, FloatArray] = {}
@@ -126,13 +126,13 @@ def _limit(one: _Asked, others: Sequence[_Asked], H: FloatArray) -> tuple[Effect
         took = np.einsum("ij,jk,ik->i", cross, other.inverse, cross)
         taken = np.clip(took / np.maximum(power, 1e-300), 0.0, 1.0)
         left = np.where(1.0 - taken > _SAME, 1.0 - taken, 0.0)
-        more = len(parameters_of(other.trial)) - count
+        more = len(parameters_of(other.candidate)) - count
         with np.errstate(divide="ignore"):
             # a simpler rival stands unless the effect gains what its further parameters cost
             if more < 0:
                 need = np.maximum(need, SELECTION.rival * -more / left)
             distance = (SELECTION.confused + SELECTION.per_parameter * max(more, 0)) / left
-        id = other.trial.id
+        id = other.candidate.id
         apart[id] = np.maximum(apart.get(id, np.zeros(power.size)), distance)
         taken_by[id] = np.maximum(taken_by.get(id, np.zeros(power.size)), taken)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -141,17 +141,17 @@ def _limit(one: _Asked, others: Sequence[_Asked], H: FloatArray) -> tuple[Effect
     for id, distance in apart.items():
         worst = float(np.max(np.sqrt(distance / need))) if np.all(np.isfinite(need)) else np.inf
         if worst > 1.0:
-            pairs.append(Pair(one.trial.id, id, float(np.max(taken_by[id])), worst))
+            pairs.append(Pair(one.candidate.id, id, float(np.max(taken_by[id])), worst))
     rival = max(taken_by, key=lambda id: float(np.max(taken_by[id])), default="")
-    names = tuple(column.name for column in one.trial.columns)
+    names = tuple(column.name for column in one.candidate.columns)
     limit = EffectLimit(
-        one.trial.id,
+        one.candidate.id,
         names,
         tuple(seen.tolist()),
         tuple(named.tolist()),
         rival,
         float(np.max(taken_by[rival])) if rival else 0.0,
-        one.trial.shapes,
+        one.candidate.shape_grid,
         own,
         tuple(need.tolist()),
     )

@@ -43,16 +43,16 @@ def _effects(found: Planned, out: Path) -> Section:
             rows.append(
                 (one.id, name, _number(seen), _number(named), f"{scale:g}", one.rival, f"{100 * one.taken:.1f} %")
             )
-    shapes = {one.id: one.shape for one in found.limits.effects if one.shape}
+    shape_grid = {one.id: one.shape for one in found.limits.effects if one.shape}
     text = [
         "Half of the diagnoses see that something is there at the size seen, and name this effect at the size named: "
         "the information of the planned recordings against what the diagnosis asks of evidence.",
         "Nearest is the effect that can take the largest share of its trace.",
     ]
-    if shapes:
+    if shape_grid:
         said = "; ".join(
             f"{id} with " + ", ".join(f"{name} = {value:.3g}" for name, value in shape.items())
-            for id, shape in shapes.items()
+            for id, shape in shape_grid.items()
         )
         text.append(f"Asked about: {said}. What comes at an instant comes in the first recording.")
     if found.information.questions.silent:
@@ -118,7 +118,7 @@ def _hardware(found: Planned) -> Section:
 def _clipped(found: Planned) -> list[str]:
     """Return which axes would stand at their range: a wider one would show what they hide."""
     shares: dict[str, float] = {}
-    for one in found.information.chains:
+    for one in found.information.trajectories:
         for readings in one.readings:
             for axis, name in enumerate(readings.axes):
                 share = float(np.mean(readings.clipped[:, axis]))

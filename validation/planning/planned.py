@@ -19,11 +19,11 @@ from discsim.recording import Plant, Recording
 from discsim.shipped import load_disc, load_throw
 from validation.diagnosis.design.plans import plans_about
 from validation.identification.plants.plan import Plan, towards
-from validation.identification.segments import Chain
+from validation.identification.segments import Trajectory
 from validation.planning.advice import Bought, NextThrow, bought, next_throws
 from validation.planning.information import Information, Questions, information_of, questions_of
 from validation.planning.limits import Coefficient, Limits, coefficients_of, limits_of
-from validation.planning.recordings import Bench, planned_chain, plans_like
+from validation.planning.recordings import Bench, planned_trajectory, plans_like
 from validation.reporting.run import json_text
 
 __all__ = ["Planned", "plan", "throws_about"]
@@ -191,20 +191,24 @@ def plan(
         like = throw or load_throw("driver")
         asked = throws_about(like, plans) if isinstance(plans, int) else [p for p in plans if isinstance(p, Plan)]
     say(f"simulating {len(asked)} recordings")
-    chains = _chains(asked, bench)
-    questions = _questions(chains)
-    say(f"asking {len(questions.trials)} hypotheses of them")
-    once = information_of(chains, questions)
+    trajectories = _trajectories(asked, bench)
+    questions = _questions(trajectories)
+    say(f"asking {len(questions.candidates)} hypotheses of them")
+    once = information_of(trajectories, questions)
     information = once.times(times)
     limits = limits_of(information)
-    offered = plans_about(chains[0], float(max(one.edges[-1] for one in chains))) if candidates is None else candidates
+    offered = (
+        plans_about(trajectories[0], float(max(one.nodes[-1] for one in trajectories)))
+        if candidates is None
+        else candidates
+    )
     say(f"trying {len(offered)} further recordings")
     further = next_throws(information, limits, offered, bench)
     others = []
     for other in instead:
         say(f"trying {'+'.join(other)}")
         swapped = Bench.of(bench.plant, bench.environment, other, bench.disc, bench.rig)
-        again = _chains(asked, swapped)
+        again = _trajectories(asked, swapped)
         others.append(("+".join(other), information_of(again, _questions(again)).times(times)))
     say("asking what better sensors would buy")
     return Planned(
@@ -219,15 +223,15 @@ def plan(
     )
 
 
-def _chains(plans: Sequence[Plan], bench: Bench) -> list[Chain]:
-    chains = []
+def _trajectories(plans: Sequence[Plan], bench: Bench) -> list[Trajectory]:
+    trajectories = []
     for item in plans:
-        made = planned_chain(item, bench)
+        made = planned_trajectory(item, bench)
         if made is None:
             raise InputError(f"'{item.text}' cannot be recorded; expected a motion that lasts, from above the ground")
-        chains.append(made)
-    return chains
+        trajectories.append(made)
+    return trajectories
 
 
-def _questions(chains: Sequence[Chain]) -> Questions:
-    return questions_of([one.recording for one in chains], float(chains[0].edges[-1]) / 2)
+def _questions(trajectories: Sequence[Trajectory]) -> Questions:
+    return questions_of([one.recording for one in trajectories], float(trajectories[0].nodes[-1]) / 2)

@@ -12,15 +12,15 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Plant, Recording, Samples, SensorSheet
 from discsim.sensors import Instruments
-from validation.diagnosis.relaxed_fit import first_chain
+from validation.diagnosis.relaxed_fit import first_trajectory
 from validation.identification.parameters import Values
 from validation.identification.plants import PLANTS
 from validation.identification.plants.plan import Plan
 from validation.identification.prediction import read, shown
 from validation.identification.readings import Readings
-from validation.identification.segments import Chain, chain, recut
+from validation.identification.segments import Trajectory, resegmented, trajectory_of
 
-__all__ = ["Bench", "planned_chain", "plans_like"]
+__all__ = ["Bench", "planned_trajectory", "plans_like"]
 
 _NO_VALUES: Values = {}
 #: a throw ends on the ground, at the latest after this long, s
@@ -71,15 +71,15 @@ def plans_like(recordings: Sequence[Recording]) -> list[Plan]:
     """Return plans of recordings like those in hand: from where their motion seems to start, by their data."""
     plans = []
     for one in recordings:
-        first = first_chain(one)
+        first = first_trajectory(one)
         what = f"as {one.name} again" if one.name else "one as in hand again"
         duration = _LONGEST_THROW if first.plant.follows_path else one.end
         plans.append(Plan(what, first.states[0], duration, one.command))
     return plans
 
 
-def planned_chain(plan: Plan, bench: Bench) -> Chain | None:
-    """Return a plan as it would be recorded without noise, cut into segments that hang together.
+def planned_trajectory(plan: Plan, bench: Bench) -> Trajectory | None:
+    """Return a plan as it would be recorded without noise, cut into segments that are continuous.
 
     None where it cannot be made: a throw that starts on the ground, numbers that leave what is finite. Raises
     `InputError` where the bench lacks what its plant needs.
@@ -89,31 +89,31 @@ def planned_chain(plan: Plan, bench: Bench) -> Chain | None:
     lacks = plant.lacks(bare)
     if lacks is not None:
         raise InputError(f"a plan of a {bench.plant}: {lacks}")
-    whole = chain(bare, np.array([0.0, plan.duration]), plan.state[None])
+    whole = trajectory_of(bare, np.array([0.0, plan.duration]), plan.state[None])
     end = _landing(whole) if plant.follows_path else plan.duration
     if end <= 0.0:
         return None
     count = max(1, round(end / plant.durations.segment))
-    cut = recut(whole, _NO_VALUES, np.linspace(0.0, end + 1e-6, count + 1))
+    cut = resegmented(whole, _NO_VALUES, np.linspace(0.0, end + 1e-6, count + 1))
     if not np.all(np.isfinite(cut.states)):
         return None
     samples = {name: made for name in bench.sheets if len(made := _samples(cut, name))}
     if not samples:
         return None
-    return chain(replace(bare, samples=samples), cut.edges, cut.states)
+    return trajectory_of(replace(bare, samples=samples), cut.nodes, cut.states)
 
 
-def _landing(whole: Chain) -> float:
+def _landing(whole: Trajectory) -> float:
     """Return when a throw of one segment reaches the ground, s; its end where it does not."""
-    t = np.arange(0.0, float(whole.edges[-1]), 0.02)
+    t = np.arange(0.0, float(whole.nodes[-1]), 0.02)
     below = np.flatnonzero(shown(whole, _NO_VALUES, "track", t)[:, 2] >= 0.0)
-    return float(t[below[0]]) if below.size else float(whole.edges[-1])
+    return float(t[below[0]]) if below.size else float(whole.nodes[-1])
 
 
-def _samples(cut: Chain, sensor: str) -> Samples:
+def _samples(cut: Trajectory, sensor: str) -> Samples:
     """Return a sensor's readings of a motion without noise, within its range."""
     sheet = cut.recording.sheets[sensor]
-    t = np.arange(0.0, float(cut.edges[-1]), 1.0 / sheet.rate_hz)
+    t = np.arange(0.0, float(cut.nodes[-1]), 1.0 / sheet.rate_hz)
     axes = SENSORS[sensor].columns
     blank = np.zeros((t.size, len(axes)))
     value = read(cut, _NO_VALUES, Readings(sensor, t, blank, blank == 0.0, blank != 0.0, np.zeros(len(axes)), axes))

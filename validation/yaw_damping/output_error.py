@@ -33,7 +33,7 @@ from validation.identification.plants.flight import FLIGHT
 from validation.identification.propagation import FLAT_ENVIRONMENT
 from validation.identification.readings import Readings
 from validation.identification.residual_tests import Whiteness, whiteness
-from validation.identification.segments import Chain
+from validation.identification.segments import Trajectory
 from validation.identification.stated_parameters import stated_parameters
 from validation.yaw_damping.observations import SHARED_S, Throw
 from validation.yaw_damping.paper_table import damping_by_26
@@ -183,7 +183,7 @@ def _first_damping(throws: Sequence[Throw]) -> float:
     return float(np.mean(found))
 
 
-def _segment(throw: Throw, state: FloatArray) -> Chain:
+def _segment(throw: Throw, state: FloatArray) -> Trajectory:
     """Return a throw as one segment from its release on: fixes and the spin rate with the noise of each."""
     readings = (
         _readings("gps", throw.path_t, throw.path, throw.path_sd),
@@ -196,9 +196,9 @@ def _segment(throw: Throw, state: FloatArray) -> Chain:
         sheets={item.sensor: SensorSheet(1.0) for item in readings},
         samples={},
     )
-    reach = FLIGHT.sizes.unknown.copy()
-    reach[_TURN] = _HELD
-    return Chain(recording, readings, np.array([0.0, throw.end + 1e-6]), state[None], reach=reach)
+    trust_radius = FLIGHT.sizes.unknown.copy()
+    trust_radius[_TURN] = _HELD
+    return Trajectory(recording, readings, np.array([0.0, throw.end + 1e-6]), state[None], trust_radius=trust_radius)
 
 
 def _readings(sensor: str, t: FloatArray, value: FloatArray, sd: FloatArray) -> Readings:
@@ -223,7 +223,7 @@ def _first_state(throw: Throw, CNr: float) -> FloatArray:
         alone = Solution((segment,), (), np.empty(0), FLIGHT.sizes.continuous, _noise(), {("aero", "CNr"): CNr})
         fit = refit(alone, iterations=_MOST_STEPS, tolerance=_STARTED, bar=least)
         if fit.merit < least:
-            best, least = fit.chains[0].states[0], fit.merit
+            best, least = fit.trajectories[0].states[0], fit.merit
         if least < _NEAR**2 * fit.count:
             break
     if best is None:
@@ -275,7 +275,7 @@ def _flight(throw: Throw, fit: Solution, number: int) -> Flight:
     flat, lookup = flight_parameters(disc, environment), tables(disc)
     for key, value in fit.values(number).items():
         flat[parameter_index(*key)] = value
-    state = np.append(fit.chains[number].states[0], 0.0)
+    state = np.append(fit.trajectories[number].states[0], 0.0)
     state[2] -= LIFT
     ended, t, states, dense = integrate(flat, lookup, state, 0.0, throw.end + 1e-6, TOLERANCE, TOLERANCE, True)
     if ended != 0:
@@ -295,7 +295,7 @@ def _fitted(throw: Throw, fit: Solution, number: int, covariance: FloatArray) ->
     slope = np.einsum("ni,nij->nj", relative / speed[:, None], sensitivities(flight, (), t).derivative[:, 3:6])
     return FittedThrow(
         throw.recording.name,
-        readonly(fit.chains[number].states[0]),
+        readonly(fit.trajectories[number].states[0]),
         flight,
         readonly(np.delete(np.sqrt(np.diag(covariance)), _TURN)),
         readonly(speed),

@@ -35,6 +35,6 @@ def test_a_scale_is_not_taken_for_a_clock():
 
 def test_it_is_named_alone():
     final = search(tables(errors=[FAST])).final
-    assert [trial.id for trial in final.hypothesis.trials] == ["gyro.clock_rate"]
+    assert [candidate.id for candidate in final.hypothesis.candidates] == ["gyro.clock_rate"]
     place = [q.key for q in final.fit.parameters].index(KEY)
     assert final.fit.at[place] == pytest.approx(1.017, abs=3e-4)

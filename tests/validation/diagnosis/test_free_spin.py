@@ -15,14 +15,14 @@ from discsim.engine import fly
 from discsim.recording import Recording
 from discsim.sensors import record
 from discsim.shipped import load_disc
-from validation.diagnosis.relaxed_fit import first_chain, relaxed, unknowns
-from validation.diagnosis.selection.constrained_fit import Tied, tied_fit
-from validation.diagnosis.selection.found import possible
+from validation.diagnosis.relaxed_fit import first_trajectory, relaxed, unknowns
+from validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from validation.diagnosis.selection.hypothesis import Hypothesis
+from validation.diagnosis.selection.search_state import possible
 from validation.identification.gauss_newton import Fit, GaussNewtonStep, linearised, linearised_columns
 from validation.identification.noise import estimate_noise, stated_noise, whitened
 from validation.identification.normal_equations import reduce
-from validation.identification.parameters import Jumps, Parameter
+from validation.identification.parameters import AllowedDefects, Parameter
 from validation.identification.plants import PLANTS
 from validation.identification.plants.free_spin import FREE_SPIN
 from validation.identification.propagation import Column
@@ -47,19 +47,19 @@ def spin_of_tables(name: str, release: Release) -> Recording:
 
 
 def left_by(fit: Fit) -> float:
-    """Return chi-squared per reading of the gyroscope's x and y, in stated noise, of pieces that hang together."""
-    own = unknowns([chain.recording for chain in fit.chains])
+    """Return chi-squared per reading of the gyroscope's x and y, in stated noise, of segments that are continuous."""
+    own = unknowns([trajectory.recording for trajectory in fit.trajectories])
     noise = estimate_noise(fit.linears, [linear.residual for linear in fit.linears], coloured=False)
     start = {(q.key, q.recordings): float(v) for q, v in zip(fit.parameters, fit.at, strict=True)}
-    tied = tied_fit(fit, Hypothesis(), own, noise, start, polish=0)
-    linear = tied.fit.linears[0]
+    fitted = continuous_fit(fit, Hypothesis(), own, noise, start, polish=0)
+    linear = fitted.fit.linears[0]
     stated = {
         group: level._replace(sd=float(linear.sd[c.rows][0]), correlation=0.0)
         for group, level in noise.items()
         for c in linear.channels
         if c.group == group
     }
-    white: FloatArray = whitened(linear, stated, tied.residuals[0][:, None])[:, 0]
+    white: FloatArray = whitened(linear, stated, fitted.residuals[0][:, None])[:, 0]
     turning = [white[c.rows] for c in linear.channels if c.sensor == "gyroscope" and c.axis != "z_rad_s"]
     return float(np.mean(np.concatenate(turning) ** 2))
 
@@ -68,13 +68,15 @@ def test_air_that_is_stiffer_at_some_angles_of_attack_leaves_noise_alone(monkeyp
     release = replace(release_of(0.4, 70.0), body_rate=np.array([2.0, -1.5, 70.0]))
     assert left_by(relaxed([spin_of_tables("cd1", release)])) < 1.2  # 700 readings: 1 +- 0.05
     fit = relaxed([spin_of_tables("dd2", NOSE_DOWN)])
-    assert left_by(fit) < 1.4  # what is sharper than a piece is not followed
+    assert left_by(fit) < 1.4  # what is sharper than a segment is not followed
     for places in ([12], [13, 14]):  # one course in time is not enough, nor is one bend
         held = FREE_SPIN.sizes.continuous.sd.copy()
         held[places] = 0.0
         with monkeypatch.context() as patch:
             patch.setitem(
-                PLANTS, FREE_SPIN.name, replace(FREE_SPIN, sizes=replace(FREE_SPIN.sizes, continuous=Jumps(held)))
+                PLANTS,
+                FREE_SPIN.name,
+                replace(FREE_SPIN, sizes=replace(FREE_SPIN.sizes, continuous=AllowedDefects(held))),
             )
             assert left_by(fit) > 3.0
 
@@ -97,13 +99,13 @@ def test_a_wobble_of_one_recording_moves_no_other():
         record(flight(seconds=0.4), BLIND, np.random.default_rng(k), plant="free_spin", name=f"{k}", disc=DRIVER)
         for k in range(2)
     ]
-    fit = Fit(tuple(first_chain(r) for r in recordings), (), np.empty(0), FREE_SPIN.sizes.continuous, {})
+    fit = Fit(tuple(first_trajectory(r) for r in recordings), (), np.empty(0), FREE_SPIN.sizes.continuous, {})
     columns = [Column(*FREE_SPIN.own_keys[0], 1e-3, (("recording", float(k)),)) for k in range(2)]
     first, second = linearised_columns(fit, columns)
-    assert np.any(first.shared[:, 0])
-    assert not np.any(first.shared[:, 1])
-    assert not np.any(second.shared[:, 0])
-    assert np.any(second.shared[:, 1])
+    assert np.any(first.common[:, 0])
+    assert not np.any(first.common[:, 1])
+    assert not np.any(second.common[:, 0])
+    assert np.any(second.common[:, 1])
 
 
 @pytest.mark.parametrize(("instant", "told"), [(0.04, False), (0.6, True)])
@@ -117,9 +119,9 @@ def test_a_knock_at_the_very_start_is_not_told_from_where_the_spin_started(insta
         disc=DRIVER,
     )
     q = Parameter("event.spin_step", "t_s", instant, 1e-3, recordings=frozenset([0]))
-    chains = (first_chain(recording),)
-    fit = Fit(chains, (q,), np.array([instant]), FREE_SPIN.sizes.continuous, {}, covariance=np.full((1, 1), 1e-6))
-    assert possible(Tied(Hypothesis(), fit, 0.0)) is told
+    trajectories = (first_trajectory(recording),)
+    fit = Fit(trajectories, (q,), np.array([instant]), FREE_SPIN.sizes.continuous, {}, covariance=np.full((1, 1), 1e-6))
+    assert possible(ContinuousFit(Hypothesis(), fit, 0.0)) is told
 
 
 def test_a_recording_that_a_step_leads_astray_takes_less_of_it_and_the_other_all():
@@ -127,24 +129,25 @@ def test_a_recording_that_a_step_leads_astray_takes_less_of_it_and_the_other_all
         record(flight(seconds=0.4), BLIND, np.random.default_rng(k), plant="free_spin", name=f"{k}", disc=DRIVER)
         for k in range(2)
     ]
-    fit = Fit(tuple(first_chain(r) for r in recordings), (), np.empty(0), FREE_SPIN.sizes.continuous, {})
+    fit = Fit(tuple(first_trajectory(r) for r in recordings), (), np.empty(0), FREE_SPIN.sizes.continuous, {})
     fit = replace(fit, noise=stated_noise(linearised(fit)))
     for _ in range(3):  # near enough that a whole step leads nearer
-        fit, _ = going(fit, 1.0).each_its_share()
+        fit, _ = going(fit, 1.0).with_own_fractions()
     for too_far, shortened in ((1.0, [False, False]), (1e3, [True, False])):
-        taken, astray = going(fit, too_far).each_its_share()
+        taken, astray = going(fit, too_far).with_own_fractions()
         assert taken is not None
         assert astray.tolist() == shortened
         # what is not led astray goes as far as by itself
-        alone, _ = going(fit, 1.0).each_its_share()
-        np.testing.assert_array_equal(taken.chains[1].states, alone.chains[1].states)
+        alone, _ = going(fit, 1.0).with_own_fractions()
+        np.testing.assert_array_equal(taken.trajectories[1].states, alone.trajectories[1].states)
 
 
 def going(fit: Fit, too_far: float) -> GaussNewtonStep:
     """Return the next step of a fit that in the first recording goes so many times as far as it should."""
     fit = replace(fit, linears=linearised(fit))
     reduced = [
-        reduce(linear, chain, fit.noise, fit.jumps) for linear, chain in zip(fit.linears, fit.chains, strict=True)
+        reduce(linear, trajectory, fit.noise, fit.defects)
+        for linear, trajectory in zip(fit.linears, fit.trajectories, strict=True)
     ]
     reduced[0] = replace(reduced[0], cross=too_far * reduced[0].cross)
     return GaussNewtonStep(fit, reduced, np.empty(0), {}, fit.merit)

@@ -9,7 +9,7 @@ from dataclasses import FrozenInstanceError, fields
 import pytest
 
 from validation.diagnosis import pipeline, stages
-from validation.diagnosis.selection.found import Search
+from validation.diagnosis.selection.search_state import Search
 from validation.diagnosis.setup import SetupFindings
 
 

@@ -5,21 +5,21 @@ from __future__ import annotations
 import pytest
 
 from validation.diagnosis.assemble import reason_for
-from validation.diagnosis.selection.candidates import Trial
+from validation.diagnosis.selection.candidates import CandidateEffect
 from validation.diagnosis.selection.evidence import price
-from validation.diagnosis.selection.found import Considered
+from validation.diagnosis.selection.search_state import Considered
 
-BIAS, IMPULSE = Trial("gyro.bias", ()), Trial("event.impulse", ())
-
-
-def considered(trial: Trial, gain: float) -> Considered:
-    return Considered(trial, gain, gain, {})
+BIAS, IMPULSE = CandidateEffect("gyro.bias", ()), CandidateEffect("event.impulse", ())
 
 
-@pytest.mark.parametrize("trial", [BIAS, IMPULSE], ids=lambda trial: trial.id)
-def test_a_candidate_is_dear_or_beaten_by_its_own_price(trial):
-    assert reason_for(considered(trial, price(trial) - 1.0), []) == "worth less than its price"
-    assert reason_for(considered(trial, price(trial) + 1.0), []) == "another explains more"
+def considered(candidate: CandidateEffect, gain: float) -> Considered:
+    return Considered(candidate, gain, gain, {})
+
+
+@pytest.mark.parametrize("trial", [BIAS, IMPULSE], ids=lambda candidate: candidate.id)
+def test_a_candidate_is_dear_or_beaten_by_its_own_price(candidate):
+    assert reason_for(considered(candidate, price(candidate) - 1.0), []) == "worth less than its price"
+    assert reason_for(considered(candidate, price(candidate) + 1.0), []) == "another explains more"
 
 
 def test_an_event_costs_more_than_a_bias():

@@ -29,14 +29,14 @@ from discsim.shipped import load_disc, load_throw
 from discsim.trajectory import predict
 from validation.cli import main
 from validation.diagnosis.pipeline import diagnose
-from validation.diagnosis.relaxed_fit import first_chain
+from validation.diagnosis.relaxed_fit import first_trajectory
 from validation.diagnosis.result import Diagnosis
-from validation.diagnosis.selection.candidates import available, parameters_of, trials_for
+from validation.diagnosis.selection.candidates import available, candidates_for, parameters_of
 from validation.identification.competing_effects import Competing
 from validation.identification.linearisation import linearise
 from validation.identification.prediction import shown
 from validation.identification.propagation import Column
-from validation.identification.segments import chain
+from validation.identification.segments import trajectory_of
 from validation.identification.sensor_model import is_motion, predicted
 
 FIELD, RIG = Environment(air_density=None), Rig(1e-3, 8e-5)
@@ -180,8 +180,8 @@ def test_an_effect_competes_beside_the_catalogue_s(tmp_path):
     assert not is_motion("my.supply", effects)
     assert effect.row in available(recordings, effects)
     assert effect.row not in available(recordings)
-    (trial,) = (trial for trial in trials_for(recordings, effects) if trial.id == "my.supply")
-    assert [(q.name, q.stated) for q in parameters_of(trial)] == [("k_uT_s2", 0.0)]
+    (candidate,) = (candidate for candidate in candidates_for(recordings, effects) if candidate.id == "my.supply")
+    assert [(q.name, q.stated) for q in parameters_of(candidate)] == [("k_uT_s2", 0.0)]
 
 
 def test_an_effect_acts_on_every_neighbour_of_a_motion_by_its_own_state(tmp_path):
@@ -204,7 +204,7 @@ def test_an_effect_acts_on_every_neighbour_of_a_motion_by_its_own_state(tmp_path
 
 def test_the_column_of_an_effects_shape_is_that_of_its_form_whatever_its_name(tmp_path):
     effect = loaded(tmp_path, WARMTH)
-    current = replace(first_chain(run_down(60.0)), effects=Competing((effect,)))
+    current = replace(first_trajectory(run_down(60.0)), effects=Competing((effect,)))
     values = {("my.warmth", "a_uT"): 3.0, ("my.warmth", "tau_s"): 4.0}
     columns = [Column("my.warmth", name, 1e-3) for name in ("a_uT", "tau_s")]
     linear = linearise(current, values, columns, np.ones(current.plant.layout.directions, dtype=np.bool_))
@@ -212,7 +212,7 @@ def test_the_column_of_an_effects_shape_is_that_of_its_form_whatever_its_name(tm
         t, warms = linear.t[channel.rows], (channel.sensor, channel.axis) == ("magnetometer", "y_uT")
         expected = np.stack([-np.expm1(-t / 4.0), -3.0 * t / 16.0 * np.exp(-t / 4.0)], axis=1)
         # central differences of 1e-3 s err by 1e-8 of the slope
-        np.testing.assert_allclose(linear.shared[channel.rows], expected if warms else 0.0 * expected, atol=1e-6)
+        np.testing.assert_allclose(linear.common[channel.rows], expected if warms else 0.0 * expected, atol=1e-6)
 
 
 def braked(effect: UserEffect, rate: float, k: float) -> Recording:
@@ -271,7 +271,7 @@ def test_both_engines_and_the_pieces_of_a_fit_fly_one_wrench(tmp_path):
 
     recording = record(truth, MODULE, np.random.default_rng(1), plant="flight", name="throw", disc=disc)
     state = np.concatenate([*(getattr(truth, name)[0] for name in ("position", "velocity", "attitude", "rate"))])
-    whole = chain(recording, np.array([0.0, 1.0]), state[None], Competing((effect,)))
+    whole = trajectory_of(recording, np.array([0.0, 1.0]), state[None], Competing((effect,)))
     values = {("my.both", "k"): 2e-3, ("my.both", "c"): 1.0 + 2e-5, **LAW}
     t = np.array([1.0])
     np.testing.assert_allclose(shown(whole, values, "gyroscope", t), truth.rate[-1:], atol=1e-3)
@@ -279,7 +279,7 @@ def test_both_engines_and_the_pieces_of_a_fit_fly_one_wrench(tmp_path):
     # more brake, less spin: dr/dc = -int r dt / Izz, but for what the air makes of it
     rows = next(channel.rows for channel in linear.channels if channel.axis == "z_rad_s")
     spin = np.trapezoid(truth.rate[:, 2], truth.t) / disc.Izz
-    assert linear.shared[rows, 0][-1] == pytest.approx(-spin, rel=0.05)
+    assert linear.common[rows, 0][-1] == pytest.approx(-spin, rel=0.05)
 
 
 @pytest.mark.parametrize("name", ["nonlinear", "ribbon"])

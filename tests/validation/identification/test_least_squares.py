@@ -12,24 +12,24 @@ from support.made import RIG, coasts, flight, release_of, states_of, tables, thr
 
 from discsim.arrays import FloatArray
 from discsim.effects import effect
-from validation.diagnosis.relaxed_fit import first_chain
+from validation.diagnosis.relaxed_fit import first_trajectory
 from validation.identification import gauss_newton, normal_equations
 from validation.identification.gauss_newton import (
     Fit,
     GaussNewtonStep,
+    discontinuous,
     linearised,
     merit_of,
-    open_gaps,
     refit,
     residuals_after,
 )
 from validation.identification.noise import stated_noise, whitened
-from validation.identification.normal_equations import local_step, normal_matrix, reduce, shared_step, unknown_prior
-from validation.identification.parameters import Jumps, Parameter, values_of
+from validation.identification.normal_equations import common_step, normal_matrix, nuisance_step, reduce, unknown_prior
+from validation.identification.parameters import AllowedDefects, Parameter, values_of
 from validation.identification.plants.flight import FLIGHT
 from validation.identification.plants.spin_down import SPIN_DOWN
 from validation.identification.release_prior import release_rows
-from validation.identification.segments import Chain, chain, stepped
+from validation.identification.segments import Trajectory, stepped, trajectory_of
 
 FRICTION = Parameter("rig.coulomb_friction", "torque_N_m", 0.0, 1e-6)
 VISCOUS = Parameter("rig", "viscous", RIG.viscous, 1e-8, 2e-7)
@@ -37,11 +37,11 @@ HARD = Parameter("mag.hard_iron", "bx_uT", 0.0, 0.05, 10.0, frozenset([1]))
 
 
 @cache
-def loose() -> Fit:
-    """Two run-downs in pieces that may jump, beside the data and not yet fitted."""
-    chains = tuple(first_chain(recording) for recording in coasts(seconds=2.0))
+def relaxed_fit() -> Fit:
+    """Two run-downs in segments that may jump, beside the data and not yet fitted."""
+    trajectories = tuple(first_trajectory(recording) for recording in coasts(seconds=2.0))
     parameters = (VISCOUS, FRICTION, HARD)
-    fit = Fit(chains, parameters, np.array([RIG.viscous, 1e-5, 0.3]), SPIN_DOWN.sizes.relaxed, {})
+    fit = Fit(trajectories, parameters, np.array([RIG.viscous, 1e-5, 0.3]), SPIN_DOWN.sizes.relaxed, {})
     linears = linearised(fit)
     noise = {group: level._replace(correlation=0.3) for group, level in stated_noise(linears).items()}
     return replace(fit, linears=linears, noise=noise)
@@ -53,14 +53,14 @@ def dense(fit: Fit, white: bool = False) -> tuple[FloatArray, FloatArray]:
     sizes = [linear.unknowns for linear in fit.linears]
     width = sum(sizes) + len(fit.parameters)
     A, b = [], []
-    for k, (linear, current) in enumerate(zip(fit.linears, fit.chains, strict=True)):
+    for k, (linear, current) in enumerate(zip(fit.linears, fit.trajectories, strict=True)):
         start, u = sum(sizes[:k]), sizes[k]
         rows = np.zeros((linear.raw.size, width))
-        rows[:, start : start + u], rows[:, sum(sizes) :] = linear.local, linear.shared
+        rows[:, start : start + u], rows[:, sum(sizes) :] = linear.nuisance, linear.common
         both = whitened(linear, noise, np.hstack([rows, linear.residual[:, None]]))
         A.append(both[:, :-1])
         b.append(both[:, -1])
-        H, right, _ = unknown_prior(linear, current, fit.jumps)
+        H, right, _ = unknown_prior(linear, current, fit.defects)
         prior = np.zeros((u, width))
         prior[:, start : start + u] = np.sqrt(H)  # diagonal: nothing is stated of a rig's release
         A.append(prior)
@@ -79,13 +79,13 @@ def white(fit: Fit) -> Fit:
 
 
 def test_eliminating_each_recording_gives_the_step_of_the_whole_system():
-    fit = white(loose())
+    fit = white(relaxed_fit())
     A, b = dense(fit)
     size = np.linalg.norm(A, axis=0)
     whole, *_ = np.linalg.lstsq(A / size, b, rcond=None)
     whole = whole / size
-    reduced = [reduce(*each, fit.noise, fit.jumps) for each in zip(fit.linears, fit.chains, strict=True)]
-    step, covariance, expected = shared_step(np.sum([r.gram for r in reduced], axis=0), fit.parameters, fit.at)
+    reduced = [reduce(*each, fit.noise, fit.defects) for each in zip(fit.linears, fit.trajectories, strict=True)]
+    step, covariance, expected = common_step(np.sum([r.gram for r in reduced], axis=0), fit.parameters, fit.at)
     p = len(fit.parameters)
     assert step == pytest.approx(whole[-p:], rel=1e-5, abs=1e-9 * np.max(np.abs(whole[-p:])))
     assert expected == pytest.approx(float(np.sum((b - A @ whole) ** 2)), rel=1e-8)
@@ -95,24 +95,24 @@ def test_eliminating_each_recording_gives_the_step_of_the_whole_system():
     for r, linear in zip(reduced, fit.linears, strict=True):
         u = linear.unknowns
         sd = 1.0 / np.linalg.norm(A[:, start : start + u], axis=0)
-        assert np.max(np.abs(local_step(r, step) - whole[start : start + u]) / sd) < 1e-3
+        assert np.max(np.abs(nuisance_step(r, step) - whole[start : start + u]) / sd) < 1e-3
         start += u
 
 
 def test_the_normal_matrix_of_long_chains_is_that_of_the_full_rows():
-    fit = white(loose())
+    fit = white(relaxed_fit())
     for linear in fit.linears:
-        assert linear.unknowns > linear.moves.shape[1]
-        A = whitened(linear, fit.noise, np.hstack([linear.local, linear.shared, linear.residual[:, None]]))
+        assert linear.unknowns > linear.sensitivities.shape[1]
+        A = whitened(linear, fit.noise, np.hstack([linear.nuisance, linear.common, linear.residual[:, None]]))
         G = A.T @ A
         size = np.sqrt(np.maximum(np.diag(G), 1e-300))
         assert np.max(np.abs(normal_matrix(linear, fit.noise) - G) / np.outer(size, size)) < 1e-10
 
 
 def test_correlated_noise_weighs_tied_pieces_by_their_dense_covariance():
-    fit = replace(loose(), jumps=SPIN_DOWN.sizes.continuous)
+    fit = replace(relaxed_fit(), defects=SPIN_DOWN.sizes.continuous)
     linear = linearised(fit)[0]
-    A = np.hstack([linear.local, linear.shared, linear.residual[:, None]])
+    A = np.hstack([linear.nuisance, linear.common, linear.residual[:, None]])
     G = np.zeros((A.shape[1],) * 2)
     for channel in linear.channels:
         sd, phi, *_ = fit.noise[channel.group]
@@ -129,7 +129,7 @@ def test_a_shared_step_obeys_priors_and_leaves_alone_what_no_reading_shows():
     gram = np.hstack([A, b[:, None]]).T @ np.hstack([A, b[:, None]])
     parameters = (Parameter("a", "x", 2.0, 1.0, 0.05), Parameter("a", "y", 0.0, 1.0), Parameter("a", "z", 0.0, 1.0))
     at = np.array([1.0, 0.0, 0.0])
-    step, _, expected = shared_step(gram, parameters, at)
+    step, _, expected = common_step(gram, parameters, at)
     rows = np.vstack([A, [1.0 / 0.05, 0.0, 0.0]])
     right = np.append(b, (2.0 - 1.0) / 0.05)
     direct = lsq_linear(rows[:, :2], right)
@@ -139,7 +139,7 @@ def test_a_shared_step_obeys_priors_and_leaves_alone_what_no_reading_shows():
 
 
 def test_a_step_from_predictions_that_are_not_finite_is_no_number():
-    step, covariance, expected = shared_step(np.full((2, 2), np.nan), (FRICTION,), np.zeros(1))
+    step, covariance, expected = common_step(np.full((2, 2), np.nan), (FRICTION,), np.zeros(1))
     assert np.isnan(step).all()
     assert np.isnan(covariance).all()
     assert np.isnan(expected)
@@ -166,46 +166,46 @@ def test_values_hold_in_the_recordings_of_their_parameter():
 
 
 def test_a_column_of_one_recording_is_zero_in_the_others():
-    first, second = loose().linears
-    assert not first.shared[:, 2].any()
-    assert second.shared[:, 2].any()
+    first, second = relaxed_fit().linears
+    assert not first.common[:, 2].any()
+    assert second.common[:, 2].any()
 
 
 def test_the_merit_is_what_the_dense_system_leaves_without_a_step():
-    fit = loose()
+    fit = relaxed_fit()
     _, b = dense(fit)
-    first = sum(float(np.sum(linear.jump[linear.jump_kind < 0] ** 2)) for linear in fit.linears)
+    first = sum(float(np.sum(linear.defect[linear.defect_kind < 0] ** 2)) for linear in fit.linears)
     assert first == 0.0
     assert merit_of(fit, fit.linears) == pytest.approx(float(b @ b), rel=1e-10)
 
 
 def test_a_fit_of_tied_pieces_finds_the_friction_with_an_honest_error():
-    """From pieces started by the data; closed, the chain is one motion."""
+    """From segments started by the data; closed, the trajectory is one motion."""
     hidden = [effect("rig.coulomb_friction", torque_N_m=1.5e-4)]
-    chains = tuple(first_chain(recording) for recording in coasts(hidden, seconds=2.0))
-    fit = Fit(chains, (FRICTION,), np.zeros(1), SPIN_DOWN.sizes.continuous, {})
+    trajectories = tuple(first_trajectory(recording) for recording in coasts(hidden, seconds=2.0))
+    fit = Fit(trajectories, (FRICTION,), np.zeros(1), SPIN_DOWN.sizes.continuous, {})
     fit = refit(replace(fit, noise=stated_noise(linearised(fit, ()))), iterations=12)
     sd = float(np.sqrt(fit.covariance[0, 0]))
     assert fit.at[0] == pytest.approx(1.5e-4, abs=4.0 * sd)
     assert sd < 1e-5
     assert fit.merit / fit.count == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / fit.count))
     for linear in fit.linears:
-        assert np.max(np.abs(linear.gaps)) < 1e-3
+        assert np.max(np.abs(linear.mismatch)) < 1e-3
         assert linear.residual == pytest.approx(linear.raw, abs=1e-2)
     # where a fit stands there is nothing left to step
-    reduced = [reduce(*each, fit.noise, fit.jumps) for each in zip(fit.linears, fit.chains, strict=True)]
+    reduced = [reduce(*each, fit.noise, fit.defects) for each in zip(fit.linears, fit.trajectories, strict=True)]
     for after, linear in zip(residuals_after(fit, reduced, np.zeros(1)), fit.linears, strict=True):
         assert np.sum(after**2) == pytest.approx(np.sum(linear.residual**2), rel=1e-4)
 
 
-def stated(seconds: float = 0.5) -> Chain:
-    """A throw of which the release is stated, and a chain that starts elsewhere."""
+def stated(seconds: float = 0.5) -> Trajectory:
+    """A throw of which the release is stated, and a trajectory that starts elsewhere."""
     release = release_of(0.4, 70.0)
     sigma = {"velocity_ned_m_s": 0.5, "roll_rad": 0.02, "pitch_rad": 0.02, "body_rate_rad_s": 0.1}
     recording = replace(throws(seconds=seconds)[0], release=replace(release, sigma=sigma))
     state = states_of(flight(seconds=seconds), np.zeros(1))
     off = np.array([0.01, -0.02, 0.03, 0.4, -0.3, 0.2, 0.03, -0.02, 0.5, 0.05, -0.02, 0.3])
-    return chain(recording, np.array([0.0, seconds]), FLIGHT.layout.moved(state, off))
+    return trajectory_of(recording, np.array([0.0, seconds]), FLIGHT.layout.moved(state, off))
 
 
 def test_a_stated_release_pulls_the_first_state_by_its_sigmas():
@@ -225,15 +225,15 @@ def test_a_stated_release_pulls_the_first_state_by_its_sigmas():
 
 
 def test_a_rig_states_no_release():
-    current = first_chain(tables()[0])
+    current = first_trajectory(tables()[0])
     residual, rows = release_rows(current)
     assert residual.size == 0
     assert rows.shape == (0, 1)
 
 
 def test_a_tied_fit_of_a_throw_comes_down_to_the_noise():
-    chains = tuple(first_chain(recording) for recording in throws(seconds=1.0))
-    fit = Fit(chains, (), np.empty(0), Jumps(np.zeros(12)), {})
+    trajectories = tuple(first_trajectory(recording) for recording in throws(seconds=1.0))
+    fit = Fit(trajectories, (), np.empty(0), AllowedDefects(np.zeros(12)), {})
     fit = refit(replace(fit, noise=stated_noise(linearised(fit))), iterations=12)
     # 24 unknowns of some 3000 readings
     assert fit.merit / fit.count == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / fit.count))
@@ -241,28 +241,28 @@ def test_a_tied_fit_of_a_throw_comes_down_to_the_noise():
 
 def test_a_fit_that_ends_with_its_pieces_apart_goes_back_to_where_they_hung_together(monkeypatch):
     """Gaps are counted to first order only: what opens them may seem to gain."""
-    chains = tuple(first_chain(recording) for recording in coasts(seconds=2.0))
-    fit = Fit(chains, (VISCOUS,), np.array([RIG.viscous]), SPIN_DOWN.sizes.continuous, {})
+    trajectories = tuple(first_trajectory(recording) for recording in coasts(seconds=2.0))
+    fit = Fit(trajectories, (VISCOUS,), np.array([RIG.viscous]), SPIN_DOWN.sizes.continuous, {})
     fit = refit(replace(fit, noise=stated_noise(linearised(fit))))
-    assert not open_gaps(fit)
+    assert not discontinuous(fit)
 
     def apart(self: GaussNewtonStep) -> Fit:
-        first, *others = self.fit.chains
+        first, *others = self.fit.trajectories
         tangents = np.zeros((len(first.states), first.plant.layout.directions))
         tangents[-1, -1] = 1.0
-        trial = replace(self.fit, chains=(stepped(first, tangents), *others))
+        trial = replace(self.fit, trajectories=(stepped(first, tangents), *others))
         return replace(trial, linears=linearised(trial), merit=0.9 * self.fit.merit)
 
-    assert open_gaps(apart(GaussNewtonStep(fit, (), np.empty(0), {}, fit.merit)))
-    monkeypatch.setattr(GaussNewtonStep, "all_by_one_share", apart)
+    assert discontinuous(apart(GaussNewtonStep(fit, (), np.empty(0), {}, fit.merit)))
+    monkeypatch.setattr(GaussNewtonStep, "with_one_fraction", apart)
     again = refit(fit, iterations=3, tolerance=-np.inf)
-    assert not open_gaps(again)
-    for before, after in zip(fit.chains, again.chains, strict=True):
+    assert not discontinuous(again)
+    for before, after in zip(fit.trajectories, again.trajectories, strict=True):
         np.testing.assert_array_equal(after.states, before.states)
 
 
 def test_a_fit_that_will_stay_above_a_bar_is_left_where_it_stands():
-    fit = replace(white(loose()), jumps=SPIN_DOWN.sizes.continuous)
+    fit = replace(white(relaxed_fit()), defects=SPIN_DOWN.sizes.continuous)
     fit = replace(fit, at=np.array([5.0 * RIG.viscous, 1e-3, 0.3]))
     whole = refit(fit)
     assert refit(fit, bar=2.0 * whole.merit).merit == whole.merit
@@ -273,28 +273,28 @@ def test_a_fit_that_will_stay_above_a_bar_is_left_where_it_stands():
 
 def test_residuals_by_a_chord_are_those_of_a_full_linearisation():
     """Readings are predicted as they are; the slopes stay those of the point where they were worked out."""
-    fit = loose()
-    moved = replace(fit, chains=tuple(stepped(c, np.full((len(c.states), 2), 1e-4)) for c in fit.chains))
+    fit = relaxed_fit()
+    moved = replace(fit, trajectories=tuple(stepped(c, np.full((len(c.states), 2), 1e-4)) for c in fit.trajectories))
     full = linearised(moved)
     for linear, chord, before in zip(full, gauss_newton.repredicted(moved), fit.linears, strict=True):
         np.testing.assert_allclose(chord.residual, linear.residual, rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(chord.jump, linear.jump, atol=1e-12)
+        np.testing.assert_allclose(chord.defect, linear.defect, atol=1e-12)
         assert chord.own is before.own
 
 
 def test_there_is_no_chord_where_other_readings_take_part():
     """A clipped reading counts where the motion would not clip: its row has no slopes."""
-    fit = loose()
-    first = fit.chains[0].readings[0]
+    fit = relaxed_fit()
+    first = fit.trajectories[0].readings[0]
     good = first.good.copy()
     good[5:8] = False
-    fewer = replace(fit.chains[0], readings=(replace(first, good=good), *fit.chains[0].readings[1:]))
-    assert gauss_newton.repredicted(replace(fit, chains=(fewer, *fit.chains[1:]))) is None
+    fewer = replace(fit.trajectories[0], readings=(replace(first, good=good), *fit.trajectories[0].readings[1:]))
+    assert gauss_newton.repredicted(replace(fit, trajectories=(fewer, *fit.trajectories[1:]))) is None
 
 
 def test_short_steps_by_chords_end_where_full_ones_do(monkeypatch):
     """Within a hundredth of a standard deviation, with fewer motions run."""
-    start = replace(loose(), jumps=SPIN_DOWN.sizes.continuous)
+    start = replace(relaxed_fit(), defects=SPIN_DOWN.sizes.continuous)
     runs = []
     run = gauss_newton.linearised
     monkeypatch.setattr(gauss_newton, "linearised", lambda *given, **named: runs.append(1) or run(*given, **named))
@@ -303,7 +303,7 @@ def test_short_steps_by_chords_end_where_full_ones_do(monkeypatch):
         monkeypatch.setattr(gauss_newton, "CHORD", chord)
         runs.clear()
         fit = refit(start, iterations=10, tolerance=1e-6)
-        return refit(replace(fit, noise=dict(fit.noise)), iterations=4, tolerance=1e-9, moved_on=False), len(runs)
+        return refit(replace(fit, noise=dict(fit.noise)), iterations=4, tolerance=1e-9, relinearise=False), len(runs)
 
     (full, often), (chord, seldom) = ended(0.0), ended(10.0)
     assert seldom < often

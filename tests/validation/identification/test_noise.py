@@ -31,18 +31,18 @@ def rows(*sizes: tuple[str, int], sd: float = 1.0, missing: tuple[int, ...] = ()
     return Linear(
         raw=np.zeros(at),
         own=none,
-        piece=np.zeros(at, dtype=np.int64),
+        segment=np.zeros(at, dtype=np.int64),
         whole=none,
         t=np.concatenate(times),
         sd=np.full(at, sd),
         channels=tuple(channels),
-        jump=np.empty(0),
-        jump_kind=np.empty(0, dtype=np.int64),
-        jump_piece=np.empty(0, dtype=np.int64),
-        moves=np.zeros((1, 0, 0)),
-        passes=np.zeros((0, 0, 0)),
-        closing=np.zeros((1, 0)),
-        gaps=np.zeros((0, 0)),
+        defect=np.empty(0),
+        defect_kind=np.empty(0, dtype=np.int64),
+        defect_segment=np.empty(0, dtype=np.int64),
+        sensitivities=np.zeros((1, 0, 0)),
+        transitions=np.zeros((0, 0, 0)),
+        matching=np.zeros((1, 0)),
+        mismatch=np.zeros((0, 0)),
         shifts=np.zeros(at),
     )
 
@@ -83,8 +83,8 @@ def test_channels_do_not_leak_into_one_another():
 
 def test_pieces_are_whitened_apart_where_they_are_asked_to_be():
     linear = rows(("gyroscope", 6))
-    piece = np.array([0, 0, 0, 1, 1, 1])
-    W = whitened(linear, {"gyroscope": GroupNoise(1.0, 0.7)}, np.eye(6), piece)
+    segment = np.array([0, 0, 0, 1, 1, 1])
+    W = whitened(linear, {"gyroscope": GroupNoise(1.0, 0.7)}, np.eye(6), segment)
     assert not W[3:, :3].any()
     assert pytest.approx(W[:3, :3]) == W[3:, 3:]
 

@@ -1,4 +1,4 @@
-"""Pieces of motion and their linearisation: against the engines, the sensors, and readings simulated anew."""
+"""Segments of motion and their linearisation: against the engines, the sensors, and readings simulated anew."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ from validation.identification.plants.flight import FLIGHT
 from validation.identification.plants.free_spin import FREE_SPIN
 from validation.identification.prediction import shown
 from validation.identification.propagation import Column, base_flat, runner_of
-from validation.identification.segments import Chain, chain, recut
+from validation.identification.segments import Trajectory, resegmented, trajectory_of
 from validation.identification.sensor_model import predicted
 
 #: sizes that show well within half a second of flight
@@ -111,10 +111,10 @@ def clean() -> Motion:
     return flight(seconds=0.9)
 
 
-def beside(motion: Motion, recording: Recording, pieces: int = 3) -> Chain:
-    """A chain that starts each piece where the true motion is."""
-    edges = np.linspace(0.0, recording.end + 1e-6, pieces + 1)
-    return chain(recording, edges, states_of(motion, edges[:-1]))
+def beside(motion: Motion, recording: Recording, segments: int = 3) -> Trajectory:
+    """A trajectory that starts each segment where the true motion is."""
+    nodes = np.linspace(0.0, recording.end + 1e-6, segments + 1)
+    return trajectory_of(recording, nodes, states_of(motion, nodes[:-1]))
 
 
 def test_every_effect_of_the_catalogue_takes_part_here():
@@ -132,7 +132,7 @@ def test_a_piece_flies_as_the_standalone_model_does(hidden: Effect):
     t = np.linspace(0.0, 0.45, 91)
     model = predict(DRIVER, FIELD, release, [hidden], duration=0.5).at(t)
     first = np.hstack([model.position[0], model.velocity[0], model.attitude[0], model.rate[0]])
-    one = chain(recorded(clean()), np.array([0.0, 0.5]), first[None])
+    one = trajectory_of(recorded(clean()), np.array([0.0, 0.5]), first[None])
     values = values_of(hidden)
     # steps fixed for speed: what they leave stays a hundredth of what the sensors' noise is, and less
     gps = shown(one, values, "gps", t)
@@ -155,7 +155,7 @@ def test_a_piece_flies_as_the_standalone_model_does(hidden: Effect):
 )
 def test_a_rig_coasts_as_in_the_engine(hidden: Sequence[Effect]):
     motion = spin_down(RIG, FIELD, 40.0, 1.5, hidden, yaw=0.5)
-    one = chain(coasting(motion, RIG), np.array([0.0, 1.5]), np.array([[0.5, 40.0]]))
+    one = trajectory_of(coasting(motion, RIG), np.array([0.0, 1.5]), np.array([[0.5, 40.0]]))
     t = np.arange(0.003, 1.49, 0.01)
     # MuJoCo's fourth-order steps of 1 ms leave this much of a pulse of 10 ms
     assert shown(one, values_of(*hidden), "gyroscope", t) == pytest.approx(motion.at(t).rate, abs=1e-5)
@@ -175,13 +175,13 @@ def test_a_rig_coasts_as_in_the_engine(hidden: Sequence[Effect]):
 def test_a_table_turns_as_in_the_engine(hidden: Sequence[Effect]):
     motion = turn_table(PROFILES[1], FIELD, hidden, yaw=0.5)
     recording = tables()[1]
-    one = chain(recording, np.array([0.0, 3.0]), np.array([[0.5, 0.0]]))
+    one = trajectory_of(recording, np.array([0.0, 3.0]), np.array([[0.5, 0.0]]))
     t = np.arange(0.003, 2.99, 0.01)
     # the engine's table follows its command by a loop of 100/s, which trails a ripple by some of its amplitude
-    loose = 1e-3 if hidden and hidden[0].id == "rig.speed_ripple" else 1e-6
-    assert shown(one, values_of(*hidden), "gyroscope", t) == pytest.approx(motion.at(t).rate, abs=loose)
+    relaxed_fit = 1e-3 if hidden and hidden[0].id == "rig.speed_ripple" else 1e-6
+    assert shown(one, values_of(*hidden), "gyroscope", t) == pytest.approx(motion.at(t).rate, abs=relaxed_fit)
     field = motion.at(t).in_body(FIELD.magnetic_field)
-    assert shown(one, values_of(*hidden), "magnetometer", t) == pytest.approx(field, abs=100.0 * loose)
+    assert shown(one, values_of(*hidden), "magnetometer", t) == pytest.approx(field, abs=100.0 * relaxed_fit)
 
 
 def test_a_disc_in_no_air_spins_freely_as_in_the_engine():
@@ -193,7 +193,7 @@ def test_a_disc_in_no_air_spins_freely_as_in_the_engine():
     recording = record(
         motion, Instruments.from_parts("mpu9250"), np.random.default_rng(1), plant="free_spin", name="spin", disc=DRIVER
     )
-    one = chain(recording, np.array([0.0, 0.5]), state[None])
+    one = trajectory_of(recording, np.array([0.0, 0.5]), state[None])
     t = np.linspace(0.0, 0.44, 89)
     # steps of 0.07 rad of the spin, fourth order
     assert shown(one, values_of(hidden), "gyroscope", t) == pytest.approx(motion.at(t).rate, abs=2e-5)
@@ -268,8 +268,8 @@ def test_a_clipped_reading_counts_where_the_fit_would_not_clip():
 
 def test_a_chain_cut_anew_is_the_same_motion():
     motion = clean()
-    one = chain(recorded(motion), np.array([0.0, 0.9]), states_of(motion, np.zeros(1)))
-    cut = recut(one, {}, np.array([0.0, 0.2, 0.55, 0.9]))
+    one = trajectory_of(recorded(motion), np.array([0.0, 0.9]), states_of(motion, np.zeros(1)))
+    cut = resegmented(one, {}, np.array([0.0, 0.2, 0.55, 0.9]))
     t = np.linspace(0.0, 0.88, 45)
     assert shown(cut, {}, "accelerometer", t) == pytest.approx(shown(one, {}, "accelerometer", t), abs=1e-4)
 
@@ -277,19 +277,19 @@ def test_a_chain_cut_anew_is_the_same_motion():
 # ------------------------------------------------------------------------------------------ linearisation
 
 
-def predictions(one: Chain, values: dict[tuple[str, str], float], after: float = -1.0) -> FloatArray:
-    """Measured minus predicted of a chain as it stands, simulated anew."""
+def predictions(one: Trajectory, values: dict[tuple[str, str], float], after: float = -1.0) -> FloatArray:
+    """Measured minus predicted of a trajectory as it stands, simulated anew."""
     linear = linearise(one, values, (), np.zeros(one.plant.layout.directions, dtype=np.bool_))
     return linear.raw[linear.t > after]
 
 
-def slope_of(one: Chain, values: dict[tuple[str, str], float], key: tuple[str, str], h: float) -> FloatArray:
+def slope_of(one: Trajectory, values: dict[tuple[str, str], float], key: tuple[str, str], h: float) -> FloatArray:
     at = values.get(key, 0.0)
     up, down = predictions(one, {**values, key: at + h}), predictions(one, {**values, key: at - h})
     return (down - up) / (2.0 * h)
 
 
-#: where a piece begins, slopes in time are taken over the next 0.4 ms: the spin turns by half of that too much
+#: where a segment begins, slopes in time are taken over the next 0.4 ms: the spin turns by half of that too much
 ONE_SIDED = 70.0 * 2e-4
 
 
@@ -307,11 +307,11 @@ def assert_column(linear: Linear, found: FloatArray, expected: FloatArray, share
 
 
 @cache
-def tied() -> tuple[Chain, Chain]:
-    """One flight as one piece and as three that hang together."""
+def tied() -> tuple[Trajectory, Trajectory]:
+    """One flight as one segment and as three that are continuous."""
     motion = clean()
-    one = chain(recorded(motion), np.array([0.0, 0.9]), states_of(motion, np.zeros(1)))
-    return one, recut(one, {}, np.array([0.0, 0.25, 0.6, 0.9]))
+    one = trajectory_of(recorded(motion), np.array([0.0, 0.9]), states_of(motion, np.zeros(1)))
+    return one, resegmented(one, {}, np.array([0.0, 0.25, 0.6, 0.9]))
 
 
 def test_columns_of_the_first_state_are_those_of_the_whole_flight():
@@ -323,7 +323,7 @@ def test_columns_of_the_first_state_are_those_of_the_whole_flight():
         moved = [
             predictions(replace(one, states=FLIGHT.layout.moved(one.states, s * tangent)), {}) for s in (1.0, -1.0)
         ]
-        assert_column(linear, linear.local[:, k], (moved[1] - moved[0]) / (2.0 * h), 1e-4, k)
+        assert_column(linear, linear.nuisance[:, k], (moved[1] - moved[0]) / (2.0 * h), 1e-4, k)
 
 
 def test_columns_of_a_jump_move_what_comes_after_it():
@@ -332,20 +332,20 @@ def test_columns_of_a_jump_move_what_comes_after_it():
     allowed[[3, 4, 5, 11]] = True
     linear = linearise(three, {}, (), allowed)
     assert linear.unknowns == 12 + 2 * 4
-    two = recut(three, {}, np.array([0.0, 0.25, 0.9]))
+    two = resegmented(three, {}, np.array([0.0, 0.25, 0.9]))
     for place, direction in ((12, 3), (14, 5), (15, 11)):
-        assert (linear.jump_kind[place], linear.jump_piece[place]) == (direction, 1)
+        assert (linear.defect_kind[place], linear.defect_segment[place]) == (direction, 1)
         h = FLIGHT.sizes.differences[direction]
         ends = []
         for sign in (1.0, -1.0):
             states = two.states.copy()
             states[1] = FLIGHT.layout.moved(two.states[1], sign * h * np.eye(12)[direction])
             ends.append(predictions(replace(two, states=states), {}))
-        assert_column(linear, linear.local[:, place], (ends[1] - ends[0]) / (2.0 * h), 1e-4, direction)
+        assert_column(linear, linear.nuisance[:, place], (ends[1] - ends[0]) / (2.0 * h), 1e-4, direction)
 
 
 def test_a_gap_that_may_not_be_is_closed_by_the_step():
-    """Pieces that stand apart: residuals are those of the motion from the first state, to first order of the gap."""
+    """Segments that stand apart: residuals are those of the motion from the first state, to first order of the gap."""
     one, three = tied()
     states = three.states.copy()
     states[1:, 0] += 1e-3
@@ -390,7 +390,7 @@ def test_columns_of_shared_parameters_are_those_of_the_whole_flight(
     key: tuple[str, str], h: float, values: dict[tuple[str, str], float]
 ):
     one, three = tied()
-    one, three = recut(one, values, one.edges), recut(one, values, three.edges)
+    one, three = resegmented(one, values, one.nodes), resegmented(one, values, three.nodes)
     stated = {
         ("aero", "CLa"): DRIVER.aero.CLa,  # type: ignore[union-attr]
         ("aero", "CNr"): DRIVER.aero.CNr,  # type: ignore[union-attr]
@@ -402,7 +402,7 @@ def test_columns_of_shared_parameters_are_those_of_the_whole_flight(
     if key in stated:
         values = {**values, key: float(stated[key])}  # type: ignore[arg-type]
     linear = linearise(three, values, [Column(*key, h)], np.zeros(12, dtype=np.bool_))
-    found, expected = linear.shared[:, 0], slope_of(one, values, key, h)
+    found, expected = linear.common[:, 0], slope_of(one, values, key, h)
     if key[1] in ("delay_s", "offset_s"):  # there is nothing from before
         found, expected = np.where(linear.t > 0.06, found, 0.0), np.where(linear.t > 0.06, expected, 0.0)
     # second differences of the readings over h
@@ -418,8 +418,8 @@ def test_a_lag_that_is_not_there_yet_has_the_slope_of_a_delay():
     # the first reading has not forgotten how the lag began
     later, none = predictions(one, {("gyro.lag", "tau_s"): h}, 1e-3), predictions(one, {}, 1e-3)
     some = (linear.t > 1e-3) & np.isin(np.arange(linear.t.size), rows_at(linear, "gyroscope"))
-    found, expected = linear.shared[some, 0], ((none - later) / h)[some[linear.t > 1e-3]]
-    # a lag is a delay to first order; a slope in time is one-sided where a piece begins
+    found, expected = linear.common[some, 0], ((none - later) / h)[some[linear.t > 1e-3]]
+    # a lag is a delay to first order; a slope in time is one-sided where a segment begins
     assert found == pytest.approx(expected, abs=ONE_SIDED * np.max(np.abs(expected)))
 
 
@@ -452,9 +452,9 @@ def test_a_lag_that_is_not_there_yet_has_the_slope_of_a_delay():
 def test_columns_of_a_rig_are_those_of_the_whole_run(recording, state, keys):  # type: ignore[no-untyped-def]
     recording = recording()
     values = {key: at for key, _, at in keys}
-    edges = np.array([0.0, recording.end + 1e-6])
-    one = chain(recording, edges, np.array([state]))
-    three = recut(one, values, np.linspace(0.0, edges[1], 4))
+    nodes = np.array([0.0, recording.end + 1e-6])
+    one = trajectory_of(recording, nodes, np.array([state]))
+    three = resegmented(one, values, np.linspace(0.0, nodes[1], 4))
     d = one.plant.layout.directions
     columns = [Column(*key, h) for key, h, _ in keys]
     linear = linearise(three, values, columns, np.zeros(d, dtype=np.bool_))
@@ -464,9 +464,9 @@ def test_columns_of_a_rig_are_those_of_the_whole_run(recording, state, keys):  #
             predictions(replace(one, states=one.plant.layout.moved(one.states, s * steps[k] * np.eye(d)[k])), values)
             for s in (1.0, -1.0)
         ]
-        assert_column(linear, linear.local[:, k], (moved[1] - moved[0]) / (2.0 * steps[k]), 1e-4, k)
+        assert_column(linear, linear.nuisance[:, k], (moved[1] - moved[0]) / (2.0 * steps[k]), 1e-4, k)
     for j, (key, h, _) in enumerate(keys):
-        assert_column(linear, linear.shared[:, j], slope_of(one, values, key, h), 1e-3, key)
+        assert_column(linear, linear.common[:, j], slope_of(one, values, key, h), 1e-3, key)
 
 
 def test_columns_of_a_free_spin_are_those_of_the_whole_motion():
@@ -477,17 +477,17 @@ def test_columns_of_a_free_spin_are_those_of_the_whole_motion():
     state[0, 14:] = 0.3, -0.2
     state[0, :6] = [1.0, -2.0, 3.0, 1.0, -0.05, 0.01]
     state[0, 6:10], state[0, 10:13] = motion.attitude[0], motion.rate[0]
-    # the wind's direction in the disc's plane is told by the piece, and so differs by the square of the tilt
+    # the wind's direction in the disc's plane is told by the segment, and so differs by the square of the tilt
     values = {key: 0.3 for key in FREE_SPIN.own_keys[:4]}
-    one = chain(recording, np.array([0.0, 0.6]), state)
-    three = recut(one, values, np.array([0.0, 0.2, 0.4, 0.6]))
+    one = trajectory_of(recording, np.array([0.0, 0.6]), state)
+    three = resegmented(one, values, np.array([0.0, 0.2, 0.4, 0.6]))
     columns = [
         Column(*FREE_SPIN.own_keys[0], 1e-3),
         Column(*FREE_SPIN.own_keys[3], 1e-3),
         Column("body.inertia_asymmetry", "dIyy_kg_m2", 1e-7),
     ]
     linear = linearise(three, values, columns, np.zeros(15, dtype=np.bool_))
-    # what wanders is told by the piece: its slope goes on, so that three pieces are the same motion as one
+    # what wanders is told by the segment: its slope goes on, so that three segments are the same motion as one
     assert predictions(three, values) == pytest.approx(predictions(one, values), abs=1e-3)
     for k in (0, 2, 4, 6, 9, 11, 12, 13, 14):
         h = FREE_SPIN.sizes.differences[k]
@@ -495,24 +495,24 @@ def test_columns_of_a_free_spin_are_those_of_the_whole_motion():
             predictions(replace(one, states=FREE_SPIN.layout.moved(one.states, s * h * np.eye(15)[k])), values)
             for s in (1.0, -1.0)
         ]
-        assert_column(linear, linear.local[:, k], (moved[1] - moved[0]) / (2.0 * h), 1e-3, k)
+        assert_column(linear, linear.nuisance[:, k], (moved[1] - moved[0]) / (2.0 * h), 1e-3, k)
     for j, column in enumerate(columns):
-        assert_column(linear, linear.shared[:, j], slope_of(one, values, column.key, column.step), 2e-3, column)
+        assert_column(linear, linear.common[:, j], slope_of(one, values, column.key, column.step), 2e-3, column)
 
 
 def test_an_event_s_columns_are_the_same_whether_or_not_quiet_pieces_are_left_out(monkeypatch: pytest.MonkeyPatch):
-    """A knock moves nothing in pieces that it does not touch: there its neighbours are not run."""
+    """A knock moves nothing in segments that it does not touch: there its neighbours are not run."""
     motion = clean()
     one = beside(motion, recorded(motion), 4)
     columns = [Column("event.impulse", f"dv_{axis}_m_s", 0.02, (("t_s", 0.4),)) for axis in ("north", "down")]
     columns.append(Column("event.spin_step", "dr_rad_s", 0.02, (("t_s", 0.7),)))
-    jumps = np.zeros(12, dtype=np.bool_)
-    made = [linearise(one, {}, columns, jumps, central=central) for central in (True, False)]
+    defects = np.zeros(12, dtype=np.bool_)
+    made = [linearise(one, {}, columns, defects, central=central) for central in (True, False)]
     monkeypatch.setattr(linearisation, "EVENT_REACH", 10.0)
     for linear, central in zip(made, (True, False), strict=True):
-        every = linearise(one, {}, columns, jumps, central=central)
+        every = linearise(one, {}, columns, defects, central=central)
         np.testing.assert_allclose(linear.own, every.own, rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(linear.passes, every.passes, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(linear.transitions, every.transitions, rtol=1e-9, atol=1e-9)
         assert np.any(linear.own[:, 12:] != 0.0, axis=0).all()
 
 

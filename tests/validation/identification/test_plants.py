@@ -15,12 +15,12 @@ from discsim.environment import Environment
 from discsim.recording import PLANTS as NAMES
 from discsim.recording import Recording, Samples, SensorSheet
 from validation.identification.dynamics import ROW
-from validation.identification.gauss_newton import Fit, linearised, open_gaps, refit
+from validation.identification.gauss_newton import Fit, discontinuous, linearised, refit
 from validation.identification.noise import stated_noise
-from validation.identification.parameters import Jumps, Parameter
+from validation.identification.parameters import AllowedDefects, Parameter
 from validation.identification.plants import PLANTS, Plant
 from validation.identification.plants.plant import Durations, Dynamics, Initial, Layout, Sizes
-from validation.identification.segments import chain, recut
+from validation.identification.segments import resegmented, trajectory_of
 
 ROOMS = [ROOT / "validation" / "diagnosis", ROOT / "validation" / "identification"]
 #: source -> (name, why it may stand there)
@@ -152,7 +152,9 @@ PENDULUM = Plant(
     layout=Layout(2, 2, spin=RATE),
     dynamics=Dynamics(propagate, lambda given, state, start, stop: 0.02),
     initial=Initial(first_states),
-    sizes=Sizes(np.array([1e-5, 1e-4]), np.array([3.0, 30.0]), Jumps(np.zeros(2)), Jumps(np.array([0.1, 0.3]))),
+    sizes=Sizes(
+        np.array([1e-5, 1e-4]), np.array([3.0, 30.0]), AllowedDefects(np.zeros(2)), AllowedDefects(np.array([0.1, 0.3]))
+    ),
     durations=Durations(segment=0.8, first_look=4.0, window=1.0, longest=60.0, setup=60.0),
     own=(Parameter("pendulum", "damping_1_s", 0.0, 1e-4),),
 )
@@ -173,12 +175,14 @@ def swing(seed: int, start=(0.9, 0.0), seconds: float = 8.0) -> Recording:
 
 def fitted(recordings) -> Fit:
     """Return the fit of what they share, their damping, from no damping at all."""
-    chains = []
+    trajectories = []
     for one in recordings:
         nodes = PENDULUM.nodes(one, PENDULUM.durations.segment)
-        chains.append(chain(one, nodes, PENDULUM.initial.states(one, nodes[:-1], 1.0)))
-    fit = Fit(tuple(chains), PENDULUM.own, np.zeros(1), PENDULUM.sizes.continuous, {})
-    return refit(Fit(fit.chains, fit.parameters, fit.at, fit.jumps, stated_noise(linearised(fit))), iterations=12)
+        trajectories.append(trajectory_of(one, nodes, PENDULUM.initial.states(one, nodes[:-1], 1.0)))
+    fit = Fit(tuple(trajectories), PENDULUM.own, np.zeros(1), PENDULUM.sizes.continuous, {})
+    return refit(
+        Fit(fit.trajectories, fit.parameters, fit.at, fit.defects, stated_noise(linearised(fit))), iterations=12
+    )
 
 
 @pytest.fixture
@@ -190,7 +194,7 @@ def registered(monkeypatch):
 def test_the_damping_of_a_pendulum_is_fitted_by_its_plant_alone():
     fit = fitted([swing(1), swing(2, (0.0, 2.0))])
     sd = float(np.sqrt(fit.covariance[0, 0]))
-    assert not open_gaps(fit)
+    assert not discontinuous(fit)
     assert fit.merit == pytest.approx(fit.count, abs=4.0 * np.sqrt(2.0 * fit.count))
     assert abs(fit.at[0] - DAMPING) < sd
     assert sd < 0.02 * DAMPING
@@ -211,8 +215,8 @@ def test_the_error_of_its_damping_is_as_large_as_the_fit_says():
 @pytest.mark.usefixtures("registered")
 def test_a_pendulum_goes_on_from_one_segment_into_the_next_as_it_would_in_one():
     one = swing(1)
-    whole = chain(one, np.array([0.0, 4.0]), np.array([[0.9, 0.0]]))
+    whole = trajectory_of(one, np.array([0.0, 4.0]), np.array([[0.9, 0.0]]))
     values = {PENDULUM.own_keys[0]: DAMPING}
-    halves = recut(whole, values, np.array([0.0, 2.0, 4.0]))
-    quarters = recut(halves, values, np.array([0.0, 1.0, 2.0, 3.0, 4.0]))
+    halves = resegmented(whole, values, np.array([0.0, 2.0, 4.0]))
+    quarters = resegmented(halves, values, np.array([0.0, 1.0, 2.0, 3.0, 4.0]))
     np.testing.assert_allclose(quarters.states[[0, 2]], halves.states, atol=1e-9)

@@ -8,15 +8,15 @@ from test_noise import coloured, rows
 
 from discsim.arrays import FloatArray
 from validation.identification.noise import estimate_noise
-from validation.identification.residual_tests import Remainder, remainders
+from validation.identification.residual_tests import UnmodelledResidual, unmodelled_residuals
 
 N, AXES, RECORDINGS = 600, 3, 4
 
 
-def left(residuals: list[FloatArray]) -> list[Remainder]:
+def left(residuals: list[FloatArray]) -> list[UnmodelledResidual]:
     """What remains of the residuals of recordings of a three-axis sensor, the noise estimated from them."""
     linears = [rows(*[("gyroscope", N)] * AXES) for _ in residuals]
-    return remainders(linears, residuals, estimate_noise(linears, residuals))
+    return unmodelled_residuals(linears, residuals, estimate_noise(linears, residuals))
 
 
 def noise(seed: int, sd: float = 1.0, phi: float = 0.0) -> list[FloatArray]:

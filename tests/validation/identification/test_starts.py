@@ -26,13 +26,14 @@ from discsim.recording import Recording, Samples, SensorSheet, read_dataset
 from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
-from validation.identification.initial.flight import Starts, flight_starts, spin_starts
-from validation.identification.initial.spin_phase import rig_starts
+from validation.identification.initial.flight import InitialStates, flight_initial_states, spin_initial_states
+from validation.identification.initial.spin_phase import rig_initial_states
 
 DRIVER, FIELD = load_disc("driver")
 MODULE = Instruments.from_parts("mpu9250", "neo_m8n")
 
-# what a fit of pieces of 0.5 s converges from: well inside a third of a turn, and of the order of a throw's own change
+# what a fit of segments of 0.5 s converges from: well inside a third of a turn, and of the order of a throw's own
+# change
 ATTITUDE_RAD, RATE, TRANSVERSE_RAD_S, VELOCITY_M_S, POSITION_M = np.radians(10.0), 0.01, 0.3, 1.5, 1.0
 
 
@@ -62,7 +63,7 @@ def instants(motion: Motion) -> np.ndarray:
     return np.arange(0.0, motion.end - 0.2, 0.5)
 
 
-def errors_of(starts: Starts, motion: Motion) -> dict[str, float]:
+def errors_of(starts: InitialStates, motion: Motion) -> dict[str, float]:
     truth = motion.at(starts.t)
     return {
         "attitude": float(np.max(rotation_error(starts.attitude, truth.attitude))),
@@ -73,7 +74,7 @@ def errors_of(starts: Starts, motion: Motion) -> dict[str, float]:
     }
 
 
-def assert_near(starts: Starts, motion: Motion) -> None:
+def assert_near(starts: InitialStates, motion: Motion) -> None:
     found = errors_of(starts, motion)
     allowed = dict(
         zip(found, (ATTITUDE_RAD, RATE, TRANSVERSE_RAD_S, VELOCITY_M_S, POSITION_M), strict=True),
@@ -85,14 +86,14 @@ def assert_near(starts: Starts, motion: Motion) -> None:
 def test_a_throw_is_found_from_its_own_sensors_for_either_hand_and_any_spin(spin_deg_s):
     """At 7000 deg/s the accelerometer's x is clipped throughout; z of the gyroscope is clipped above 2000 deg/s."""
     motion = flight(spin_deg_s, heading_deg=-150.0 if spin_deg_s < 0 else 40.0)
-    starts = flight_starts(measured(motion), instants(motion))
+    starts = flight_initial_states(measured(motion), instants(motion))
     assert_near(starts, motion)
     assert starts.ambiguous == ()
 
 
 def test_a_tumbling_disc_is_followed_by_its_gyroscope():
     motion = flight(spin_deg_s=-50.0)
-    assert_near(flight_starts(measured(motion), instants(motion)), motion)
+    assert_near(flight_initial_states(measured(motion), instants(motion)), motion)
 
 
 def test_a_throw_that_only_a_camera_saw_from_above_starts_as_its_release_says():
@@ -104,8 +105,8 @@ def test_a_throw_that_only_a_camera_saw_from_above_starts_as_its_release_says():
     seen = Samples(motion.t[::33], motion.position[::33] * [1.0, 1.0, np.nan])
     sheet = SensorSheet(30.0, 0.03)
     recording = Recording("flight", "throw", FIELD, DRIVER, None, release, {"track": sheet}, {"track": seen})
-    assert_near(flight_starts(recording, instants(motion)), motion)
-    past = flight_starts(recording, np.array([30.0]))
+    assert_near(flight_initial_states(recording, instants(motion)), motion)
+    past = flight_initial_states(recording, np.array([30.0]))
     assert past.position[0, 2] > 1.0
     assert np.all(np.isfinite(np.concatenate([past.velocity[0], past.attitude[0], past.rate[0]])))
 
@@ -127,14 +128,14 @@ def test_a_throw_that_only_a_camera_saw_from_above_starts_as_its_release_says():
 )
 def test_a_sensor_that_errs_does_not_lead_the_start_astray(error):
     motion = flight()
-    assert_near(flight_starts(measured(motion, error), instants(motion)), motion)
+    assert_near(flight_initial_states(measured(motion, error), instants(motion)), motion)
 
 
 def test_a_common_clock_turns_written_times_and_nothing_else():
     """Where every sensor writes 2 % too much time, the state at written time t is the true one at t/1.02."""
     motion = flight()
     written = instants(motion)
-    starts = flight_starts(measured(motion, effect("clock.rate", ratio=1.02)), written)
+    starts = flight_initial_states(measured(motion, effect("clock.rate", ratio=1.02)), written)
     found = errors_of(starts._replace(t=written / 1.02), motion)
     assert found["attitude"] < ATTITUDE_RAD
     # every rate is read in written time: 2 % less turn per second, and no more wrong than that
@@ -155,7 +156,7 @@ def test_a_common_clock_turns_written_times_and_nothing_else():
 def test_sensors_that_slip_against_one_another_leave_the_spin_axis_where_it_is(error):
     """The phase slips by turns over a flight; untold, the drag would pull the axis to every side in turn."""
     motion = flight()
-    starts = flight_starts(measured(motion, error), instants(motion))
+    starts = flight_initial_states(measured(motion, error), instants(motion))
     truth = motion.at(starts.t)
     cosine = np.sum(body_to_ned(starts.attitude)[:, :, 2] * body_to_ned(truth.attitude)[:, :, 2], axis=1)
     assert np.arccos(np.min(cosine)) < ATTITUDE_RAD
@@ -164,13 +165,13 @@ def test_sensors_that_slip_against_one_another_leave_the_spin_axis_where_it_is(e
 def test_lost_magnetometer_readings_make_no_spin():
     """Each of 5 % lost readings looks like 0.7 rad of turn, and the rate like 5 % more."""
     motion = flight()
-    starts = flight_starts(measured(motion, effect("mag.dropped_samples", fraction=0.05)), instants(motion))
+    starts = flight_initial_states(measured(motion, effect("mag.dropped_samples", fraction=0.05)), instants(motion))
     assert errors_of(starts, motion)["rate"] < RATE
 
 
 def test_late_fixes_move_the_path_and_leave_the_attitude():
     motion = flight()
-    starts = flight_starts(measured(motion, effect("gps.latency", delay_s=0.2)), instants(motion))
+    starts = flight_initial_states(measured(motion, effect("gps.latency", delay_s=0.2)), instants(motion))
     found = errors_of(starts, motion)
     assert found["attitude"] < ATTITUDE_RAD
     assert found["position"] < 0.2 * 24.0 + POSITION_M
@@ -185,14 +186,14 @@ def test_a_knock_and_wild_fixes_are_no_velocity():
     fixes[20] = np.nan
     samples = {**recording.samples, "gps": Samples(recording.need("gps").t, fixes)}
     wild = Recording("flight", "wild", recording.environment, DRIVER, None, None, recording.sheets, samples)
-    assert_near(flight_starts(wild, instants(motion)), motion)
+    assert_near(flight_initial_states(wild, instants(motion)), motion)
 
 
 @pytest.mark.parametrize("missing", ["magnetometer", "accelerometer", "gyroscope"])
 def test_the_path_and_the_lift_stand_in_for_a_missing_sensor(missing):
     """Without the gyroscope nutation is not seen: of p and q only their size, 1 rad/s, bounds the error."""
     motion = flight()
-    starts = flight_starts(measured(motion, without=(missing,)), instants(motion))
+    starts = flight_initial_states(measured(motion, without=(missing,)), instants(motion))
     found = errors_of(starts, motion)
     assert found["attitude"] < ATTITUDE_RAD
     assert found["velocity"] < VELOCITY_M_S
@@ -206,7 +207,7 @@ def test_the_pull_to_the_axis_shows_a_spin_that_no_other_sensor_does(spin_deg_s)
     recording = measured(motion, without=("magnetometer",))
     assert recording.sheets["gyroscope"].clipped(recording.need("gyroscope").value[:, 2]).all()
     # at the very start nothing before it is there to be smoothed with
-    assert errors_of(flight_starts(recording, instants(motion)[1:]), motion)["rate"] < RATE
+    assert errors_of(flight_initial_states(recording, instants(motion)[1:]), motion)["rate"] < RATE
 
 
 SENSORS = ("magnetometer", "accelerometer", "gyroscope", "gps")
@@ -221,7 +222,7 @@ def test_whatever_is_missing_the_answer_is_finite(plant):
             if len(missing) == 4:
                 continue
             recording = measured(motion, without=missing, plant=plant)
-            starts = (flight_starts if plant == "flight" else spin_starts)(recording, t)
+            starts = (flight_initial_states if plant == "flight" else spin_initial_states)(recording, t)
             for part in (*starts[:5], *starts.ambiguous):
                 assert np.all(np.isfinite(part)), missing
             np.testing.assert_allclose(np.linalg.norm(starts.attitude, axis=1), 1.0, atol=1e-9)
@@ -232,7 +233,7 @@ def test_a_recording_of_a_few_readings_is_answered():
     whole = measured(motion)
     samples = {name: part.between(0.0, 0.03) for name, part in whole.samples.items()}
     short = Recording("flight", "short", whole.environment, DRIVER, None, None, whole.sheets, samples)
-    starts = flight_starts(short, np.zeros(1))
+    starts = flight_initial_states(short, np.zeros(1))
     assert all(np.all(np.isfinite(part)) for part in starts[:5])
 
 
@@ -240,7 +241,7 @@ def test_a_recording_of_a_few_readings_is_answered():
 def test_a_free_spin_is_found_but_for_a_turn_about_the_field(iron):
     motion = flight()
     hidden = effect("mag.hard_iron", bx_uT=iron, by_uT=-iron, bz_uT=-0.5 * iron)
-    starts = spin_starts(measured(motion, hidden, without=("gps",), plant="free_spin"), instants(motion))
+    starts = spin_initial_states(measured(motion, hidden, without=("gps",), plant="free_spin"), instants(motion))
     truth = motion.at(starts.t)
     apart = to_body(starts.attitude, FIELD.magnetic_field) - truth.in_body(FIELD.magnetic_field)
     # a tenth of a radian of the field's 50 uT
@@ -262,7 +263,7 @@ def test_a_rig_that_runs_down_shows_its_angle(initial, iron):
     module = MODULE.without("gps").with_effects([effect("mag.hard_iron", bx_uT=iron, by_uT=-iron)])
     recording = record(motion, module, np.random.default_rng(4), plant="spin_down", name="rig", rig=rig)
     t = np.arange(0.0, 9.9, 0.5)
-    psi, r = rig_starts(recording, t)
+    psi, r = rig_initial_states(recording, t)
     truth = motion.at(t)
     ahead = to_body(truth.attitude, FIELD.magnetic_field)
     turned = np.arctan2(FIELD.magnetic_field[1], FIELD.magnetic_field[0]) - np.arctan2(ahead[:, 1], ahead[:, 0])
@@ -279,7 +280,7 @@ def test_a_table_that_stands_still_and_turns_both_ways_shows_its_angle():
         motion, MODULE.without("gps"), np.random.default_rng(5), plant="rate_table", name="table", command=profile
     )
     t = np.arange(0.0, 8.9, 0.25)
-    psi, r = rig_starts(recording, t)
+    psi, r = rig_initial_states(recording, t)
     truth = motion.at(t)
     _, _, yaw = euler_angles(truth.attitude)
     assert np.max(np.abs(np.angle(np.exp(1j * (psi - yaw))))) < 0.2
@@ -292,7 +293,9 @@ def test_a_table_that_stands_still_and_turns_both_ways_shows_its_angle():
 def test_the_field_of_a_recorded_throw_is_where_the_starts_put_it(name):
     for recording in read_dataset(PRACTICE / name):
         magnetometer = recording.need("magnetometer")
-        starts = (flight_starts if recording.plant == "flight" else spin_starts)(recording, magnetometer.t)
+        starts = (flight_initial_states if recording.plant == "flight" else spin_initial_states)(
+            recording, magnetometer.t
+        )
         apart = magnetometer.value - to_body(starts.attitude, recording.environment.magnetic_field)
         # the readings' own noise is 0.6 uT per axis
         assert np.sqrt(np.mean(apart**2)) < 1.2

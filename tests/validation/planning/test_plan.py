@@ -24,7 +24,7 @@ from validation.planning.advice import bought, next_throws
 from validation.planning.information import Information, information_of, questions_of
 from validation.planning.limits import coefficients_of, limits_of, needed
 from validation.planning.planned import throws_about
-from validation.planning.recordings import Bench, planned_chain
+from validation.planning.recordings import Bench, planned_trajectory
 
 DISC, FIELD = load_disc("driver")
 TABLE = """
@@ -36,9 +36,9 @@ rate_rad_s = [20.0, 60.0, 60.0]
 
 
 def information(bench: Bench, plans: list[Plan]) -> Information:
-    chains = [planned_chain(item, bench) for item in plans]
-    assert None not in chains
-    return information_of(chains, questions_of([one.recording for one in chains], 1.0))
+    trajectories = [planned_trajectory(item, bench) for item in plans]
+    assert None not in trajectories
+    return information_of(trajectories, questions_of([one.recording for one in trajectories], 1.0))
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +70,7 @@ def test_half_of_the_gains_exceed_the_price_at_the_size_that_is_needed(price, pa
 
 def test_iron_along_the_axis_of_a_table_is_seen_as_the_mean_of_its_readings_allows(table):
     """Nothing else of three axes moves z of a steady table: the sd of its mean is sigma over the root of n."""
-    (one,) = table.chains
+    (one,) = table.trajectories
     count = len(one.recording.samples["magnetometer"])
     sheet = one.recording.sheets["magnetometer"]
     sigma = np.hypot(sheet.noise_rms, sheet.resolution / np.sqrt(12.0))
@@ -126,7 +126,7 @@ def test_coefficients_free_together_are_known_less_than_each_alone_and_more_thro
 
 
 def test_a_further_throw_never_takes_knowledge_away_and_the_best_is_first(flights):
-    bench = Bench.like(flights.chains[0].recording)
+    bench = Bench.like(flights.trajectories[0].recording)
     offered = throws_about(load_throw("driver"), 2)
     ranked = next_throws(flights, limits_of(flights), offered, bench)
     assert len(ranked) == 2
@@ -143,7 +143,7 @@ def test_a_sensor_with_half_the_noise_helps_and_its_absence_hurts(flights):
 def test_a_throw_from_the_ground_is_no_recording():
     state = throws_about(load_throw("driver"), 1)[0].state.copy()
     state[2] = 0.1
-    assert planned_chain(Plan("", state, 5.0), Bench.of("flight", FIELD, ["mpu9250"], DISC)) is None
+    assert planned_trajectory(Plan("", state, 5.0), Bench.of("flight", FIELD, ["mpu9250"], DISC)) is None
 
 
 @pytest.mark.parametrize(

@@ -147,8 +147,8 @@ class TestOutputError:
 
     def test_an_uncertain_inertia_reaches_the_standard_error(self, throws, fit):
         """(26) is proportional to Izz; but a disc precesses at a rate over Izz, so its path knows it better still."""
-        loose = replace(DISC, sigma={"Izz_kg_m2": 0.02 * DISC.Izz})
-        some = [replace(throw, recording=replace(throw.recording, disc=loose)) for throw in throws]
+        relaxed_fit = replace(DISC, sigma={"Izz_kg_m2": 0.02 * DISC.Izz})
+        some = [replace(throw, recording=replace(throw.recording, disc=relaxed_fit)) for throw in throws]
         found = fit_yaw_damping(some, [throw.state for throw in fit.throws])
         value, sd = found.others["disc.Izz"]
         assert abs(value - DISC.Izz) < 3 * sd < 3 * 0.02 * DISC.Izz

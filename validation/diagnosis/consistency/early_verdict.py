@@ -1,9 +1,10 @@
 """An early end where no motion of the plant follows the readings: which sensors contradict which.
 
-A search among effects is of use beside a fit that follows the data. Where not even short beginnings of recordings are
-followed, with all that a relaxed fit sets free and free clocks besides, nothing that comes after would help: it would
-only take minutes. Here each sensor is left out in turn, then each is looked at alone and in pairs, and what can be
-followed together and what cannot is the answer.
+Takes recordings; gives None, or a `Contradiction` (fault isolation by leaving each sensor out). A search among effects
+is of use beside a fit that follows the data. Where not even short beginnings of recordings are followed, with all that
+a relaxed fit sets free and free clocks besides, nothing that comes after would help: it would only take minutes. Here
+each sensor is left out in turn, then each is looked at alone and in pairs, and what can be followed together and what
+cannot is the answer.
 
 All limits are counts (recordings, seconds of them, steps): the same recordings give the same answer on any machine.
 """
@@ -25,10 +26,10 @@ from validation.diagnosis.consistency.spin_rates import RatesApart, rates_apart
 from validation.diagnosis.detectors.speed_ripple import ripple
 from validation.diagnosis.relaxed_fit import (
     beginning,
-    first_chain,
+    first_trajectory,
     free_clocks,
-    from_other_starts,
-    loose_parameters,
+    from_other_initial_states,
+    relaxed_parameters,
 )
 from validation.diagnosis.selection.evidence import BOUNDS
 from validation.diagnosis.settings import CONSISTENCY
@@ -38,7 +39,7 @@ from validation.identification.observations import readings_of
 from validation.identification.parameters import Parameter
 from validation.identification.plants import plant_of
 from validation.identification.readings import group_of
-from validation.identification.segments import Chain
+from validation.identification.segments import Trajectory
 
 __all__ = [
     "Contradiction",
@@ -95,7 +96,7 @@ class Contradiction:
     def sentences(self) -> tuple[str, ...]:
         """What there is to say, in words."""
         plant = self.whole.fit.plant
-        length = float(np.median([chain.edges[-1] for chain in self.whole.fit.chains]))
+        length = float(np.median([trajectory.nodes[-1] for trajectory in self.whole.fit.trajectories]))
         said = [
             f"No motion of a {plant.name} follows the first {length:.2g} s of these recordings, whatever the "
             f"ordinary errors of the sensors are: the best {plant.motion} leaves "
@@ -232,10 +233,11 @@ def _follows_pulsing(recordings: Sequence[Recording], known: Sequence[Parameter]
     Of a strong ripple not the rate reference alone tells: the accelerometer feels how it turns faster and slower, so
     that each contradicts what the others tell of a table without one.
     """
-    for proposal in ripple(whole.fit, whole.noise)[: CONSISTENCY.ripples]:
-        starts = {name: number for ((_, name), _), number in proposal.start.items()}
+    for screened in ripple(whole.fit, whole.noise)[: CONSISTENCY.ripples]:
+        starts = {name: number for ((_, name), _), number in screened.start.items()}
         free = {
-            Parameter(proposal.trial.id, name, 0.0, step): float(starts[name]) for name, step in _RIPPLE_STEPS.items()
+            Parameter(screened.candidate.id, name, 0.0, step): float(starts[name])
+            for name, step in _RIPPLE_STEPS.items()
         }
         look = look_at(recordings, known, whole.sensors, CONSISTENCY.few, free)
         if look is not None and all(
@@ -253,9 +255,9 @@ def contradiction_after(fit: Fit) -> Contradiction | None:
     """
     if not fit.plant.weakly_identified:
         return None
-    noise = true_noise([readings for chain in fit.chains for readings in chain.readings])
-    sensors = tuple(name for name in SENSORS if any(r.sensor == name for r in fit.chains[0].readings))
-    look = Look(sensors, tuple(range(len(fit.chains))), fit, noise, tuple(left_of(fit, noise)))
+    noise = true_noise([readings for trajectory in fit.trajectories for readings in trajectory.readings])
+    sensors = tuple(name for name in SENSORS if any(r.sensor == name for r in fit.trajectories[0].readings))
+    look = Look(sensors, tuple(range(len(fit.trajectories))), fit, noise, tuple(left_of(fit, noise)))
     if look.follows:
         return None
     astray = [sensor for sensor in look.sensors if look.level(sensor) > CONSISTENCY.astray]
@@ -294,10 +296,10 @@ def _pulses(recordings: Sequence[Recording], whole: Look, sensor: str) -> bool:
 def _reconciled(recordings: Sequence[Recording], look: Look, sensor: str) -> bool:
     """Tell whether a motion that others tell is that of a sensor, too, if it is late, lags or lost samples."""
     found = []
-    for i, chain in enumerate(look.fit.chains):
+    for i, trajectory in enumerate(look.fit.trajectories):
         readings = next((r for r in readings_of(recordings[look.places[i]]) if r.sensor == sensor), None)
         if readings is not None:
-            found.append(left_when_shifted(chain, look.fit.values(i), readings, true_noise([readings])))
+            found.append(left_when_shifted(trajectory, look.fit.values(i), readings, true_noise([readings])))
     levels = [level for level in found if np.isfinite(level)]
     return not levels or float(np.median(levels)) <= CONSISTENCY.reconciled
 
@@ -314,19 +316,19 @@ def look_at(
     ``free`` are parameters that may move beside the ordinary ones, and where they start.
     """
     plant = plant_of(recordings[0])
-    chains: list[Chain] = []
+    trajectories: list[Trajectory] = []
     places: list[int] = []
     for i, one in enumerate(recordings):
         samples = {name: own for name, own in one.samples.items() if name in sensors}
-        if len(chains) == few or not samples:
+        if len(trajectories) == few or not samples:
             continue
-        chain = beginning(first_chain(replace(one, samples=samples)), plant.durations.first_look)
-        if any(np.any(readings.good) for readings in chain.readings):
-            chains.append(chain)
+        trajectory = beginning(first_trajectory(replace(one, samples=samples)), plant.durations.first_look)
+        if any(np.any(readings.good) for readings in trajectory.readings):
+            trajectories.append(trajectory)
             places.append(i)
-    if not chains:
+    if not trajectories:
         return None
-    there = {readings.sensor for chain in chains for readings in chain.readings}
+    there = {readings.sensor for trajectory in trajectories for readings in trajectory.readings}
     stated = [q for q in known if any(q.acts_in(i) for i in places)]
     stated = [
         q
@@ -334,17 +336,21 @@ def look_at(
         else replace(q, recordings=frozenset(places.index(i) for i in q.recordings if i in places))
         for q in stated
     ]
-    usual = (*stated, *loose_parameters([chain.recording for chain in chains], there), *free_clocks(there))
+    usual = (
+        *stated,
+        *relaxed_parameters([trajectory.recording for trajectory in trajectories], there),
+        *free_clocks(there),
+    )
     parameters = (*usual, *free)
-    noise = true_noise([readings for chain in chains for readings in chain.readings])
+    noise = true_noise([readings for trajectory in trajectories for readings in trajectory.readings])
     start = np.array([*(q.stated for q in usual), *free.values()])
-    fit = Fit(tuple(chains), parameters, start, plant.sizes.relaxed, noise)
-    count = sum(int(np.count_nonzero(r.good)) for chain in chains for r in chain.readings)
+    fit = Fit(tuple(trajectories), parameters, start, plant.sizes.relaxed, noise)
+    count = sum(int(np.count_nonzero(r.good)) for trajectory in trajectories for r in trajectory.readings)
     steps = _STEPS_OF_FIGURES if plant.weakly_identified else _STEPS
     fit = refit(fit, iterations=steps, tolerance=1e-3 * count, bounds=BOUNDS)
     look = Look(tuple(name for name in SENSORS if name in there), tuple(places), fit, noise, tuple(left_of(fit, noise)))
     if look.follows or len(there) == 1 or plant.weakly_identified:
         return look
     # where no path is there, the attitude at the start may be any about the field
-    fit = from_other_starts(fit)
+    fit = from_other_initial_states(fit)
     return replace(look, fit=fit, left=tuple(left_of(fit, noise)))

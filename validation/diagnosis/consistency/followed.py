@@ -17,7 +17,7 @@ from validation.identification.gauss_newton import Fit
 from validation.identification.noise import DEFAULT, GroupNoise
 from validation.identification.prediction import shiftable
 from validation.identification.readings import Readings, group_of
-from validation.identification.segments import Chain
+from validation.identification.segments import Trajectory
 from validation.identification.sensor_model import Values
 
 __all__ = ["left_of", "left_when_shifted", "true_noise"]
@@ -88,18 +88,20 @@ _WINDOWS, _READINGS = 5, 60
 _LAGS, _GRID = (0.0, 0.001, 0.002, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.25, 0.5), 0.001
 
 
-def left_when_shifted(chain: Chain, values: Values, readings: Readings, noise: Mapping[str, GroupNoise]) -> float:
+def left_when_shifted(
+    trajectory: Trajectory, values: Values, readings: Readings, noise: Mapping[str, GroupNoise]
+) -> float:
     """Return what a motion leaves of a sensor that lags, and is late by anything in each window, in its noise.
 
     A wrong clock, a delay, a lag and lost samples do that; a sensor of another motion they do not reconcile. A robust
     root mean square in the median window, each at the shift that leaves least, with the best lag; NaN without readings.
     """
-    at, value, grid, told = shiftable(chain, values, readings, noise, _GRID)
-    start, end = float(chain.edges[0]), float(chain.edges[-1])
+    at, value, grid, told = shiftable(trajectory, values, readings, noise, _GRID)
+    start, end = float(trajectory.nodes[0]), float(trajectory.nodes[-1])
     used = np.flatnonzero((at >= start) & (at < end) & np.isfinite(value).any(axis=1))
     if grid.size < 2 or used.size < 4:
         return np.nan
-    window = np.floor((at[used] - start) / chain.plant.durations.window).astype(int)
+    window = np.floor((at[used] - start) / trajectory.plant.durations.window).astype(int)
     parts = [part for k in np.unique(window) if (part := used[window == k]).size >= 4]
     parts = [part[:: 1 + part.size // _READINGS] for part in parts[:: 1 + len(parts) // _WINDOWS]]
     levels = []

@@ -19,8 +19,8 @@ from scipy.interpolate import BSpline
 from discsim.arrays import ComplexArray, FloatArray, IntArray
 from discsim.compiled import compiled
 from discsim.recording import Recording
-from validation.diagnosis.consistency.row_times import Rows
-from validation.diagnosis.consistency.turning import rate_of, retimed, signals_of
+from validation.diagnosis.consistency.phase_regression import rate_of, retimed, signals_of
+from validation.diagnosis.consistency.time_stamp_recovery import Rows
 
 __all__ = ["OwnClock", "SamplesShown", "own_clock_of"]
 

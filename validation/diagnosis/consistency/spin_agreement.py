@@ -19,10 +19,9 @@ import numpy as np
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import ClockRate, Scale
 from discsim.recording import Recording
+from validation.diagnosis.consistency.low_pass_transient import LowPassTransient, low_pass_transient_of
 from validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
-from validation.diagnosis.consistency.row_times import Rows, rows_of
-from validation.diagnosis.consistency.settling import Settling, settling_of
-from validation.diagnosis.consistency.turning import (
+from validation.diagnosis.consistency.phase_regression import (
     REACH,
     angle_turned,
     centripetal,
@@ -33,6 +32,7 @@ from validation.diagnosis.consistency.turning import (
     steps,
     tone,
 )
+from validation.diagnosis.consistency.time_stamp_recovery import Rows, rows_of
 
 __all__ = ["Agreement", "Cause", "Comparison", "Proof", "RowProof", "agreement_of", "compared", "written_ratios"]
 
@@ -201,7 +201,7 @@ class Agreement:
     causes: tuple[Cause, ...] = ()
     rows: Rows | None = None
     row_proofs: tuple[RowProof, ...] = ()
-    settling: Settling | None = None
+    settling: LowPassTransient | None = None
     own_clock: OwnClock | None = None
 
     @property
@@ -257,7 +257,7 @@ def agreement_of(
     own_clock = None if rows is None else own_clock_of([r for r, _ in some], [n for _, n in some], rows)
     # in the times that counted rows give, where there are such
     timed = [r if rows is None else _in_true_time(r, n, rows, own_clock) for r, n in some]
-    settling = settling_of(timed, [name for _, name in some])
+    settling = low_pass_transient_of(timed, [name for _, name in some])
     found = Agreement(known[0], comparisons, (), rows, (), settling, own_clock)
     if not found.contradiction:
         return found

@@ -1,9 +1,10 @@
-"""What to record next: which recording would tell a named effect from one that could stand in for it.
+"""Experiment design: which next recording would tell a named effect from one that could stand in for it.
 
-A recording that could be made is simulated with the named effect as it was found, its readings compared with what the
-other hypothesis predicts, and all that this hypothesis may move is moved: the new recording's own unknowns freely, the
-numbers that recordings share as far as those in hand let them. The chi-squared that is left, in the noise that was
-found, is what the new recording is expected to say for the named effect: its expected evidence.
+Takes what a search found; gives the recording and its expected evidence (T-optimality: Atkinson and Fedorov, "The
+design of experiments for discriminating between two rival models", 1975). A recording that could be made is simulated
+with the named effect as it was found, its readings compared with what the other hypothesis predicts, and all that this
+hypothesis may move is moved: the new recording's own unknowns freely, the common numbers as far as the recordings in
+hand let them. The chi-squared that is left, in the noise that was found, is the expected evidence.
 """
 
 from __future__ import annotations
@@ -21,21 +22,21 @@ from discsim.recording import SENSORS, Recording, Samples
 from validation.diagnosis.design.plans import plans_about
 from validation.diagnosis.relaxed_fit import unknowns
 from validation.diagnosis.result import Advice, Separation
-from validation.diagnosis.selection.candidates import Trial, parameters_of
+from validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from validation.diagnosis.selection.evidence import BOUNDS
-from validation.diagnosis.selection.found import Rival, Search
+from validation.diagnosis.selection.search_state import Rival, Search
 from validation.diagnosis.settings import SELECTION
 from validation.identification.gauss_newton import Fit, mapped
 from validation.identification.linearisation import linearise, moved
 from validation.identification.noise import NoiseModel
-from validation.identification.normal_equations import local_step, reduce, shared_step
+from validation.identification.normal_equations import common_step, nuisance_step, reduce
 from validation.identification.parameters import Parameter, Values, values_of
 from validation.identification.plants import Plant
 from validation.identification.plants.plan import Plan
 from validation.identification.prediction import read, shown
 from validation.identification.propagation import Column
 from validation.identification.readings import Readings, group_of
-from validation.identification.segments import Chain, chain, recut
+from validation.identification.segments import Trajectory, resegmented, trajectory_of
 
 __all__ = ["ENOUGH", "advise", "confusions", "expected_evidence", "in_words"]
 
@@ -84,14 +85,15 @@ def _figure(chi2: float) -> str:
     return f"{chi2:,.0f}" if chi2 >= 10.0 else f"{chi2:.1f}"
 
 
-def confusions(found: Search, trial: Trial) -> list[Rival]:
+def confusions(found: Search, candidate: CandidateEffect) -> list[Rival]:
     """Return the effects that recordings in hand cannot tell from a named one."""
-    size = len(parameters_of(trial))
+    size = len(parameters_of(candidate))
     return [
         rival
-        for rival in found.rivals.get(trial.name, [])
-        if rival.worse < SELECTION.confused + SELECTION.per_parameter * max(0, len(parameters_of(rival.trial)) - size)
-        and not _become(rival, trial)
+        for rival in found.rivals.get(candidate.name, [])
+        if rival.worse
+        < SELECTION.confused + SELECTION.per_parameter * max(0, len(parameters_of(rival.candidate)) - size)
+        and not _become(rival, candidate)
     ]
 
 
@@ -99,14 +101,14 @@ def confusions(found: Search, trial: Trial) -> list[Rival]:
 _KNOWN = 0.1
 
 
-def _become(rival: Rival, trial: Trial) -> bool:
+def _become(rival: Rival, candidate: CandidateEffect) -> bool:
     """Tell whether the recordings shape a rival so that it is the effect in whose place it stands."""
-    row = rival.trial.row
-    if row.becomes is None or row.becomes[0] != trial.id:
+    row = rival.candidate.row
+    if row.becomes is None or row.becomes[0] != candidate.id:
         return False
     _, name, value = row.becomes
-    known, fit = _KNOWN * row.grid_sigma[name], rival.tied.fit
-    place = next(k for k, q in enumerate(fit.parameters) if q.key == (rival.trial.id, name))
+    known, fit = _KNOWN * row.grid_sigma[name], rival.fitted.fit
+    place = next(k for k, q in enumerate(fit.parameters) if q.key == (rival.candidate.id, name))
     sd = float(np.sqrt(max(float(fit.covariance[place, place]), 0.0)))
     return 0.0 < sd < known and abs(float(fit.at[place]) - value) < 3.0 * sd
 
@@ -115,19 +117,19 @@ def advise(found: Search, names: Sequence[str], plans: Sequence[Plan] | None = N
     """Return for each named effect and each that it is confused with what recording would tell them apart.
 
     ``names`` are those of the recordings; ``plans`` recordings that could be made, by default such as are made easily
-    about those in hand. Keys are the names of the two trials. What happened in one recording only, at one instant, has
-    no advice: no new recording holds it.
+    about those in hand. Keys are the names of the two candidates. What happened in one recording only, at one instant,
+    has no advice: no new recording holds it.
     """
     advice = {}
-    for trial in found.final.hypothesis.trials:
-        rivals = confusions(found, trial)
-        if not rivals or _once(trial.id):
+    for candidate in found.final.hypothesis.candidates:
+        rivals = confusions(found, candidate)
+        if not rivals or _once(candidate.id):
             continue
-        like = _typical(found, trial)
-        longest = max(one.recording.end for one in found.final.fit.chains)
-        about = plans_about(found.final.fit.chains[like], longest)
+        like = _typical(found, candidate)
+        longest = max(one.recording.end for one in found.final.fit.trajectories)
+        about = plans_about(found.final.fit.trajectories[like], longest)
         again, offered = about[0], about[1:] if plans is None else list(plans)
-        held = "" if trial.recordings is None else f" (under the conditions of recording {names[like]})"
+        held = "" if candidate.recordings is None else f" (under the conditions of recording {names[like]})"
         for rival in rivals:
             evidence = expected_evidence(found, rival, [again, *offered], like)
             told = [
@@ -138,21 +140,23 @@ def advise(found: Search, names: Sequence[str], plans: Sequence[Plan] | None = N
             if told:
                 ranked = sorted(told, key=lambda item: -item.expected_chi2)
                 repeated = told[0] if np.isfinite(evidence[0]) else None
-                advice[trial.name, rival.trial.name] = Advice(ranked[0], ranked[1] if ranked[1:] else None, repeated)
+                advice[candidate.name, rival.candidate.name] = Advice(
+                    ranked[0], ranked[1] if ranked[1:] else None, repeated
+                )
     return advice
 
 
-def _typical(found: Search, trial: Trial) -> int:
+def _typical(found: Search, candidate: CandidateEffect) -> int:
     """Return the recording in hand that new ones are made like: of those that hold an effect the middle one."""
-    chains = found.final.fit.chains
-    some = [i for i in range(len(chains)) if trial.recordings is None or i in trial.recordings]
-    most = max(len(chains[i].recording.samples) for i in some)
-    some = [i for i in some if len(chains[i].recording.samples) == most]
-    some.sort(key=lambda i: _pace(chains[i]))
+    trajectories = found.final.fit.trajectories
+    some = [i for i in range(len(trajectories)) if candidate.recordings is None or i in candidate.recordings]
+    most = max(len(trajectories[i].recording.samples) for i in some)
+    some = [i for i in some if len(trajectories[i].recording.samples) == most]
+    some.sort(key=lambda i: _pace(trajectories[i]))
     return some[len(some) // 2]
 
 
-def _pace(one: Chain) -> float:
+def _pace(one: Trajectory) -> float:
     """Return what recordings are put in order by: a throw's speed, a table's highest rate, else the rate at first."""
     layout = one.plant.layout
     if layout.velocity is not None:
@@ -168,7 +172,7 @@ def expected_evidence(found: Search, rival: Rival, plans: Sequence[Plan], like: 
     Plans are recorded with the hardware of recording number ``like`` and hold the effects that it holds. NaN where a
     plan cannot be simulated: a table of coefficients does not reach there, a throw that starts on the ground.
     """
-    held = _Held.of(rival.tied.fit, found.final.fit.noise)
+    held = _Held.of(rival.fitted.fit, found.final.fit.noise)
 
     def one(plan: Plan) -> float:
         own = _own(found, plan, like)
@@ -189,18 +193,18 @@ def _values(fit: Fit, own: Sequence[Parameter], like: int) -> dict[tuple[str, st
     return {**fit.fixed, **_sums(parameters, at, [*shared, *range(len(fit.parameters), len(parameters))])}
 
 
-def _recorded(found: Search, plan: Plan, own: Sequence[Parameter], like: int) -> Chain | None:
+def _recorded(found: Search, plan: Plan, own: Sequence[Parameter], like: int) -> Trajectory | None:
     """Return a plan as it would be recorded without noise under the final hypothesis; None where it cannot be made."""
     fit = found.final.fit
     values = _values(fit, own, like)
-    old = fit.chains[like]
+    old = fit.trajectories[like]
     plant = old.plant
     state = plan.state if plant.design is None else plant.design.as_in_hand(plan.state, old.states)
     bare = replace(old.recording, command=plan.command, release=None, name="planned", path=None, samples={})
-    whole = chain(bare, np.array([0.0, plan.duration]), state[None], old.effects)
+    whole = trajectory_of(bare, np.array([0.0, plan.duration]), state[None], old.effects)
     end = _landing(whole, values) if plant.follows_path else plan.duration
     count = max(1, round(end / plant.durations.segment))
-    cut = recut(whole, values, np.linspace(0.0, end + 1e-6, count + 1))
+    cut = resegmented(whole, values, np.linspace(0.0, end + 1e-6, count + 1))
     samples = {sensor: _samples(cut, values, sensor, old.recording, fit.noise) for sensor in old.recording.samples}
     samples = {sensor: item for sensor, item in samples.items() if len(item)}
     if end == 0.0 or not samples or not np.all(np.isfinite(cut.states)):
@@ -208,20 +212,20 @@ def _recorded(found: Search, plan: Plan, own: Sequence[Parameter], like: int) ->
     sheets = dict(bare.sheets)
     if "accelerometer" in sheets:  # readings that stand still for want of noise are no limit
         sheets["accelerometer"] = replace(sheets["accelerometer"], noise_rms=0.0)
-    return chain(replace(bare, samples=samples, sheets=sheets), cut.edges, cut.states, old.effects)
+    return trajectory_of(replace(bare, samples=samples, sheets=sheets), cut.nodes, cut.states, old.effects)
 
 
-def _landing(whole: Chain, values: Values) -> float:
-    """Return when a throw of one piece reaches the ground, s; its end where it does not, zero where it starts there."""
-    t = np.arange(0.0, float(whole.edges[-1]), 0.02)
+def _landing(whole: Trajectory, values: Values) -> float:
+    """Return when a throw of one segment reaches the ground, s; its end where it does not, zero if it starts there."""
+    t = np.arange(0.0, float(whole.nodes[-1]), 0.02)
     below = np.flatnonzero(shown(whole, values, "track", t)[:, 2] >= 0.0)
-    return float(t[below[0]]) if below.size else float(whole.edges[-1])
+    return float(t[below[0]]) if below.size else float(whole.nodes[-1])
 
 
-def _samples(cut: Chain, values: Values, sensor: str, like: Recording, noise: NoiseModel) -> Samples:
+def _samples(cut: Trajectory, values: Values, sensor: str, like: Recording, noise: NoiseModel) -> Samples:
     """Return a sensor's readings of a motion without noise: on the axes that a recording in hand has, in its range."""
     sheet, old = like.sheets[sensor], like.samples[sensor]
-    t = np.arange(float(old.t[0]) if len(old) else 0.0, float(cut.edges[-1]), 1.0 / sheet.rate_hz)
+    t = np.arange(float(old.t[0]) if len(old) else 0.0, float(cut.nodes[-1]), 1.0 / sheet.rate_hz)
     axes = SENSORS[sensor].columns
     blank = np.zeros((t.size, len(axes)))
     readings = Readings(sensor, t, blank, blank == 0.0, blank != 0.0, np.zeros(len(axes)), axes)
@@ -252,16 +256,17 @@ class _Held:
     @classmethod
     def of(cls, rival: Fit, noise: NoiseModel) -> _Held:
         reduced = [
-            reduce(linear, one, noise, rival.jumps) for linear, one in zip(rival.linears, rival.chains, strict=True)
+            reduce(linear, one, noise, rival.defects)
+            for linear, one in zip(rival.linears, rival.trajectories, strict=True)
         ]
         gram = np.sum([item.gram for item in reduced], axis=0)
-        return cls(rival, gram, shared_step(gram, rival.parameters, rival.at)[2], noise)
+        return cls(rival, gram, common_step(gram, rival.parameters, rival.at)[2], noise)
 
-    def beyond(self, made: Chain, own: Sequence[Parameter], like: int) -> float:
+    def beyond(self, made: Trajectory, own: Sequence[Parameter], like: int) -> float:
         """Return by how much the least chi-squared grows with a new recording whose own unknowns are ``own``.
 
-        ``made`` starts where the final hypothesis moves, piece by piece, so that no phase can slip by a turn on the way
-        to where the rival's pieces hang together. NaN where predictions leave what is finite.
+        ``made`` starts where the final hypothesis moves, segment by segment, so that no phase can slip by a turn on the
+        way to where the rival's segments are continuous. NaN where predictions leave what is finite.
         """
         fit = self.fit
         parameters = (*fit.parameters, *own)
@@ -271,16 +276,16 @@ class _Held:
         columns = [Column(q.group, q.name, q.step) for q in (parameters[k] for k in active)]
         growth = np.nan
         for _ in range(_STEPS):
-            linear = linearise(made, _sums(parameters, at, active), columns, fit.jumps.allowed, central=False)
+            linear = linearise(made, _sums(parameters, at, active), columns, fit.defects.allowed, central=False)
             linear = linear.spread(active, p)
-            new = reduce(linear, made, self.noise, fit.jumps)
-            step, _, expected = shared_step(new.gram + self._at(at[:shared], p), parameters, at)
+            new = reduce(linear, made, self.noise, fit.defects)
+            step, _, expected = common_step(new.gram + self._at(at[:shared], p), parameters, at)
             before, growth = growth, max(float(expected) - self.chi2, 0.0)
             if not np.isfinite(expected) or abs(before - growth) < _SETTLED * (growth + 1.0):
                 break
             bounds = np.array([BOUNDS.get(q.key, (-np.inf, np.inf)) for q in parameters])
             step = np.clip(at + step, bounds[:, 0], bounds[:, 1]) - at
-            made, at = moved(made, linear, local_step(new, step), step), at + step
+            made, at = moved(made, linear, nuisance_step(new, step), step), at + step
         return float(growth) if np.isfinite(expected) else float(before)
 
     def _at(self, at: FloatArray, width: int) -> FloatArray:

@@ -9,17 +9,19 @@ from discsim.toml_table import read_toml
 from validation.identification.plants import PLANTS, Plant
 from validation.identification.plants.plan import Plan
 from validation.identification.plants.plant import Design
-from validation.identification.segments import Chain
+from validation.identification.segments import Trajectory
 
 __all__ = ["plans_about", "read_plans"]
 
 
-def plans_about(chain: Chain, longest: float) -> list[Plan]:
+def plans_about(trajectory: Trajectory, longest: float) -> list[Plan]:
     """Return recordings about one in hand: first the same again, then others.
 
     ``longest`` is the length in s of the longest recording in hand.
     """
-    return _design(chain.plant).about(chain.recording, chain.states[0], float(chain.edges[-1]), longest)
+    return _design(trajectory.plant).about(
+        trajectory.recording, trajectory.states[0], float(trajectory.nodes[-1]), longest
+    )
 
 
 def read_plans(path: Path, plant: str) -> list[Plan]:

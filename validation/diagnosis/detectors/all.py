@@ -1,6 +1,6 @@
-"""Searches for effects that one linear question about whole recordings does not find: events, gusts, ripples, slips.
+"""All detectors in turn: events, gusts, ripples, dropped samples, clipping, offsets of time.
 
-Each returns proposals with values to start from; fits with all parameters free decide.
+Takes a fit and what was found so far; gives candidates with values to start from. Fits with all parameters free decide.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from collections.abc import Sequence
 from validation.diagnosis.detectors.dropped_samples import Shifted, dropped_accelerometer
 from validation.diagnosis.detectors.events import events
 from validation.diagnosis.detectors.gusts import gusts
-from validation.diagnosis.detectors.local_problem import asked_of
+from validation.diagnosis.detectors.local_problem import local_problems
 from validation.diagnosis.detectors.saturation import saturation
 from validation.diagnosis.detectors.speed_ripple import ripple
 from validation.diagnosis.detectors.time_offsets import time_offsets
-from validation.diagnosis.selection.constrained_fit import Tied
-from validation.diagnosis.selection.proposals import Proposal
+from validation.diagnosis.selection.continuous_fit import ContinuousFit
+from validation.diagnosis.selection.score_tests import ScreenedCandidate
 from validation.diagnosis.settings import DETECTORS
 from validation.identification.gauss_newton import Fit
 from validation.identification.noise import NoiseModel
@@ -28,30 +28,31 @@ __all__ = ["searched"]
 
 
 def searched(
-    loose: Fit,
-    tied: Tied,
+    relaxed_fit: Fit,
+    fitted: ContinuousFit,
     own: Sequence[Parameter],
     noise: NoiseModel,
     lost: Sequence[Shifted] = (),
     least: float = DETECTORS.least,
-) -> list[Proposal | Shifted]:
+) -> list[ScreenedCandidate | Shifted]:
     """Return what all searches propose upon a hypothesis, best first.
 
-    ``loose`` is the relaxed fit with its ``noise``, ``tied`` the fit under the hypothesis so far, ``own`` the stated
-    parameters and each recording's unknowns, ``lost`` the magnetometer's lost samples as its phase tells them. Without
-    a hypothesis what is missing may have bent the tied fit, and events are looked for from the relaxed one.
+    ``relaxed_fit`` is the relaxed fit with its ``noise``, ``fitted`` the fit under the hypothesis so far, ``own`` the
+    stated parameters and each recording's unknowns, ``lost`` the magnetometer's lost samples as its phase tells them.
+    Without a hypothesis what is missing may have bent the continuous fit, and events are looked for from the relaxed
+    one.
     """
-    taken = tied.hypothesis.trials
-    fit, level = (loose, noise) if not taken else (tied.fit, tied.fit.noise)
-    found: list[Proposal | Shifted] = []
-    if not loose.plant.commanded:
-        asked = asked_of(fit, level, own, tied.hypothesis)
-        found += events(asked, least)
-        found += gusts(asked, least)
-    found += ripple(tied.fit, tied.fit.noise, taken, least)
+    taken = fitted.hypothesis.candidates
+    fit, level = (relaxed_fit, noise) if not taken else (fitted.fit, fitted.fit.noise)
+    found: list[ScreenedCandidate | Shifted] = []
+    if not relaxed_fit.plant.commanded:
+        problems = local_problems(fit, level, own, fitted.hypothesis)
+        found += events(problems, least)
+        found += gusts(problems, least)
+    found += ripple(fitted.fit, fitted.fit.noise, taken, least)
     found += lost
-    found += saturation(tied.fit, tied.fit.noise, taken)
-    found += time_offsets(tied.fit, tied.fit.noise, taken)
-    if loose.plant.path_known:  # else an accelerometer counts by its means over turns
-        found += dropped_accelerometer(loose, noise, taken)
-    return sorted(found, key=lambda p: p.proposal.gain if isinstance(p, Shifted) else p.gain, reverse=True)
+    found += saturation(fitted.fit, fitted.fit.noise, taken)
+    found += time_offsets(fitted.fit, fitted.fit.noise, taken)
+    if relaxed_fit.plant.path_known:  # else an accelerometer counts by its means over turns
+        found += dropped_accelerometer(relaxed_fit, noise, taken)
+    return sorted(found, key=lambda p: p.screened.gain if isinstance(p, Shifted) else p.gain, reverse=True)

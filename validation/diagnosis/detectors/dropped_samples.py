@@ -1,4 +1,7 @@
-"""Dropped samples: a sensor whose sample numbers have run ahead, by Viterbi alignment and phases."""
+"""Dropped samples: a sensor whose sample numbers have run ahead, by Viterbi alignment and phases.
+
+Takes a relaxed fit; gives candidates with trajectories in the time that the counts say.
+"""
 
 from __future__ import annotations
 
@@ -12,36 +15,36 @@ from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import DroppedSamples
 from validation.diagnosis.detectors.sample_alignment import first_yaw, lost_along, phase_counts, repaired
 from validation.diagnosis.relaxed_fit import relaxed
-from validation.diagnosis.selection.candidates import Trial
-from validation.diagnosis.selection.proposals import Proposal
+from validation.diagnosis.selection.candidates import CandidateEffect
+from validation.diagnosis.selection.score_tests import ScreenedCandidate
 from validation.diagnosis.settings import DETECTORS
 from validation.identification.gauss_newton import Fit, mapped, refit
 from validation.identification.noise import NoiseModel
 from validation.identification.parameters import Parameter
-from validation.identification.segments import Chain, recut
+from validation.identification.segments import Trajectory, resegmented
 
-__all__ = ["Shifted", "Slips", "dropped_accelerometer", "dropped_magnetometer"]
+__all__ = ["PhaseLosses", "Shifted", "dropped_accelerometer", "dropped_magnetometer"]
 
 
 @dataclass(frozen=True)
 class Shifted:
-    """A proposal that changes what the readings mean: the chains to fit it from, instead of the loose fit's.
+    """A screened candidate that changes what the readings mean, and the trajectories to fit it from.
 
-    ``proposal.gain`` is in chi-squared where the search stood, less the price of each sample that it takes for lost.
-    ``cost`` is that price: twice the logarithm of the ways to lose as many.
+    ``screened candidate.gain`` is in chi-squared where the search stood, less the price of each sample that it takes
+    for lost. ``cost`` is that price: twice the logarithm of the ways to lose as many.
     """
 
-    proposal: Proposal
-    chains: tuple[Chain, ...]
+    screened: ScreenedCandidate
+    trajectories: tuple[Trajectory, ...]
     cost: float = 0.0
 
 
-def _losses(id: str, chains: Sequence[Chain], sensor: str) -> tuple[Trial, float]:
-    """Return the trial of lost samples as chains hold them, and the price of where they are."""
+def _losses(id: str, trajectories: Sequence[Trajectory], sensor: str) -> tuple[CandidateEffect, float]:
+    """Return the candidate of lost samples as trajectories hold them, and the price of where they are."""
     lost = sampled = 0.0
     cost = 0.0
-    for chain in chains:
-        counts = chain.lost.get(sensor)
+    for trajectory in trajectories:
+        counts = trajectory.lost.get(sensor)
         if counts is None:
             continue
         n, gone = float(counts.size), float(counts[-1])
@@ -51,73 +54,78 @@ def _losses(id: str, chains: Sequence[Chain], sensor: str) -> tuple[Trial, float
     if lost:
         cost = 2.0 * lost * (1.0 - np.log(share))
     sd = float(np.sqrt(max(share * (1.0 - share), 1.0 / sampled) / sampled))
-    return Trial(id, (), None, (("fraction", share, sd),)), cost
+    return CandidateEffect(id, (), None, (("fraction", share, sd),)), cost
 
 
 @dataclass(frozen=True)
-class Slips:
+class PhaseLosses:
     """Lost samples of the magnetometer as its phase tells them about a relaxed fit; about none before it is asked."""
 
     fit: Fit | None = None
     found: tuple[Shifted, ...] = ()
 
-    def about(self, fit: Fit, known: Sequence[Parameter]) -> Slips:
+    def about(self, fit: Fit, known: Sequence[Parameter]) -> PhaseLosses:
         """Return what is found about a fit, which is worked out once."""
-        return self if self.fit is fit else Slips(fit, tuple(dropped_magnetometer(fit, known)))
+        return self if self.fit is fit else PhaseLosses(fit, tuple(dropped_magnetometer(fit, known)))
 
 
 def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = DETECTORS.least_dropped) -> list[Shifted]:
-    """Return lost samples of the magnetometer as a proposal where its phase shows steps.
+    """Return lost samples of the magnetometer as a screened candidate where its phase shows steps.
 
-    The motion of a loose fit follows the magnetometer; with steps found it is fitted anew with the samples at their
+    The motion of a relaxed fit follows the magnetometer; with steps found it is fitted anew with the samples at their
     own times, and the counts are then read once more off the motion that all sensors agree on.
     """
-    chains = fit.chains
+    trajectories = fit.trajectories
     sensor = "magnetometer"
     id = catalogued(DroppedSamples, sensor).id
     counts = [
-        phase_counts(chain.recording) if chain.recording.get(sensor) is not None else np.zeros(0) for chain in chains
+        phase_counts(trajectory.recording) if trajectory.recording.get(sensor) is not None else np.zeros(0)
+        for trajectory in trajectories
     ]
     steps = sum(float(c[-1]) for c in counts if c.size)
     if steps < DETECTORS.fewest_steps:
         return []
     fixed = [
-        repaired(chain.recording, sensor, c) if c.size else chain.recording
-        for chain, c in zip(chains, counts, strict=True)
+        repaired(trajectory.recording, sensor, c) if c.size else trajectory.recording
+        for trajectory, c in zip(trajectories, counts, strict=True)
     ]
     anew = relaxed(fixed, known)
     gain = fit.merit - anew.merit
     if gain < least:
         return []
-    new = tuple(_own_times(one, chain, {sensor: c}) for one, chain, c in zip(anew.chains, chains, counts, strict=True))
-    # what was lost while the phase stood still shows in what comes after, by a motion that hangs together
+    new = tuple(
+        _own_times(one, trajectory, {sensor: c})
+        for one, trajectory, c in zip(anew.trajectories, trajectories, counts, strict=True)
+    )
+    # what was lost while the phase stood still shows in what comes after, by a motion that is continuous
     plant = anew.plant
-    found = replace(anew, chains=new)
+    found = replace(anew, trajectories=new)
     if plant.commanded:
         whole = tuple(
-            _begun(replace(c, edges=c.edges[[0, -1]], states=c.states[:1]), anew, i) for i, c in enumerate(new)
+            _begun(replace(c, nodes=c.nodes[[0, -1]], states=c.states[:1]), anew, i) for i, c in enumerate(new)
         )
-        counted, _ = _counted(replace(found, chains=whole), sensor, _stated_sd(found, sensor, anew.noise))
+        counted, _ = _counted(replace(found, trajectories=whole), sensor, _stated_sd(found, sensor, anew.noise))
         standing = tuple(
-            recut(one, found.values(i), chain.edges) for i, (one, chain) in enumerate(zip(whole, new, strict=True))
+            resegmented(one, found.values(i), trajectory.nodes)
+            for i, (one, trajectory) in enumerate(zip(whole, new, strict=True))
         )
-        found = _with_losses(replace(found, chains=standing), counted, sensor)
+        found = _with_losses(replace(found, trajectories=standing), counted, sensor)
     for _ in range(2):
-        tied = refit(replace(found, jumps=plant.sizes.continuous), iterations=4)
-        counted, _ = _counted(tied, sensor, _stated_sd(found, sensor, anew.noise))
+        fitted = refit(replace(found, defects=plant.sizes.continuous), iterations=4)
+        counted, _ = _counted(fitted, sensor, _stated_sd(found, sensor, anew.noise))
         same = all(
             np.array_equal(a.lost.get(sensor, 0.0), b.lost.get(sensor, 0.0))
-            for a, b in zip(found.chains, counted.chains, strict=True)
+            for a, b in zip(found.trajectories, counted.trajectories, strict=True)
         )
-        found = _with_losses(tied, counted, sensor)
+        found = _with_losses(fitted, counted, sensor)
         if same:
             break
-    trial, cost = _losses(id, found.chains, sensor)
-    return [Shifted(Proposal(trial, gain - cost, {}), found.chains, cost)]
+    candidate, cost = _losses(id, found.trajectories, sensor)
+    return [Shifted(ScreenedCandidate(candidate, gain - cost, {}), found.trajectories, cost)]
 
 
-def _begun(whole: Chain, fit: Fit, i: int) -> Chain:
-    """Return a table's motion in one piece from the yaw that its first readings show."""
+def _begun(whole: Trajectory, fit: Fit, i: int) -> Trajectory:
+    """Return a table's motion in one segment from the yaw that its first readings show."""
     yaw = whole.plant.layout.yaw
     if yaw is None or whole.recording.get("magnetometer") is None:
         return whole
@@ -128,16 +136,18 @@ def _begun(whole: Chain, fit: Fit, i: int) -> Chain:
 
 
 def _with_losses(fit: Fit, counted: Fit, sensor: str) -> Fit:
-    """Return a fit with the losses that the chains of another hold."""
-    chains = tuple(
-        replace(chain, lost={**chain.lost, sensor: other.lost[sensor]}) if sensor in other.lost else chain
-        for chain, other in zip(fit.chains, counted.chains, strict=True)
+    """Return a fit with the losses that the trajectories of another hold."""
+    trajectories = tuple(
+        replace(trajectory, lost={**trajectory.lost, sensor: other.lost[sensor]})
+        if sensor in other.lost
+        else trajectory
+        for trajectory, other in zip(fit.trajectories, counted.trajectories, strict=True)
     )
-    return replace(fit, chains=chains)
+    return replace(fit, trajectories=trajectories)
 
 
-def _own_times(anew: Chain, old: Chain, lost: Mapping[str, FloatArray]) -> Chain:
-    """Return the pieces of a fit to repaired recordings as pieces of the recording itself, its losses beside it."""
+def _own_times(anew: Trajectory, old: Trajectory, lost: Mapping[str, FloatArray]) -> Trajectory:
+    """Return the segments of a fit to repaired recordings as segments of the recording itself, its losses beside it."""
     some = {sensor: counts for sensor, counts in lost.items() if counts.size}
     written = {readings.sensor: readings.t for readings in old.readings}
     readings = tuple(replace(r, t=written[r.sensor]) for r in anew.readings)
@@ -145,52 +155,58 @@ def _own_times(anew: Chain, old: Chain, lost: Mapping[str, FloatArray]) -> Chain
 
 
 def dropped_accelerometer(
-    fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: float = DETECTORS.least_dropped
+    fit: Fit, noise: NoiseModel, taken: Sequence[CandidateEffect] = (), least: float = DETECTORS.least_dropped
 ) -> list[Shifted]:
-    """Return lost samples of the accelerometer as a proposal where the motion tells that its readings slip."""
+    """Return lost samples of the accelerometer as a screened candidate where the motion tells of them."""
     sensor = "accelerometer"
     id = catalogued(DroppedSamples, sensor).id
-    if sensor not in {r.sensor for chain in fit.chains for r in chain.readings}:
+    if sensor not in {r.sensor for trajectory in fit.trajectories for r in trajectory.readings}:
         return []
-    if any(trial.id == id for trial in taken):
+    if any(candidate.id == id for candidate in taken):
         return []
     sd = _stated_sd(fit, sensor, noise)
     if _counted(fit, sensor, sd)[1] < least:
         return []
     # what is lost has bent the motion: once more without the sensor in question
     without = replace(
-        fit, chains=tuple(replace(c, readings=tuple(r for r in c.readings if r.sensor != sensor)) for c in fit.chains)
+        fit,
+        trajectories=tuple(
+            replace(c, readings=tuple(r for r in c.readings if r.sensor != sensor)) for c in fit.trajectories
+        ),
     )
     free = refit(without, iterations=4)
     whole = replace(
-        free, chains=tuple(replace(c, readings=old.readings) for c, old in zip(free.chains, fit.chains, strict=True))
+        free,
+        trajectories=tuple(
+            replace(c, readings=old.readings) for c, old in zip(free.trajectories, fit.trajectories, strict=True)
+        ),
     )
     whole, gain = _counted(whole, sensor, sd)
     if gain < least:
         return []
     again = refit(replace(whole, noise=noise), iterations=3)
     again, _ = _counted(again, sensor, sd)
-    trial, cost = _losses(id, again.chains, sensor)
-    if trial.told[0][1] == 0.0:
+    candidate, cost = _losses(id, again.trajectories, sensor)
+    if candidate.fixed_values[0][1] == 0.0:
         return []
-    return [Shifted(Proposal(trial, gain, {}), again.chains, cost)]
+    return [Shifted(ScreenedCandidate(candidate, gain, {}), again.trajectories, cost)]
 
 
 def _stated_sd(fit: Fit, sensor: str, noise: NoiseModel) -> FloatArray:
     """Return the noise of a sensor's axes: as stated, or where nothing is stated as a fit shows it."""
-    readings = next(r for chain in fit.chains for r in chain.readings if r.sensor == sensor)
+    readings = next(r for trajectory in fit.trajectories for r in trajectory.readings if r.sensor == sensor)
     return np.where(np.isfinite(readings.sd), readings.sd, noise[sensor].sd)
 
 
 def _counted(fit: Fit, sensor: str, sd: FloatArray) -> tuple[Fit, float]:
-    """Return a fit whose chains hold the likeliest losses of a sensor by its motion, and their gain."""
+    """Return a fit whose trajectories hold the likeliest losses of a sensor by its motion, and their gain."""
 
-    def one(i: int) -> tuple[Chain, float]:
-        chain = fit.chains[i]
-        if all(r.sensor != sensor for r in chain.readings):
-            return chain, 0.0
-        counts, gain = lost_along(chain, fit.values(i), sensor, 2.0 * sd)
-        return replace(chain, lost={**chain.lost, sensor: counts}), gain
+    def one(i: int) -> tuple[Trajectory, float]:
+        trajectory = fit.trajectories[i]
+        if all(r.sensor != sensor for r in trajectory.readings):
+            return trajectory, 0.0
+        counts, gain = lost_along(trajectory, fit.values(i), sensor, 2.0 * sd)
+        return replace(trajectory, lost={**trajectory.lost, sensor: counts}), gain
 
-    done = mapped(one, range(len(fit.chains)))
-    return replace(fit, chains=tuple(chain for chain, _ in done)), float(sum(gain for _, gain in done))
+    done = mapped(one, range(len(fit.trajectories)))
+    return replace(fit, trajectories=tuple(trajectory for trajectory, _ in done)), float(sum(gain for _, gain in done))

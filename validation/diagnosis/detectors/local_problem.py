@@ -1,4 +1,8 @@
-"""The linear problem about a fit in which detectors ask their questions, event by event."""
+"""The local linear problem about a fit, in which detectors solve for one event after another.
+
+Takes a fit and a hypothesis; gives, recording by recording, what any further column would explain once all unknowns
+have had their say (the columns projected off the others: Frisch, Waugh and Lovell).
+"""
 
 from __future__ import annotations
 
@@ -10,17 +14,17 @@ import numpy as np
 from discsim.arrays import FloatArray, IntArray
 from discsim.effects.air import Wind
 from discsim.effects.catalogue import catalogued
-from validation.diagnosis.selection.candidates import Trial
+from validation.diagnosis.selection.candidates import CandidateEffect
 from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
-from validation.diagnosis.selection.proposals import Proposal
+from validation.diagnosis.selection.score_tests import ScreenedCandidate
 from validation.identification.gauss_newton import Fit, linearised
 from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel, whitened
 from validation.identification.normal_equations import inverse_of, known_directions, reduce, unknown_prior
 from validation.identification.parameters import Parameter
-from validation.identification.segments import Chain, recut
+from validation.identification.segments import Trajectory, resegmented
 
-__all__ = ["WIND", "Asked", "Ground", "asked_of", "gain_of", "peaks"]
+__all__ = ["WIND", "LocalProblem", "LocalProblems", "gain_of", "local_problems", "peaks"]
 
 #: spacing of the boundaries at which a jump is asked for, s
 _FINE = 0.1
@@ -36,17 +40,17 @@ WIND = tuple((catalogued(Wind).id, name) for name in Wind._fields)
 
 
 @dataclass(frozen=True)
-class Ground:
+class LocalProblem:
     """One recording, linearised: what any further column would explain once all its unknowns have had their say.
 
     ``white`` (n, m) are whitened columns of the first state and the parameters, ``left`` (n,) the whitened residual;
     ``inverse`` (m, m) and ``right`` (m,) the normal equations with what is known from elsewhere.
     """
 
-    chain: Chain
+    trajectory: Trajectory
     linear: Linear
     noise: NoiseModel
-    piece: IntArray
+    segment: IntArray
     white: FloatArray
     left: FloatArray
     inverse: FloatArray
@@ -66,27 +70,27 @@ class Ground:
         value = scale * (V @ ((V.T @ (scale * b)) / w))
         return float(b @ value), np.asarray(value)
 
-    def ask(self, columns: FloatArray) -> tuple[float, FloatArray]:
+    def solve(self, columns: FloatArray) -> tuple[float, FloatArray]:
         """Return gain and values (c,) of whitened columns (n, c)."""
         return self.explained(columns.T @ columns, self.white.T @ columns, columns.T @ self.left)
 
 
-def _fine_edges(chain: Chain) -> FloatArray:
-    """Return boundaries about `_FINE` apart, those of the chain among them."""
+def _fine_nodes(trajectory: Trajectory) -> FloatArray:
+    """Return boundaries about `_FINE` apart, those of the trajectory among them."""
     parts = [
         np.linspace(a, b, max(1, round((b - a) / _FINE)) + 1)[:-1]
-        for a, b in zip(chain.edges[:-1], chain.edges[1:], strict=True)
+        for a, b in zip(trajectory.nodes[:-1], trajectory.nodes[1:], strict=True)
     ]
-    return np.concatenate([*parts, chain.edges[-1:]])
+    return np.concatenate([*parts, trajectory.nodes[-1:]])
 
 
 @dataclass(frozen=True)
-class Asked:
+class LocalProblems:
     """A fit made ready for questions: each recording's ground, and where the columns of a steady wind are in it."""
 
     fit: Fit
-    taken: tuple[Trial, ...]
-    grounds: Mapping[int, Ground]
+    taken: tuple[CandidateEffect, ...]
+    by_recording: Mapping[int, LocalProblem]
     wind: tuple[int, ...]
 
     def has(self, id: str, recording: int) -> bool:
@@ -94,7 +98,7 @@ class Asked:
         return any(t.id == id and (t.recordings is None or recording in t.recordings) for t in self.taken)
 
 
-def asked_of(fit: Fit, noise: NoiseModel, own: Sequence[Parameter], hypothesis: Hypothesis) -> Asked:
+def local_problems(fit: Fit, noise: NoiseModel, own: Sequence[Parameter], hypothesis: Hypothesis) -> LocalProblems:
     """Return a fit, relaxed or tied, ready for questions: cut finely, hanging together, under a hypothesis.
 
     Parameters of the fit that the hypothesis does not have are taken back to where they stand without it.
@@ -111,21 +115,24 @@ def asked_of(fit: Fit, noise: NoiseModel, own: Sequence[Parameter], hypothesis: 
     every = (*free, *(q for q in fit.parameters if (q.key, q.recordings) not in mine))
     place = {(q.key, q.recordings): number for q, number in zip(fit.parameters, fit.at, strict=True)}
     at = np.array([place.get((q.key, q.recordings), q.stated) for q in every])
-    tied = replace(fit, parameters=every, at=at, jumps=plant.sizes.continuous, noise=noise)
+    fitted = replace(fit, parameters=every, at=at, defects=plant.sizes.continuous, noise=noise)
     if not np.any(plant.sizes.continuous.allowed):  # else segments are short, and what is not modelled wanders by them
-        chains = tuple(recut(chain, tied.values(i), _fine_edges(chain)) for i, chain in enumerate(tied.chains))
-        tied = replace(tied, chains=chains)
-    return Asked(tied, hypothesis.trials, _grounds(tied, len(free)), wind)
+        trajectories = tuple(
+            resegmented(trajectory, fitted.values(i), _fine_nodes(trajectory))
+            for i, trajectory in enumerate(fitted.trajectories)
+        )
+        fitted = replace(fitted, trajectories=trajectories)
+    return LocalProblems(fitted, hypothesis.candidates, _by_recording(fitted, len(free)), wind)
 
 
-def _grounds(fit: Fit, f: int) -> dict[int, Ground]:
+def _by_recording(fit: Fit, f: int) -> dict[int, LocalProblem]:
     """Return the grounds of all recordings; the first ``f`` parameters are free, the others taken back."""
     parameters, noise, at = fit.parameters[:f], fit.noise, fit.at
     linears = linearised(fit)
     away = np.concatenate([np.zeros(f), at[f:] - np.array([q.stated for q in fit.parameters[f:]])])
     grams = []
-    for linear, chain in zip(linears, fit.chains, strict=True):
-        G = reduce(linear, chain, noise, fit.jumps).gram
+    for linear, trajectory in zip(linears, fit.trajectories, strict=True):
+        G = reduce(linear, trajectory, noise, fit.defects).gram
         back = G[:-1, -1] + G[:-1, :-1] @ away
         grams.append((G[:f, :f], back[:f]))
     total = np.sum([g for g, _ in grams], axis=0)
@@ -133,22 +140,22 @@ def _grounds(fit: Fit, f: int) -> dict[int, Ground]:
     prior = np.array([q.precision for q in parameters])
     off = prior * (np.array([q.stated for q in parameters]) - at[:f])
     found = {}
-    for i, (linear, chain) in enumerate(zip(linears, fit.chains, strict=True)):
-        residual = linear.residual + linear.shared @ away
+    for i, (linear, trajectory) in enumerate(zip(linears, fit.trajectories, strict=True)):
+        residual = linear.residual + linear.common @ away
         own = linear.unknowns
-        columns = np.hstack([linear.local, linear.shared[:, :f], residual[:, None]])
+        columns = np.hstack([linear.nuisance, linear.common[:, :f], residual[:, None]])
         white = whitened(linear, noise, columns)
         A, e = white[:, :-1], white[:, -1]
         H, right = A.T @ A, A.T @ e
-        known, pull, _ = unknown_prior(linear, chain, fit.jumps)
+        known, pull, _ = unknown_prior(linear, trajectory, fit.defects)
         H[:own, :own] += known
         right[:own] += pull
         H[own:, own:] += total - grams[i][0] + np.diag(prior)
         right[own:] += pulled - grams[i][1] + off
         scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
         inverse = inverse_of(H * np.outer(scale, scale)) * np.outer(scale, scale)
-        piece = np.where(linear.piece < 0, chain.segment_of(linear.t), linear.piece)
-        found[i] = Ground(chain, linear, noise, piece, A, e, inverse, right)
+        segment = np.where(linear.segment < 0, trajectory.segment_of(linear.t), linear.segment)
+        found[i] = LocalProblem(trajectory, linear, noise, segment, A, e, inverse, right)
     return found
 
 
@@ -159,6 +166,6 @@ def peaks(gain: FloatArray, count: int) -> list[int]:
     return [int(j) for j in tops[np.argsort(gain[tops])[::-1][:count]]]
 
 
-def gain_of(proposal: Proposal) -> float:
-    """Return what a proposal is expected to gain, to sort by."""
-    return proposal.gain
+def gain_of(screened: ScreenedCandidate) -> float:
+    """Return what a screened candidate is expected to gain, to sort by."""
+    return screened.gain

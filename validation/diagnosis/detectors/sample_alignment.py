@@ -1,7 +1,8 @@
 """Samples that were lost without a trace: the rest are written at the nominal spacing, so time slips by whole samples.
 
-A sample written as the k-th was taken at (k + c)/rate, where c, the number lost before it, never falls. Where the disc
-spins, a lost sample is a step in the phase of the readings; elsewhere only a motion known from other sensors tells.
+Takes a sensor's samples and a motion; gives how many were lost before each. A sample written as the k-th was taken at
+(k + c)/rate, where c never falls: the likeliest course of c is found by dynamic programming (Viterbi, 1967). Where the
+disc spins, a lost sample is a step in the phase; elsewhere only a motion known from other sensors tells.
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ from discsim.arrays import ComplexArray, FloatArray, IntArray, sd_by_median
 from discsim.compiled import compiled_nogil
 from discsim.recording import Recording, Samples
 from validation.identification.prediction import shown
-from validation.identification.segments import Chain
+from validation.identification.segments import Trajectory
 from validation.identification.sensor_model import Values, delay
 
-__all__ = ["circle_through", "first_yaw", "likeliest_counts", "lost_along", "phase_counts", "repaired"]
+__all__ = ["circle_through", "first_yaw", "lost_along", "phase_counts", "repaired", "viterbi_counts"]
 
 #: most samples lost in a row that are looked for
 _IN_A_ROW = 4
@@ -35,7 +36,7 @@ _FIRST = 12
 _SEEN = 4.5
 
 
-def likeliest_counts(cost: FloatArray, gaps: IntArray, each: float = _COST) -> tuple[IntArray, float]:
+def viterbi_counts(cost: FloatArray, gaps: IntArray, each: float = _COST) -> tuple[IntArray, float]:
     """Return the never-falling counts (n,) of least cost (n, c) and their cost; a lost sample costs ``each``.
 
     ``gaps`` (n,) is by how many sampling intervals a sample follows the one before: more than one may be lost in a row
@@ -48,7 +49,7 @@ def likeliest_counts(cost: FloatArray, gaps: IntArray, each: float = _COST) -> t
 
 @compiled_nogil
 def _walk(cost: FloatArray, gaps: IntArray, each: float, counts: IntArray) -> float:
-    """Write `likeliest_counts` into counts (n,) and return their cost (Viterbi)."""
+    """Write `viterbi_counts` into counts (n,) and return their cost (Viterbi)."""
     n, c = cost.shape
     best, new = cost[0] + each * np.arange(c), np.empty(c)
     came = np.zeros((n, c), dtype=np.int64)
@@ -132,9 +133,9 @@ def _centre(z: ComplexArray) -> complex:
 
 
 def lost_along(
-    current: Chain, values: Values, sensor: str, sd: FloatArray, *, about: FloatArray | None = None
+    current: Trajectory, values: Values, sensor: str, sd: FloatArray, *, about: FloatArray | None = None
 ) -> tuple[FloatArray, float]:
-    """Return the likeliest counts lost before each sample (n,) of a sensor by a chain's motion, and their gain.
+    """Return the likeliest counts lost before each sample (n,) of a sensor by a trajectory's motion, and their gain.
 
     ``sd`` (k,) is the noise of its axes. The gain is that in chi-squared over losing none, or over the counts
     ``about``, less the price of each loss.
@@ -144,7 +145,7 @@ def lost_along(
     readings = next(r for r in current.readings if r.sensor == sensor)
     rate_hz = recording.sheets[sensor].rate_hz
     place = grid_of(samples, rate_hz)
-    end = float(current.edges[-1])
+    end = float(current.nodes[-1])
     most = max(int((end - samples.t[-1]) * rate_hz) + 1, 0)
     most = min(most, int(0.25 * place[-1]) + 8)
     if about is not None:
@@ -165,16 +166,16 @@ def lost_along(
         believed[-1] += _TOGETHER + _COST * missing
         believed[-1, missing] = cost[-1, missing]
     gaps = np.diff(place, prepend=place[0])
-    path, _ = likeliest_counts(believed, gaps)
+    path, _ = viterbi_counts(believed, gaps)
     # the gain is what the readings say alone
-    _, least = likeliest_counts(cost, gaps)
+    _, least = viterbi_counts(cost, gaps)
     was = np.zeros(len(samples), dtype=np.int64) if about is None else about.astype(np.int64)
     before = float(cost[np.arange(len(samples)), was].sum()) + _COST * float(was[-1])
     return path.astype(float), before - least
 
 
-def first_yaw(current: Chain, values: Values) -> float:
-    """Return by how much the first piece's yaw must grow for the first magnetometer samples to agree with it, rad."""
+def first_yaw(current: Trajectory, values: Values) -> float:
+    """Return by how much the first segment's yaw must grow for the first magnetometer samples to agree with it, rad."""
     samples = current.recording.samples["magnetometer"]
     lost = current.lost.get("magnetometer", np.zeros(len(samples)))
     some = np.flatnonzero(np.all(np.isfinite(samples.value), axis=1))[:_FIRST]

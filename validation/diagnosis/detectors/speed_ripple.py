@@ -1,4 +1,7 @@
-"""Speed ripple: a line in the residual of a rig's rate at a multiple of its angle."""
+"""Speed ripple: a line in the residual of a rig's rate at a multiple of its angle (order analysis).
+
+Takes a fit of rigs; gives candidates with order, amplitude and phase.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +14,8 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.rig import SpeedRipple
 from validation.diagnosis.detectors.local_problem import gain_of, peaks
-from validation.diagnosis.selection.candidates import Trial
-from validation.diagnosis.selection.proposals import Proposal
+from validation.diagnosis.selection.candidates import CandidateEffect
+from validation.diagnosis.selection.score_tests import ScreenedCandidate
 from validation.diagnosis.settings import DETECTORS
 from validation.identification.gauss_newton import Fit
 from validation.identification.noise import NoiseModel
@@ -26,13 +29,15 @@ _ID = catalogued(SpeedRipple).id
 _ORDERS, _BIN = (0.1, 40.0), 0.02
 
 
-def ripple(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: float = DETECTORS.least) -> list[Proposal]:
-    """Return ripples of a table's speed as proposals, best first: several orders where they are near in gain.
+def ripple(
+    fit: Fit, noise: NoiseModel, taken: Sequence[CandidateEffect] = (), least: float = DETECTORS.least
+) -> list[ScreenedCandidate]:
+    """Return ripples of a table's speed as screened candidates, best first: several orders where they are near in gain.
 
     The rate's residual (rate reference, else gyroscope, else the magnetometer's phase) is transformed over the angle
     turned; the best orders are then refined by least squares. The gain is less what so many orders gain by chance.
     """
-    if not fit.plant.commanded or any(trial.id == _ID for trial in taken):
+    if not fit.plant.commanded or any(candidate.id == _ID for candidate in taken):
         return []
     found = _ripples(fit, noise, least, 0.0)
     if not found:
@@ -42,9 +47,9 @@ def ripple(fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: floa
     return _ripples(fit, noise, least, amplitude) or found
 
 
-def _ripples(fit: Fit, noise: NoiseModel, least: float, amplitude: float) -> list[Proposal]:
+def _ripples(fit: Fit, noise: NoiseModel, least: float, amplitude: float) -> list[ScreenedCandidate]:
     """Return what `ripple` does, of a table that one of this amplitude (rad/s) slows."""
-    told = [_rate_residual(fit, i, noise, amplitude) for i in range(len(fit.chains))]
+    told = [_rate_residual(fit, i, noise, amplitude) for i in range(len(fit.trajectories))]
     parts = [part for part in told if part is not None]
     if not parts:
         return []
@@ -60,7 +65,7 @@ def _ripples(fit: Fit, noise: NoiseModel, least: float, amplitude: float) -> lis
     inside = (order > max(_ORDERS[0], 4.0 * np.pi / width)) & (order < _ORDERS[1])
     chance = 2.0 * np.log(max(_ORDERS[1] * width / (2.0 * np.pi), 1.0))
     power = np.where(inside, power, 0.0)
-    found: list[Proposal] = []
+    found: list[ScreenedCandidate] = []
     for top in peaks(power, 6):
         best = max(
             (_sine(psi, e, weight, o) for o in order[top] + np.linspace(-1.5, 1.5, 61) * np.pi / width),
@@ -73,12 +78,12 @@ def _ripples(fit: Fit, noise: NoiseModel, least: float, amplitude: float) -> lis
         gain, o, amplitude, phase = best
         if gain - chance > least:
             id, shape = _ID, (("order", o), ("phase_rad", phase))
-            trial = Trial(id, (Column(id, "amplitude_rad_s", 0.005, shape),))
+            candidate = CandidateEffect(id, (Column(id, "amplitude_rad_s", 0.005, shape),))
             start: dict[tuple[tuple[str, str], frozenset[int] | None], float] = {
                 ((id, name), None): number for name, number in (*shape, ("amplitude_rad_s", amplitude))
             }
-            if all(abs(o - p.trial.shapes["order"]) > np.pi / width for p in found):
-                found.append(Proposal(trial, gain - chance, start))
+            if all(abs(o - p.candidate.shape_grid["order"]) > np.pi / width for p in found):
+                found.append(ScreenedCandidate(candidate, gain - chance, start))
     found.sort(key=gain_of, reverse=True)
     return [p for p in found if p.gain > 0.8 * found[0].gain][:3]
 
@@ -100,8 +105,8 @@ def _rate_residual(
 
     A table of rate c + a sin(order psi) takes 2 pi / sqrt(c^2 - a^2) for a turn: it turns slower than its command.
     """
-    linear, chain = fit.linears[i], fit.chains[i]
-    command = chain.recording.command
+    linear, trajectory = fit.linears[i], fit.trajectories[i]
+    command = trajectory.recording.command
     assert command is not None
     for sensor, axis in (("rate_reference", None), ("gyroscope", "z_rad_s"), ("magnetometer", None)):
         channels = [c for c in linear.channels if c.sensor == sensor and axis in (None, c.axis)]
@@ -118,8 +123,8 @@ def _rate_residual(
         if sensor != "magnetometer":
             e = e - np.mean(e)
             return psi[moving], e[moving], sd[moving] ** -2.0
-        assert chain.plant.layout.yaw is not None
-        slope = np.concatenate([linear.own[c.rows, chain.plant.layout.yaw] for c in channels])
+        assert trajectory.plant.layout.yaw is not None
+        slope = np.concatenate([linear.own[c.rows, trajectory.plant.layout.yaw] for c in channels])
         ok = moving & (np.abs(slope) > 3.0 * sd)
         # the rate that a slip of phase amounts to is its slope in time: differences of one axis at a time
         return _phase_rate(t[ok], psi[ok], e[ok] / slope[ok], sd[ok] / np.abs(slope[ok]))
@@ -127,14 +132,14 @@ def _rate_residual(
 
 
 def _phase_rate(
-    t: FloatArray, psi: FloatArray, slip: FloatArray, sd: FloatArray
+    t: FloatArray, psi: FloatArray, phase_drift: FloatArray, sd: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Return angle, rate and weight from slips of phase: averaged per instant, then their differences."""
     instants, inverse = np.unique(t, return_inverse=True)
     if instants.size < 8:
         return None
     w = np.bincount(inverse, sd**-2.0)
-    mean = np.bincount(inverse, slip * sd**-2.0) / w
+    mean = np.bincount(inverse, phase_drift * sd**-2.0) / w
     angle = np.bincount(inverse, psi) / np.bincount(inverse)
     gap = np.diff(instants)
     near = gap < 2.5 * np.median(gap)

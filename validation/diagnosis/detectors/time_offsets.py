@@ -1,8 +1,8 @@
 """Offsets of time on a rig, found by shifting a sensor's readings along the motion that the others tell.
 
-Takes a fit of rigs; gives proposals of ``accel.time_offset`` and ``gyro.time_offset``, and of the lag that looks alike
-where a sensor is late. A linear question finds small offsets; a ramp and its corners are not linear over tens of
-milliseconds. In the air, where all sensors turn, phases tell the same before anything is fitted
+Takes a fit of rigs; gives screened candidates of ``accel.time_offset`` and ``gyro.time_offset``, and of the lag that
+looks alike where a sensor is late. A linear question finds small offsets; a ramp and its corners are not linear over
+tens of milliseconds. In the air, where all sensors turn, phases tell the same before anything is fitted
 (`validation.diagnosis.setup`).
 """
 
@@ -16,13 +16,13 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import Lag
 from discsim.effects.setup import TimeOffset
-from validation.diagnosis.selection.candidates import Trial, free_trial
-from validation.diagnosis.selection.proposals import Proposal
+from validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
+from validation.diagnosis.selection.score_tests import ScreenedCandidate
 from validation.diagnosis.settings import DETECTORS
 from validation.identification.gauss_newton import Fit
 from validation.identification.noise import NoiseModel
 from validation.identification.prediction import shiftable
-from validation.identification.segments import Chain
+from validation.identification.segments import Trajectory
 
 __all__ = ["time_offsets"]
 
@@ -36,8 +36,8 @@ _LONGEST_LAG = 0.15
 
 
 def time_offsets(
-    fit: Fit, noise: NoiseModel, taken: Sequence[Trial] = (), least: float = DETECTORS.least
-) -> list[Proposal]:
+    fit: Fit, noise: NoiseModel, taken: Sequence[CandidateEffect] = (), least: float = DETECTORS.least
+) -> list[ScreenedCandidate]:
     """Return offsets of time, and lags, of the sensors of a rig whose readings do not turn with the field.
 
     What is gained is in chi-squared in ``noise``; effects that are ``taken`` already are not proposed.
@@ -47,9 +47,12 @@ def time_offsets(
     found = []
     for sensor in ("accelerometer", "gyroscope"):
         late, lag = catalogued(TimeOffset, sensor).id, catalogued(Lag, sensor).id
-        if any(trial.id in (late, lag) for trial in taken):
+        if any(candidate.id in (late, lag) for candidate in taken):
             continue
-        left = sum((_left(chain, fit.values(i), sensor, noise) for i, chain in enumerate(fit.chains)), np.zeros(1))
+        left = sum(
+            (_left(trajectory, fit.values(i), sensor, noise) for i, trajectory in enumerate(fit.trajectories)),
+            np.zeros(1),
+        )
         best = int(np.argmin(left))
         offset = float(_TRIED[best]) if left.size > 1 else 0.0
         gain = float(left[int(np.argmin(np.abs(_TRIED)))] - left[best]) if offset else 0.0
@@ -61,16 +64,16 @@ def time_offsets(
     return found
 
 
-def _proposal(id: str, name: str, value: float, gain: float) -> Proposal:
-    return Proposal(free_trial(id), gain, {((id, name), None): value})
+def _proposal(id: str, name: str, value: float, gain: float) -> ScreenedCandidate:
+    return ScreenedCandidate(free_candidate(id), gain, {((id, name), None): value})
 
 
-def _left(chain: Chain, values: dict[tuple[str, str], float], sensor: str, noise: NoiseModel) -> FloatArray:
+def _left(trajectory: Trajectory, values: dict[tuple[str, str], float], sensor: str, noise: NoiseModel) -> FloatArray:
     """Return what a motion leaves of a sensor (tried,) at each offset, in chi-squared; (1,) without readings."""
-    readings = next((r for r in chain.readings if r.sensor == sensor), None)
+    readings = next((r for r in trajectory.readings if r.sensor == sensor), None)
     if readings is None or readings.taken is not None:
         return np.zeros(1)
-    at, value, grid, told = shiftable(chain, values, readings, noise, _GRID)
+    at, value, grid, told = shiftable(trajectory, values, readings, noise, _GRID)
     used = np.flatnonzero(np.isfinite(value).any(axis=1))
     if used.size == 0 or grid.size < 2:
         return np.zeros(1)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
+from validation.diagnosis.consistency.low_pass_transient import TransientProof
 from validation.diagnosis.consistency.own_clock import SamplesShown
-from validation.diagnosis.consistency.settling import SettleProof
 from validation.diagnosis.consistency.spin_agreement import Agreement, Cause, RowProof
 from validation.diagnosis.report.wording import plus_minus
 
@@ -123,7 +123,7 @@ def _rows(proofs: tuple[RowProof, ...]) -> Table:
     return "Rows counted in ticks, on recordings that took no part", header, rows
 
 
-def _settling(proofs: tuple[SettleProof, ...]) -> Table:
+def _settling(proofs: tuple[TransientProof, ...]) -> Table:
     rows: list[tuple[str, ...]] = [
         (
             proof.recording,

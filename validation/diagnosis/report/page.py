@@ -295,7 +295,7 @@ def _further(outcome: Outcome) -> str:
 
 
 def _next_recordings(diagnosis: Diagnosis) -> list[str]:
-    """Return what to record next: what separates confused effects, then the answer's own proposals, each once."""
+    """Return what to record next: what separates confused effects, then what the answer proposes, each once."""
     separating = [telling_apart(item.id, other) for item in diagnosis.effects for other in item.confused_with]
     return list(dict.fromkeys(text for text in (*separating, *diagnosis.next_recordings) if text))
 

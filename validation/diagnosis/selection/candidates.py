@@ -1,7 +1,8 @@
-"""Candidate effects as trials: which numbers of an effect a linear question can free, and at which shapes.
+"""Candidate effects: which numbers of an effect a linear problem can free, and on which grid of the others.
 
-Parameters that enter a reading in proportion are freed; those that shape it (an exponent, a height, an instant) are
-tried at some values first and freed once the effect is taken up.
+Takes recordings; gives candidates. Parameters that enter a reading in proportion are freed; those that shape it (an
+exponent, a height, an instant) are tried on a grid first and freed once the effect is taken up (variable projection:
+Golub and Pereyra, 1973).
 """
 
 from __future__ import annotations
@@ -16,21 +17,21 @@ from validation.identification.competing_effects import CATALOGUED, Competing
 from validation.identification.parameters import Parameter
 from validation.identification.propagation import Column
 
-__all__ = ["Trial", "free_trial", "parameters_of", "trials_for"]
+__all__ = ["CandidateEffect", "candidates_for", "free_candidate", "parameters_of"]
 
 
 @dataclass(frozen=True)
-class Trial:
+class CandidateEffect:
     """An effect as a hypothesis: free columns, and the recordings it acts in (None: all).
 
-    ``told`` are parameters (name, value, sd) that a search has found and that no fit moves; ``user`` is an effect of
-    the user's own, None for one of the catalogue.
+    ``fixed_values`` are parameters (name, value, sd) that a search has found and that no fit moves; ``user`` is an
+    effect of the user's own, None for one of the catalogue.
     """
 
     id: str
     columns: tuple[Column, ...]
     recordings: frozenset[int] | None = None
-    told: tuple[tuple[str, float, float], ...] = ()
+    fixed_values: tuple[tuple[str, float, float], ...] = ()
     user: UserEffect | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -44,13 +45,13 @@ class Trial:
         return self.id if self.recordings is None else f"{self.id}@{','.join(map(str, sorted(self.recordings)))}"
 
     @property
-    def shapes(self) -> dict[str, float]:
+    def shape_grid(self) -> dict[str, float]:
         """Values of the parameters that shape the effect."""
         return dict(self.columns[0].given) if self.columns else {}
 
 
 #: a parameter is held this many steps wide, so that one without a trace in the readings stays where it is
-_LOOSE = 1e5
+_PRIOR_SIGMA = 1e5
 #: and an angle of the motion, rad: a rig's axis is plumb to within a few degrees. Of its two tilts the one square to
 #: the field hardly shows, and would wander off
 _ANGLE = 0.1
@@ -64,10 +65,10 @@ def _step(row: Row, name: str) -> float:
     return _STEP * row.scale[row.parameters.index(name)]
 
 
-def _loose(row: Row, column: Column) -> float:
+def _prior_sigma(row: Row, column: Column) -> float:
     """Return how loosely a parameter is held at its baseline, one sigma."""
     held = row.acts_on == "motion" and column.name.endswith("_rad")
-    return min(_LOOSE * column.step, _ANGLE if held else float("inf"))
+    return min(_PRIOR_SIGMA * column.step, _ANGLE if held else float("inf"))
 
 
 def available(recordings: Sequence[Recording], effects: Competing = CATALOGUED) -> list[Row]:
@@ -88,36 +89,38 @@ def detected(recordings: Sequence[Recording], detector: str) -> list[Row]:
     return [row for row in available(recordings) if row.detector == detector]
 
 
-def trials_for(recordings: Sequence[Recording], effects: Competing = CATALOGUED) -> tuple[Trial, ...]:
-    """Return the trials of all effects that enter linearly, at each of their shapes."""
-    trials = []
+def candidates_for(recordings: Sequence[Recording], effects: Competing = CATALOGUED) -> tuple[CandidateEffect, ...]:
+    """Return the candidates of all effects that enter linearly, at each of their shapes."""
+    candidates = []
     for row in available(recordings, effects):
         if row.detector or any(sensor not in recordings[0].sheets for sensor in row.needs):
             continue
-        shapes: list[tuple[tuple[str, float], ...]] = [()]
+        shape_grid: list[tuple[tuple[str, float], ...]] = [()]
         for name, values in row.grid.items():
-            shapes = [(*shape, (name, value)) for shape in shapes for value in values]
-        trials += [free_trial(row.id, shape, effects.user_effect(row.id)) for shape in shapes]
-    return tuple(trials)
+            shape_grid = [(*shape, (name, value)) for shape in shape_grid for value in values]
+        candidates += [free_candidate(row.id, shape, effects.user_effect(row.id)) for shape in shape_grid]
+    return tuple(candidates)
 
 
-def free_trial(id: str, shape: tuple[tuple[str, float], ...] = (), user: UserEffect | None = None) -> Trial:
-    """Return the trial of an effect in all recordings with every parameter free but those of its ``shape``."""
+def free_candidate(
+    id: str, shape: tuple[tuple[str, float], ...] = (), user: UserEffect | None = None
+) -> CandidateEffect:
+    """Return the candidate of an effect in all recordings with every parameter free but those of its ``shape``."""
     row = CATALOGUE[id] if user is None else user.row
     free = [name for name in row.parameters if name not in {name for name, _ in shape}]
-    return Trial(id, tuple(Column(id, name, _step(row, name), shape) for name in free), user=user)
+    return CandidateEffect(id, tuple(Column(id, name, _step(row, name), shape) for name in free), user=user)
 
 
-def parameters_of(trial: Trial, *, shaped: bool = True) -> tuple[Parameter, ...]:
-    """Return the parameters of a trial for a fit, its shapes among them where ``shaped``."""
-    row = trial.row
+def parameters_of(candidate: CandidateEffect, *, shaped: bool = True) -> tuple[Parameter, ...]:
+    """Return the parameters of a candidate for a fit, its shapes among them where ``shaped``."""
+    row = candidate.row
     baseline = row.sizes
     found = [
-        Parameter(c.group, c.name, float(baseline[c.name]), c.step, _loose(row, c), trial.recordings)
-        for c in trial.columns
+        Parameter(c.group, c.name, float(baseline[c.name]), c.step, _prior_sigma(row, c), candidate.recordings)
+        for c in candidate.columns
     ]
     if shaped:
-        for name, value in trial.shapes.items():
+        for name, value in candidate.shape_grid.items():
             sigma = row.grid_sigma.get(name, float("inf"))
-            found.append(Parameter(trial.id, name, value, _step(row, name), sigma, trial.recordings))
+            found.append(Parameter(candidate.id, name, value, _step(row, name), sigma, candidate.recordings))
     return tuple(found)

@@ -1,4 +1,8 @@
-"""What evidence costs: gains in likelihood that an effect needs, bounds and signs of parameters."""
+"""What evidence costs: the penalty that a candidate's gain in likelihood must exceed, bounds and signs of parameters.
+
+Takes a candidate; gives its penalty in twice the log likelihood (an information criterion: Schwarz, 1978, raised by the
+number of candidates and instants that were tried).
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from discsim.effects.catalogue import CATALOGUE
-from validation.diagnosis.selection.candidates import Trial, parameters_of
+from validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from validation.diagnosis.settings import SELECTION
 
 __all__ = ["price"]
@@ -25,11 +29,11 @@ ONE_SIDED: Mapping[tuple[str, str], float] = {
 }
 
 
-def price(trial: Trial) -> float:
-    """Return what a trial must gain to be believed."""
-    count = len(parameters_of(trial))
-    row = trial.row
+def price(candidate: CandidateEffect) -> float:
+    """Return what a candidate must gain to be believed."""
+    count = len(parameters_of(candidate))
+    row = candidate.row
     if row.event:
         return (SELECTION.event_entry if row.brief else SELECTION.gust_entry) + SELECTION.per_parameter * count
-    odd = trial.recordings is not None and row.of_disc
+    odd = candidate.recordings is not None and row.of_disc
     return SELECTION.entry + SELECTION.per_parameter * count + (SELECTION.other_disc if odd else 0.0)

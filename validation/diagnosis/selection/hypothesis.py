@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-from validation.diagnosis.selection.candidates import Trial, parameters_of
+from validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from validation.identification.parameters import Parameter
 
 __all__ = ["Hypothesis", "Start"]
@@ -19,24 +19,24 @@ Start: TypeAlias = Mapping[tuple[tuple[str, str], frozenset[int] | None], float]
 class Hypothesis:
     """Effects that may act."""
 
-    trials: tuple[Trial, ...] = ()
+    candidates: tuple[CandidateEffect, ...] = ()
 
-    def plus(self, trial: Trial) -> Hypothesis:
+    def plus(self, candidate: CandidateEffect) -> Hypothesis:
         """Return it with one more effect."""
-        return replace(self, trials=(*self.trials, trial))
+        return replace(self, candidates=(*self.candidates, candidate))
 
-    def without(self, trial: Trial) -> Hypothesis:
+    def without(self, candidate: CandidateEffect) -> Hypothesis:
         """Return it less one of its effects."""
-        return replace(self, trials=tuple(t for t in self.trials if t is not trial))
+        return replace(self, candidates=tuple(t for t in self.candidates if t is not candidate))
 
     @property
     def size(self) -> int:
         """Number of parameters it adds."""
-        return sum(len(parameters_of(trial)) for trial in self.trials)
+        return sum(len(parameters_of(candidate)) for candidate in self.candidates)
 
 
 def fitted_parameters(hypothesis: Hypothesis, own: Sequence[Parameter]) -> tuple[Parameter, ...]:
     """Return a recording set's own parameters and those of the hypothesis."""
-    taken = [q for trial in hypothesis.trials for q in parameters_of(trial)]
+    taken = [q for candidate in hypothesis.candidates for q in parameters_of(candidate)]
     keys = {(q.key, q.recordings) for q in taken}
     return (*(q for q in own if (q.key, q.recordings) not in keys), *taken)

@@ -1,7 +1,8 @@
-"""All questions of one linearisation: what any set of parameters, in any recordings, would explain.
+"""The normal equations of all candidates at once: what any set of parameters, in any recordings, would explain.
 
-The columns of every candidate are taken once, each recording's own unknowns eliminated, and what remains are small
-matrices: a hypothesis is a choice of rows and columns of them, and costs a few microseconds.
+Takes a fit and candidates; gives `NormalEquations`. The columns of every candidate are taken once, each recording's
+nuisance unknowns eliminated, and what remains are small matrices: a hypothesis is a choice of rows and columns of them,
+and costs a few microseconds.
 """
 
 from __future__ import annotations
@@ -13,21 +14,21 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.errors import InputError
-from validation.diagnosis.selection.candidates import Trial, parameters_of
+from validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from validation.diagnosis.selection.to_stated import to_baseline
 from validation.identification.gauss_newton import Fit, linearised_columns, mapped
 from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel
 from validation.identification.normal_equations import Reduced, inverse_of, reduce
-from validation.identification.parameters import Jumps, Parameter
+from validation.identification.parameters import AllowedDefects, Parameter
 from validation.identification.plants import PLANTS
 from validation.identification.propagation import Column
 
-__all__ = ["Answer", "Board", "board_of"]
+__all__ = ["NormalEquations", "ScoreTest", "normal_equations_of"]
 
 
 @dataclass(frozen=True)
-class Answer:
+class ScoreTest:
     """What a choice of columns explains: chi-squared left, priors included, and the values of the free columns."""
 
     chi2: float
@@ -36,7 +37,7 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Board:
+class NormalEquations:
     """Reduced normal matrices of all recordings over [columns | residual], taken to the baseline of every column."""
 
     columns: tuple[Column, ...]
@@ -51,11 +52,11 @@ class Board:
         return int(self.grams.shape[0])
 
     def columns_of(self, parameters: Sequence[Parameter]) -> list[tuple[Column, Parameter]]:
-        """Return the columns of parameters, those that have one here, to `ask` with."""
+        """Return the columns of parameters, those that have one here, to `solve` with."""
         found = [(column_of(q), q) for q in parameters]
         return [(column, q) for column, q in found if column in self.place]
 
-    def ask(self, parameters: Sequence[tuple[Column, Parameter]], only: Sequence[int] | None = None) -> Answer:
+    def solve(self, parameters: Sequence[tuple[Column, Parameter]], only: Sequence[int] | None = None) -> ScoreTest:
         """Free some columns, each in its recordings and with its prior; all others stay at their baseline.
 
         ``only`` are the recordings that take part; by default all. Values are measured from the baseline.
@@ -64,7 +65,7 @@ class Board:
         free = np.array([self.place[column] for column, _ in parameters], dtype=int)
         f = free.size
         if f == 0:
-            return Answer(float(sum(self.grams[i, -1, -1] for i in some)), np.empty(0), np.empty((0, 0)))
+            return ScoreTest(float(sum(self.grams[i, -1, -1] for i in some)), np.empty(0), np.empty((0, 0)))
         H, right, chi2 = np.zeros((f, f)), np.zeros(f), 0.0
         for i in some:
             G = self.grams[i]
@@ -77,7 +78,7 @@ class Board:
         scale = np.where(np.diag(H) > 0.0, 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300)), 0.0)
         covariance = inverse_of(H * np.outer(scale, scale)) * np.outer(scale, scale)
         value = covariance @ right
-        return Answer(chi2 - float(value @ right), value, covariance)
+        return ScoreTest(chi2 - float(value @ right), value, covariance)
 
 
 def column_of(q: Parameter) -> Column:
@@ -87,14 +88,18 @@ def column_of(q: Parameter) -> Column:
     return Column(q.group, q.name, q.step)
 
 
-def board_of(fit: Fit, trials: Sequence[Trial], noise: NoiseModel, jumps: Jumps) -> Board:
-    """Take the columns of trials and of a fit's own parameters where the fit stands, to the baseline of each."""
+def normal_equations_of(
+    fit: Fit, candidates: Sequence[CandidateEffect], noise: NoiseModel, defects: AllowedDefects
+) -> NormalEquations:
+    """Take the columns of candidates and of a fit's own parameters where the fit stands, to the baseline of each."""
     columns = tuple(
-        dict.fromkeys((*map(column_of, fit.parameters), *(column for trial in trials for column in trial.columns)))
+        dict.fromkeys(
+            (*map(column_of, fit.parameters), *(column for candidate in candidates for column in candidate.columns))
+        )
     )
     place = {column: k for k, column in enumerate(columns)}
-    linears = linearised_columns(replace(fit, jumps=jumps), columns)
-    reduced = mapped(lambda linear, chain: reduce(linear, chain, noise, jumps), linears, fit.chains)
+    linears = linearised_columns(replace(fit, defects=defects), columns)
+    reduced = mapped(lambda linear, trajectory: reduce(linear, trajectory, noise, defects), linears, fit.trajectories)
     grams = np.stack([r.gram for r in reduced])
     if not np.all(np.isfinite(grams)):
         raise InputError(
@@ -103,9 +108,9 @@ def board_of(fit: Fit, trials: Sequence[Trial], noise: NoiseModel, jumps: Jumps)
             "discsim import RAW --throw N or --rows A:B takes it out"
         )
     to_baseline(grams, fit, [place[column_of(q)] for q in fit.parameters])
-    return Board(columns, grams, place, linears, tuple(reduced))
+    return NormalEquations(columns, grams, place, linears, tuple(reduced))
 
 
-def free_columns(trial: Trial) -> list[tuple[Column, Parameter]]:
-    """Return the columns that a trial frees, with their parameters."""
-    return list(zip(trial.columns, parameters_of(trial, shaped=False), strict=True))
+def free_columns(candidate: CandidateEffect) -> list[tuple[Column, Parameter]]:
+    """Return the columns that a candidate frees, with their parameters."""
+    return list(zip(candidate.columns, parameters_of(candidate, shaped=False), strict=True))

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.recording import Recording
-from validation.diagnosis.relaxed_fit import beginning, first_chain, ordinary, unknowns
+from validation.diagnosis.relaxed_fit import beginning, first_trajectory, ordinary, unknowns
 from validation.identification.gauss_newton import Fit, linearised, refit
 from validation.identification.noise import stated_noise
 from validation.identification.stated_parameters import stated_parameters
@@ -26,13 +26,13 @@ _LENGTH, _RECORDINGS, _STEPS = 1.5, 2, 5
 
 @np.errstate(over="ignore", invalid="ignore")
 def left_by_short_fit(recordings: Sequence[Recording]) -> float:
-    """Return the merit per reading that a loose fit to the beginnings of flights leaves; infinite where it fails."""
+    """Return the merit per reading that a relaxed fit to the beginnings of flights leaves; infinite where it fails."""
     some = list(recordings)[:_RECORDINGS]
-    chains = tuple(beginning(first_chain(one), _LENGTH) for one in some)
-    sensors = {readings.sensor for one in chains for readings in one.readings}
+    trajectories = tuple(beginning(first_trajectory(one), _LENGTH) for one in some)
+    sensors = {readings.sensor for one in trajectories for readings in one.readings}
     parameters = (*stated_parameters(some), *unknowns(some), *ordinary(sensors, some[0].plant))
     at = np.array([q.stated for q in parameters])
-    fit = Fit(chains, parameters, at, chains[0].plant.sizes.relaxed, {})
+    fit = Fit(trajectories, parameters, at, trajectories[0].plant.sizes.relaxed, {})
     bare = linearised(fit, ())
     fit = refit(replace(fit, noise=stated_noise(bare)), iterations=_STEPS, tolerance=1e-3 * fit.count)
     merit = fit.merit / max(fit.count, 1)

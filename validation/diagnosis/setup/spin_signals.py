@@ -16,7 +16,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import ComplexArray, FloatArray
 from discsim.recording import Recording
-from validation.diagnosis.consistency.turning import rate_of
+from validation.diagnosis.consistency.phase_regression import rate_of
 from validation.identification.initial.path import local_cubics, path_fixes
 from validation.identification.initial.spin_phase import field_spin
 from validation.identification.plants import plant_of

@@ -1,8 +1,9 @@
 """None of these: the force, moment or sensor term that no effect of the catalogue accounts for, as a formula.
 
-One linearisation with a constant force and moment in each direction answers, piece by piece, what any function of the
-state would explain: its value in a piece weighs that piece's part of the column. The best few are then fitted by output
-error, their exponents free, and believed only where recordings that took no part are explained by them, too.
+Takes a fit that follows the data; gives a law, or None. One linearisation with a constant force and moment in each
+direction answers, segment by segment, what any function of the state would explain: its value in a segment weighs that
+segment's part of the column. The best few are fitted by output error, their exponents free, and believed only where
+recordings that took no part are explained by them, too.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from discsim.arrays import FloatArray
 from discsim.effects.kind import BOARD
 from discsim.recording import Recording
 from validation.diagnosis.result import Law
-from validation.diagnosis.selection.constrained_fit import Tied, tied_fit
+from validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
 from validation.diagnosis.unknown_law.formula import as_laws, as_sensor_laws
@@ -25,10 +26,10 @@ from validation.diagnosis.unknown_law.sensor_law import asked_of_sensors, fitted
 from validation.diagnosis.unknown_law.terms import SensorTerm
 from validation.identification.gauss_newton import Fit, mapped, refit
 from validation.identification.noise import GroupNoise, NoiseModel, chi_squared, log_likelihood
-from validation.identification.normal_equations import local_step, reduce, shared_step
+from validation.identification.normal_equations import common_step, nuisance_step, reduce
 from validation.identification.parameters import Parameter
 from validation.identification.plants.law_terms import Term
-from validation.identification.residual_tests import remainders
+from validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = ["FoundLaw", "find_law"]
 
@@ -39,9 +40,9 @@ class FoundLaw:
 
     ``gain`` is twice the log likelihood gained over the fit without any effect, ``heldout`` the log likelihood gained
     by recording while it took no part, ``chi2`` its chi-squared there before and after in the noise of the fit with the
-    law, ``share`` the part of the excess of chi2 that it explains. ``tied`` is that fit. ``reference`` says
+    law, ``share`` the part of the excess of chi2 that it explains. ``fitted`` is that fit. ``reference`` says
     the same law in another way: its value at an ordinary state, which is known better than its coefficients, whose
-    errors hang together with those of the exponents.
+    errors are continuous with those of the exponents.
     """
 
     law: Law
@@ -49,7 +50,7 @@ class FoundLaw:
     heldout: Mapping[int, float]
     share: float
     reference: str
-    tied: Tied
+    fitted: ContinuousFit
     also: tuple[Law, ...] = field(default_factory=tuple)
     chi2: Mapping[int, tuple[float, float]] = field(default_factory=dict)
 
@@ -63,21 +64,23 @@ def _held_out(before: Fit, after: Fit) -> tuple[dict[int, float], dict[int, tupl
     The shared parameters are those of the other recordings, by one step of the fit without it; the recording's own
     unknowns follow. chi-squared is in the levels of noise of the fit after.
     """
-    count = len(before.chains)
+    count = len(before.trajectories)
     if count < 2:
         return {}, {}
     levelled = {group: noise._replace(correlation=0.0) for group, noise in after.noise.items()}
     sides, squares = [], []
     for fit in (before, after):
         linears = fit.linears
-        reduced = mapped(lambda linear, chain, f=fit: reduce(linear, chain, f.noise, f.jumps), linears, fit.chains)
+        reduced = mapped(
+            lambda linear, trajectory, f=fit: reduce(linear, trajectory, f.noise, f.defects), linears, fit.trajectories
+        )
         levels, squared = [], []
         for i in range(count):
             others = np.sum([r.gram for j, r in enumerate(reduced) if j != i], axis=0)
-            step, _, _ = shared_step(others, fit.parameters, fit.at)
+            step, _, _ = common_step(others, fit.parameters, fit.at)
             acting = np.array([q.acts_in(i) for q in fit.parameters], dtype=bool)
             step = np.where(acting, step, 0.0)
-            left = linears[i].after(local_step(reduced[i], step), step)
+            left = linears[i].after(nuisance_step(reduced[i], step), step)
             levels.append(log_likelihood(linears[i], fit.noise, left))
             squared.append(chi_squared(linears[i], levelled, left))
         sides.append(levels)
@@ -89,9 +92,9 @@ def _held_out(before: Fit, after: Fit) -> tuple[dict[int, float], dict[int, tupl
 # ----------------------------------------------------------------------------------------------------- finding
 
 
-def _own_at(loose: Fit, own: Sequence[Parameter]) -> FloatArray:
-    """Return where own parameters start: those that stand for a recording alone, where the loose fit has them."""
-    known = {(q.key, q.recordings): number for q, number in zip(loose.parameters, loose.at, strict=True)}
+def _own_at(relaxed_fit: Fit, own: Sequence[Parameter]) -> FloatArray:
+    """Return where own parameters start: those that stand for a recording alone, where the relaxed fit has them."""
+    known = {(q.key, q.recordings): number for q, number in zip(relaxed_fit.parameters, relaxed_fit.at, strict=True)}
     return np.array([known.get((q.key, q.recordings), q.stated) if q.recordings else q.stated for q in own])
 
 
@@ -99,13 +102,13 @@ def _white(noise: NoiseModel) -> dict[str, GroupNoise]:
     return {group: GroupNoise(item.sd, min(item.correlation, 0.9)) for group, item in noise.items()}
 
 
-def _beside(loose: Fit, own: Sequence[Parameter], own_at: FloatArray, noise: NoiseModel) -> Fit:
+def _beside(relaxed_fit: Fit, own: Sequence[Parameter], own_at: FloatArray, noise: NoiseModel) -> Fit:
     """Return a fit without errors of the sensors whose motion stays beside the data, to ask from.
 
-    In the air its pieces jump as those of the loose fit do, for what hides turns a whole flight too far from a line; a
-    rig's hang together.
+    In the air its segments jump as those of the relaxed fit do, for what hides turns a whole flight too far from a
+    line; a rig's are continuous.
     """
-    fit = refit(Fit(loose.chains, tuple(own), own_at, loose.jumps, _white(noise)), iterations=5)
+    fit = refit(Fit(relaxed_fit.trajectories, tuple(own), own_at, relaxed_fit.defects, _white(noise)), iterations=5)
     levels: dict[str, list[float]] = {}
     for linear in fit.linears:
         for channel in linear.channels:
@@ -116,7 +119,7 @@ def _beside(loose: Fit, own: Sequence[Parameter], own_at: FloatArray, noise: Noi
         for g, item in fit.noise.items()
         if g in quick
     }
-    return replace(fit, noise=sure, jumps=fit.jumps if fit.plant.airborne else fit.plant.sizes.continuous)
+    return replace(fit, noise=sure, defects=fit.defects if fit.plant.airborne else fit.plant.sizes.continuous)
 
 
 def _quick(e: FloatArray) -> float:
@@ -125,22 +128,26 @@ def _quick(e: FloatArray) -> float:
 
 
 def find_law(
-    loose: Fit, best: Tied, own: Sequence[Parameter], noise: NoiseModel, recordings: Sequence[Recording]
+    relaxed_fit: Fit, best: ContinuousFit, own: Sequence[Parameter], noise: NoiseModel, recordings: Sequence[Recording]
 ) -> FoundLaw | None:
     """Return the law that explains what the catalogue does not, or None where none holds on held-out recordings.
 
-    ``loose`` is the relaxed fit, ``best`` the best fit with effects of the catalogue (or without any), ``own`` the
-    parameters that the recordings leave open without any effect, ``noise`` that of the relaxed fit.
+    ``relaxed_fit`` is the relaxed fit, ``best`` the best fit with effects of the catalogue (or without any), ``own``
+    the parameters that the recordings leave open without any effect, ``noise`` that of the relaxed fit.
     """
-    plant = loose.plant
+    plant = relaxed_fit.plant
     if plant.weakly_identified:
         return None  # what a free spin does not model takes up any further moment
     if len(recordings) == 1 and BOARD.isdisjoint(recordings[0].samples):
         return None  # one path takes any law, and no other recording could bear it out
-    base = best if not best.hypothesis.trials else tied_fit(loose, Hypothesis(), own, noise, {}, iterations=6, polish=1)
-    own_at = _own_at(loose, own)
-    start = _beside(loose, own, own_at, noise)
-    states = [state_of(chain, start.values(i)) for i, chain in enumerate(start.chains)]
+    base = (
+        best
+        if not best.hypothesis.candidates
+        else continuous_fit(relaxed_fit, Hypothesis(), own, noise, {}, iterations=6, polish=1)
+    )
+    own_at = _own_at(relaxed_fit, own)
+    start = _beside(relaxed_fit, own, own_at, noise)
+    states = [state_of(trajectory, start.values(i)) for i, trajectory in enumerate(start.trajectories)]
     at = reference_of(states)
     motion = plant.laws.terms
     about = sensor_library(start)
@@ -149,54 +156,59 @@ def find_law(
         ranked += candidate_laws(start, own, motion, at)
     ranked += [(gain, 0.0, term) for gain, term in zip(asked_of_sensors(start, own, about), about, strict=True)]
     ranked.sort(key=lambda item: -item[0])
-    found: tuple[Tied, Term | SensorTerm] | None = None
+    found: tuple[ContinuousFit, Term | SensorTerm] | None = None
     for _, coefficient, term in _spread(ranked):
-        tied: Tied | None
+        fitted: ContinuousFit | None
         if isinstance(term, SensorTerm):
-            tied = fitted_sensor_law(start, own, own_at, term)
+            fitted = fitted_sensor_law(start, own, own_at, term)
         else:
-            tied = fitted_law(start, own, own_at, [term], [coefficient], at)
-        if tied is None:
+            fitted = fitted_law(start, own, own_at, [term], [coefficient], at)
+        if fitted is None:
             continue
-        if found is None or _priced(tied) < _priced(found[0]):
-            found = tied, term
-        if _share(base.fit, tied.fit, start.noise) > UNKNOWN_LAW.all:
+        if found is None or _priced(fitted) < _priced(found[0]):
+            found = fitted, term
+        if _share(base.fit, fitted.fit, start.noise) > UNKNOWN_LAW.all:
             break
     if found is None:
         return None
-    tied, term = found
+    fitted, term = found
     if isinstance(term, SensorTerm):
-        return _believed(tied, term, base, best, at, start.noise)
-    return _believed(*_more_terms(start, own, own_at, tied, term, at), base, best, at, start.noise)
+        return _believed(fitted, term, base, best, at, start.noise)
+    return _believed(*_more_terms(start, own, own_at, fitted, term, at), base, best, at, start.noise)
 
 
 def _more_terms(
-    start: Fit, own: Sequence[Parameter], own_at: FloatArray, tied: Tied, first: Term, at: Mapping[str, float]
-) -> tuple[Tied, tuple[Term, ...]]:
+    start: Fit,
+    own: Sequence[Parameter],
+    own_at: FloatArray,
+    fitted: ContinuousFit,
+    first: Term,
+    at: Mapping[str, float],
+) -> tuple[ContinuousFit, tuple[Term, ...]]:
     """Return the fit of a law with one more term where the first leaves more than noise, and its terms.
 
     The further term is asked for beside the first from where the motion is beside the data, and must gain its price and
     held-out likelihood over the law without it.
     """
     terms: tuple[Term, ...] = (first,)
-    if len(start.chains) < 2 or not remainders(tied.fit.linears, tied.residuals, tied.fit.noise):
-        return tied, terms  # and where no other recording could bear a further term out
-    held = tuple(q for q in tied.fit.parameters if q.group == "law")
-    beside = Fit(start.chains, (*own, *held), tied.fit.at, start.jumps, start.noise, tied.fit.fixed)
+    if len(start.trajectories) < 2 or not unmodelled_residuals(fitted.fit.linears, fitted.residuals, fitted.fit.noise):
+        return fitted, terms  # and where no other recording could bear a further term out
+    held = tuple(q for q in fitted.fit.parameters if q.group == "law")
+    beside = Fit(start.trajectories, (*own, *held), fitted.fit.at, start.defects, start.noise, fitted.fit.fixed)
     beside = refit(beside, iterations=3)
     if not np.isfinite(beside.merit):
-        return tied, terms  # under this law no motion lasts: there is nothing beside it to ask
-    coefficient = float(tied.fit.at[[q.name for q in tied.fit.parameters].index("0.coefficient")])
-    powers = {q.name: float(v) for q, v in zip(tied.fit.parameters, tied.fit.at, strict=True) if q.group == "law"}
+        return fitted, terms  # under this law no motion lasts: there is nothing beside it to ask
+    coefficient = float(fitted.fit.at[[q.name for q in fitted.fit.parameters].index("0.coefficient")])
+    powers = {q.name: float(v) for q, v in zip(fitted.fit.parameters, fitted.fit.at, strict=True) if q.group == "law"}
     settled = replace(first, powers=tuple((s, powers.get(f"0.power_{s}", n)) for s, n in first.powers))
     others = [term for term in start.plant.laws.terms if _key(term) != _key(first)]
-    best, chosen = tied, terms
+    best, chosen = fitted, terms
     for _, further, term in _spread(candidate_laws(beside, (*own, *held), others, at)):
         assert isinstance(term, Term)
         both = fitted_law(start, own, own_at, [settled, term], [coefficient, further], at)
         if _priced(both) + SELECTION.entry > _priced(best):
             continue
-        gains, _ = _held_out(tied.fit, both.fit)
+        gains, _ = _held_out(fitted.fit, both.fit)
         if not _holds(gains):
             continue
         best, chosen = both, (settled, term)
@@ -230,24 +242,29 @@ def _share(base: Fit, fit: Fit, noise: NoiseModel) -> float:
     return (before - after) / max(before - base.count, 1.0)
 
 
-def _priced(tied: Tied) -> float:
+def _priced(fitted: ContinuousFit) -> float:
     """Return a fit's score with what the numbers of its law cost: of laws that do as well the simpler one is taken."""
-    return tied.score + SELECTION.per_parameter * sum(q.group in ("law", "term") for q in tied.fit.parameters)
+    return fitted.score + SELECTION.per_parameter * sum(q.group in ("law", "term") for q in fitted.fit.parameters)
 
 
 def _believed(
-    tied: Tied, terms: tuple[Term, ...] | SensorTerm, base: Tied, best: Tied, at: Mapping[str, float], noise: NoiseModel
+    fitted: ContinuousFit,
+    terms: tuple[Term, ...] | SensorTerm,
+    base: ContinuousFit,
+    best: ContinuousFit,
+    at: Mapping[str, float],
+    noise: NoiseModel,
 ) -> FoundLaw | None:
     """Return the law if it gains what it costs, explains most of the excess, and recordings that took no part."""
-    if _priced(tied) + SELECTION.entry > min(base.score, best.score):
+    if _priced(fitted) + SELECTION.entry > min(base.score, best.score):
         return None
-    share = _share(base.fit, tied.fit, noise)
-    heldout, chi2 = _held_out(base.fit, tied.fit)
+    share = _share(base.fit, fitted.fit, noise)
+    heldout, chi2 = _held_out(base.fit, fitted.fit)
     if not _holds(heldout) or share < UNKNOWN_LAW.share:
         return None
     total = sum(heldout.values()) if heldout else None
     if isinstance(terms, SensorTerm):
-        laws, reference = as_sensor_laws(terms, tied.fit, total)
+        laws, reference = as_sensor_laws(terms, fitted.fit, total)
     else:
-        laws, reference = as_laws(terms, tied.fit, at, total)
-    return FoundLaw(laws[0], base.score - tied.score, heldout, share, reference, tied, laws[1:], chi2)
+        laws, reference = as_laws(terms, fitted.fit, at, total)
+    return FoundLaw(laws[0], base.score - fitted.score, heldout, share, reference, fitted, laws[1:], chi2)

@@ -1,4 +1,4 @@
-"""Laws on the motion: terms of force and moment, asked by algebra and fitted."""
+"""Laws on the motion: terms of force and moment, screened by score tests and fitted by output error."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.law import WRENCH_TARGETS
-from validation.diagnosis.selection.constrained_fit import Tied, noise_of, scored
+from validation.diagnosis.selection.continuous_fit import ContinuousFit, noise_of, scored
 from validation.diagnosis.selection.evidence import BOUNDS
 from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.selection.screening import Answer, Board, column_of
+from validation.diagnosis.selection.screening import NormalEquations, ScoreTest, column_of
 from validation.diagnosis.selection.to_stated import to_baseline
 from validation.identification.gauss_newton import Fit, linearised_columns, mapped, refit
 from validation.identification.linear import Linear
@@ -21,7 +21,7 @@ from validation.identification.parameters import Parameter
 from validation.identification.plants import Plant
 from validation.identification.plants.law_terms import Term
 from validation.identification.propagation import Column
-from validation.identification.segments import Chain, recut
+from validation.identification.segments import Trajectory, resegmented
 
 __all__ = ["candidate_laws", "fitted_law"]
 
@@ -33,11 +33,11 @@ _POWER_STEP = 1e-3
 _POWER_SIGMA = 3.0
 
 
-def state_of(chain: Chain, values: Mapping[tuple[str, str], float]) -> dict[str, FloatArray]:
-    """Return the symbols of a law, each (k,), in the middle of every piece."""
-    middle = 0.5 * (chain.edges[1:] + chain.edges[:-1])
-    there = recut(chain, values, np.append(middle, chain.edges[-1])).states
-    return chain.plant.laws.symbols(chain.recording, middle, there, values)
+def state_of(trajectory: Trajectory, values: Mapping[tuple[str, str], float]) -> dict[str, FloatArray]:
+    """Return the symbols of a law, each (k,), in the middle of every segment."""
+    middle = 0.5 * (trajectory.nodes[1:] + trajectory.nodes[:-1])
+    there = resegmented(trajectory, values, np.append(middle, trajectory.nodes[-1])).states
+    return trajectory.plant.laws.symbols(trajectory.recording, middle, there, values)
 
 
 def reference_of(states: Sequence[Mapping[str, FloatArray]]) -> dict[str, float]:
@@ -63,28 +63,28 @@ def _weighed(linear: Linear, first: int, targets: Sequence[int], weights: FloatA
     """Return a linearisation with terms for its last columns, made of those of constants.
 
     ``first`` is the place of the first constant among the shared columns, ``targets`` (m,) which of them a term
-    weighs, ``weights`` (m, k) its value in each piece.
+    weighs, ``weights`` (m, k) its value in each segment.
     """
-    local, (k, d) = linear.unknowns, linear.moves.shape[:2]
+    local, (k, d) = linear.unknowns, linear.sensitivities.shape[:2]
     places = [d + first + j for j in targets]
-    own = linear.own[:, places] * weights[:, linear.piece].T
-    passes = linear.passes[:, :, places] * weights.T[: k - 1, None, :]
+    own = linear.own[:, places] * weights[:, linear.segment].T
+    passes = linear.transitions[:, :, places] * weights.T[: k - 1, None, :]
     moves = np.zeros((k, d, len(targets)))
     for i in range(k - 1):
-        moves[i + 1] = linear.passes[i, :, :d] @ moves[i] + passes[i]
+        moves[i + 1] = linear.transitions[i, :, :d] @ moves[i] + passes[i]
     return replace(
         linear,
         own=np.hstack([linear.own[:, : d + first], own]),
-        moves=np.concatenate([linear.moves[:, :, : local + first], moves], axis=2),
-        passes=np.concatenate([linear.passes[:, :, : d + first], passes], axis=2),
+        sensitivities=np.concatenate([linear.sensitivities[:, :, : local + first], moves], axis=2),
+        transitions=np.concatenate([linear.transitions[:, :, : d + first], passes], axis=2),
     )
 
 
-def board_of_terms(
+def normal_equations_of_terms(
     fit: Fit, terms: Sequence[Term], states: Sequence[Mapping[str, FloatArray]], at: Mapping[str, float]
-) -> Board:
-    """Return the board of a fit's own parameters and terms, its pieces jumping as they may."""
-    plant, jumps = fit.plant, fit.jumps
+) -> NormalEquations:
+    """Return the board of a fit's own parameters and terms, its segments jumping as they may."""
+    plant, defects = fit.plant, fit.defects
     targets = list(dict.fromkeys(term.target for term in terms))
     place_of = [targets.index(term.target) for term in terms]
     taken = len({int(q.name.partition(".")[0]) for q in fit.parameters if q.group == "law"})
@@ -94,19 +94,23 @@ def board_of_terms(
         _weighed(linear, len(own), place_of, np.array([term.weight(state, at) for term in terms]))
         for linear, state in zip(bare, states, strict=True)
     ]
-    reduced = mapped(lambda linear, chain: reduce(linear, chain, fit.noise, jumps), linears, fit.chains)
+    reduced = mapped(
+        lambda linear, trajectory: reduce(linear, trajectory, fit.noise, defects), linears, fit.trajectories
+    )
     columns = (*own, *(Column("law", f"{j}.candidate", 1.0) for j in range(len(terms))))
     grams = to_baseline(np.stack([r.gram for r in reduced]), fit)
-    return Board(columns, grams, {column: j for j, column in enumerate(columns)}, tuple(linears), tuple(reduced))
+    return NormalEquations(
+        columns, grams, {column: j for j, column in enumerate(columns)}, tuple(linears), tuple(reduced)
+    )
 
 
-def _asked(board: Board, own: Sequence[Parameter], terms: int) -> Iterator[tuple[float, float]]:
+def _asked(equations: NormalEquations, own: Sequence[Parameter], terms: int) -> Iterator[tuple[float, float]]:
     """Yield what each term would gain in chi2, and its coefficient."""
     taken = [(column_of(q), q) for q in own]
-    base = board.ask(taken).chi2
+    base = equations.solve(taken).chi2
     for j in range(terms):
         column = Column("law", f"{j}.candidate", 1.0)
-        answer: Answer = board.ask([*taken, (column, Parameter("law", column.name, 0.0, 1.0))])
+        answer: ScoreTest = equations.solve([*taken, (column, Parameter("law", column.name, 0.0, 1.0))])
         yield base - answer.chi2, float(answer.value[-1])
 
 
@@ -147,12 +151,12 @@ def fitted_law(
     at: Mapping[str, float],
     *,
     iterations: int = 8,
-) -> Tied:
-    """Fit terms and own parameters by output error, pieces hanging together."""
+) -> ContinuousFit:
+    """Fit terms and own parameters by output error, segments hanging together."""
     plant = start.plant
     parameters, first = _parameters(terms, coefficients, plant)
     fit = Fit(
-        start.chains,
+        start.trajectories,
         (*own, *parameters),
         np.concatenate([own_at, first]),
         plant.sizes.continuous,
@@ -172,7 +176,7 @@ def candidate_laws(
     fit: Fit, own: Sequence[Parameter], terms: Sequence[Term], at: Mapping[str, float]
 ) -> list[tuple[float, float, Term]]:
     """Return gain, coefficient and term, best first, the best few of each target."""
-    states = [state_of(chain, fit.values(i)) for i, chain in enumerate(fit.chains)]
-    board = board_of_terms(fit, terms, states, at)
-    found = [(gain, c, term) for (gain, c), term in zip(_asked(board, own, len(terms)), terms, strict=True)]
+    states = [state_of(trajectory, fit.values(i)) for i, trajectory in enumerate(fit.trajectories)]
+    equations = normal_equations_of_terms(fit, terms, states, at)
+    found = [(gain, c, term) for (gain, c), term in zip(_asked(equations, own, len(terms)), terms, strict=True)]
     return sorted(found, key=lambda item: -item[0])

@@ -1,4 +1,4 @@
-"""Laws on a sensor: warming, drift, rate, reading and turning terms, asked by algebra and fitted."""
+"""Laws on a sensor: warming, drift, rate, reading and turning terms, screened by score tests and fitted."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from discsim.arrays import FloatArray, IntArray
-from validation.diagnosis.selection.constrained_fit import Tied, noise_of, scored
+from validation.diagnosis.selection.continuous_fit import ContinuousFit, noise_of, scored
 from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.selection.screening import Board, column_of
+from validation.diagnosis.selection.screening import NormalEquations, column_of
 from validation.diagnosis.selection.to_stated import to_baseline
 from validation.diagnosis.unknown_law.terms import SENSORS, SHAPES, SensorTerm
 from validation.identification.gauss_newton import Fit, linearised, mapped, whole_step
 from validation.identification.linear import Linear
 from validation.identification.noise import chi_squared
-from validation.identification.normal_equations import reduce, shared_step
+from validation.identification.normal_equations import common_step, reduce
 from validation.identification.parameters import Parameter
 from validation.identification.propagation import Column
-from validation.identification.segments import Chain
+from validation.identification.segments import Trajectory
 
 __all__ = ["asked_of_sensors", "fitted_sensor_law"]
 
@@ -41,54 +41,60 @@ class Turned:
     angle: CubicSpline | CubicHermiteSpline
 
 
-def turned(chain: Chain) -> Turned:
-    """Return how a chain turns, from the states at the starts of its pieces."""
-    t, spin, command = chain.edges[:-1], chain.plant.layout.spin, chain.recording.command
+def turned(trajectory: Trajectory) -> Turned:
+    """Return how a trajectory turns, from the states at the starts of its segments."""
+    t, spin, command = trajectory.nodes[:-1], trajectory.plant.layout.spin, trajectory.recording.command
     if command is not None:
         # piecewise linear, so its integral is exact on its knots and parabolas between
-        grid = np.union1d(np.linspace(0.0, chain.edges[-1], 20 * t.size), np.clip(command.t, 0.0, chain.edges[-1]))
+        grid = np.union1d(
+            np.linspace(0.0, trajectory.nodes[-1], 20 * t.size), np.clip(command.t, 0.0, trajectory.nodes[-1])
+        )
         r = np.interp(grid, command.t, command.value)
         psi = cumulative_trapezoid(r, grid, initial=0)
         rate = CubicHermiteSpline(grid, r, np.gradient(r, grid))
         return Turned(rate, CubicHermiteSpline(grid, psi, r))
-    r = np.zeros(t.size) if spin is None else chain.states[:, spin]
+    r = np.zeros(t.size) if spin is None else trajectory.states[:, spin]
     if t.size < 3:
-        t, r = np.append(t, chain.edges[-1]), np.append(r, r[-1])
+        t, r = np.append(t, trajectory.nodes[-1]), np.append(r, r[-1])
     rate = CubicSpline(t, r)
     return Turned(rate, rate.antiderivative())
 
 
-def _seen(linear: Linear, chain: Chain, term: SensorTerm, shape: float) -> list[tuple[slice, int, FloatArray]]:
+def _seen(
+    linear: Linear, trajectory: Trajectory, term: SensorTerm, shape: float
+) -> list[tuple[slice, int, FloatArray]]:
     """Return rows, axis and basis (n, size) of a term on each of its sensor's axes."""
-    spin = turned(chain)
+    spin = turned(trajectory)
     found = []
-    axes = next((readings.axes for readings in chain.readings if readings.sensor == term.sensor), ())
+    axes = next((readings.axes for readings in trajectory.readings if readings.sensor == term.sensor), ())
     for channel in linear.channels:
         if channel.sensor == term.sensor:
             t = linear.t[channel.rows]
-            x = _reading(linear, chain, channel.rows, channel.index, term.sensor, axes.index(channel.axis))
+            x = _reading(linear, trajectory, channel.rows, channel.index, term.sensor, axes.index(channel.axis))
             basis = term.basis(t, spin.rate(t), spin.angle(t), x, shape)
             found.append((channel.rows, axes.index(channel.axis), basis))
     return found
 
 
-def _reading(linear: Linear, chain: Chain, rows: slice, index: IntArray, sensor: str, axis: int) -> FloatArray:
+def _reading(
+    linear: Linear, trajectory: Trajectory, rows: slice, index: IntArray, sensor: str, axis: int
+) -> FloatArray:
     """Return what the model expects an axis to read, (n,), the closing of gaps included."""
-    readings = next(r for r in chain.readings if r.sensor == sensor)
+    readings = next(r for r in trajectory.readings if r.sensor == sensor)
     return np.asarray(readings.value[index, axis] - linear.residual[rows])
 
 
-def _columns_of(linear: Linear, chain: Chain, term: SensorTerm, shape: float) -> FloatArray:
+def _columns_of(linear: Linear, trajectory: Trajectory, term: SensorTerm, shape: float) -> FloatArray:
     """Return the columns (n, axes size) of a sensor term's coefficients."""
-    axes = len(_axes(chain, term.sensor))
+    axes = len(_axes(trajectory, term.sensor))
     columns = np.zeros((linear.raw.size, axes * term.size))
-    for rows, axis, basis in _seen(linear, chain, term, shape):
+    for rows, axis, basis in _seen(linear, trajectory, term, shape):
         columns[rows, axis * term.size : (axis + 1) * term.size] = basis
     return columns
 
 
-def _axes(chain: Chain, sensor: str) -> tuple[str, ...]:
-    return next((readings.axes for readings in chain.readings if readings.sensor == sensor), ())
+def _axes(trajectory: Trajectory, sensor: str) -> tuple[str, ...]:
+    return next((readings.axes for readings in trajectory.readings if readings.sensor == sensor), ())
 
 
 def _widened(linear: Linear, columns: FloatArray) -> Linear:
@@ -97,17 +103,17 @@ def _widened(linear: Linear, columns: FloatArray) -> Linear:
     return replace(
         linear,
         own=np.hstack([linear.own, columns]),
-        moves=np.concatenate([linear.moves, np.zeros((*linear.moves.shape[:2], more))], axis=2),
-        passes=np.concatenate([linear.passes, np.zeros((*linear.passes.shape[:2], more))], axis=2),
+        sensitivities=np.concatenate([linear.sensitivities, np.zeros((*linear.sensitivities.shape[:2], more))], axis=2),
+        transitions=np.concatenate([linear.transitions, np.zeros((*linear.transitions.shape[:2], more))], axis=2),
     )
 
 
 def orders(fit: Fit, sensor: str) -> list[float]:
-    """Return the orders of the spin at which a sensor's residuals of a loose fit have their highest lines."""
+    """Return the orders of the spin at which a sensor's residuals of a relaxed fit have their highest lines."""
     length = 0.0
     parts = []
-    for linear, chain in zip(fit.linears, fit.chains, strict=True):
-        spin = turned(chain)
+    for linear, trajectory in zip(fit.linears, fit.trajectories, strict=True):
+        spin = turned(trajectory)
         for channel in linear.channels:
             if channel.sensor == sensor:
                 psi = spin.angle(linear.t[channel.rows])
@@ -136,41 +142,41 @@ def orders(fit: Fit, sensor: str) -> list[float]:
 def sensor_library(fit: Fit) -> list[SensorTerm]:
     """Return the terms about sensors that are asked for first."""
     terms = []
-    length = 0.5 * max(float(chain.edges[-1]) for chain in fit.chains)
-    spin = max(float(np.max(np.abs(turned(chain).rate(chain.edges[:-1])))) for chain in fit.chains)
+    length = 0.5 * max(float(trajectory.nodes[-1]) for trajectory in fit.trajectories)
+    spin = max(float(np.max(np.abs(turned(trajectory).rate(trajectory.nodes[:-1])))) for trajectory in fit.trajectories)
     for sensor in SENSORS:
-        values = [r.value[r.good] for chain in fit.chains for r in chain.readings if r.sensor == sensor]
+        values = [r.value[r.good] for trajectory in fit.trajectories for r in trajectory.readings if r.sensor == sensor]
         if not values or not any(v.size for v in values):
             continue
         units = {"drift": length, "rate": spin, "reading": float(np.std(np.concatenate(values)))}
         for kind in SENSORS[sensor]:
-            shapes = orders(fit, sensor) if kind == "turning" else SHAPES[kind]
+            shape_grid = orders(fit, sensor) if kind == "turning" else SHAPES[kind]
             unit = float(f"{max(units.get(kind, 1.0), 1e-6):.1g}")
-            terms += [SensorTerm(sensor, kind, shape, unit) for shape in shapes]
+            terms += [SensorTerm(sensor, kind, shape, unit) for shape in shape_grid]
     return terms
 
 
 def asked_of_sensors(fit: Fit, own: Sequence[Parameter], terms: Sequence[SensorTerm]) -> list[float]:
-    """Return what each sensor term would gain in chi2, pieces jumping as they may."""
+    """Return what each sensor term would gain in chi2, segments jumping as they may."""
     if not terms:
         return []
-    bare, jumps = linearised(fit), fit.jumps
+    bare, defects = linearised(fit), fit.defects
     wide, places, at = [], [], len(fit.parameters)
     for term in terms:
-        width = max(len(_axes(chain, term.sensor)) for chain in fit.chains) * term.size
+        width = max(len(_axes(trajectory, term.sensor)) for trajectory in fit.trajectories) * term.size
         places.append(range(at, at + width))
         at += width
-    for linear, chain in zip(bare, fit.chains, strict=True):
+    for linear, trajectory in zip(bare, fit.trajectories, strict=True):
         parts = [
-            _columns_of(linear, chain, term, term.shape)
-            if _axes(chain, term.sensor)
+            _columns_of(linear, trajectory, term, term.shape)
+            if _axes(trajectory, term.sensor)
             else np.zeros((linear.raw.size, len(place)))
             for term, place in zip(terms, places, strict=True)
         ]
         wide.append(_widened(linear, np.hstack(parts)))
-    reduced = mapped(lambda linear, chain: reduce(linear, chain, fit.noise, jumps), wide, fit.chains)
+    reduced = mapped(lambda linear, trajectory: reduce(linear, trajectory, fit.noise, defects), wide, fit.trajectories)
     columns = (*map(column_of, fit.parameters), *(Column("term", str(j), 1.0) for j in range(at - len(fit.parameters))))
-    board = Board(
+    equations = NormalEquations(
         columns,
         to_baseline(np.stack([r.gram for r in reduced]), fit),
         {column: j for j, column in enumerate(columns)},
@@ -178,22 +184,24 @@ def asked_of_sensors(fit: Fit, own: Sequence[Parameter], terms: Sequence[SensorT
         tuple(reduced),
     )
     taken = [(column_of(q), q) for q in own]
-    base = board.ask(taken).chi2
+    base = equations.solve(taken).chi2
     gains = []
     for place in places:
         chosen = [(columns[j], Parameter("term", columns[j].name, 0.0, 1.0)) for j in place]
-        gains.append(base - board.ask([*taken, *chosen]).chi2)
+        gains.append(base - equations.solve([*taken, *chosen]).chi2)
     return gains
 
 
-def fitted_sensor_law(start: Fit, own: Sequence[Parameter], own_at: FloatArray, term: SensorTerm) -> Tied | None:
-    """Fit a sensor term and own parameters by output error, pieces hanging together.
+def fitted_sensor_law(
+    start: Fit, own: Sequence[Parameter], own_at: FloatArray, term: SensorTerm
+) -> ContinuousFit | None:
+    """Fit a sensor term and own parameters by output error, segments hanging together.
 
-    The chains keep their readings; what the term takes off them is part of the residual.
+    The trajectories keep their readings; what the term takes off them is part of the residual.
     """
-    axes = max((_axes(chain, term.sensor) for chain in start.chains), key=len)
+    axes = max((_axes(trajectory, term.sensor) for trajectory in start.trajectories), key=len)
     names = [(axis, j) for axis in axes for j in range(term.size)]
-    noise, chains, shape = start.noise, start.chains, term.shape
+    noise, trajectories, shape = start.noise, start.trajectories, term.shape
     at = np.concatenate([own_at, np.zeros(len(names)), [shape]])
     parameters = (
         *own,
@@ -201,27 +209,31 @@ def fitted_sensor_law(start: Fit, own: Sequence[Parameter], own_at: FloatArray, 
         Parameter("term", "shape", shape, _SHAPE_STEP * shape, 0.3 * shape if term.kind != "turning" else 0.01),
     )
     p = len(own)
-    fit = Fit(chains, parameters, at, start.plant.sizes.continuous, noise)
+    fit = Fit(trajectories, parameters, at, start.plant.sizes.continuous, noise)
     for round in range(12):
         bare = linearised(replace(fit, parameters=tuple(own), at=fit.at[:p]))
         linears = []
         shape, c = float(fit.at[-1]), fit.at[p:-1]
-        for linear, chain in zip(bare, fit.chains, strict=True):
-            if not _axes(chain, term.sensor):
+        for linear, trajectory in zip(bare, fit.trajectories, strict=True):
+            if not _axes(trajectory, term.sensor):
                 linears.append(_widened(linear, np.zeros((linear.raw.size, len(names) + 1))))
                 continue
-            here = _columns_of(linear, chain, term, shape)
+            here = _columns_of(linear, trajectory, term, shape)
             h = _SHAPE_STEP * shape
-            slope = (_columns_of(linear, chain, term, shape + h) - _columns_of(linear, chain, term, shape - h)) @ c
+            slope = (
+                _columns_of(linear, trajectory, term, shape + h) - _columns_of(linear, trajectory, term, shape - h)
+            ) @ c
             less = replace(linear, raw=linear.raw - here @ c)
             linears.append(_widened(less, np.hstack([here, slope[:, None] / (2.0 * h)])))
         fit = replace(fit, linears=tuple(linears))
         merit = sum(chi_squared(linear, fit.noise, linear.residual) for linear in linears)
-        reduced = mapped(lambda linear, chain, f=fit: reduce(linear, chain, f.noise, f.jumps), linears, fit.chains)
+        reduced = mapped(
+            lambda linear, trajectory, f=fit: reduce(linear, trajectory, f.noise, f.defects), linears, fit.trajectories
+        )
         gram = np.sum([r.gram for r in reduced], axis=0)
         free = [*range(p + len(names))] if not np.any(c) else [*range(len(parameters))]
         some = [*free, len(parameters)]
-        step, covariance, expected = shared_step(gram[np.ix_(some, some)], [parameters[j] for j in free], fit.at[free])
+        step, covariance, expected = common_step(gram[np.ix_(some, some)], [parameters[j] for j in free], fit.at[free])
         full = np.zeros(len(parameters))
         full[free] = step
         if len(free) == len(parameters):

@@ -1,4 +1,8 @@
-"""Attitude from field, specific force and transverse rates in a frame that does not spin (Wahba's problem)."""
+"""Attitude from field, specific force and transverse rates in a frame that does not spin.
+
+Takes a recording and the phase of its spin; gives the attitude on a grid. Two directions seen in two frames are matched
+locally in time by the eigenvector of a 4 x 4 matrix: Wahba's problem (SIAM Review 7, 1965) by Davenport's q-method.
+"""
 
 from __future__ import annotations
 
@@ -233,7 +237,7 @@ def turned_to_ned(
     ``normals`` (n, 3) what the path says of the spin axis, which stands in for a sensor that is missing.
     """
     field = recording.environment.magnetic_field
-    force, felt = (None, None) if pair is None else pair
+    force, force_felt = (None, None) if pair is None else pair
     # a turn or so, except that at a slow spin nothing needs to average out
     fast = median_of(frame.r)
     sigma = float(np.clip(3.0 / max(fast, 0.1), VECTOR_SIGMA, 0.4)) if fast > SLOW else VECTOR_SIGMA
@@ -241,12 +245,12 @@ def turned_to_ned(
     magnetic = None if frame.field is None else field_in_start(frame.field, frame, grid, sigma)
     if magnetic is not None:
         wandering = frame.transverse is None
-        magnetic = _without_axial_iron(magnetic, axis, field, felt, force, wandering=wandering)
+        magnetic = _without_axial_iron(magnetic, axis, field, force_felt, force, wandering=wandering)
     sigma = ATTITUDE_SIGMA if frame.transverse is not None else GRID
-    if felt is not None and force is not None:
+    if force_felt is not None and force is not None:
         if magnetic is None and normals is not None:
-            return _fitted_turns(axis, felt, normals, force, sigma), False
-        return _fitted_turns(magnetic, felt, field, force, sigma), magnetic is not None
+            return _fitted_turns(axis, force_felt, normals, force, sigma), False
+        return _fitted_turns(magnetic, force_felt, field, force, sigma), magnetic is not None
     if normals is not None:
         # the lift's size on both sides weighs its direction
         lift = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -293,7 +297,7 @@ def _without_axial_iron(
     m: FloatArray,
     axis: FloatArray,
     field: FloatArray,
-    felt: FloatArray | None,
+    force_felt: FloatArray | None,
     force: FloatArray | None,
     *,
     wandering: bool,
@@ -306,8 +310,8 @@ def _without_axial_iron(
     strength = float(np.linalg.norm(field))
     x = np.array([0.0, 1.0])
     known = None
-    if felt is not None and force is not None:
-        f = felt / np.maximum(np.linalg.norm(felt, axis=1, keepdims=True), 1e-6)
+    if force_felt is not None and force is not None:
+        f = force_felt / np.maximum(np.linalg.norm(force_felt, axis=1, keepdims=True), 1e-6)
         g = force / np.maximum(np.linalg.norm(force, axis=1, keepdims=True), 1e-6)
         # a small force has no direction worth the name
         known = f, g @ field, np.minimum(np.linalg.norm(force, axis=1) / 5.0, 1.0)

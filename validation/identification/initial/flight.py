@@ -1,4 +1,4 @@
-"""Where a fit of short pieces starts: path, attitude and body rates at given instants, from the data alone.
+"""Where a fit of short segments starts: path, attitude and body rates at given instants, from the data alone.
 
 Three steps, each with a fall-back where a sensor is missing. The angle turned about the spin axis, psi, comes from the
 field in the disc's plane (`phase_spin`): hard iron and the ellipse of soft iron are taken out by a conic through the
@@ -31,18 +31,18 @@ from validation.identification.initial.attitude import (
     windowed,
 )
 from validation.identification.initial.path import (
-    Felt,
+    SpecificForce,
     compared,
     dead_reckoning,
-    felt_by,
     in_ned,
     integrated,
     path_fixes,
     path_states,
+    specific_force_by,
 )
 from validation.identification.initial.smoothing import GRID
 
-__all__ = ["Starts", "flight_starts", "spin_starts"]
+__all__ = ["InitialStates", "flight_initial_states", "spin_initial_states"]
 
 
 #: sensors that fly with the disc
@@ -51,7 +51,7 @@ ON_BOARD = ("magnetometer", "gyroscope", "accelerometer")
 HIGH = 1e4
 
 
-class Starts(NamedTuple):
+class InitialStates(NamedTuple):
     """States at instants, for a fit to start from.
 
     ``t`` (k,) s in written time; ``position`` (k, 3) m and ``velocity`` (k, 3) m/s in N; ``attitude`` (k, 4)
@@ -69,7 +69,7 @@ class Starts(NamedTuple):
 # ---------------------------------------------------------------------------------------------- the three plants
 
 
-def flight_starts(recording: Recording, t: FloatArray) -> Starts:
+def flight_initial_states(recording: Recording, t: FloatArray) -> InitialStates:
     """Return states at instants t (k,) s of a flight; always finite.
 
     Without GPS and track the path is dead reckoning from the stated release, or from a guess. Without path or
@@ -85,28 +85,28 @@ def flight_starts(recording: Recording, t: FloatArray) -> Starts:
     frame = frame_of(recording)
     grid = _even(t, recording)
     fixes = path_fixes(recording)
-    felt = felt_by(recording, frame)
-    pair = None if fixes is None else compared(fixes, felt, grid, recording.environment.gravity)
+    force_felt = specific_force_by(recording, frame)
+    pair = None if fixes is None else compared(fixes, force_felt, grid, recording.environment.gravity)
     normals = None if fixes is None or pair is None else _normals(recording, path_states(fixes, None, grid)[1], pair[0])
-    if fixes is not None and felt is not None and pair is not None and normals is not None:
-        slip = _slip(frame, recording.environment.magnetic_field, grid, pair, normals)
-        if slip is not None:
-            felt = _turned_about_axis(felt, frame, -np.interp(felt.grid, grid, slip))
-            pair = compared(fixes, felt, grid, recording.environment.gravity)
+    if fixes is not None and force_felt is not None and pair is not None and normals is not None:
+        phase_drift = _phase_drift(frame, recording.environment.magnetic_field, grid, pair, normals)
+        if phase_drift is not None:
+            force_felt = _turned_about_axis(force_felt, frame, -np.interp(force_felt.grid, grid, phase_drift))
+            pair = compared(fixes, force_felt, grid, recording.environment.gravity)
     G, certain = turned_to_ned(recording, frame, grid, pair, normals)
     attitude, rate = states_from(recording, frame, grid, G, t)
-    if felt is not None:
-        felt = in_ned(felt, grid, G, recording.environment.gravity)
+    if force_felt is not None:
+        force_felt = in_ned(force_felt, grid, G, recording.environment.gravity)
     if fixes is not None:
-        position, velocity = path_states(fixes, felt, t)
+        position, velocity = path_states(fixes, force_felt, t)
     else:
-        position, velocity = dead_reckoning(recording, felt, t)
+        position, velocity = dead_reckoning(recording, force_felt, t)
     return _finite(
-        Starts(t, position, velocity, attitude, rate, () if certain else other_attitudes(recording, attitude[0]))
+        InitialStates(t, position, velocity, attitude, rate, () if certain else other_attitudes(recording, attitude[0]))
     )
 
 
-def _predicted(recording: Recording, t: FloatArray) -> Starts | None:
+def _predicted(recording: Recording, t: FloatArray) -> InitialStates | None:
     """Return the states (k,) of the flight from a stated release, or None where that does not say enough to fly."""
     release, disc = recording.release, recording.disc
     if release is None or release.position is None or disc is None:
@@ -119,10 +119,10 @@ def _predicted(recording: Recording, t: FloatArray) -> Starts | None:
     except InputError:
         return None
     at = flight.at(np.maximum(t, 0.0))
-    return Starts(t, at.position - high, at.velocity, at.attitude, at.rate, ())
+    return InitialStates(t, at.position - high, at.velocity, at.attitude, at.rate, ())
 
 
-def spin_starts(recording: Recording, t: FloatArray) -> Starts:
+def spin_initial_states(recording: Recording, t: FloatArray) -> InitialStates:
     """Return attitudes and rates at instants t (k,) s of a free spin; position and velocity are zero.
 
     The field alone cannot tell a turn about itself: the attitude given is the one that starts most level.
@@ -133,7 +133,7 @@ def spin_starts(recording: Recording, t: FloatArray) -> Starts:
     G, _ = turned_to_ned(recording, frame, grid, None, None)
     attitude, rate = states_from(recording, frame, grid, G, t)
     nothing = np.zeros((t.size, 3))
-    return _finite(Starts(t, nothing, nothing.copy(), attitude, rate, other_attitudes(recording, attitude[0])))
+    return _finite(InitialStates(t, nothing, nothing.copy(), attitude, rate, other_attitudes(recording, attitude[0])))
 
 
 # ---------------------------------------------------------------------------------------------- readings
@@ -148,7 +148,7 @@ def _even(t: FloatArray, recording: Recording) -> FloatArray:
 # ---------------------------------------------------------------------------------------------- attitude
 
 
-def _slip(
+def _phase_drift(
     frame: Attitude,
     field: FloatArray,
     grid: FloatArray,
@@ -161,12 +161,12 @@ def _slip(
     disc's plane, which path and lift foretell, shows it; what changes by less than half a radian is left alone, for
     wind and iron make as much.
     """
-    force, felt = pair
-    if frame.field is None or felt is None or grid.size < 5:
+    force, force_felt = pair
+    if frame.field is None or force_felt is None or grid.size < 5:
         return None
     m = field_in_start(frame.field, frame, grid, VECTOR_SIGMA)
     axis = body_to_ned(frame.D_at(grid))[:, :, 2]
-    a, b = _from_to(m, felt, axis), _from_to(np.broadcast_to(field, m.shape), force, normals)
+    a, b = _from_to(m, force_felt, axis), _from_to(np.broadcast_to(field, m.shape), force, normals)
     product, level = a * np.conj(b), np.abs(a * b)
     # a steady slip first: 7 rad/s are 2 % of the fastest spin, or 10 % of readings lost at an ordinary one
     trial = np.linspace(-7.0, 7.0, 281)
@@ -181,10 +181,12 @@ def _slip(
     return angle if float(np.ptp(angle)) > 0.5 else None
 
 
-def _turned_about_axis(felt: Felt, frame: Attitude, angle: FloatArray) -> Felt:
+def _turned_about_axis(force_felt: SpecificForce, frame: Attitude, angle: FloatArray) -> SpecificForce:
     """Return a force felt turned about the spin axis by an angle (n,) rad on its grid."""
-    axis = body_to_ned(frame.D_at(felt.grid))[:, :, 2]
-    return integrated(felt.grid, np.einsum("nij,nj->ni", body_to_ned(turn(angle[:, None] * axis)), felt.force))
+    axis = body_to_ned(frame.D_at(force_felt.grid))[:, :, 2]
+    return integrated(
+        force_felt.grid, np.einsum("nij,nj->ni", body_to_ned(turn(angle[:, None] * axis)), force_felt.force)
+    )
 
 
 def _from_to(m: FloatArray, f: FloatArray, axis: FloatArray) -> ComplexArray:
@@ -222,7 +224,7 @@ def _normals(recording: Recording, velocity: FloatArray, force: FloatArray) -> F
 # ---------------------------------------------------------------------------------------------- path
 
 
-def _finite(starts: Starts) -> Starts:
+def _finite(starts: InitialStates) -> InitialStates:
     """Return the starts with anything that is not finite replaced by what a level, resting disc has."""
     level = np.array([1.0, 0.0, 0.0, 0.0])
     lost = np.asarray(~np.all(np.isfinite(starts.attitude), axis=1))

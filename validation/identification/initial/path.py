@@ -1,4 +1,9 @@
-"""The path and what an accelerometer felt along it: local cubics through fixes, dead reckoning."""
+"""The path, and the specific force along it: what position fixes and an accelerometer say of a throw's first states.
+
+Takes fixes and specific force on a grid; gives position and velocity at given instants. Cubics are fitted to fixes
+within a window about each instant (local polynomial regression, Cleveland 1979); where fixes end, specific force is
+integrated (dead reckoning).
+"""
 
 from __future__ import annotations
 
@@ -15,16 +20,16 @@ from validation.identification.initial.attitude import VECTOR_SIGMA, Attitude
 from validation.identification.initial.smoothing import FEWEST, median_of, readings_for
 
 __all__ = [
-    "Felt",
     "Fixes",
+    "SpecificForce",
     "compared",
     "dead_reckoning",
-    "felt_by",
     "in_ned",
     "integrated",
     "local_cubics",
     "path_fixes",
     "path_states",
+    "specific_force_by",
 ]
 
 #: half a window of the path's fit, s: 9 fixes at 10 Hz
@@ -45,7 +50,7 @@ class Fixes(NamedTuple):
     velocity_sd: float
 
 
-class Felt(NamedTuple):
+class SpecificForce(NamedTuple):
     """Specific force in S at the start, (n, 3) on ``grid`` (n,), and its first and second integral from the start."""
 
     grid: FloatArray
@@ -105,10 +110,10 @@ def _force_in_start(recording: Recording, frame: Attitude, grid: FloatArray, sig
     return np.asarray(np.einsum("nij,nj->ni", body_to_ned(frame.D_at(grid)), vector))
 
 
-def felt_by(recording: Recording, frame: Attitude) -> Felt | None:
+def specific_force_by(recording: Recording, frame: Attitude) -> SpecificForce | None:
     """Return the specific force in S at the start and its integrals over the recording."""
     if frame.tumbling:
-        return _felt_tumbling(recording, frame)
+        return _specific_force_tumbling(recording, frame)
     # as local as a turn allows: the integrals average it anyway
     sigma = float(np.clip(3.0 / max(median_of(frame.r), 0.1), 0.03, VECTOR_SIGMA))
     grid = np.arange(0.0, recording.end + sigma, sigma)
@@ -116,7 +121,7 @@ def felt_by(recording: Recording, frame: Attitude) -> Felt | None:
     return None if force is None else integrated(grid, force)
 
 
-def _felt_tumbling(recording: Recording, frame: Attitude) -> Felt | None:
+def _specific_force_tumbling(recording: Recording, frame: Attitude) -> SpecificForce | None:
     """Return the force of a disc whose three rates are known: each reading less what the sensor's place makes."""
     readings = readings_for(recording, "accelerometer")
     if readings is None or frame.transverse is None:
@@ -132,22 +137,22 @@ def _felt_tumbling(recording: Recording, frame: Attitude) -> Felt | None:
     return integrated(readings.t, np.einsum("nij,nj->ni", C, force))
 
 
-def integrated(grid: FloatArray, force: FloatArray) -> Felt:
+def integrated(grid: FloatArray, force: FloatArray) -> SpecificForce:
     """Return a force (n, 3) on a grid (n,) with its first and second integrals."""
     step = np.diff(grid)[:, None]
     gained = cumulative_trapezoid(force, grid, axis=0, initial=0)
     # trapezoids of the first integral, with the parabola that a straight force makes
     steps = gained[:-1] * step + (2 * force[:-1] + force[1:]) * step**2 / 6
-    return Felt(grid, force, gained, np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]))
+    return SpecificForce(grid, force, gained, np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]))
 
 
-def in_ned(felt: Felt, grid: FloatArray, G: FloatArray, gravity: float) -> Felt:
+def in_ned(force_felt: SpecificForce, grid: FloatArray, G: FloatArray, gravity: float) -> SpecificForce:
     """Return the acceleration in N, and its integrals, that attitudes G (n, 3, 3) on ``grid`` make of a force felt."""
-    nearest = np.clip(np.rint((felt.grid - grid[0]) / (grid[1] - grid[0])).astype(int), 0, grid.size - 1)
+    nearest = np.clip(np.rint((force_felt.grid - grid[0]) / (grid[1] - grid[0])).astype(int), 0, grid.size - 1)
     # a wrong reading must not carry the disc away: the specific force of a throw is below 4 g
-    size = np.linalg.norm(felt.force, axis=1, keepdims=True)
-    force = felt.force * np.minimum(1.0, 40.0 / np.maximum(size, 1e-9))
-    return integrated(felt.grid, np.einsum("nij,nj->ni", G[nearest], force) + np.array([0.0, 0.0, gravity]))
+    size = np.linalg.norm(force_felt.force, axis=1, keepdims=True)
+    force = force_felt.force * np.minimum(1.0, 40.0 / np.maximum(size, 1e-9))
+    return integrated(force_felt.grid, np.einsum("nij,nj->ni", G[nearest], force) + np.array([0.0, 0.0, gravity]))
 
 
 def _stuck(value: FloatArray, resolution: float) -> BoolArray:
@@ -230,7 +235,9 @@ def _local_cubics(fixes: Fixes, t: FloatArray, moved: FloatArray, gained: FloatA
     return out
 
 
-def compared(fixes: Fixes, felt: Felt | None, grid: FloatArray, gravity: float) -> tuple[FloatArray, FloatArray | None]:
+def compared(
+    fixes: Fixes, force_felt: SpecificForce | None, grid: FloatArray, gravity: float
+) -> tuple[FloatArray, FloatArray | None]:
     """Return the specific force (n, 3) in N from the path, and that felt in S at the start, over the same windows.
 
     Both go through the same cubics: as path and velocity that the force felt would make. So a force that changes
@@ -239,11 +246,13 @@ def compared(fixes: Fixes, felt: Felt | None, grid: FloatArray, gravity: float) 
     """
     inside = np.clip(grid, fixes.t[0], fixes.t[-1])
     down = np.array([0.0, 0.0, gravity])
-    if felt is None:
+    if force_felt is None:
         return local_cubics(fixes, inside)[:, 2, :] - down, None
     found = []
     for delay in (0.0, 0.1, 0.2, 0.3):
-        both = _local_cubics(fixes, inside[::3] if delay else inside, *felt.integrals_at(fixes.t - delay))[:, 2, :]
+        both = _local_cubics(fixes, inside[::3] if delay else inside, *force_felt.integrals_at(fixes.t - delay))[
+            :, 2, :
+        ]
         force, other = both[:, :3] - down, both[:, 3:]
         apart = np.linalg.norm(force, axis=1) - np.linalg.norm(other, axis=1)
         # whatever both differ in all the time is a bias
@@ -254,27 +263,29 @@ def compared(fixes: Fixes, felt: Felt | None, grid: FloatArray, gravity: float) 
     best = min(found, key=lambda entry: entry[0])
     if best[1] == 0.0 or best[0] > 0.5 * found[0][0]:
         return found[0][2], found[0][3]
-    both = _local_cubics(fixes, inside, *felt.integrals_at(fixes.t - best[1]))[:, 2, :]
+    both = _local_cubics(fixes, inside, *force_felt.integrals_at(fixes.t - best[1]))[:, 2, :]
     return both[:, :3] - down, both[:, 3:]
 
 
-def path_states(fixes: Fixes, felt: Felt | None, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+def path_states(fixes: Fixes, force_felt: SpecificForce | None, t: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return position and velocity (k, 3) at t: what the acceleration in N makes, and local cubics for the rest."""
     nothing = np.zeros((fixes.t.size, 0))
     inside = np.clip(t, fixes.t[0], fixes.t[-1])
     outside = (t - inside)[:, None]
-    if felt is None:
+    if force_felt is None:
         cubic = local_cubics(fixes, inside)
         x, v, a = cubic[:, 0], cubic[:, 1], cubic[:, 2]
         return x + v * outside + 0.5 * a * outside**2, v + a * outside
-    moved, gained = felt.integrals_at(fixes.t)
+    moved, gained = force_felt.integrals_at(fixes.t)
     rest = fixes._replace(position=fixes.position - moved, velocity=fixes.velocity - gained)
     cubic = _local_cubics(rest, inside, nothing, nothing)
-    moved, gained = felt.integrals_at(t)
+    moved, gained = force_felt.integrals_at(t)
     return cubic[:, 0] + cubic[:, 1] * outside + moved, cubic[:, 1] + gained
 
 
-def dead_reckoning(recording: Recording, felt: Felt | None, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+def dead_reckoning(
+    recording: Recording, force_felt: SpecificForce | None, t: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Return position and velocity (k, 3) at t from the stated release, or a guess, and the acceleration in N."""
     release = recording.release
     position = np.array([0.0, 0.0, -GUESSED_HEIGHT])
@@ -283,7 +294,7 @@ def dead_reckoning(recording: Recording, felt: Felt | None, t: FloatArray) -> tu
         position = np.array(release.position)
     if release is not None and release.velocity is not None:
         velocity = np.array(release.velocity)
-    if felt is None:
+    if force_felt is None:
         return position + velocity * t[:, None], np.tile(velocity, (t.size, 1))
-    moved, gained = felt.integrals_at(t)
+    moved, gained = force_felt.integrals_at(t)
     return position + velocity * t[:, None] + moved, velocity + gained

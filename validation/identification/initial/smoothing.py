@@ -1,4 +1,7 @@
-"""Smoothing shared by the initial states: readings on a grid, kernel averages, medians."""
+"""Smoothing shared by the initial states: readings on a grid, Gaussian kernel averages, medians.
+
+Takes readings at uneven instants; gives averages at others (kernel regression, Nadaraya 1964, Watson 1964).
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""The phase of the spin from the field in the disc's plane: conic fit, phase smoothing."""
+"""The phase of the spin from the field in the disc's plane.
+
+Takes a recording; gives phase (rad), rate (rad/s) and amplitude on a grid. Hard and soft iron are taken out by a conic
+through the readings; the phase that is left is unwrapped about the expected rate and smoothed.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +28,15 @@ from validation.identification.initial.smoothing import (
 )
 from validation.identification.ordinary_errors import ordinary_sigma
 
-__all__ = ["Spin", "centripetal_rate", "expected_rate", "field_spin", "gaussian_kernel", "phase_spin", "rig_starts"]
+__all__ = [
+    "Spin",
+    "centripetal_rate",
+    "expected_rate",
+    "field_spin",
+    "gaussian_kernel",
+    "phase_spin",
+    "rig_initial_states",
+]
 
 #: prior of the centre of the circle that the field runs, uT
 _IRON = ordinary_sigma("circle of the field")
@@ -57,7 +69,7 @@ class Spin(NamedTuple):
         return _curve(self.grid, self.phase, self.rate, t)
 
 
-def rig_starts(recording: Recording, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+def rig_initial_states(recording: Recording, t: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the yaw angle psi (k,) rad, unwrapped, and the rate r (k,) rad/s, at instants t (k,) s of a rig run.
 
     The axis points straight down. Without magnetometer psi counts from zero at the recording's start.

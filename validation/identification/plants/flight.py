@@ -26,8 +26,8 @@ from discsim.parameters import PARAMETERS, Tables
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
 from validation.identification.dynamics import FASTEST, SIZE, acting_tables
-from validation.identification.initial.flight import flight_starts
-from validation.identification.parameters import Jumps, Values
+from validation.identification.initial.flight import flight_initial_states
+from validation.identification.parameters import AllowedDefects, Values
 from validation.identification.plants.law_terms import Term
 from validation.identification.plants.plan import Plan, towards, turns
 from validation.identification.plants.plant import (
@@ -71,7 +71,7 @@ def _longest_step(given: Given, state: FloatArray, start: float, stop: float) ->
 
 
 @compiled_nogil
-def flight_pieces(
+def flight_segments(
     flats: FloatArray,
     tables: Tables,
     states: FloatArray,
@@ -110,14 +110,14 @@ def flight_pieces(
 
 
 def _states(recording: Recording, t: FloatArray, ratio: float) -> FloatArray:
-    starts = flight_starts(recording, np.minimum(t * ratio, recording.end))
+    starts = flight_initial_states(recording, np.minimum(t * ratio, recording.end))
     states = np.hstack([starts.position, starts.velocity, starts.attitude, starts.rate])
     states[:, _SPIN] *= ratio
     return states
 
 
 def _other_attitudes(recording: Recording) -> tuple[FloatArray, ...]:
-    return flight_starts(recording, np.zeros(1)).ambiguous
+    return flight_initial_states(recording, np.zeros(1)).ambiguous
 
 
 def _lacks(recording: Recording) -> str | None:
@@ -273,13 +273,13 @@ FLIGHT = Plant(
     name="flight",
     motion="flight",
     layout=Layout(13, 12, _POSITION, _VELOCITY, _ATTITUDE, _RATE, _SPIN, per_time=(_SPIN,)),
-    dynamics=Dynamics(propagated_by(flight_pieces), _longest_step),
+    dynamics=Dynamics(propagated_by(flight_segments), _longest_step),
     initial=Initial(_states, _other_attitudes),
     sizes=Sizes(  # m, m/s, rad, rad/s
         differences=np.repeat([1e-3, 1e-3, 1e-5, 1e-4], 3),
         unknown=np.repeat([1e4, 300.0, 30.0, 1e3], 3),
-        continuous=Jumps(np.zeros(12)),
-        relaxed=Jumps(np.repeat([0.1, 0.5, 0.05, 0.3], 3)),
+        continuous=AllowedDefects(np.zeros(12)),
+        relaxed=AllowedDefects(np.repeat([0.1, 0.5, 0.05, 0.3], 3)),
     ),
     # twice the longest throw; a first look of two segments
     durations=Durations(segment=0.5, first_look=1.0, window=0.5, longest=20.0, setup=60.0, event_near=0.09),

@@ -31,8 +31,8 @@ from discsim.parameters import PARAMETERS
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
 from validation.identification.dynamics import FASTEST, SIZE
-from validation.identification.initial.flight import spin_starts
-from validation.identification.parameters import Jumps, Parameter
+from validation.identification.initial.flight import spin_initial_states
+from validation.identification.parameters import AllowedDefects, Parameter
 from validation.identification.plants.plan import Plan, turns
 from validation.identification.plants.plant import (
     Design,
@@ -98,9 +98,9 @@ def _spinning(
     """Write the derivative of body rates w (3,) in a free spin into dw (3,): Euler's equations and the nuisances.
 
     wobble (10,) is how fast the wobble dies, 1/s, how much faster it turns for the stiffness of the air, rad/s, and how
-    both differ along the wind and across it (cosine and sine of twice the wind's direction), each with its change
-    over the first seconds. heading is that of x_B in N where psi is zero. Air is as stiff as the slope of its moment
-    over the angle of attack, which need not be smooth: state[13] is what that adds in this piece, rad/s. A moment about
+    both differ along the wind and across it (cosine and sine of twice the wind's direction), each with its change over
+    the first seconds. heading is that of x_B in N where psi is zero. Air is as stiff as the slope of its moment over
+    the angle of attack, which need not be smooth: state[13] is what that adds in this segment, rad/s. A moment about
     one axis turns the wobble as much as it tells that axis from the other.
 
     How that moment bends with the angle of attack drives the wobble at twice its own frequency, by the square of the
@@ -138,7 +138,7 @@ def _spinning(
 
 
 @compiled_nogil
-def free_spin_pieces(
+def free_spin_segments(
     flats: FloatArray,
     wobbles: FloatArray,
     states: FloatArray,
@@ -148,7 +148,7 @@ def free_spin_pieces(
     rows: FloatArray,
     ends: FloatArray,
 ) -> None:
-    """Spin freely from states (c, 16); wobbles (c, 10) as for `_spinning`. Else as `flight_pieces`.
+    """Spin freely from states (c, 16); wobbles (c, 10) as for `_spinning`. Else as `flight_segments`.
 
     Rates by the classical fourth-order steps, attitude by the fourth-order Magnus step through them.
     """
@@ -247,7 +247,7 @@ def _nodes(recording: Recording, segment: float) -> FloatArray:
 
 
 def _states(recording: Recording, t: FloatArray, ratio: float) -> FloatArray:
-    starts = spin_starts(recording, np.minimum(t * ratio, recording.end))
+    starts = spin_initial_states(recording, np.minimum(t * ratio, recording.end))
     states = np.zeros((t.size, _SIZE))
     states[:, _ATTITUDE], states[:, _RATE] = starts.attitude, starts.rate
     states[:, _SPIN] *= ratio
@@ -257,7 +257,7 @@ def _states(recording: Recording, t: FloatArray, ratio: float) -> FloatArray:
 
 
 def _other_attitudes(recording: Recording) -> tuple[FloatArray, ...]:
-    return spin_starts(recording, np.zeros(1)).ambiguous
+    return spin_initial_states(recording, np.zeros(1)).ambiguous
 
 
 def _grows_with(t: FloatArray, states: FloatArray) -> dict[str, FloatArray]:
@@ -287,7 +287,7 @@ def _over_turns(recording: Recording, one: Readings) -> list[Readings]:
     Translation and gravity turn with the spin and average out; what remains of x and y is centripetal.
     """
     grid = np.linspace(0.0, recording.end, max(int(recording.end / 0.05), 2))
-    rate = spin_starts(recording, grid).rate[:, 2]
+    rate = spin_initial_states(recording, grid).rate[:, 2]
     phase = np.interp(one.t, grid, cumulative_trapezoid(rate, grid, initial=0))
     phase = np.abs(phase) / (2.0 * np.pi)
     centres = np.arange(phase[0] + _TURNS / 2, phase[-1] - _TURNS / 2, _TURNS / 2)
@@ -373,13 +373,13 @@ FREE_SPIN = Plant(
     name=_NAME,
     motion="free spin",
     layout=Layout(_SIZE, 15, attitude=_ATTITUDE, rate=_RATE, spin=_SPIN, per_time=(_DECAY, _SPIN)),
-    dynamics=Dynamics(propagated_by(free_spin_pieces, lambda given, own: own), _longest_step),
+    dynamics=Dynamics(propagated_by(free_spin_segments, lambda given, own: own), _longest_step),
     initial=Initial(_states, _other_attitudes),
     sizes=Sizes(
         differences=np.array([1e-2, 1e-2, 1e-2, 1e-2, 1e-4, 1e-4, *[1e-5] * 3, *[1e-4] * 3, 1e-3, 3e-3, 3e-3]),
         unknown=np.array([100.0, 100.0, 100.0, 100.0, 3.0, 3.0, *[30.0] * 3, *[1e3] * 3, 0.01, 0.5, 0.5]),
-        continuous=Jumps(_WANDER),
-        relaxed=Jumps(_RELAXED),
+        continuous=AllowedDefects(_WANDER),
+        relaxed=AllowedDefects(_RELAXED),
     ),
     # its beginning follows anything, or nothing before it is fitted whole: it is looked at for the figures of the
     # answer alone, once spin rates are apart. Just after release the wobble is largest, and what the air does to it is

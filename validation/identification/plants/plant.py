@@ -20,7 +20,7 @@ from discsim.parameters import Tables
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
 from validation.identification.dynamics import ROW
-from validation.identification.parameters import Jumps, Parameter, Values
+from validation.identification.parameters import AllowedDefects, Parameter, Values
 from validation.identification.plants.law_terms import Term
 from validation.identification.plants.plan import Plan
 from validation.identification.readings import Readings
@@ -128,7 +128,7 @@ def _tables(given: Given, own: FloatArray) -> Tables:
     return given.tables
 
 
-def propagated_by(pieces: Callable[..., None], beside: Callable[[Given, FloatArray], Any] = _tables) -> Propagate:
+def propagated_by(segments: Callable[..., None], beside: Callable[[Given, FloatArray], Any] = _tables) -> Propagate:
     """Return a plant's motion by its compiled loop over states, which fills rows (c, m, 19) and ends (c, s).
 
     ``beside`` gives what the loop takes beside the parameters of the physics, of what is given and the plant's own.
@@ -144,7 +144,7 @@ def propagated_by(pieces: Callable[..., None], beside: Callable[[Given, FloatArr
         out: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
         rows, ends = np.empty((states.shape[0], out.size, ROW)), np.empty(states.shape)
-        pieces(flats, beside(given, own), states, times, last, out, rows, ends)
+        segments(flats, beside(given, own), states, times, last, out, rows, ends)
         return rows, ends
 
     return propagate
@@ -199,14 +199,14 @@ class Sizes:
     """Sizes in each direction of a state (d,), in its units.
 
     ``differences`` are half the differences by which slopes are taken; ``unknown`` is what is known of a state without
-    any reading, one sigma. ``continuous`` are the defects of continuity that a fit allows whose segments hang together,
-    ``relaxed`` those that it allows to stay beside the data whatever physics is missing.
+    any reading, one sigma. ``continuous`` are the defects of continuity that a fit allows whose segments are
+    continuous, ``relaxed`` those that it allows to stay beside the data whatever physics is missing.
     """
 
     differences: FloatArray
     unknown: FloatArray
-    continuous: Jumps
-    relaxed: Jumps
+    continuous: AllowedDefects
+    relaxed: AllowedDefects
 
 
 class Durations(NamedTuple):

@@ -15,8 +15,8 @@ from discsim.parameters import PARAMETERS
 from discsim.recording import Recording, Samples
 from discsim.toml_table import TomlTable
 from validation.identification.dynamics import SIZE
-from validation.identification.initial.spin_phase import rig_starts
-from validation.identification.parameters import Jumps
+from validation.identification.initial.spin_phase import rig_initial_states
+from validation.identification.parameters import AllowedDefects
 from validation.identification.plants.plan import Plan, turns
 from validation.identification.plants.plant import (
     Design,
@@ -80,7 +80,7 @@ def _commanded(p: Any, knots: FloatArray, t: float, psi: float) -> tuple[float, 
 
 
 @compiled_nogil
-def table_pieces(
+def table_segments(
     flats: FloatArray,
     knots: FloatArray,
     states: FloatArray,
@@ -92,7 +92,7 @@ def table_pieces(
 ) -> None:
     """Turn a table along its command knots (2, n); of states (c, 13) the yaw and the angle turned so far count.
 
-    ``times`` should hold the knots within the piece. Else as `flight_pieces`.
+    ``times`` should hold the knots within the segment. Else as `flight_segments`.
     """
     n = times.size
     turned, r, slope = np.empty(n), np.empty(n), np.empty(n)
@@ -123,7 +123,7 @@ def table_pieces(
 
 def _states(recording: Recording, t: FloatArray, ratio: float) -> FloatArray:
     del ratio
-    yaw, _ = rig_starts(recording, t)
+    yaw, _ = rig_initial_states(recording, t)
     return np.stack([yaw, yaw - yaw[0]], axis=1)
 
 
@@ -226,14 +226,14 @@ RATE_TABLE = Plant(
     motion="run of the table",
     layout=Layout(2, 1, yaw=_YAW),
     dynamics=Dynamics(
-        propagated_by(table_pieces, lambda given, own: given.knots), _longest_step, _corners, _consistent
+        propagated_by(table_segments, lambda given, own: given.knots), _longest_step, _corners, _consistent
     ),
     initial=Initial(_states),
     sizes=Sizes(  # rad
         differences=np.array([1e-5]),
         unknown=np.array([1e6]),
-        continuous=Jumps(np.zeros(1)),
-        relaxed=Jumps(np.array([0.5])),
+        continuous=AllowedDefects(np.zeros(1)),
+        relaxed=AllowedDefects(np.array([0.5])),
     ),
     # ten minutes of a rig; the plateaus of a profile for its setup
     durations=Durations(segment=1.0, first_look=30.0, window=1.0, longest=600.0, setup=300.0),

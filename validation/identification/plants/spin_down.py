@@ -14,8 +14,8 @@ from discsim.parameters import PARAMETERS, Tables
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
 from validation.identification.dynamics import SIZE, acting_tables
-from validation.identification.initial.spin_phase import rig_starts
-from validation.identification.parameters import Jumps, Values
+from validation.identification.initial.spin_phase import rig_initial_states
+from validation.identification.parameters import AllowedDefects, Values
 from validation.identification.plants.law_terms import Term
 from validation.identification.plants.plan import Plan, turns
 from validation.identification.plants.plant import (
@@ -52,7 +52,7 @@ def _friction(p: Any, tables: Tables, t: float, r: float) -> float:
 
 
 @compiled_nogil
-def spin_down_pieces(
+def spin_down_segments(
     flats: FloatArray,
     tables: Tables,
     states: FloatArray,
@@ -62,7 +62,7 @@ def spin_down_pieces(
     rows: FloatArray,
     ends: FloatArray,
 ) -> None:
-    """Let a rig run down from states (c, 13) of which psi and r count; else as `flight_pieces`."""
+    """Let a rig run down from states (c, 13) of which psi and r count; else as `flight_segments`."""
     n = times.size
     psi, r, slope = np.empty(n), np.empty(n), np.empty(n)
     for c in range(states.shape[0]):
@@ -97,7 +97,7 @@ def _between(
 
 def _states(recording: Recording, t: FloatArray, ratio: float) -> FloatArray:
     del ratio
-    return np.stack(rig_starts(recording, t), axis=1)
+    return np.stack(rig_initial_states(recording, t), axis=1)
 
 
 def _lacks(recording: Recording) -> str | None:
@@ -162,13 +162,13 @@ SPIN_DOWN = Plant(
     name="spin_down",
     motion="run",
     layout=Layout(2, 2, spin=_SPIN, yaw=_YAW),
-    dynamics=Dynamics(propagated_by(spin_down_pieces), _longest_step),
+    dynamics=Dynamics(propagated_by(spin_down_segments), _longest_step),
     initial=Initial(_states),
     sizes=Sizes(  # rad, rad/s
         differences=np.array([1e-5, 1e-4]),
         unknown=np.array([1e6, 1e3]),
-        continuous=Jumps(np.zeros(2)),
-        relaxed=Jumps(np.array([0.5, 0.5])),
+        continuous=AllowedDefects(np.zeros(2)),
+        relaxed=AllowedDefects(np.array([0.5, 0.5])),
     ),
     # ten minutes of a rig
     durations=Durations(segment=0.5, first_look=10.0, window=1.0, longest=600.0, setup=300.0, event_near=0.12),

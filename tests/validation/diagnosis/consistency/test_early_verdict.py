@@ -87,7 +87,7 @@ def test_a_delay_and_lost_samples_are_reconciled_and_another_throw_is_not(sound,
     noise = true_noise([own])
 
     def left(readings):
-        return left_when_shifted(fit.chains[0], fit.values(0), readings, noise)
+        return left_when_shifted(fit.trajectories[0], fit.values(0), readings, noise)
 
     kept = np.sort(np.random.default_rng(1).choice(own.t.size, int(0.95 * own.t.size), replace=False))
     lost = replace(own, t=own.t[: kept.size], value=own.value[kept], good=own.good[kept], clipped=own.clipped[kept])

@@ -12,7 +12,7 @@ from support.made import MODULE, throws
 from discsim.recording import Recording, Samples
 from discsim.sensors.sampling import Noise, Sampling
 from validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
-from validation.diagnosis.consistency.row_times import rows_of
+from validation.diagnosis.consistency.time_stamp_recovery import rows_of
 
 #: the logger's loop and the part's period, s: the loop skips a sample every 1 / (LOOP / PERIOD - 1) steps
 LOOP, PERIOD = 0.01, 0.0094

@@ -17,10 +17,10 @@ from validation.diagnosis.design.next_recording import ENOUGH, advise, confusion
 from validation.diagnosis.design.plans import plans_about, read_plans
 from validation.diagnosis.relaxed_fit import relaxed
 from validation.diagnosis.result import Advice, Diagnosis, Separation
-from validation.diagnosis.selection.candidates import Trial, trials_for
-from validation.diagnosis.selection.constrained_fit import tied_fit
-from validation.diagnosis.selection.found import Rival, Search, values_of_fit
+from validation.diagnosis.selection.candidates import CandidateEffect, candidates_for
+from validation.diagnosis.selection.continuous_fit import continuous_fit
 from validation.diagnosis.selection.hypothesis import Hypothesis
+from validation.diagnosis.selection.search_state import Rival, Search, values_of_fit
 from validation.diagnosis.selection.stepwise import search
 from validation.diagnosis.setup import SetupFindings
 from validation.diagnosis.stages import Prepared, Question, Tried, silent
@@ -46,14 +46,14 @@ def answer_of(found: Search) -> Diagnosis:
 
 
 def the_rival(found: Search) -> Rival:
-    (trial,) = found.final.hypothesis.trials
-    (rival,) = confusions(found, trial)
+    (candidate,) = found.final.hypothesis.candidates
+    (rival,) = confusions(found, candidate)
     return rival
 
 
-def trial_of(id: str, only: int | None = None) -> Trial:
-    trial = next(trial for trial in trials_for(coasts()) if trial.id == id)
-    return Trial(trial.id, trial.columns, None if only is None else frozenset([only]))
+def trial_of(id: str, only: int | None = None) -> CandidateEffect:
+    candidate = next(candidate for candidate in candidates_for(coasts()) if candidate.id == id)
+    return CandidateEffect(candidate.id, candidate.columns, None if only is None else frozenset([only]))
 
 
 def evidence_once_made(rate: float, lean: float) -> float:
@@ -66,12 +66,12 @@ def evidence_once_made(rate: float, lean: float) -> float:
     hidden = [effect("rig.axis_tilt", tilt_north_rad=lean, tilt_east_rad=0.0)] if lean else []
     motion = spin_down(RIG, FIELD, rate, 4.0, hidden, yaw=1.1)
     recordings = [*coasts((), [STRETCHED]), coasting(motion, RIG, 2, [found])]
-    loose = relaxed(recordings)
+    relaxed_fit = relaxed(recordings)
     rest = (trial_of("rig.axis_tilt", 2),) if lean else ()
     noise = stretched().final.fit.noise
     start = {(("rig.axis_tilt", "tilt_north_rad"), frozenset([2])): lean}
     scores = [
-        tied_fit(loose, Hypothesis((trial_of(id), *rest)), (), noise, start).score
+        continuous_fit(relaxed_fit, Hypothesis((trial_of(id), *rest)), (), noise, start).score
         for id in ("accel.position_offset", "accel.scale")
     ]
     return scores[0] - scores[1] - the_rival(stretched()).worse
@@ -79,8 +79,8 @@ def evidence_once_made(rate: float, lean: float) -> float:
 
 def test_run_downs_cannot_tell_a_scale_from_an_offset_along_the_radius_and_a_leant_axis_can():
     found = stretched()
-    assert [trial.id for trial in found.final.hypothesis.trials] == ["accel.scale"]
-    assert the_rival(found).trial.id == "accel.position_offset"
+    assert [candidate.id for candidate in found.final.hypothesis.candidates] == ["accel.scale"]
+    assert the_rival(found).candidate.id == "accel.position_offset"
     advice = advise(found, ["01", "02"])["accel.scale", "accel.position_offset"]
     assert "leant" in advice.best.recording
     assert advice.best.expected_chi2 > ENOUGH
@@ -89,10 +89,10 @@ def test_run_downs_cannot_tell_a_scale_from_an_offset_along_the_radius_and_a_lea
 
 
 def test_the_expected_evidence_is_what_the_recording_brings_once_it_is_made():
-    plans = plans_about(stretched().final.fit.chains[0], 4.0)
+    plans = plans_about(stretched().final.fit.trajectories[0], 4.0)
     leant = next(plan for plan in plans if plan.lean == (LEAN, 0.0) and plan.state[1] == pytest.approx(60.0, rel=0.01))
     faster = next(plan for plan in plans if not any(plan.lean) and plan.state[1] > 100.0)
-    like = int(np.argmax([chain.states[0, 1] for chain in stretched().final.fit.chains]))
+    like = int(np.argmax([trajectory.states[0, 1] for trajectory in stretched().final.fit.trajectories]))
     good, bad = expected_evidence(stretched(), the_rival(stretched()), [leant, faster], like)
     # noise moves a gain of G by a standard deviation of 2 sqrt(G)
     assert evidence_once_made(60.0, LEAN) == pytest.approx(good, abs=3.0 * 2.0 * np.sqrt(good))
@@ -150,24 +150,26 @@ def test_what_happened_once_has_no_next_recording():
 def test_every_built_in_recording_can_be_simulated(make, hidden, rival):  # type: ignore[no-untyped-def]
     recordings = make([hidden])
     found = search(recordings)
-    (trial,) = found.final.hypothesis.trials
-    other = next(item for item in found.trials if item.id == rival)
-    tied = tied_fit(found.final.fit, Hypothesis((other,)), found.own, found.final.fit.noise, values_of_fit(found.final))
-    plans = plans_about(found.final.fit.chains[0], 1.5)
+    (candidate,) = found.final.hypothesis.candidates
+    other = next(item for item in found.candidates if item.id == rival)
+    fitted = continuous_fit(
+        found.final.fit, Hypothesis((other,)), found.own, found.final.fit.noise, values_of_fit(found.final)
+    )
+    plans = plans_about(found.final.fit.trajectories[0], 1.5)
     assert 12 <= len(plans) <= 20
     assert len({plan.text for plan in plans}) == len(plans)
     assert plans[0].text.startswith("the same")
-    evidence = expected_evidence(found, Rival(other, 0.0, tied), plans, 0)
+    evidence = expected_evidence(found, Rival(other, 0.0, fitted), plans, 0)
     assert np.all(np.isfinite(evidence))
-    assert trial.id == hidden.id
+    assert candidate.id == hidden.id
     assert max(evidence) > ENOUGH
 
 
 def test_a_throw_that_starts_on_the_ground_has_no_evidence():
     found = search(throws([effect("air.wind", w_north_m_s=1.0, w_east_m_s=-0.5)]))
-    state = found.final.fit.chains[0].states[0].copy()
+    state = found.final.fit.trajectories[0].states[0].copy()
     state[2] = 0.1
-    rival = Rival(found.final.hypothesis.trials[0], 0.0, found.final)
+    rival = Rival(found.final.hypothesis.candidates[0], 0.0, found.final)
     assert np.isnan(expected_evidence(found, rival, [Plan("", state, 2.0)], 0)[0])
 
 

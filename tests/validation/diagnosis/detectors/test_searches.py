@@ -20,15 +20,15 @@ from validation.diagnosis.detectors import dropped_samples
 from validation.diagnosis.detectors.dropped_samples import dropped_accelerometer
 from validation.diagnosis.detectors.events import events
 from validation.diagnosis.detectors.gusts import gusts
-from validation.diagnosis.detectors.local_problem import Asked, asked_of
-from validation.diagnosis.detectors.sample_alignment import likeliest_counts, phase_counts
+from validation.diagnosis.detectors.local_problem import LocalProblems, local_problems
+from validation.diagnosis.detectors.sample_alignment import phase_counts, viterbi_counts
 from validation.diagnosis.detectors.saturation import saturation
 from validation.diagnosis.detectors.speed_ripple import ripple
 from validation.diagnosis.detectors.time_offsets import time_offsets
-from validation.diagnosis.relaxed_fit import first_chain, relaxed
-from validation.diagnosis.selection.constrained_fit import tied_fit
+from validation.diagnosis.relaxed_fit import first_trajectory, relaxed
+from validation.diagnosis.selection.continuous_fit import continuous_fit
 from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.identification.clipping import equal_beyond_chance, plateau_of
+from validation.identification.clipping import clipping_level_of, equal_beyond_chance
 from validation.identification.gauss_newton import Fit
 from validation.identification.noise import estimate_noise
 from validation.identification.plants.rate_table import RATE_TABLE
@@ -70,13 +70,13 @@ def throws(hidden: tuple[Effect, ...] = (), errors: tuple[Effect, ...] = ()) -> 
 
 
 @cache
-def loose(hidden: tuple[Effect, ...] = (), errors: tuple[Effect, ...] = ()) -> Fit:
+def relaxed_fit(hidden: tuple[Effect, ...] = (), errors: tuple[Effect, ...] = ()) -> Fit:
     return relaxed(throws(hidden, errors))
 
 
-def questions(hidden: tuple[Effect, ...] = ()) -> Asked:
-    fit = loose(hidden)
-    return asked_of(fit, shown_noise(fit), (), Hypothesis())
+def questions(hidden: tuple[Effect, ...] = ()) -> LocalProblems:
+    fit = relaxed_fit(hidden)
+    return local_problems(fit, shown_noise(fit), (), Hypothesis())
 
 
 def shown_noise(fit: Fit):  # type: ignore[no-untyped-def]
@@ -89,7 +89,7 @@ def table(*hidden: Effect, errors: tuple[Effect, ...] = ()) -> Recording:
     return record(motion, module, np.random.default_rng(4), plant="rate_table", name="table", command=PROFILE)
 
 
-# what makes a proposal worth a refit; with nothing hidden the best of some dozen boundaries gains 18 at most
+# what makes a screened candidate worth a refit; with nothing hidden the best of some dozen boundaries gains 18 at most
 LEAST = 25.0
 
 
@@ -107,12 +107,14 @@ def test_an_event_is_found_in_its_recording_at_its_instant_with_its_size(
     hidden: Effect, sizes: dict[str, float]
 ) -> None:
     best = events(questions((hidden,)))[0]
-    assert best.trial.id == hidden.id
-    assert best.trial.recordings == frozenset([1])
-    tied = tied_fit(loose((hidden,)), Hypothesis((best.trial,)), (), shown_noise(loose((hidden,))), best.start)
+    assert best.candidate.id == hidden.id
+    assert best.candidate.recordings == frozenset([1])
+    fitted = continuous_fit(
+        relaxed_fit((hidden,)), Hypothesis((best.candidate,)), (), shown_noise(relaxed_fit((hidden,))), best.start
+    )
     found = {
         q.name: (v, s)
-        for q, v, s in zip(tied.fit.parameters, tied.fit.at, np.sqrt(np.diag(tied.fit.covariance)), strict=True)
+        for q, v, s in zip(fitted.fit.parameters, fitted.fit.at, np.sqrt(np.diag(fitted.fit.covariance)), strict=True)
     }
     assert found["t_s"][0] == pytest.approx(1.237, abs=0.02)
     for name, size in sizes.items():
@@ -124,17 +126,17 @@ def test_an_event_is_found_in_its_recording_at_its_instant_with_its_size(
 def test_a_gust_is_found_in_its_recording_near_its_instant() -> None:
     hidden = effect("air.gust", t_s=1.1, width_s=0.3, w_north_m_s=0.9, w_east_m_s=-0.5)
     best = gusts(questions((hidden,)))[0]
-    assert best.trial.recordings == frozenset([1])
-    assert best.trial.shapes["t_s"] == pytest.approx(1.1, abs=0.25)
-    assert best.start[("air.gust", "w_north_m_s"), best.trial.recordings] > 0.3
+    assert best.candidate.recordings == frozenset([1])
+    assert best.candidate.shape_grid["t_s"] == pytest.approx(1.1, abs=0.25)
+    assert best.start[("air.gust", "w_north_m_s"), best.candidate.recordings] > 0.3
 
 
 def test_nothing_is_proposed_for_throws_that_hide_nothing() -> None:
-    asked = questions()
-    assert events(asked, LEAST + 20.0) == []
-    assert gusts(asked, LEAST) == []
-    assert saturation(loose(), shown_noise(loose())) == []
-    assert dropped_accelerometer(loose(), shown_noise(loose())) == []
+    problems = questions()
+    assert events(problems, LEAST + 20.0) == []
+    assert gusts(problems, LEAST) == []
+    assert saturation(relaxed_fit(), shown_noise(relaxed_fit())) == []
+    assert dropped_accelerometer(relaxed_fit(), shown_noise(relaxed_fit())) == []
 
 
 def test_steps_of_the_phase_tell_how_many_samples_were_lost() -> None:
@@ -154,13 +156,13 @@ def test_a_wrong_clock_is_not_taken_for_lost_samples() -> None:
 
 def test_lost_samples_of_the_accelerometer_are_counted_by_the_motion_of_the_others() -> None:
     errors = (effect("accel.dropped_samples", fraction=0.02),)
-    fit = loose((), errors)
+    fit = relaxed_fit((), errors)
     (found,) = dropped_accelerometer(fit, shown_noise(fit))
     whole, short = throws(), throws((), errors)
-    for chain, a, b in zip(found.chains, whole, short, strict=True):
+    for trajectory, a, b in zip(found.trajectories, whole, short, strict=True):
         gone = len(a.samples["accelerometer"]) - len(b.samples["accelerometer"])
-        assert chain.lost["accelerometer"][-1] == pytest.approx(gone, abs=1)
-    ((name, share, sd),) = found.proposal.trial.told
+        assert trajectory.lost["accelerometer"][-1] == pytest.approx(gone, abs=1)
+    ((name, share, sd),) = found.screened.candidate.fixed_values
     assert name == "fraction"
     assert share == pytest.approx(0.02, abs=4.0 * sd)
 
@@ -168,7 +170,7 @@ def test_lost_samples_of_the_accelerometer_are_counted_by_the_motion_of_the_othe
 @pytest.mark.parametrize("ratio", [1.015, 0.985])
 def test_a_flight_is_followed_by_the_others_where_the_clock_of_one_sensor_is_wrong(ratio: float) -> None:
     """With all at once the accelerometer's phase, off by turns, leads the fit astray."""
-    fit = loose((), (effect("accel.clock_rate", ratio=ratio),))
+    fit = relaxed_fit((), (effect("accel.clock_rate", ratio=ratio),))
     assert fit.merit < 1.2 * fit.count
     assert fit.values(0)["accel.clock_rate", "ratio"] == pytest.approx(ratio, abs=2e-4)
 
@@ -177,16 +179,16 @@ def test_counts_never_fall_and_follow_the_cheapest_way() -> None:
     # samples 0 1 2 | 4 5 of a ramp: one was lost before the fourth
     ramp, taken = np.arange(7.0), np.array([0, 1, 2, 4, 5])
     cost = ((taken[:, None] - ramp[np.arange(5)[:, None] + np.arange(3)]) / 0.1) ** 2
-    counts, least = likeliest_counts(cost, np.array([0, 1, 1, 1, 1]), each=9.0)
+    counts, least = viterbi_counts(cost, np.array([0, 1, 1, 1, 1]), each=9.0)
     assert counts.tolist() == [0, 0, 0, 1, 1]
     assert least == pytest.approx(9.0)
 
 
 def test_readings_that_stand_still_below_the_range_are_a_limit() -> None:
     errors = (effect("accel.saturation", limit_m_s2=40.0),)
-    fit = loose((), errors)
+    fit = relaxed_fit((), errors)
     (found,) = saturation(fit, shown_noise(fit))
-    ((name, limit, _),) = found.trial.told
+    ((name, limit, _),) = found.candidate.fixed_values
     assert name == "limit_m_s2"
     assert limit == pytest.approx(40.0, abs=1e-9)
     assert found.gain > 1000.0
@@ -196,8 +198,8 @@ def test_noise_alone_makes_no_plateau() -> None:
     rng = np.random.default_rng(3)
     for size in (50, 2000, 20000):
         steady = 60.0 + 0.08 * rng.standard_normal((size, 3))
-        assert plateau_of(np.round(steady / 0.005) * 0.005, 0.005) is None
-        assert plateau_of(np.minimum(np.round(steady / 0.005) * 0.005, 60.0), 0.005) == 60.0
+        assert clipping_level_of(np.round(steady / 0.005) * 0.005, 0.005) is None
+        assert clipping_level_of(np.minimum(np.round(steady / 0.005) * 0.005, 60.0), 0.005) == 60.0
 
 
 def test_equal_readings_count_against_chance() -> None:
@@ -214,9 +216,9 @@ def test_equal_readings_count_against_chance() -> None:
 def test_a_ripple_is_found_at_its_order_amplitude_and_phase() -> None:
     fit = relaxed([table(RIPPLE)])
     noise = shown_noise(fit)
-    tied = tied_fit(fit, Hypothesis(), (), noise, {})
-    best = ripple(tied.fit, tied.fit.noise)[0]
-    refit = tied_fit(fit, Hypothesis((best.trial,)), (), noise, best.start)
+    fitted = continuous_fit(fit, Hypothesis(), (), noise, {})
+    best = ripple(fitted.fit, fitted.fit.noise)[0]
+    refit = continuous_fit(fit, Hypothesis((best.candidate,)), (), noise, best.start)
     found = {q.name: v for q, v in zip(refit.fit.parameters, refit.fit.at, strict=True)}
     assert found["order"] == pytest.approx(2.06, abs=2e-3)
     assert found["amplitude_rad_s"] == pytest.approx(0.05, rel=0.05)
@@ -225,8 +227,8 @@ def test_a_ripple_is_found_at_its_order_amplitude_and_phase() -> None:
 
 def test_a_steady_table_has_no_ripple() -> None:
     fit = relaxed([table()])
-    tied = tied_fit(fit, Hypothesis(), (), shown_noise(fit), {})
-    assert ripple(tied.fit, tied.fit.noise) == []
+    fitted = continuous_fit(fit, Hypothesis(), (), shown_noise(fit), {})
+    assert ripple(fitted.fit, fitted.fit.noise) == []
 
 
 def test_a_table_that_stands_still_has_no_ripple() -> None:
@@ -246,20 +248,20 @@ def test_a_table_that_stands_still_has_no_ripple() -> None:
 
 def test_a_table_with_ripple_turns_as_in_the_engine() -> None:
     motion = turn_table(PROFILE, FIELD, [RIPPLE])
-    chain = first_chain(table(RIPPLE))
-    assert chain.plant.layout.directions == RATE_TABLE.sizes.continuous.sd.size
+    trajectory = first_trajectory(table(RIPPLE))
+    assert trajectory.plant.layout.directions == RATE_TABLE.sizes.continuous.sd.size
     values = {("rig.speed_ripple", name): v for name, v in RIPPLE.value._asdict().items()}
     t = np.arange(0.003, 0.95, 0.01)
-    rate = shown(chain, values, "gyroscope", t)[:, 2]
-    # the first piece starts from nothing turned; its steps of 0.3 rad of the ripple leave some 1e-5 of its amplitude
+    rate = shown(trajectory, values, "gyroscope", t)[:, 2]
+    # the first segment starts from nothing turned; its steps of 0.3 rad of the ripple leave some 1e-5 of its amplitude
     assert np.max(np.abs(rate - motion.at(t).rate[:, 2])) < 1e-4 * 0.05 + 1e-6
 
 
 def offsets_found(*errors: Effect) -> dict[str, float]:
     """Return what is proposed for a table: effect to its first value."""
     made = relaxed([table(errors=errors)])
-    tied = tied_fit(made, Hypothesis(), (), shown_noise(made), {})
-    return {p.trial.id: next(iter(p.start.values())) for p in time_offsets(tied.fit, tied.fit.noise)}
+    fitted = continuous_fit(made, Hypothesis(), (), shown_noise(made), {})
+    return {p.candidate.id: next(iter(p.start.values())) for p in time_offsets(fitted.fit, fitted.fit.noise)}
 
 
 @pytest.mark.parametrize("offset", [-0.08, -0.03, 0.05])
@@ -279,9 +281,9 @@ def test_no_offset_of_time_is_proposed_for_a_sound_table() -> None:
 def test_what_the_phase_tells_of_losses_is_worked_out_once_for_a_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
     monkeypatch.setattr(dropped_samples, "dropped_magnetometer", lambda fit, known: calls.append(fit) or [])
-    slips, one, other = dropped_samples.Slips(), loose(), replace(loose())
+    phase_losses, one, other = dropped_samples.PhaseLosses(), relaxed_fit(), replace(relaxed_fit())
     assert calls == []
     for fit in (one, one, other):
-        slips = slips.about(fit, ())
-        assert slips.fit is fit
+        phase_losses = phase_losses.about(fit, ())
+        assert phase_losses.fit is fit
     assert calls == [one, other]

@@ -13,13 +13,13 @@ from discsim.effects import Effect, effect
 from validation.diagnosis.design.next_recording import confusions
 from validation.diagnosis.relaxed_fit import relaxed, unknowns
 from validation.diagnosis.selection import stepwise as searching
-from validation.diagnosis.selection.candidates import Trial, trials_for
-from validation.diagnosis.selection.constrained_fit import Tied
+from validation.diagnosis.selection.candidates import CandidateEffect, candidates_for
+from validation.diagnosis.selection.continuous_fit import ContinuousFit
 from validation.diagnosis.selection.exchange import exchanged, rivals_of
-from validation.diagnosis.selection.found import Rival, possible
 from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
-from validation.diagnosis.selection.proposals import Pair, Proposal, pairs
-from validation.diagnosis.selection.screening import board_of
+from validation.diagnosis.selection.score_tests import Pair, ScreenedCandidate, pairs
+from validation.diagnosis.selection.screening import normal_equations_of
+from validation.diagnosis.selection.search_state import Rival, possible
 from validation.identification.noise import estimate_noise
 from validation.identification.plants.flight import FLIGHT
 from validation.identification.stated_parameters import stated_parameters
@@ -32,27 +32,27 @@ def ranked() -> list[Pair]:
     """Return the pairs for throws with a yaw damping that grows with speed and a magnetometer's clock that is slow."""
     recordings = throws([YAW], [CLOCK])
     known = stated_parameters(recordings)
-    loose = relaxed(recordings, known)
-    noise = estimate_noise(loose.linears, [linear.residual for linear in loose.linears])
-    trials = trials_for(recordings)
-    board = board_of(loose, trials, noise, FLIGHT.sizes.continuous)
-    return pairs(board, trials, (*known, *unknowns(recordings)))
+    relaxed_fit = relaxed(recordings, known)
+    noise = estimate_noise(relaxed_fit.linears, [linear.residual for linear in relaxed_fit.linears])
+    candidates = candidates_for(recordings)
+    board = normal_equations_of(relaxed_fit, candidates, noise, FLIGHT.sizes.continuous)
+    return pairs(board, candidates, (*known, *unknowns(recordings)))
 
 
 def named(hidden: list[Effect], errors: list[Effect]) -> list[str]:
     """Return what a search names in throws."""
-    return sorted(trial.id for trial in searching.search(throws(hidden, errors)).final.hypothesis.trials)
+    return sorted(candidate.id for candidate in searching.search(throws(hidden, errors)).final.hypothesis.candidates)
 
 
 def test_the_first_pair_is_the_right_one_and_starts_near_its_numbers():
     best = ranked()[0]
-    assert {trial.id for trial in best.hypothesis.trials} == {YAW.id, CLOCK.id}
+    assert {candidate.id for candidate in best.hypothesis.candidates} == {YAW.id, CLOCK.id}
     assert best.start[(YAW.id, "exponent"), None] == pytest.approx(0.3, rel=0.3)
     assert best.start[(CLOCK.id, "ratio"), None] - 1.0 == pytest.approx(-4e-4, rel=0.3)
 
 
 def test_every_two_effects_are_asked_once_at_their_best_shape():
-    asked = [frozenset(trial.id for trial in pair.hypothesis.trials) for pair in ranked()]
+    asked = [frozenset(candidate.id for candidate in pair.hypothesis.candidates) for pair in ranked()]
     assert all(len(ids) == 2 for ids in asked)
     assert len(set(asked)) == len(asked)
     assert [pair.merit for pair in ranked()] == sorted(pair.merit for pair in ranked())
@@ -92,33 +92,35 @@ def windy() -> searching.Search:
     return searching.search(throws([effect("air.wind", w_north_m_s=-1.4, w_east_m_s=-1.0)], seconds=2.0))
 
 
-def of(id: str) -> Trial:
-    return next(trial for trial in windy().trials if trial.id == id)
+def of(id: str) -> CandidateEffect:
+    return next(candidate for candidate in windy().candidates if candidate.id == id)
 
 
 @cache
-def as_shear() -> Tied:
+def as_shear() -> ContinuousFit:
     """Return the fit of that wind as one that grows with height."""
-    return searching.tied_fit(windy().loose, Hypothesis((of("air.wind_shear"),)), windy().own, windy().loose_noise, {})
+    return searching.continuous_fit(
+        windy().relaxed_fit, Hypothesis((of("air.wind_shear"),)), windy().own, windy().relaxed_noise, {}
+    )
 
 
 def test_an_effect_gives_way_to_one_that_explains_as_much_with_fewer_parameters():
     sheared = as_shear()
     found = replace(windy(), final=sheared).about(sheared.fit)
     found = replace(found, rivals=rivals_of(found))
-    assert next(rival.trial.id for rival in found.rivals["air.wind_shear"]) == "air.wind"
+    assert next(rival.candidate.id for rival in found.rivals["air.wind_shear"]) == "air.wind"
     better = exchanged(found)
     assert better is not None
-    assert [trial.id for trial in better.hypothesis.trials] == ["air.wind"]
+    assert [candidate.id for candidate in better.hypothesis.candidates] == ["air.wind"]
 
 
 def test_an_effect_does_not_give_way_to_one_that_needs_more_parameters_for_the_same():
-    assert [trial.id for trial in windy().final.hypothesis.trials] == ["air.wind"]
+    assert [candidate.id for candidate in windy().final.hypothesis.candidates] == ["air.wind"]
     assert exchanged(windy()) is None
 
 
 def test_a_shear_that_is_known_to_have_none_is_not_confused_with_the_wind():
-    (wind,) = windy().final.hypothesis.trials
+    (wind,) = windy().final.hypothesis.candidates
     sheared = as_shear()
     place = [q.name for q in sheared.fit.parameters].index("exponent")
     assert sheared.fit.covariance[place, place] ** 0.5 < 0.05
@@ -127,18 +129,24 @@ def test_a_shear_that_is_known_to_have_none_is_not_confused_with_the_wind():
     # where the exponent is not known, nobody can tell
     wide = replace(sheared, fit=replace(sheared.fit, covariance=1e4 * sheared.fit.covariance))
     found = replace(windy(), rivals={wind.name: [Rival(of("air.wind_shear"), 0.0, wide)]})
-    assert [rival.trial.id for rival in confusions(found, wind)] == ["air.wind_shear"]
+    assert [rival.candidate.id for rival in confusions(found, wind)] == ["air.wind_shear"]
 
 
 def test_a_sensor_far_off_the_disc_is_impossible():
-    trial = of("accel.position_offset")
-    places = ((trial.id, name) for name in ("dx_m", "dy_m", "dz_m"))
+    candidate = of("accel.position_offset")
+    places = ((candidate.id, name) for name in ("dx_m", "dy_m", "dz_m"))
     values = dict.fromkeys(((key, None) for key in places), 1e-4)
-    fit = searching.tied_fit(
-        windy().loose, Hypothesis((trial,)), windy().own, windy().loose_noise, values, iterations=0, polish=0
+    fit = searching.continuous_fit(
+        windy().relaxed_fit,
+        Hypothesis((candidate,)),
+        windy().own,
+        windy().relaxed_noise,
+        values,
+        iterations=0,
+        polish=0,
     )
 
-    def with_offset(x: float) -> Tied:
+    def with_offset(x: float) -> ContinuousFit:
         at = fit.fit.at.copy()
         at[[q.name for q in fit.fit.parameters].index("dx_m")] = x
         return replace(fit, fit=replace(fit.fit, at=at, covariance=1e-6 * np.eye(at.size)))
@@ -149,7 +157,13 @@ def test_a_sensor_far_off_the_disc_is_impossible():
 
 def test_offers_from_two_fits_come_in_turn_and_lost_samples_first():
     big, small = of("air.wind"), of("aero.stall")
-    there = [(Proposal(trial, gain, {}), windy().loose, 0.0) for trial, gain in ((big, 1e6), (small, 9e5), (big, 1.0))]
-    here = [(Proposal(small, 5e3, {}), windy().loose, 0.0), (Proposal(big, 1e4, {}), windy().loose, 30.0)]
+    there = [
+        (ScreenedCandidate(candidate, gain, {}), windy().relaxed_fit, 0.0)
+        for candidate, gain in ((big, 1e6), (small, 9e5), (big, 1.0))
+    ]
+    here = [
+        (ScreenedCandidate(small, 5e3, {}), windy().relaxed_fit, 0.0),
+        (ScreenedCandidate(big, 1e4, {}), windy().relaxed_fit, 30.0),
+    ]
     gains = [offer[0].gain for offer in searching.in_turn(there, here)]
     assert gains == [1e6, 1e4, 9e5, 5e3]

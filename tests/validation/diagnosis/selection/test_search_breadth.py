@@ -1,4 +1,6 @@
-"""How many proposals a step of the search refits: few near the data, more where algebra is led astray far from it."""
+"""How many screened candidates a step of the search refits: few near the data, more where algebra is led astray far
+from it.
+"""
 
 from __future__ import annotations
 
@@ -10,23 +12,25 @@ import pytest
 from support.made import coasts, throws
 
 from discsim.effects.catalogue import CATALOGUE, effect
-from validation.diagnosis.relaxed_fit import first_chain
+from validation.diagnosis.relaxed_fit import first_trajectory
 from validation.diagnosis.selection import exchange
-from validation.diagnosis.selection import found as finding
+from validation.diagnosis.selection import search_state as finding
 from validation.diagnosis.selection import stepwise as searching
-from validation.diagnosis.selection.candidates import Trial, free_trial
-from validation.diagnosis.selection.constrained_fit import Tied
+from validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
+from validation.diagnosis.selection.continuous_fit import ContinuousFit
 from validation.diagnosis.selection.evidence import price
-from validation.diagnosis.selection.found import on_the_disc
 from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.selection.proposals import Proposal, hinted
+from validation.diagnosis.selection.score_tests import ScreenedCandidate, hinted
+from validation.diagnosis.selection.search_state import on_the_disc
 from validation.identification.gauss_newton import Fit, linearised, merit_of
 from validation.identification.noise import stated_noise
 from validation.identification.plants.flight import FLIGHT
 from validation.identification.plants.spin_down import SPIN_DOWN
 
 #: what algebra ranks, best first; none but the seventh comes near the data
-RANKED = [Trial(id, ()) for id, row in CATALOGUE.items() if id.startswith(("mag.", "gyro.")) and not row.event]
+RANKED = [
+    CandidateEffect(id, ()) for id, row in CATALOGUE.items() if id.startswith(("mag.", "gyro.")) and not row.event
+]
 RIGHT = RANKED[6]
 #: the normal equations about the relaxed fit, about another, and which: nothing asks them here
 UNASKED = (None, None, None)
@@ -35,51 +39,51 @@ COUNT = 1812
 
 
 def step(
-    monkeypatch: pytest.MonkeyPatch, *, far: bool, right: Trial, hints: Sequence[Proposal] = ()
+    monkeypatch: pytest.MonkeyPatch, *, far: bool, right: CandidateEffect, hints: Sequence[ScreenedCandidate] = ()
 ) -> tuple[str, list[str], list[float]]:
     """Return what one step of the search adds, and what it refitted, where fits are not made but told.
 
     Beside it how much below the present fit's merit each had to come, per reading, or be given up.
     """
     recordings = coasts(seconds=1.0)
-    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
+    fit = Fit(tuple(first_trajectory(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
     linears = linearised(fit)
-    fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
-    base = Tied(Hypothesis(), fit, 1e6)
+    fit = Fit(fit.trajectories, (), np.empty(0), fit.defects, stated_noise(linears), linears=linears)
+    base = ContinuousFit(Hypothesis(), fit, 1e6)
     assert fit.count == COUNT
     refitted, bars = [], []
 
-    def told(fit: Fit, hypothesis: Hypothesis, *others: object, bar: float) -> Tied:
-        refitted.append(hypothesis.trials[-1].id)
+    def told(fit: Fit, hypothesis: Hypothesis, *others: object, bar: float) -> ContinuousFit:
+        refitted.append(hypothesis.candidates[-1].id)
         bars.append((merit_of(fit, fit.linears) - bar) / fit.count)
-        return Tied(hypothesis, fit, 0.0 if hypothesis.trials[-1] == right else 5e5)
+        return ContinuousFit(hypothesis, fit, 0.0 if hypothesis.candidates[-1] == right else 5e5)
 
-    def chi2(tied: Tied, noise: object) -> float:
+    def chi2(fitted: ContinuousFit, noise: object) -> float:
         left = 20.0 if far else 1.1
-        for trial in tied.hypothesis.trials:
-            left = 1.0 if trial == right else 0.9 * left
+        for candidate in fitted.hypothesis.candidates:
+            left = 1.0 if candidate == right else 0.9 * left
         return left * fit.count
 
-    monkeypatch.setattr(searching, "tied_fit", told)
+    monkeypatch.setattr(searching, "continuous_fit", told)
     monkeypatch.setattr(searching, "chi2_in", chi2)
     monkeypatch.setattr(finding, "chi2_in", chi2)
-    monkeypatch.setattr(finding, "board_of", lambda *_: None)
+    monkeypatch.setattr(finding, "normal_equations_of", lambda *_: None)
     monkeypatch.setattr(searching, "searched", lambda *_: [])
-    monkeypatch.setattr(searching, "proposals", lambda *_: [])
-    ranked = [Proposal(trial, 1e6 - rank, {}) for rank, trial in enumerate(RANKED)]
+    monkeypatch.setattr(searching, "screened_candidates", lambda *_: [])
+    ranked = [ScreenedCandidate(candidate, 1e6 - rank, {}) for rank, candidate in enumerate(RANKED)]
     monkeypatch.setattr(searching, "one_per_effect", lambda _: ranked)
     found = finding.Search(
         tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base, *UNASKED, hints=tuple(hints)
     )
     _, best = searching.next_effect(found, base, 0)
     assert best is not None
-    return best.hypothesis.trials[-1].id, refitted, bars
+    return best.hypothesis.candidates[-1].id, refitted, bars
 
 
 def test_far_from_the_data_more_is_refitted_until_something_comes_near(monkeypatch):
     best, refitted, bars = step(monkeypatch, far=True, right=RIGHT)
     assert best == RIGHT.id
-    assert refitted == [trial.id for trial in RANKED[:7]]
+    assert refitted == [candidate.id for candidate in RANKED[:7]]
     # ten times what was left before the first, and by the best of the others since
     np.testing.assert_allclose(np.diff(bars), [20.0, *5 * [0.0]], atol=1e-9)
 
@@ -94,34 +98,34 @@ def test_near_the_data_four_are_refitted(monkeypatch):
     _, refitted, bars = step(monkeypatch, far=False, right=RIGHT)
     assert len(refitted) == 4
     # half of what an effect must gain, as algebra said of each
-    half = [0.5 * price(trial) for trial in RANKED[:4]]
+    half = [0.5 * price(candidate) for candidate in RANKED[:4]]
     np.testing.assert_allclose(bars, np.array(half) / COUNT)
 
 
 def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present_one_is(monkeypatch):
     """Algebra asked for a number far off; from no effect at all the same fit comes to what it gains."""
     recordings = coasts(seconds=1.0)
-    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
+    fit = Fit(tuple(first_trajectory(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
     linears = linearised(fit)
-    fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
-    base = Tied(Hypothesis(), fit, 1e4)
-    tilt = free_trial("rig.axis_tilt")
+    fit = Fit(fit.trajectories, (), np.empty(0), fit.defects, stated_noise(linears), linears=linears)
+    base = ContinuousFit(Hypothesis(), fit, 1e4)
+    tilt = free_candidate("rig.axis_tilt")
     size = (("rig.axis_tilt", "tilt_north_rad"), None)
 
-    def told(fit: Fit, hypothesis: Hypothesis, own: object, noise: object, start: dict, *, bar: float) -> Tied:
-        return Tied(hypothesis, fit, 2e4 if size in start else 0.0)
+    def told(fit: Fit, hypothesis: Hypothesis, own: object, noise: object, start: dict, *, bar: float) -> ContinuousFit:
+        return ContinuousFit(hypothesis, fit, 2e4 if size in start else 0.0)
 
-    monkeypatch.setattr(searching, "tied_fit", told)
-    monkeypatch.setattr(searching, "chi2_in", lambda tied, noise: 1.1 * tied.fit.count)
-    monkeypatch.setattr(finding, "chi2_in", lambda tied, noise: 1.1 * tied.fit.count)
-    monkeypatch.setattr(finding, "board_of", lambda *_: None)
+    monkeypatch.setattr(searching, "continuous_fit", told)
+    monkeypatch.setattr(searching, "chi2_in", lambda fitted, noise: 1.1 * fitted.fit.count)
+    monkeypatch.setattr(finding, "chi2_in", lambda fitted, noise: 1.1 * fitted.fit.count)
+    monkeypatch.setattr(finding, "normal_equations_of", lambda *_: None)
     monkeypatch.setattr(searching, "searched", lambda *_: [])
-    monkeypatch.setattr(searching, "proposals", lambda *_: [])
-    monkeypatch.setattr(searching, "one_per_effect", lambda _: [Proposal(tilt, 1e6, {size: 0.3})])
+    monkeypatch.setattr(searching, "screened_candidates", lambda *_: [])
+    monkeypatch.setattr(searching, "one_per_effect", lambda _: [ScreenedCandidate(tilt, 1e6, {size: 0.3})])
     found = finding.Search(tuple(recordings), (), fit, fit.noise, (tilt,), base, base, *UNASKED)
     _, best = searching.next_effect(found, base, 0)
     assert best is not None
-    assert best.hypothesis.trials == (tilt,)
+    assert best.hypothesis.candidates == (tilt,)
 
 
 def test_far_from_the_data_what_sensors_asked_of_one_another_is_refitted_first_and_beside_it_is_not(monkeypatch):
@@ -136,25 +140,25 @@ def exchanged(monkeypatch: pytest.MonkeyPatch, without_scale: float) -> set[str]
     ``without_scale`` is the score of the offset and the place alone; that of the three is 40, with the place 42.
     """
     recordings = coasts(seconds=1.0)
-    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
+    fit = Fit(tuple(first_trajectory(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
     linears = linearised(fit)
-    fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
+    fit = Fit(fit.trajectories, (), np.empty(0), fit.defects, stated_noise(linears), linears=linears)
     offset, scale, board, place = map(
-        free_trial, ("accel.time_offset", "accel.scale", "board.rotation", "accel.position_offset")
+        free_candidate, ("accel.time_offset", "accel.scale", "board.rotation", "accel.position_offset")
     )
 
-    def told(fit: Fit, hypothesis: Hypothesis, *others: object, bar: float) -> Tied:
-        return Tied(hypothesis, fit, without_scale if set(hypothesis.trials) == {offset, place} else 1e4)
+    def told(fit: Fit, hypothesis: Hypothesis, *others: object, bar: float) -> ContinuousFit:
+        return ContinuousFit(hypothesis, fit, without_scale if set(hypothesis.candidates) == {offset, place} else 1e4)
 
-    monkeypatch.setattr(exchange, "tied_fit", told)
+    monkeypatch.setattr(exchange, "continuous_fit", told)
     monkeypatch.setattr(exchange, "possible", lambda _: True)
-    final = Tied(Hypothesis((offset, scale, board)), fit, 40.0)
-    base = Tied(Hypothesis(), fit, 1e6)
+    final = ContinuousFit(Hypothesis((offset, scale, board)), fit, 40.0)
+    base = ContinuousFit(Hypothesis(), fit, 1e6)
     found = finding.Search(tuple(recordings), (), fit, fit.noise, (), base, final, *UNASKED)
-    with_place = Tied(Hypothesis((offset, scale, place)), fit, 42.0)
+    with_place = ContinuousFit(Hypothesis((offset, scale, place)), fit, 42.0)
     rivals = {board.name: [finding.Rival(place, 2.0, with_place)]}
     better = exchange.exchanged(replace(found, rivals=rivals))
-    return None if better is None else {trial.id for trial in better.hypothesis.trials}
+    return None if better is None else {candidate.id for candidate in better.hypothesis.candidates}
 
 
 def test_a_rival_that_makes_another_effect_superfluous_takes_the_place_of_both(monkeypatch):
@@ -172,17 +176,19 @@ def scope(monkeypatch: pytest.MonkeyPatch, everywhere: float) -> frozenset[int] 
     ``everywhere`` is its score in both.
     """
     recordings = coasts(seconds=1.0)
-    fit = Fit(tuple(first_chain(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
+    fit = Fit(tuple(first_trajectory(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
     linears = linearised(fit)
-    fit = Fit(fit.chains, (), np.empty(0), fit.jumps, stated_noise(linears), linears=linears)
-    stall = replace(free_trial("aero.stall"), recordings=frozenset([1]))
-    monkeypatch.setattr(exchange, "tied_fit", lambda fit, hypothesis, *_, bar: Tied(hypothesis, fit, everywhere))
+    fit = Fit(fit.trajectories, (), np.empty(0), fit.defects, stated_noise(linears), linears=linears)
+    stall = replace(free_candidate("aero.stall"), recordings=frozenset([1]))
+    monkeypatch.setattr(
+        exchange, "continuous_fit", lambda fit, hypothesis, *_, bar: ContinuousFit(hypothesis, fit, everywhere)
+    )
     monkeypatch.setattr(exchange, "possible", lambda _: True)
     monkeypatch.setattr(exchange, "lost", lambda *_: False)
-    base, final = Tied(Hypothesis(), fit, 1e6), Tied(Hypothesis((stall,)), fit, 40.0)
+    base, final = ContinuousFit(Hypothesis(), fit, 1e6), ContinuousFit(Hypothesis((stall,)), fit, 40.0)
     found = finding.Search(tuple(recordings), (), fit, fit.noise, (), base, final, *UNASKED)
-    (trial,) = exchange.widened(found, final).hypothesis.trials
-    return trial.recordings
+    (candidate,) = exchange.widened(found, final).hypothesis.candidates
+    return candidate.recordings
 
 
 def test_an_effect_that_one_recording_shows_is_named_in_all_where_the_others_do_not_contradict_it(monkeypatch):
@@ -197,7 +203,7 @@ def test_an_effect_that_the_others_contradict_stays_in_its_recording(monkeypatch
 def test_a_centre_of_mass_off_the_disc_is_not_refitted_and_a_sensor_s_unknown_place_is():
     """Where a path alone is recorded algebra asks for metres of the one; along the axis nothing shows the other."""
     recordings = throws(seconds=0.3)
-    base = Tied(Hypothesis(), Fit((), (), np.empty(0), FLIGHT.sizes.continuous, {}), 0.0)
+    base = ContinuousFit(Hypothesis(), Fit((), (), np.empty(0), FLIGHT.sizes.continuous, {}), 0.0)
     found = finding.Search(tuple(recordings), (), base.fit, {}, (), base, base, *UNASKED)
     radius = 0.5 * recordings[0].disc.diameter
 

@@ -10,14 +10,14 @@ from support.made import tables, throws
 
 from discsim.effects import CATALOGUE, Effect, effect
 from discsim.written import as_written
-from validation.diagnosis.selection.candidates import available, parameters_of, trials_for
+from validation.diagnosis.selection.candidates import available, candidates_for, parameters_of
 from validation.diagnosis.selection.stepwise import search
 from validation.diagnosis.setup import SetupFindings
 from validation.diagnosis.setup_effects import with_reversed_axes
 
 
 def test_a_setting_is_no_trial_of_the_search_and_a_size_is():
-    tried = {trial.id for trial in trials_for(throws(seconds=0.5))}
+    tried = {candidate.id for candidate in candidates_for(throws(seconds=0.5))}
     setup = {id for id, row in CATALOGUE.items() if row.setup}
     assert tried & setup == {id for id in setup if not CATALOGUE[id].settings}
     assert {"mag.time_offset", "board.rotation", "site.field"} <= tried
@@ -25,8 +25,8 @@ def test_a_setting_is_no_trial_of_the_search_and_a_size_is():
 
 def test_a_turn_that_nothing_shows_is_held_where_it_is():
     """A prior of radians keeps normal equations regular where no sensor tells a direction."""
-    trial = next(trial for trial in trials_for(tables()) if trial.id == "board.rotation")
-    for parameter in parameters_of(trial):
+    candidate = next(candidate for candidate in candidates_for(tables()) if candidate.id == "board.rotation")
+    for parameter in parameters_of(candidate):
         assert np.pi < parameter.sigma < 100.0
 
 
@@ -52,7 +52,7 @@ def test_what_needs_a_sensor_that_is_not_there_is_not_tried():
 )
 def test_a_small_fault_on_a_rate_table_is_named_alone_with_its_size(fault: Effect, sd: dict[str, float]):
     final = search(tables(errors=[fault])).final
-    assert [trial.id for trial in final.hypothesis.trials] == [fault.id]
+    assert [candidate.id for candidate in final.hypothesis.candidates] == [fault.id]
     errors = np.sqrt(np.diag(final.fit.covariance))
     found = {q.name: (v, e) for q, v, e in zip(final.fit.parameters, final.fit.at, errors, strict=True)}
     for name, largest in sd.items():
@@ -68,7 +68,7 @@ def test_an_offset_of_time_beside_a_place_is_not_told_as_a_turned_board_and_a_sc
         effect("accel.position_offset", dx_m=4e-5, dy_m=-3.6e-4),
     ]
     final = search(tables(errors=errors)).final
-    assert {trial.id for trial in final.hypothesis.trials} == {error.id for error in errors}
+    assert {candidate.id for candidate in final.hypothesis.candidates} == {error.id for error in errors}
     found = {q.name: v for q, v in zip(final.fit.parameters, final.fit.at, strict=True)}
     assert found["offset_s"] == pytest.approx(-0.018, abs=5e-4)
     assert found["dy_m"] == pytest.approx(-3.6e-4, abs=3e-5)

@@ -25,7 +25,7 @@ from validation.challenge.cases.off_catalogue import (
     haunted,
 )
 from validation.diagnosis.relaxed_fit import relaxed
-from validation.diagnosis.selection.constrained_fit import tied_fit
+from validation.diagnosis.selection.continuous_fit import continuous_fit
 from validation.diagnosis.selection.hypothesis import Hypothesis
 from validation.diagnosis.unknown_law.find import FoundLaw, find_law
 from validation.identification.noise import estimate_noise
@@ -49,10 +49,10 @@ def coasting(secrets: Sequence[OffCatalogue | None], seconds: float = 5.0) -> li
 
 def law_of(recordings: Sequence[Recording]) -> FoundLaw | None:
     own = stated_parameters(recordings)
-    loose = relaxed(recordings, own)
-    noise = estimate_noise(loose.linears, [linear.residual for linear in loose.linears])
-    base = tied_fit(loose, Hypothesis(), own, noise, {}, iterations=6, polish=1)
-    return find_law(loose, base, own, noise, recordings)
+    relaxed_fit = relaxed(recordings, own)
+    noise = estimate_noise(relaxed_fit.linears, [linear.residual for linear in relaxed_fit.linears])
+    base = continuous_fit(relaxed_fit, Hypothesis(), own, noise, {}, iterations=6, polish=1)
+    return find_law(relaxed_fit, base, own, noise, recordings)
 
 
 def within(found: FoundLaw, name: str, truth: float, sigmas: float = 3.0) -> bool:

@@ -1,7 +1,8 @@
-"""An accelerometer that forgets slowly: what the throw has left in it, dying away while the disc already flies.
+"""The transient of a low-pass: what the throw has left in an accelerometer, dying away while the disc already flies.
 
-A low-pass of time constant tau hides what turns with the spin and keeps the acceleration of the hand: what it reads
-beyond the pull towards the axis falls off as exp(-t/tau), the same in every recording of one sensor (accel.lag).
+Takes recordings; gives the time constant tau with proofs on recordings set aside. A low-pass hides what turns with the
+spin and keeps the acceleration of the hand: what it reads beyond the pull towards the axis falls off as exp(-t/tau),
+the same in every recording of one sensor (accel.lag).
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import Lag
 from discsim.recording import Recording
-from validation.diagnosis.consistency.turning import pull_of
+from validation.diagnosis.consistency.phase_regression import centripetal_of
 from validation.identification.plants import plant_of
 
-__all__ = ["SettleProof", "Settling", "settling_of"]
+__all__ = ["LowPassTransient", "TransientProof", "low_pass_transient_of"]
 
 _LAG = catalogued(Lag, "accelerometer").id
 #: time constants that are tried, s
@@ -46,7 +47,7 @@ class _Start:
 
 
 @dataclass(frozen=True)
-class SettleProof:
+class TransientProof:
     """A recording's own time constant, that of the others, and what that leaves of this one, rms m/s^2 of an axis."""
 
     recording: str
@@ -58,12 +59,12 @@ class SettleProof:
 
 
 @dataclass(frozen=True)
-class Settling:
+class LowPassTransient:
     """The time constant of all recordings, with an error from their scatter, and what it leaves of each."""
 
     tau_s: float
     sd_s: float
-    heldout: tuple[SettleProof, ...]
+    heldout: tuple[TransientProof, ...]
 
     @property
     def sentences(self) -> list[str]:
@@ -85,7 +86,7 @@ class Settling:
         return {"id": _LAG, **asdict(self)}
 
 
-def settling_of(recordings: Sequence[Recording], names: Sequence[str]) -> Settling | None:
+def low_pass_transient_of(recordings: Sequence[Recording], names: Sequence[str]) -> LowPassTransient | None:
     """Return how slowly the accelerometer settles, None where it does not show that, or in one recording alone."""
     starts = [
         start
@@ -105,7 +106,7 @@ def settling_of(recordings: Sequence[Recording], names: Sequence[str]) -> Settli
         best, sd = _lowest(own, start.t.size)
         numbers = 2.0 * start.t.size
         proofs.append(
-            SettleProof(
+            TransientProof(
                 start.name,
                 best,
                 sd,
@@ -117,7 +118,9 @@ def settling_of(recordings: Sequence[Recording], names: Sequence[str]) -> Settli
     if np.median([(proof.left_m_s2_after / proof.left_m_s2_before) ** 2 for proof in proofs]) > _LEFT:
         return None
     tau = float(_TAUS[int(np.argmin(np.sum([np.log(own) for own in squares.values()], axis=0)))])
-    return Settling(tau, float(np.std([proof.tau_s for proof in proofs], ddof=1) / np.sqrt(len(proofs))), tuple(proofs))
+    return LowPassTransient(
+        tau, float(np.std([proof.tau_s for proof in proofs], ddof=1) / np.sqrt(len(proofs))), tuple(proofs)
+    )
 
 
 def _lowest(squares: FloatArray, readings: int) -> tuple[float, float]:
@@ -130,7 +133,7 @@ def _lowest(squares: FloatArray, readings: int) -> tuple[float, float]:
 
 
 def _start(recording: Recording, name: str) -> _Start | None:
-    found = pull_of(recording)
+    found = centripetal_of(recording)
     if found is None or not plant_of(recording).airborne:
         return None
     t, felt, pull = found

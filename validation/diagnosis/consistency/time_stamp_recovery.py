@@ -1,8 +1,9 @@
-"""Rows that a logger wrote as if they were evenly spaced: how long each lasted, and in which ticks they come.
+"""Time-stamp recovery: how long each row lasted that a logger wrote as if evenly spaced, and in which ticks.
 
-Where a field turns steadily, the angle between two rows tells the time between them, once a gyroscope tells the rate.
-Rows that were lost, or came late, last several ticks of the sensor's own clock. Whole numbers of a common tick, found
-in every recording alike, are what no clock that merely runs wrong would make.
+Takes recordings; gives the tick and each row's duration. Where a field turns steadily, the angle between two rows tells
+the time between them, once a gyroscope tells the rate. Rows that were lost, or came late, last several ticks of the
+sensor's own clock. Whole numbers of a common tick, found in every recording alike, are what no clock that merely runs
+wrong would make.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.recording import Recording
-from validation.diagnosis.consistency.turning import angle_turned, retimed, signals_of, steps
+from validation.diagnosis.consistency.phase_regression import angle_turned, retimed, signals_of, steps
 
 __all__ = ["Durations", "Rows", "durations", "rows_of"]
 

@@ -1,4 +1,4 @@
-"""What a search has found so far, and what is asked of a fit: whether it is far from the data, and possible."""
+"""Where a search stands: what was found so far, and whether a fit is far from the data, and possible."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy as np
 from discsim.effects.catalogue import CATALOGUE, catalogued
 from discsim.effects.events import SpinStep
 from discsim.recording import Recording
-from validation.diagnosis.detectors.dropped_samples import Slips
-from validation.diagnosis.selection.candidates import Trial
-from validation.diagnosis.selection.constrained_fit import Tied
+from validation.diagnosis.detectors.dropped_samples import PhaseLosses
+from validation.diagnosis.selection.candidates import CandidateEffect
+from validation.diagnosis.selection.continuous_fit import ContinuousFit
 from validation.diagnosis.selection.evidence import ONE_SIDED
 from validation.diagnosis.selection.hypothesis import Start
-from validation.diagnosis.selection.proposals import Proposal
-from validation.diagnosis.selection.screening import Board, board_of
+from validation.diagnosis.selection.score_tests import ScreenedCandidate
+from validation.diagnosis.selection.screening import NormalEquations, normal_equations_of
 from validation.diagnosis.settings import SELECTION
 from validation.identification.gauss_newton import Fit
 from validation.identification.noise import NoiseModel, chi_squared
 from validation.identification.parameters import Parameter
-from validation.identification.residual_tests import remainders
+from validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = [
     "Considered",
@@ -44,9 +44,9 @@ _KICK = (catalogued(SpinStep).id, "t_s")
 
 @dataclass(frozen=True)
 class Considered:
-    """A trial that was refitted: what it gained when it was, by the likelihood and in chi-squared."""
+    """A candidate that was refitted: what it gained when it was, by the likelihood and in chi-squared."""
 
-    trial: Trial
+    candidate: CandidateEffect
     gain: float
     chi2_gain: float
     values: Mapping[str, float]
@@ -56,9 +56,9 @@ class Considered:
 class Rival:
     """An effect in the place of a named one: how much worse the likelihood is (twice its logarithm), and the fit."""
 
-    trial: Trial
+    candidate: CandidateEffect
     worse: float
-    tied: Tied
+    fitted: ContinuousFit
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +71,14 @@ class Search:
         The recordings as they are stated, and the parameters that they leave open without any effect.
     loose, loose_noise, loose_board
         The relaxed fit, its noise, and what every effect would do to it.
-    trials
+    candidates
         The effects that compete, at each of their shapes.
     base, final
         The fits of the baseline and of the effects so far.
     board, asked
         What every effect would do to a fit, in its own noise, and which fit that is: in the end the final one.
     steps, considered, rivals
-        Fits on the way; trials that were refitted; what could stand in for a named effect, by its name.
+        Fits on the way; candidates that were refitted; what could stand in for a named effect, by its name.
     outliers
         Readings that were left out: (recording, sensor, axis, time, deviations).
     hints
@@ -91,67 +91,70 @@ class Search:
 
     recordings: tuple[Recording, ...]
     own: tuple[Parameter, ...]
-    loose: Fit
-    loose_noise: NoiseModel
-    trials: tuple[Trial, ...]
-    base: Tied
-    final: Tied
-    loose_board: Board
-    board: Board
+    relaxed_fit: Fit
+    relaxed_noise: NoiseModel
+    candidates: tuple[CandidateEffect, ...]
+    base: ContinuousFit
+    final: ContinuousFit
+    loose_board: NormalEquations
+    equations: NormalEquations
     asked: Fit
-    steps: tuple[Tied, ...] = ()
+    steps: tuple[ContinuousFit, ...] = ()
     considered: tuple[Considered, ...] = ()
     rivals: Mapping[str, Sequence[Rival]] = field(default_factory=dict)
     outliers: tuple[tuple[int, str, str, float, float], ...] = ()
-    hints: tuple[Proposal, ...] = ()
+    hints: tuple[ScreenedCandidate, ...] = ()
     cost: float = 0.0
-    slips: Slips = field(default_factory=Slips)
+    phase_losses: PhaseLosses = field(default_factory=PhaseLosses)
 
     def about(self, fit: Fit) -> Search:
         """Return the search with its board about a fit, which is worked out once."""
         if self.asked is fit:
             return self
-        return replace(self, board=board_of(fit, self.trials, fit.noise, fit.plant.sizes.continuous), asked=fit)
+        return replace(
+            self, equations=normal_equations_of(fit, self.candidates, fit.noise, fit.plant.sizes.continuous), asked=fit
+        )
 
-    def with_step(self, tied: Tied) -> Search:
+    def with_step(self, fitted: ContinuousFit) -> Search:
         """Return the search with one more fit on the way."""
-        return replace(self, steps=(*self.steps, tied))
+        return replace(self, steps=(*self.steps, fitted))
 
     def at_base(self) -> Search:
         """Return the search as if nothing had been found."""
         return replace(self, final=self.base)
 
 
-def values_of_fit(tied: Tied) -> Start:
+def values_of_fit(fitted: ContinuousFit) -> Start:
     """Return the values of a fit's parameters as a start for another."""
-    return {(q.key, q.recordings): float(v) for q, v in zip(tied.fit.parameters, tied.fit.at, strict=True)}
+    return {(q.key, q.recordings): float(v) for q, v in zip(fitted.fit.parameters, fitted.fit.at, strict=True)}
 
 
-def chi2_in(tied: Tied, noise: NoiseModel) -> float:
+def chi2_in(fitted: ContinuousFit, noise: NoiseModel) -> float:
     """Return the chi-squared of a fit's residuals in a given noise."""
     return sum(
-        chi_squared(linear, noise, residual) for linear, residual in zip(tied.fit.linears, tied.residuals, strict=True)
+        chi_squared(linear, noise, residual)
+        for linear, residual in zip(fitted.fit.linears, fitted.residuals, strict=True)
     )
 
 
-def far(found: Search, tied: Tied) -> bool:
+def far(found: Search, fitted: ContinuousFit) -> bool:
     """Tell whether a fit is far from the data."""
-    return chi2_in(tied, found.loose_noise) > SELECTION.far * tied.fit.count
+    return chi2_in(fitted, found.relaxed_noise) > SELECTION.far * fitted.fit.count
 
 
-def lost(found: Search, tied: Tied) -> bool:
+def lost(found: Search, fitted: ContinuousFit) -> bool:
     """Tell whether a fit is far from the data and leaves what is no noise: no answer rests on it."""
-    return far(found, tied) and bool(remainders(tied.fit.linears, tied.residuals, tied.fit.noise))
+    return far(found, fitted) and bool(unmodelled_residuals(fitted.fit.linears, fitted.residuals, fitted.fit.noise))
 
 
-def no_nearer(found: Search, before: Tied, after: Tied) -> bool:
+def no_nearer(found: Search, before: ContinuousFit, after: ContinuousFit) -> bool:
     """Tell whether one fit is not much nearer to the data than another."""
-    return chi2_in(after, found.loose_noise) > SELECTION.no_nearer * chi2_in(before, found.loose_noise)
+    return chi2_in(after, found.relaxed_noise) > SELECTION.no_nearer * chi2_in(before, found.relaxed_noise)
 
 
-def misses(found: Search, tied: Tied) -> bool:
+def misses(found: Search, fitted: ContinuousFit) -> bool:
     """Tell whether a fit is far from data that the relaxed fit follows: whatever it holds, something is missing."""
-    return far(found, tied) and found.loose.merit < SELECTION.followed * found.loose.count
+    return far(found, fitted) and found.relaxed_fit.merit < SELECTION.followed * found.relaxed_fit.count
 
 
 def on_the_disc(found: Search, start: Start) -> bool:
@@ -177,25 +180,25 @@ def _radius(recording: Recording) -> float:
     return np.inf if recording.disc is None else 0.5 * recording.disc.diameter
 
 
-def possible(tied: Tied) -> bool:
+def possible(fitted: ContinuousFit) -> bool:
     """Tell whether a fit's parameters make sense.
 
     Friction does not drive, an event is told from the start, neither a sensor nor the centre of mass lies off the disc.
     """
-    sd = np.sqrt(np.maximum(np.diag(tied.fit.covariance), 0.0))
-    recording = tied.fit.chains[0].recording
+    sd = np.sqrt(np.maximum(np.diag(fitted.fit.covariance), 0.0))
+    recording = fitted.fit.trajectories[0].recording
     radius = _radius(recording)
-    for q, value, error in zip(tied.fit.parameters, tied.fit.at, sd, strict=True):
+    for q, value, error in zip(fitted.fit.parameters, fitted.fit.at, sd, strict=True):
         if q.key in ONE_SIDED and ONE_SIDED[q.key] * value < -3.0 * error:
             return False
-        if q.key == _KICK and value < tied.fit.plant.durations.event_from:
+        if q.key == _KICK and value < fitted.fit.plant.durations.event_from:
             return False
         if _is_place(q.group) and abs(value) - 3.0 * error > radius:
             return False
     return True
 
 
-def from_here(proposal: Proposal, current: Tied) -> Proposal:
-    """Return a proposal whose start keeps what the fit has found for everything else."""
-    own = {key: value for key, value in proposal.start.items() if key[0][0] == proposal.trial.id}
-    return replace(proposal, start={**values_of_fit(current), **own})
+def from_here(screened: ScreenedCandidate, current: ContinuousFit) -> ScreenedCandidate:
+    """Return a screened candidate whose start keeps what the fit has found for everything else."""
+    own = {key: value for key, value in screened.start.items() if key[0][0] == screened.candidate.id}
+    return replace(screened, start={**values_of_fit(current), **own})

@@ -1,9 +1,9 @@
-"""What turns with the spin, sensor by sensor: how far each turns in the time that the recording writes.
+"""Phase regression: how far each sensor's signal turns in the time that the recording writes.
 
-The field, which stands still in N, turns backwards in B; the wobble of a disc turns forwards, (Izz - Ixx)/Ixx times as
-fast as it spins. Each is followed against the angle that a sensor of the
-rate makes over the written times, in short segments whose amplitude and phase are free: a sensor that turns further
-than that angle says that the time, or the rate, is wrong.
+Takes a recording; gives each signal's turn against the angle that a sensor of the rate makes. The field, which stands
+still in N, turns backwards in B; the wobble of a disc turns forwards, (Izz - Ixx)/Ixx times as fast as it spins. Each
+is followed in short segments whose amplitude and phase are free: a sensor that turns further than that angle says that
+the time, or the rate, is wrong.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ __all__ = [
     "Tone",
     "angle_turned",
     "centripetal",
+    "centripetal_of",
     "explained",
     "left_of",
-    "pull_of",
     "rate_of",
     "rest_of",
     "retimed",
@@ -226,7 +226,7 @@ def tone(signal: Signal, psi: FloatArray) -> Tone:
     return Tone(ratio, sd, explained(signal, psi, ratio))
 
 
-def pull_of(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+def centripetal_of(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Return times (n,) and the accelerometer's x and y (n, 2), measured and as the spin alone would make them.
 
     None without an accelerometer off the axis or a sensor of the rate; what is clipped or missing is NaN.
@@ -246,7 +246,7 @@ def pull_of(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray] |
 
 def centripetal(recording: Recording) -> Tone | None:
     """Return the rate by the accelerometer's pull towards the axis over that by the gyroscope: no time enters it."""
-    found = pull_of(recording)
+    found = centripetal_of(recording)
     if found is None:
         return None
     t, f, pull = found
