@@ -96,11 +96,11 @@ def clipped(value: FloatArray, stated_range: float | None, resolution: float | N
     A whole sensor's readings are wanted: what its other axes and times show of its noise is part of the judgement.
     """
     if value.flags.writeable or value.base is not None:
-        return _clipped(value, stated_range, resolution)
+        return clipped_anew(value, stated_range, resolution)
     known = _KNOWN.get(id(value))
     if known is not None and known[0]() is value and known[1] == (stated_range, resolution):
         return known[2]
-    found = _clipped(value, stated_range, resolution)
+    found = clipped_anew(value, stated_range, resolution)
     found.flags.writeable = False
     with _LOCK:  # recordings are looked at side by side
         for key in [key for key, (array, _, _) in _KNOWN.items() if array() is None]:
@@ -111,7 +111,7 @@ def clipped(value: FloatArray, stated_range: float | None, resolution: float | N
     return found
 
 
-def _clipped(value: FloatArray, stated_range: float | None, resolution: float | None) -> BoolArray:
+def clipped_anew(value: FloatArray, stated_range: float | None, resolution: float | None) -> BoolArray:
     table = value if value.ndim == 2 else value[:, None]
     step = resolution or step_of(table)
     found = at_range(table, stated_range, step)

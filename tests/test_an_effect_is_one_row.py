@@ -136,7 +136,7 @@ told["bent"] = np.max(np.abs(sound)), np.max(np.abs(bent - sound - 1e-3 * sound 
 candidates = {candidate.id: candidate for candidate in candidates_for([plain]) if candidate.id in ids}
 told["candidates"] = sorted(candidates)
 columns = [column for candidate in candidates.values() for column in candidate.columns]
-slopes = linearise(first_trajectory(plain), {}, columns, FLIGHT.sizes.continuous.allowed).shared
+slopes = linearise(first_trajectory(plain), {}, columns, FLIGHT.sizes.continuous.allowed).common
 told["slopes"] = {c.group: float(np.max(np.abs(slopes[:, k]))) for k, c in enumerate(columns)}
 
 # challenge
@@ -196,7 +196,7 @@ def test_its_sensor_records_an_effect_that_is_one_row(told):
 
 
 def test_a_diagnosis_tries_an_effect_that_is_one_row(told):
-    assert told["trials"] == BOTH
+    assert told["candidates"] == BOTH
     assert all(0.0 < slope < float("inf") for slope in told["slopes"].values())
     assert len(told["slopes"]) == 2
 

@@ -28,10 +28,18 @@ LONG_FILES = {
 }
 LONG_FUNCTIONS = {
     "tests/support/outcomes.py:explained": "one literal: the whole outcome that the tests of the report read",
+    "validation/commands/estimate.py:command": "one option after another, and the help that users read",
+    "validation/commands/fly.py:command": "one option after another, and the help that users read",
+    "validation/commands/plan.py:command": "one option after another, and the help that users read",
+    "validation/commands/scatter.py:command": "one option after another, and the help that users read",
+    "validation/planning/planned.py:plan": "a door: most of it says what its arguments are",
+    "validation/scattering/scattered.py:scatter": "a door: most of it says what its arguments are",
     "validation/commands/rate_table.py:command": "older than the rule; its body is to call and not to work",
     "validation/sweeps/result.py:labelled": "older than the rule; to be split by idea",
 }
 MANY_ARGUMENTS = {
+    "validation/planning/planned.py:plan": "a door: what is planned, with which parts, instead of which",
+    "validation/scattering/scattered.py:scatter": "a door: what is thrown, and what of it is uncertain",
     "tests/support/made_logs.py:write_table": "older than the rule, one above it",
     "tests/support/spinning_sensor.py:tone": "older than the rule; what a tone is made of belongs together",
 }

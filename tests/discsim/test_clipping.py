@@ -126,7 +126,7 @@ def test_an_axis_that_never_changes_is_dead_where_others_scatter_and_it_is_small
 
 def test_recordings_that_are_looked_at_side_by_side_do_not_disturb_one_another(monkeypatch):
     """What is remembered of readings goes with them: threads that drop theirs at once clear one memory."""
-    monkeypatch.setattr(clipping, "_clipped", lambda value, *_: np.zeros(value.shape, dtype=np.bool_))
+    monkeypatch.setattr(clipping, "clipped_anew", lambda value, *_: np.zeros(value.shape, dtype=np.bool_))
 
     def look(number: int) -> int:
         for _ in range(3000):

@@ -19,7 +19,9 @@ def command(
     effect: EffectOption = None,
     seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 7,
 ) -> None:
-    """Write a CSV log of simulated throws, as a stranger's logger would: with rest, hand, and columns of its own.
+    """Write a CSV log of simulated throws, as a stranger's logger would.
+
+    It holds rest, the hand that throws, and columns of its own.
 
     Example: discsim example-log my-log.csv --throws 3 --spin 1700 --effect mag.hard_iron:bx_uT=9,by_uT=-6
     """

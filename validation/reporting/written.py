@@ -27,7 +27,7 @@ class Written:
     """The files of a folder by their digests: those of an earlier run (None: it kept no list), and of this one."""
 
     out: Path
-    before: dict[str, str] | None
+    before: dict[str, str | None] | None
     now: set[str] = field(default_factory=set)
 
     def __call__(self, path: Path) -> None:
@@ -43,19 +43,28 @@ class Written:
                 f"{path}: is there, and discsim did not write it, or it was changed since; expected another --out, or "
                 "--force to overwrite it"
             )
-        self.now.add(name)
+        if name not in self.now:
+            self.now.add(name)
+            self._note()
+
+    def _note(self) -> None:
+        """Say in the folder what is being written, for a run that is killed cannot say it later."""
+        unknown = [name for name, value in (self.before or {}).items() if value is None]
+        marked = json.dumps(dict.fromkeys(sorted({*unknown, *self.now})))
+        (self.out / _UNFINISHED).write_text(marked + "\n", encoding="utf-8")
 
     def _ours(self, name: str, path: Path) -> bool:
         if OVERWRITE.get() or self.before is None:
             return True
-        return self.before.get(name) == digest(path)
+        # of what a killed run was writing only the name is known
+        return name in self.before and self.before[name] in (None, digest(path))
 
     def digests(self) -> dict[str, str]:
         """Return the digests of what this run has written, and of what an earlier one had and is as it was."""
         kept = {
             name: value
             for name, value in (self.before or {}).items()
-            if name not in self.now and (self.out / name).is_file()
+            if value is not None and name not in self.now and (self.out / name).is_file()
         }
         mine = {name: digest(self.out / name) for name in self.now if (self.out / name).is_file()}
         return dict(sorted({**kept, **mine}.items()))
@@ -75,9 +84,9 @@ def watching(out: Path) -> Iterator[Written]:
     (out / _UNFINISHED).unlink(missing_ok=True)
 
 
-def _before(out: Path) -> dict[str, str] | None:
+def _before(out: Path) -> dict[str, str | None] | None:
     """Return what earlier runs wrote; None where one did that kept no list."""
-    found: dict[str, str] = {}
+    found: dict[str, str | None] = {}
     for name in ("run.json", _UNFINISHED):
         try:
             content = json.loads((out / name).read_bytes())

@@ -305,8 +305,8 @@ def _made(inputs: Inputs, flown: Flown, nominal: FloatArray, heading: float, see
         flown,
         nominal,
         heading,
-        tuple(_ellipses(ends[:, :2])),
-        tuple(_percentiles(name, unit, float(middle[name, unit][0]), v) for (name, unit), v in results.items()),
+        tuple(ellipses_of(ends[:, :2])),
+        tuple(percentiles_of(name, unit, float(middle[name, unit][0]), v) for (name, unit), v in results.items()),
         tuple(sensitivities(inputs, rows, results[key], key[0]) for key in results if key[0] in _EXPLAINED),
         seed,
     )
@@ -329,7 +329,7 @@ def _results(ends: FloatArray, start: FloatArray, heading: float) -> dict[tuple[
     }
 
 
-def _ellipses(points: FloatArray) -> list[Ellipse]:
+def ellipses_of(points: FloatArray) -> list[Ellipse]:
     """Return the ellipses of landings (n, 2), north and east."""
     mean, covariance = points.mean(axis=0), np.cov(points.T)
     w, V = np.linalg.eigh(covariance)
@@ -345,7 +345,7 @@ def _ellipses(points: FloatArray) -> list[Ellipse]:
     return found
 
 
-def _percentiles(name: str, unit: str, nominal: float, values: FloatArray) -> Percentiles:
+def percentiles_of(name: str, unit: str, nominal: float, values: FloatArray) -> Percentiles:
     """Return percentiles of values (n,), and of each the order statistics that hold it in 95 of 100 samples."""
     ranked, n = np.sort(values), values.size
     places = [

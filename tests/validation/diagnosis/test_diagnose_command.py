@@ -80,7 +80,7 @@ def test_it_writes_its_answer_and_the_model_and_says_the_verdict(monkeypatch, tm
     assert options["seed"] == 7
     said = capsys.readouterr()
     assert said.out.startswith("explained: The baseline leaves out a steady wind")
-    assert said.err == "fitting (2)\n"
+    assert said.err == "fitting (step 2 of 2)\n"
 
 
 def test_an_effect_of_ones_own_is_handed_on_and_its_file_kept_in_the_run(monkeypatch, tmp_path, asked):

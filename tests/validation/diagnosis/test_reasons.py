@@ -16,7 +16,7 @@ def considered(candidate: CandidateEffect, gain: float) -> Considered:
     return Considered(candidate, gain, gain, {})
 
 
-@pytest.mark.parametrize("trial", [BIAS, IMPULSE], ids=lambda candidate: candidate.id)
+@pytest.mark.parametrize("candidate", [BIAS, IMPULSE], ids=lambda candidate: candidate.id)
 def test_a_candidate_is_dear_or_beaten_by_its_own_price(candidate):
     assert reason_for(considered(candidate, price(candidate) - 1.0), []) == "worth less than its price"
     assert reason_for(considered(candidate, price(candidate) + 1.0), []) == "another explains more"

@@ -152,6 +152,7 @@ def test_a_changed_plan_is_refused_until_it_is_told_to_start_anew(plan, undistur
     for name, content in undisturbed.items():
         (out / name).parent.mkdir(parents=True, exist_ok=True)
         (out / name).write_bytes(content)
+    (out / "run.json").write_text("{}")  # of a version that kept no list of its files
     assert sweep(plan, out, "--workers", "1", "--mounts", "2") == 2
     message = capsys.readouterr().err
     assert "holds results of another run (estimators, mounts differ)" in message

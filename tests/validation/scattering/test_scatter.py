@@ -67,7 +67,7 @@ def test_few_flights_are_asked_for_a_linear_answer_only():
 
 def test_ellipses_hold_their_share_and_those_of_normal_landings_have_the_normal_size():
     points = np.random.default_rng(0).multivariate_normal([80.0, 3.0], [[9.0, 4.0], [4.0, 4.0]], 20_000)
-    for ellipse in scattered._ellipses(points):
+    for ellipse in scattered.ellipses_of(points):
         turn = np.radians(ellipse.direction_deg)
         away = points - [ellipse.north, ellipse.east]
         long = away @ [np.cos(turn), np.sin(turn)] / ellipse.semi_axes[0]
@@ -80,7 +80,7 @@ def test_the_interval_of_a_percentile_holds_it_in_95_of_100_samples():
     rng = np.random.default_rng(3)
     held = 0
     for _ in range(400):
-        found = scattered._percentiles("x", "m", 0.0, rng.standard_normal(300))
+        found = scattered.percentiles_of("x", "m", 0.0, rng.standard_normal(300))
         low, high = found.intervals[2]
         held += low <= 0.0 <= high
     assert held / 400 > 0.92  # binomial: 0.95 -+ 0.011, and the interval is conservative

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -58,6 +60,24 @@ def test_a_run_that_was_stopped_does_not_stand_in_the_way_of_the_next(tmp_path):
     assert not (tmp_path / "run.json").exists()
     run(tmp_path, "whole")
     assert [path.name for path in sorted(tmp_path.iterdir())] == ["answer.txt", "run.json"]
+
+
+def test_a_run_that_was_killed_does_not_stand_in_the_way_of_the_next(tmp_path):
+    """Nothing runs behind a signal that kills: what is being written is said before it is."""
+    killed = (
+        "import os, signal, sys; from pathlib import Path; from discsim.files import write_text\n"
+        "from validation.reporting.run import start_run\n"
+        "out = Path(sys.argv[1])\n"
+        "with start_run(out):\n"
+        "    write_text(out / 'answer.txt', 'half')\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    assert subprocess.run([sys.executable, "-c", killed, str(tmp_path)], check=False).returncode == -signal.SIGKILL
+    assert (tmp_path / "answer.txt").read_text() == "half"
+    (tmp_path / "mine.txt").write_text("mine")
+    run(tmp_path, "whole")
+    assert (tmp_path / "answer.txt").read_text() == "whole"
+    assert {path.name for path in tmp_path.iterdir()} == {"answer.txt", "mine.txt", "run.json"}
 
 
 def test_a_folder_of_before_there_was_a_list_is_taken_as_discsim_s(tmp_path):
