@@ -19,7 +19,8 @@ from discsim.sensors.sampling import Noise
 from validation.diagnosis import diagnose
 
 rig = Rig(Izz=0.0025, viscous=1.5e-5)
-part = Instruments.from_parts("mpu9250").without("accelerometer", "gps").fitted("gyroscope", range=100.0, noise=Noise(0.01))
+part = Instruments.from_parts("mpu9250").without("accelerometer")
+part = part.fitted("gyroscope", range=100.0, noise=Noise(0.01))
 stepping = part.with_effects([effect("gyro.bias_step", t_s=2.2, step_rad_s=0.04)])
 environment = Environment(magnetic_field=np.array([20.0, 0.0, 45.0]))
 runs = []
