@@ -6,15 +6,17 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from discsim.arrays import FloatArray, readonly
 from discsim.files import write_text
 from discsim.shipped import load_disc, load_throw
 from discsim.trajectory import predict
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = [
     "Carried",

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from matplotlib import colormaps
 from scipy.stats import sobol_indices
 
@@ -16,6 +15,9 @@ from validation.reporting.figures import new_figure, save_figure
 from validation.sweeps.cases import cases_of, described
 from validation.sweeps.chunks import Sweep
 from validation.sweeps.mounts import MOUNT_FIELDS
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["Share", "draw_shares", "shares_of", "write_shares"]
 

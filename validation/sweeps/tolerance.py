@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from scipy.stats import qmc
 
 from discsim.arrays import FloatArray
@@ -14,6 +13,9 @@ from discsim.files import write_text
 from validation.reporting.figures import new_figure, save_figure
 from validation.sweeps.cases import READ, cases_of, described
 from validation.sweeps.chunks import Sweep
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["Tolerance", "draw_tolerances", "sentences_of", "tolerances_of", "write_tolerances"]
 
