@@ -129,8 +129,8 @@ def asked(case: Case, recordings: Sequence[Recording]) -> dict[str, str]:
     fitted, _ = with_inertia(prepared(recordings, names)[0])
     found = screened(fitted)
     base = found.base
-    near = screened_candidates(found.about(base.fit).board, found.trials, Hypothesis(), found.own)
-    odd = [p for p in near if p.trial.recordings is not None and p.trial.row.of_disc]
+    near = screened_candidates(found.about(base.fit).equations, found.candidates, Hypothesis(), found.own)
+    odd = [p for p in near if p.candidate.recordings is not None and p.candidate.row.of_disc]
     best: dict[str, Sequence[ScreenedCandidate]] = {
         "effect": [p for p in near if p not in odd],
         "other_disc": odd,
@@ -147,7 +147,7 @@ def asked(case: Case, recordings: Sequence[Recording]) -> dict[str, str]:
         if some := best.get(limit.column, ()):
             top = max(some, key=_less)
             row[limit.column] = f"{_reached(found, top, limit):.3f}"
-            row[f"{limit.column}_is"] = top.trial.name
+            row[f"{limit.column}_is"] = top.candidate.name
     row |= {name: f"{value:.3f}" for name, value in _left(found).items()}
     return row
 
@@ -163,7 +163,7 @@ def verdict_on(number: int, seed: int) -> str:
 
 
 def _less(screened: ScreenedCandidate) -> float:
-    return screened.gain - SELECTION.per_parameter * len(parameters_of(screened.trial))
+    return screened.gain - SELECTION.per_parameter * len(parameters_of(screened.candidate))
 
 
 def _reached(found: Search, top: ScreenedCandidate, limit: Limit) -> float:
@@ -173,12 +173,12 @@ def _reached(found: Search, top: ScreenedCandidate, limit: Limit) -> float:
     base = found.base
     refitted = continuous_fit(
         found.relaxed_fit if limit.column in ("event", "gust") else base.fit,
-        Hypothesis((top.trial,)),
+        Hypothesis((top.candidate,)),
         found.own,
         base.fit.noise,
         {**values_of_fit(base), **top.start},
     )
-    return base.score - refitted.score - SELECTION.per_parameter * len(parameters_of(top.trial))
+    return base.score - refitted.score - SELECTION.per_parameter * len(parameters_of(top.candidate))
 
 
 def _left(found: Search) -> dict[str, float]:
