@@ -288,9 +288,9 @@ def test_where_the_field_alone_is_read_a_tilt_of_the_axis_and_another_field_stan
     assert case.concealed[1].effect.id == "rig.axis_tilt"
     made = [corrected(one, [case.concealed[0].effect]) for one in recordings(case)]
     found = search(made)
-    (trial,) = found.final.hypothesis.trials
-    assert trial.id == "rig.axis_tilt"
-    assert "site.field" in [rival.trial.id for rival in found.rivals["rig.axis_tilt"]]
+    (candidate,) = found.final.hypothesis.candidates
+    assert candidate.id == "rig.axis_tilt"
+    assert "site.field" in [rival.candidate.id for rival in found.rivals["rig.axis_tilt"]]
 
 
 def test_a_late_gyroscope_that_few_relations_show_is_borne_out_by_the_air():
