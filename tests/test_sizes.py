@@ -19,15 +19,8 @@ LINES_OF_A_FUNCTION, ARGUMENTS, LINES_OF_A_FILE = 60, 8, 600
 COMPILED = ("compiled", "inlined", "numba.", "njit", "intrinsic", "overload", "cfunc", "compiler.cfunc")
 
 #: where a rule does not hold, and why: "file" for its lines, "file:function" for its lines or its arguments
-LONG_FILES = {
-    "tests/discsim/test_damaged_recording.py": "older than the rule, a little above it; to be split by idea",
-    "tests/discsim/test_recording.py": "older than the rule, a little above it; to be split by idea",
-    "tests/discsim/test_sensors.py": "older than the rule, a little above it; to be split by idea",
-    "tests/validation/importing/test_importing.py": "older than the rule, a little above it; to be split by idea",
-    "tests/validation/importing/test_sniffing.py": "older than the rule, a little above it; to be split by idea",
-}
+LONG_FILES: dict[str, str] = {}
 LONG_FUNCTIONS = {
-    "tests/support/outcomes.py:explained": "one literal: the whole outcome that the tests of the report read",
     "validation/commands/estimate.py:command": "one option after another, and the help that users read",
     "validation/commands/fly.py:command": "one option after another, and the help that users read",
     "validation/commands/plan.py:command": "one option after another, and the help that users read",

@@ -19,7 +19,7 @@ from scipy.interpolate import BSpline
 from discsim.arrays import ComplexArray, FloatArray, IntArray
 from discsim.compiled import compiled
 from discsim.recording import Recording
-from validation.diagnosis.consistency.phase_regression import rate_of, retimed, signals_of
+from validation.diagnosis.consistency.phase_regression import rate_of, retimed, signal_of
 from validation.diagnosis.consistency.time_stamp_recovery import Rows
 
 __all__ = ["OwnClock", "SamplesShown", "own_clock_of"]
@@ -117,10 +117,10 @@ class OwnClock:
     def counted(self, recording: Recording, name: str) -> Recording | None:
         """Return a recording with its samples at the times that its rows' samples give, None where there is none."""
         mine = next((item for item in self.shown if item.recording == name), None)
-        written = _field_times(recording)
-        if mine is None or written is None:
+        field = signal_of(recording, "field")
+        if mine is None or field is None:
             return None
-        return retimed(recording, written, written[0] + mine.times())
+        return retimed(recording, field.t, field.t[0] + mine.times())
 
     @property
     def sentences(self) -> list[str]:
@@ -304,8 +304,9 @@ def _followed(field: _Field, newest: IntArray, apart: IntArray, period: float, *
     """Return the likeliest samples of a recording's rows, found with the motion in turn from first guesses."""
     ahead = np.full(_AHEAD.size, np.inf)
     ahead[1:] = -2.0 * np.log(_AHEAD[1:])
-    skipped = np.array([1.0 - _SKIPPED, _SKIPPED] if means else [1.0])
-    skipped = -2.0 * np.log(skipped)
+    skipped = -2.0 * np.log(np.array([1.0 - _SKIPPED, _SKIPPED] if means else [1.0]))
+    middle = np.median(field.value.real) + 1j * np.median(field.value.imag)
+    size = float(np.median(np.abs(field.value - middle)))
     found: _Found | None = None
     for _ in range(_ROUNDS):
         t = np.asarray((newest - (0.5 * apart if means else 0.0)) * period, dtype=np.float64)
@@ -313,7 +314,6 @@ def _followed(field: _Field, newest: IntArray, apart: IntArray, period: float, *
         columns = motion.columns(np.asarray(newest * period))
         if means:
             columns = np.asarray(0.5 * (columns + motion.columns(np.asarray((newest - apart) * period))))
-        size = float(np.median(np.abs(field.value - np.median(field.value.real) - 1j * np.median(field.value.imag))))
         x, left, scale = _fitted(columns, motion.held(size), field.value)
         every = motion.columns(np.arange(-2.0, newest[-1] + 12.0) * period) @ x
         shown = [0.5 * (every[2:] + every[1:-1]), 0.5 * (every[2:] + every[:-2])] if means else [every[2:]]
@@ -333,14 +333,9 @@ def _rms(left: ComplexArray) -> float:
     return float(np.sqrt(np.mean(np.abs(left) ** 2)))
 
 
-def _field_times(recording: Recording) -> FloatArray | None:
-    """Return the written times (n,) of the rows whose field is told."""
-    return next((one.t for one in signals_of(recording) if one.sensor == "magnetometer"), None)
-
-
 def _field_of(recording: Recording) -> _Field | None:
     """Return the field in a recording's plane, None where it or the rate is not told."""
-    signal = next((one for one in signals_of(recording) if one.sensor == "magnetometer"), None)
+    signal = signal_of(recording, "field")
     known = rate_of(recording)
     if signal is None or known is None:
         return None

@@ -29,6 +29,7 @@ __all__ = [
     "rate_of",
     "rest_of",
     "retimed",
+    "signal_of",
     "signals_of",
     "steps",
     "still_part",
@@ -127,6 +128,11 @@ def signals_of(recording: Recording) -> list[Signal]:
         t, w = rates
         add("wobble", "gyroscope", t, w[:, 0], w[:, 1], (disc.Izz - disc.Ixx) / disc.Ixx)
     return found
+
+
+def signal_of(recording: Recording, name: str) -> Signal | None:
+    """Return one of `signals_of` by its name, "field" or "wobble"; None where it is not shown."""
+    return next((signal for signal in signals_of(recording) if signal.name == name), None)
 
 
 def _segments(t: FloatArray) -> list[slice]:

@@ -28,6 +28,7 @@ from validation.diagnosis.consistency.phase_regression import (
     explained,
     left_of,
     rate_of,
+    signal_of,
     signals_of,
     steps,
     tone,
@@ -349,7 +350,7 @@ def _cause(id: str, comparisons: Sequence[Comparison], recordings: Mapping[str, 
 
 def _field_left(recording: Recording, size: float) -> tuple[float | None, float | None]:
     """Return what is left of the field's turning before and after a cause of a size (logarithm), uT rms."""
-    field = next((signal for signal in signals_of(recording) if signal.sensor == "magnetometer"), None)
+    field = signal_of(recording, "field")
     if field is None:
         return None, None
     psi = angle_turned(recording, field.t)
@@ -394,7 +395,7 @@ def _row_proofs(rows: Rows | None, some: Sequence[tuple[Recording, str]]) -> tup
 
 def _told(rows: Rows, recording: Recording, name: str) -> float | None:
     """Return how the rows' durations by the wobble go with those by the field, where the wobble is large."""
-    wobble = next((signal for signal in signals_of(recording) if signal.name == "wobble"), None)
+    wobble = signal_of(recording, "wobble")
     own = next((item for item in rows.durations if item.name == name), None)
     if wobble is None or own is None or not np.array_equal(wobble.t, own.t):
         return None

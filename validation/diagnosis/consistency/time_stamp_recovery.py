@@ -16,7 +16,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.recording import Recording
-from validation.diagnosis.consistency.phase_regression import angle_turned, retimed, signals_of, steps
+from validation.diagnosis.consistency.phase_regression import angle_turned, retimed, signal_of, steps
 
 __all__ = ["Durations", "Rows", "durations", "rows_of"]
 
@@ -50,7 +50,7 @@ class Durations:
 
 def durations(recording: Recording, name: str) -> Durations | None:
     """Return how long each row lasted, None where the field does not tell."""
-    field = next((signal for signal in signals_of(recording) if signal.sensor == "magnetometer"), None)
+    field = signal_of(recording, "field")
     if field is None:
         return None
     psi = angle_turned(recording, field.t)
