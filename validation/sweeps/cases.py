@@ -14,6 +14,7 @@ from discsim.arrays import FloatArray, readonly
 from discsim.files import write_text
 from discsim.shipped import load_disc, load_throw
 from discsim.trajectory import predict
+from validation.scenarios.throws import rms
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -152,14 +153,9 @@ def rows_of(scores: xr.Dataset, landing: Landing | None) -> list[Row]:
             if landing is not None and np.isfinite(rate).sum() > 1:
                 carried = carried_on(error, rate, landing)
                 whole = _figures(error.ravel())
-                ends = (100 * _rms(carried.CNr), _rms(carried.landing))
+                ends = (100 * rms(carried.CNr), rms(carried.landing))
                 rows.append(Row(case.place, str(name), float("nan"), int(scored.sum()), *whole, *ends))
     return rows
-
-
-def _rms(values: FloatArray) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
 
 
 def _figures(error: FloatArray) -> tuple[float, float, float, float]:
@@ -167,7 +163,7 @@ def _figures(error: FloatArray) -> tuple[float, float, float, float]:
     read = known.size / error.size if error.size else 0.0
     if not known.size:
         return read, float("nan"), float("nan"), float("nan")
-    return read, 100 * float(known.mean()), 100 * _rms(known), 100 * float(np.quantile(np.abs(known), 0.95))
+    return read, 100 * float(known.mean()), 100 * rms(known), 100 * float(np.quantile(np.abs(known), 0.95))
 
 
 def write_rows(folder: Path, rows: list[Row]) -> None:

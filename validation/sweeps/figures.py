@@ -14,6 +14,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from discsim.arrays import FloatArray
 from validation.reporting.figures import colour, new_figure, save_figure
+from validation.scenarios.throws import rms
 from validation.sweeps.chunks import Sweep
 from validation.sweeps.mounts import closed_form
 
@@ -111,7 +112,7 @@ def _size_over_radius(axes: Axes, shown: xr.Dataset, sweep: Sweep, limit: float 
     for s, rate in enumerate(rates):
         read = np.isfinite(error[:, :, s])
         whole = read.mean(axis=1) > READ
-        size = np.array([_rms(error[k, :, s]) if whole[k] else np.nan for k in range(len(radii))])
+        size = np.array([rms(error[k, :, s]) if whole[k] else np.nan for k in range(len(radii))])
         label = f"{rate:.0f} deg/s" + ("" if whole.any() else ", beyond its range")
         axes.plot(1000 * radii, size, "o-", ms=4, lw=1.0, color=shade(scale(rate)), label=label)
         farthest = 1000 * limit / np.radians(rate) ** 2 if limit else np.inf
@@ -119,13 +120,13 @@ def _size_over_radius(axes: Axes, shown: xr.Dataset, sweep: Sweep, limit: float 
             axes.axvline(farthest, color=shade(scale(rate)), lw=0.9, ls=":")
     fine = np.geomspace(radii[0], radii[-1], 60)
     predicted = [
-        _rms(100 * closed_form(np.ones(1), np.array([-radius, 0.0, 0.0]), sweep.mounts[:, :3])) for radius in fine
+        rms(100 * closed_form(np.ones(1), np.array([-radius, 0.0, 0.0]), sweep.mounts[:, :3])) for radius in fine
     ]
     axes.plot(1000 * fine, predicted, color="black", lw=1.2, ls="--", label="Eq. (9)")
     for name in shown.estimator.values:
         if name != "accelerometer":
             other = _relative(shown, str(name)).values
-            size = np.array([_rms(other[k]) for k in range(len(radii))])
+            size = np.array([rms(other[k]) for k in range(len(radii))])
             # a method that takes seconds for each mount is scored on few of them
             count = int(np.isfinite(shown.known.sel(estimator=name)).any("segment").sum("mount").max())
             label = f"{name}, all rates ({count} mount{'s' if count > 1 else ''})"
@@ -147,11 +148,6 @@ def _plain_decades(axes: Axes) -> None:
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_locator(NullLocator())
-
-
-def _rms(values: FloatArray) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
 
 
 def draw_axes(result: xr.Dataset, path: Path | None = None) -> Figure:
