@@ -24,7 +24,7 @@ from validation.identification.gauss_newton import Fit, linearised, merit_of, re
 from validation.identification.linear import Linear
 from validation.identification.noise import channel_of, estimate_noise, stated_noise, whitened
 from validation.identification.ordinary_errors import ordinary_errors
-from validation.identification.parameters import Parameter
+from validation.identification.parameters import Parameter, Values
 from validation.identification.plants import plant_of
 from validation.identification.prediction import shown
 from validation.identification.readings import Readings
@@ -205,7 +205,10 @@ def part_of(fit: Fit, chosen: Sequence[int]) -> Fit:
 #: sensors without which the motion of a flight can still be followed, with the effect that is their clock
 _LED = {sensor: (catalogued(ClockRate, sensor).id, "ratio") for sensor in ("accelerometer", "gyroscope")}
 #: clocks that are tried on a motion that the other sensors tell
-_CLOCKS_TRIED = 1.0 + 1e-4 * np.arange(-300, 301)
+_CLOCKS_STEP = 1e-4
+_CLOCKS_TRIED = 1.0 + _CLOCKS_STEP * np.arange(-300, 301)
+#: clocks this far apart at a recording's end, rad, lie in one valley, and no more than so many are passed over
+_ALIKE, _FEW_CLOCKS = 0.5, 20
 
 
 def _led_by_others(fit: Fit) -> Fit:
@@ -287,21 +290,40 @@ def _without(fit: Fit, sensor: str, tolerance: float) -> Fit:
 
 
 def _clock_read(led: Fit, readings: Sequence[Sequence[Readings]], sensor: str, clock: tuple[str, str]) -> float:
-    """Return the clock by which a sensor's readings fit a motion best."""
-    misfit = np.zeros(_CLOCKS_TRIED.size)
-    for i, (one, own) in enumerate(zip(led.trajectories, readings, strict=True)):
-        told = next((r for r in own if r.sensor == sensor), None)
-        if told is None:
-            continue
-        end = one.nodes[-1]
-        for k, ratio in enumerate(_CLOCKS_TRIED):
-            values = {**led.values(i), clock: float(ratio)}
-            at = told.t - delay(values, sensor, told.t)
-            inside = (at > 0.0) & (at < end)
-            left = np.where(told.good, told.value, np.nan)[inside] - shown(one, values, sensor, at[inside])
-            left = left[:, np.isfinite(left).any(axis=0)]
-            misfit[k] += float(np.nanmean(np.abs(left - np.nanmedian(left, axis=0)))) if left.size else 0.0
-    return float(_CLOCKS_TRIED[int(np.argmin(misfit))])
+    """Return the clock by which a sensor's readings fit a motion best.
+
+    Between clocks apart by less than a radian at the end of the longest recording the misfit has no other minimum: of
+    those tried each is looked at only about the best of a few.
+    """
+    turned = max(
+        float(one.nodes[-1] * np.max(np.abs(one.states[:, one.plant.layout.spin])))
+        if one.plant.layout.spin is not None
+        else np.inf
+        for one in led.trajectories
+    )
+    apart = int(np.clip(_ALIKE / max(turned * _CLOCKS_STEP, 1e-9), 1, _FEW_CLOCKS))
+
+    def misfit(ratio: float) -> float:
+        return sum(
+            _misfit_at(one, told, {**led.values(i), clock: ratio}, sensor)
+            for i, (one, own) in enumerate(zip(led.trajectories, readings, strict=True))
+            for told in own
+            if told.sensor == sensor
+        )
+
+    rough = _CLOCKS_TRIED[::apart]
+    best = apart * int(np.argmin([misfit(float(ratio)) for ratio in rough]))
+    near = _CLOCKS_TRIED[max(best - apart, 0) : best + apart + 1]
+    return float(near[int(np.argmin([misfit(float(ratio)) for ratio in near]))])
+
+
+def _misfit_at(one: Trajectory, told: Readings, values: Values, sensor: str) -> float:
+    """Return the mean distance of a sensor's readings from a motion under some values."""
+    at = told.t - delay(values, sensor, told.t)
+    inside = (at > 0.0) & (at < one.nodes[-1])
+    left = np.where(told.good, told.value, np.nan)[inside] - shown(one, values, sensor, at[inside])
+    left = left[:, np.isfinite(left).any(axis=0)]
+    return float(np.nanmean(np.abs(left - np.nanmedian(left, axis=0)))) if left.size else 0.0
 
 
 def free_clocks(sensors: set[str]) -> tuple[Parameter, ...]:

@@ -28,6 +28,7 @@ from discsim.toml_table import TomlTable
 from validation.identification.dynamics import FASTEST, SIZE, acting_tables
 from validation.identification.initial.flight import flight_initial_states
 from validation.identification.parameters import AllowedDefects, Values
+from validation.identification.plants.flight_neighbours import SLOWEST, add_neighbours
 from validation.identification.plants.law_terms import Term
 from validation.identification.plants.plan import Plan, towards, turns
 from validation.identification.plants.plant import (
@@ -83,12 +84,15 @@ def flight_segments(
 ) -> None:
     """Fly from states (c, 13), each with its row of flats (c, k), in the steps ``times`` (n,).
 
-    Writes rows (c, m, 19) at instants out (m,) and ends (c, 13), the states at ``times[last]``.
+    Writes rows (c, m, 19) at instants out (m,) and ends (c, 13), the states at ``times[last]``. All states but the
+    first are its neighbours, which count by how they part from it.
     """
     n = times.size
     path, dense, K = np.empty((n, 14)), np.empty((n - 1, 7, 14)), np.empty((16, 14))
     given = tables
-    for c in range(states.shape[0]):
+    disc = flats[0, :SIZE].copy().view(PARAMETERS)[0].disc
+    turning = abs(states[0, _SPIN]) * disc.Izz / disc.Ixx > SLOWEST
+    for c in range(1 if turning else states.shape[0]):
         flat = flats[c, :SIZE].copy()
         p = flat.view(PARAMETERS)[0]
         tables = acting_tables(given, flats[c])
@@ -107,6 +111,8 @@ def flight_segments(
         ends[c, :6] = end[:6]
         ends[c, 6:10] = end[9:13]
         ends[c, 10:13] = end[13:16]
+    if turning and states.shape[0] > 1:
+        add_neighbours(flats, given, states, times[0], times[last], times[n - 1], out, rows, ends)
 
 
 def _states(recording: Recording, t: FloatArray, ratio: float) -> FloatArray:
