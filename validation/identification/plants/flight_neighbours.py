@@ -20,6 +20,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.compiled import compiled, inlined
+from discsim.effects.events import EVENT_WIDTH_S
 from discsim.flight_equations import derivative
 from discsim.frames import rotate_by_quaternion
 from discsim.parameters import PARAMETERS, Tables
@@ -27,12 +28,14 @@ from validation.identification.dynamics import ROW, SIZE, acting_tables
 
 __all__ = ["SLOWEST", "add_neighbours"]
 
-#: longest step, s, and in radians of nutation: its quadrature, of fourth order, is then good to 1.8^4/2880, 3.6e-3
-_STEP, _NUTATION = 0.0125, 1.8
+#: longest step, s, and in radians of nutation: its quadrature, of fourth order, is then good to 1.4^4/2880, 1.3e-3
+_STEP, _NUTATION = 0.01, 1.4
 #: and where coefficients come from a table, which has corners
 _CORNERED = 0.5
 #: below this nutation, rad/s, a body has no momentum to speak of: neighbours are flown as the motion itself
 SLOWEST = 20.0
+#: ends and middles of steps that an instant between them is told by
+_NEAR = 6
 
 
 @compiled
@@ -54,12 +57,16 @@ def add_neighbours(
     p = flats[0, :SIZE].copy().view(PARAMETERS)[0]
     nutation = abs(states[0, 12]) * p.disc.Izz / p.disc.Ixx
     longest = _NUTATION if given.static.columns.shape[1] == 0 else _CORNERED
-    steps = max(2, ceil((end - start) / min(_STEP, longest / nutation)))
+    longest = min(_STEP, longest / nutation)
+    for c in range(flats.shape[0]):
+        if _knocked(flats[c, :SIZE].copy().view(PARAMETERS)[0], start, stop):
+            longest = min(longest, 0.5 * EVENT_WIDTH_S)
+    steps = max(3, ceil((end - start) / longest))
     h = (end - start) / steps
     more = steps + max(0, ceil((stop - end) / h - 1e-9))
     first, other = np.empty((2 * more + 1, ROW)), np.empty((2 * more + 1, ROW))
     places, weights = _between(out, start, 0.5 * h, 2 * more + 1)
-    between, work = np.empty(ROW), np.empty((12, 14))
+    between, work = np.empty(ROW), np.zeros((12, 14))
     for c in range(states.shape[0]):
         p = flats[c, :SIZE].copy().view(PARAMETERS)[0]
         _fly(p, acting_tables(given, flats[c]), states[c], start, h, work, other if c else first)
@@ -67,26 +74,35 @@ def add_neighbours(
             continue
         _subtract(first, other)
         for j in range(out.size):
-            _add(rows[0, j], other[places[j] : places[j] + 4], weights[j], between, rows[c, j])
+            _add(rows[0, j], other[places[j] : places[j] + _NEAR], weights[j], between, rows[c, j])
         change = other[2 * steps]
         ends[c, :6] = ends[0, :6] + change[:6]
         _turned(ends[0, 6:10], change[10:13], ends[c, 6:10])
         ends[c, 10:13] = ends[0, 10:13] + change[13:16]
 
 
+@inlined
+def _knocked(p: Any, start: float, stop: float) -> bool:
+    """Tell whether a knock or a kick falls into a time, s."""
+    push, kick = p.event_impulse, p.event_spin_step
+    pushed = push.dv_north_m_s != 0.0 or push.dv_east_m_s != 0.0 or push.dv_down_m_s != 0.0
+    reach = 6.0 * EVENT_WIDTH_S
+    if pushed and start - reach < push.t_s < stop + reach:
+        return True
+    return bool(kick.dr_rad_s != 0.0 and start - reach < kick.t_s < stop + reach)
+
+
 @compiled
 def _between(out: FloatArray, start: float, apart: float, count: int) -> tuple[Any, FloatArray]:
-    """Return place (m,) and weights (m, 4), at instants out (m,), of the cubic through four of a grid from start on."""
-    places, weights = np.empty(out.size, dtype=np.int64), np.empty((out.size, 4))
+    """Return place (m,) and weights (m, 6), at instants out (m,), of a quintic through six of a grid from start on."""
+    places, weights = np.empty(out.size, dtype=np.int64), np.ones((out.size, _NEAR))
     for j in range(out.size):
         s = (out[j] - start) / apart
-        k = min(max(int(s) - 1, 0), count - 4)
-        x = s - k
-        weights[j, 0] = -(x - 1.0) * (x - 2.0) * (x - 3.0) / 6.0
-        weights[j, 1] = x * (x - 2.0) * (x - 3.0) / 2.0
-        weights[j, 2] = -x * (x - 1.0) * (x - 3.0) / 2.0
-        weights[j, 3] = x * (x - 1.0) * (x - 2.0) / 6.0
-        places[j] = k
+        places[j] = min(max(int(s) - 2, 0), count - _NEAR)
+        for k in range(_NEAR):
+            for other in range(_NEAR):
+                if other != k:
+                    weights[j, k] *= (s - places[j] - other) / (k - other)
     return places, weights
 
 
@@ -103,10 +119,12 @@ def _turned(q: FloatArray, small: FloatArray, new: FloatArray) -> None:
 
 @inlined
 def _add(row: FloatArray, changes: FloatArray, weights: FloatArray, change: FloatArray, new: FloatArray) -> None:
-    """Write a row of motion with changes (4, 19) between their instants added to it into new (19,); change is free."""
-    a, b, c, d = weights[0], weights[1], weights[2], weights[3]
+    """Write a row of motion with changes (6, 19) between their instants added to it into new (19,); change is free."""
     for i in range(ROW):
-        change[i] = a * changes[0, i] + b * changes[1, i] + c * changes[2, i] + d * changes[3, i]
+        change[i] = 0.0
+    for k in range(_NEAR):
+        for i in range(ROW):
+            change[i] += weights[k] * changes[k, i]
     for i in range(9):
         new[i] = row[i] + change[i]
     _turned(row[9:13], change[10:13], new[9:13])
@@ -145,11 +163,13 @@ def _in_body(y: FloatArray, dy: FloatArray, row: FloatArray) -> None:
 
 
 @inlined
-def _turn_to(y0: FloatArray, H: FloatArray, ahead: float, about: float, body: FloatArray, y: FloatArray) -> None:
+def _turn_to(
+    y0: FloatArray, H: FloatArray, ahead: float, larger: float, about: float, body: FloatArray, y: FloatArray
+) -> None:
     """Write attitude, rates and angle into y (14,) where H has come to after ``ahead`` s.
 
-    H (4, 4) is the momentum in F before and now and at rest before and now; ``about`` by what share its size has been
-    larger in the mean. ``body`` (6,) is 1/Ixx, 1/Izz, one over the size of H before and over its square, cosine and
+    H (4, 4) is the momentum in F before and now and at rest before and now, its size ``larger`` now by a share and
+    ``about`` in the mean. ``body`` (6,) is 1/Ixx, 1/Izz, one over the size of H before and over its square, cosine and
     sine of half the angle that F turns about H by then, with H as it was.
 
     F turns by the least turns that take H before to H now, at rest and in F, and between them about H.
@@ -161,7 +181,7 @@ def _turn_to(y0: FloatArray, H: FloatArray, ahead: float, about: float, body: Fl
     qw, qx, qy, qz = y0[6], y0[7], y0[8], y0[9]
     w, x = qw * ew - qx * ex - qy * ey - qz * ez, qw * ex + qx * ew + qy * ez - qz * ey
     y_, z = qw * ey - qx * ez + qy * ew + qz * ex, qw * ez + qx * ey - qy * ex + qz * ew
-    half = 0.5 * body[3]
+    half = 0.5 * body[3] * (1.0 - larger)
     ax = half * (N0[1] * N[2] - N0[2] * N[1])
     ay = half * (N0[2] * N[0] - N0[0] * N[2])
     az = half * (N0[0] * N[1] - N0[1] * N[0])
@@ -257,19 +277,17 @@ def _fly(p: Any, tables: Tables, state: FloatArray, start: float, h: float, work
                 body[4], body[5] = c * c - s * s, 2.0 * c * s
             _moved(y0, ahead, K, _SQUARES[stage], _WEIGHTS[stage], H, y)
             larger = _larger(H, body)
-            _turn_to(y0, H, ahead, (4.0 * middle + larger) / 6.0 if stage == 2 else 0.5 * larger, body, y)
+            _turn_to(y0, H, ahead, larger, (4.0 * middle + larger) / 6.0 if stage == 2 else 0.5 * larger, body, y)
             middle = larger
         body[4], body[5] = c, s
         _moved(y0, 0.5 * h, K, _SQUARES[3], _WEIGHTS[3], H, y)
         middle = _larger(H, body)
-        _turn_to(y0, H, 0.5 * h, 0.5 * middle, body, y)
-        for i in range(3):
-            dy[3 + i] = K[2, i]
-        dy[10], dy[11] = (K[2, 3] - Izz * y[12] * y[11]) * body[0], (K[2, 4] + Izz * y[12] * y[10]) * body[0]
-        dy[12] = K[2, 5] * body[1]
+        _turn_to(y0, H, 0.5 * h, middle, 0.5 * middle, body, y)
+        derivative(p, tables, start + (step + 0.5) * h, y, dy)
         _in_body(y, dy, rows[2 * step + 1])
         body[4], body[5] = c * c - s * s, 2.0 * c * s
         _moved(y0, h, K, _SQUARES[4], _WEIGHTS[4], H, y)
-        _turn_to(y0, H, h, (4.0 * middle + _larger(H, body)) / 6.0, body, y)
+        larger = _larger(H, body)
+        _turn_to(y0, H, h, larger, (4.0 * middle + larger) / 6.0, body, y)
         for i in range(14):
             y0[i] = y[i]
