@@ -61,7 +61,11 @@ def compiled_sums(function: F) -> F:
 
 
 def inlined(function: F) -> F:
-    """Compile like `compiled`, into every caller: where passing the arguments costs as much as the work."""
+    """Compile like `compiled`, into every caller: where passing the arguments costs as much as the work.
+
+    Such a function makes no arrays, so that it need not count who holds those that it is given: counting the ten arrays
+    of `Tables` took four fifths of an evaluation of the air.
+    """
     return _compile(function, forceinline=True)
 
 
@@ -88,7 +92,7 @@ def _compile(function: F, nogil: bool = False, forceinline: bool = False, reorde
     config: Any = numba.core.config
     before = config.CACHE_DIR
     config.CACHE_DIR = str(_cache_folder())
-    how: dict[str, Any] = {"error_model": "numpy", "nogil": nogil, "forceinline": forceinline}
+    how: dict[str, Any] = {"error_model": "numpy", "nogil": nogil, "forceinline": forceinline, "_nrt": not forceinline}
     how["fastmath"] = {"reassoc", "nsz", "contract"} if reorder else False
     try:
         try:

@@ -143,7 +143,11 @@ def compiled_wrench(effect: Applied) -> Callable[..., tuple[float, float, float,
 
 
 def _not_compiled(path: Path, message: str) -> InputError:
-    """Return the error for numba's message: its first line that says something, at the line it tells of the file."""
+    """Return the error for numba's message: its first line that says something, at the line it tells of the file.
+
+    Where colorama is installed numba colours what it says.
+    """
+    message = re.sub(r"\x1b\[[0-9;]*m", "", message)
     said = [line.strip() for line in message.splitlines() if line.strip()]
     reason = next((line for line in said if not line.startswith("Failed in nopython")), "numba refuses it")
     line = re.search(rf'File "[^"]*{re.escape(path.name)}", line (\d+)', message)
