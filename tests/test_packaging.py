@@ -52,7 +52,7 @@ def test_the_wheel_holds_every_package_and_the_models():
     wheel = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
     packages = sorted(path.parent.name for path in ROOT.glob("*/__init__.py") if path.parent.name != "tests")
     assert sorted(wheel["packages"]) == packages
-    assert wheel["force-include"] == {"models": "discsim/models"}
+    assert wheel["force-include"] == {"models": "discsim/models", "docs/glossary.md": "discsim/glossary.md"}
     for package in packages:
         assert (ROOT / package / "py.typed").exists()
 

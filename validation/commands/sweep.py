@@ -36,9 +36,9 @@ def command(
 ) -> None:
     """Score estimators over every combination of a plan's axes and mounts, on one truth run for all mounts.
 
-    Writes sweep.nc (labelled arrays, netCDF), cases.csv and cases.md (a row for each combination and rate) and
-    sweep.png into --out; of a saltelli plan shares.csv and shares.png (which error of the mount makes the scatter),
-    with --below tolerances.csv, tolerances.md and tolerances.png. Each finished chunk is kept in
+    Writes report.html, sweep.nc (labelled arrays, netCDF), cases.csv and cases.md (a row for each combination and
+    rate) and sweep.png into --out; of a saltelli plan shares.csv and shares.png (which error of the mount makes the
+    scatter), with --below tolerances.csv, tolerances.md and tolerances.png. Each finished chunk is kept in
     --out/checkpoints: stopped at any moment, the same command goes on and gives the same bytes.
 
     Example: discsim sweep installation --mounts 4096 --below 1 --out sweep

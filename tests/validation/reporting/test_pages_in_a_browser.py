@@ -53,7 +53,7 @@ def test_a_figure_keeps_where_its_points_are_and_what_they_are_worth(tmp_path):
 
 def test_a_page_holds_all_it_shows(tmp_path):
     text = made(tmp_path).read_text()
-    assert not re.findall(r'(?:src|href)="(?!data:)', text)
+    assert not re.findall(r'(?:src|href)="(?!data:|#)', text)
     assert "@media print" in text
     assert "prefers-color-scheme: dark" in text
 
