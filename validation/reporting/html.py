@@ -17,7 +17,8 @@ from validation.reporting.run import current_run, package_version
 
 __all__ = ["Section", "Tone", "write_page", "write_report"]
 
-_NUMBER = re.compile(r"^[-+\u2212]?\d[\d,.]*(e[-+]?\d+)?( ?%)?$")
+#: what stands at the right of its cell: a number, or the dash in the place of one
+_NUMBER = re.compile(r"^([-+\u2212]?\d[\d,.]*(e[-+]?\d+)?( ?%)?|–)$")
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,8 @@ def _answer(methods: Sequence[MethodScore]) -> str:
         return f"No method knows the rate for {100 * _KNOWN:.0f} % of the run."
     best = min(knowing, key=lambda one: one.rms)
     rest = "; ".join(f"{one.method} {np.degrees(one.rms):.3g}" for one in knowing if one is not best)
-    said = f"{best.method} errs least: {np.degrees(best.rms):.3g} deg/s rms over the whole run."
+    told = f"{100 * best.known:.0f} % of the run"
+    said = f"{best.method} errs least: {np.degrees(best.rms):.3g} deg/s rms where it knows the rate, {told}."
     return f"{said} The others: {rest} deg/s." if rest else said
 
 

@@ -16,9 +16,9 @@ __all__ = ["write_fit_page"]
 
 def write_fit_page(out: Path, fit: Fit, sources: Sequence[Compared], notes: Sequence[str]) -> Path:
     """Write report.html into ``out``, where the figures are already; return the path of the page."""
-    share = f" ({100 * fit.sd / abs(fit.CNr):.2g} % of it)" if fit.CNr else ""
+    share = f", {100 * fit.sd / abs(fit.CNr):.2g} % of it" if fit.CNr else ""
     lead = (
-        f"C_Nr = {fit.CNr:.6f} ± {fit.sd:.6f} (one standard deviation){share}, from "
+        f"C_Nr = {fit.CNr:.6f} ± {fit.sd:.6f} (one standard deviation{share}), from "
         f"{len(fit.throws)} throw{'s' * (len(fit.throws) > 1)}, spin by {fit.method}."
     )
     if notes:
