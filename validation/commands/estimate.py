@@ -39,7 +39,7 @@ def command(
     place: PlaceOption = None,
     date: DateOption = None,
 ) -> None:
-    """Estimate the spin rate of a recording and its standard deviation over time.
+    """Estimate the spin rate of a recording over time.
 
     Writes rate.csv (time_s,method,rate_rad_s,sd_rad_s; a cell is empty where a method cannot tell), rate.png,
     estimate.json and report.html into --out. fft and accelerometer give magnitudes. Methods that contradict each other

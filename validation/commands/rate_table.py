@@ -49,7 +49,10 @@ def command(
         typer.Option(help="Parts on the table, names or TOML files separated by commas. Default: the paper's module."),
     ] = None,
     radius: Annotated[
-        float | None, typer.Option(help="Where the accelerometer is stated to sit, m from the axis on -x.")
+        float | None,
+        typer.Option(
+            help="Where the accelerometer is stated to sit, m from the axis on -x. Default: where its part says."
+        ),
     ] = None,
     table: Annotated[
         str | None,
@@ -74,7 +77,7 @@ def command(
     out: OutOption = Path("rate-table"),
     seed: SeedOption = 0,
 ) -> None:
-    """Turn a rate table through a profile and score every method against the truth.
+    """Turn a rate table and score every method against the truth.
 
     Writes a recording folder (the module and the table's read-out), truth.csv, methods.csv (each method over the whole
     run), bands.csv (by rate), plateaus.csv where the profile has some, scores.json, report.html, methods.png (as the

@@ -45,10 +45,12 @@ def command(
     out: OutOption = Path("validation-report"),
     seed: SeedOption = 0,
 ) -> None:
-    """Run the rate table and a set of throws, score every estimator against truth, and write a report.
+    """Run the main job: score everything against truth, report it.
 
-    Writes scores.json, report.html and figures into --out. Exit status 1 if a score is outside its tolerance. Where
-    GitHub runs it, failures become annotations and the summary goes to the job's page.
+    A rate table and a set of throws are simulated and every estimator is scored; then C_Nr is fitted, its flights are
+    compared, and concealed effects are diagnosed. Writes scores.json, report.html and figures into --out. Exit status 1
+    if a score is outside its tolerance. Where GitHub runs it, failures become annotations and the summary goes to the
+    job's page.
 
     Example: discsim validate --quick --junit scores.xml --out validation-report
     or: discsim validate --disc mine.toml --throws mine-1.toml,mine-2.toml --limits limits.toml --against last-report

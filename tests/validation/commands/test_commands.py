@@ -44,6 +44,7 @@ def test_the_help_says_of_each_command_what_the_command_itself_says():
     for module, line in COMMANDS.values():
         command = import_module(f"validation.commands.{module}").command
         assert line == command.__doc__.strip().splitlines()[0]
+        assert len(line) <= 63, f"{line}: cut off on a terminal of 80 columns"
 
 
 def test_a_command_loads_neither_the_others_nor_what_it_does_not_need():
