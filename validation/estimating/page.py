@@ -9,7 +9,7 @@ import numpy as np
 
 from discsim.recording import Recording
 from estimators.rate import YawRate
-from validation.reporting.html import Section, write_report
+from validation.reporting.html import Section, Tone, write_report
 
 __all__ = ["answer_of", "write_estimate_page"]
 
@@ -61,7 +61,7 @@ def write_estimate_page(
         why = [(method, reason) for method, reason in left_out.items()]
         sections.append(Section("Methods left out", (), ("method", "because"), why))
     sections.append(_sensors(recording))
-    tone = "bad" if not known else "heed" if contradictions else "good"
+    tone: Tone = "bad" if not known else "heed" if contradictions else "good"
     write_report(out / "report.html", f"Spin rate of {recording.name}", lead, sections, tone)
     return out / "report.html"
 
