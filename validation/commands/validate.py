@@ -47,10 +47,9 @@ def command(
 ) -> None:
     """Run the main job: score everything against truth, report it.
 
-    A rate table and a set of throws are simulated and every estimator is scored; then C_Nr is fitted, its flights are
-    compared, and concealed effects are diagnosed. Writes scores.json, report.html and figures into --out. Exit status 1
-    if a score is outside its tolerance. Where GitHub runs it, failures become annotations and the summary goes to the
-    job's page.
+    Simulates a rate table and throws, scores every estimator, fits C_Nr, compares its flights, diagnoses concealed cases.
+    Writes scores.json, report.html and figures into --out. Exit status 1 if a score is outside its tolerance. Where
+    GitHub runs it, failures become annotations and the summary goes to the job's page.
 
     Example: discsim validate --quick --junit scores.xml --out validation-report
     or: discsim validate --disc mine.toml --throws mine-1.toml,mine-2.toml --limits limits.toml --against last-report
