@@ -47,7 +47,7 @@ def command(
 ) -> None:
     """Run the main job: score everything against truth, report it.
 
-    Simulates a rate table and throws, scores every estimator, fits C_Nr, compares its flights, diagnoses concealed cases.
+    Simulates a rate table and throws, scores every estimator, fits C_Nr and flies with it, diagnoses concealed cases.
     Writes scores.json, report.html and figures into --out. Exit status 1 if a score is outside its tolerance. Where
     GitHub runs it, failures become annotations and the summary goes to the job's page.
 
