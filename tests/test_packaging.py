@@ -113,4 +113,4 @@ def test_a_build_holds_the_commit_that_it_was_made_from(tmp_path, monkeypatch):
 def test_the_build_hook_is_told_of_and_goes_with_the_sources():
     build = PROJECT["tool"]["hatch"]["build"]
     assert "custom" in build["hooks"]
-    assert "hatch_build.py" in build["targets"]["sdist"]["include"]
+    assert "hatch_build.py" in build["targets"]["sdist"]["only-include"]
