@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import re
+import runpy
+import shutil
 import subprocess
+import sys
 import tomllib
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -52,7 +56,7 @@ def test_the_wheel_holds_every_package_and_the_models():
     wheel = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
     packages = sorted(path.parent.name for path in ROOT.glob("*/__init__.py") if path.parent.name != "tests")
     assert sorted(wheel["packages"]) == packages
-    assert wheel["force-include"] == {"models": "discsim/models"}
+    assert wheel["force-include"] == {"models": "discsim/models", "docs/glossary.md": "discsim/glossary.md"}
     for package in packages:
         assert (ROOT / package / "py.typed").exists()
 
@@ -78,3 +82,35 @@ def test_the_package_says_whose_it_is_under_which_licence_and_how_to_cite_it():
     assert "doi: 10.3390/s18103564\n" in citation
     assert f"## {project['version']}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     assert "docs/architecture.md" in (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+
+
+def built(root: Path, monkeypatch: pytest.MonkeyPatch, version: str = "standard") -> dict[str, str]:
+    """Return what the build hook adds to a build of a folder, by its place there: the text of the file."""
+    interface = ModuleType("hatchling.builders.hooks.plugin.interface")
+    interface.BuildHookInterface = object
+    monkeypatch.setitem(sys.modules, interface.__name__, interface)
+    hook = runpy.run_path(str(ROOT / "hatch_build.py"))["CommitHook"]()
+    hook.root, data = str(root), {"force_include": {}}
+    hook.initialize(version, data)
+    return {place: Path(file).read_text(encoding="utf-8") for file, place in data["force_include"].items()}
+
+
+def test_a_build_holds_the_commit_that_it_was_made_from(tmp_path, monkeypatch):
+    (tmp_path / "discsim").mkdir()
+    shutil.copy(ROOT / "discsim" / "version.py", tmp_path / "discsim")
+    assert built(tmp_path, monkeypatch) == {}  # no history, as in an archive of the sources
+    git = ["git", "-C", str(tmp_path), "-c", "user.name=a", "-c", "user.email=a@b"]
+    for words in (["init", "-q"], ["add", "."], ["commit", "-qm", "first"]):
+        subprocess.run([*git, *words], check=True)
+    head = subprocess.run([*git, "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True).stdout
+    assert built(tmp_path, monkeypatch) == {"discsim/commit.txt": head}
+    assert built(tmp_path, monkeypatch, "editable") == {}
+    (tmp_path / "discsim" / "commit.txt").write_text(head)  # in an sdist, which holds it already
+    assert built(tmp_path, monkeypatch) == {}
+    assert runpy.run_path(str(tmp_path / "discsim" / "version.py"))["commit"]() == head.strip()
+
+
+def test_the_build_hook_is_told_of_and_goes_with_the_sources():
+    build = PROJECT["tool"]["hatch"]["build"]
+    assert "custom" in build["hooks"]
+    assert "hatch_build.py" in build["targets"]["sdist"]["only-include"]

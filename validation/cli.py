@@ -21,6 +21,8 @@ app = typer.Typer(
     name="discsim",
     help="Physics validation testbed for a flying disc. --debug shows the traceback of an error; --force overwrites "
     "files in --out that discsim did not write.",
+    epilog="Begin with a log of your own: discsim import LOG --throw 1 --out throw, then discsim check throw, discsim "
+    "estimate throw --out spin, discsim diagnose throw. Without one: discsim example-log my-log.csv makes it.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,

@@ -17,7 +17,7 @@ from discsim.result import Result
 from validation.challenge.blind import Request
 from validation.challenge.cases.case import Kind, Mask
 from validation.challenge.report.figures import draw_detection
-from validation.challenge.report.page import goals_met
+from validation.challenge.report.page import MANY, goals_met
 from validation.challenge.run import challenge, write_challenge
 from validation.challenge.scores.detection import Curve, detections, fit_curve
 from validation.challenge.scores.result import Scored, rates_of, times
@@ -25,9 +25,6 @@ from validation.challenge.scores.scoring import Rate
 from validation.reporting.run import Run
 
 __all__ = ["Challenged", "blind_test"]
-
-#: from this many cases on a rate of one per cent can be shown
-MANY = 300
 
 
 @dataclass(frozen=True)

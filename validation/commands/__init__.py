@@ -11,43 +11,43 @@ __all__ = ["COMMANDS", "register"]
 #: name on the command line -> module in this package, and the first line of its help
 COMMANDS: dict[str, tuple[str, str]] = {
     "import": ("import_", "Turn a raw logger file into a recording folder."),
-    "check": ("check", "Say what a recording holds, what is wrong with it, and what it can tell. Nothing is fitted."),
+    "check": ("check", "Say what a recording holds, and what is wrong with it."),
     "diagnose": (
         "diagnose",
-        "Tell whether the baseline explains recordings down to their noise, and if not, what was left out.",
+        "Tell what the simulation left out of recordings, if anything.",
     ),
     "challenge": ("challenge", "Put discsim diagnose to a blind test and score it."),
-    "estimate": ("estimate", "Estimate the spin rate of a recording and its standard deviation over time."),
-    "score": ("score", "Score rates that something computed, a firmware say, against the truth."),
+    "estimate": ("estimate", "Estimate the spin rate of a recording over time."),
+    "score": ("score", "Score rates that a firmware computed against the truth."),
     "fit": ("fit", "Fit C_Nr to the throws of a data set."),
     "fly": ("fly", "Fly a disc and write what its instruments record."),
-    "scatter": ("scatter", "Tell where throws land when release, coefficients and wind are uncertain."),
+    "scatter": ("scatter", "Tell where throws land when release or air are uncertain."),
     "plan": (
         "plan",
-        "Tell what recordings could show, before going out: effects, coefficients, and what would tell more.",
+        "Tell what recordings could show, before going out.",
     ),
-    "rate-table": ("rate_table", "Turn a rate table through a profile and score every method against the truth."),
+    "rate-table": ("rate_table", "Turn a rate table and score every method against the truth."),
     "sweep": (
         "sweep",
-        "Score estimators over every combination of a plan's axes and mounts, on one truth run for all mounts.",
+        "Score estimators over many mounts, parts, fields or throws.",
     ),
     "validate": (
         "validate",
-        "Run the rate table and a set of throws, score every estimator against truth, and write a report.",
+        "Run the main job: score everything against truth, report it.",
     ),
     "view": (
         "view",
-        "Show a flight or a rate table in MuJoCo's interactive viewer, or draw it off screen with --video.",
+        "Show a flight or a rate table, live or as a video.",
     ),
-    "list": ("list_", "List what is shipped: discs, parts, throws, sites, maps, sweeps or effects, a line each."),
+    "list": ("list_", "List what is shipped: discs, parts, throws, effects and more."),
     "show": (
         "show",
-        "Show a disc, part, throw, site, map or sweep as its file has it, or an effect with its parameters.",
+        "Show what is shipped: a disc, part, throw, map or effect.",
     ),
-    "example-log": ("example_log", "Write a CSV log of simulated throws, as a stranger's logger would."),
+    "example-log": ("example_log", "Write a CSV log of simulated throws, as a logger would."),
     "study": (
         "study",
-        "Run a study of the documentation. NAME --help shows its options; without NAME all studies are listed.",
+        "Run a study of the documentation; without a name list them.",
     ),
 }
 

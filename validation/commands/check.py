@@ -18,10 +18,11 @@ def command(
         Path | None, typer.Option("--out", help="Folder for check.json; nothing is written without it.")
     ] = None,
 ) -> None:
-    """Say what a recording holds, what is wrong with it, and what it can tell. Nothing is fitted.
+    """Say what a recording holds, and what is wrong with it.
 
-    Prints a table per recording: rates, gaps, held, late and lost rows, clipping, resolution and noise as found in the
-    readings, then what cannot be or is unlikely, with what to do. Writes check.json and run.json where --out is given.
+    Nothing is fitted. Prints a table per recording: rates, gaps, held, late and lost rows, clipping, resolution and
+    noise as found in the readings, then what cannot be or is unlikely, with what to do. Writes check.json and run.json
+    where --out is given.
 
     Example: discsim check throw-01
     """

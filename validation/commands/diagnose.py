@@ -36,8 +36,9 @@ def command(
     place: PlaceOption = None,
     date: DateOption = None,
 ) -> None:
-    """Tell whether the baseline explains recordings down to their noise, and if not, what was left out.
+    """Tell what the simulation left out of recordings, if anything.
 
+    Says whether the baseline, a freely spinning disc with honest sensors, explains them down to their noise.
     Writes diagnosis.json (verdict, places, effects with their sizes, evidence, held-out gain), report.html to read,
     residuals*.png, and model.toml: the improved model, which other commands take with --model.
 

@@ -39,12 +39,12 @@ def command(
     place: PlaceOption = None,
     date: DateOption = None,
 ) -> None:
-    """Estimate the spin rate of a recording and its standard deviation over time.
+    """Estimate the spin rate of a recording over time.
 
-    Writes rate.csv (time_s,method,rate_rad_s,sd_rad_s; a cell is empty where a method cannot tell), rate.png and
-    estimate.json into --out. fft and accelerometer give magnitudes. Methods that contradict each other beyond their
-    standard deviations are named, not averaged. No method needs the magnetic field of the place; where it is stated,
-    or looked up by --place and --date, the magnetometer's methods know more.
+    Writes rate.csv (time_s,method,rate_rad_s,sd_rad_s; a cell is empty where a method cannot tell), rate.png,
+    estimate.json and report.html into --out. fft and accelerometer give magnitudes. Methods that contradict each other
+    beyond their standard deviations are named, not averaged. No method needs the magnetic field of the place; where it
+    is stated, or looked up by --place and --date, the magnetometer's methods know more.
 
     Example: discsim estimate throw-01 --method all --out throw-01-rate
     """

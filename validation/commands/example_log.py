@@ -19,7 +19,7 @@ def command(
     effect: EffectOption = None,
     seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 7,
 ) -> None:
-    """Write a CSV log of simulated throws, as a stranger's logger would.
+    """Write a CSV log of simulated throws, as a logger would.
 
     It holds rest, the hand that throws, and columns of its own.
 

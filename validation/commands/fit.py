@@ -28,8 +28,8 @@ def command(
     """Fit C_Nr to the throws of a data set.
 
     Writes cnr.json (C_Nr by output error, with its standard deviation), cnr_table.csv (the paper's table), model.toml
-    (the disc with the fitted C_Nr), model-table.toml (the disc with the paper's table), fit.png, surface.png and
-    sources.png into --out.
+    (the disc with the fitted C_Nr), model-table.toml (the disc with the paper's table), fit.png, surface.png,
+    sources.png and report.html into --out.
 
     Example: discsim fit practice/calm-evening --out calm-evening-fit
     """

@@ -12,7 +12,7 @@ __all__ = ["command"]
 def command(
     kind: Annotated[str, typer.Argument(help="discs, parts, throws, sites, maps, sweeps or effects.")],
 ) -> None:
-    """List what is shipped: discs, parts, throws, sites, maps, sweeps or effects, a line each.
+    """List what is shipped: discs, parts, throws, effects and more.
 
     Example: discsim list discs
     """

@@ -44,7 +44,7 @@ def command(
     ] = None,
     out: OutOption = Path("plan"),
 ) -> None:
-    """Tell what recordings could show, before going out: effects, coefficients, and what would tell more.
+    """Tell what recordings could show, before going out.
 
     Writes plan.json, plan.png and report.html into --out: the size of each effect that would be seen and named, pairs
     that could not be told apart, the sd of C_Nr and every coefficient, the best next recordings, and what better

@@ -49,7 +49,10 @@ def command(
         typer.Option(help="Parts on the table, names or TOML files separated by commas. Default: the paper's module."),
     ] = None,
     radius: Annotated[
-        float | None, typer.Option(help="Where the accelerometer is stated to sit, m from the axis on -x.")
+        float | None,
+        typer.Option(
+            help="Where the accelerometer is stated to sit, m from the axis on -x. Default: where its part says."
+        ),
     ] = None,
     table: Annotated[
         str | None,
@@ -74,12 +77,12 @@ def command(
     out: OutOption = Path("rate-table"),
     seed: SeedOption = 0,
 ) -> None:
-    """Turn a rate table through a profile and score every method against the truth.
+    """Turn a rate table and score every method against the truth.
 
     Writes a recording folder (the module and the table's read-out), truth.csv, methods.csv (each method over the whole
-    run), bands.csv (by rate), plateaus.csv where the profile has some, scores.json, methods.png (as the paper's Fig. 7)
-    and waveform.png into --out; with the paper's module also the wide-range gyroscope's recording, in adxrs649/.
-    With --recording the emulation's files go into emulation/, and comparison.md and comparison.png show both.
+    run), bands.csv (by rate), plateaus.csv where the profile has some, scores.json, report.html, methods.png (as the
+    paper's Fig. 7) and waveform.png into --out; with the paper's module also the wide-range gyroscope's recording, in
+    adxrs649/. With --recording the emulation's files go into emulation/; comparison.md and comparison.png show both.
 
     Example: discsim rate-table --table workshop --parts mpu9250,adxl375 --radius 0.03 --out rate-table
     """
@@ -179,6 +182,7 @@ def _emulate(run: Run, asked: _Asked) -> None:
     import numpy as np
 
     from validation.scenarios.rate_table import plateau_table, rate_table_checks
+    from validation.scenarios.table_page import write_table_page
     from validation.scenarios.table_scores import score_rates
 
     result = asked.run(run, run.out.resolve().name or "rate-table")
@@ -190,6 +194,7 @@ def _emulate(run: Run, asked: _Asked) -> None:
     run.write_json("scores.json", [item.as_dict() for item in checks])
     run.step("drawing")
     _draw(run.out, result)
+    write_table_page(run.out, scores, table, checks)
     _print_methods(scores)
     if table:
         _print_plateaus(table)
@@ -201,6 +206,7 @@ def _compare(run: Run, real: MeasuredRun, asked: _Asked) -> None:
     from dataclasses import replace
 
     from validation.experiments.table_recording import compare, draw_comparison
+    from validation.scenarios.table_page import write_table_page
 
     bench = replace(asked.bench, stated=real.instruments)
     emulated = asked._replace(bench=bench).run(run, f"{real.recording.name or 'run'}-emulated")
@@ -213,8 +219,10 @@ def _compare(run: Run, real: MeasuredRun, asked: _Asked) -> None:
     found.write(run.out)
     draw_comparison(found, run.out / "comparison.png")
     run.write_json("scores.json", [])
+    said = found.sentences(run.out)
+    write_table_page(run.out, found.measured, found.plateaus, compared=said)
     _print_methods(found.measured)
-    for line in found.sentences(run.out):
+    for line in said:
         typer.echo(line)
 
 

@@ -34,7 +34,7 @@ def command(
     out: OutOption = Path("scatter"),
     seed: SeedOption = 0,
 ) -> None:
-    """Tell where throws land when release, coefficients and wind are uncertain.
+    """Tell where throws land when release or air are uncertain.
 
     Writes scatter.json (ellipses, percentiles, sensitivities), landings.csv (every flight), scatter.png,
     sensitivities.png and report.html into --out. What throw, disc and model state with a sigma is uncertain.

@@ -28,7 +28,7 @@ def command(
     junit: Annotated[Path | None, typer.Option(help="Also write the limits as a JUnit XML file.")] = None,
     out: OutOption = Path("score"),
 ) -> None:
-    """Score rates that something computed, a firmware say, against the truth.
+    """Score rates that a firmware computed against the truth.
 
     Writes score.json, score.png and report.html into --out. Exit status 1 if a limit is exceeded. RATE.csv may have a
     column method, and sd_rad_s; rate.csv of discsim estimate is one. The truth is interpolated to the rates' times.

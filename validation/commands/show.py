@@ -12,7 +12,7 @@ __all__ = ["command"]
 def command(
     name: Annotated[str, typer.Argument(help="A name of `discsim list`; discs/driver is the disc of that name alone.")],
 ) -> None:
-    """Show a disc, part, throw, site, map or sweep as its file has it, or an effect with its parameters.
+    """Show what is shipped: a disc, part, throw, map or effect.
 
     Example: discsim show driver
     """

@@ -16,7 +16,9 @@ def command(
     context: typer.Context,
     name: Annotated[str | None, typer.Argument(help="The study. Without one they are listed.")] = None,
 ) -> None:
-    """Run a study of the documentation. NAME --help shows its options; without NAME all studies are listed.
+    """Run a study of the documentation; without a name list them.
+
+    NAME --help shows a study's options.
 
     Example: discsim study paper --page docs/paper.md
     """

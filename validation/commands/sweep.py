@@ -34,11 +34,12 @@ def command(
     out: OutOption = Path("sweep"),
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything random. Default: the plan's.")] = None,
 ) -> None:
-    """Score estimators over every combination of a plan's axes and mounts, on one truth run for all mounts.
+    """Score estimators over many mounts, parts, fields or throws.
 
-    Writes sweep.nc (labelled arrays, netCDF), cases.csv and cases.md (a row for each combination and rate) and
-    sweep.png into --out; of a saltelli plan shares.csv and shares.png (which error of the mount makes the scatter),
-    with --below tolerances.csv, tolerances.md and tolerances.png. Each finished chunk is kept in
+    Every combination of a plan's axes and mounts is scored, on one truth run for all mounts.
+    Writes report.html, sweep.nc (labelled arrays, netCDF), cases.csv and cases.md (a row for each combination and
+    rate) and sweep.png into --out; of a saltelli plan shares.csv and shares.png (which error of the mount makes the
+    scatter), with --below tolerances.csv, tolerances.md and tolerances.png. Each finished chunk is kept in
     --out/checkpoints: stopped at any moment, the same command goes on and gives the same bytes.
 
     Example: discsim sweep installation --mounts 4096 --below 1 --out sweep

@@ -45,8 +45,9 @@ def command(
     out: OutOption = Path("validation-report"),
     seed: SeedOption = 0,
 ) -> None:
-    """Run the rate table and a set of throws, score every estimator against truth, and write a report.
+    """Run the main job: score everything against truth, report it.
 
+    Simulates a rate table and throws, scores every estimator, fits C_Nr and flies with it, diagnoses concealed cases.
     Writes scores.json, report.html and figures into --out. Exit status 1 if a score is outside its tolerance. Where
     GitHub runs it, failures become annotations and the summary goes to the job's page.
 

@@ -48,7 +48,7 @@ def command(
     enlarge: Annotated[float, typer.Option(help="Draw the disc so many times its size.")] = 1.0,
     out: Annotated[Path, typer.Option("--out", help="Folder to write into; created where absent.")] = Path("."),
 ) -> None:
-    """Show a flight or a rate table in MuJoCo's interactive viewer, or draw it off screen with --video.
+    """Show a flight or a rate table, live or as a video.
 
     A .png shows a whole flight in one picture, with --at single stills. run.json is left beside FILE.
 

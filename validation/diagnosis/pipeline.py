@@ -14,6 +14,7 @@ from validation.diagnosis.inertia import with_inertia
 from validation.diagnosis.prepared import prepared
 from validation.diagnosis.relaxed_fit import relaxed
 from validation.diagnosis.result import Outcome
+from validation.diagnosis.selection.refits import told_to
 from validation.diagnosis.selection.stepwise import search
 from validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault
 from validation.diagnosis.setup_effects import free_parameters, with_reversed_axes
@@ -44,13 +45,14 @@ def diagnose(
     recordings = tuple(recording for dataset in datasets for recording in dataset)
     called = tuple(name for group in recording_names(datasets, names) for name in group)
     question = Question(recordings, called, tuple(names), Competing(tuple(user_effects)), plans, seed, progress)
-    progress("checking the setup", 0, 5)
-    tried = tried_under(find_setup_faults(recordings), question)
-    for suppose in (likeliest_fault, reversed_axes):
-        supposed = suppose(tried)
-        again = tried if supposed is None else tried_under(supposed, question)
-        tried = again if again.contradiction is None else tried
-    return outcome_of(judged(tried, progress), question)
+    with told_to(progress):
+        progress("checking the setup", 0, 5)
+        tried = tried_under(find_setup_faults(recordings), question)
+        for suppose in (likeliest_fault, reversed_axes):
+            supposed = suppose(tried)
+            again = tried if supposed is None else tried_under(supposed, question)
+            tried = again if again.contradiction is None else tried
+        return outcome_of(judged(tried, progress), question)
 
 
 def tried_under(setup: SetupFindings, question: Question) -> Tried:

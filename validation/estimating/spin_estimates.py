@@ -32,6 +32,7 @@ from estimators.methods import (
 from estimators.rate import YawRate
 from estimators.usable import usable
 from validation.diagnosis.setup import find_setup_faults
+from validation.estimating.page import write_estimate_page
 from validation.reporting.figures import draw_differences, draw_rates, new_figure, save_figure
 from validation.reporting.run import json_text
 from validation.running.given import Given, given_recordings
@@ -112,12 +113,14 @@ class SpinEstimates(Result):
         return draw_estimates(self.rates, self.recording.name)
 
     def report(self, folder: Path | str) -> Path:
-        """Write rate.csv, estimate.json and rate.png into ``folder``; return the path of the first."""
+        """Write rate.csv, estimate.json, rate.png and report.html into ``folder``; return the path of the first."""
         out = Path(folder)
         write_pieces(out / "rate.csv", rate_csv(self.rates))
         content = estimate_json(self.recording, self.asked, self.rates, self.left_out, self.disagreements, self.notes)
         write_text(out / "estimate.json", json_text(content))
         draw_estimates(self.rates, self.recording.name, out / "rate.png")
+        contradictions = [item.text for item in self.disagreements]
+        write_estimate_page(out, self.recording, self.rates, self.left_out, contradictions, self.notes)
         return out / "rate.csv"
 
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from validation.challenge.blind import Request, diagnose_blind
 from validation.challenge.cases.conceal import Answer
 from validation.challenge.scores.scoring import CaseScore, score_case
+from validation.diagnosis.answer.named import MOVE_LIMIT
 from validation.reporting.scores import Score, at_most, score
 
 __all__ = ["FULL_CASES", "QUICK_CASES", "Concealed", "concealed_cases", "concealed_checks"]
@@ -38,10 +39,22 @@ class Concealed(NamedTuple):
         hidden = ", ".join(self.answer.effects)
         return (
             self.answer.verdict + (f": {hidden}" if hidden else ""),
-            found + (f": {named}" if named else ""),
+            found + (f": {named}" if named else self._moved),
             "right" if self.score.right else "WRONG",
             self.request.command,
         )
+
+    @property
+    def _moved(self) -> str:
+        """What a recalibration moved, from the stated value to the one found, and by how many stated deviations."""
+        stated = {} if self.diagnosis is None else self.diagnosis.get("recalibrated", {})
+        sigmas = {name: (item["value"] - item["stated"]) / item["stated_sd"] for name, item in stated.items()}
+        texts = [
+            f"{name} {stated[name]['stated']:.4g} → {stated[name]['value']:.4g} ({move:+.1f} stated sd)"
+            for name, move in sigmas.items()
+            if abs(move) > MOVE_LIMIT
+        ]
+        return f": {', '.join(texts)}" if texts else ""
 
 
 def concealed_cases(requests: Sequence[Request]) -> Iterator[Concealed]:

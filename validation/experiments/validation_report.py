@@ -75,8 +75,7 @@ def _scores(scores: Sequence[Score]) -> list[Section]:
     groups: dict[str, list[tuple[str, ...]]] = {}
     for item in scores:
         group, _, name = item.name.partition(": ")
-        unit = "" if item.unit == "1" else f" {item.unit}"
-        row = (name or group, f"{item.value:.5g}{unit}", item.goal, "ok" if item.ok else "FAIL")
+        row = (name or group, item.shown, item.goal, "ok" if item.ok else "FAIL")
         groups.setdefault(group, []).append(row)
     header = ("score", "value", "goal", "")
     return [Section(f"Scores: {group}", (), header, rows) for group, rows in groups.items()]

@@ -37,5 +37,6 @@ def draw_limits(limits: Limits, path: Path) -> None:
     axes.set_ylim(-0.7, len(rows) - 0.3)
     axes.set_xlabel("size at which half of the diagnoses see and name it, over a small but visible size")
     axes.set_title("What these recordings can show, a dot for each parameter")
-    axes.legend(loc="lower right", fontsize=8)
+    # below the axes: dots may lie in each corner
+    figure.legend(loc="outside lower center", ncols=2, fontsize=8)
     save_figure(figure, path)

@@ -25,7 +25,7 @@ def github_commands(scores: Sequence[Score], changes: Sequence[Change] = ()) -> 
 
 
 def _said(item: Score) -> str:
-    return f"{item.value:.6g} {item.unit} (expected {item.expected:g} +- {item.tolerance:g})"
+    return f"{item.shown} (expected {item.goal})".replace("±", "+-")
 
 
 def _message(text: str) -> str:

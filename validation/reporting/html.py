@@ -8,15 +8,17 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from discsim.files import write_text
 from discsim.version import commit
+from validation.reporting.glossary import with_terms
 from validation.reporting.run import current_run, package_version
 
-__all__ = ["Section", "write_page", "write_report"]
+__all__ = ["Section", "Tone", "write_page", "write_report"]
 
-_NUMBER = re.compile(r"^[-+\u2212]?\d[\d,.]*(e[-+]?\d+)?( ?%)?$")
+#: what stands at the right of its cell: a number, or the dash in the place of one
+_NUMBER = re.compile(r"^([-+\u2212]?\d[\d,.]*(e[-+]?\d+)?( ?%)?|–)$")
 
 
 @dataclass(frozen=True)
@@ -35,9 +37,13 @@ class Section:
         return [(caption, base64.b64encode(path.read_bytes()).decode()) for caption, path in self.figures]
 
 
-def write_report(path: Path, title: str, lead: str, sections: Sequence[Section]) -> None:
-    """Write the page to ``path``, figures embedded."""
-    write_page(path, "report.html", title=title, lead=lead, sections=sections)
+#: how the banner of a page looks: neither good nor bad, as hoped, to be heeded, outside what was asked
+Tone = Literal["plain", "good", "heed", "bad"]
+
+
+def write_report(path: Path, title: str, lead: str, sections: Sequence[Section], tone: Tone = "plain") -> None:
+    """Write the page to ``path``, figures embedded; ``lead``, its banner, is the answer."""
+    write_page(path, "report.html", title=title, lead=lead, sections=sections, tone=tone)
 
 
 def write_page(path: Path, template: str, **content: Any) -> None:
@@ -52,8 +58,8 @@ def write_page(path: Path, template: str, **content: Any) -> None:
     loader = environment.loader
     assert loader is not None
     script = Markup(loader.get_source(environment, "page.js")[0].rstrip())
-    page = environment.get_template(template).render(footer=made_by(), script=script, **content)
-    write_text(path, page)
+    page = environment.get_template(template).render(footer=made_by(), script=script, **{"tone": "plain", **content})
+    write_text(path, with_terms(page))
 
 
 def made_by() -> str:

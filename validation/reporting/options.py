@@ -75,7 +75,7 @@ PlaceOption: TypeAlias = Annotated[
     typer.Option(
         "--place",
         metavar="LAT,LON",
-        help="Where it was recorded, degrees north and east: the World Magnetic Model gives the field there.",
+        help="Where it was recorded, degrees north and east (47.4,8.5): looks the magnetic field up (WMM).",
     ),
 ]
 DateOption: TypeAlias = Annotated[

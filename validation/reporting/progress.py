@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeAlias
 
-__all__ = ["Progress", "shown"]
+__all__ = ["Pace", "Progress", "shown"]
 
 #: called with what is being done, how much of it is done, and how much there is: ("screening", 3, 44)
 Progress: TypeAlias = Callable[[str, int, int], None]
@@ -26,12 +26,38 @@ def shown() -> Iterator[Progress]:
 
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"))
     with Bars(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as bars:
-        task = bars.add_task("", total=None)
+        task, pace = bars.add_task("", total=None), Pace()
 
         def report(stage: str, done: int, total: int) -> None:
-            bars.update(task, description=stage, completed=done, total=total)
+            left = pace(stage, done, total)
+            bars.update(task, description=f"{stage}{f' ({left})' if left else ''}", completed=done, total=total)
 
         yield report
+
+
+class Pace:
+    """Tells how long the rest of a round takes: "refitting with: wind" is one of the round "refitting with".
+
+    What is left takes as long as what is done took for each; ``now`` gives seconds.
+    """
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        self._now = now
+        self._round, self._began, self._first = "", 0.0, 0
+
+    def __call__(self, stage: str, done: int, total: int) -> str:
+        """Return the time left in words; empty for what is no round, and before one of it is done."""
+        round_, colon, _ = stage.partition(": ")
+        if not colon:
+            self._round = ""
+            return ""
+        if round_ != self._round or done < self._first:
+            self._round, self._began, self._first = round_, self._now(), done
+            return ""
+        if done == self._first:
+            return ""
+        left = (self._now() - self._began) / (done - self._first) * (total - done)
+        return f"about {left:.0f} s left of these" if left >= 1 else ""
 
 
 class _Lines:
@@ -40,11 +66,14 @@ class _Lines:
     def __init__(self) -> None:
         self._stage = ""
         self._started = time.monotonic()
+        self._pace = Pace()
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         if stage != self._stage:
             self._stage = stage
-            step = f" (step {min(done + 1, total)} of {total})" if total > 1 else ""
+            kind = "" if ": " in stage else "step "
+            step = f" ({kind}{min(done + 1, total)} of {total})" if total > 1 else ""
             spent = time.monotonic() - self._started
             so_far = f", {spent:.0f} s so far" if spent >= 1 else ""
-            print(f"{stage}{step}{so_far}", file=sys.stderr, flush=True)
+            left = self._pace(stage, done, total)
+            print(f"{stage}{step}{so_far}{f', {left}' if left else ''}", file=sys.stderr, flush=True)

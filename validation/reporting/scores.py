@@ -38,11 +38,16 @@ class Score:
         return f"{self.expected:g} ± {self.tolerance:g}{unit}"
 
     @property
+    def shown(self) -> str:
+        """The value with its unit, where it has one, for a table."""
+        return f"{self.value:.5g}" if self.unit in ("", "1") else f"{self.value:.5g} {self.unit}"
+
+    @property
     def text(self) -> str:
         """One line for a log."""
         verdict = "ok  " if self.ok else "FAIL"
-        value = f"{self.value:.6g} {self.unit}".rstrip()
-        return f"{verdict} {self.name}: {value} (expected {self.expected:g} +- {self.tolerance:g})"
+        value = f"{self.value:.6g}" + ("" if self.unit in ("", "1") else f" {self.unit}")
+        return f"{verdict} {self.name}: {value} (expected {self.goal})".replace("±", "+-")
 
 
 def score(name: str, value: float, unit: str, expected: float, tolerance: float) -> Score:

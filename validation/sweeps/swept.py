@@ -19,6 +19,7 @@ from validation.running.tasks import Task, claim, discard, run_tasks
 from validation.sweeps.cases import landing_of, rows_of, write_rows
 from validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, truth_tasks
 from validation.sweeps.figures import draw_sweep
+from validation.sweeps.page import write_sweep_page
 from validation.sweeps.plan import Plan, plan_file, read_plan
 from validation.sweeps.result import labelled, write_netcdf
 from validation.sweeps.shares import draw_shares, shares_of, write_shares
@@ -75,18 +76,23 @@ class Swept(Result):
         return draw_sweep(self.scores, self.sweep)
 
     def report(self, folder: Path | str) -> Path:
-        """Write sweep.nc (netCDF), the tables cases.csv and cases.md, and sweep.png; return the path of the first.
+        """Write sweep.nc (netCDF), cases.csv and cases.md, sweep.png and report.html; return the path of the first.
 
         Of a saltelli design also the shares of variance, shares.csv and shares.png.
         """
         out = Path(folder)
         out.mkdir(parents=True, exist_ok=True)
         write_netcdf(out / "sweep.nc", self.scores)
-        write_rows(out, rows_of(self.scores, landing_of()))
+        rows = rows_of(self.scores, landing_of())
+        write_rows(out, rows)
         draw_sweep(self.scores, self.sweep, out / "sweep.png")
         if shares := shares_of(self.scores, self.sweep):
             write_shares(out / "shares.csv", shares)
             draw_shares(shares, out / "shares.png")
+        else:
+            (out / "shares.png").unlink(missing_ok=True)  # of an earlier run into this folder
+        varied = ", ".join(f"{size} of {name}" for name, size in self.scores.sizes.items())
+        write_sweep_page(out, self.sweep.plan.name, varied, error_rows(self.scores), rows)
         return out / "sweep.nc"
 
     def tolerances(self, below: float) -> list[Tolerance]:

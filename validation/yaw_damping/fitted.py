@@ -24,6 +24,7 @@ from validation.yaw_damping.figures import draw_fit, draw_sources, draw_surface
 from validation.yaw_damping.model import fitted_model, tabulated_model
 from validation.yaw_damping.observations import Throw, observe
 from validation.yaw_damping.output_error import Fit, fit_yaw_damping
+from validation.yaw_damping.page import write_fit_page
 from validation.yaw_damping.paper_table import PaperTable, paper_table, table_csv
 
 __all__ = ["FittedYawDamping", "check_method", "cnr_json", "fit_recordings", "notes"]
@@ -108,7 +109,7 @@ class FittedYawDamping(Result):
         return cnr_json(self.fit, self.sources)
 
     def report(self, folder: Path | str) -> Path:
-        """Write cnr.json, cnr_table.csv, model files and figures into ``folder``; return the path of the first."""
+        """Write cnr.json, cnr_table.csv, models, figures and report.html; return the path of the first."""
         out = Path(folder)
         write_text(out / "cnr.json", json_text(self.to_json()))
         write_text(out / "cnr_table.csv", table_csv(self.paper))
@@ -117,6 +118,7 @@ class FittedYawDamping(Result):
         draw_fit(self.throws, self.fit, self.paper, out / "fit.png")
         draw_surface(self.paper, self.fit, out / "surface.png")
         draw_sources(self.sources, out / "sources.png")
+        write_fit_page(out, self.fit, self.sources, self.notes)
         return out / "cnr.json"
 
 

@@ -19,7 +19,7 @@ from validation.challenge.cases.case import Concealed
 from validation.challenge.cases.conceal import Answer
 from validation.challenge.cases.detection_limit import noncentrality, strength
 from validation.challenge.cases.draw import draw_case
-from validation.challenge.report.page import GOALS, goals_met
+from validation.challenge.report.page import GOALS, goal_rows, goals_met
 from validation.challenge.run import challenge
 from validation.challenge.scores.result import Scored, rates_of, read_result
 from validation.challenge.scores.scoring import CaseScore, clustered_rate, confusion, rate, score_case, summary
@@ -324,6 +324,19 @@ def test_goals_are_met_only_by_rates_that_meet_them():
     # one false alarm in six is what chance may bring where a hundredth is right; three are not
     assert goals_met({**good, "false_alarm_rate": rate([True] + [False] * 5)}, few=True)
     assert not goals_met({**good, "false_alarm_rate": rate([True] * 3 + [False] * 3)}, few=True)
+
+
+def test_too_few_cases_are_said_to_be_too_few_and_no_failure_unless_chance_does_not_bring_it():
+    good = {name: rate([name.startswith(("right", "coverage"))] * 400) for name in GOALS}
+
+    def said(alarms: list[bool], few: bool) -> str:
+        rows = goal_rows({**good, "false_alarm_rate": rate(alarms)}, None, few=few)
+        return rows[list(good).index("false_alarm_rate")][-1]
+
+    assert said([True] + [False] * 5, few=True) == "too few cases"
+    assert said([True] + [False] * 5, few=False) == "FAIL"
+    assert said([True] * 3 + [False] * 3, few=True) == "FAIL"
+    assert said([False] * 400, few=True) == "ok"
 
 
 def test_the_confusion_matrix_has_a_row_for_what_was_concealed():

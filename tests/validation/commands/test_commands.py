@@ -44,6 +44,7 @@ def test_the_help_says_of_each_command_what_the_command_itself_says():
     for module, line in COMMANDS.values():
         command = import_module(f"validation.commands.{module}").command
         assert line == command.__doc__.strip().splitlines()[0]
+        assert len(line) <= 63, f"{line}: cut off on a terminal of 80 columns"
 
 
 def test_a_command_loads_neither_the_others_nor_what_it_does_not_need():
@@ -96,8 +97,9 @@ def test_the_same_seed_gives_the_same_bytes_and_another_one_does_not(monkeypatch
     names = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*") if path.is_file())
     assert Path("run/adxrs649/recording.toml") in names
     assert Path("run/methods.png") in names
+    assert Path("run/report.html") in names
     for name in names:
-        if name.name != "run.json":
+        if name.name not in ("run.json", "report.html"):  # these name the command, and with it the folder
             assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
     first, other = ((tmp_path / name / "run" / "magnetometer.csv").read_bytes() for name in ("a", "c"))
     assert first != other

@@ -43,7 +43,10 @@ def rows(out):
 def test_all_writes_every_method_and_says_which_are_left_out_and_which_contradict(folder, tmp_path, capsys):
     out = tmp_path / "out"
     command(folder, method="all", out=out, pad=None, step=5)
-    assert {path.name for path in out.iterdir()} == {"rate.csv", "rate.png", "estimate.json", "run.json"}
+    written = {"rate.csv", "rate.png", "estimate.json", "report.html", "run.json"}
+    assert {path.name for path in out.iterdir()} == written
+    page = (out / "report.html").read_text()
+    assert page.index("contradiction") < page.index("By method") < page.index("Methods left out")
     table = rows(out)
     assert list(table[0]) == ["time_s", "method", "rate_rad_s", "sd_rad_s"]
     rates = np.degrees([float(row["rate_rad_s"]) for row in table if row["method"] == "fft"])

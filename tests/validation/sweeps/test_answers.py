@@ -183,7 +183,8 @@ def test_a_saltelli_plan_of_two_is_swept_and_told(tmp_path):
     found = sweep(plan, workers=1)
     found.report(tmp_path / "out")
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert {"sweep.nc", "sweep.png", "cases.csv", "cases.md", "shares.csv", "shares.png"} <= names
+    assert {"sweep.nc", "sweep.png", "cases.csv", "cases.md", "shares.csv", "shares.png", "report.html"} <= names
+    assert "Which error of the mount it is" in (tmp_path / "out" / "report.html").read_text()
     # with the same module A and its neighbour along z differ by nothing but z
     rows = list(csv.DictReader((tmp_path / "out" / "shares.csv").read_text().splitlines()))
     fastest = {row["source"]: float(row["total_order"]) for row in rows if row["rate_deg_s"] == "2500"}

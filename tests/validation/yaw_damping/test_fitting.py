@@ -282,9 +282,11 @@ class TestCommand:
         assert model.disc.aero.CNr == answer["CNr"]["value"]
         assert model.disc.sigma["CNr"] == answer["CNr"]["sd"]
         assert read_model(tmp_path / "out" / "model-table.toml").disc.yaw_damping_table.CNr.shape == (51, 35)
-        assert {"cnr_table.csv", "fit.png", "surface.png", "sources.png", "run.json"} <= {
-            path.name for path in (tmp_path / "out").iterdir()
-        }
+        names = {path.name for path in (tmp_path / "out").iterdir()}
+        assert {"cnr_table.csv", "fit.png", "surface.png", "sources.png", "report.html", "run.json"} <= names
+        page = (tmp_path / "out" / "report.html").read_text()
+        assert f"{answer['CNr']['value']:.6f} ± {answer['CNr']['sd']:.6f}" in page
+        assert ">throw-1<" in page
         assert read_recording(tmp_path / "set" / "throw-0").disc.aero.CNr == DISC.aero.CNr
 
     def test_an_unknown_method_is_refused_by_name(self, tmp_path):

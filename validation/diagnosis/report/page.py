@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
+from math import erfc, sqrt
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
 from markupsafe import Markup
 
 from discsim.recording import SENSORS
@@ -112,6 +114,7 @@ def write_diagnosis_report(
         more_candidates=_further(outcome),
         next_recordings=_next_recordings(diagnosis),
         recalibrated=[_moved(name, item) for name, item in diagnosis.recalibrated.items()],
+        by_recording=_by_recording(outcome),
         noise=[_noise(item) for item in diagnosis.noise],
         outliers=[
             (
@@ -300,12 +303,31 @@ def _next_recordings(diagnosis: Diagnosis) -> list[str]:
     return list(dict.fromkeys(text for text in (*separating, *diagnosis.next_recordings) if text))
 
 
-def _moved(name: str, item: Recalibration) -> tuple[str, str, str, str, str]:
+def _by_recording(outcome: Outcome) -> list[tuple[str, str, str, str]]:
+    """Return for each recording its mismatch over noise before and after, and where most of it is; the worst first."""
+    squares: dict[str, dict[tuple[str, str], tuple[Any, Any]]] = {}
+    for item in outcome.residuals:
+        known = np.isfinite(item.before) & np.isfinite(item.after)
+        if known.any():
+            pair = item.before[known] ** 2, item.after[known] ** 2
+            squares.setdefault(item.recording, {})[item.sensor, item.axis] = pair
+    rows = []
+    for recording, axes in squares.items():
+        before, after = (np.concatenate([pair[k] for pair in axes.values()]).mean() for k in (0, 1))
+        worst = max(axes, key=lambda axis: float(axes[axis][0].mean()))
+        where = f"{_plain(worst[0])} {readable_axis(worst[1])}"
+        rows.append((float(before), (recording, f"{before:.2f}", f"{after:.2f}", where)))
+    return [row for _, row in sorted(rows, key=lambda item: -item[0])] if len(rows) > 1 else []
+
+
+def _moved(name: str, item: Recalibration) -> tuple[str, str, str, str, str, str]:
+    chance = erfc(abs(item.sigmas) / sqrt(2.0))
     return (
         name,
         plus_minus(item.stated, item.stated_sd),
         plus_minus(item.value, item.sd),
         _signed(item.sigmas, 1),
+        f"{chance:.2g}" if chance >= 1e-12 else "below 1e-12",
         "beyond its uncertainty" if item.beyond else "",
     )
 

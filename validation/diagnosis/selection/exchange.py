@@ -12,6 +12,7 @@ from validation.diagnosis.selection.candidates import CandidateEffect, parameter
 from validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from validation.diagnosis.selection.evidence import price
 from validation.diagnosis.selection.hypothesis import fitted_parameters
+from validation.diagnosis.selection.refits import refitting
 from validation.diagnosis.selection.score_tests import ScreenedCandidate, scope_price, start_of
 from validation.diagnosis.selection.screening import free_columns
 from validation.diagnosis.selection.search_state import Rival, Search, from_here, lost, possible, values_of_fit
@@ -53,11 +54,12 @@ def eliminated_backward(found: Search, current: ContinuousFit, kept: CandidateEf
     """Leave out effects that the others have made superfluous, but for one that is ``kept``."""
     while len(current.hypothesis.candidates) > 1:
         weakest: ContinuousFit | None = None
-        for candidate in current.hypothesis.candidates:
+        for number, candidate in enumerate(current.hypothesis.candidates):
             if (
                 candidate.fixed_values or candidate is kept
             ):  # what is told is kept in the trajectories whatever the hypothesis says
                 continue
+            refitting("refitting without", candidate.id, number, len(current.hypothesis.candidates))
             less = continuous_fit(
                 current.fit,
                 current.hypothesis.without(candidate),
@@ -111,6 +113,7 @@ def rivals_of(found: Search) -> dict[str, list[Rival]]:
             scoped = screened.candidate
             if scoped.id in seen or worse > worst or len(seen) >= 3:
                 continue
+            refitting(f"refitting in place of {candidate.id}", scoped.id, len(seen), 3)
             seen.add(scoped.id)
             other_fit = continuous_fit(
                 final.fit,

@@ -26,6 +26,7 @@ from validation.diagnosis.selection.continuous_fit import ContinuousFit, continu
 from validation.diagnosis.selection.evidence import ONE_SIDED, price
 from validation.diagnosis.selection.exchange import eliminated_backward, exchanged, rivals_of, widened
 from validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
+from validation.diagnosis.selection.refits import refitting
 from validation.diagnosis.selection.score_tests import (
     ScreenedCandidate,
     hinted,
@@ -261,14 +262,17 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
     distant = far(found, current)
     fits: list[tuple[float, ContinuousFit, Fit, float]] = []
     seen: set[tuple[str, frozenset[int] | None]] = set()
+    different = len({(offer[0].candidate.id, offer[0].candidate.recordings) for offer in offers})
     near_data = chi2_now < SELECTION.near * current.fit.count
     best_chi2, merit_now = chi2_now, merit_of(current.fit, current.fit.linears)
     for screened, fit, cost in offers:
         key = (screened.candidate.id, screened.candidate.recordings)
         if key in seen:
             continue
-        if len(seen) >= (SELECTION.refitted if near_data else SELECTION.refitted_at_most):
+        most = SELECTION.refitted if near_data else SELECTION.refitted_at_most
+        if len(seen) >= most:
             break
+        refitting(f"effect {step + 1}, refitting with", screened.candidate.id, len(seen), min(most, different))
         seen.add(key)
         if screened.candidate.row.hides_readings:
             # readings at the limit take no part in a fit: what the motion asks for beyond it is the evidence
@@ -351,7 +355,9 @@ def _together(found: Search) -> tuple[Search, ContinuousFit | None]:
     before = base.score, chi2_in(base, noise)
     ranked = pairs(found.loose_board, found.candidates, found.own)
     sensible = [pair for pair in ranked if on_the_disc(found, pair.start)]
-    for pair in sensible[: SELECTION.pairs_refitted]:
+    chosen = sensible[: SELECTION.pairs_refitted]
+    for number, pair in enumerate(chosen):
+        refitting("refitting with two", " and ".join(c.id for c in pair.hypothesis.candidates), number, len(chosen))
         start = {**pair.start, **_wobbles(found.relaxed_fit)}
         # it counts only where it comes near the data
         both = continuous_fit(

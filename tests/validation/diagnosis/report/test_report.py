@@ -32,7 +32,9 @@ class Page(HTMLParser):
         assert self.open == []
 
     def handle_starttag(self, tag, attrs):
-        self.sources += [value or "" for name, value in attrs if name in ("src", "href")]
+        self.sources += [
+            value or "" for name, value in attrs if name in ("src", "href") and not (value or "").startswith("#")
+        ]
         if tag not in self.EMPTY:
             self.open.append(tag)
 
