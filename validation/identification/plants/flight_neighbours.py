@@ -1,8 +1,8 @@
 """How a flight changes with where it starts and with its parameters: neighbours of a motion, flown in long steps.
 
 Takes the motion of a segment and states and parameters beside it; gives the motions from there. What counts of them is
-only by how little they part from the first: first and neighbours are flown alike in steps of a whole turn of the
-nutation and less, and their differences are added to the first motion as it was flown exactly. The differences are good
+only by how little they part from the first: first and neighbours are flown alike in steps of a quarter turn of the
+nutation or so, and their differences are added to the first motion as it was flown exactly. The differences are good
 to some parts in a thousand, which moves no end of a fit: it ends where readings and the exact motion agree best.
 
 A step of that length is possible because all that a step adds up is slow. Let H be the angular momentum that the rates
