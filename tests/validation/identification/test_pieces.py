@@ -459,7 +459,6 @@ def rippling() -> Recording:
             [0.5, 0.0],
             [
                 (("rig.speed_ripple", "amplitude_rad_s"), 1e-4, 1.2),
-                (("rig.speed_ripple", "order"), 3e-4, 6.0),
                 (("rig.speed_ripple", "phase_rad"), 1e-4, 0.3),
             ],
         ),
@@ -469,6 +468,8 @@ def rippling() -> Recording:
 def test_columns_of_a_rig_are_those_of_the_whole_run(recording, state, keys):  # type: ignore[no-untyped-def]
     recording = recording()
     values = {key: at for key, _, at in keys}
+    if "rig.speed_ripple" in {group for group, _ in values}:
+        values["rig.speed_ripple", "order"] = 6.0  # sets the integrator's steps, so that no difference is taken over it
     nodes = np.array([0.0, recording.end + 1e-6])
     one = trajectory_of(recording, nodes, np.array([state]))
     three = resegmented(one, values, np.linspace(0.0, nodes[1], 4))
