@@ -16,6 +16,7 @@ from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator, ScalarFo
 from support.spinning_sensor import MPU9250, Faults, Spin, Truth, move, record, without
 
 from discsim.arrays import FloatArray
+from discsim.errors import InputError
 from discsim.recording import Recording, Samples
 from estimators.bound import tone_bound
 from estimators.fft_fast import padded_peak
@@ -115,8 +116,11 @@ def window_likelihood(samples: Samples, recording: Recording) -> Answer:
 
 
 def best(samples: Samples, recording: Recording) -> Answer:
-    """What `discsim estimate` takes, told nothing but the recording."""
-    found = best_of_recording(recording)
+    """What `discsim estimate` takes, told nothing but the recording; NaN of a window too short to show a spin."""
+    try:
+        found = best_of_recording(recording)
+    except InputError:
+        return Answer(float("nan"), float("nan"))
     middle = np.array([0.5 * (samples.t[0] + samples.t[-1])])
     return Answer(float(found.at(middle)[0]), float(np.interp(middle[0], found.t, found.sd)))
 

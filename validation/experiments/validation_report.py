@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from validation.experiments.concealed import Concealed
+from validation.experiments.feedback.experiment import INSIDE
 from validation.experiments.feedback.loop import Loop
 from validation.experiments.feedback.scoring import OUTPUT_ERROR
 from validation.reporting.figures import COLOURS, new_figure, save_figure, symmetric_log
@@ -106,15 +107,26 @@ def _throws(results: Sequence[ThrowResult], out: Path) -> Section:
 def _loop(loop: Loop, out: Path) -> Section:
     text = (
         "One C_Nr for all throws, by output error and by straight lines and (26), from each method's spin. Errors are "
-        "those of the first throw flown with the source's C_Nr (output error) and spin at release; the last column has "
-        "the true spin, so that only C_Nr is the source's."
+        "those of the first throw flown with the source's C_Nr (output error) and spin at release; the last column but "
+        "one has the true spin, so that only C_Nr is the source's. The paper's table (28) ends where its experiments "
+        f"did: flown by it is a throw that stays inside, {INSIDE.name}, with the true release."
     )
     figures = [
         ("Spin, its models and what they leave", out / "cnr.png"),
         ("C_Nr by source", out / "cnr-sources.png"),
+        ("The table (28) by the best spin, and the throws that it is from", out / "cnr-table.png"),
         ("Predicted flights against the truth", out / "feedback.png"),
     ]
-    header = ("spin by", "CNr", "sd", "by (26)", "landing, m", "track, m", "landing by CNr alone, m")
+    header = (
+        "spin by",
+        "CNr",
+        "sd",
+        "by (26)",
+        "landing, m",
+        "track, m",
+        "landing by CNr alone, m",
+        "landing by (28), m",
+    )
     return Section("C_Nr, and the flights that it predicts", (text,), header, _loop_rows(loop), figures)
 
 
@@ -134,7 +146,10 @@ def _loop_rows(loop: Loop) -> list[tuple[str, ...]]:
         assert item.fit is not None
         flight = predicted[item.source.label]
         errors = (f"{value:.3f}" for value in (flight.landing, flight.track, flight.damping_only))
-        rows.append((item.source.label, f"{item.fit.CNr:.6f}", f"{item.fit.sd:.6f}", f"{item.fit.by_26:.6f}", *errors))
+        by_table = loop.by_table.get(item.source.label)
+        last = "outside" if by_table is None else f"{by_table:.3f}"
+        fitted = (f"{item.fit.CNr:.6f}", f"{item.fit.sd:.6f}", f"{item.fit.by_26:.6f}")
+        rows.append((item.source.label, *fitted, *errors, last))
     return rows
 
 

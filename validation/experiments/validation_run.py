@@ -34,29 +34,31 @@ from validation.scenarios.rate_table import (
 )
 from validation.scenarios.rate_table_figures import draw_methods, draw_waveform
 from validation.scenarios.throws import ThrowResult, fly_throws, throw_checks
-from validation.yaw_damping.figures import draw_fit, draw_sources
+from validation.yaw_damping.figures import draw_fit, draw_sources, draw_surface
 
 __all__ = ["Judging", "Validated", "validate"]
 
 
 @dataclass(frozen=True)
 class Judging:
-    """What scores are held against: limits and an earlier run; and how many seeds are recorded into a file of limits.
+    """What scores are held against: limits and an earlier run; and what is recorded into a file of limits.
 
-    `read` reads both, so that what is wrong with them is said before the work.
+    ``margin`` is in standard deviations, None for what `limits_text` takes. `read` reads limits and the earlier run, so
+    that what is wrong with them is said before the work.
     """
 
     limits: Mapping[str, Limit] = field(default_factory=dict)
     before: Sequence[Score] | None = None
     record: Path | None = None
     seeds: int = 5
+    margin: float | None = None
     against: Path | None = None
 
     @classmethod
-    def read(cls, limits: Path | None, against: Path | None, record: Path | None, seeds: int) -> Judging:
-        """Read files of limits and scores; raises `InputError` as they do."""
-        known = {} if limits is None else read_limits(limits)
-        return cls(known, None if against is None else read_scores(against), record, seeds, against)
+    def read(cls, shipped: Mapping[str, Limit], limits: Path | None, against: Path | None) -> Judging:
+        """Read a file of limits, which go before shipped ones, and earlier scores; raises `InputError` as they do."""
+        known = {**shipped, **({} if limits is None else read_limits(limits))}
+        return cls(known, None if against is None else read_scores(against), against=against)
 
 
 @dataclass(frozen=True)
@@ -146,6 +148,7 @@ def _draw(run: Run, measured: _Measured) -> None:
     loop = measured.loop
     draw_fit(loop.throws, loop.fit, loop.paper, run.out / "cnr.png")
     draw_sources(loop.found, run.out / "cnr-sources.png")
+    draw_surface(loop.paper, loop.fit, run.out / "cnr-table.png")
     draw_fig_13(loop.flown[0], run.out / "feedback.png")
 
 
@@ -158,4 +161,4 @@ def _record(run: Run, judging: Judging, subject: Subject, scores: Sequence[Score
     for number in range(1, judging.seeds):
         run.step(f"seed {run.seed + number}, {number + 1} of {judging.seeds}")
         runs.append(_measure(run, np.random.default_rng(run.seed + number), subject).scores)
-    write_text(judging.record, limits_text(runs, " ".join(["discsim", *run.command])))
+    write_text(judging.record, limits_text(runs, " ".join(["discsim", *run.command]), judging.margin))

@@ -12,10 +12,10 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from discsim.errors import InputError
-from discsim.files import read_text
+from discsim.files import model_file, model_names, read_text
 from validation.reporting.scores import Score, score
 
-__all__ = ["Limit", "limited", "limits_text", "margin", "read_limits"]
+__all__ = ["Limit", "limited", "limits_text", "margin", "read_limits", "shipped_limits"]
 
 #: a limit is to hold this share of all further runs, and that with this confidence: of 25 scores of a run that draw
 #: random numbers one in 400 runs then fails by chance
@@ -60,6 +60,15 @@ def _limit(path: Path, name: str, value: object) -> Limit:
     return Limit(float(numbers["tolerance"]), None if expected is None else float(expected))
 
 
+def shipped_limits(quick: bool) -> dict[str, Limit]:
+    """Return the limits that come with the program, of the full run or the quick one; the files say how they came.
+
+    Empty where none were recorded: the scores then keep their own tolerances.
+    """
+    name = "quick" if quick else "full"
+    return read_limits(model_file(f"limits/{name}.toml")) if name in model_names("limits") else {}
+
+
 def limited(scores: Sequence[Score], limits: Mapping[str, Limit]) -> list[Score]:
     """Return the scores judged by the limits that there are for them; the others as they are.
 
@@ -86,17 +95,18 @@ def margin(count: int) -> float:
     return z * float(np.sqrt((count - 1) * (1 + 1 / count) / chi2.ppf(1 - CONFIDENCE, count - 1)))
 
 
-def limits_text(runs: Sequence[Sequence[Score]], made_by: str) -> str:
+def limits_text(runs: Sequence[Sequence[Score]], made_by: str, factor: float | None = None) -> str:
     """Return a file of limits from runs that differ in their seed alone.
 
-    A tolerance is the distance of the mean from what is expected, and `margin` standard deviations. A score that does
-    not scatter keeps its own tolerance, and so does one that some run did not know or have.
+    A tolerance is the distance of the mean from what is expected, and ``factor`` standard deviations (None: `margin`).
+    A score that does not scatter keeps its own tolerance, and so does one that some run did not know or have.
     """
-    factor = margin(len(runs))
+    how = f"# tolerance = |mean - expected| + {margin(len(runs)) if factor is None else factor:.2f} standard deviations"
+    if factor is None:
+        how += f", which hold {100 * SHARE:g} % of further\n# runs with {100 * CONFIDENCE:g} % confidence"
     lines = [
         f"# Limits of `{made_by}`, from {len(runs)} seeds.",
-        f"# tolerance = |mean - expected| + {factor:.2f} standard deviations, which hold {100 * SHARE:g} % of further",
-        f"# runs with {100 * CONFIDENCE:g} % confidence; scores that do not scatter keep their own.",
+        f"{how};\n# scores that do not scatter keep their own.",
         "",
         "[limits]",
     ]
@@ -106,10 +116,11 @@ def limits_text(runs: Sequence[Sequence[Score]], made_by: str) -> str:
         all_known = len(seen) == len(runs) and bool(np.isfinite(seen).all())
         spread = float(seen.std(ddof=1)) if all_known else 0.0
         found = f"seen {seen.min():.4g} to {seen.max():.4g}" if len(seen) > 1 else f"in one run {item.value:.4g}"
-        remark = f"{found}, expected {item.expected:.6g}"
         if all_known and spread > ROUNDING * float(np.abs(seen).max()):
-            tolerance = f"{abs(float(seen.mean()) - item.expected) + factor * spread:.3g}"
+            mean = float(seen.mean())
+            beyond = (margin(len(runs)) if factor is None else factor) * spread
+            tolerance, found = f"{abs(mean - item.expected) + beyond:.6g}", f"{found}, mean {mean:.4g}, sd {spread:.3g}"
         else:
             tolerance = f"{item.tolerance!r}"
-        lines.append(f"{json.dumps(item.name)} = {tolerance}  # {remark}")
+        lines.append(f"{json.dumps(item.name)} = {tolerance}  # {found}, expected {item.expected:.6g}")
     return "\n".join([*lines, ""])

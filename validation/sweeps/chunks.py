@@ -132,7 +132,9 @@ class _Bench:
         self.options = Options(fft=FftSettings(step=plan.fft_step))
         accelerometer_rng, magnetometer_rng = (self._rng(2, k) for k in (0, 1))
         felt, seen = _timed(module, "accelerometer"), _timed(module, "magnetometer")
-        self.felt = look_with_accelerometer(motion, felt, accelerometer_rng) if felt is not None else None
+        self.yields = "mount_hz" in case.settings
+        mount_hz = case.settings.get("mount_hz", np.inf)
+        self.felt = look_with_accelerometer(motion, felt, accelerometer_rng, mount_hz) if felt is not None else None
         self.seen = look_with_magnetometer(motion, seen, magnetometer_rng) if seen is not None else None
 
     def _rng(self, *key: int) -> np.random.Generator:
@@ -160,8 +162,7 @@ class _Bench:
             return YawRate(name, none, none, none)
 
     def _estimate(self, name: str, number: int, module: Instruments) -> YawRate:
-        noise = self._rng(0, self.plan.mounts.module_of(number))
-        streams = dict(zip(SENSORS, noise.spawn(len(SENSORS)), strict=True))  # as `record` does
+        streams = self._streams(number)
         if name == "accelerometer":
             felt = module.sensors["accelerometer"]
             assert isinstance(felt, Accelerometer)
@@ -176,13 +177,24 @@ class _Bench:
             return fft(shown, self.options.fft, fixed_axis=self.plan.plant != "flight")
         return estimate(self.recording(module, number), name, self.options)
 
+    def _streams(self, number: int) -> dict[str, np.random.Generator]:
+        """Return each sensor's stream of noise, as `record` has them."""
+        noise = self._rng(0, self.plan.mounts.module_of(number))
+        return dict(zip(SENSORS, noise.spawn(len(SENSORS)), strict=True))
+
     def recording(self, module: Instruments, number: int) -> Recording:
         """Return the whole recording of a mount's module."""
         disc = None
         if self.plan.plant == "flight":
             disc = self.case.settings["disc"][0] if "disc" in self.case.settings else load_disc("driver")[0]
         noise = self._rng(0, self.plan.mounts.module_of(number))
-        return record(self.motion, module, noise, plant=self.plan.plant, name=f"mount {number}", disc=disc)
+        made = record(self.motion, module, noise, plant=self.plan.plant, name=f"mount {number}", disc=disc)
+        felt = module.sensors.get("accelerometer")
+        if not self.yields or not isinstance(felt, Accelerometer):
+            return made
+        assert self.felt is not None
+        moved = self.felt.measure(felt, self._streams(number)["accelerometer"])
+        return replace(made, samples={**made.samples, "accelerometer": moved})
 
 
 def _timed(module: Instruments, name: str) -> Any:

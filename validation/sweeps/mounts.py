@@ -32,6 +32,7 @@ __all__ = [
     "closed_form",
     "look_with_accelerometer",
     "look_with_magnetometer",
+    "stretched",
 ]
 
 #: what a mount is: offset from the stated place in B, m; rotation vector of the sensor's axes, rad
@@ -161,15 +162,37 @@ class AccelerometerView(NamedTuple):
         return Samples(self.t, reading)
 
 
-def look_with_accelerometer(motion: Motion, sensor: Accelerometer, rng: np.random.Generator) -> AccelerometerView:
-    """Take from a motion what every mount of ``sensor`` needs; ``rng`` draws its instants where they are random."""
+def stretched(rate: FloatArray, mount_hz: float) -> FloatArray:
+    """Return how many times as far from the axis (n,) a module rides at spin rates (n,) rad/s in a mount that yields.
+
+    A module of mass m in an elastic mount vibrates at w = 2 pi ``mount_hz``: m w^2 per metre hold it against m r^2 p at
+    its place p, so that p = p0/(1 - (r/w)^2) of where it sits at rest. The spin changes slowly against the vibration,
+    which is damped. Raises `InputError` where the spin reaches w: no spring holds it then.
+    """
+    w = 2 * np.pi * mount_hz
+    fastest = float(np.max(np.abs(rate), initial=0.0))
+    if fastest >= w:
+        raise InputError(
+            f"a mount of {mount_hz:g} Hz at {fastest / (2 * np.pi):.3g} turns/s tears off; expected a stiffer"
+        )
+    return np.asarray(1.0 / (1.0 - (rate / w) ** 2))
+
+
+def look_with_accelerometer(
+    motion: Motion, sensor: Accelerometer, rng: np.random.Generator, mount_hz: float = np.inf
+) -> AccelerometerView:
+    """Take from a motion what every mount of ``sensor`` needs; ``rng`` draws its instants where they are random.
+
+    A mount that yields, of ``mount_hz``, lets the sensor out by `stretched`.
+    """
     written, taken = sensor.sampling.instants(motion.start, motion.end, rng)
 
     def signal(t: FloatArray) -> FloatArray:
         state = motion.at(t)
         origin = specific_force(state, motion.surroundings, np.zeros(3))
         along = [specific_force(state, motion.surroundings, axis) - origin for axis in np.eye(3)]  # per metre
-        return np.hstack((origin, *along, bias_drift(sensor.drift, t - motion.start)))
+        out = stretched(state.rate[:, 2], mount_hz)[:, None]
+        return np.hstack((origin, out * along[0], out * along[1], along[2], bias_drift(sensor.drift, t - motion.start)))
 
     # a lag is linear and settled at the start, so it may act before the mount turns and weighs the parts
     parts = filtered(sensor.lag, motion, signal, taken)

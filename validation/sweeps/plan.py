@@ -233,6 +233,7 @@ _KINDS: Mapping[str, _Kind] = MappingProxyType(
         "radius_m": _Kind(BOTH, False, lowest=1e-4, highest=0.5),
         "accelerometer_hz": _Kind(BOTH, False, lowest=1.0, highest=1e5),
         "magnetometer_hz": _Kind(BOTH, False, lowest=1.0, highest=1e5),
+        "mount_hz": _Kind(BOTH, False, lowest=1.0, highest=1e5),
         "noise_ratio": _Kind(BOTH, False, lowest=0.0, highest=1e6),
     }
 )

@@ -214,4 +214,5 @@ def draw_tolerances(found: list[Tolerance], below: float, path: Path) -> None:
     what = f"offset along each axis that keeps {100 * SHARE:g} %\nof mounts below {100 * below:g} % (mm)"
     for axes in panels[:, 0]:
         axes.set_ylabel(what)
+        axes.set_ylim(bottom=0.0)
     save_figure(figure, path)

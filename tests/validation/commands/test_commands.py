@@ -21,6 +21,7 @@ from discsim.written import as_written
 from validation.cli import main
 from validation.commands import COMMANDS
 from validation.experiments import validation_run as headless
+from validation.reporting.limits import shipped_limits
 from validation.reporting.scores import at_most
 
 
@@ -287,15 +288,20 @@ def test_debug_shows_the_traceback(monkeypatch, capsys):
 def test_validate_scores_everything_and_leaves_its_report(monkeypatch, tmp_path, capsys):
     """With the concealed case that has something in it; the other is drawn and scored the same way."""
     monkeypatch.setattr(headless, "QUICK_CASES", headless.QUICK_CASES[1:])
+    kept = {name: limit for name, limit in shipped_limits(True).items() if not name.startswith("concealed, noise")}
+    monkeypatch.setattr("validation.reporting.limits.shipped_limits", lambda quick: kept)
     out, junit = tmp_path / "report", tmp_path / "scores.xml"
     assert run(monkeypatch, "validate", "--quick", "--out", str(out), "--junit", str(junit)) == 0
     scores = json.loads((out / "scores.json").read_text())
     assert len(scores) >= 10
     assert set(scores[0]) == {"name", "value", "unit", "expected", "tolerance", "ok"}
     assert all(score["ok"] for score in scores)
+    assert {score["name"]: score["tolerance"] for score in scores} == {
+        name: limit.tolerance for name, limit in kept.items()
+    }
     assert sum("concealed" in score["name"] for score in scores) == 2
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 6
+    assert page.count("data:image/png;base64,") == 7
     suite = ElementTree.parse(junit).getroot()[0]
     assert int(suite.get("tests")) == len(scores)
     assert suite.get("failures") == "0"

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from discsim.errors import InputError
+from discsim.files import model_file
 from validation.reporting.ci import github_commands, markdown_summary
-from validation.reporting.limits import SHARE, Limit, limited, limits_text, margin, read_limits
+from validation.reporting.limits import SHARE, Limit, limited, limits_text, margin, read_limits, shipped_limits
 from validation.reporting.regression import compare_scores, read_scores, write_regression
 from validation.reporting.run import json_text
 from validation.reporting.scores import Score, at_most, score
@@ -73,6 +75,19 @@ class TestRecorded:
         assert limits["noise"].tolerance == pytest.approx(expected, rel=5e-3)
         assert limits["noise"].tolerance < 2.0
 
+    def test_a_regression_of_three_standard_deviations_fails(self, tmp_path):
+        """By the margin of the shipped limits, with made numbers; what was seen in the runs still passes."""
+        runs = self.runs(20, np.random.default_rng(0))
+        seen = np.array([run[0].value for run in runs])
+        limits = read_limits(written(tmp_path, limits_text(runs, "discsim validate", 3.0)))
+
+        def judged(value: float) -> bool:
+            return limited([score("noise", value, "deg/s", 14.0, 5.0)], {"noise": limits["noise"]})[0].ok
+
+        assert all(judged(value) for value in seen)
+        assert judged(seen.mean() + 2.99 * seen.std(ddof=1))
+        assert not judged(seen.mean() + 3.01 * seen.std(ddof=1))
+
     def test_what_does_not_scatter_or_is_not_known_keeps_its_own(self, tmp_path):
         limits = read_limits(written(tmp_path, limits_text(self.runs(3, np.random.default_rng(0)), "")))
         assert (limits["exact"].tolerance, limits["unknown"].tolerance) == (1e-4, 2.0)
@@ -95,6 +110,31 @@ class TestRecorded:
         assert margin(3) > margin(5) > margin(20) > margin(1000) > 3.8
         with pytest.raises(ValueError, match="at least two"):
             margin(1)
+
+
+class TestShipped:
+    """The quick run's limits, recorded from 20 seeds: `discsim validate --quick` is judged by them."""
+
+    TEXT = model_file("limits/quick.toml").read_text(encoding="utf-8")
+    REMARK = re.compile(r'^(".+") = (\S+)  # seen .+, mean (\S+), sd (\S+), expected (\S+)$', re.MULTILINE)
+
+    def test_the_file_says_by_which_command_and_when_it_was_recorded(self):
+        assert "`discsim validate --quick --record-limits models/limits/quick.toml --repeat 20 --margin 3" in self.TEXT
+        assert re.search(r"20 seeds.+on \d{4}-\d\d-\d\d", self.TEXT)
+
+    def test_every_score_that_scatters_has_three_of_its_standard_deviations_and_its_bias(self):
+        rows = self.REMARK.findall(self.TEXT)
+        assert len(rows) >= 10
+        for name, tolerance, mean, sd, expected in rows:
+            wanted = abs(float(mean) - float(expected)) + 3 * float(sd)
+            # the remark has four digits of the mean and three of the deviation
+            loose = 1e-3 * abs(float(mean)) + 0.02 * float(sd)
+            assert float(tolerance) == pytest.approx(wanted, abs=loose), name
+
+    def test_all_of_it_is_read(self):
+        limits = shipped_limits(True)
+        assert len(limits) == self.TEXT.count('\n"')
+        assert all(limit.expected is None for limit in limits.values())
 
 
 class TestAgainst:

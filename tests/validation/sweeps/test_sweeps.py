@@ -31,6 +31,7 @@ from validation.sweeps.mounts import (
     closed_form,
     look_with_accelerometer,
     look_with_magnetometer,
+    stretched,
 )
 from validation.sweeps.plan import Plan, plan_file, read_plan
 from validation.sweeps.result import labelled, write_netcdf
@@ -325,3 +326,49 @@ def test_a_profile_from_a_file_counts_from_the_plans_folder(tmp_path):
 def test_the_default_profile_is_swept_where_the_plan_names_none(tmp_path):
     text = SMALL.replace("rates_deg_s = [1200, 2600]\nhold_s = 2.0\nramp_s = 0.5\n", "")
     np.testing.assert_array_equal(plan_of(tmp_path, text).profile.t, default_profile().t)
+
+
+class TestALooseMount:
+    def test_it_lets_the_module_out_as_far_as_a_spring_in_the_turning_frame_does(self):
+        """Centrifugal, Coriolis and elastic force with some damping, integrated until it is at rest."""
+        from scipy.integrate import solve_ivp
+
+        r, hz, place = np.radians(3000.0), 40.0, np.array([-0.0161, 0.003])
+        w = 2 * np.pi * hz
+
+        def slopes(_: float, y: np.ndarray) -> np.ndarray:
+            p, v = y[:2], y[2:]
+            force = r**2 * p - w**2 * (p - place) + 2 * r * np.array([v[1], -v[0]]) - 0.2 * w * v
+            return np.concatenate([v, force])
+
+        end = solve_ivp(slopes, (0.0, 2.0), np.concatenate([place, np.zeros(2)]), rtol=1e-9, atol=1e-12).y[:2, -1]
+        np.testing.assert_allclose(end, place * stretched(np.array([r]), hz), rtol=1e-6)
+
+    def test_the_rate_errs_by_half_the_square_of_spin_over_vibration_and_more(self):
+        """(9) with what the mount lets the sensor out: r (1/sqrt(1 - (r/w)^2) - 1)."""
+        rate, sensor = 80.0, Accelerometer(position=np.array([-0.0161, 0.0, 0.0]))
+        view = look_with_accelerometer(steady(rate), sensor, np.random.default_rng(0), 50.0)
+        estimate = accelerometer(view.measure(sensor, np.random.default_rng(0)), sensor.sheet)
+        share = (rate / (100 * np.pi)) ** 2
+        np.testing.assert_allclose(estimate.rate / rate - 1, 1 / np.sqrt(1 - share) - 1, atol=1e-9)
+        assert estimate.rate[0] / rate - 1 > share / 2
+
+    def test_a_sweep_over_it_moves_the_accelerometer_alone_in_a_whole_recording_as_well(self, tmp_path):
+        text = SMALL.replace("radius_m = [0.01, 0.02]", "mount_hz = [50.0]").replace("count = 6", "count = 1")
+        text = text.replace("drawn = true", "").replace("about_y_deg = [-3, 3]", "")  # a tilt brings gravity in
+        text = text.replace("fft = 2", "accelerometer_calibrated = 1")
+        _, result = swept(plan_of(tmp_path, text))
+        one = result.isel(mount=0, mount_hz=0)
+        spin = np.radians(one.rate_deg_s.values)
+        offset = np.array([[float(one.x_m), float(one.y_m), 0.0]])
+        away = 1 + closed_form(np.ones(2), np.array([-0.0161, 0.0, 0.0]), offset)[0]
+        expected = np.degrees(spin) * (away * np.sqrt(stretched(spin, 50.0)) - 1)
+        # 0.03 m/s^2 of noise over 1 s, of some 7 and 33 m/s^2
+        np.testing.assert_allclose(one.bias_deg_s.sel(estimator="accelerometer"), expected, atol=2.0)
+        # the calibration by the field takes a share of the rate for a place, and leaves what grows with the rate
+        calibrated = one.bias_deg_s.sel(estimator="accelerometer_calibrated").values
+        assert 0.1 < np.abs(calibrated).max() < np.abs(expected).max()
+
+    def test_a_mount_that_cannot_hold_the_module_is_refused(self):
+        with pytest.raises(InputError, match="tears off"):
+            stretched(np.array([100.0]), 15.0)

@@ -46,10 +46,11 @@ class Layout:
     """Where the numbers of a state stand that others ask for by name; None for what a state does not hold.
 
     A state has ``size`` numbers and moves in ``directions``: the four numbers of an attitude (quaternion from B to N)
-    by small turns in B, each other number by itself; without an attitude, numbers behind the last direction follow from
-    the others and do not move. ``position`` and ``velocity`` are in N, m and m/s, ``rate`` in B, rad/s; ``spin`` is the
-    rate about the spin axis, ``yaw`` a rig's angle about its own, rad. ``per_time`` are the numbers that come out
-    smaller by a ratio where all times are written larger by it.
+    by small turns in B, each other number by itself. Without an attitude the columns of ``moves`` (s, d) say which
+    numbers a direction moves; where it is not given each moves its own, and numbers behind the last direction follow
+    from the others and do not move. ``position`` and ``velocity`` are in N, m and m/s, ``rate`` in B, rad/s; ``spin``
+    is the rate about the spin axis, ``yaw`` a rig's angle about its own, rad. ``per_time`` are the numbers that come
+    out smaller by a ratio where all times are written larger by it.
     """
 
     size: int
@@ -61,6 +62,7 @@ class Layout:
     spin: int | None = None
     yaw: int | None = None
     per_time: tuple[int, ...] = ()
+    moves: tuple[tuple[float, ...], ...] | None = None
 
     def __post_init__(self) -> None:
         if self.attitude is not None and self.directions != self.size - 1:
@@ -73,6 +75,8 @@ class Layout:
         """Return states (..., s) moved by tangents (..., d)."""
         shape = (*np.broadcast_shapes(states.shape[:-1], tangents.shape[:-1]), states.shape[-1])
         new = np.array(np.broadcast_to(states, shape))
+        if self.moves is not None:
+            return np.asarray(new + tangents @ np.array(self.moves).T)
         if self.attitude is None:
             new[..., : self.directions] += tangents
             return new
@@ -84,6 +88,8 @@ class Layout:
 
     def difference(self, a: FloatArray, b: FloatArray) -> FloatArray:
         """Return the tangents (..., d) that move states b (..., s) to a."""
+        if self.moves is not None:
+            return np.asarray((a - b) @ np.linalg.inv(np.array(self.moves)).T)
         if self.attitude is None:
             return np.asarray(a[..., : self.directions] - b[..., : self.directions])
         first, last = self.attitude.start, self.attitude.stop
@@ -91,8 +97,11 @@ class Layout:
         return np.concatenate([a[..., :first] - b[..., :first], turned, a[..., last:] - b[..., last:]], axis=-1)
 
     def directions_of(self, places: slice | int) -> tuple[int, ...]:
-        """Return the directions in which the numbers at some places of a state move, or those of its attitude."""
+        """Return the directions in which the numbers at some places of a state alone move, or those of its attitude."""
         numbers = range(places, places + 1) if isinstance(places, int) else range(places.start, places.stop)
+        if self.moves is not None:
+            columns = zip(*self.moves, strict=True)
+            return tuple(j for j, c in enumerate(columns) if all(bool(x) == (n in numbers) for n, x in enumerate(c)))
         if self.attitude is None or numbers.stop <= self.attitude.start:
             return tuple(numbers)
         if numbers.start == self.attitude.start:

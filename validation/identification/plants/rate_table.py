@@ -36,6 +36,11 @@ __all__ = ["RATE_TABLE"]
 
 #: where the numbers of a state stand
 _YAW, _TURNED = 0, 1
+#: a state moves by turning further, and by having started elsewhere: only the first moves the table in its ripple, so
+#: that slopes that pass from one segment to the next have to keep them apart
+_MOVES = ((1.0, 1.0), (1.0, 0.0))
+#: the angle turned is zero at the start by definition: held there, rad, far within what readings tell of a phase
+_AT_START = 1e-7
 
 # ---------------------------------------------------------------------------------------------------- its motion
 
@@ -224,16 +229,16 @@ def _knots(table: TomlTable) -> tuple[FloatArray, FloatArray]:
 RATE_TABLE = Plant(
     name="rate_table",
     motion="run of the table",
-    layout=Layout(2, 1, yaw=_YAW),
+    layout=Layout(2, 2, yaw=_YAW, moves=_MOVES),
     dynamics=Dynamics(
         propagated_by(table_segments, lambda given, own: given.knots), _longest_step, _corners, _consistent
     ),
     initial=Initial(_states),
     sizes=Sizes(  # rad
-        differences=np.array([1e-5]),
-        unknown=np.array([1e6]),
-        continuous=AllowedDefects(np.zeros(1)),
-        relaxed=AllowedDefects(np.array([0.5])),
+        differences=np.array([1e-5, 1e-5]),
+        unknown=np.array([_AT_START, 1e6]),
+        continuous=AllowedDefects(np.zeros(2)),
+        relaxed=AllowedDefects(np.array([0.5, 0.0])),
     ),
     # ten minutes of a rig; the plateaus of a profile for its setup
     durations=Durations(segment=1.0, first_look=30.0, window=1.0, longest=600.0, setup=300.0),
