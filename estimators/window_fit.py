@@ -12,7 +12,7 @@ from math import ceil, cos, log, log2, pi, sin, sqrt
 import numpy as np
 
 from discsim.arrays import ComplexArray, FloatArray
-from discsim.compiled import compiled
+from discsim.compiled import compiled, compiled_nogil
 from estimators.spin_spline import IndexArray
 from estimators.tone import field_shape, fit_tone, turns
 
@@ -389,7 +389,7 @@ def _tell(
 # ------------------------------------------------------------------------------------------------ all windows
 
 
-@compiled
+@compiled_nogil
 def search_windows(
     t: FloatArray,
     m: FloatArray,
@@ -398,6 +398,7 @@ def search_windows(
     first: IndexArray,
     after: IndexArray,
     interval: float,
+    span: float,
     degree: int,
     ellipse_sd: float,
     limits: tuple[float, float, float],
@@ -406,9 +407,8 @@ def search_windows(
     """Fill ``table`` (w, columns) with the tones of windows about ``centres`` (w,); rows stay where nothing is told.
 
     ``lengths`` (k,) are tried in turn; ``first`` and ``after`` (k, w) are the ranges of the readings at times t (n,)
-    and field m (n, 3).
+    and field m (n, 3). ``interval`` and ``span`` are the readings' usual spacing and the length of them all, s.
     """
-    span = t[-1] - t[0] if t.size else 0.0
     powers = degree + 2
     most = 1 + 2 * _PEAKS
     found, spread = np.empty((most, powers + 5)), np.empty((most, powers + 5, powers + 5))
@@ -468,7 +468,7 @@ def search_windows(
                 break
 
 
-@compiled
+@compiled_nogil
 def turn_windows(
     t: FloatArray,
     m: FloatArray,
@@ -476,6 +476,8 @@ def turn_windows(
     start: FloatArray,
     first: IndexArray,
     after: IndexArray,
+    interval: float,
+    span: float,
     degree: int,
     ellipse_sd: float,
     limits: tuple[float, float, float],
@@ -489,8 +491,6 @@ def turn_windows(
     along z. The turning needs the phase and the phase the turning, so thrice.
     """
     powers = degree + 2
-    span = t[-1] - t[0] if t.size else 0.0
-    interval = np.median(np.diff(t)) if t.size > 1 else 1.0
     parameters, covariance = np.empty(powers + 5), np.empty((powers + 5, powers + 5))
     for index in range(centres.size):
         lo, hi, length = first[index], after[index], start[index, 8]
