@@ -239,7 +239,7 @@ def _read_folder(folder: Path) -> Recording:
     sheets = _read_sheets(top.table("sensors", required=True), strict=strict)
     top.finish()
 
-    samples = {}
+    samples: dict[str, Samples] = {}
     for sensor, kind in SENSORS.items():
         file = folder / f"{sensor}.csv"
         if not _there(file):

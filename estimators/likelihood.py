@@ -272,8 +272,9 @@ def _searched(t: FloatArray, m: FloatArray, centres: FloatArray, settings: Likel
         first, after = _ranges(t, own, lengths[:, None])
         lo, hi = _reach(first, after, t.size)
         table = np.full((own.size, len(COLUMNS)), np.nan)
+        at, field = _copies(t[lo:hi], m[lo:hi])
         search_windows(
-            np.array(t[lo:hi]), np.array(m[lo:hi]), own, lengths, first - lo, after - lo, interval, span, settings.degree,
+            at, field, own, lengths, first - lo, after - lo, interval, span, settings.degree,
             settings.ellipse_sd, limits, table,
         )  # fmt: skip
         return table[before:]
@@ -301,13 +302,19 @@ def _turned(
         lo, hi = _reach(first, after, t.size)
         rates, _ = transverse_rates(gyroscope, t[lo:hi])
         table = np.full((own.size, len(COLUMNS)), np.nan)
+        at, field = _copies(t[lo:hi], m[lo:hi])
         turn_windows(
-            np.array(t[lo:hi]), np.array(m[lo:hi]), own, known[part], first - lo, after - lo, interval, span, settings.degree,
+            at, field, own, known[part], first - lo, after - lo, interval, span, settings.degree,
             settings.ellipse_sd, limits, axial.offset, rates, table,
         )  # fmt: skip
         return table
 
     return np.concatenate([np.empty((0, len(COLUMNS))), *side_by_side(fit, _parts(centres.size))])
+
+
+def _copies(t: FloatArray, m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return arrays that may be written: for those that may not all would be compiled once more."""
+    return np.array(t), np.array(m)
 
 
 def _interval(t: FloatArray) -> float:

@@ -72,7 +72,7 @@ class SpinSpline:
         out = np.zeros(self.size)
         for place, factor in enumerate(_BEND):
             out[place : place + bend.size] += factor * bend
-        return out * self.spacing**-1.5
+        return np.asarray(out * self.spacing**-1.5)
 
     def bend_precision(self, local: FloatArray) -> FloatArray:
         """Return the precision (size, size) of coefficients whose second differences have precisions (size - 2,)."""

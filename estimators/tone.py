@@ -277,9 +277,11 @@ def fit_tone(
             decrement += step * right[i]
         trial_cost = _assemble(x, parts, shape, trial, powers, weight, trial_normal, trial_right, work)
         if trial_cost <= cost * (1 + 1e-12):
-            parameters[:] = trial
-            normal[:] = trial_normal
-            right[:] = trial_right
+            # entry by entry: an assignment of arrays compiles the words of an error that cannot be, a second's work
+            for i in range(m):
+                parameters[i], right[i] = trial[i], trial_right[i]
+                for j in range(m):
+                    normal[i, j] = trial_normal[i, j]
             cost = trial_cost
             damping = damping * 0.1 if damping > 1e-5 else 0.0
             if noise <= 0.0:  # the prior's weight follows the noise found

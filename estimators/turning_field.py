@@ -45,7 +45,9 @@ def integrate(
     """
     D = np.eye(3)
     psi = 0.0
-    attitude[0] = D
+    for i in range(3):
+        for j in range(3):
+            attitude[0, i, j] = D[i, j]
     psi_at[0] = 0.0
     for k in range(times.size - 1):
         h = (times[k + 1] - times[k]) / substeps
@@ -121,6 +123,17 @@ def _weighed(
         a, b = SOFT[column]
         D[a, 6 + column] = scale * turned[b]
         D[b, 6 + column] = scale * turned[a]
+
+
+@compiled
+def _note(rest: FloatArray, total: FloatArray, place: int) -> None:
+    """Write a sum (q, k) at a place of ``rest`` (m, q, k), entry by entry.
+
+    An assignment of arrays compiles the words of an error that cannot be, which takes seconds.
+    """
+    for a in range(total.shape[0]):
+        for b in range(total.shape[1]):
+            rest[place, a, b] = total[a, b]
 
 
 @compiled
@@ -240,7 +253,8 @@ def add_normal_equations(
                         if k != j:
                             for a in range(q):
                                 pairs[max(j, k), min(j, k)] -= theta[j, a] * run[k, a]
-                    rest_g[j], rest_l[j] = sum_g, sum_l
+                    _note(rest_g, sum_g, j)
+                    _note(rest_l, sum_l, j)
                     order[ended] = j
                     ended, count = ended + 1, count - 1
                     active[m] = active[count]
@@ -277,7 +291,8 @@ def add_normal_equations(
                 pairs[max(j, k), min(j, k)] += value
     settled = ended
     for m in range(count):
-        rest_g[active[m]], rest_l[active[m]] = sum_g, sum_l
+        _note(rest_g, sum_g, active[m])
+        _note(rest_l, sum_l, active[m])
         order[ended] = active[m]
         ended += 1
     for place in range(ended):

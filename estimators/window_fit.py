@@ -110,7 +110,8 @@ def _transform(
             grid[slots[k]] += z[k] * term[k]
         _fourier(grid, size, wheel)
         if power == 0:
-            total[:size] = grid[:size]
+            for k in range(size):
+                total[k] = grid[k]
         else:
             for k in range(size):
                 w = 2 * pi * ((k if k < size // 2 else k - size) * unit)
@@ -276,8 +277,17 @@ def _chirped(
             rows[count, 1] = 2 * pi * ((highest if highest < size // 2 else highest - size) * unit)
             rows[count, 2] = chirp
             count += 1
-    order = np.argsort(rows[:count, 0])
-    return rows[order[max(0, count - _PEAKS) :]][:, 1:]
+    kept = min(count, _PEAKS)
+    highest_last = np.empty((kept, 2))
+    for place in range(kept - 1, -1, -1):
+        best = 0
+        for row in range(1, count):
+            # of equals the later one
+            if rows[row, 0] >= rows[best, 0]:
+                best = row
+        highest_last[place, 0], highest_last[place, 1] = rows[best, 1], rows[best, 2]
+        rows[best, 0] = -1.0
+    return highest_last
 
 
 @compiled

@@ -189,7 +189,7 @@ class Problem:
             self.substeps, self.h, at.axes, at.attitude, np.eye(3) + _symmetric(x[soft]), x[vector], at.field,
             at.residual, scale, self.despun, self.first, self.weights, self.spline.size,
             self.first if none else self.slow_first, self.weights if none else self.slow_weights,
-            0 if none else self.slow.size, self.read, read, at.turn, information, right,
+            0 if self.slow is None else self.slow.size, self.read, read, at.turn, information, right,
         )  # fmt: skip
 
     def evaluate_rows(self, x: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
