@@ -83,8 +83,8 @@ time is linear.
 
 {log}
 
-Goal: an hour in 60 s and 1 GB. It is missed: the cost per minute of log hardly changes with length, and
-[what each method costs](estimators.md) says which methods take it.
+Goal: an hour in 60 s and 1 GB. The work is shared by all cores: on two, half the CPU seconds pass by the clock where
+nothing else runs. [What each method costs](estimators.md) says which methods take it.
 """
 
 

@@ -356,7 +356,11 @@ def read_csv(path: Path, header: str, *, gaps_allowed: bool = True) -> Samples:
         line, previous = line + len(table), float(table[-1, 0])
     if not times:
         raise InputError.at(path, 2, "no samples; expected at least one row (or leave the file out)")
-    samples = Samples(sealed(np.concatenate(times)), sealed(np.concatenate(values)))
+    t = sealed(np.concatenate(times))
+    times.clear()
+    value = sealed(np.concatenate(values))
+    values.clear()
+    samples = Samples(t, value)
     if found := _beyond(samples, header):
         row, message = found
         raise InputError.at(path, 2 + row, message)
