@@ -453,7 +453,9 @@ def search_windows(
             if known:
                 starts[0, 0], starts[0, 1] = before + slope * (centre - at), slope
             starts[int(known) :, 0] = rates[:count]
-            count = _fits(tau, x, z, u, half, interval, starts, powers, ellipse_sd, found, spread, variances, 0)
+            # of a type, not the number itself: for that one numba would compile the function once more
+            none = int(np.int64(0))
+            count = _fits(tau, x, z, u, half, interval, starts, powers, ellipse_sd, found, spread, variances, none)
             about = 0.0
             for k in range(n):
                 about += (z[k] - mean).real ** 2 + (z[k] - mean).imag ** 2
@@ -526,5 +528,8 @@ def turn_windows(
             continue
         _positive(parameters, powers)
         row = table[index]
-        if _tell(x, z, u, half, interval, parameters, covariance, variance, powers, True, limits, row) == _TOLD:
+        if (
+            _tell(x, z, u, half, interval, parameters, covariance, variance, powers, bool(np.bool_(True)), limits, row)
+            == _TOLD
+        ):
             row[6], row[8], row[9] = mean_z, length, along
