@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["BoolArray", "ComplexArray", "FloatArray", "IntArray", "readonly", "sd_by_median", "vector3"]
+__all__ = ["BoolArray", "ComplexArray", "FloatArray", "IntArray", "readonly", "sd_by_median", "sealed", "vector3"]
 
 FloatArray: TypeAlias = NDArray[np.float64]
 BoolArray: TypeAlias = NDArray[np.bool_]
@@ -17,8 +17,19 @@ ComplexArray: TypeAlias = NDArray[np.complex128]
 
 
 def readonly(values: ArrayLike) -> FloatArray:
-    """Return a read-only float64 copy; a frozen dataclass alone would still let its arrays be written."""
+    """Return a read-only float64 copy; a frozen dataclass alone would still let its arrays be written.
+
+    An array that owns its numbers and is read-only already is one: it comes back as it is.
+    """
+    if type(values) is np.ndarray and values.dtype == np.float64 and values.base is None and not values.flags.writeable:
+        return values
     array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array
+
+
+def sealed(array: FloatArray) -> FloatArray:
+    """Return an array that nobody else holds, made read-only: `readonly` without a copy."""
     array.setflags(write=False)
     return array
 

@@ -58,6 +58,8 @@ ROUNDING = 0.33
 #: Readings over which the noise is looked at, and the share of such windows that are quieter than what counts: the
 #: quietest of all would be so by chance.
 WINDOW, QUIETEST = 32, 0.05
+#: Windows that are looked at together: memory does not grow with a recording.
+PIECE = 1 << 17
 #: Fewest readings that tell a constant axis.
 LEAST = 16
 #: A step is no step where more than this share of the small spacings are no multiples of it.
@@ -254,21 +256,32 @@ def _quietest(column: FloatArray) -> float:
     noise alternate, neighbours correlating by -0.8; where they do not, they are motion and say nothing.
     """
     rough = np.diff(column, 4)
-    rough = rough[np.isfinite(rough)]
+    if not np.all(finite := np.isfinite(rough)):
+        rough = rough[finite]
     if rough.size < WINDOW // 2:
         return float("nan")
     width = min(WINDOW, rough.size)
     # scaled first: a reading of 1e300 has no square
-    scale = float(np.max(np.abs(rough))) or 1.0
+    scale = max(float(np.max(rough)), -float(np.min(rough))) or 1.0
+    total = float(np.sum((rough / scale) ** 2))
+    white = [
+        _white_windows(rough[start : start + PIECE + width], width, scale, total)
+        for start in range(0, rough.size - width + 1, PIECE)
+    ]
+    squares = np.concatenate(white)
+    return scale * float(np.sqrt(np.quantile(squares, QUIETEST) / width / 70.0)) if squares.size else float("nan")
+
+
+def _white_windows(rough: FloatArray, width: int, scale: float, total: float) -> FloatArray:
+    """Return the sums of squares, over ``scale`` squared, of the first windows of ``rough`` (n,) that hold white noise.
+
+    ``total`` is the sum over all of a sensor's readings: what running sums leave of a window of zeros is below it.
+    """
     products = np.stack([(rough / scale) ** 2, np.append(rough[1:] * (rough[:-1] / scale / scale), 0.0)])
     sums = np.cumsum(np.concatenate([np.zeros((2, 1)), products], axis=1), axis=1)
-    squares, neighbours = sums[:, width:] - sums[:, :-width]
-    # what the running sums leave in a window of zeros
-    squares = np.where(squares < 1e-13 * max(sums[0, -1], 1e-300), 0.0, squares)
-    white = neighbours <= ALTERNATING * squares
-    if not np.any(white):
-        return float("nan")
-    return scale * float(np.sqrt(np.quantile(squares[white], QUIETEST) / width / 70.0))
+    squares, neighbours = (sums[:, width:] - sums[:, :-width])[:, :PIECE]
+    squares = np.where(squares < 1e-13 * max(total, 1e-300), 0.0, squares)
+    return np.asarray(squares[neighbours <= ALTERNATING * squares])
 
 
 def _is_limit(column: FloatArray, axis: int, top: float, step: float, quiet: _Noise) -> bool:

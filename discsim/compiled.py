@@ -18,7 +18,15 @@ from typing import Any, TypeVar, cast
 import numba
 import numba.core.config
 
-__all__ = ["compiled", "compiled_address", "compiled_before", "compiled_nogil", "compiled_sums", "inlined"]
+__all__ = [
+    "compiled",
+    "compiled_address",
+    "compiled_before",
+    "compiled_nogil",
+    "compiled_nogil_sums",
+    "compiled_sums",
+    "inlined",
+]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -58,6 +66,11 @@ def compiled_sums(function: F) -> F:
     Values change by rounding alone; NaN and infinity keep their meaning.
     """
     return _compile(function, reorder=True)
+
+
+def compiled_nogil_sums(function: F) -> F:
+    """Compile like `compiled_sums`, and let other threads run meanwhile."""
+    return _compile(function, nogil=True, reorder=True)
 
 
 def inlined(function: F) -> F:

@@ -22,6 +22,7 @@ __all__ = [
     "guarding",
     "model_file",
     "model_names",
+    "read_pieces",
     "read_text",
     "replacing",
     "write_bytes",
@@ -58,20 +59,34 @@ def replacing(path: Path) -> None:
         guard(path)
 
 
+#: bytes of a file that are read at a time where no more of it is to be held
+BLOCK = 1 << 22
+
+
 def read_text(path: Path) -> str:
     """Return a UTF-8 file's text with LF line ends and no byte order mark; raises `InputError` where it is none."""
+    return "".join(read_pieces(path))
+
+
+def read_pieces(path: Path, size: int = BLOCK) -> Iterator[str]:
+    """Yield the text of `read_text` in pieces of whole lines, of about ``size`` bytes each; raises as it does."""
+    line = 1
     try:
-        content = path.read_bytes()
+        with path.open("rb") as stream:
+            while content := stream.read(size):
+                content += stream.readline() if not content.endswith(b"\n") else b""
+                content = content.removeprefix(codecs.BOM_UTF8) if line == 1 else content
+                try:
+                    yield content.decode("utf-8").replace("\r\n", "\n")
+                except UnicodeDecodeError as error:
+                    line += content.count(b"\n", 0, error.start)
+                    found = f"byte 0x{content[error.start]:02x} is no UTF-8; expected UTF-8 text"
+                    raise InputError.at(path, line, found) from None
+                line += content.count(b"\n")
     except FileNotFoundError:
         raise InputError.at(path, None, "no such file; expected a readable UTF-8 file") from None
     except OSError as error:
         raise InputError.at(path, None, f"cannot be read ({error.strerror}); expected a readable UTF-8 file") from None
-    content = content.removeprefix(codecs.BOM_UTF8)
-    try:
-        return content.decode("utf-8").replace("\r\n", "\n")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise InputError.at(path, line, f"byte 0x{content[error.start]:02x} is no UTF-8; expected UTF-8 text") from None
 
 
 def write_bytes(path: Path, content: bytes) -> None:
@@ -110,10 +125,18 @@ def digest(path: Path) -> str:
     total = hashlib.sha256()
     if path.is_dir():
         for child in sorted(p for p in path.rglob("*") if p.is_file()):
-            total.update(str(child.relative_to(path)).encode() + b"\0" + child.read_bytes() + b"\0")
+            total.update(str(child.relative_to(path)).encode() + b"\0")
+            _digest_file(child, total)
+            total.update(b"\0")
     else:
-        total.update(path.read_bytes())
+        _digest_file(path, total)
     return total.hexdigest()
+
+
+def _digest_file(path: Path, total: hashlib._Hash) -> None:
+    with path.open("rb") as stream:
+        while piece := stream.read(BLOCK):
+            total.update(piece)
 
 
 def _models() -> Traversable:

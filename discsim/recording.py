@@ -12,21 +12,23 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray, readonly
+from discsim.arrays import BoolArray, FloatArray, readonly, sealed
 from discsim.clipping import at_range, clipped
 from discsim.disc import Disc, Release, Rig
 from discsim.environment import Environment
 from discsim.errors import InputError
-from discsim.files import read_text, replacing, write_text
+from discsim.files import read_pieces, replacing, write_pieces
 from discsim.limits import MOST_ROWS, reading_fault, written_time_fault
 from discsim.recorded import Recorded
 from discsim.toml_table import TomlTable, read_toml
@@ -107,7 +109,7 @@ class Samples:
         """Number of missing scalar readings (NaN)."""
         return int(np.count_nonzero(np.isnan(self.value)))
 
-    @property
+    @cached_property
     def interval(self) -> float:
         """Median spacing of the time stamps, s (NaN for a single sample)."""
         return float(np.median(np.diff(self.t))) if self.t.size > 1 else float("nan")
@@ -237,7 +239,7 @@ def _read_folder(folder: Path) -> Recording:
     sheets = _read_sheets(top.table("sensors", required=True), strict=strict)
     top.finish()
 
-    samples = {}
+    samples: dict[str, Samples] = {}
     for sensor, kind in SENSORS.items():
         file = folder / f"{sensor}.csv"
         if not _there(file):
@@ -246,7 +248,10 @@ def _read_folder(folder: Path) -> Recording:
             raise InputError.at(
                 file, None, f"a sensor file without its table; expected [sensors.{sensor}] in recording.toml"
             )
-        samples[sensor] = read_csv(file, kind.header)
+        found = read_csv(file, kind.header)
+        # sensors of one log have one time: it is held once
+        same = next((one.t for one in samples.values() if np.array_equal(one.t, found.t)), found.t)
+        samples[sensor] = Samples(same, found.value)
     command = folder / "command.csv"
     knots = read_csv(command, COMMAND_HEADER, gaps_allowed=False) if _there(command) else None
     if knots is not None and plant != "rate_table":
@@ -319,7 +324,7 @@ def read_sheet(table: TomlTable, sensor: str, *, strict: bool, rate_required: bo
 
 _EMPTY_CELL = re.compile(r"(?<=,)[ \t]*(?=,|$)", re.MULTILINE)
 _CELL = re.compile(r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan)", re.ASCII | re.IGNORECASE)
-BLOCK = 1 << 22  # characters parsed at a time
+BLOCK = 1 << 22  # bytes parsed at a time
 
 
 def read_csv(path: Path, header: str, *, gaps_allowed: bool = True) -> Samples:
@@ -327,28 +332,35 @@ def read_csv(path: Path, header: str, *, gaps_allowed: bool = True) -> Samples:
 
     Numpy's parser reads block by block; a block that it refuses is gone through line by line to say where and why.
     """
-    first, _, body = read_text(path).partition("\n")
+    pieces = read_pieces(path, BLOCK)
+    first, _, start = next(pieces, "").partition("\n")
     if first != header:
         raise InputError.at(path, 1, f"header is '{first[:120]}', expected '{header}'")
-    body = body.rstrip("\n \t")
-    if not body:
-        raise InputError.at(path, 2, "no samples; expected at least one row (or leave the file out)")
-    if (rows := body.count("\n") + 1) > MOST_ROWS:
-        raise InputError.at(path, 2 + MOST_ROWS, f"{rows} rows; expected at most {MOST_ROWS}: cut it into recordings")
     width = header.count(",") + 1
-    tables: list[FloatArray] = []
+    times: list[FloatArray] = []
+    values: list[FloatArray] = []
     line, previous = 2, -np.inf
-    for block in _blocks(body):
+    for block in _blocks(chain([start], pieces)):
+        if line - 2 + (rows := block.count("\n") + 1) > MOST_ROWS:
+            rows += line - 2 + sum(piece.count("\n") for piece in pieces)
+            fault = f"{rows} rows; expected at most {MOST_ROWS}: cut it into recordings"
+            raise InputError.at(path, 2 + MOST_ROWS, fault)
         table = _parse(block, width)
         if table is None or table[0, 0] <= previous:
             raise _first_fault(path, block, header, line, previous)
         if not gaps_allowed and np.any(np.isnan(table)):
             row = int(np.argmax(np.any(np.isnan(table), axis=1)))
             raise InputError.at(path, line + row, f"a cell is empty; expected a number in every cell of {path.name}")
-        tables.append(table)
+        times.append(table[:, 0].copy())
+        values.append(table[:, 1].copy() if width == 2 else table[:, 1:].copy())
         line, previous = line + len(table), float(table[-1, 0])
-    table = np.concatenate(tables)
-    samples = Samples(table[:, 0], table[:, 1] if width == 2 else table[:, 1:])
+    if not times:
+        raise InputError.at(path, 2, "no samples; expected at least one row (or leave the file out)")
+    t = sealed(np.concatenate(times))
+    times.clear()
+    value = sealed(np.concatenate(values))
+    values.clear()
+    samples = Samples(t, value)
     if found := _beyond(samples, header):
         row, message = found
         raise InputError.at(path, 2 + row, message)
@@ -364,13 +376,18 @@ def _beyond(samples: Samples, header: str) -> tuple[int, str] | None:
     return found
 
 
-def _blocks(body: str) -> Iterator[str]:
-    start = 0
-    while start < len(body):
-        stop = body.find("\n", start + BLOCK)
-        stop = len(body) if stop < 0 else stop
-        yield body[start:stop]
-        start = stop + 1
+def _blocks(pieces: Iterable[str]) -> Iterator[str]:
+    """Yield pieces of whole lines without the last line's end; blank lines at the end of all are none."""
+    kept = ""
+    for piece in pieces:
+        text = kept + piece
+        block = text.rstrip("\n \t")
+        if not block:
+            kept = text
+            continue
+        yield block
+        # the end of the last row is no row
+        kept = text[len(block) :].partition("\n")[2]
 
 
 def _parse(block: str, width: int) -> FloatArray | None:
@@ -438,7 +455,7 @@ def write_recording(recording: Recording, folder: Path | str) -> None:
     stage = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
     try:
         for name, text in texts.items():
-            write_text(stage / name, text)
+            write_pieces(stage / name, text)
         if folder.exists():
             _refuse_strangers(folder)
             _replace_files(stage, folder)
@@ -477,9 +494,9 @@ def _replace_files(stage: Path, folder: Path) -> None:
             (folder / name).unlink(missing_ok=True)
 
 
-def _texts(recording: Recording) -> dict[str, str]:
-    """Return the text of every file of the folder by its name."""
-    texts = {"recording.toml": recording_toml(recording)}
+def _texts(recording: Recording) -> dict[str, Iterable[str]]:
+    """Return the text of every file of the folder by its name, in pieces."""
+    texts: dict[str, Iterable[str]] = {"recording.toml": [recording_toml(recording)]}
     for sensor, samples in recording.samples.items():
         if len(samples) == 0:
             raise InputError(f"{recording.name}: {sensor} has no samples; expected some, or the sensor left out")
@@ -493,18 +510,24 @@ def _texts(recording: Recording) -> dict[str, str]:
     return texts
 
 
-def _within(recording: Recording, name: str, samples: Samples, header: str) -> str:
-    """Return a sensor's CSV; raises `InputError` where the reader would refuse it."""
+def _within(recording: Recording, name: str, samples: Samples, header: str) -> Iterator[str]:
+    """Return a sensor's CSV in pieces; raises `InputError` where the reader would refuse it."""
     if found := _beyond(samples, header):
         row, message = found
         raise InputError(f"{recording.name}: {name}, row {row}: {message}")
     return _csv(samples, header)
 
 
-def _csv(samples: Samples, header: str) -> str:
-    table = np.column_stack((samples.t, samples.value)).tolist()
-    lines = [",".join("" if x != x else repr(x) for x in row) for row in table]  # x != x: NaN
-    return "\n".join([header, *lines, ""])
+#: rows put into words at once: their text, a few MB, is all that is held of it
+_ROWS = 50_000
+
+
+def _csv(samples: Samples, header: str) -> Iterator[str]:
+    yield f"{header}\n"
+    for first in range(0, len(samples), _ROWS):
+        part = slice(first, first + _ROWS)
+        table = np.column_stack((samples.t[part], samples.value[part])).tolist()
+        yield "".join([",".join(["" if x != x else repr(x) for x in row]) + "\n" for row in table])  # x != x: NaN
 
 
 def recording_toml(recording: Recording) -> str:

@@ -1,16 +1,20 @@
-"""One thread for linear algebra while our own code runs, and the caller's number of threads before and after."""
+"""One thread for linear algebra while our own code runs, and as many as there are cores for pieces of our own work."""
 
 from __future__ import annotations
 
+import os
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from contextvars import copy_context
 from functools import wraps
 from typing import ParamSpec, TypeVar
 
-__all__ = ["limited", "one_thread"]
+__all__ = ["cores", "limited", "one_thread", "side_by_side"]
 
 P = ParamSpec("P")
+S = TypeVar("S")
 T = TypeVar("T")
 
 
@@ -58,3 +62,26 @@ def one_thread(function: Callable[P, T]) -> Callable[P, T]:
             return function(*given, **named)
 
     return inside
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def side_by_side(function: Callable[[S], T], pieces: Sequence[S]) -> list[T]:
+    """Return ``function`` of each piece, in their order, worked on by as many threads as there are cores.
+
+    What it computes must let other threads run meanwhile (`discsim.compiled.compiled_nogil`, numpy on large arrays).
+    Each piece sees the context of the caller, as numpy's error state is part of it.
+    """
+    count = min(cores(), len(pieces))
+    if count < 2:
+        return [function(piece) for piece in pieces]
+    with ThreadPoolExecutor(count) as pool:
+        waiting = [pool.submit(copy_context().run, function, piece) for piece in pieces]
+        try:
+            return [one.result() for one in waiting]
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise

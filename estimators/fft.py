@@ -9,9 +9,10 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from discsim.arrays import BoolArray, ComplexArray, FloatArray
-from discsim.compiled import compiled
+from discsim.compiled import compiled_nogil
 from discsim.errors import InputError
 from discsim.recording import Samples
+from discsim.threads import side_by_side
 from estimators.fft_fast import dirichlet, highest, spectra, transform_at
 from estimators.precession import AxialField, axial_field
 from estimators.rate import YawRate
@@ -181,12 +182,13 @@ def _by_window(
     along_axis = sliding_window_view(magnetometer.value[:, 2], n)
     stamps, field = sliding_window_view(t, n), np.ascontiguousarray(magnetometer.value[:, :2])
     whole = np.concatenate([[0], np.cumsum(~np.isfinite(field).all(axis=1))])  # gaps before each sample
-    for first in range(0, starts.size, CHUNK):
+
+    def fill(first: int) -> None:
         chosen = starts[first : first + CHUNK]
         spacing = (t[chosen + n - 1] - t[chosen]) / (n - 1)
         usable = _evenly_spaced(stamps[chosen], spacing) & (whole[chosen + n] == whole[chosen])
         if not usable.any():
-            continue
+            return
         spacing = spacing[usable]
         still, mean = np.empty((spacing.size, n)), np.empty(spacing.size)
         _wider_axis(field, chosen[usable], still, mean)
@@ -194,7 +196,7 @@ def _by_window(
         found = [_spectral_peak(still[block], mean[block], spacing[block], settings) for block in blocks]
         peak, line, known = (np.concatenate(parts) for parts in zip(*found, strict=True))
         if not known.any():
-            continue
+            return
         omega = 2 * np.pi * peak[known] / (n + settings.pad)  # (PE2), rad per sample
         spread, size, certain = _uncertainty(still[known], mean[known], line[known], omega, settings)
         slots = (first + np.flatnonzero(usable))[known]
@@ -202,6 +204,8 @@ def _by_window(
         sd[slots] = np.where(certain, spread / spacing[known], np.nan)
         amplitude[slots] = np.where(certain, size, np.nan)
         axial[slots] = _mean_known(along_axis[starts[slots]])
+
+    side_by_side(fill, range(0, starts.size, CHUNK))
     return rate, sd, amplitude, axial
 
 
@@ -211,7 +215,7 @@ def _evenly_spaced(t: FloatArray, interval: FloatArray) -> BoolArray:
     return np.asarray(np.ptp(stray, axis=1) <= interval / 2)
 
 
-@compiled
+@compiled_nogil
 def _wider_axis(field: FloatArray, starts: IndexArray, still: FloatArray, mean: FloatArray) -> None:
     """Fill ``still`` (w, n) with the windows of the axis that varies more, less their means (w,)."""
     n = still.shape[1]
@@ -290,7 +294,7 @@ def _uncertainty(
     return np.sqrt(noise**2 + grid**2 + leakage**2 + smear**2), amplitude, certain
 
 
-@compiled
+@compiled_nogil
 def _noise_variance(still: FloatArray, omega: FloatArray, variance: FloatArray) -> None:
     """Fill ``variance`` (w,) with that of the noise in windows (w, n) that hold a line at ``omega`` rad per sample.
 
@@ -337,7 +341,7 @@ def _noise_variance(still: FloatArray, omega: FloatArray, variance: FloatArray) 
         variance[i] = max(squares, 0.0) / freedom
 
 
-@compiled
+@compiled_nogil
 def _explained(gram: FloatArray, shown: FloatArray, size: int) -> tuple[float, int]:
     """Return the sum of squares that columns explain, and how many count; both arguments are overwritten.
 

@@ -23,7 +23,7 @@ import numpy as np
 import scipy.fft
 
 from discsim.arrays import ComplexArray, FloatArray, readonly
-from discsim.compiled import compiled
+from discsim.compiled import compiled, compiled_nogil
 from estimators.spin_spline import IndexArray
 
 __all__ = ["Spectra", "dirichlet", "highest", "padded_peak", "spectra", "transform_at"]
@@ -203,7 +203,7 @@ def _steep(n: int, coarse_size: int, total: int) -> FloatArray:
     return readonly(np.minimum(bounds, n))
 
 
-@compiled
+@compiled_nogil
 def _centre(
     spectrum: ComplexArray, centring: ComplexArray, mirror: int, coarse: ComplexArray, strongest: IndexArray
 ) -> None:
@@ -236,7 +236,7 @@ def _value_at(x: FloatArray, table: ComplexArray, order: int) -> complex:
     return complex(real, imaginary)
 
 
-@compiled
+@compiled_nogil
 def _values_at(x: FloatArray, table: ComplexArray, order: IndexArray) -> ComplexArray:
     out = np.empty(order.size, dtype=np.complex128)
     for i in range(order.size):
@@ -244,7 +244,7 @@ def _values_at(x: FloatArray, table: ComplexArray, order: IndexArray) -> Complex
     return out
 
 
-@compiled
+@compiled_nogil
 def _search(
     still: FloatArray,
     mean: FloatArray,

@@ -180,7 +180,8 @@ def _reference(recording: Recording, tracks: list[Track], settings: TrackingSett
     slope = np.gradient(whole.rate, whole.t) if len(whole) > 1 else np.zeros(len(whole))
     blur = np.zeros(len(whole))
     for track in tracks:
-        blur = np.maximum(blur, np.interp(whole.t, track.t, track.blur, left=0.0, right=0.0))
+        own = slice(*np.searchsorted(whole.t, [track.t[0] - 1e-9, track.t[-1] + 1e-9]))
+        blur[own] = np.maximum(blur[own], np.interp(whole.t[own], track.t, track.blur))
     return _Reference(whole.t, whole.rate, whole.sd, slope, blur)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples, SensorSheet
+from discsim.threads import side_by_side
 from estimators.precession import AxialField, axial_field, transverse_gyroscope, transverse_rates
 from estimators.rate import YawRate
 from estimators.spin_spline import IndexArray
@@ -47,6 +48,13 @@ LARGEST_MISFIT = 0.05
 #: Relative standard deviation of the correction by p and q: the gyroscope's gain (2 %), and soft iron (3 % on the field
 #: along the axis, and the mean of two such across it).
 CORRECTION_SD = 0.042
+
+
+#: Windows that are fitted together: memory does not grow with the recording, and parts are fitted side by side.
+TOGETHER = 1024
+
+#: Windows before a part from which its search takes up the tone: each starts from that of the window before it.
+BEFORE = 16
 
 
 @dataclass(frozen=True)
@@ -201,6 +209,8 @@ def usable_field(magnetometer: Samples, sheet: SensorSheet | None = None) -> tup
     good: BoolArray = np.all(np.isfinite(magnetometer.value), axis=1)
     if sheet is not None:
         good &= ~np.any(sheet.clipped(magnetometer.value), axis=1)
+    if np.all(good):
+        return magnetometer.t, magnetometer.value
     return magnetometer.t[good], magnetometer.value[good]
 
 
@@ -240,26 +250,86 @@ def fit_windows(
     With ``gyroscope`` and ``axial`` the turning of the field by p and q is part of the model and the phase rate
     found is -r; ``start`` are then the fits without it. Windows that cannot tell are NaN.
     """
-    interval = float(np.median(np.diff(t))) if t.size > 1 else 1.0
     centres = np.asarray(centres, dtype=float)
-    limits = (settings.turns, settings.significance, settings.largest_sd)
-    table = np.full((centres.size, len(COLUMNS)), np.nan)
     if gyroscope is None or axial is None or start is None:
-        lengths = np.array(_lengths(settings))
-        first, after = _ranges(t, centres, lengths[:, None])
-        search_windows(
-            t, m, centres, lengths, first, after, interval, settings.degree, settings.ellipse_sd, limits, table
-        )
+        table = _searched(t, m, centres, settings)
     else:
-        first, after = _ranges(t, centres, np.nan_to_num(start.length))
-        known = np.column_stack([getattr(start, name) for name in COLUMNS[:-2]])
-        rates, _ = transverse_rates(gyroscope, t)
-        turn_windows(
-            t, m, centres, known, first, after, settings.degree, settings.ellipse_sd, limits, axial.offset, rates, table
-        )
+        table = _turned(t, m, centres, settings, gyroscope, axial, start)
     columns = {name: table[:, i].copy() for i, name in enumerate(COLUMNS)}
     offset = columns.pop("offset_x") + 1j * columns.pop("offset_y")
     return ToneFit(t=centres, offset=offset, **columns)
+
+
+def _searched(t: FloatArray, m: FloatArray, centres: FloatArray, settings: LikelihoodSettings) -> FloatArray:
+    """Return the table (w, columns) of windows in which a tone is looked for."""
+    lengths = np.array(_lengths(settings))
+    interval, span = _interval(t), float(t[-1] - t[0]) if t.size else 0.0
+    limits = (settings.turns, settings.significance, settings.largest_sd)
+
+    def fit(part: slice) -> FloatArray:
+        before = min(part.start, BEFORE)
+        own = centres[part.start - before : part.stop]
+        first, after = _ranges(t, own, lengths[:, None])
+        lo, hi = _reach(first, after, t.size)
+        table = np.full((own.size, len(COLUMNS)), np.nan)
+        at, field = _copies(t[lo:hi], m[lo:hi])
+        search_windows(
+            at, field, own, lengths, first - lo, after - lo, interval, span, settings.degree,
+            settings.ellipse_sd, limits, table,
+        )  # fmt: skip
+        return table[before:]
+
+    return np.concatenate([np.empty((0, len(COLUMNS))), *side_by_side(fit, _parts(centres.size))])
+
+
+def _turned(
+    t: FloatArray,
+    m: FloatArray,
+    centres: FloatArray,
+    settings: LikelihoodSettings,
+    gyroscope: Samples,
+    axial: AxialField,
+    start: ToneFit,
+) -> FloatArray:
+    """Return the table (w, columns) of windows that have a tone, with the field's turning by p and q."""
+    interval, span = _interval(t), float(t[-1] - t[0]) if t.size else 0.0
+    limits = (settings.turns, settings.significance, settings.largest_sd)
+    known = np.column_stack([getattr(start, name) for name in COLUMNS[:-2]])
+
+    def fit(part: slice) -> FloatArray:
+        own = centres[part]
+        first, after = _ranges(t, own, np.nan_to_num(start.length[part]))
+        lo, hi = _reach(first, after, t.size)
+        rates, _ = transverse_rates(gyroscope, t[lo:hi])
+        table = np.full((own.size, len(COLUMNS)), np.nan)
+        at, field = _copies(t[lo:hi], m[lo:hi])
+        turn_windows(
+            at, field, own, known[part], first - lo, after - lo, interval, span, settings.degree,
+            settings.ellipse_sd, limits, axial.offset, rates, table,
+        )  # fmt: skip
+        return table
+
+    return np.concatenate([np.empty((0, len(COLUMNS))), *side_by_side(fit, _parts(centres.size))])
+
+
+def _copies(t: FloatArray, m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return arrays that may be written: for those that may not all would be compiled once more."""
+    return np.array(t), np.array(m)
+
+
+def _interval(t: FloatArray) -> float:
+    return float(np.median(np.diff(t))) if t.size > 1 else 1.0
+
+
+def _parts(count: int) -> list[slice]:
+    """Return the parts in which so many windows are fitted."""
+    return [slice(start, min(start + TOGETHER, count)) for start in range(0, count, TOGETHER)]
+
+
+def _reach(first: IndexArray, after: IndexArray, count: int) -> tuple[int, int]:
+    """Return from which to which of ``count`` readings windows of these ranges reach; all where that is nearly all."""
+    lo, hi = int(np.min(first)), int(np.max(after))
+    return (lo, hi) if hi - lo < 0.9 * count else (0, count)
 
 
 def _ranges(t: FloatArray, centres: FloatArray, lengths: FloatArray) -> tuple[IndexArray, IndexArray]:

@@ -420,7 +420,7 @@ def folding_notes(recording: Recording) -> list[str]:
     half = np.pi / recording.need("magnetometer").interval
     notes = []
     for name in ("rate_reference", "gyroscope", "accelerometer"):
-        if name not in recording:
+        if name not in recording or (name == "accelerometer" and not _may_show(recording, half)):
             continue
         shown = np.abs(_shown(recording, name))
         above = shown > half
@@ -435,6 +435,15 @@ def folding_notes(recording: Recording) -> list[str]:
             f"{np.degrees(folded):.0f} deg/s"
         )
     return notes
+
+
+def _may_show(recording: Recording, rate: float) -> bool:
+    """Tell whether any reading of the accelerometer is as large as a spin of that rate, rad/s, makes it."""
+    samples, position = recording.need("accelerometer"), recording.sheets["accelerometer"].position
+    if position is None or len(samples) == 0:
+        return False
+    lowest, highest = (float(pick.reduce(samples.value[:, :2], axis=None, initial=0.0)) for pick in (np.fmin, np.fmax))
+    return bool(np.sqrt(2.0) * max(highest, -lowest) >= rate**2 * np.hypot(*position[:2]))
 
 
 def _shown(recording: Recording, sensor: str) -> FloatArray:

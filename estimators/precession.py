@@ -49,11 +49,14 @@ def axial_field(amplitude: FloatArray, axial: FloatArray, strength: float | None
     a, z = amplitude[known], axial[known]
     offsets = np.linspace(-2 * HARD_IRON_SD, 2 * HARD_IRON_SD, 2001)
     # by least squares over (offset, strength), the strength drawn to the one stated and the offset to zero
-    squares = a[None, :] ** 2 + (z[None, :] - offsets[:, None]) ** 2
-    lengths = np.sqrt(squares)
-    mean = np.mean(lengths, axis=1)
+    mean, variance = np.empty(offsets.size), np.empty(offsets.size)
+    rows = max(1, LENGTHS // a.size)
+    for start in range(0, offsets.size, rows):
+        part = slice(start, start + rows)
+        lengths = np.sqrt(a[None, :] ** 2 + (z[None, :] - offsets[part, None]) ** 2)
+        mean[part], variance[part] = np.mean(lengths, axis=1), np.var(lengths, axis=1)
     # neighbours overlap and share the errors of soft iron: a window counts as knowing its length to 0.3 uT
-    cost = np.var(lengths, axis=1) * max(1.0, 0.1 * a.size) / 0.3**2 + (offsets / HARD_IRON_SD) ** 2
+    cost = variance * max(1.0, 0.1 * a.size) / 0.3**2 + (offsets / HARD_IRON_SD) ** 2
     if strength is not None:
         cost += ((mean - strength) / (STRENGTH_SD * strength)) ** 2
     weight = np.exp(-0.5 * (cost - np.min(cost)))
@@ -62,6 +65,8 @@ def axial_field(amplitude: FloatArray, axial: FloatArray, strength: float | None
     return AxialField(best, float(np.sqrt(np.sum(weight * (offsets - best) ** 2))))
 
 
+#: Lengths of the field, of a window and an offset each, that are held at once: 8 MB, whatever the length of a log.
+LENGTHS = 1 << 20
 #: Prior standard deviation of hard iron along z, uT.
 HARD_IRON_SD = 20.0
 #: Relative standard deviation of the strength of the field that the sensor should show: its own scale, mostly.

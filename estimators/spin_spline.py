@@ -14,6 +14,9 @@ __all__ = ["IndexArray", "SpinSpline"]
 
 IndexArray = NDArray[np.int64]
 
+#: a second difference
+_BEND = (1.0, -2.0, 1.0)
+
 
 @dataclass(frozen=True)
 class SpinSpline:
@@ -57,10 +60,32 @@ class SpinSpline:
         matrix[np.arange(len(index))[:, None], index[:, None] + np.arange(4)] = weights
         return matrix
 
-    def second_difference(self) -> FloatArray:
-        """Return the rows (size - 2, size) whose squares sum to the integral of (r'')^2, in white-noise units.
+    def bend(self, coefficients: FloatArray) -> FloatArray:
+        """Return the second differences (size - 2,) of coefficients (size,), whose squares sum to that of r''.
 
-        With r'' white noise of spectral density S, each row times the coefficients has variance S.
+        They are in white-noise units: with r'' white noise of spectral density S, each has variance S.
         """
-        rows = np.diff(np.eye(self.size), 2, axis=0) / self.spacing**2
-        return np.asarray(rows * np.sqrt(self.spacing))
+        return np.asarray(np.diff(coefficients, 2) * self.spacing**-1.5)
+
+    def pulled(self, bend: FloatArray) -> FloatArray:
+        """Return the sum (size,) over second differences of ``bend`` (size - 2,) times their derivatives."""
+        out = np.zeros(self.size)
+        for place, factor in enumerate(_BEND):
+            out[place : place + bend.size] += factor * bend
+        return np.asarray(out * self.spacing**-1.5)
+
+    def bend_precision(self, local: FloatArray) -> FloatArray:
+        """Return the precision (size, size) of coefficients whose second differences have precisions (size - 2,)."""
+        out, row = np.zeros((self.size, self.size)), np.arange(self.size - 2)
+        for i, one in enumerate(_BEND):
+            for j, other in enumerate(_BEND):
+                out[row + i, row + j] += one * other * self.spacing**-3 * local
+        return out
+
+    def bend_variance(self, covariance: FloatArray) -> FloatArray:
+        """Return the variances (size - 2,) of `bend` of coefficients with a covariance (size, size)."""
+        out, row = np.zeros(self.size - 2), np.arange(self.size - 2)
+        for i, one in enumerate(_BEND):
+            for j, other in enumerate(_BEND):
+                out += one * other * self.spacing**-3 * covariance[row + i, row + j]
+        return out

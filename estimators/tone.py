@@ -8,7 +8,7 @@ The batch and the streaming estimator call the same functions, so they give the 
 
 from __future__ import annotations
 
-from math import cos, floor, sin, sqrt
+from math import floor, sqrt
 
 import numpy as np
 
@@ -277,9 +277,11 @@ def fit_tone(
             decrement += step * right[i]
         trial_cost = _assemble(x, parts, shape, trial, powers, weight, trial_normal, trial_right, work)
         if trial_cost <= cost * (1 + 1e-12):
-            parameters[:] = trial
-            normal[:] = trial_normal
-            right[:] = trial_right
+            # entry by entry: an assignment of arrays compiles the words of an error that cannot be, a second's work
+            for i in range(m):
+                parameters[i], right[i] = trial[i], trial_right[i]
+                for j in range(m):
+                    normal[i, j] = trial_normal[i, j]
             cost = trial_cost
             damping = damping * 0.1 if damping > 1e-5 else 0.0
             if noise <= 0.0:  # the prior's weight follows the noise found
@@ -329,29 +331,41 @@ def field_shape(
     while k < n - 2 and t[k + 1] < centre:
         k += 1
     fraction = (centre - t[k]) / (t[k + 1] - t[k])
+    count = (n - 1) * substeps
+    phase, cosine, sine = np.empty(count), np.empty(count), np.empty(count)
+    for i in range(n - 1):
+        h = (t[i + 1] - t[i]) / substeps
+        for j in range(substeps):
+            x = (t[i] + (j + 0.5) * h - centre) / half
+            angle = 0.0
+            for power in range(powers - 1, -1, -1):
+                angle = angle * x + parameters[power]
+            phase[i * substeps + j] = angle
+    turns(phase, cosine, sine)
+    # the transverse rate turned with the field, times its sub-step
+    turned = np.empty(count, dtype=np.complex128)
+    total = 0.0
+    for i in range(n - 1):
+        h = (t[i + 1] - t[i]) / substeps
+        for j in range(substeps):
+            s = i * substeps + j
+            turned[s] = h * rates[i, j] * complex(cosine[s], -sine[s])
+            total += turned[s].real
     start = complex(amplitude, 0.0)
     along_start = axial
-    mean_rate = 0.0
     # the first passes find which start has the wanted value at the centre and the wanted mean along z
     for _ in range(3):
         y, along = start, along_start
         u[0] = y
         mean_along = along / n
-        mean_rate = 0.0
         for i in range(n - 1):
-            h = (t[i + 1] - t[i]) / substeps
-            for j in range(substeps):
-                x = (t[i] + (j + 0.5) * h - centre) / half
-                phase = 0.0
-                for power in range(powers - 1, -1, -1):
-                    phase = phase * x + parameters[power]
-                w = rates[i, j] * complex(cos(phase), -sin(phase))
-                mean_rate += h * w.real
+            for s in range(i * substeps, (i + 1) * substeps):
+                w = turned[s]
                 # midpoint rule: second order
-                middle = y + 0.5j * h * along * w
-                half_along = along + 0.5 * h * (y.conjugate() * w).imag
-                y += 1j * h * half_along * w
-                along += h * (middle.conjugate() * w).imag
+                middle = y + 0.5j * along * w
+                half_along = along + 0.5 * (y.conjugate() * w).imag
+                y += 1j * half_along * w
+                along += (middle.conjugate() * w).imag
             u[i + 1] = y
             mean_along += along / n
         at_centre = u[k] + fraction * (u[k + 1] - u[k])
@@ -359,4 +373,4 @@ def field_shape(
         along_start += axial - mean_along
     for i in range(n):
         u[i] /= at_centre
-    return float(mean_rate / (t[n - 1] - t[0]))
+    return float(total / (t[n - 1] - t[0]))

@@ -11,8 +11,8 @@ from math import cos, sin, sqrt
 
 import numpy as np
 
-from discsim.arrays import FloatArray
-from discsim.compiled import compiled, compiled_sums
+from discsim.arrays import ComplexArray, FloatArray
+from discsim.compiled import compiled, compiled_nogil, compiled_nogil_sums, compiled_sums
 from estimators.spin_spline import IndexArray
 
 __all__ = ["SOFT", "add_normal_equations", "integrate"]
@@ -21,56 +21,72 @@ __all__ = ["SOFT", "add_normal_equations", "integrate"]
 SOFT = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
-@compiled
+@compiled_nogil
 def integrate(
     times: FloatArray,
     substeps: int,
-    r: FloatArray,
-    body_re: FloatArray,
-    body_im: FloatArray,
-    despun_re: FloatArray,
-    despun_im: FloatArray,
+    first: IndexArray,
+    weights: FloatArray,
+    spin: FloatArray,
+    body: ComplexArray,
+    despun: ComplexArray,
     attitude: FloatArray,
     psi_at: FloatArray,
     axes: FloatArray,
-    psi_middle: FloatArray,
+    turn: FloatArray,
 ) -> None:
     """Integrate the attitude from rates at the middle of equal sub-steps between ``times`` (n,).
 
     Written: ``attitude`` (n, 3, 3) C_BN, the identity at the first time; ``psi_at`` (n,) the angle turned;
     ``axes`` (k, 3, 3), whose rows are the axes of the frame that does not spin, in N, at the middle of each sub-step,
-    and ``psi_middle`` (k,). Transverse rates (k,) are the sum of those given in the body and in the frame that does
-    not spin.
+    and ``turn`` (k, 2), cosine and sine of the angle there. The spin is a spline of coefficients ``spin``, of which
+    four from ``first`` (k,) on act by ``weights`` (k, 4); transverse rates (k,) are the sum of those given in the body
+    and in the frame that does not spin (each p + i q; empty: none).
     """
     D = np.eye(3)
     psi = 0.0
-    attitude[0] = D
+    for i in range(3):
+        for j in range(3):
+            attitude[0, i, j] = D[i, j]
     psi_at[0] = 0.0
     for k in range(times.size - 1):
         h = (times[k + 1] - times[k]) / substeps
         for j in range(substeps):
             s = k * substeps + j
-            middle = psi + 0.5 * h * r[s]
-            p, q = body_re[s], body_im[s]
-            # C3(psi)^T takes body components to the frame that does not spin
-            a = cos(middle) * p - sin(middle) * q + despun_re[s]
-            b = sin(middle) * p + cos(middle) * q + despun_im[s]
+            r = 0.0
+            for i in range(4):
+                r += weights[s, i] * spin[first[s] + i]
+            middle = psi + 0.5 * h * r
+            c, si = cos(middle), sin(middle)
+            a, b = 0.0, 0.0
+            if body.size:
+                # C3(psi)^T takes body components to the frame that does not spin
+                a = c * body[s].real - si * body[s].imag
+                b = si * body[s].real + c * body[s].imag
+            if despun.size:
+                a += despun[s].real
+                b += despun[s].imag
             # exp(-[v x]) with v = (a, b, 0) h/2 twice, so that the axes are there at the middle too
             x, y = 0.5 * h * a, 0.5 * h * b
-            angle = sqrt(x * x + y * y)
-            f1 = sin(angle) / angle if angle > 1e-9 else 1.0
-            f2 = (1.0 - cos(angle)) / (angle * angle) if angle > 1e-4 else 0.5
+            square = x * x + y * y
+            if square < 1e-3:  # the next terms are below 1e-17
+                f1 = 1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0)))
+                f2 = 0.5 - square / 24.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0 * (1.0 - square / 90.0)))
+            else:
+                angle = sqrt(square)
+                f1, f2 = sin(angle) / angle, (1.0 - cos(angle)) / square
             for half in range(2):
                 for i in range(3):
                     d0, d1, d2 = D[0, i], D[1, i], D[2, i]
                     dot = x * d0 + y * d1
-                    D[0, i] = d0 - f1 * y * d2 + f2 * (x * dot - angle * angle * d0)
-                    D[1, i] = d1 + f1 * x * d2 + f2 * (y * dot - angle * angle * d1)
-                    D[2, i] = d2 - f1 * (x * d1 - y * d0) - f2 * angle * angle * d2
+                    D[0, i] = d0 - f1 * y * d2 + f2 * (x * dot - square * d0)
+                    D[1, i] = d1 + f1 * x * d2 + f2 * (y * dot - square * d1)
+                    D[2, i] = d2 - f1 * (x * d1 - y * d0) - f2 * square * d2
                 if half == 0:
-                    axes[s] = D
-                    psi_middle[s] = middle
-            psi += h * r[s]
+                    for i in range(3):
+                        axes[s, 0, i], axes[s, 1, i], axes[s, 2, i] = D[0, i], D[1, i], D[2, i]
+                    turn[s, 0], turn[s, 1] = c, si
+            psi += h * r
         c, si = cos(psi), sin(psi)
         for i in range(3):
             attitude[k + 1, 0, i] = c * D[0, i] + si * D[1, i]
@@ -110,6 +126,17 @@ def _weighed(
 
 
 @compiled
+def _note(rest: FloatArray, total: FloatArray, place: int) -> None:
+    """Write a sum (q, k) at a place of ``rest`` (m, q, k), entry by entry.
+
+    An assignment of arrays compiles the words of an error that cannot be, which takes seconds.
+    """
+    for a in range(total.shape[0]):
+        for b in range(total.shape[1]):
+            rest[place, a, b] = total[a, b]
+
+
+@compiled
 def _acting(low: int, now: int, slow_low: int, slow_now: int, size: int, slow_size: int, active: IndexArray) -> int:
     """Write which coefficients act now or did at the reading before; return how many."""
     count = 0
@@ -123,7 +150,7 @@ def _acting(low: int, now: int, slow_low: int, slow_now: int, size: int, slow_si
     return count
 
 
-@compiled_sums
+@compiled_nogil_sums
 def add_normal_equations(
     substeps: int,
     h: FloatArray,
@@ -141,14 +168,16 @@ def add_normal_equations(
     slow_first: IndexArray,
     slow_weights: FloatArray,
     slow_size: int,
-    moments: FloatArray,
+    read: int,
+    shown: ComplexArray,
+    turn: FloatArray,
     information: FloatArray,
     right: FloatArray,
 ) -> None:
     """Add the magnetometer's part of the normal equations to ``information`` (m, m) and ``right`` (m,).
 
-    Parameters in order: the spin's spline, ``moments`` given as such, the two splines of what is not read, field (3),
-    hard iron (3), soft iron (6).
+    Parameters in order: the spin's spline, bias and gain of the transverse rates that a gyroscope shows (``read``: 4,
+    or none), the two splines of what is not read, field (3), hard iron (3), soft iron (6).
 
     Parameters
     ----------
@@ -165,10 +194,12 @@ def add_normal_equations(
     first, weights, size : (k,), (k, 4) arrays, int
         First coefficient and weights of the spin's spline at each sub-step, and its coefficients' number;
         ``slow_first``, ``slow_weights`` and ``slow_size`` of the others' (none: 0).
-    moments : (n, r, 3) array
-        Rotation in N by each of r parameters up to each reading, per unit.
+    shown, turn : (k,), (k, 2) arrays
+        Transverse rates p + i q that the gyroscope shows, less its bias, and cosine and sine as `integrate` gives them.
     """
-    n, read = attitude.shape[0], moments.shape[1]
+    n = attitude.shape[0]
+    #: rotation in N by bias (2) and gain (2) of the gyroscope so far, per unit
+    moments = np.zeros((read, 3))
     total_size, q, dense = size + 2 * slow_size, 4 if despun else 3, 13 + read
     #: rotation by each parameter so far; its product with G, summed; those with each other; and with L
     theta, run = np.zeros((total_size, q)), np.zeros((total_size, q))
@@ -185,6 +216,15 @@ def add_normal_equations(
     for i in range(n):
         if i > 0:
             for s in range((i - 1) * substeps, i * substeps):
+                if read:
+                    body_p, body_q, cosine, sine = shown[s].real, shown[s].imag, turn[s, 0], turn[s, 1]
+                    for a in range(3):
+                        ex = h[s] * (cosine * axes[s, 0, a] + sine * axes[s, 1, a])
+                        ey = h[s] * (-sine * axes[s, 0, a] + cosine * axes[s, 1, a])
+                        moments[0, a] -= ex
+                        moments[1, a] -= ey
+                        moments[2, a] += body_p * ex + body_q * ey
+                        moments[3, a] += body_p * ey - body_q * ex
                 for j in range(4):
                     c, w = first[s] + j, h[s] * weights[s, j]
                     if despun:
@@ -213,7 +253,8 @@ def add_normal_equations(
                         if k != j:
                             for a in range(q):
                                 pairs[max(j, k), min(j, k)] -= theta[j, a] * run[k, a]
-                    rest_g[j], rest_l[j] = sum_g, sum_l
+                    _note(rest_g, sum_g, j)
+                    _note(rest_l, sum_l, j)
                     order[ended] = j
                     ended, count = ended + 1, count - 1
                     active[m] = active[count]
@@ -221,7 +262,7 @@ def add_normal_equations(
         _weighed(scale[i], attitude[i], iron, skew, turned[i], residual[i], B, D)
         for a in range(3):
             for j in range(read):
-                D[a, 12 + j] = B[a, 0] * moments[i, j, 0] + B[a, 1] * moments[i, j, 1] + B[a, 2] * moments[i, j, 2]
+                D[a, 12 + j] = B[a, 0] * moments[j, 0] + B[a, 1] * moments[j, 1] + B[a, 2] * moments[j, 2]
         for a in range(q):
             for b in range(q):
                 G[a, b] = B[0, a] * B[0, b] + B[1, a] * B[1, b] + B[2, a] * B[2, b]
@@ -250,7 +291,8 @@ def add_normal_equations(
                 pairs[max(j, k), min(j, k)] += value
     settled = ended
     for m in range(count):
-        rest_g[active[m]], rest_l[active[m]] = sum_g, sum_l
+        _note(rest_g, sum_g, active[m])
+        _note(rest_l, sum_l, active[m])
         order[ended] = active[m]
         ended += 1
     for place in range(ended):

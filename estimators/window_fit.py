@@ -12,7 +12,7 @@ from math import ceil, cos, log, log2, pi, sin, sqrt
 import numpy as np
 
 from discsim.arrays import ComplexArray, FloatArray
-from discsim.compiled import compiled
+from discsim.compiled import compiled, compiled_nogil
 from estimators.spin_spline import IndexArray
 from estimators.tone import field_shape, fit_tone, turns
 
@@ -110,7 +110,8 @@ def _transform(
             grid[slots[k]] += z[k] * term[k]
         _fourier(grid, size, wheel)
         if power == 0:
-            total[:size] = grid[:size]
+            for k in range(size):
+                total[k] = grid[k]
         else:
             for k in range(size):
                 w = 2 * pi * ((k if k < size // 2 else k - size) * unit)
@@ -276,8 +277,17 @@ def _chirped(
             rows[count, 1] = 2 * pi * ((highest if highest < size // 2 else highest - size) * unit)
             rows[count, 2] = chirp
             count += 1
-    order = np.argsort(rows[:count, 0])
-    return rows[order[max(0, count - _PEAKS) :]][:, 1:]
+    kept = min(count, _PEAKS)
+    highest_last = np.empty((kept, 2))
+    for place in range(kept - 1, -1, -1):
+        best = 0
+        for row in range(1, count):
+            # of equals the later one
+            if rows[row, 0] >= rows[best, 0]:
+                best = row
+        highest_last[place, 0], highest_last[place, 1] = rows[best, 1], rows[best, 2]
+        rows[best, 0] = -1.0
+    return highest_last
 
 
 @compiled
@@ -389,7 +399,7 @@ def _tell(
 # ------------------------------------------------------------------------------------------------ all windows
 
 
-@compiled
+@compiled_nogil
 def search_windows(
     t: FloatArray,
     m: FloatArray,
@@ -398,6 +408,7 @@ def search_windows(
     first: IndexArray,
     after: IndexArray,
     interval: float,
+    span: float,
     degree: int,
     ellipse_sd: float,
     limits: tuple[float, float, float],
@@ -406,9 +417,8 @@ def search_windows(
     """Fill ``table`` (w, columns) with the tones of windows about ``centres`` (w,); rows stay where nothing is told.
 
     ``lengths`` (k,) are tried in turn; ``first`` and ``after`` (k, w) are the ranges of the readings at times t (n,)
-    and field m (n, 3).
+    and field m (n, 3). ``interval`` and ``span`` are the readings' usual spacing and the length of them all, s.
     """
-    span = t[-1] - t[0] if t.size else 0.0
     powers = degree + 2
     most = 1 + 2 * _PEAKS
     found, spread = np.empty((most, powers + 5)), np.empty((most, powers + 5, powers + 5))
@@ -443,7 +453,9 @@ def search_windows(
             if known:
                 starts[0, 0], starts[0, 1] = before + slope * (centre - at), slope
             starts[int(known) :, 0] = rates[:count]
-            count = _fits(tau, x, z, u, half, interval, starts, powers, ellipse_sd, found, spread, variances, 0)
+            # of a type, not the number itself: for that one numba would compile the function once more
+            none = int(np.int64(0))
+            count = _fits(tau, x, z, u, half, interval, starts, powers, ellipse_sd, found, spread, variances, none)
             about = 0.0
             for k in range(n):
                 about += (z[k] - mean).real ** 2 + (z[k] - mean).imag ** 2
@@ -468,7 +480,7 @@ def search_windows(
                 break
 
 
-@compiled
+@compiled_nogil
 def turn_windows(
     t: FloatArray,
     m: FloatArray,
@@ -476,6 +488,8 @@ def turn_windows(
     start: FloatArray,
     first: IndexArray,
     after: IndexArray,
+    interval: float,
+    span: float,
     degree: int,
     ellipse_sd: float,
     limits: tuple[float, float, float],
@@ -489,8 +503,6 @@ def turn_windows(
     along z. The turning needs the phase and the phase the turning, so thrice.
     """
     powers = degree + 2
-    span = t[-1] - t[0] if t.size else 0.0
-    interval = np.median(np.diff(t)) if t.size > 1 else 1.0
     parameters, covariance = np.empty(powers + 5), np.empty((powers + 5, powers + 5))
     for index in range(centres.size):
         lo, hi, length = first[index], after[index], start[index, 8]
@@ -516,5 +528,8 @@ def turn_windows(
             continue
         _positive(parameters, powers)
         row = table[index]
-        if _tell(x, z, u, half, interval, parameters, covariance, variance, powers, True, limits, row) == _TOLD:
+        if (
+            _tell(x, z, u, half, interval, parameters, covariance, variance, powers, bool(np.bool_(True)), limits, row)
+            == _TOLD
+        ):
             row[6], row[8], row[9] = mean_z, length, along

@@ -15,7 +15,7 @@ from estimators.spin_spline import SpinSpline
 from estimators.tracking.track import RateRows, TrackingSettings
 from estimators.turning_field import add_normal_equations, integrate
 
-__all__ = ["Linear", "Problem", "Segment"]
+__all__ = ["Linear", "Problem", "Segment", "Turned"]
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,11 @@ class Segment:
     walk: float = 0.0
 
 
-class _Turned(NamedTuple):
+class Turned(NamedTuple):
     """What the model makes of the field, at times t (n,) and in the middle of sub-steps (k,).
 
     ``residual`` (n, 3) uT, ``psi`` (n,) the angle turned, ``field`` (n, 3) in B before the irons, ``attitude``
-    (n, 3, 3), ``axes`` (k, 3, 3) of the frame that does not spin, ``psi_middle`` (k,).
+    (n, 3, 3), ``axes`` (k, 3, 3) of the frame that does not spin, ``turn`` (k, 2) cosine and sine of the angle.
     """
 
     residual: FloatArray
@@ -49,7 +49,7 @@ class _Turned(NamedTuple):
     field: FloatArray
     attitude: FloatArray
     axes: FloatArray
-    psi_middle: FloatArray
+    turn: FloatArray
 
 
 class Problem:
@@ -62,7 +62,8 @@ class Problem:
     def __init__(self, segment: Segment, top_rate: float, typical_rate: float = 0.0) -> None:
         t, settings, gyroscope = segment.t, segment.settings, segment.gyroscope
         fixed_axis, walk = segment.fixed_axis, segment.walk
-        self.t, self.m, self.settings, self.rows = t, segment.m, settings, segment.rows
+        # copies, which may be written: compiled code would be compiled once more for what may not
+        self.t, self.m, self.settings, self.rows = np.array(t), np.array(segment.m), settings, segment.rows
         self.strength, self.decaying = segment.strength, segment.decaying
         # a quarter of a radian per sub-step: the midpoint rule then errs by 1 % of the wobble's own share
         finest = min(0.005, 0.25 / max(top_rate, 1.0))
@@ -133,10 +134,13 @@ class Problem:
             mean[part] = row.calibration
         return precision, mean
 
-    def roughness_rows(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return rows (k, spline size) and their targets (k,): r'' is white noise, about r'^2/r for a decay."""
-        rows = self.spline.second_difference()
-        target = np.zeros(rows.shape[0])
+    def penalty(self) -> FloatArray:
+        """Return the precision (spline size, spline size) of the spin for a roughness of one."""
+        return self.spline.bend_precision(self.local)
+
+    def bend_expected(self, x: FloatArray) -> FloatArray:
+        """Return what second differences are expected to be, (spline size - 2,): r'' is white noise, about r'^2/r."""
+        target = np.zeros(self.spline.size - 2)
         if self.decaying:
             c = x[self.parts[0]]
             level = (c[:-2] + c[1:-1] + c[2:]) / 3
@@ -144,55 +148,48 @@ class Problem:
             bend = np.where(np.abs(level) > 3.0, slope**2 / np.where(np.abs(level) > 3.0, level, 1.0), 0.0)
             # steeper than a time constant of two seconds is no spin-down in air
             target = np.where(np.abs(slope) < 0.5 * np.abs(level), bend, 0.0) * np.sqrt(self.spline.spacing)
-        return rows, target
+        return target
 
     # -------------------------------------------------------------------------------- model
 
-    def evaluate(self, x: FloatArray) -> _Turned:
+    def evaluate(self, x: FloatArray) -> Turned:
         """Return what the model makes of the field at the parameters x."""
         spin, transverse, vector, iron, soft = self.parts[:5]
-        c = x[spin]
-        r = np.einsum("ki,ki->k", self.weights, c[self.first[:, None] + np.arange(4)])
-        w, unread = self.w, np.zeros(self.middle.size, dtype=complex)
+        nothing = np.zeros(0, dtype=complex)
+        # the rates that a gyroscope shows, at no gain and no bias all zero where there is none
+        shown, unread = nothing, nothing
         if self.read:
             bias, gain = complex(*x[transverse][:2]), complex(*x[transverse][2:4])
-            w = (1 + gain) * (self.w - bias)
+            shown = (1 + gain) * (self.w - bias)
+        elif not self.despun:
+            shown = self.w
         if self.slow is not None:
             real, imaginary = x[transverse][self.read :].reshape(2, -1)
             PQ = real + 1j * imaginary
             unread = np.einsum("ki,ki->k", self.slow_weights, PQ[self.slow_first[:, None] + np.arange(4)])
         n, k = self.t.size, self.middle.size
         C, psi = np.empty((n, 3, 3)), np.empty(n)
-        axes, psi_middle = np.empty((k, 3, 3)), np.empty(k)
+        axes, turn = np.empty((k, 3, 3)), np.empty((k, 2))
         integrate(
-            self.t, self.substeps, r, np.ascontiguousarray(w.real), np.ascontiguousarray(w.imag),
-            np.ascontiguousarray(unread.real), np.ascontiguousarray(unread.imag), C, psi, axes, psi_middle,
+            self.t, self.substeps, self.first, self.weights, np.ascontiguousarray(x[spin]), shown, unread,
+            C, psi, axes, turn,
         )  # fmt: skip
         turned = C @ x[vector]
         residual = self.m - turned @ (np.eye(3) + _symmetric(x[soft])).T - x[iron]
-        return _Turned(residual, psi, turned, C, axes, psi_middle)
+        return Turned(residual, psi, turned, C, axes, turn)
 
     def add_field(
-        self, x: FloatArray, at: _Turned, scale: FloatArray, information: FloatArray, right: FloatArray
+        self, x: FloatArray, at: Turned, scale: FloatArray, information: FloatArray, right: FloatArray
     ) -> None:
         """Add the magnetometer's normal equations at x, each reading (n,) times ``scale``."""
         _, transverse, vector, _, soft = self.parts[:5]
-        n, k = self.t.size, self.middle.size
-        total = np.zeros((n, self.read, 3))
-        if self.read:
-            cm, sm = np.cos(at.psi_middle)[:, None], np.sin(at.psi_middle)[:, None]
-            ex = cm * at.axes[:, 0] + sm * at.axes[:, 1]
-            ey = -sm * at.axes[:, 0] + cm * at.axes[:, 1]
-            read = self.w - complex(*x[transverse][:2])
-            p, q = read.real[:, None], read.imag[:, None]
-            moment = np.stack([-ex, -ey, p * ex + q * ey, p * ey - q * ex], 1) * self.h[:, None, None]
-            total[1:] = np.cumsum(np.add.reduceat(moment, np.arange(0, k, self.substeps), axis=0), axis=0)
+        read = self.w - complex(*x[transverse][:2]) if self.read else np.zeros(0, dtype=complex)
         none = self.slow is None
         add_normal_equations(
             self.substeps, self.h, at.axes, at.attitude, np.eye(3) + _symmetric(x[soft]), x[vector], at.field,
             at.residual, scale, self.despun, self.first, self.weights, self.spline.size,
             self.first if none else self.slow_first, self.weights if none else self.slow_weights,
-            0 if self.slow is None else self.slow.size, total, information, right,
+            0 if self.slow is None else self.slow.size, self.read, read, at.turn, information, right,
         )  # fmt: skip
 
     def evaluate_rows(self, x: FloatArray) -> list[tuple[FloatArray, FloatArray]]:

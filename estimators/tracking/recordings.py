@@ -10,6 +10,7 @@ import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
 from discsim.recording import Recording, Samples
+from discsim.threads import side_by_side
 from estimators.likelihood import LEAST, LikelihoodSettings, ToneFit, fit_windows, span_of, usable_field, window_centres
 from estimators.precession import AxialField, axial_field, transverse_gyroscope
 from estimators.rate import YawRate
@@ -31,6 +32,9 @@ def _segments(t: FloatArray, settings: TrackingSettings) -> list[tuple[float, fl
         for i in range(count)
     ]
 
+
+#: Readings whose first rate is made at once: memory does not grow with the recording.
+_BLOCK = 1 << 18
 
 #: Longest span, s, of which every step has an answer, be it that nothing is known: a day, which is 1.7 million.
 LONGEST = 86400.0
@@ -74,7 +78,7 @@ def tracks_of(
     noise = None
     if sheet is not None and sheet.noise_rms is not None:
         noise = float(np.hypot(sheet.noise_rms, (sheet.resolution or 0.0) / np.sqrt(12)))
-    tracks = []
+    pieces: list[tuple[Segment, FloatArray]] = []
     for first, last, rate in _runs(
         t, replace(fits, phase_rate=fits.phase_rate - fold), unclipped(recording, "gyroscope")
     ):
@@ -96,11 +100,15 @@ def tracks_of(
                 rows=_between(rows or [], float(t[chosen][0]), float(t[chosen][-1])),
                 walk=_walk(recording, noise, size, stop - start),
             )
-            # readings so unlike a turning field that nothing can be solved have no track
-            with suppress(np.linalg.LinAlgError):
-                start_rate = rate[chosen.start - first : chosen.stop - first]
-                tracks.append(track_spin(segment, start_rate, axial=axial, noise=noise))
-    return tracks
+            pieces.append((segment, rate[chosen.start - first : chosen.stop - first]))
+
+    def track(piece: tuple[Segment, FloatArray]) -> Track | None:
+        # readings so unlike a turning field that nothing can be solved have no track
+        with suppress(np.linalg.LinAlgError):
+            return track_spin(*piece, axial=axial, noise=noise)
+        return None
+
+    return [one for one in side_by_side(track, pieces) if one is not None]
 
 
 @remembered
@@ -152,32 +160,15 @@ def _runs(t: FloatArray, fits: ToneFit, gyroscope: Samples | None) -> list[tuple
     known = np.isfinite(fits.phase_rate)
     times, rates = fits.t[known], -fits.phase_rate[known]
     lengths = fits.length[known]
-    if gyroscope is not None:
-        z = gyroscope.value[:, 2]
-        good = np.isfinite(z)
-        smooth = np.interp(t, gyroscope.t[good], z[good]) if np.count_nonzero(good) > 1 else np.full(t.size, np.nan)
-        near = np.zeros(t.size, dtype=bool)
-        if np.count_nonzero(good) > 1:
-            index = np.clip(np.searchsorted(gyroscope.t[good], t), 1, np.count_nonzero(good) - 1)
-            near = np.diff(gyroscope.t[good])[index - 1] < 0.1
-            near &= (t >= gyroscope.t[good][0] - 0.02) & (t <= gyroscope.t[good][-1] + 0.02)
-    else:
-        smooth, near = np.full(t.size, np.nan), np.zeros(t.size, dtype=bool)
-    covered = near.copy()
+    shown = None if gyroscope is None else _known(gyroscope.t, gyroscope.value[:, 2])
+    fold = 2 * np.pi / float(np.median(np.diff(t)))
+    covered, rate = np.empty(t.size, dtype=bool), np.empty(t.size)
+    for start in range(0, t.size, _BLOCK):
+        part = slice(start, start + _BLOCK)
+        covered[part], rate[part] = _first_rate(t[part], times, rates, shown, fold)
     reach = 0.5 * lengths + 0.25
     for first, last in zip(np.searchsorted(t, times - reach), np.searchsorted(t, times + reach, "right"), strict=True):
         covered[first:last] = True
-    rate = np.interp(t, times, rates) if times.size else np.where(near, smooth, 0.0)
-    distance = np.full(t.size, np.inf)
-    if times.size:
-        after = (
-            np.clip(np.searchsorted(times, t), 1, max(times.size - 1, 1)) if times.size > 1 else np.zeros(t.size, int)
-        )
-        distance = np.minimum(np.abs(t - times[after]), np.abs(t - times[np.maximum(after - 1, 0)]))
-    # where no window tells, the gyroscope does; where both do, it tells how many turns a slow sampling missed
-    fold = 2 * np.pi / float(np.median(np.diff(t)))
-    missed = np.where(near, np.rint((np.nan_to_num(smooth) - rate) / fold), 0.0)
-    rate = np.where(near & (distance > 0.5), smooth, rate + fold * missed)
     runs = []
     edges = np.flatnonzero(np.diff(np.concatenate([[False], covered, [False]]).astype(int)))
     for first, last in zip(edges[::2], edges[1::2], strict=True):
@@ -186,6 +177,42 @@ def _runs(t: FloatArray, fits: ToneFit, gyroscope: Samples | None) -> list[tuple
         for a, b in zip([first, *holes], [*holes, last], strict=True):
             runs.append((int(a), int(b), rate[a:b]))
     return runs
+
+
+def _known(t: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """Return times and readings (n,) without gaps, or None of fewer than two."""
+    good = np.isfinite(value)
+    if np.count_nonzero(good) < 2:
+        return None
+    return (t, value) if np.all(good) else (t[good], value[good])
+
+
+def _first_rate(
+    t: FloatArray,
+    times: FloatArray,
+    rates: FloatArray,
+    shown: tuple[FloatArray, FloatArray] | None,
+    fold: float,
+) -> tuple[BoolArray, FloatArray]:
+    """Return at which of times t (n,) a gyroscope is near, and a first rate there (n,).
+
+    ``rates`` (w,) are the windows' at ``times``, ``shown`` times and rates of the gyroscope; ``fold`` is the rate,
+    rad/s, of a turn per reading.
+    """
+    smooth, near = np.full(t.size, np.nan), np.zeros(t.size, dtype=bool)
+    if shown is not None:
+        at, z = shown
+        smooth = np.interp(t, at, z)
+        index = np.clip(np.searchsorted(at, t), 1, at.size - 1)
+        near = (at[index] - at[index - 1] < 0.1) & (t >= at[0] - 0.02) & (t <= at[-1] + 0.02)
+    if times.size == 0:
+        return near, np.where(near, smooth, 0.0)
+    after = np.clip(np.searchsorted(times, t), min(1, times.size - 1), times.size - 1)
+    distance = np.minimum(np.abs(t - times[after]), np.abs(t - times[np.maximum(after - 1, 0)]))
+    rate = np.interp(t, times, rates)
+    # where no window tells, the gyroscope does; where both do, it tells how many turns a slow sampling missed
+    missed = np.where(near, np.rint((np.nan_to_num(smooth) - rate) / fold), 0.0)
+    return near, np.where(near & (distance > 0.5), smooth, rate + fold * missed)
 
 
 def joined(method: str, tracks: list[Track], settings: TrackingSettings, span: tuple[float, float]) -> YawRate:
@@ -199,9 +226,9 @@ def joined(method: str, tracks: list[Track], settings: TrackingSettings, span: t
     for index, track in enumerate(tracks):
         good = _trusted(track, settings)
         if index > 0:
-            good &= track.t > 0.5 * (tracks[index - 1].times[-1] + track.times[0])
+            good &= track.t > 0.5 * (tracks[index - 1].stop + track.start)
         if index + 1 < len(tracks):
-            good &= track.t <= 0.5 * (track.times[-1] + tracks[index + 1].times[0])
+            good &= track.t <= 0.5 * (track.stop + tracks[index + 1].start)
         place = np.searchsorted(steps, np.rint(track.t[good] / settings.step))
         rate[place], sd[place] = track.rate[good], track.sd[good]
     return YawRate(method, grid, rate, sd, signed=True)
@@ -219,15 +246,7 @@ def _answers(tracks: list[Track], settings: TrackingSettings, span: tuple[float,
 
 def _trusted(track: Track, settings: TrackingSettings) -> BoolArray:
     good = (track.sd <= settings.largest_sd) & np.isfinite(track.rate)
-    square = np.mean(track.residual**2, axis=1)
-    # a single wild reading, which had no weight, is no misfit
-    square = np.minimum(square, 40 * float(np.median(square)))
-    cumulative = np.concatenate([[0.0], np.cumsum(square)])
-    lo = np.searchsorted(track.times, track.t - 0.25)
-    hi = np.searchsorted(track.times, track.t + 0.25)
-    local = (cumulative[hi] - cumulative[lo]) / np.maximum(hi - lo, 1)
-    usual = float(np.median(square)) * 1.27  # the mean of chi-square of three is 1.27 times its median
-    good &= (local <= settings.misfit**2 * max(usual, 1e-12)) & (hi - lo >= 3)
+    good &= (track.left <= settings.misfit**2 * max(track.usual, 1e-12)) & (track.count >= 3)
     field = float(np.linalg.norm(track.field))
     if track.noise > 0.2 * field:
         good[:] = False

@@ -6,12 +6,13 @@ from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import csr_array
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, IntArray
 from estimators.precession import AxialField
 from estimators.spin_spline import SpinSpline
 from estimators.tracking.problem import Linear, Problem, Segment
-from estimators.tracking.solution import adapt, evidence, linearise, solve, with_roughness
+from estimators.tracking.solution import Mixture, Point, adapt, linearise, mean_roughness, solve, with_roughness
 from estimators.tracking.track import Track
 
 __all__ = ["track_bound", "track_spin"]
@@ -25,8 +26,9 @@ def track_bound(segment: Segment, rate: FloatArray, noise: float, at: float) -> 
     """
     problem = Problem(segment, top_rate=float(np.max(np.abs(rate))))
     ones, precession = np.ones(segment.t.size), segment.settings.precession
-    x, linear, *_ = solve(problem, _start(problem, rate, None), noise, ones, 1e-6, precession, 20)
-    information, _, _ = with_roughness(problem, linear, x, np.zeros(problem.spline.size - 2), 1e-10)
+    start = Point(problem, _start(problem, rate, None), ones)
+    point, linear, _ = solve(problem, start, noise, 1e-6, precession, 20)
+    information, _, _ = with_roughness(problem, linear, point.x, np.zeros(problem.spline.size - 2), 1e-10)
     B = np.zeros(problem.size)
     B[problem.parts[0]] = problem.spline.basis(np.array([at]))[0]
     return float(np.sqrt(B @ np.linalg.solve(information, B)))
@@ -46,78 +48,91 @@ def track_spin(
 
 
 class _Fit(NamedTuple):
-    """The most likely parameters x, the problem about them, residuals (n, 3), phase (n,), and both sizes found.
+    """The most likely parameters, the problem about them, and both sizes found.
 
-    ``sigma`` is the readings' noise, uT; ``roughness`` the spectral density of r''; ``target`` (k,) its mean.
+    ``sigma`` is the readings' noise, uT; ``mixture`` the spectral densities of r'' and the spin by them; ``target``
+    (k,) the mean of r''.
     """
 
-    x: FloatArray
+    point: Point
     linear: Linear
-    residual: FloatArray
-    phase: FloatArray
     target: FloatArray
     sigma: float
-    roughness: float
+    mixture: Mixture
 
 
 def _fitted(problem: Problem, x: FloatArray, floor: float) -> _Fit:
     """Fit the parameters, and in turn noise, roughness, precession and the weights of bad readings, in 4 rounds."""
     settings, precession = problem.settings, problem.settings.precession
-    weights, roughness = np.ones(problem.t.size), 100.0
-    sigma = max(float(np.sqrt(np.mean(problem.evaluate(x).residual ** 2))), floor)
+    roughness, point = 100.0, Point(problem, x, np.ones(problem.t.size))
+    sigma = max(float(np.sqrt(np.mean(point.at.residual**2))), floor)
     for outer in range(4):
-        x, linear, residual, psi, target = solve(problem, x, sigma, weights, roughness, precession, 15)
-        length = np.sqrt(np.mean(residual**2, axis=1))
-        sigma = max(_noise(residual, weights, problem, linear, roughness), floor)
+        point, linear, target = solve(problem, point, sigma, roughness, precession, 15)
+        length = np.sqrt(np.mean(point.at.residual**2, axis=1))
+        sigma = max(_noise(point, linear, roughness), floor)
         # Huber's weight for single bad readings
-        weights = np.sqrt(np.minimum(1.0, 4.0 * sigma / np.maximum(length, 1e-12)))
-        precision, mean = problem.prior(precession)
-        linear, residual, psi = linearise(problem, x, sigma, weights, precision, mean)
-        previous, roughness = roughness, adapt(problem, linear, x, target)
+        point = point.weighed(np.sqrt(np.minimum(1.0, 4.0 * sigma / np.maximum(length, 1e-12))))
+        linear = linearise(point, sigma, *problem.prior(precession))
+        mixture = adapt(problem, linear, point.x, target)
+        previous, roughness = roughness, mean_roughness(mixture)
         if problem.slow is not None and problem.despun:
             # the part of the precession that the field shows tells the size of the part that it does not
-            PQ = x[problem.parts[1]]
+            PQ = point.x[problem.parts[1]]
             shown = 1 - np.diag(np.linalg.inv(linear.information))[problem.parts[1]] / precession**2
             weight = np.clip(shown, 0, 1)
             seen = float(np.sum(weight * PQ**2) + 2 * settings.precession**2) / (float(np.sum(weight)) + 2)
             precession = max(settings.precession, float(np.sqrt(seen)))
         if outer > 0 and abs(np.log(roughness / previous)) < 0.2:
             break
-    return _Fit(x, linear, residual, psi, target, sigma, roughness)
+    return _Fit(point, linear, target, sigma, mixture)
 
 
 def _track(problem: Problem, fit: _Fit) -> Track:
     """Return the rate on the grid of answers, integrated over the roughness, with all that is told of the fit."""
-    x, step = fit.x, problem.settings.step
-    mixture = evidence(problem, fit.linear, x, fit.target)
+    x, step, residual = fit.point.x, problem.settings.step, fit.point.at.residual
+    mixture, roughness = fit.mixture, mean_roughness(fit.mixture)
     first = int(np.ceil(problem.t[0] / step - 1e-9))
     count = int(np.floor(problem.t[-1] / step + 1e-9)) + 1 - first
     grid = step * (first + np.arange(count, dtype=np.float64))
     B = problem.spline.basis(grid)
-    rate_covariance = B @ (mixture.covariance * _correlation(problem, fit.residual, x)) @ B.T
+    variance = np.sum((B @ mixture.covariance) * B, axis=1) * _correlation(problem, residual, x)
     blur = _blur(problem.spline, mixture.mean, grid)
-    everything = np.linalg.inv(with_roughness(problem, fit.linear, x, fit.target, fit.roughness)[0])
+    everything = np.linalg.inv(with_roughness(problem, fit.linear, x, fit.target, roughness)[0])
     calibrations = problem.parts[5:]
+    left, many, usual = _left(problem.t, residual, grid)
     return Track(
         t=grid,
         rate=B @ mixture.mean,
-        sd=np.hypot(np.sqrt(np.diag(rate_covariance)), blur),
+        sd=np.hypot(np.sqrt(variance), blur),
         blur=blur,
-        covariance=rate_covariance,
-        times=problem.t,
-        phase=fit.phase,
-        residual=fit.residual,
+        start=float(problem.t[0]),
+        stop=float(problem.t[-1]),
+        left=left,
+        count=many,
+        usual=usual,
         noise=fit.sigma,
         hard_iron=x[problem.parts[3]],
         field=x[problem.parts[2]],
-        spline=problem.spline,
-        coefficients=mixture.mean,
-        roughness=fit.roughness,
+        roughness=roughness,
         calibration=[x[part] for part in calibrations],
         calibration_sd=[np.sqrt(np.diag(everything)[part]) for part in calibrations],
-        chi2=[float(np.mean(error**2)) for error, _ in problem.evaluate_rows(x)],
+        chi2=[float(np.mean(error**2)) for error, _ in fit.point.rows],
         gyroscope_gain=complex(*x[problem.parts[1]][2:4]) if problem.read else 0j,
     )
+
+
+def _left(t: FloatArray, residual: FloatArray, grid: FloatArray) -> tuple[FloatArray, IntArray, float]:
+    """Return the mean square per axis, uT^2, of residuals (k, 3) over half a second about each instant of a grid (n,).
+
+    Beside it the number of readings there (n,), and the mean square of most readings.
+    """
+    square = np.mean(residual**2, axis=1)
+    # a single wild reading, which had no weight, is no misfit
+    square = np.minimum(square, 40 * float(np.median(square)))
+    cumulative = np.concatenate([[0.0], np.cumsum(square)])
+    lo, hi = np.searchsorted(t, grid - 0.25), np.searchsorted(t, grid + 0.25)
+    # the mean of chi-square of three is 1.27 times its median
+    return (cumulative[hi] - cumulative[lo]) / np.maximum(hi - lo, 1), hi - lo, 1.27 * float(np.median(square))
 
 
 def _blur(spline: SpinSpline, coefficients: FloatArray, t: FloatArray) -> FloatArray:
@@ -136,9 +151,11 @@ def _blur(spline: SpinSpline, coefficients: FloatArray, t: FloatArray) -> FloatA
 def _start(problem: Problem, start_rate: FloatArray, axial: AxialField | None) -> FloatArray:
     """Return a first point: the spline through the rates, then field and hard iron by linear least squares."""
     x = np.zeros(problem.size)
-    B = problem.spline.basis(problem.t)
-    rows = problem.spline.second_difference()
-    x[problem.parts[0]] = np.linalg.solve(B.T @ B + 1e-4 * rows.T @ rows, B.T @ start_rate)
+    first, weights = problem.spline.local(problem.t)
+    places = (first[:, None] + np.arange(4)).ravel()
+    B = csr_array((weights.ravel(), places, np.arange(0, places.size + 1, 4)), shape=(first.size, problem.spline.size))
+    smooth = 1e-4 * problem.spline.bend_precision(np.ones(problem.spline.size - 2))
+    x[problem.parts[0]] = np.linalg.solve((B.T @ B).toarray() + smooth, B.T @ start_rate)
     for part, row in zip(problem.parts[5:], problem.rows, strict=True):
         x[part] = row.calibration
     at = problem.evaluate(x)  # the field is zero: residual = m, derivative by field = C
@@ -154,16 +171,16 @@ def _start(problem: Problem, start_rate: FloatArray, axial: AxialField | None) -
     return x
 
 
-def _noise(residual: FloatArray, weights: FloatArray, problem: Problem, linear: Linear, roughness: float) -> float:
-    rows = np.sqrt(problem.local)[:, None] * problem.spline.second_difference()
+def _noise(point: Point, linear: Linear, roughness: float) -> float:
+    problem, penalty = point.problem, point.problem.penalty() / roughness
     information = linear.information.copy()
-    information[problem.parts[0], problem.parts[0]] += rows.T @ rows / roughness
+    information[problem.parts[0], problem.parts[0]] += penalty
     # parameters that the data and not the prior decide
     precision, _ = problem.prior(problem.settings.precession)
-    precision[problem.parts[0], problem.parts[0]] += rows.T @ rows / roughness
+    precision[problem.parts[0], problem.parts[0]] += penalty
     freedom = problem.size - float(np.trace(np.linalg.solve(information, precision)))
-    count = 3 * float(np.sum(weights**2))
-    square = float(np.sum((weights[:, None] * residual) ** 2))
+    count = 3 * float(np.sum(point.weights**2))
+    square = float(np.sum((point.weights[:, None] * point.at.residual) ** 2))
     return sqrt(square / max(count - freedom, 0.2 * count))
 
 

@@ -3,32 +3,63 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 
 from discsim.arrays import FloatArray
-from estimators.tracking.problem import Linear, Problem
+from estimators.tracking.problem import Linear, Problem, Turned
 
-__all__ = ["adapt", "evidence", "linearise", "solve", "with_roughness"]
+__all__ = ["Mixture", "Point", "adapt", "linearise", "mean_roughness", "solve", "with_roughness"]
 
 
 #: Spectral densities of r'' tried, (rad/s^3)^2 s. Their prior falls slowly: where the data cannot tell, a
 #: steady change of rate is likelier than a rough one.
 _GRID = np.logspace(-10, 7, 35)
 
+#: The grid is left where the evidence is this far below the best twice in a row: exp(-25) of it.
+FAR = 25.0
 
-def linearise(
-    problem: Problem, x: FloatArray, noise: float, weights: FloatArray, precision: FloatArray, mean: FloatArray
-) -> tuple[Linear, FloatArray, FloatArray]:
-    """Linearise readings about unknowns x with their priors; beside it residuals (n, 3) and spin phase (n,), rad."""
-    at = problem.evaluate(x)
-    error = (at.residual * (weights[:, None] / noise)).ravel()
-    information = precision.copy()
-    right = -precision @ (x - mean)
-    problem.add_field(x, at, weights / noise, information, right)
+
+class Point:
+    """Unknowns x, what the model makes of them, and the normal equations there for readings of unit noise.
+
+    Each is worked out when it is first asked for, and once: noise, roughness and priors change more often than x.
+    """
+
+    def __init__(self, problem: Problem, x: FloatArray, weights: FloatArray, at: Turned | None = None) -> None:
+        self.problem, self.x, self.weights = problem, x, weights
+        self.at = problem.evaluate(x) if at is None else at
+
+    def weighed(self, weights: FloatArray) -> Point:
+        """Return the same point with other weights (n,) of the readings."""
+        same = np.array_equal(weights, self.weights)
+        return self if same else Point(self.problem, self.x, weights, self.at)
+
+    @cached_property
+    def field(self) -> tuple[FloatArray, FloatArray]:
+        """The magnetometer's information (m, m) and right-hand side (m,)."""
+        size = self.problem.size
+        information, right = np.zeros((size, size)), np.zeros(size)
+        self.problem.add_field(self.x, self.at, self.weights, information, right)
+        return information, right
+
+    @cached_property
+    def rows(self) -> list[tuple[FloatArray, FloatArray]]:
+        """The whitened residuals and derivatives of other sensors' rows."""
+        return self.problem.evaluate_rows(self.x)
+
+
+def linearise(point: Point, noise: float, precision: FloatArray, mean: FloatArray) -> Linear:
+    """Linearise readings of a noise, uT, about a point, with the unknowns' priors."""
+    problem, x = point.problem, point.x
+    error = (point.at.residual * (point.weights[:, None] / noise)).ravel()
+    information = point.field[0] / noise**2 + precision
+    right = point.field[1] / noise**2 - precision @ (x - mean)
     cost = float(error @ error + (x - mean) @ precision @ (x - mean))
-    for row_error, row_J in problem.evaluate_rows(x):
+    for row_error, row_J in point.rows:
         # a reading far outside its calibration's reach must not bend the track: Huber's weight at four sigma
         weight = np.minimum(1.0, 4.0 / np.maximum(np.abs(row_error), 1e-12))
         information += row_J.T @ (row_J * weight[:, None])
@@ -47,7 +78,7 @@ def linearise(
         cost += gap**2
     if not (np.isfinite(cost) and np.all(np.isfinite(information))):
         raise np.linalg.LinAlgError("the fit has left the numbers")
-    return Linear(information, right, cost), at.residual, at.psi
+    return Linear(information, right, cost)
 
 
 def with_roughness(
@@ -55,34 +86,33 @@ def with_roughness(
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return the information (n, n), right-hand side (n,) and cost of a linearisation with a roughness's rows added."""
     scale = np.sqrt(problem.local)
-    rows = scale[:, None] * problem.spline.second_difference()
     spin = problem.parts[0]
     information = linear.information.copy()
-    information[spin, spin] += rows.T @ rows / roughness
-    gap = scale * target - rows @ x[spin]
+    information[spin, spin] += problem.penalty() / roughness
+    gap = scale * (target - problem.spline.bend(x[spin]))
     right = linear.right.copy()
-    right[spin] += rows.T @ gap / roughness
+    right[spin] += problem.spline.pulled(scale * gap) / roughness
     return information, right, linear.cost + float(gap @ gap) / roughness
 
 
 def solve(
-    problem: Problem, x: FloatArray, noise: float, weights: FloatArray, roughness: float, precession: float, most: int
-) -> tuple[FloatArray, Linear, FloatArray, FloatArray, FloatArray]:
+    problem: Problem, point: Point, noise: float, roughness: float, precession: float, most: int
+) -> tuple[Point, Linear, FloatArray]:
     """Gauss-Newton with damping until a step is worth less than a hundredth of a standard deviation."""
     precision, mean = problem.prior(precession)
-    _, target = problem.roughness_rows(x)
-    linear, residual, psi = linearise(problem, x, noise, weights, precision, mean)
+    target = problem.bend_expected(point.x)
+    linear = linearise(point, noise, precision, mean)
     damping = 0.0
     for _ in range(most):
-        information, right, cost = with_roughness(problem, linear, x, target, roughness)
-        diagonal = np.diag(information)
-        step = cho_solve(cho_factor(information + np.diag(damping * diagonal)), right)
-        trial = x + step
-        moved, trial_residual, trial_psi = linearise(problem, trial, noise, weights, precision, mean)
-        _, _, trial_cost = with_roughness(problem, moved, trial, target, roughness)
+        information, right, cost = with_roughness(problem, linear, point.x, target, roughness)
+        information[np.diag_indices_from(information)] *= 1.0 + damping
+        step = cho_solve(cho_factor(information), right)
+        trial = Point(problem, point.x + step, point.weights)
+        moved = linearise(trial, noise, precision, mean)
+        _, _, trial_cost = with_roughness(problem, moved, trial.x, target, roughness)
         if trial_cost <= cost + 1e-9:
-            x, linear, residual, psi = trial, moved, trial_residual, trial_psi
-            _, target = problem.roughness_rows(x)
+            point, linear = trial, moved
+            target = problem.bend_expected(point.x)
             damping = 0.0 if damping < 1e-4 else damping * 0.1
             if float(step @ right) < 1e-4:
                 break
@@ -90,11 +120,11 @@ def solve(
             damping = max(1e-4, 10 * damping)
             if damping > 1e6:
                 break
-    return x, linear, residual, psi, target
+    return point, linear, target
 
 
 @dataclass(frozen=True)
-class _Mixture:
+class Mixture:
     """Weights of the grid of roughness, the spin's mean coefficients and covariance, and the best log evidence."""
 
     weight: FloatArray
@@ -103,75 +133,98 @@ class _Mixture:
     log: float
 
 
-def evidence(problem: Problem, linear: Linear, x: FloatArray, target: FloatArray) -> _Mixture:
-    """Integrate over the roughness, each value of a grid weighed by its marginal likelihood (Laplace).
+class _Reduced:
+    """The spin's normal equations, what is not spin eliminated; only the prior of the second differences changes."""
 
-    What is not spin is eliminated first; then only the prior of the second differences changes over the grid.
-    """
-    count = problem.spline.size - 2
-    spin = problem.parts[0]
-    size = spin.stop
-    A, B, C = linear.information[:size, :size], linear.information[:size, size:], linear.information[size:, size:]
-    inner = cho_factor(C)
-    reduced = A - B @ cho_solve(inner, B.T)
-    right0 = linear.right[:size] - B @ cho_solve(inner, linear.right[size:])
-    rows = np.sqrt(problem.local)[:, None] * problem.spline.second_difference()
-    penalty = rows.T @ rows
-    gap = np.sqrt(problem.local) * target - rows @ x[spin]
-    pull = rows.T @ gap
+    def __init__(self, problem: Problem, linear: Linear, x: FloatArray, target: FloatArray) -> None:
+        size = problem.parts[0].stop
+        A, B, C = linear.information[:size, :size], linear.information[:size, size:], linear.information[size:, size:]
+        inner = cho_factor(C)
+        self.problem, self.coefficients = problem, x[problem.parts[0]]
+        self.information = A - B @ cho_solve(inner, B.T)
+        self.right = linear.right[:size] - B @ cho_solve(inner, linear.right[size:])
+        self.gap = target - problem.spline.bend(self.coefficients)
 
-    def solved(roughness: float) -> tuple[float, FloatArray, tuple[FloatArray, bool]]:
-        factor = cho_factor(reduced + penalty / roughness, check_finite=False)
-        right = right0 + pull / roughness
-        step = cho_solve(factor, right, check_finite=False)
-        determinant = 2 * float(np.sum(np.log(np.diag(factor[0]))))
-        cost = float(gap @ gap) / roughness - float(step @ right)
-        return -0.5 * (cost + determinant + count * np.log(roughness)), step, factor
+    def evidence(self, near: int | None = None) -> Mixture:
+        """Integrate over the roughness, each value of a grid weighed by its marginal likelihood (Laplace).
 
-    results = [solved(roughness) for roughness in _GRID]
-    log = np.array([result[0] for result in results]) - 0.18 * np.log(_GRID)
-    log = np.where(_GRID >= problem.least, log, -np.inf)
-    weight = np.exp(log - np.max(log))
-    weight = np.where(weight < 1e-3, 0.0, weight)
-    weight /= np.sum(weight)
-    steps = np.array([result[1] for result in results])
-    mean = weight @ steps
-    covariance = np.zeros((size, size))
-    for share, (_, step, factor) in zip(weight, results, strict=True):
-        if share > 0:
+        All of the grid is looked at, or what matters of it about the place ``near``.
+        """
+        problem = self.problem
+        count, size, local = problem.spline.size - 2, self.right.size, problem.local
+        penalty, pull = problem.penalty(), problem.spline.pulled(local * self.gap)
+        squares = float(local @ self.gap**2)
+        log, solved = np.full(_GRID.size, -np.inf), {}
+
+        def look(place: int) -> float:
+            roughness = _GRID[place]
+            # symmetric: the transpose, in which LAPACK works without a copy, has the same factor
+            factor, failed = dpotrf((self.information + penalty / roughness).T, lower=1, clean=0, overwrite_a=1)
+            if failed:
+                raise np.linalg.LinAlgError("the spin's normal equations are not positive")
+            right = self.right + pull / roughness
+            step = dpotrs(factor, right, lower=1)[0]
+            determinant = 2 * float(np.sum(np.log(np.diag(factor))))
+            cost = squares / roughness - float(step @ right)
+            solved[place] = step, factor
+            if roughness >= problem.least:
+                log[place] = -0.5 * (cost + determinant + count * np.log(roughness)) - 0.18 * np.log(roughness)
+            return float(log[place])
+
+        if near is None:
+            best = max(look(place) for place in range(_GRID.size))
+        else:
+            best = look(near)
+            for places in (range(near + 1, _GRID.size), range(near - 1, -1, -1)):
+                far = 0
+                for place in places:
+                    found = look(place)
+                    best, far = max(best, found), far + 1 if found < best - FAR else 0
+                    if far == 2:
+                        break
+        weight = np.exp(log - best)
+        weight = np.where(weight < 1e-3, 0.0, weight)
+        weight /= np.sum(weight)
+        likely = [int(place) for place in np.flatnonzero(weight)]
+        mean = np.sum([weight[place] * solved[place][0] for place in likely], axis=0)
+        covariance = np.zeros((size, size))
+        for place in likely:
+            step, factor = solved[place]
             spread = step - mean
-            covariance += share * (cho_solve(factor, np.eye(size), check_finite=False) + np.outer(spread, spread))
-    # Student's t with one degree of freedom: a normal law whose precision is Gamma(1/2, 1/2), by its logarithm
-    own = float(np.sum(np.log(problem.local) - 0.5 * problem.local + 0.5))
-    return _Mixture(weight, x[spin] + mean, covariance, float(np.max(log)) + own)
+            covariance += weight[place] * (dpotri(factor, lower=1)[0] + np.outer(spread, spread))
+        covariance = np.tril(covariance) + np.tril(covariance, -1).T
+        # Student's t with one degree of freedom: a normal law whose precision is Gamma(1/2, 1/2), by its logarithm
+        own = float(np.sum(np.log(local) - 0.5 * local + 0.5))
+        return Mixture(weight, self.coefficients + mean, covariance, best + own)
 
 
-def adapt(problem: Problem, linear: Linear, x: FloatArray, target: FloatArray) -> float:
+def adapt(problem: Problem, linear: Linear, x: FloatArray, target: FloatArray) -> Mixture:
     """Find the roughness, and where it is larger than elsewhere: Student's t with one degree of freedom for r''.
 
     A flight is alike smooth throughout; a rate table is quiet between the corners of its ramps. Which of both it is,
     the evidence says. Expectation-maximisation with the posterior variance of r'', so that intervals without data
     keep the common roughness.
     """
-    rows = problem.spline.second_difference()
+    reduced = _Reduced(problem, linear, x, target)
     problem.local = np.ones(problem.spline.size - 2)
-    best = mixture = evidence(problem, linear, x, target)
+    best = mixture = reduced.evidence()
     kept, needed = problem.local, best.log + 10.0  # corners must be plain
     for _ in range(12):
-        roughness = _mean_roughness(mixture)
-        bend = rows @ mixture.mean - target
-        square = bend**2 + np.sum((rows @ mixture.covariance) * rows, axis=1)
+        roughness = mean_roughness(mixture)
+        bend = problem.spline.bend(mixture.mean) - target
+        square = bend**2 + problem.spline.bend_variance(mixture.covariance)
         # corners fall between knots: neighbours share them
         smooth = np.maximum(square, 0.5 * np.maximum(np.roll(square, 1), np.roll(square, -1)))
         problem.local = 2.0 / (1.0 + smooth / roughness)
-        mixture = evidence(problem, linear, x, target)
+        mixture = reduced.evidence(near=int(np.argmax(mixture.weight)))
         if mixture.log < max(best.log, needed - 10.0):
             break  # without end it would gather all roughness in ever fewer intervals
         if mixture.log > max(best.log, needed):
             best, kept = mixture, problem.local
     problem.local = kept
-    return _mean_roughness(best)
+    return best
 
 
-def _mean_roughness(mixture: _Mixture) -> float:
+def mean_roughness(mixture: Mixture) -> float:
+    """Return the geometric mean of the roughness, (rad/s^3)^2 s."""
     return float(np.exp(np.sum(mixture.weight * np.log(_GRID))))

@@ -7,10 +7,9 @@ from dataclasses import field as dataclass_field
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, IntArray
 from discsim.errors import InputError
 from estimators.precession import STRENGTH_SD
-from estimators.spin_spline import SpinSpline
 
 __all__ = ["RateRows", "Track", "TrackingSettings"]
 
@@ -87,25 +86,24 @@ class Track:
     """One segment's answer.
 
     ``t`` (n,) s, ``rate`` and ``sd`` (n,) rad/s; ``blur`` (n,) the share of sd that the knots' spacing makes at a
-    corner; ``covariance`` (n, n) of the rate; ``phase`` (k,) rad, the angle turned at the magnetometer's times
-    ``times`` (k,); ``residual`` (k, 3) uT; ``noise`` per axis, uT; ``hard_iron`` (3,) uT; ``field`` (3,) uT at the
-    start; ``calibration`` of other sensors; ``chi2`` of their rows per degree of freedom; ``spline``,
-    ``coefficients``; ``roughness`` the spectral density of r'' found.
+    corner; ``start`` and ``stop`` of the magnetometer's readings, s, and of their residual about each t the mean square
+    per axis ``left`` (n,) with the number of readings ``count`` (n,), and ``usual`` that of most readings, uT^2;
+    ``noise`` per axis, uT; ``hard_iron`` (3,) uT; ``field`` (3,) uT at the start; ``calibration`` of other sensors;
+    ``chi2`` of their rows per degree of freedom; ``roughness`` the spectral density of r'' found.
     """
 
     t: FloatArray
     rate: FloatArray
     sd: FloatArray
     blur: FloatArray
-    covariance: FloatArray
-    times: FloatArray
-    phase: FloatArray
-    residual: FloatArray
+    start: float
+    stop: float
+    left: FloatArray
+    count: IntArray
+    usual: float
     noise: float
     hard_iron: FloatArray
     field: FloatArray
-    spline: SpinSpline
-    coefficients: FloatArray
     roughness: float
     calibration: list[FloatArray] = dataclass_field(default_factory=list)
     calibration_sd: list[FloatArray] = dataclass_field(default_factory=list)

@@ -142,3 +142,12 @@ def test_recordings_that_are_looked_at_side_by_side_do_not_disturb_one_another(m
             assert list(pool.map(look, range(8))) == list(range(8))
     finally:
         sys.setswitchinterval(before)
+
+
+def test_noise_found_piece_by_piece_is_that_of_the_whole(monkeypatch):
+    rate = np.radians(3797.0) * np.exp(-np.arange(3000) / 2000)
+    seen = np.clip(wobbling(rate, np.random.default_rng(3)), -LIMIT, LIMIT)
+    whole, found = limits(seen), clipped(seen, None, None)
+    monkeypatch.setattr(clipping, "PIECE", 100)
+    np.testing.assert_array_equal(limits(seen), whole)
+    assert np.array_equal(clipped(seen.copy(), None, None), found)

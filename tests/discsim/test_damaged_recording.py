@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tracemalloc
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -529,3 +530,34 @@ def check_damage(folder: Path, data: st.DataObject) -> None:
         assert np.all(np.isfinite(samples.t))
         assert np.all(np.diff(samples.t) > 0)
         assert not np.any(np.isinf(samples.value))
+
+
+@pytest.mark.parametrize("block", [1, 40, 1 << 22])
+def test_blank_lines_are_a_fault_between_rows_and_none_at_the_end_whatever_the_blocks(tmp_path, monkeypatch, block):
+    monkeypatch.setattr(module, "BLOCK", block)
+    file = tmp_path / "magnetometer.csv"
+    file.write_text(f"{HEADER}\n{ROWS}\n \n\t\n\n")
+    assert len(read_csv(file, HEADER)) == ROWS.count("\n")
+    file.write_text(f"{HEADER}\n{ROWS}\n \n9,1,2,3\n")
+    with pytest.raises(InputError, match=rf"magnetometer.csv:{2 + ROWS.count(chr(10))}: a blank line between rows"):
+        read_csv(file, HEADER)
+
+
+def test_reading_holds_little_more_than_the_readings(tmp_path, monkeypatch):
+    """A log of an hour has 115 MB of readings a sensor: the text of all, and copies, would be many times that."""
+    monkeypatch.setattr(module, "BLOCK", 1 << 16)
+    t = 0.001 * np.arange(150_000)
+    value = np.round(np.random.default_rng(0).normal(0, 30, (t.size, 3)), 4)
+    file = tmp_path / "magnetometer.csv"
+    with file.open("w") as stream:
+        stream.write(f"{HEADER}\n")
+        stream.write(("%.3f,%.4f,%.4f,%.4f\n" * t.size) % tuple(np.column_stack([t, value]).ravel().tolist()))
+    tracemalloc.start()
+    try:
+        read = read_csv(file, HEADER)
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert np.array_equal(read.value, value)
+    # the parts and all of it, once, and a few blocks as text
+    assert most < 2.1 * (t.nbytes + value.nbytes) + 20 * module.BLOCK

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from discsim.errors import InputError
-from discsim.files import digest, model_file, model_names, read_text, write_bytes, write_text
+from discsim.files import digest, model_file, model_names, read_pieces, read_text, write_bytes, write_text
 
 
 def test_text_is_utf_8_with_the_line_ends_given(tmp_path):
@@ -87,3 +87,17 @@ def test_the_place_of_shipped_files_does_not_depend_on_the_working_folder(tmp_pa
     monkeypatch.chdir(tmp_path)
     assert model_file("disc.xml") == before
     assert Path(before).is_file()
+
+
+@pytest.mark.parametrize("size", [1, 3, 7, 1000])
+def test_pieces_of_a_file_are_whole_lines_and_make_its_text(tmp_path, size):
+    (tmp_path / "file").write_bytes(b"\xef\xbb\xbfone\r\ntwo\n\n" + "größer".encode() + b"\r\n \nend")
+    pieces = list(read_pieces(tmp_path / "file", size))
+    assert "".join(pieces) == read_text(tmp_path / "file") == "one\ntwo\n\ngrößer\n \nend"
+    assert all(piece.endswith("\n") for piece in pieces[:-1])
+
+
+def test_a_byte_that_is_no_text_is_found_in_any_piece(tmp_path):
+    (tmp_path / "file").write_bytes(b"one\ntwo\nthr\xff\n")
+    with pytest.raises(InputError, match=r"file:3: byte 0xff is no UTF-8"):
+        list(read_pieces(tmp_path / "file", 4))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -222,14 +223,14 @@ def test_a_write_that_fails_leaves_nothing_behind(flight, tmp_path, monkeypatch,
     before = {file.name: file.read_bytes() for file in flight.iterdir()}
     written = 0
 
-    def failing(path: Path, text: str) -> None:
+    def failing(path: Path, pieces: Iterable[str]) -> None:
         nonlocal written
         written += 1
         if written == fails_at:
             raise kill
-        path.write_text(text)
+        path.write_text("".join(pieces))
 
-    monkeypatch.setattr(module, "write_text", failing)
+    monkeypatch.setattr(module, "write_pieces", failing)
     for folder in (tmp_path / "new", flight):
         written = 0
         with pytest.raises(type(kill)):

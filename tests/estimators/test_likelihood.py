@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support.spinning_sensor import MPU9250, Faults, Spin, move, record, tone
+from support.spinning_sensor import MPU9250, Faults, Spin, move, record, tone, without
 
 from discsim.errors import InputError
 from discsim.recording import Samples
@@ -200,3 +200,17 @@ def test_a_clipped_reading_is_not_used(thrown):
     )
     error = np.degrees(answer.rate - truth.r(answer.t))
     assert np.sqrt(np.nanmean(error**2)) < 1.3
+
+
+@pytest.mark.parametrize("precession", [True, False])
+def test_windows_fitted_in_parts_are_those_of_the_whole(monkeypatch, precession):
+    """A part's search begins some windows before it: from there on each starts as in the whole."""
+    spin = Spin() if precession else without(Spin(), precession=False)
+    recording, _ = record(spin, np.random.default_rng(12), sensors=("magnetometer", "gyroscope"))
+    whole = likelihood(recording)
+    monkeypatch.setattr("estimators.likelihood.TOGETHER", 20)
+    parts = likelihood(recording)
+    assert len(whole) > 60
+    assert np.array_equal(np.isnan(parts.rate), np.isnan(whole.rate))
+    # a fit ends within a ten-thousandth of a standard deviation
+    np.testing.assert_allclose((parts.rate - whole.rate) / whole.sd, 0.0, atol=1e-3)

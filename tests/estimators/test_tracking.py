@@ -217,3 +217,26 @@ def test_unusable_input_is_an_error():
         TrackingSettings(knots=-1.0)
     with pytest.raises(InputError, match="overlap"):
         TrackingSettings(segment=3.0)
+
+
+def test_the_evidence_near_its_peak_is_all_that_matters(thrown, monkeypatch):
+    """The grid of roughness is left where the evidence has fallen to exp(-25): no value beyond has any weight."""
+    spin, truth = thrown
+    recording, _ = record(spin, np.random.default_rng(21), IRON, truth=truth, sensors=PHASE)
+    near = tracking(recording)
+    monkeypatch.setattr("estimators.tracking.solution.FAR", np.inf)
+    whole = tracking(Recording(**vars(recording)))
+    np.testing.assert_allclose(near.rate, whole.rate, rtol=1e-12)
+    np.testing.assert_allclose(near.sd, whole.sd, rtol=1e-9)
+
+
+def test_segments_side_by_side_are_those_one_after_the_other(thrown, monkeypatch):
+    spin, truth = thrown
+    recording, _ = record(spin, np.random.default_rng(22), IRON, truth=truth, sensors=PHASE)
+    settings = TrackingSettings(segment=1.0, overlap=0.3)
+    monkeypatch.setattr("discsim.threads.cores", lambda: 3)
+    beside = tracking(recording, settings)
+    monkeypatch.setattr("discsim.threads.cores", lambda: 1)
+    after = tracking(Recording(**vars(recording)), settings)
+    assert np.array_equal(beside.rate, after.rate, equal_nan=True)
+    assert np.array_equal(beside.sd, after.sd, equal_nan=True)

@@ -6,8 +6,11 @@ The cases are drawn by the blind test's own generator and simulated by MuJoCo. S
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
+from discsim.threads import cores
 from validation.challenge.blind import Request, diagnose_blind
 from validation.challenge.cases.conceal import Answer
 from validation.challenge.scores.scoring import CaseScore, score_case
@@ -57,12 +60,24 @@ class Concealed(NamedTuple):
         return f": {', '.join(texts)}" if texts else ""
 
 
-def concealed_cases(requests: Sequence[Request]) -> Iterator[Concealed]:
-    """Yield cases one after the other, each diagnosed by another process that gets recordings and nothing else."""
-    for request in requests:
+@contextmanager
+def concealed_cases(requests: Sequence[Request]) -> Iterator[Iterator[Concealed]]:
+    """Diagnose cases inside the block, as many at once as there are cores, and yield an iterator of them in order.
+
+    Each is diagnosed by another process that gets recordings and nothing else: what runs in the block goes on beside.
+    """
+
+    def diagnosed(request: Request) -> Concealed:
         answer = Answer.of(request.draw())
         done = diagnose_blind(tuple(request), None)
-        yield Concealed(request, answer, done["diagnosis"], done["error"], score_case(answer, done["diagnosis"]))
+        return Concealed(request, answer, done["diagnosis"], done["error"], score_case(answer, done["diagnosis"]))
+
+    pool = ThreadPoolExecutor(cores())
+    try:
+        waiting = [pool.submit(diagnosed, request) for request in requests]
+        yield (one.result() for one in waiting)
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
 
 
 def concealed_checks(cases: Sequence[Concealed]) -> list[Score]:

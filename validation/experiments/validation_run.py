@@ -96,13 +96,14 @@ def validate(
     started = time.monotonic()
     subject, judging = subject or shipped_subject(quick), judging or Judging()
 
-    run.step("engine against closed forms")
-    scores = closed_form_checks(subject.disc, subject.environment)
-    measured = _measure(run, run.rng, subject)
-    scores += measured.scores
-    _draw(run, measured)
     requests = QUICK_CASES if quick else FULL_CASES
-    concealed = list(run.progress(concealed_cases(requests), len(requests), "concealed case"))
+    with concealed_cases(requests) as cases:
+        run.step("engine against closed forms")
+        scores = closed_form_checks(subject.disc, subject.environment)
+        measured = _measure(run, run.rng, subject)
+        scores += measured.scores
+        _draw(run, measured)
+        concealed = list(run.progress(cases, len(requests), "concealed case"))
     scores += concealed_checks(concealed)
     if recordings:
         run.step("recordings")
