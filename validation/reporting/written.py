@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from glob import escape
 from pathlib import Path
 
 from discsim.errors import InputError
@@ -19,6 +22,8 @@ __all__ = ["OVERWRITE", "Written", "alone_in", "watching"]
 OVERWRITE: ContextVar[bool] = ContextVar("overwrite", default=False)
 #: what a run that did not end has written, in place of the run.json that it would have left
 _UNFINISHED = ".discsim-unfinished.json"
+#: names of what is not yet whole
+_BEGUN = re.compile(r"\..+\.[0-9a-f]{8}")
 #: kept by their own rules: results of single tasks, which another run refuses or goes on with
 _OWN_RULES = ("checkpoints",)
 
@@ -46,9 +51,9 @@ class Written:
             )
         if name not in self.now:
             self.now.add(name)
-            self._note()
+            self.note()
 
-    def _note(self) -> None:
+    def note(self) -> None:
         """Say in the folder what is being written, for a run that is killed cannot say it later."""
         unknown = [name for name, value in (self.before or {}).items() if value is None]
         marked = json.dumps(dict.fromkeys(sorted({*unknown, *self.now})))
@@ -77,15 +82,33 @@ class Written:
 
 @contextmanager
 def watching(out: Path) -> Iterator[Written]:
-    """Take note of what is written into a folder while the block runs, and refuse what must stay as it is."""
+    """Take note of what is written into a folder while the block runs, and refuse what must stay as it is.
+
+    What a killed run had begun is taken away first: nobody else writes into the folder (`alone_in`).
+    """
     written = Written(out, _before(out))
+    if (out / _UNFINISHED).exists():
+        _sweep(out)
+    written.note()
     try:
         with guarding(written):
             yield written
     except BaseException:
         if written.now:
             write_text(out / _UNFINISHED, json.dumps(written.digests()) + "\n")
+        elif not (written.before or {}):
+            written.listed()
         raise
+
+
+def _sweep(out: Path) -> None:
+    """Take away files and folders that were to become others by a rename (`discsim.files.beside`)."""
+    for left in (*out.rglob(".*"), *out.parent.glob(f"{escape(f'.{out.name}.')}*")):
+        if _BEGUN.fullmatch(left.name):
+            if left.is_dir():
+                shutil.rmtree(left, ignore_errors=True)
+            else:
+                left.unlink(missing_ok=True)
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from support.flight_log import BOOT, LATE, battery, combined, flight, integrals, magnetometer, message, stamps, ulog
+from support.flight_log import BOOT, LATE, battery, combined, flight, integrals, magnetometer, message, ulog
 from support.made_logs import LANDING, RELEASE, Log, made_log
 
 from discsim.recording import Recording, read_recording
