@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import re
 import signal
 import sys
 import time
@@ -86,13 +87,18 @@ def run(words: Sequence[str], heard: Path) -> int:
 
 
 def content(out: Path) -> dict[str, bytes]:
-    """Return the files of a folder by their names, without what is between runs and what stands apart."""
+    """Return the files of a folder by their names, without what is between runs and what stands apart.
+
+    Pages say by which command they were made: where it wrote to, and how many workers it had, is no result.
+    """
     found = {}
     for file in sorted(out.rglob("*")):
         name = file.relative_to(out).as_posix()
         if not file.is_file() or name.split("/")[0] in _BETWEEN:
             continue
         found[name] = file.read_bytes()
+        if file.suffix in (".html", ".json"):
+            found[name] = re.sub(rb"--workers \d+", b"--workers N", found[name].replace(str(out).encode(), b"OUT"))
         if name == "run.json":
             told = json.loads(found[name])
             found[name] = json.dumps({key: told[key] for key in told if key not in _APART}).encode()
