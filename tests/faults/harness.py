@@ -101,6 +101,7 @@ def content(out: Path) -> dict[str, bytes]:
             found[name] = re.sub(rb"--workers \d+", b"--workers N", found[name].replace(str(out).encode(), b"OUT"))
         if name == "run.json":
             told = json.loads(found[name])
+            told["files"] = {key: value for key, value in told["files"].items() if not key.endswith(".html")}
             found[name] = json.dumps({key: told[key] for key in told if key not in _APART}).encode()
     return found
 
