@@ -26,7 +26,7 @@ from validation.reporting.run import start_run
 from validation.reporting.written import alone_in
 
 #: moments tried of each signal: the command tries fifty
-MOMENTS = 4
+MOMENTS = 1
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from matplotlib.ticker import NullLocator
+from matplotlib.ticker import LogFormatter, NullLocator
 
 from discsim.arrays import FloatArray
 from discsim.files import write_bytes
@@ -122,8 +122,13 @@ def _take_names_literally(figure: Figure) -> None:
     named = [text for text in figure.findobj(Text) if "$" in text.get_text()]
     if not named:
         return
-    ticks = [tick for axes in figure.axes for axis in (axes.xaxis, axes.yaxis) for tick in axis.get_major_ticks()]
-    ticks += [tick for axes in figure.axes for axis in (axes.xaxis, axes.yaxis) for tick in axis.get_minor_ticks()]
+    logarithmic = [
+        axis
+        for axes in figure.axes
+        for axis in (axes.xaxis, axes.yaxis)
+        if isinstance(axis.get_major_formatter(), LogFormatter)
+    ]
+    ticks = [tick for axis in logarithmic for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks())]
     formulas = {id(label) for tick in ticks for label in (tick.label1, tick.label2)}  # powers of ten
     for text in named:
         if id(text) not in formulas:
