@@ -122,7 +122,7 @@ def start_run(out: Path, seed: int | None = None, inputs: Iterable[Path] = ()) -
             raise InputError(f"--out {out}: is the input; expected another folder, to leave that as it is")
         if path.is_dir() and out.resolve().is_relative_to(path.resolve()):
             raise InputError(
-                f"--out {out}: lies within the input {path}; expected a folder outside, to leave it as it is"
+                f"--out {out}: lies in the input {path}; expected a folder outside, to leave that as it is"
             )
     out.mkdir(parents=True, exist_ok=True)
     run = Run(out, sys.argv[1:], seed, paths)

@@ -46,6 +46,8 @@ class _Unheard:
                 raise
 
     def __getattr__(self, name: str) -> Any:
+        if name == "buffer":  # who finds it writes there, past all this
+            raise AttributeError(name)
         return getattr(self._stream, name)
 
 
