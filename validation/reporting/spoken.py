@@ -20,6 +20,8 @@ class _Unheard:
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
+        #: raised by the next flush: who only tried whether a stream takes text passes over what `write` raises
+        self._failed: OSError | None = None
 
     def write(self, text: str) -> int:
         with self._turned_away():
@@ -29,12 +31,15 @@ class _Unheard:
     def flush(self) -> None:
         with self._turned_away():
             self._stream.flush()
+        if self._failed is not None:
+            failed, self._failed = self._failed, None
+            raise failed
 
     @contextmanager
     def _turned_away(self) -> Iterator[None]:
         """Let a stream that failed write to nowhere, what it holds already, too: the interpreter flushes it at its end.
 
-        Raises what is no reader's leaving, as of a full disk.
+        What is no reader's leaving, as of a full disk, is raised by `flush`.
         """
         try:
             yield
@@ -43,7 +48,7 @@ class _Unheard:
             os.dup2(nowhere, self._stream.fileno())
             os.close(nowhere)
             if not isinstance(error, BrokenPipeError):
-                raise
+                self._failed = error
 
     def __getattr__(self, name: str) -> Any:
         if name == "buffer":  # who finds it writes there, past all this
