@@ -1,7 +1,8 @@
 """Mutation testing: change one operator, comparison or number of a file, run its tests, and list what nobody noticed.
 
 ``python -m tests.mutants discsim/frames.py --tests tests/discsim/test_frames.py --count 40 --seed 1``. Each mutant is
-made in a copy of the checkout, without compiling (numba runs as plain Python), and killed where a test fails or hangs.
+made in a copy of the checkout and killed where a test fails or hangs. Functions run as plain Python, a hundred times as
+fast as compiling them anew; tests that fly need ``--compiled``.
 """
 
 from __future__ import annotations
@@ -77,16 +78,22 @@ def main() -> int:
     parser.add_argument("--tests", nargs="+", required=True)
     parser.add_argument("--count", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--compiled", action="store_true", help="compile each mutant, about a minute")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "copy"
-        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".git", "__pycache__", ".*_cache", "docs"))
+        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".git", "__pycache__", ".*_cache"))
         target = copy / given.file
         source = target.read_text(encoding="utf-8")
         places = _places(ast.parse(source))
         chosen = sorted(random.Random(given.seed).sample(places, min(given.count, len(places))))
         words = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider", *given.tests]
-        environment = {**os.environ, "PYTHONPATH": str(copy), "NUMBA_DISABLE_JIT": "1", "CI": "1"}
+        environment = {
+            **os.environ,
+            "PYTHONPATH": str(copy),
+            "NUMBA_DISABLE_JIT": str(int(not given.compiled)),
+            "CI": "1",
+        }
 
         def passes(longest: float) -> bool:
             try:

@@ -123,3 +123,15 @@ def test_an_error_is_one_line_of_printable_characters(tmp_path):
         table_of(tmp_path, '"a\\nb\\u001b[31m" = 1\n').finish()
     assert str(caught.value).isprintable()
     assert r"unknown key 'a\nb\x1b[31m'" in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["\\u001b[31mred", "a\\u009b31m", "evil\\u202etxt.exe", "\\u0000"])
+def test_a_text_that_a_terminal_would_obey_is_refused(tmp_path, text):
+    with pytest.raises(InputError, match=r"'x' is .*, expected a text without control characters") as caught:
+        table_of(tmp_path, f'x = "{text}"\n').text("x")
+    assert str(caught.value).isprintable()
+
+
+def test_a_text_may_have_lines_and_letters_of_any_language(tmp_path):
+    for text in ("Flug 7, Wurf \u00e4", "\ube44\ud589", "a\\nb\\tc"):
+        assert table_of(tmp_path, f'x = "{text}"\n').text("x")
