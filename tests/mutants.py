@@ -51,7 +51,7 @@ def _places(tree: ast.Module) -> list[tuple[int, int]]:
         if id(node) in skipped or not hasattr(node, "lineno"):
             continue
         changes = [getattr(node, "op", None), *getattr(node, "ops", [])]
-        numeric = isinstance(node, ast.Constant) and isinstance(node.value, int | float) and node.value is not True
+        numeric = isinstance(node, ast.Constant) and isinstance(node.value, int | float)
         if numeric or any(type(one) in _OPERATORS for one in changes):
             found.append((number, node.lineno))
     return found
@@ -62,7 +62,9 @@ def _mutant(source: str, number: int) -> tuple[str, str]:
     tree = ast.parse(source)
     node = list(ast.walk(tree))[number]
     before = ast.unparse(node)
-    if isinstance(node, ast.Constant):
+    if isinstance(node, ast.Constant) and isinstance(node.value, bool):
+        node.value = not node.value
+    elif isinstance(node, ast.Constant):
         node.value = node.value + 1 if isinstance(node.value, int) else node.value * 1.1 + 0.1 * (node.value == 0.0)
     elif isinstance(node, ast.Compare):
         node.ops[0] = _OPERATORS[type(node.ops[0])]() if type(node.ops[0]) in _OPERATORS else node.ops[0]
