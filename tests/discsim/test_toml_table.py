@@ -135,3 +135,13 @@ def test_a_text_that_a_terminal_would_obey_is_refused(tmp_path, text):
 def test_a_text_may_have_lines_and_letters_of_any_language(tmp_path):
     for text in ("Flug 7, Wurf \u00e4", "\ube44\ud589", "a\\nb\\tc"):
         assert table_of(tmp_path, f'x = "{text}"\n').text("x")
+
+
+@pytest.mark.parametrize(("value", "positive", "fine"), [(0.5, True, True), (0.0, True, False), (-1.5, False, True)])
+def test_only_what_must_be_above_zero_is_refused_where_it_is_not(tmp_path, value, positive, fine):
+    table = table_of(tmp_path, f"x_m = {value}\n")
+    if fine:
+        assert table.number("x", "m", positive=positive) == value
+        return
+    with pytest.raises(InputError, match=r"'x_m' is 0\.0, expected a number above zero"):
+        table.number("x", "m", positive=positive)
