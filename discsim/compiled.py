@@ -40,7 +40,10 @@ def _cache_folder() -> Path:
             text = source.read_bytes()
             if package.name != "validation" or b"compiled" in text:
                 digest.update(text)
-    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    try:
+        base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    except RuntimeError:  # a user without a home: nowhere to keep anything
+        base = os.devnull
     return Path(base) / "discsim" / digest.hexdigest()[:16]
 
 

@@ -6,12 +6,20 @@ from pathlib import Path
 
 __all__ = ["InputError"]
 
+#: characters of a message that are shown: a file may have names of thousands, and what was expected stands at the end
+_HEAD, _TAIL = 800, 300
+
 
 class InputError(ValueError):
     """Input that cannot be used; the message names the file, the line where there is one, and the remedy."""
 
     @classmethod
     def at(cls, path: Path | str, line: int | None, message: str) -> InputError:
-        """Return an error that starts with ``path:line:``, in one line: what does not print is escaped."""
+        """Return an error that starts with ``path:line:``, in one line: what does not print is escaped.
+
+        Of a very long message the middle is left out.
+        """
         where = f"{path}:{line}" if line else f"{path}"
+        if len(message) > _HEAD + _TAIL:
+            message = f"{message[:_HEAD]} ... {message[-_TAIL:]}"
         return cls("".join(c if c.isprintable() else ascii(c)[1:-1] for c in f"{where}: {message}"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 import hashlib
 import os
-import tempfile
+import secrets
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -18,10 +18,12 @@ from discsim.errors import InputError
 
 __all__ = [
     "Guard",
+    "beside",
     "digest",
     "guarding",
     "model_file",
     "model_names",
+    "named_in_errors",
     "read_pieces",
     "read_text",
     "replacing",
@@ -39,6 +41,8 @@ class Guard(Protocol):
         ...
 
 
+#: Of the thread that opened the block, and of threads that are given its context (as those of the identification are):
+#: two runs in two threads must not ask each other's guards, and a thread of the caller's own writes outside of both.
 _GUARD: ContextVar[Guard | None] = ContextVar("guard", default=None)
 
 
@@ -101,18 +105,32 @@ def write_pieces(path: Path, pieces: Iterable[str]) -> None:
 
 def _write(path: Path, pieces: Iterable[bytes]) -> None:
     replacing(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    with named_in_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = beside(path)
+        # with the rights of any new file: asking for the process's mask would mean to change it, for all threads
+        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                stream.writelines(pieces)
+            os.replace(temporary, path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+
+
+def beside(path: Path) -> Path:
+    """Return a hidden name in the same folder that nothing has, for what becomes ``path`` by one rename."""
+    return path.parent / f".{path.name}.{secrets.token_hex(4)}"
+
+
+@contextmanager
+def named_in_errors(path: Path) -> Iterator[None]:
+    """Let an OSError of the block name ``path``: a full disk names nothing, a temporary file nothing known."""
     try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.writelines(pieces)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
 
 
 def write_text(path: Path, text: str) -> None:

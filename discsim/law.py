@@ -34,6 +34,10 @@ SYMBOLS = ("t", "h", "V", "alpha", "p_H", "q_H", "r", "x", "y", "z")
 WRENCH_TARGETS = ("force_x_N", "force_y_N", "force_z_N", "moment_x_N_m", "moment_y_N_m", "moment_z_N_m")
 _FUNCTIONS = ("sign", "exp", "cos", "sin")
 _COUNT = len(SYMBOLS)
+#: characters of a law's text: the longest law that a diagnosis writes has some two hundred
+_LONGEST = 5000
+#: size of an exponent: r^30 is 1e111 at the fastest spin, and no force grows so
+_STEEPEST = 30.0
 #: a row of a law's numbers: place of its target, coefficient, of each symbol the power of its magnitude and its sign
 #: to a power, decay in 1/s, order and phase of the angle turned
 _DECAY, _ORDER, _PHASE, LAW_WIDTH = (2 + 2 * _COUNT + k for k in range(4))
@@ -112,8 +116,10 @@ class _Parser:
     """Reads a sum of products into rows: coefficient, powers of the magnitudes, whether the sign is kept."""
 
     def __init__(self, text: str, coefficients: Mapping[str, float]) -> None:
-        self._text, self._coefficients = text, coefficients
+        self._text, self._coefficients = text if len(text) <= 200 else f"{text[:197]}...", coefficients
         self._tokens: list[str] = []
+        if len(text) > _LONGEST:
+            raise self._error(f"{len(text)} characters, at most {_LONGEST} are read")
         place = 0
         while text[place:].strip():
             token = _TOKEN.match(text, place)
@@ -169,15 +175,24 @@ class _Parser:
             else:
                 value, place, power, is_odd = self._factor()
                 if place < 0:
-                    coefficient *= pow(value, inverse * power)
+                    coefficient *= self._power(value, inverse * power)
                 else:
                     powers[place] += inverse * power
                     odd[place] = (odd[place] + is_odd) % 2.0
             if self._peek() in ("", "+", "-"):
-                return [float(coefficient), *powers, *odd, decay, order, phase]
+                row = [float(coefficient), *powers, *odd, decay, order, phase]
+                if not all(map(isfinite, row)) or max(map(abs, powers)) > _STEEPEST:
+                    raise self._error(f"a number that is not finite, or a power above {_STEEPEST:g} in all")
+                return row
             inverse = -1.0 if self._skip("/") else 1.0
             if inverse > 0.0:
                 self._skip("*", "·")
+
+    def _power(self, value: float, exponent: float) -> float:
+        try:
+            return pow(value, exponent)
+        except (OverflowError, ValueError):  # too large for a number; zero to a negative power
+            raise self._error(f"{value:g} to the power {exponent:g}") from None
 
     def _decay(self) -> float:
         """Read ``exp(-t/tau)``; return 1/tau."""

@@ -8,10 +8,8 @@ a new folder appears whole or not at all.
 from __future__ import annotations
 
 import io
-import os
 import re
 import shutil
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -28,7 +26,7 @@ from discsim.clipping import at_range, clipped
 from discsim.disc import Disc, Release, Rig
 from discsim.environment import Environment
 from discsim.errors import InputError
-from discsim.files import read_pieces, replacing, write_pieces
+from discsim.files import beside, named_in_errors, read_pieces, replacing, write_pieces
 from discsim.limits import MOST_ROWS, reading_fault, written_time_fault
 from discsim.recorded import Recorded
 from discsim.toml_table import TomlTable, read_toml
@@ -451,23 +449,21 @@ def write_recording(recording: Recording, folder: Path | str) -> None:
     texts = _texts(recording)
     if folder.exists() and not folder.is_dir():
         raise InputError.at(folder, None, "is a file; expected a folder (it is created where absent)")
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    stage = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
-    try:
-        for name, text in texts.items():
-            write_pieces(stage / name, text)
-        if folder.exists():
-            _refuse_strangers(folder)
-            _replace_files(stage, folder)
-        else:
-            umask = os.umask(0)
-            os.umask(umask)
-            stage.chmod(0o777 & ~umask)
-            for name in texts:
-                replacing(folder / name)
-            stage.rename(folder)
-    finally:
-        shutil.rmtree(stage, ignore_errors=True)
+    stage = beside(folder)
+    with named_in_errors(folder):
+        try:
+            stage.mkdir(parents=True)
+            for name, text in texts.items():
+                write_pieces(stage / name, text)
+            if folder.exists():
+                _refuse_strangers(folder)
+                _replace_files(stage, folder)
+            else:
+                for name in texts:
+                    replacing(folder / name)
+                stage.rename(folder)
+        finally:
+            shutil.rmtree(stage, ignore_errors=True)
 
 
 def _refuse_strangers(folder: Path) -> None:

@@ -26,6 +26,8 @@ __all__ = ["TomlTable", "read_toml"]
 _HEADER = re.compile(r"""^\s*\[+\s*(["'A-Za-z_][\w\-.\s"']*?)\s*\]+\s*(?:#.*)?$""")
 #: a key or a value without blanks that no line of an error should hold whole
 _LONG_WORD = re.compile(r"\S{120,}")
+#: control characters but tabs and line ends, and marks that turn the direction of what follows (Unicode's Bidi_Control)
+_CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 _KEY = re.compile(r"""^\s*(["']?)([A-Za-z0-9_\-.]+)\1\s*=""")
 
 
@@ -155,9 +157,11 @@ class TomlTable:
         return self.error(None, message)
 
     def text(self, key: str, *, required: bool = True, choices: tuple[str, ...] = ()) -> str | None:
-        """Take a string; one of ``choices`` where given."""
+        """Take a string without control characters, which a terminal would obey; one of ``choices`` where given."""
         expected = f"one of {', '.join(choices)}" if choices else "a text"
         value = self._take(key, expected, required)
+        if isinstance(value, str) and _CONTROL.search(value):
+            raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected a text without control characters")
         if value is not None and (not isinstance(value, str) or (choices and value not in choices)):
             raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected {expected}")
         return value

@@ -45,6 +45,10 @@ def test_no_mutation_leads_estimate_or_a_run_down_astray():
     assert not faults(["spin-down", "estimate"], DEARER, DEARER_SECONDS, SEED)
 
 
+def test_no_mutation_of_a_log_of_messages_crashes_its_reader():
+    assert not faults(["logs"], DEARER, DEARER_SECONDS, SEED)
+
+
 @pytest.mark.parametrize("path", sorted(CORPUS.glob("*.toml")), ids=lambda path: path.stem)
 def test_what_once_failed_is_right_or_refused(path):
     case = read_case(path)

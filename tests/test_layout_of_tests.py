@@ -91,7 +91,7 @@ def test_every_folder_of_tests_is_named_after_the_room_that_it_tests(path):
     if place.parts and place.parts[0] in OURS:
         assert (ROOT / place).is_dir(), f"{place} is no room of the code"
     else:
-        assert place.parts[:1] in ((), ("fuzz",), ("support",))
+        assert place.parts[:1] in ((), ("faults",), ("fuzz",), ("support",))
 
 
 def test_no_two_files_of_tests_have_the_same_name():

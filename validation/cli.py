@@ -1,7 +1,8 @@
 """The command ``discsim``: parses, calls, and turns errors into one clear line and an exit status.
 
 Each sub-command lives in ``validation.commands`` in a module of its own name and is imported only when it runs.
-Exit status: 0 done, 1 done but outside tolerance, 2 bad input or usage, 3 a fault of the program itself.
+Exit status: 0 done, 1 done but outside tolerance, 2 bad input or usage, or a place that cannot be read or written,
+3 a fault of the program itself, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import typer
 
 from discsim.errors import InputError
 from validation.commands import register
+from validation.reporting.spoken import speaking
 
 __all__ = ["app", "main"]
 
@@ -64,29 +66,47 @@ def main() -> None:
     os.environ.setdefault("MPLBACKEND", "Agg")
     # this process and its children are the command's own; from Python `discsim.threads` limits them while it is needed
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    with speaking():
+        status = _status(debug)
+    sys.exit(status)
+
+
+def _status(debug: bool) -> int:
+    """Run the command that ``sys.argv`` names and return its exit status, with one line on stderr where it failed."""
     try:
         # the options that stand before a command take no value, so the first other word is its name
         app.registered_commands.clear()
         words = _completed() or sys.argv[1:]
         register(app, next((argument for argument in words if not argument.startswith("-")), None))
         status = app(standalone_mode=False, prog_name="discsim")
-    except (InputError, typer.TyperException) as error:
+        sys.stdout.flush()  # a full disk below it is an error like any other
+    except (InputError, typer.TyperException, OSError, MemoryError) as error:
         if debug:
             traceback.print_exc()
-        message = error.format_message() if isinstance(error, typer.TyperException) else str(error)
-        typer.echo(f"discsim: {message}", err=True)
-        sys.exit(2)
+        typer.echo(f"discsim: {_in_one_line(error)}", err=True)
+        return 2
     except (KeyboardInterrupt, typer.Abort):
-        typer.echo("discsim: interrupted", err=True)
-        sys.exit(130)
+        status = 130
     except Exception as error:
         if debug:
             raise
         typer.echo(f"discsim: internal error, {type(error).__name__}: {error} (--debug shows where)", err=True)
-        sys.exit(3)
+        return 3
     if status == 130:  # typer turns an interrupt into this status and says nothing
         typer.echo("discsim: interrupted", err=True)
-    sys.exit(status if isinstance(status, int) else 0)
+    return status if isinstance(status, int) else 0
+
+
+def _in_one_line(error: BaseException) -> str:
+    if isinstance(error, typer.TyperException):
+        return str(error.format_message())
+    if isinstance(error, OSError):
+        what = error.strerror or str(error) or type(error).__name__
+        where = f"{os.fsdecode(error.filename)}: " if isinstance(error.filename, str | bytes) else ""
+        return f"{where}the system says '{what}'; expected a place that can be read or written, with room left"
+    if isinstance(error, MemoryError):
+        return f"not enough memory ({str(error) or 'none left'}); expected a shorter recording, or fewer at once"
+    return str(error)
 
 
 if __name__ == "__main__":

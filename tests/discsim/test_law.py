@@ -118,6 +118,12 @@ def test_both_engines_fly_a_law():
         ("b^n r", "to the power"),
         ("c sign r", r"found 'r' where \( belongs"),
         ("c (r + V)", r"unknown '\('"),
+        ("10^400 r", "10 to the power 400"),
+        ("1e999 r", "not finite"),
+        ("nan r", "not finite"),
+        ("|r|^99", "a power above 30"),
+        ("b * " * 3000 + "r", "12001 characters, at most 5000 are read"),
+        ("|" * 4000, "belongs"),
     ],
 )
 def test_a_text_that_is_no_law_is_refused_with_the_place(text, expected):

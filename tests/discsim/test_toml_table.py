@@ -123,3 +123,25 @@ def test_an_error_is_one_line_of_printable_characters(tmp_path):
         table_of(tmp_path, '"a\\nb\\u001b[31m" = 1\n').finish()
     assert str(caught.value).isprintable()
     assert r"unknown key 'a\nb\x1b[31m'" in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["\\u001b[31mred", "a\\u009b31m", "evil\\u202etxt.exe", "\\u0000"])
+def test_a_text_that_a_terminal_would_obey_is_refused(tmp_path, text):
+    with pytest.raises(InputError, match=r"'x' is .*, expected a text without control characters") as caught:
+        table_of(tmp_path, f'x = "{text}"\n').text("x")
+    assert str(caught.value).isprintable()
+
+
+def test_a_text_may_have_lines_and_letters_of_any_language(tmp_path):
+    for text in ("Flug 7, Wurf \u00e4", "\ube44\ud589", "a\\nb\\tc"):
+        assert table_of(tmp_path, f'x = "{text}"\n').text("x")
+
+
+@pytest.mark.parametrize(("value", "positive", "fine"), [(0.5, True, True), (0.0, True, False), (-1.5, False, True)])
+def test_only_what_must_be_above_zero_is_refused_where_it_is_not(tmp_path, value, positive, fine):
+    table = table_of(tmp_path, f"x_m = {value}\n")
+    if fine:
+        assert table.number("x", "m", positive=positive) == value
+        return
+    with pytest.raises(InputError, match=r"'x_m' is 0\.0, expected a number above zero"):
+        table.number("x", "m", positive=positive)

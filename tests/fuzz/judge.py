@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from discsim.errors import InputError
 
-__all__ = ["LONGEST_S", "MOST_BYTES", "FaultFound", "Outcome", "Unanswered", "judge"]
+__all__ = ["LONGEST_S", "MOST_BYTES", "FaultFound", "Outcome", "Unanswered", "judge", "possible"]
 
 #: no answer to a small input within this long is a fault, s of this process's own time, whatever else is running
 LONGEST_S = 20.0
@@ -34,6 +34,12 @@ class Unanswered(BaseException):
 
 class FaultFound(AssertionError):
     """An answer that cannot be."""
+
+
+def possible(condition: bool, what: str) -> None:
+    """Raise `FaultFound` for an answer that cannot be."""
+    if not condition:
+        raise FaultFound(what)
 
 
 class Outcome(NamedTuple):

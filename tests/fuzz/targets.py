@@ -36,11 +36,13 @@ from validation.scenarios.method_disagreement import disagreements
 from validation.scenarios.rate_table import plateau_table, rate_table_checks, run_rate_table
 from validation.sweeps.plan import read_plan
 
-from .judge import FaultFound
+from . import analyses
+from .judge import possible
+from .logs import LOGS, mutated_log
 from .mutate import ODD_NUMBERS, mutated
 from .seeds import FILES, RAW, RECORDINGS, recording_files
 
-__all__ = ["CHEAP", "TARGETS", "Target"]
+__all__ = ["CHEAP", "DEAR", "TARGETS", "Target"]
 
 Files = Mapping[str, str]
 
@@ -56,11 +58,6 @@ class Target(NamedTuple):
     mutate: Callable[[Files, random.Random], dict[str, str]] = mutated
 
 
-def _possible(condition: bool, what: str) -> None:
-    if not condition:
-        raise FaultFound(what)
-
-
 # --------------------------------------------------------------------------------------------- recordings
 
 
@@ -68,7 +65,7 @@ def _read(folder: Path) -> Recording:
     """Read a recording; what is read can be written, and is the same again."""
     recording = read_recording(folder)
     for samples in recording.samples.values():
-        _possible(not np.any(np.isinf(samples.value)) and bool(np.all(np.diff(samples.t) > 0)), "readings or times")
+        possible(not np.any(np.isinf(samples.value)) and bool(np.all(np.diff(samples.t) > 0)), "readings or times")
     return recording
 
 
@@ -78,13 +75,13 @@ def _read_and_write(folder: Path) -> None:
     again = read_recording(folder / "again")
     for sensor, samples in recording.samples.items():
         same = np.array_equal(samples.value, again.samples[sensor].value, equal_nan=True)
-        _possible(same and np.array_equal(samples.t, again.samples[sensor].t), f"{sensor} differs once written")
+        possible(same and np.array_equal(samples.t, again.samples[sensor].t), f"{sensor} differs once written")
 
 
 def _check(folder: Path) -> None:
     recording = _read(folder)
     text = json_text(check_recording(recording, find_setup_faults([recording]).faults).to_json())
-    _possible("Infinity" not in text, "a number that JSON does not have")
+    possible("Infinity" not in text, "a number that JSON does not have")
 
 
 def _estimate(folder: Path) -> None:
@@ -100,21 +97,21 @@ def _estimate(folder: Path) -> None:
 def _rate_that_can_be(rate: YawRate, recording: Recording) -> None:
     """No infinite number, no rate beyond every sensor's and every machine's, no uncertainty below zero or missing."""
     known = np.isfinite(rate.rate)
-    _possible(bool(np.all(np.isfinite(rate.t))), f"{rate.method}: a time that is no number")
-    _possible(not np.any(np.isinf(rate.rate)), f"{rate.method}: an infinite rate")
-    _possible(bool(np.all(np.abs(rate.rate[known]) <= FASTEST)), f"{rate.method}: a rate beyond {FASTEST:g} rad/s")
-    _possible(bool(np.all(rate.sd[known] >= 0)), f"{rate.method}: a standard deviation below zero, or none")
+    possible(bool(np.all(np.isfinite(rate.t))), f"{rate.method}: a time that is no number")
+    possible(not np.any(np.isinf(rate.rate)), f"{rate.method}: an infinite rate")
+    possible(bool(np.all(np.abs(rate.rate[known]) <= FASTEST)), f"{rate.method}: a rate beyond {FASTEST:g} rad/s")
+    possible(bool(np.all(rate.sd[known] >= 0)), f"{rate.method}: a standard deviation below zero, or none")
     # rates are told of times that were measured, or half a window from them
     first = min(float(samples.t[0]) for samples in recording.samples.values())
     inside = bool(np.all((rate.t >= first - 1.0) & (rate.t <= recording.end + 1.0)))
-    _possible(inside, f"{rate.method}: a rate of a time that was not measured")
+    possible(inside, f"{rate.method}: a rate of a time that was not measured")
 
 
 def _import(folder: Path) -> None:
     result = import_recording(folder / "log.csv", read_map(folder / "map.toml"))
     write_recording(result.recording, folder / "imported")
     read_recording(folder / "imported")
-    _possible(all("\n" not in text for text in (*result.notes, result.summary)), "a note of two lines")
+    possible(all("\n" not in text for text in (*result.notes, result.summary)), "a note of two lines")
 
 
 def _import_unknown(folder: Path) -> None:
@@ -122,7 +119,18 @@ def _import_unknown(folder: Path) -> None:
         (folder / "proposed.toml").write_text(map_text(sniff(logged, "free_spin")), encoding="utf-8")
         read = read_readings(logged, read_map(folder / "proposed.toml"))
     for throw in stretches(read):
-        _possible(bool(throw.text.isprintable()), "a throw that cannot be shown")
+        possible(bool(throw.text.isprintable()), "a throw that cannot be shown")
+
+
+def _messages(folder: Path) -> None:
+    (raw,) = folder.iterdir()
+    said: list[str] = []
+    with opened(raw, said.append) as logged:
+        (folder / "map.toml").write_text(map_text(sniff(logged)), encoding="utf-8")
+        result = import_recording(logged, read_map(folder / "map.toml"))
+    write_recording(result.recording, folder / "imported")
+    read_recording(folder / "imported")
+    possible(all(note.isprintable() and len(note) < 2000 for note in said), "a note that cannot be shown")
 
 
 # ------------------------------------------------------------------------------------- files that people write
@@ -132,25 +140,25 @@ def _model(folder: Path) -> None:
     model = read_model(folder / "model.toml")
     write_model(model, folder / "again.toml")
     again = read_model(folder / "again.toml")
-    _possible([item.effect for item in again.effects] == [item.effect for item in model.effects], "another model")
+    possible([item.effect for item in again.effects] == [item.effect for item in model.effects], "another model")
 
 
 def _plan(folder: Path) -> None:
     plan = read_plan(folder / "plan.toml")
-    _possible(bool(plan.cases), "a plan without a case")
+    possible(bool(plan.cases), "a plan without a case")
     for case in plan.cases[:4]:
         plan.instruments(case)
         plan.environment(case.settings)
 
 
 def _profile(folder: Path) -> None:
-    _possible(len(read_profile(folder / "profile.csv")) > 1, "a profile of one knot")
+    possible(len(read_profile(folder / "profile.csv")) > 1, "a profile of one knot")
 
 
 def _candidates(plant: Any) -> Callable[[Path], None]:
     def run(folder: Path) -> None:
         for plan in read_plans(folder / "candidates.toml", plant):
-            _possible(bool(np.all(np.isfinite(plan.state))) and plan.duration > 0, "a plan of no numbers")
+            possible(bool(np.all(np.isfinite(plan.state))) and plan.duration > 0, "a plan of no numbers")
 
     return run
 
@@ -183,14 +191,14 @@ def _odd_size(size: float, rng: random.Random) -> str:
 
 def _motion_that_can_be(motion: Motion) -> None:
     for name in ("t", "position", "velocity", "attitude", "rate"):
-        _possible(bool(np.all(np.isfinite(getattr(motion, name)))), f"{name} is not finite")
+        possible(bool(np.all(np.isfinite(getattr(motion, name)))), f"{name} is not finite")
 
 
 def _recorded(motion: Motion, effects: Sequence[Effect], plant: Any, parts: str) -> None:
     instruments = Instruments.from_parts(*parts.split(",")).with_effects(effects)
     recording = record(motion, instruments, np.random.default_rng(0), plant=plant, name="fuzzed")
     for samples in recording.samples.values():
-        _possible(not np.any(np.isinf(samples.value)), "a reading is not finite")
+        possible(not np.any(np.isinf(samples.value)), "a reading is not finite")
 
 
 def _effects(folder: Path, plant: str) -> tuple[Any, list[Effect]]:
@@ -282,8 +290,15 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
         "fly": Target(_with("model", "throw"), _fly, 1.0, _odd_effects),
         "rate-table": Target(_with("model", "profile"), _rate_table, 0.1, _odd_effects),
         "spin-down": Target(_with("model"), _spin_down, 1.0, _odd_effects),
+        "logs": Target(LOGS, _messages, 2.0, mutated_log),
+        "score": Target(analyses.RATES, analyses.score, 1.0),
+        "fit": Target({"flight": analyses.SETS["flight"]}, analyses.fit, 0.3),
+        "diagnose": Target(analyses.SETS, analyses.diagnose, 0.3),
+        "sweep": Target(analyses.SWEEPS, analyses.swept, 0.3),
         "call": Target({"any": lambda: {"call.txt": ""}}, _call, 0.5, lambda _, rng: {"call.txt": str(rng.random())}),
     }
 )
 #: targets of milliseconds a case
-CHEAP = ("recording", "import", *FILES)
+CHEAP = ("recording", "import", *FILES, "score")
+#: targets of seconds a case: a few in each run of the suite, thousands by the command
+DEAR = ("fit", "diagnose", "sweep")

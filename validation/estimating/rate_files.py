@@ -78,7 +78,7 @@ def _groups(path: Path) -> Iterator[tuple[str, FloatArray, FloatArray, FloatArra
         sd = 0.0 if sd_column is None else _number(path, number, row[header.index(sd_column)]) * _SDS[sd_column]
         table = tables.setdefault(name, [])
         if table and time <= table[-1][0]:
-            raise InputError.at(path, number, f"time {time:g} s does not ascend (before it {table[-1][0]:g})")
+            raise InputError.at(path, number, f"time {time:g} s follows {table[-1][0]:g} s; expected ascending time")
         table.append((time, rate, sd))
     if not tables:
         raise InputError.at(path, None, "holds no row; expected rates over time")

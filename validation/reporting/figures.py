@@ -7,13 +7,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
+from weakref import WeakSet
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
+from matplotlib.text import Text
+from matplotlib.ticker import LogFormatter, NullLocator
 
 from discsim.arrays import FloatArray
 from discsim.files import write_bytes
@@ -60,6 +62,12 @@ STYLE: Mapping[Any, Any] = MappingProxyType(
 )
 
 
+#: matplotlib's settings of whoever called, from the first figure begun until the last one is saved
+_BEFORE: dict[Any, Any] = {}
+#: figures begun and not saved; one that nobody holds any more drops out
+_BEGUN: WeakSet[Figure] = WeakSet()
+
+
 def colour(method: str, others: Sequence[str] = ()) -> str:
     """Return a method's colour; one without its own takes the next free one by its place in ``others``."""
     if method in COLOURS:
@@ -72,14 +80,31 @@ def new_figure(
     rows: int = 1, columns: int = 1, *, width: float = 9.0, height: float = 4.5, **options: Any
 ) -> tuple[Figure, Any]:
     """Return a figure (inches) and its axes as ``Figure.subplots`` does (one, or an array of them)."""
-    mpl.rcParams.update(dict(STYLE))  # not in a context: titles and legends come later and take it too
+    # not in a context: titles and legends come later and take it too; `save_figure` gives back what was
+    _BEFORE.update({key: mpl.rcParams[key] for key in STYLE if key not in _BEFORE})
+    mpl.rcParams.update(dict(STYLE))
     figure = Figure(figsize=(width, height), layout="constrained")
+    _BEGUN.add(figure)
     FigureCanvasAgg(figure)
     return figure, figure.subplots(rows, columns, **options)
 
 
 def save_figure(figure: Figure, path: Path | None) -> Figure:
-    """Write a figure as ``path``'s ending says (``.png`` or ``.svg``), without a date, unless it is None; return it."""
+    """Write a figure as ``path``'s ending says (``.png`` or ``.svg``), without a date, unless it is None; return it.
+
+    With the last figure that was begun, matplotlib's settings are the caller's own again.
+    """
+    try:
+        return _saved(figure, path)
+    finally:
+        _BEGUN.discard(figure)
+        if not _BEGUN:
+            mpl.rcParams.update(_BEFORE)
+            _BEFORE.clear()
+
+
+def _saved(figure: Figure, path: Path | None) -> Figure:
+    _take_names_literally(figure)
     if path is None:
         return figure
     kind = path.suffix.removeprefix(".")
@@ -90,6 +115,24 @@ def save_figure(figure: Figure, path: Path | None) -> Figure:
     figure.savefig(buffer, format=kind, dpi=150, metadata=metadata)
     write_bytes(path, buffer.getvalue())
     return figure
+
+
+def _take_names_literally(figure: Figure) -> None:
+    """Let a dollar in a recording's name be one: matplotlib reads a formula between two, and fails at a wrong one."""
+    named = [text for text in figure.findobj(Text) if "$" in text.get_text()]
+    if not named:
+        return
+    logarithmic = [
+        axis
+        for axes in figure.axes
+        for axis in (axes.xaxis, axes.yaxis)
+        if isinstance(axis.get_major_formatter(), LogFormatter)
+    ]
+    ticks = [tick for axis in logarithmic for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks())]
+    formulas = {id(label) for tick in ticks for label in (tick.label1, tick.label2)}  # powers of ten
+    for text in named:
+        if id(text) not in formulas:
+            text.set_parse_math(False)
 
 
 def symmetric_log(axes: Axes, *, linear: float, limit: float) -> None:

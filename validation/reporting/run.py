@@ -19,7 +19,7 @@ import numpy as np
 from discsim.errors import InputError
 from discsim.files import digest, write_text
 from discsim.version import commit, version
-from validation.reporting.written import watching
+from validation.reporting.written import alone_in, watching
 
 __all__ = ["Run", "current_run", "package_version", "source_digest", "start_run"]
 
@@ -98,6 +98,7 @@ class Run:
             yield item
 
 
+#: of the thread that opened the run: a page that another thread makes was not made by this run
 _CURRENT: ContextVar[Run | None] = ContextVar("run", default=None)
 
 
@@ -111,35 +112,43 @@ def start_run(out: Path, seed: int | None = None, inputs: Iterable[Path] = ()) -
     """Open a run that writes into ``out``; ``run.json`` is written when the block ends without an error.
 
     What is there and was not written by discsim stays as it is: an `InputError` names it, unless --force was given.
+    So does an input: ``out`` may not lie within one. Of two runs at once into one folder the second is refused.
     """
     if out.exists() and not out.is_dir():
         raise InputError(f"--out {out}: is a file; expected a folder (it is created where absent)")
     paths = list(inputs)
-    if any(path.resolve() == out.resolve() for path in paths):
-        raise InputError(f"--out {out}: is the input; expected another folder, to leave that as it is")
+    for path in paths:
+        if path.resolve() == out.resolve():
+            raise InputError(f"--out {out}: is the input; expected another folder, to leave that as it is")
+        if path.is_dir() and out.resolve().is_relative_to(path.resolve()):
+            raise InputError(
+                f"--out {out}: lies in the input {path}; expected a folder outside, to leave that as it is"
+            )
     out.mkdir(parents=True, exist_ok=True)
     run = Run(out, sys.argv[1:], seed, paths)
     started = time.monotonic()
     digests = {str(path): digest(path) for path in run.inputs}
     _say_compiling(run)
-    token = _CURRENT.set(run)
-    try:
-        with watching(out) as written:
-            yield run
-    finally:
-        _CURRENT.reset(token)
-    run.write_json(
-        "run.json",
-        {
-            "command": ["discsim", *run.command],
-            "version": package_version(),
-            "commit": commit(),
-            "seed": seed,
-            "inputs": digests,
-            "duration_s": round(time.monotonic() - started, 3),
-            "files": written.digests(),
-        },
-    )
+    with alone_in(out):
+        token = _CURRENT.set(run)
+        try:
+            with watching(out) as written:
+                yield run
+        finally:
+            _CURRENT.reset(token)
+        run.write_json(
+            "run.json",
+            {
+                "command": ["discsim", *run.command],
+                "version": package_version(),
+                "commit": commit(),
+                "seed": seed,
+                "inputs": digests,
+                "duration_s": round(time.monotonic() - started, 3),
+                "files": written.digests(),
+            },
+        )
+        written.listed()
 
 
 def _say_compiling(run: Run) -> None:

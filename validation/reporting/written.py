@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import json
+import os
+import re
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from glob import escape
 from pathlib import Path
 
 from discsim.errors import InputError
-from discsim.files import digest, guarding
+from discsim.files import digest, guarding, write_text
 
-__all__ = ["OVERWRITE", "Written", "watching"]
+__all__ = ["OVERWRITE", "Written", "alone_in", "watching"]
 
 #: whether files may be overwritten whoever wrote them: what --force says
 OVERWRITE: ContextVar[bool] = ContextVar("overwrite", default=False)
 #: what a run that did not end has written, in place of the run.json that it would have left
 _UNFINISHED = ".discsim-unfinished.json"
+#: names of what is not yet whole
+_BEGUN = re.compile(r"\..+\.[0-9a-f]{8}")
 #: kept by their own rules: results of single tasks, which another run refuses or goes on with
 _OWN_RULES = ("checkpoints",)
 
@@ -45,19 +51,23 @@ class Written:
             )
         if name not in self.now:
             self.now.add(name)
-            self._note()
+            self.note()
 
-    def _note(self) -> None:
+    def note(self) -> None:
         """Say in the folder what is being written, for a run that is killed cannot say it later."""
         unknown = [name for name, value in (self.before or {}).items() if value is None]
         marked = json.dumps(dict.fromkeys(sorted({*unknown, *self.now})))
-        (self.out / _UNFINISHED).write_text(marked + "\n", encoding="utf-8")
+        write_text(self.out / _UNFINISHED, marked + "\n")
 
     def _ours(self, name: str, path: Path) -> bool:
         if OVERWRITE.get() or self.before is None:
             return True
         # of what a killed run was writing only the name is known
         return name in self.before and self.before[name] in (None, digest(path))
+
+    def listed(self) -> None:
+        """Take away what stood in the place of a run.json, which has the list now."""
+        (self.out / _UNFINISHED).unlink(missing_ok=True)
 
     def digests(self) -> dict[str, str]:
         """Return the digests of what this run has written, and of what an earlier one had and is as it was."""
@@ -72,16 +82,60 @@ class Written:
 
 @contextmanager
 def watching(out: Path) -> Iterator[Written]:
-    """Take note of what is written into a folder while the block runs, and refuse what must stay as it is."""
+    """Take note of what is written into a folder while the block runs, and refuse what must stay as it is.
+
+    What a killed run had begun is taken away first: nobody else writes into the folder (`alone_in`).
+    """
     written = Written(out, _before(out))
+    if (out / _UNFINISHED).exists():
+        _sweep(out)
+    written.note()
     try:
         with guarding(written):
             yield written
     except BaseException:
         if written.now:
-            (out / _UNFINISHED).write_text(json.dumps(written.digests()) + "\n", encoding="utf-8")
+            write_text(out / _UNFINISHED, json.dumps(written.digests()) + "\n")
+        elif not (written.before or {}):
+            written.listed()
         raise
-    (out / _UNFINISHED).unlink(missing_ok=True)
+
+
+def _sweep(out: Path) -> None:
+    """Take away files and folders that were to become others by a rename (`discsim.files.beside`)."""
+    for left in (*out.rglob(".*"), *out.parent.glob(f"{escape(f'.{out.name}.')}*")):
+        if _BEGUN.fullmatch(left.name):
+            if left.is_dir():
+                shutil.rmtree(left, ignore_errors=True)
+            else:
+                left.unlink(missing_ok=True)
+
+
+@contextmanager
+def alone_in(out: Path) -> Iterator[None]:
+    """Keep other runs out of a folder while the block runs; one that is killed keeps nobody out.
+
+    The lock is on the folder itself, so that no file is left of it, and is the process's: it goes with it. Raises
+    `InputError` where another run holds it. Without locks (Windows, some network disks) the block runs unguarded.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        yield
+        return
+    handle = os.open(out, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(
+                f"--out {out}: another run is writing into it; expected another folder, or to wait for that run's end"
+            ) from None
+        except OSError:
+            pass
+        yield
+    finally:
+        os.close(handle)
 
 
 def _before(out: Path) -> dict[str, str | None] | None:

@@ -181,6 +181,7 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
         with _deaf_children():
             cluster = LocalCluster(
                 n_workers=workers,
+                host="127.0.0.1",  # whoever reaches a scheduler runs what he likes
                 threads_per_worker=1,
                 processes=True,
                 dashboard_address="127.0.0.1:0",  # any free port: several runs may go on side by side

@@ -99,7 +99,7 @@ def test_each_method_of_a_file_is_scored_and_the_paper_s_have_no_sign(tmp_path):
     ("text", "said"),
     [
         ("t,rate\n0,1\n", r":1: .*expected time_s and one of"),
-        ("time_s,rate_rad_s\n0,1\n0,2\n", r":3: time 0 s does not ascend"),
+        ("time_s,rate_rad_s\n0,1\n0,2\n", r":3: time 0 s follows 0 s; expected ascending time"),
         ("time_s,rate_rad_s\n0,x\n", r":2: 'x' is no number"),
         ("time_s,rate_rad_s\n0,inf\n", r":2: 'inf' is not finite"),
         ("time_s,rate_rad_s\n0\n", r":2: has 1 cells; expected 2"),

@@ -139,6 +139,15 @@ def fix_logs() -> dict[str, tuple[bytes, tuple[int, ...]]]:
 
 
 @needs_readers
+def test_a_damaged_log_adds_no_lines_of_its_reader_to_the_terminal(tmp_path, capfd):
+    """Its index is made by C, which writes a line for each byte that begins no message."""
+    content = logs()["flight.bin"][0]
+    tables_of(tmp_path, "holed.bin", content[:4000] + bytes(300) + content[4000:])
+    print("still heard", file=sys.stderr)
+    assert capfd.readouterr() == ("", "still heard\n")
+
+
+@needs_readers
 @pytest.mark.parametrize("name", ["midnight.nmea", "course.txt", "week.ubx", "split.ubx", "mixed.ubx",
                                   "acknowledged.ubx", "telemetry.tlog", "navsat.mcap"])  # fmt: skip
 def test_fixes_become_metres_north_east_down_of_the_first(tmp_path, name):

@@ -141,7 +141,7 @@ def found(id: str, parameters: Mapping[str, ParameterValue], setting: Mapping[st
     if id not in CATALOGUE:
         return ", ".join(f"{escape(name)} = {with_unit(id, name, item)}" for name, item in parameters.items())
     values = {name: f"{size:g}" for name, size in CATALOGUE[id].sizes.items()}
-    values |= {name: f"<b>{text.replace('-', '−')}</b>" for name, text in setting.items()}
+    values |= {name: f"<b>{escape(text).replace('-', '−')}</b>" for name, text in setting.items()}
     values |= {name: f"<b>{with_unit(id, name, item)}</b>" for name, item in parameters.items()}
     return _filled(id, values)
 

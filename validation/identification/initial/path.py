@@ -222,7 +222,7 @@ def _local_cubics(fixes: Fixes, t: FloatArray, moved: FloatArray, gained: FloatA
         )
         y = np.concatenate([x[chosen] / fixes.position_sd, v[chosen][quick] / fixes.velocity_sd])
         weighted = A
-        solution = np.linalg.solve(A.T @ A + ridge, A.T @ y)
+        solution = _solved(A.T @ A + ridge, A.T @ y)
         for scale in (30.0, 10.0, 4.0, 3.0):
             misfit = np.linalg.norm(y[:, :3] - A @ solution[:, :3], axis=1)
             # noise may be larger than stated: outliers are told by the others' median
@@ -230,9 +230,20 @@ def _local_cubics(fixes: Fixes, t: FloatArray, moved: FloatArray, gained: FloatA
             if float(np.max(misfit)) < usual * 4.0:
                 break
             weighted = A * (1 / (1 + (misfit / (scale * usual)) ** 2) ** 2)[:, None]
-            solution = np.linalg.solve(weighted.T @ A + ridge, weighted.T @ y)
+            solution = _solved(weighted.T @ A + ridge, weighted.T @ y)
         out[i] = solution
     return out
+
+
+def _solved(normal: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve normal equations; the smallest of their solutions where rounding leaves no single one.
+
+    So it is where the clock of the fixes jumped by hours: seconds to the sixth power hide the other numbers.
+    """
+    try:
+        return np.asarray(np.linalg.solve(normal, right))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.lstsq(normal, right)[0])
 
 
 def compared(

@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import re
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +37,8 @@ FAST = "GYR and ACC"
 FIX_3D = 3
 #: Bytes at most that pad a page of a log of blocks: 256, less a header of 6 and one byte (pymavlink's DFReader).
 PADDING = 249
+#: of two threads that read logs, the second would take the silence of the first for the standard error to go back to
+_ONE_BLOCK = threading.Lock()
 
 
 def begins(head: bytes) -> bool:
@@ -45,9 +50,14 @@ def read(raw: Path) -> Log:
     """Return the tables of a log; bytes that are no message are stepped over and counted."""
     from pymavlink.DFReader import DFReader_binary
 
-    said = io.StringIO()  # it prints what it finds damaged
+    said = io.StringIO()  # it prints what it finds damaged, and its part in C a line for each such byte
     rows = Rows()
-    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), DFReader_binary(str(raw)) as log:
+    with (
+        contextlib.redirect_stdout(said),
+        contextlib.redirect_stderr(said),
+        _unheard(),
+        DFReader_binary(str(raw)) as log,
+    ):
         wanted = list(MESSAGES)
         while (message := log.recv_match(type=wanted)) is not None:
             _add(message, rows)
@@ -60,6 +70,25 @@ def read(raw: Path) -> Log:
         notes.append("it breaks off within a message; read up to there")
     tables, others = chosen(rows.sources())
     return Log(tables, (*notes, *others), bool(notes))
+
+
+@contextlib.contextmanager
+def _unheard() -> Iterator[None]:
+    """Let what C writes to this process's standard error go nowhere inside the block; one block at a time."""
+    with _ONE_BLOCK:
+        try:
+            before = os.dup(2)
+        except OSError:  # there is none
+            yield
+            return
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        try:
+            os.dup2(nowhere, 2)
+            yield
+        finally:
+            os.dup2(before, 2)
+            os.close(before)
+            os.close(nowhere)
 
 
 def _add(message: Any, rows: Rows) -> None:
