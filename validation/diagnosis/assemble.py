@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2 as chi2_law
 
+from discsim.arrays import FloatArray
 from discsim.disc import Aero, aero_key
 from discsim.effects.catalogue import effect as catalogued
 from discsim.model_file import Model, ModelEffect
@@ -36,7 +37,7 @@ from validation.diagnosis.result import (
     Recalibration,
     Residuals,
 )
-from validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
+from validation.diagnosis.selection.candidates import CandidateEffect, in_parameters, parameters_of
 from validation.diagnosis.selection.continuous_fit import ContinuousFit
 from validation.diagnosis.selection.evidence import price
 from validation.diagnosis.selection.search_state import Considered, Search, chi2_in
@@ -78,6 +79,8 @@ def _named(
             # where nothing shows it, a fit leaves it anywhere within its prior: the baseline says as much
             value = q.stated
         values[q.name] = ParameterValue(float(value), float(error) if known else None)
+    if candidate.row.regular is not None:
+        values = _of_regular(final, candidate)
     values.update({name: ParameterValue(value, sd) for name, value, sd in candidate.fixed_values})
     for name, value in candidate.shape_grid.items():
         values.setdefault(name, ParameterValue(float(value), None))
@@ -93,6 +96,32 @@ def _named(
         confused.append(Confusion(rival.candidate.id, float(rival_bic), in_words(candidate.id, told), told))
     where = None if candidate.recordings is None else tuple(names[i] for i in sorted(candidate.recordings))
     return NamedEffect(candidate.id, values, Evidence(bic, held, p), where, tuple(confused))
+
+
+def _of_regular(final: ContinuousFit, candidate: CandidateEffect) -> dict[str, ParameterValue]:
+    """Return an effect's parameters from the numbers that the fit moved in their place, errors to first order.
+
+    None is determined where one that is infinite at the baseline is known to no better than half of itself.
+    """
+    row, fit = candidate.row, final.fit
+    some = [k for k, q in enumerate(fit.parameters) if (q.group, q.recordings) == (candidate.id, candidate.recordings)]
+    names, at = [fit.parameters[k].name for k in some], fit.at[some]
+    covariance = np.full((len(some), len(some)), np.nan)
+    if fit.covariance.shape[0] == len(fit.parameters):
+        covariance = fit.covariance[np.ix_(some, some)]
+
+    def sizes(numbers: FloatArray) -> FloatArray:
+        return np.array([*in_parameters(row, dict(zip(names, numbers.tolist(), strict=True))).values()])
+
+    steps = np.array([fit.parameters[k].step for k in some])
+    slopes = np.stack([(sizes(at + d) - sizes(at - d)) for d in np.diag(steps)], axis=1) / (2.0 * steps)
+    value, sd = sizes(at), np.sqrt(np.diag(slopes @ covariance @ slopes.T))
+    infinite = [k for k, none in enumerate(row.sizes.values()) if not np.isfinite(none)]
+    known = bool(np.all(sd[infinite] <= 0.5 * np.abs(value[infinite])))
+    return {
+        name: ParameterValue(float(v), float(e) if known else None)
+        for name, v, e in zip(row.sizes, value, sd, strict=True)
+    }
 
 
 def _noise_notes(linears: Sequence[Linear], found: NoiseModel) -> list[NoiseNote]:

@@ -21,7 +21,7 @@ from discsim.recording import Recording
 from validation.diagnosis.detectors.all import searched
 from validation.diagnosis.detectors.dropped_samples import PhaseLosses, Shifted
 from validation.diagnosis.relaxed_fit import relaxed, unknowns, without_outliers
-from validation.diagnosis.selection.candidates import CandidateEffect, candidates_for, parameters_of
+from validation.diagnosis.selection.candidates import CandidateEffect, candidates_for, in_parameters, parameters_of
 from validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from validation.diagnosis.selection.evidence import ONE_SIDED, price
 from validation.diagnosis.selection.exchange import eliminated_backward, exchanged, rivals_of, widened
@@ -338,7 +338,7 @@ def _considering(
         if q.group == candidate.id and q.recordings == candidate.recordings
     }
     gained = score - refitted.score, chi2_before - chi2_in(refitted, found.relaxed_noise)
-    return replace(found, considered=(*found.considered, Considered(candidate, *gained, values)))
+    return replace(found, considered=(*found.considered, Considered(candidate, *gained, in_parameters(candidate.row, values))))
 
 
 def _together(found: Search) -> tuple[Search, ContinuousFit | None]:

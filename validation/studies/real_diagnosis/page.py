@@ -21,16 +21,15 @@ from validation.studies.real_diagnosis.charts import draw_fields, draw_golf, dra
 from validation.studies.real_diagnosis.flatball import Rows, rows_of
 from validation.studies.real_diagnosis.golf_causes import (
     APART,
-    CAUSES,
     GROUND,
     LEFT,
-    NONE,
     CauseHeldOut,
     Throw,
     held_out,
     without_cause,
 )
 from validation.studies.real_diagnosis.golf_flight import Flown, flown
+from validation.studies.real_diagnosis.golf_worlds import CAUSES, NONE
 from validation.studies.real_diagnosis.runs import diagnosed, diagnosis_digest
 from validation.studies.real_diagnosis.sensors import Checked, Linear, against_cameras, checked_log, field_in_body
 from validation.studies.real_recordings.sources import SOURCES, Source, load, raw_columns
