@@ -77,7 +77,7 @@ ROWS = (
         (60.0, 10.0, 10.0),
         setup=True,
         title="a camera that sees what flies too far out (parallax)",
-        form="plan = nadir + (true − nadir) / (1 − h / {height_m}), nadir at {north_m} north, {east_m} east; h the height",
+        form="plan = nadir + (true − nadir) / (1 − h / {height_m}), nadir {north_m} north, {east_m} east; h the height",
         grows_with="height times distance from the camera's foot",
         trace="the track runs outward from the point under the camera, more so the higher the disc flies",
         bounds={"curvature_1_m": (-0.01, 0.1)},

@@ -33,6 +33,7 @@ from discsim.effects.sensors import (
     SoftIron,
     StrayField,
 )
+from discsim.effects.track_rows import Camera, Parallax, camera_of, parallax_of, pictured
 from discsim.engine import FlyingDisc, fly
 from discsim.environment import Environment
 from discsim.errors import InputError
@@ -40,7 +41,6 @@ from discsim.files import model_file
 from discsim.frames import body_to_ned
 from discsim.recording import Samples
 from discsim.rig import turn_table
-from discsim.effects.track_rows import Camera, Parallax, camera_of, parallax_of, pictured
 from discsim.sensors import Accelerometer, Gps, Gyroscope, Magnetometer, Noise, RateReference, Sampling, Tracker
 
 FLU = np.array([1.0, -1.0, -1.0])
@@ -485,7 +485,7 @@ class TestTrackerAndReference:
         np.testing.assert_array_equal(got[~lost], exact[~lost])
 
     def test_a_camera_sees_what_flies_too_far_out_from_the_point_under_it(self):
-        """The form of the catalogue, by hand; a height that was measured otherwise stays, and on the ground all does."""
+        """The form of the catalogue, by hand; a height measured otherwise stays, and on the ground all does."""
         true = measured(Tracker(Sampling(100.0)), FLIGHT).value
         seen = measured(Tracker(Sampling(100.0), camera=Camera(60.0, 20.0, -5.0)), FLIGHT).value
         nadir, h = np.array([20.0, -5.0]), -true[:, 2:]

@@ -12,11 +12,13 @@ from discsim.arrays import FloatArray
 from discsim.disc import Aero, aero_key
 from discsim.effects.catalogue import effect as catalogued
 from discsim.model_file import Model, ModelEffect
+from validation.diagnosis.consistency.driven import turning_of
 from validation.diagnosis.consistency.spin_agreement import Agreement, agreement_of
 from validation.diagnosis.contradicted import contradicted_outcome
 from validation.diagnosis.design.next_recording import advise, confusions, in_words
 from validation.diagnosis.held_out import Choice, choices_without_each, heldout_chi2, heldout_gain
 from validation.diagnosis.localisation import located_effect, located_unmodelled
+from validation.diagnosis.partly import partly_explained
 from validation.diagnosis.report.wording import telling_apart
 from validation.diagnosis.result import (
     SMALLEST_P_VALUE,
@@ -49,6 +51,7 @@ from validation.diagnosis.unknown_law.find import FoundLaw
 from validation.diagnosis.verdict import RECALIBRATED_NAMES, recalibrations, standard_errors
 from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel, chi_squared
+from validation.identification.plants import plant_of
 from validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = ["outcome_of", "reason_for"]
@@ -308,11 +311,15 @@ def outcome_of(judged: Judged, question: Question) -> Outcome:
     ready, found = tried.prepared, tried.found
     setup = answer_of_setup(ready.setup, question.recordings, tried.fit, judged.verdict)
     warnings, agreement = (*setup.warnings, *ready.notes), agreement_of(ready.meant, question.names, ready.agreeing)
+    turning = None
+    if judged.verdict == "unexplained" and not plant_of(ready.meant[0]).path_known:
+        turning = turning_of(question.recordings, question.names)
     if found is not None:
-        return _outcome_of_search(judged, question, found, setup, warnings, agreement)
+        told = () if turning is None else turning.sentences
+        return _outcome_of_search(judged, question, found, setup, (*told, *warnings), agreement)
     assert tried.contradiction is not None
     datasets, names, seed = question.datasets, question.names, question.seed
-    return contradicted_outcome(tried.contradiction, ready.meant, datasets, names, seed, warnings, agreement)
+    return contradicted_outcome(tried.contradiction, ready.meant, datasets, names, seed, warnings, agreement, turning)
 
 
 def _outcome_of_search(
@@ -334,6 +341,7 @@ def _outcome_of_search(
     best = found if not unexplained else found.at_base() if law is None else replace(found, final=law.fitted)
     named = tuple(_named(found, candidate, less[candidate.name], names, choices, advice) for candidate in candidates)
     named = on_board_axes(named, judged.tried.prepared.setup, found.final.fit)
+    partly = partly_explained(found, names) if unexplained and law is None else ()
     moved = recalibrations(best)
     baseline, final, held = _figures(found, unexplained, choices) if law is None else _with_law(found, law)
     diagnosis = Diagnosis(
@@ -356,8 +364,9 @@ def _outcome_of_search(
         tuple(replace(item, recording=names[int(item.recording)]) for item in held),
         tuple(Outlier(names[i], s, a, t, d) for i, s, a, t, d in found.outliers),
         tuple(dict.fromkeys((*setup.next_recordings, *_next_recordings(found, unexplained, named)))),
-        warnings,
+        (*warnings, *(one.text for one in partly)),
         agreement,
+        partly,
     )
     model = _model(best, (*named, *setup.effects), diagnosis.law)
     shown = _residuals(best, names, unexplained and law is None)

@@ -1,6 +1,6 @@
 """Tracks that run on after the touch-down, or begin with points that stand still: what of them is a flight.
 
-Takes a track; gives its flight and how much was cut. A disc in the air loses a quarter of its speed in a second at
+Takes a track; gives its flight and how much was cut. A disc in the air loses a third of its speed in a second at
 most; one that touches down loses it within a few frames, and one that was not yet thrown has none.
 """
 
@@ -15,15 +15,16 @@ from discsim.recording import Samples
 
 __all__ = ["TrackCut", "flight_of"]
 
-#: share of the speed of the second beside it below which a track's end, or its beginning, is no flight: the drag of a
-#: driver (C_D of 0.3 at 20 m/s, 0.18 kg) takes 30 % of the speed in a second, and the window lies within
-_SLOW = 0.6
+#: share of the speed of the half second beside it below which a track's end, or beginning, is no flight: the drag of a
+#: driver (C_D of 0.3 at 20 m/s, 0.18 kg) takes 30 % of the speed in a second, 10 % between the middles of the two
+_SLOW, _BESIDE_S = 0.85, 0.5
 #: a speed is that of a line through so many rows, s or rows, whichever is longer
 _WINDOW_S, _FEWEST = 0.1, 4
 #: what is cut must last this long, s: a slip of one click does not
 _LEAST_S = 0.06
-#: a speed counts as slow where it is so by this many of its standard deviations
-_SURE = 4.0
+#: a speed counts as slow where it is so by this many of its standard deviations: with the share above, 4 of them by
+#: chance at the end of a track whose points scatter by 0.1 m
+_SURE = 2.5
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,8 @@ def flight_of(track: Samples, noise: float | None = None) -> TrackCut:
         return TrackCut(track, 0.0, 0.0)
     before = float(t[first] - t[0]) if t[first] - t[0] >= _LEAST_S else 0.0
     after = float(t[-1] - t[last]) if t[-1] - t[last] >= _LEAST_S else 0.0
+    if not before and not after:
+        return TrackCut(track, 0.0, 0.0)
     flight = track.between(t[first] if before else -np.inf, t[last] if after else np.inf)
     return TrackCut(flight, before, after)
 
@@ -67,8 +70,9 @@ def _flying(t: FloatArray, plan: FloatArray, noise: float) -> int:
     last = t[width - 1 :]  # a window is told by its last row
     fastest = np.maximum.accumulate(speed[::-1])[::-1] + _SURE * sd
     for k in range(speed.size):
-        before = speed[(last >= last[k] - 1.0 - _WINDOW_S) & (last < last[k] - _WINDOW_S)]
-        if before.size >= _FEWEST and fastest[k] < _SLOW * float(np.median(before)):
+        before = speed[(last >= last[k] - _BESIDE_S - _WINDOW_S) & (last < last[k] - _WINDOW_S)]
+        usual = float(np.median(before)) if before.size >= _FEWEST else 0.0
+        if fastest[k] < _SLOW * usual and _SURE * sd < 0.5 * usual:
             return k  # the first row of the first slow window, where the disc came down
     return t.size - 1
 

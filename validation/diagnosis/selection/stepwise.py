@@ -31,6 +31,7 @@ from validation.diagnosis.selection.score_tests import (
     hinted,
     one_per_effect,
     pairs,
+    pictured_from_above,
     screened_candidates,
     start_of,
 )
@@ -113,6 +114,7 @@ def screened(
     report("fitting the baseline", 2, 4)
     base = _baseline(relaxed_fit, equations, own, noise)
     asked = tuple(hinted(hint) for hint in hints if any(candidate.id == hint.id for candidate in candidates))
+    asked += pictured_from_above(recordings, candidates)
     stated = tuple(as_stated or recordings)
     return Search(
         stated,
@@ -338,7 +340,9 @@ def _considering(
         if q.group == candidate.id and q.recordings == candidate.recordings
     }
     gained = score - refitted.score, chi2_before - chi2_in(refitted, found.relaxed_noise)
-    return replace(found, considered=(*found.considered, Considered(candidate, *gained, in_parameters(candidate.row, values))))
+    return replace(
+        found, considered=(*found.considered, Considered(candidate, *gained, in_parameters(candidate.row, values)))
+    )
 
 
 def _together(found: Search) -> tuple[Search, ContinuousFit | None]:

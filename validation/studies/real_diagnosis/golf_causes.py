@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -22,17 +23,37 @@ from validation.importing.throw import MeasuredThrow
 from validation.studies.golf_throws.prediction import drawn
 from validation.studies.real_diagnosis.golf_worlds import INPUTS, NONE, Cause, World
 
-__all__ = ["CauseFit", "CauseHeldOut", "Throw", "fit_cause", "held_out", "likely_pairs", "without_cause"]
+__all__ = [
+    "OWN",
+    "CauseFit",
+    "CauseHeldOut",
+    "Throw",
+    "fit_cause",
+    "held_out",
+    "known",
+    "likely_pairs",
+    "positions",
+    "without_cause",
+]
 
 #: what is left to what no cause here describes, m, and between what times it is taken to be independent, s
-LEFT, APART = 0.5, 0.2
+LEFT, APART = 0.2, 0.2
+#: a point that counts is the middle of a parabola through the rows so near, s; clicks that are this many robust
+#: deviations off it are left out (by chance one in 3000)
+NEAR, OFF = 0.12, 4.0
 #: what the track's end says of the height there, m
 GROUND = 0.5
 #: columns of the inputs of a throw that are its own (release), and those that all share (wind)
 OWN, WIND = 9, 3
+#: the release is where a parabola through the track's first so many seconds begins: the first click alone may be stale
+BEGINNING = 0.3
 #: difference of an input, in its sigmas
 DIFFERENCE = 0.02
-ITERATIONS = 40
+ITERATIONS = 12
+#: a fit has come down where a step lowers the squares by less than this share: a tenth of what one sigma is worth
+SETTLED = 1e-3
+#: tolerance of the flights, below a millimetre at the touch-down
+TOLERANCE = 1e-5
 
 
 @dataclass(frozen=True)
@@ -49,17 +70,32 @@ class Throw:
         step = max(round(APART / float(np.median(np.diff(t)))), 1)
         return np.unique(np.append(np.arange(step, t.size, step), t.size - 1))
 
-    @property
+    @cached_property
     def plan(self) -> FloatArray:
-        """The points (m, 2) m that count."""
-        plan: FloatArray = self.recording.need("track").value[self.kept, :2]
-        return plan
+        """The points (m, 2) m that count, freed of single bad clicks."""
+        track = self.recording.need("track")
+        return np.stack([_smoothed(track.t, track.value[:, :2], k) for k in self.kept])
 
-    @property
+    @cached_property
     def place(self) -> FloatArray:
-        """Where the track begins, (2,) m."""
-        place: FloatArray = self.recording.need("track").value[0, :2]
-        return place
+        """Where the track begins, (2,) m, as its first rows have it together."""
+        track = self.recording.need("track")
+        return _smoothed(track.t, track.value[:, :2], 0, BEGINNING)
+
+
+def _smoothed(t: FloatArray, plan: FloatArray, row: int, near_by: float = NEAR) -> FloatArray:
+    """Return where a parabola through the rows beside one has it, (2,) m; those far off take no part."""
+    near = np.flatnonzero(np.abs(t - t[row]) <= near_by)
+    for _ in range(2):
+        A = np.vander(t[near] - t[row], 3)
+        fit = np.linalg.lstsq(A, plan[near])[0]
+        off = np.linalg.norm(plan[near] - A @ fit, axis=1)
+        good = off <= OFF * max(float(np.median(off)) / 1.1774, 1e-9)  # the median of a length in plan is 1.18 sigma
+        if np.count_nonzero(good) < 4:
+            break
+        near = near[good]
+    smooth: FloatArray = fit[2]
+    return smooth
 
 
 @dataclass(frozen=True)
@@ -76,6 +112,8 @@ class CauseFit:
         Squares of residuals and of moves of what is stated, in their sigmas.
     paths : mapping
         By throw: the fitted flight at the times that count, (m, 3) m, straight on below the ground.
+    seen : mapping
+        By throw: the plan (m, 2) m that the camera has of it there.
     rms : mapping
         By throw: root mean square distance in plan between what the camera sees of the flight and the track, m.
     touch_down : mapping
@@ -93,6 +131,7 @@ class CauseFit:
     sd: FloatArray
     merit: float
     paths: Mapping[str, FloatArray]
+    seen: Mapping[str, FloatArray]
     rms: Mapping[str, float]
     touch_down: Mapping[str, float]
     moves: Mapping[str, float]
@@ -128,7 +167,7 @@ def fit_cause(cause: Cause, throws: Mapping[str, Throw], start: CauseFit | None 
     begin = np.zeros(stated + free)
     if start is not None:
         begin[:stated] = start.inputs
-    solved = least_squares(residuals, begin, derivatives, bounds=reach, ftol=1e-5, max_nfev=ITERATIONS)
+    solved = least_squares(residuals, begin, derivatives, bounds=reach, ftol=SETTLED, max_nfev=ITERATIONS)
     J = derivatives(solved.x)
     covariance = np.linalg.pinv(J.T @ J)
     sd = np.array(cause.steps) * np.sqrt(np.diag(covariance)[stated:])
@@ -139,17 +178,18 @@ def _described(cause: Cause, throws: Mapping[str, Throw], u: FloatArray, sd: Flo
     """Return what a fit found at ``u`` says."""
     free, stated = len(cause.steps), OWN * len(throws) + WIND
     x = np.array(cause.steps) * u[stated:]
-    paths, rms, landed, moves = {}, {}, {}, {}
+    paths, seen, rms, landed, moves = {}, {}, {}, {}, {}
     for k, (name, throw) in enumerate(throws.items()):
         own = _inputs(u, k, free)
         world = cause.apply(_world(throw), x)
-        path = paths[name] = _positions(throw, world, own[None])[0]
-        apart = world.seen(path, throw.place) - throw.plan
+        path = paths[name] = positions(throw, world, own[None])[0]
+        seen[name] = world.seen(path, throw.place)
+        apart = seen[name] - throw.plan
         rms[name] = float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
         landed[name] = float(np.linalg.norm(world.seen(_landing(world, path), throw.place) - throw.plan[-1]))
         moves[name] = float(np.max(np.abs(own[:OWN])))
     wind = u[stated - WIND : stated]
-    return CauseFit(cause, x, sd, merit, paths, rms, landed, moves, wind, u[:stated])
+    return CauseFit(cause, x, sd, merit, paths, seen, rms, landed, moves, wind, u[:stated])
 
 
 def _landing(world: World, path: FloatArray) -> FloatArray:
@@ -324,13 +364,13 @@ def _of_throw(cause: Cause, throw: Throw, z: FloatArray, x: FloatArray) -> tuple
     """
     world = cause.apply(_world(throw), x)
     moved = np.vstack((z, z + DIFFERENCE * np.eye(INPUTS)))
-    said = [_said(throw, world, path) for path in _positions(throw, world, moved)]
+    said = [_said(throw, world, path) for path in positions(throw, world, moved)]
     slopes = [(one - said[0]) / DIFFERENCE for one in said[1:]]
     for place, step in enumerate(cause.steps):
         other = x.copy()
         other[place] += step
         further = cause.apply(_world(throw), other)
-        slopes.append(_said(throw, further, _positions(throw, further, z[None])[0]) - said[0])
+        slopes.append(_said(throw, further, positions(throw, further, z[None])[0]) - said[0])
     measured = np.append(throw.plan.ravel() / LEFT, 0.0)
     return measured - said[0], np.stack(slopes, axis=1)
 
@@ -340,7 +380,7 @@ def _said(throw: Throw, world: World, path: FloatArray) -> FloatArray:
     return np.append(world.seen(path, throw.place).ravel() / LEFT, world.above(path)[-1] / GROUND)
 
 
-def _positions(throw: Throw, world: World, z: FloatArray) -> FloatArray:
+def positions(throw: Throw, world: World, z: FloatArray) -> FloatArray:
     """Return positions (n, m, 3) at the times that count, of flights with inputs z (n, 12); straight on below 0 m."""
     recording = throw.recording
     environment = recording.environment
@@ -348,7 +388,7 @@ def _positions(throw: Throw, world: World, z: FloatArray) -> FloatArray:
         throw.measured, world.disc, environment, throw.place, _wind_sigma(environment), z + world.bias, world.effects
     )
     t = world.instants(recording.need("track").t[throw.kept])
-    flown = predict_many(world.disc, environment, states, parameters=flats, times=t)
+    flown = predict_many(world.disc, environment, states, parameters=flats, times=t, tolerance=TOLERANCE)
     beyond = np.maximum(t[None] - flown.end[:, None], 0.0)[:, :, None]
     after = flown.state[:, None, :3] + flown.state[:, None, 3:6] * beyond
     return np.where(beyond > 0.0, after, flown.track[:, :, :3])

@@ -75,8 +75,8 @@ class World:
 class Cause:
     """A change of the world by numbers x: ``apply`` returns the world that goes with them.
 
-    ``steps`` are sizes by which they are tried, none for a cause that is not fitted; ``reach`` (2, k) is where they make
-    sense. ``told`` says their size in words.
+    ``steps`` are sizes by which they are tried, none for a cause that is not fitted; ``reach`` (k, 2) is where they
+    make sense. ``told`` says their size in words.
     """
 
     name: str
@@ -100,7 +100,7 @@ def pair(first: Cause, second: Cause) -> Cause:
         f"{first.name} and {second.name}",
         (*first.steps, *second.steps),
         lambda world, x: second.apply(first.apply(world, x[:k]), x[k:]),
-        reach,  # type: ignore[arg-type]
+        reach,
         lambda x: f"{first.told(x[:k])}; {second.told(x[k:])}",
     )
 
