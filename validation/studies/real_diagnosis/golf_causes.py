@@ -47,6 +47,8 @@ GROUND = 0.5
 OWN, WIND = 9, 3
 #: the release is where a parabola through the track's first so many seconds begins: the first click alone may be stale
 BEGINNING = 0.3
+#: shares of the rms without a cause: what counts as no change, and what is left by a cause that helps
+SAME, LITTLE = 0.005, 0.5
 #: difference of an input, in its sigmas
 DIFFERENCE = 0.02
 ITERATIONS = 12
@@ -63,7 +65,7 @@ class Throw:
     recording: Recording
     measured: MeasuredThrow
 
-    @property
+    @cached_property
     def kept(self) -> FloatArray:
         """Rows of the track that count: every `APART` s, and the last."""
         t = self.recording.need("track").t
@@ -230,6 +232,16 @@ class CauseHeldOut:
         """What is left along each track with the cause as the others have it, as a share of what is left without."""
         return {name: one.rms[name] / self.plain[name].rms[name] for name, one in self.tried.items()}
 
+    @property
+    def worsens(self) -> bool:
+        """Whether what two throws say of it leaves more of the third than no cause does."""
+        return any(left > 1.0 + SAME for left in self.left.values())
+
+    @property
+    def helps(self) -> bool:
+        """Whether it leaves little of each throw."""
+        return all(left <= LITTLE for left in self.left.values())
+
 
 def held_out(cause: Cause, throws: Mapping[str, Throw], plain: Mapping[tuple[str, ...], CauseFit]) -> CauseHeldOut:
     """Fit a cause to all throws, and to all but each; try that on the one left out.
@@ -384,8 +396,9 @@ def positions(throw: Throw, world: World, z: FloatArray) -> FloatArray:
     """Return positions (n, m, 3) at the times that count, of flights with inputs z (n, 12); straight on below 0 m."""
     recording = throw.recording
     environment = recording.environment
+    place = world.true(throw.place, throw.measured.height)
     states, flats = drawn(
-        throw.measured, world.disc, environment, throw.place, _wind_sigma(environment), z + world.bias, world.effects
+        throw.measured, world.disc, environment, place, _wind_sigma(environment), z + world.bias, world.effects
     )
     t = world.instants(recording.need("track").t[throw.kept])
     flown = predict_many(world.disc, environment, states, parameters=flats, times=t, tolerance=TOLERANCE)

@@ -63,6 +63,12 @@ class World:
         level: FloatArray = self.ground[0] + position[..., :2] @ self.ground[1:]
         return -position[..., 2] - level
 
+    def true(self, seen: FloatArray, height: float) -> FloatArray:
+        """Return where something at a height above ground is, (2,) m, that a track has at ``seen``."""
+        curvature, *nadir = self.picture
+        place: FloatArray = seen * (1.0 - curvature * height) + height * np.array(nadir)
+        return place
+
     def seen(self, position: FloatArray, release: FloatArray) -> FloatArray:
         """Return the plan (..., 2) m that a track has of positions (..., 3) of a throw released at (2,) m."""
         above = position.copy()
