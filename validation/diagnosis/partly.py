@@ -17,7 +17,6 @@ from validation.diagnosis.answer.partly import PartlyExplained
 from validation.diagnosis.held_out import heldout_chi2
 from validation.diagnosis.selection.candidates import CandidateEffect, in_parameters
 from validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from validation.diagnosis.selection.evidence import price
 from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
 from validation.diagnosis.selection.search_state import Search, values_of_fit
 from validation.diagnosis.settings import UNKNOWN_LAW
@@ -25,8 +24,8 @@ from validation.identification.noise import chi_squared
 
 __all__ = ["partly_explained"]
 
-#: single effects that are asked, those that gained most: time alone
-_ASKED = 2
+#: steps of a fit from the baseline's: what tells attitude by a path alone comes down slowly
+_STEPS = 20
 
 
 def partly_explained(found: Search, names: Sequence[str]) -> tuple[PartlyExplained, ...]:
@@ -36,26 +35,32 @@ def partly_explained(found: Search, names: Sequence[str]) -> tuple[PartlyExplain
     """
     if len(names) < 2:
         return ()
-    for fitted in _tried(found):
+    for fitted, before in _tried(found):
         candidates = fitted.hypothesis.candidates
-        about = replace(found, final=fitted).about(fitted.fit)
+        about = replace(found, final=fitted, base=before).about(fitted.fit)
         heldout = {name: _heldout(about, i) for i, name in enumerate(names)}
         if all(after <= (1.0 - UNKNOWN_LAW.share) * before for before, after in heldout.values()):
             return tuple(PartlyExplained(one.id, _jackknifed(about, fitted, one), heldout) for one in candidates)
     return ()
 
 
-def _tried(found: Search) -> Iterator[ContinuousFit]:
-    """Yield the final fit and those of single effects that gained most, of such as act in all recordings alike."""
-    shared = [one.columns and one.recordings is None for one in found.final.hypothesis.candidates]
+def _tried(found: Search) -> Iterator[tuple[ContinuousFit, ContinuousFit]]:
+    """Yield the final fit and those of the effects that were hinted at, of such as act in all recordings alike.
+
+    Beside each stands a fit without it that is as far down: hints go on from the fit of the baseline, and that from
+    where they end.
+    """
+    shared = [bool(one.columns) and one.recordings is None for one in found.final.hypothesis.candidates]
     if shared and all(shared):
-        yield found.final
-    ranked = sorted(found.considered, key=lambda one: -one.chi2_gain)
-    single = {one.candidate.id: one for one in ranked if one.candidate.columns and one.candidate.recordings is None}
-    for one in [*single.values()][:_ASKED]:
-        if one.gain > price(one.candidate):
-            fit, noise = found.relaxed_fit, found.relaxed_noise
-            yield continuous_fit(fit, Hypothesis((one.candidate,)), found.own, noise, values_of_fit(found.base))
+        yield found.final, found.base
+    base, noise = found.base, found.relaxed_noise
+    for one in (hint.candidate for hint in found.hints if hint.candidate.columns and hint.candidate.recordings is None):
+        start, hypothesis = values_of_fit(base), Hypothesis((one,))
+        fitted = continuous_fit(base.fit, hypothesis, found.own, noise, start, iterations=_STEPS)
+        start = values_of_fit(fitted)
+        plain = continuous_fit(fitted.fit, Hypothesis(), found.own, noise, start, iterations=_STEPS)
+        if np.isfinite(fitted.score):
+            yield fitted, plain if plain.score < base.score else base
 
 
 def _heldout(found: Search, i: int) -> tuple[float, float]:

@@ -60,8 +60,8 @@ def sized(values: Values, kind: type[_Kind], acts_on: str | None = None) -> _Kin
 
     ``acts_on`` tells the sensor where several have one of this type.
     """
-    made: Any
-    made, places = _places(kind, acts_on)
+    asked: Any = kind
+    made, places = _places(asked, acts_on)
     effect: _Kind = made(*(values.get(key, none) for key, none in places))
     return effect
 

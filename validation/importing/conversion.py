@@ -557,7 +557,7 @@ def _sheet(sensor_map: SensorMap, samples: Samples, own_rate: float | None) -> S
 
 
 #: how well a release's place in plan is stated by the track's first row, m: that row counts as a reading itself, and
-#: from a camera it is off by the disc's height over the camera's times the distance from under it, half a metre and more
+#: from a camera it is off by the disc's height over the camera's times the distance from under it: half a metre
 _PLACE = 1.0
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from discsim.arrays import FloatArray
+from discsim.arrays import BoolArray, FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import GyroscopeBias, HardIron
 from discsim.effects.setup import TimeOffset
@@ -135,15 +135,17 @@ class _Windows:
     rate_t: FloatArray
     rate: FloatArray
 
-    def fit(self, some: FloatArray) -> FloatArray:
+    def fit(self, some: BoolArray) -> FloatArray:
         """Return iron (3,) uT, bias (3,) rad/s and lateness (s) that reconcile some of the windows best."""
         tried = [self._iron(late, some) for late in _LATE]
         best = int(np.argmin([left for _, left in tried]))
         start = np.concatenate([tried[best][0], np.zeros(3), [_LATE[best]]])
         apart = max(self.left(start, some), 1e-3)
-        solved = least_squares(
-            lambda u: self._apart(u * _SCALE, some).ravel() / apart, start / _SCALE, loss="soft_l1", max_nfev=6
-        )
+
+        def left(u: FloatArray) -> FloatArray:
+            return self._apart(u * _SCALE, some).ravel() / apart
+
+        solved = least_squares(left, start / _SCALE, loss="soft_l1", max_nfev=6)
         x: FloatArray = solved.x * _SCALE
         return x
 
@@ -163,11 +165,11 @@ class _Windows:
         sd: FloatArray = np.sqrt(np.sum(off**2, axis=0) * (_BLOCKS - 1.0) / _BLOCKS)
         return sd
 
-    def left(self, x: FloatArray, some: FloatArray) -> float:
+    def left(self, x: FloatArray, some: BoolArray) -> float:
         """Return the median of what windows leave, uT."""
         return float(np.median(np.linalg.norm(self._apart(x, some), axis=1)))
 
-    def _iron(self, late: float, some: FloatArray) -> tuple[FloatArray, float]:
+    def _iron(self, late: float, some: BoolArray) -> tuple[FloatArray, float]:
         """Return the iron (3,) uT by least squares where the magnetometer is late by so much, and what is left."""
         turn = self._turns(np.zeros(3), late, some)
         A = (np.eye(3) - turn).reshape(-1, 3)
@@ -175,13 +177,13 @@ class _Windows:
         iron: FloatArray = np.linalg.lstsq(A, y)[0]
         return iron, float(np.median(np.abs(y - A @ iron)))
 
-    def _apart(self, x: FloatArray, some: FloatArray) -> FloatArray:
+    def _apart(self, x: FloatArray, some: BoolArray) -> FloatArray:
         """Return what the windows leave (n, 3) uT with iron, bias and lateness x (7,)."""
         turn = self._turns(x[3:6], float(x[6]), some)
         apart: FloatArray = self.later[some] - x[:3] - np.einsum("nij,nj->ni", turn, self.m[some] - x[:3])
         return apart
 
-    def _turns(self, bias: FloatArray, late: float, some: FloatArray) -> FloatArray:
+    def _turns(self, bias: FloatArray, late: float, some: BoolArray) -> FloatArray:
         """Return the turns (n, 3, 3) of body vectors over some of the windows by the rates less a bias."""
         step = np.diff(self.rate_t)[:, None] * (0.5 * (self.rate[1:] + self.rate[:-1]) - bias)
         attitude = _product(np.vstack([np.zeros(3), step]))
@@ -213,7 +215,7 @@ def _windows(recording: Recording) -> _Windows | None:
     if gyroscope is None or magnetometer is None:
         return None
     sheet = recording.sheets["gyroscope"]
-    bad = ~np.isfinite(gyroscope.value).all(axis=1) | sheet.clipped(gyroscope.value).any(axis=1)
+    bad = np.asarray(~np.isfinite(gyroscope.value).all(axis=1) | sheet.clipped(gyroscope.value).any(axis=1))
     good = np.isfinite(magnetometer.value).all(axis=1)
     if np.count_nonzero(~bad) < _FEWEST or np.count_nonzero(good) < _FEWEST:
         return None

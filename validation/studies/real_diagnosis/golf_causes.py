@@ -169,7 +169,9 @@ def fit_cause(cause: Cause, throws: Mapping[str, Throw], start: CauseFit | None 
     begin = np.zeros(stated + free)
     if start is not None:
         begin[:stated] = start.inputs
-    solved = least_squares(residuals, begin, derivatives, bounds=reach, ftol=SETTLED, max_nfev=ITERATIONS)
+    solved = least_squares(
+        residuals, begin, derivatives, bounds=(reach[0], reach[1]), ftol=SETTLED, max_nfev=ITERATIONS
+    )
     J = derivatives(solved.x)
     covariance = np.linalg.pinv(J.T @ J)
     sd = np.array(cause.steps) * np.sqrt(np.diag(covariance)[stated:])
