@@ -22,6 +22,8 @@ from discsim.effects.track_rows import Camera, Parallax, camera_of, pictured
 
 __all__ = ["CAMERA", "CAUSES", "NONE", "Cause", "World", "pair"]
 
+#: a rate derivative is within this of what is stated: discs have -0.2 to 0.01 (models/discs), and a fit asks for -9
+_RATES = 0.5
 #: inputs of a throw (`validation.studies.golf_throws.prediction.drawn`)
 INPUTS = 12
 
@@ -135,7 +137,7 @@ def _rate(name: str, step: float) -> Cause:
         changed = aero._replace(**{name: getattr(aero, name) + float(x[0])})
         return replace(world, disc=replace(world.disc, aero=changed))
 
-    return Cause(f"{name} of the disc, offset", (step,), apply)
+    return Cause(f"{name} of the disc, offset", (step,), apply, ((-_RATES, _RATES),))
 
 
 def _catalogued(what: str, steps: tuple[float, ...], effect: Callable[..., Any], most: float = np.inf) -> Cause:

@@ -166,7 +166,7 @@ def _golf(real: Path, figures: Path, work: Path, seed: int, say: Say) -> Content
     say("golf throws: pairs")
     likely = likely_pairs(CAUSES[1:], throws, plain[tuple(throws)])
     pairs = [held_out(pair(*one.causes), throws, plain) for one in likely[:PAIRS]]
-    free = sorted(found[1:], key=lambda one: max(one.left.values()))
+    free = sorted(found[1:], key=lambda one: (one.worsens, -sum(one.gains.values())))
     draw_golf(throws, stated, found[0], free[0], figures / "golf.png")
     noise = max(throw.recording.sheets["track"].noise_rms or 0.0 for throw in throws.values())
     return {
