@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-__all__ = ["AIRBORNE", "BOARD", "EVERYWHERE", "FLIGHT", "RIGS", "UNSEEN_IN_MEANS", "Row", "with_article"]
+__all__ = ["AIRBORNE", "BOARD", "EVERYWHERE", "FLIGHT", "RIGS", "UNSEEN_IN_MEANS", "Regular", "Row", "with_article"]
 
 FLIGHT = ("flight",)
 AIRBORNE = ("flight", "free_spin")
@@ -23,6 +23,18 @@ _NOTHING: Mapping[str, Any] = MappingProxyType({})
 def with_article(sensor: str) -> str:
     """Return a sensor's name behind its article: "an accelerometer"."""
     return f"{'an' if sensor[0] in 'aeiou' else 'a'} {sensor}"
+
+
+class Regular(NamedTuple):
+    """Numbers that a fit moves in place of an effect's parameters, where these are not regular at the baseline.
+
+    ``type`` has them, the baseline by default; ``scale`` is a small but visible size of each; ``effect`` returns the
+    effect of such numbers. Whatever reads the effect takes either.
+    """
+
+    type: type[Any]
+    scale: tuple[float, ...]
+    effect: Callable[..., Any]
 
 
 class Row(NamedTuple):
@@ -48,6 +60,9 @@ class Row(NamedTuple):
     turns, one ``per_turn`` so many times as that parameter says; one of the motion that is ``also_read`` changes what a
     sensor reads of a given motion, too; one that ``hides_readings`` leaves no reading behind that a fit could use;
     parameters ``in_percent`` are shares; it ``becomes`` (another effect's id, by its parameter, at a value).
+
+    Where a parameter is infinite at the baseline, ``regular`` tells what a fit moves instead; rules for a fit are then
+    of those numbers.
 
     ``apply`` is all that an effect with no place in the engines and sensors needs: a function of the forms that
     `discsim.effects.applied` tells.
@@ -83,6 +98,7 @@ class Row(NamedTuple):
     hides_readings: bool = False
     in_percent: bool = False
     becomes: tuple[str, str, float] | None = None
+    regular: Regular | None = None
     apply: Callable[..., Any] | None = None
 
     @property
@@ -109,6 +125,17 @@ class Row(NamedTuple):
     def sizes(self) -> dict[str, float]:
         """The parameters at the baseline, by name."""
         return {name: none for name, none in self.baseline._asdict().items() if not isinstance(none, str)}
+
+    @property
+    def fitted(self) -> dict[str, float]:
+        """What a fit moves, at the baseline, by name: the parameters, or the regular numbers in their place."""
+        return self.sizes if self.regular is None else self.regular.type()._asdict()
+
+    @property
+    def fitted_scale(self) -> dict[str, float]:
+        """A small but visible size of each number that a fit moves, by name."""
+        scale = self.scale if self.regular is None else self.regular.scale
+        return dict(zip(self.fitted, scale, strict=True))
 
     @property
     def baseline(self) -> Any:

@@ -8,6 +8,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.sensors import Latency
+from discsim.effects.track_rows import Camera, pictured
 from discsim.errors import InputError
 from discsim.motion import Motion, State, Surroundings
 from discsim.recording import Samples, SensorSheet
@@ -60,11 +61,15 @@ class Gps(MotionSensor):
 
 @dataclass(frozen=True)
 class Tracker(MotionSensor):
-    """A camera or radar that sees the centre of mass; noise in m per axis, a share ``unseen`` of coordinates lost."""
+    """A camera or radar that sees the centre of mass; noise in m per axis, a share ``unseen`` of coordinates lost.
+
+    The plan of a ``camera`` whose height is not taken into account has what flies too far out.
+    """
 
     sampling: Sampling = field(default_factory=lambda: Sampling(30.0))
     noise: Noise = field(default_factory=Noise)
     unseen: float = 0.0
+    camera: Camera = field(default_factory=Camera)
     #: what else is added to its readings before lag and noise
     additions: tuple[Addition, ...] = ()
 
@@ -73,8 +78,8 @@ class Tracker(MotionSensor):
             raise InputError(f"share of coordinates unseen is {self.unseen:g}, expected 0 to below 1")
 
     def reading(self, state: State, surroundings: Surroundings) -> FloatArray:
-        """Return the position, (..., n, 3)."""
-        return state.position
+        """Return the position, (..., n, 3), as the camera's plan has it."""
+        return pictured(self.camera, state.position)
 
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
         """Return the track of a motion, value (n, 3) m in N, NaN where unseen."""

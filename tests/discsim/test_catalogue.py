@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from discsim.effects import CATALOGUE
@@ -20,9 +21,11 @@ def test_a_row_tells_a_reader_its_name_its_form_and_its_trace(row):
 
 @pytest.mark.parametrize("row", CATALOGUE.values(), ids=lambda row: row.id)
 def test_rules_for_a_fit_are_of_parameters_that_the_effect_has(row):
-    told = {*row.units, *row.bounds, *row.sign, *row.positive, *row.grid, *row.grid_sigma}
-    assert told <= set(row.parameters)
+    assert {*row.units, *row.positive} <= set(row.parameters)
+    assert {*row.bounds, *row.sign, *row.grid, *row.grid_sigma} <= set(row.fitted)
     assert len(row.scale) == len(row.parameters)
+    assert list(row.fitted_scale) == list(row.fitted)
+    assert all(np.isfinite(none) for none in row.fitted.values()) or row.detector
     assert set(row.plants) <= set(EVERYWHERE)
     assert set(row.unseen_on) < set(row.plants) | {""}
 

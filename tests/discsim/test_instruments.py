@@ -62,6 +62,8 @@ def sized(row: Row, times: float) -> Effect:
     given = {name: none + times * scale for (name, none), scale in zip(row.sizes.items(), row.scale, strict=True)}
     if row.id == "accel.saturation":
         given = {"limit_m_s2": 30.0}
+    if row.id == "track.camera":
+        given["height_m"] = 60.0
     if row.id == "mag.stray_field":
         given["height_m"] = 1.0
     faulty = FAULTS.get(row.id) or FAULTS.get(row.id.split(".")[1], "")

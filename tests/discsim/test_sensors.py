@@ -33,6 +33,7 @@ from discsim.effects.sensors import (
     SoftIron,
     StrayField,
 )
+from discsim.effects.track_rows import Camera, Parallax, camera_of, parallax_of, pictured
 from discsim.engine import FlyingDisc, fly
 from discsim.environment import Environment
 from discsim.errors import InputError
@@ -482,6 +483,25 @@ class TestTrackerAndReference:
         assert lost.mean() == pytest.approx(0.25, abs=4 * np.sqrt(0.25 * 0.75 / 12003))
         assert np.any(lost.any(axis=1) & ~lost.all(axis=1))
         np.testing.assert_array_equal(got[~lost], exact[~lost])
+
+    def test_a_camera_sees_what_flies_too_far_out_from_the_point_under_it(self):
+        """The form of the catalogue, by hand; a height measured otherwise stays, and on the ground all does."""
+        true = measured(Tracker(Sampling(100.0)), FLIGHT).value
+        seen = measured(Tracker(Sampling(100.0), camera=Camera(60.0, 20.0, -5.0)), FLIGHT).value
+        nadir, h = np.array([20.0, -5.0]), -true[:, 2:]
+        np.testing.assert_allclose(seen[:, :2], nadir + (true[:, :2] - nadir) / (1.0 - h / 60.0), atol=1e-8)
+        np.testing.assert_array_equal(seen[:, 2], true[:, 2])
+        ground = np.array([[3.0, 4.0, 0.0]])
+        np.testing.assert_array_equal(pictured(Camera(60.0, 20.0, -5.0), ground), ground)
+
+    def test_a_camera_is_the_same_in_the_numbers_that_a_fit_moves(self):
+        """And they are regular where it is so far away that it sees everything in its place."""
+        camera, position = Camera(45.0, 12.0, 7.0), np.array([[10.0, -3.0, -5.0], [80.0, 9.0, -1.0]])
+        np.testing.assert_allclose(pictured(parallax_of(camera), position), pictured(camera, position), rtol=1e-12)
+        np.testing.assert_allclose(camera_of(parallax_of(camera)), camera, rtol=1e-12)
+        assert parallax_of(Camera()) == Parallax()
+        small = pictured(Parallax(1e-9, 0.0, 0.0), position) - position
+        np.testing.assert_allclose(small[:, :2], 1e-9 * -position[:, 2:] * position[:, :2], rtol=1e-6)
 
     def test_a_share_that_cannot_be_is_refused(self):
         with pytest.raises(InputError, match=r"unseen is 1.5, expected 0 to below 1"):

@@ -8,14 +8,17 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2 as chi2_law
 
+from discsim.arrays import FloatArray
 from discsim.disc import Aero, aero_key
 from discsim.effects.catalogue import effect as catalogued
 from discsim.model_file import Model, ModelEffect
+from validation.diagnosis.consistency.driven import turning_of
 from validation.diagnosis.consistency.spin_agreement import Agreement, agreement_of
 from validation.diagnosis.contradicted import contradicted_outcome
 from validation.diagnosis.design.next_recording import advise, confusions, in_words
 from validation.diagnosis.held_out import Choice, choices_without_each, heldout_chi2, heldout_gain
 from validation.diagnosis.localisation import located_effect, located_unmodelled
+from validation.diagnosis.partly import partly_explained
 from validation.diagnosis.report.wording import telling_apart
 from validation.diagnosis.result import (
     SMALLEST_P_VALUE,
@@ -36,7 +39,7 @@ from validation.diagnosis.result import (
     Recalibration,
     Residuals,
 )
-from validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
+from validation.diagnosis.selection.candidates import CandidateEffect, in_parameters, parameters_of
 from validation.diagnosis.selection.continuous_fit import ContinuousFit
 from validation.diagnosis.selection.evidence import price
 from validation.diagnosis.selection.search_state import Considered, Search, chi2_in
@@ -48,6 +51,7 @@ from validation.diagnosis.unknown_law.find import FoundLaw
 from validation.diagnosis.verdict import RECALIBRATED_NAMES, recalibrations, standard_errors
 from validation.identification.linear import Linear
 from validation.identification.noise import NoiseModel, chi_squared
+from validation.identification.plants import plant_of
 from validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = ["outcome_of", "reason_for"]
@@ -78,6 +82,8 @@ def _named(
             # where nothing shows it, a fit leaves it anywhere within its prior: the baseline says as much
             value = q.stated
         values[q.name] = ParameterValue(float(value), float(error) if known else None)
+    if candidate.row.regular is not None:
+        values = _of_regular(final, candidate)
     values.update({name: ParameterValue(value, sd) for name, value, sd in candidate.fixed_values})
     for name, value in candidate.shape_grid.items():
         values.setdefault(name, ParameterValue(float(value), None))
@@ -93,6 +99,32 @@ def _named(
         confused.append(Confusion(rival.candidate.id, float(rival_bic), in_words(candidate.id, told), told))
     where = None if candidate.recordings is None else tuple(names[i] for i in sorted(candidate.recordings))
     return NamedEffect(candidate.id, values, Evidence(bic, held, p), where, tuple(confused))
+
+
+def _of_regular(final: ContinuousFit, candidate: CandidateEffect) -> dict[str, ParameterValue]:
+    """Return an effect's parameters from the numbers that the fit moved in their place, errors to first order.
+
+    None is determined where one that is infinite at the baseline is known to no better than half of itself.
+    """
+    row, fit = candidate.row, final.fit
+    some = [k for k, q in enumerate(fit.parameters) if (q.group, q.recordings) == (candidate.id, candidate.recordings)]
+    names, at = [fit.parameters[k].name for k in some], fit.at[some]
+    covariance = np.full((len(some), len(some)), np.nan)
+    if fit.covariance.shape[0] == len(fit.parameters):
+        covariance = fit.covariance[np.ix_(some, some)]
+
+    def sizes(numbers: FloatArray) -> FloatArray:
+        return np.array([*in_parameters(row, dict(zip(names, numbers.tolist(), strict=True))).values()])
+
+    steps = np.array([fit.parameters[k].step for k in some])
+    slopes = np.stack([(sizes(at + d) - sizes(at - d)) for d in np.diag(steps)], axis=1) / (2.0 * steps)
+    value, sd = sizes(at), np.sqrt(np.diag(slopes @ covariance @ slopes.T))
+    infinite = [k for k, none in enumerate(row.sizes.values()) if not np.isfinite(none)]
+    known = bool(np.all(sd[infinite] <= 0.5 * np.abs(value[infinite])))
+    return {
+        name: ParameterValue(float(v), float(e) if known else None)
+        for name, v, e in zip(row.sizes, value, sd, strict=True)
+    }
 
 
 def _noise_notes(linears: Sequence[Linear], found: NoiseModel) -> list[NoiseNote]:
@@ -279,11 +311,15 @@ def outcome_of(judged: Judged, question: Question) -> Outcome:
     ready, found = tried.prepared, tried.found
     setup = answer_of_setup(ready.setup, question.recordings, tried.fit, judged.verdict)
     warnings, agreement = (*setup.warnings, *ready.notes), agreement_of(ready.meant, question.names, ready.agreeing)
+    turning = None
+    if judged.verdict == "unexplained" and not plant_of(ready.meant[0]).path_known:
+        turning = turning_of(question.recordings, question.names)
     if found is not None:
-        return _outcome_of_search(judged, question, found, setup, warnings, agreement)
+        told = () if turning is None else turning.sentences
+        return _outcome_of_search(judged, question, found, setup, (*told, *warnings), agreement)
     assert tried.contradiction is not None
     datasets, names, seed = question.datasets, question.names, question.seed
-    return contradicted_outcome(tried.contradiction, ready.meant, datasets, names, seed, warnings, agreement)
+    return contradicted_outcome(tried.contradiction, ready.meant, datasets, names, seed, warnings, agreement, turning)
 
 
 def _outcome_of_search(
@@ -305,6 +341,7 @@ def _outcome_of_search(
     best = found if not unexplained else found.at_base() if law is None else replace(found, final=law.fitted)
     named = tuple(_named(found, candidate, less[candidate.name], names, choices, advice) for candidate in candidates)
     named = on_board_axes(named, judged.tried.prepared.setup, found.final.fit)
+    partly = partly_explained(found, names) if unexplained and law is None else ()
     moved = recalibrations(best)
     baseline, final, held = _figures(found, unexplained, choices) if law is None else _with_law(found, law)
     diagnosis = Diagnosis(
@@ -327,8 +364,9 @@ def _outcome_of_search(
         tuple(replace(item, recording=names[int(item.recording)]) for item in held),
         tuple(Outlier(names[i], s, a, t, d) for i, s, a, t, d in found.outliers),
         tuple(dict.fromkeys((*setup.next_recordings, *_next_recordings(found, unexplained, named)))),
-        warnings,
+        (*warnings, *(one.text for one in partly)),
         agreement,
+        partly,
     )
     model = _model(best, (*named, *setup.effects), diagnosis.law)
     shown = _residuals(best, names, unexplained and law is None)

@@ -9,6 +9,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.model_file import Model
 from discsim.recording import Recording
+from validation.diagnosis.consistency.driven import Turning
 from validation.diagnosis.consistency.early_verdict import Contradiction, Look
 from validation.diagnosis.consistency.spin_agreement import Agreement
 from validation.diagnosis.result import Diagnosis, FitFigures, Located, Outcome, Residuals
@@ -18,6 +19,11 @@ __all__ = ["contradicted_outcome"]
 
 #: a residual beyond this many times the noise is shown and counted as this: beyond it a number says nothing more
 _MOST = 1e6
+#: what is to be recorded where sensors contradict one another, and where they agree and nothing turns freely
+_AGAIN = "The same again once these sensors agree: until then no effect can be looked for."
+_FREE = (
+    "A stretch in which nothing drives the body: its sensors agree, and no law of motion here is of one that is driven."
+)
 
 
 def contradicted_outcome(
@@ -28,12 +34,13 @@ def contradicted_outcome(
     seed: int,
     warnings: Sequence[str] = (),
     agreement: Agreement | None = None,
+    turning: Turning | None = None,
 ) -> Outcome:
     """Return the outcome of recordings that no motion follows: unexplained, located by sensor.
 
     ``recordings`` (called ``names``) are those of the data sets ``datasets``. Baseline and final figures are those of
     the look at all sensors together, in noise that no misfit has inflated. ``warnings`` come after what contradicts
-    what, ``agreement`` is that of the spin.
+    what, ``agreement`` is that of the spin, ``turning`` what rates and field say where no law of motion holds.
     """
     look = found.whole
     squares = _excess(look)
@@ -55,13 +62,22 @@ def contradicted_outcome(
         figures,
         figures,
         located,
-        next_recordings=("The same again once these sensors agree: until then no effect can be looked for.",),
-        warnings=(*found.sentences, *warnings),
+        next_recordings=(_AGAIN if turning is None or not turning.reconciled else _FREE,),
+        warnings=(*_sentences(found, turning), *warnings),
         agreement=agreement,
+        partly=() if turning is None else turning.partly,
     )
     return Outcome(
         diagnosis, Model(first.environment, first.disc, first.rig, (), ()), tuple(shown), (), settings_told()
     )
+
+
+def _sentences(found: Contradiction, turning: Turning | None) -> tuple[str, ...]:
+    """Return what contradicts what, and what turning says: where sensors agree on it no column is to be compared."""
+    if turning is None or not turning.sentences:
+        return found.sentences
+    told = found.sentences[:-1] if turning.reconciled else found.sentences
+    return (*told, *turning.sentences)
 
 
 def _text(found: Contradiction, sensor: str) -> str:

@@ -15,6 +15,7 @@ from discsim.arrays import ComplexArray
 from discsim.disc import Disc
 from discsim.errors import InputError
 from discsim.recording import Recording
+from validation.diagnosis.consistency.driven import turning_of
 from validation.diagnosis.consistency.phase_regression import angle_turned, rate_of
 from validation.identification.plants import plant_of
 
@@ -59,10 +60,12 @@ def _ratio(recordings: Sequence[Recording]) -> tuple[float, float, str]:
     told = [(ratio, air) for ratio, air, share, _ in read if share > _READ]
     tumbling = [size for _, _, share, size in read if share <= _READ and size > _TUMBLES]
     if len(tumbling) > len(told):
+        turning = turning_of(recordings, [one.name for one in recordings]).sentences
         raise InputError(
             f"{recordings[0].path or recordings[0].name}: a free spin without [disc] whose transverse rates "
             f"({100.0 * float(np.median(tumbling)):.0f} % of the spin) are not the wobble of one symmetric body; add "
             "[disc] with Ixx_kg_m2 and Izz_kg_m2 to recording.toml, or import the rows of the free spin alone"
+            + "".join(f". {sentence}" for sentence in turning).rstrip(".")
         )
     if told:
         ratio, air = (float(x) for x in np.median(told, axis=0))

@@ -12,6 +12,7 @@ from discsim.clipping import constant_axes
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from discsim.written import require_seconds
+from validation.diagnosis.track_ends import flight_of
 from validation.identification.initial.smoothing import FEWEST
 from validation.identification.plants import plant_of
 
@@ -38,6 +39,9 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
     for recording, name in zip(recordings, names, strict=True):
         _refuse(recording, name)
         kept = {}
+        recording, note = _in_flight(recording)
+        if note:
+            notes.setdefault(note, []).append(name)
         sheets = dict(recording.sheets)
         for sensor, samples in recording.samples.items():
             left, step = _shortened(samples, sheets[sensor], _longest(recording))
@@ -50,6 +54,29 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
         _enough(usable[-1], name)
     said = [note if len(where) == len(names) else f"{', '.join(where)}: {note}" for note, where in notes.items()]
     return usable, [*_absent(usable, names), *said]
+
+
+def _in_flight(recording: Recording) -> tuple[Recording, str]:
+    """Return a recording whose track is that of the flight alone, and what was cut off; time zero is its release.
+
+    Other sensors tell when the release was: only where there are none the first point that moves does.
+    """
+    track = recording.get("track")
+    if track is None or not plant_of(recording).follows_path:
+        return recording, ""
+    cut = flight_of(track, recording.sheets["track"].noise_rms)
+    if not cut.before and not cut.after:
+        return recording, ""
+    flight, said = cut.flight, []
+    if cut.before:
+        said.append(f"its first {cut.before:.2f} s, before the disc moves")
+        if len(recording.samples) == 1:
+            flight = Samples(flight.t - flight.t[0], flight.value)
+            said[-1] += " (time counts from there)"
+    if cut.after:
+        said.append(f"its last {cut.after:.2f} s, in which it is too slow to fly: it has come down")
+    samples = {**recording.samples, "track": flight}
+    return replace(recording, samples=samples), f"the track is cut: {' and '.join(said)}."
 
 
 def _refuse(recording: Recording, name: str) -> None:

@@ -29,6 +29,7 @@ from validation.diagnosis.answer.named import (
     Recalibration,
     Separation,
 )
+from validation.diagnosis.answer.partly import PartlyExplained
 from validation.diagnosis.consistency.spin_agreement import Agreement
 
 __all__ = [
@@ -49,6 +50,7 @@ __all__ = [
     "Outcome",
     "Outlier",
     "ParameterValue",
+    "PartlyExplained",
     "Recalibration",
     "Residuals",
     "Separation",
@@ -85,6 +87,8 @@ class Diagnosis:
         What to record next, as sentences.
     warnings : tuple of str
         What the reader must know: a sensor that is absent or cannot be used, sensors that contradict one another.
+    partly : tuple of PartlyExplained
+        Effects that explain an unexplained mismatch in part, on every recording set aside.
     agreement : Agreement or None
         Which sensors agree about the spin, and what single causes reconcile them; None where none can be compared.
     """
@@ -105,6 +109,7 @@ class Diagnosis:
     next_recordings: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     agreement: Agreement | None = None
+    partly: tuple[PartlyExplained, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.datasets:
@@ -146,6 +151,7 @@ class Diagnosis:
             "located": _list(self.located),
             "effects": _list(self.effects),
             "recalibrated": {name: item.to_json() for name, item in self.recalibrated.items()},
+            "partly_explained": _list(self.partly),
             "law": None if self.law is None else self.law.to_json(),
             "noise": _list(self.noise),
             "fit": {"baseline": self.baseline.to_json(), "final": self.final.to_json()},

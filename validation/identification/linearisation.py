@@ -142,7 +142,7 @@ class _Around:
         if (group, name) in self.values:
             return self.values[group, name]
         if (row := self.effects.row(group)) is not None:
-            return row.sizes[name]
+            return row.fitted[name]
         recording = self.recording
         if group == "environment" and name.startswith("magnetic_"):
             return float(recording.environment.magnetic_field[["north", "east", "down"].index(name.split("_")[1])])

@@ -33,7 +33,7 @@ _Kind = TypeVar("_Kind")
 #: the effects that only move the instants at which samples were taken
 CLOCKS = tuple(row.id for row in CATALOGUE.values() if row.moves_time)
 _FIELD = ("magnetic_north", "magnetic_east", "magnetic_down")
-_BASELINE = {(row.id, name): none for row in CATALOGUE.values() for name, none in row.sizes.items()}
+_BASELINE = {(row.id, name): none for row in CATALOGUE.values() for name, none in row.fitted.items()}
 
 
 def value(values: Values, group: str, name: str) -> float:
@@ -42,13 +42,17 @@ def value(values: Values, group: str, name: str) -> float:
 
 
 @cache
-def _places(kind: type[Any], acts_on: str | None) -> tuple[tuple[tuple[str, str], float], ...]:
-    """Return the keys of an effect's parameters and their baselines; none where a sensor cannot have such an effect."""
+def _places(kind: type[Any], acts_on: str | None) -> tuple[type[Any], tuple[tuple[tuple[str, str], float], ...]]:
+    """Return the type that a fit makes of an effect, and the keys of its numbers with their baselines.
+
+    There are none where a sensor cannot have such an effect.
+    """
     try:
         row = catalogued(kind, acts_on)
     except KeyError:
-        return ()
-    return tuple(((row.id, name), none) for name, none in row.sizes.items())
+        return kind, ()
+    made = kind if row.regular is None else row.regular.type
+    return made, tuple(((row.id, name), none) for name, none in row.fitted.items())
 
 
 def sized(values: Values, kind: type[_Kind], acts_on: str | None = None) -> _Kind:
@@ -56,8 +60,9 @@ def sized(values: Values, kind: type[_Kind], acts_on: str | None = None) -> _Kin
 
     ``acts_on`` tells the sensor where several have one of this type.
     """
-    made: Any = kind
-    effect: _Kind = made(*(values.get(key, none) for key, none in _places(made, acts_on)))
+    asked: Any = kind
+    made, places = _places(asked, acts_on)
+    effect: _Kind = made(*(values.get(key, none) for key, none in places))
     return effect
 
 

@@ -556,6 +556,11 @@ def _sheet(sensor_map: SensorMap, samples: Samples, own_rate: float | None) -> S
     return replace(sensor_map.sheet, rate_hz=float(f"{1 / interval:.4g}"))
 
 
+#: how well a release's place in plan is stated by the track's first row, m: that row counts as a reading itself, and
+#: from a camera it is off by the disc's height over the camera's times the distance from under it: half a metre
+_PLACE = 1.0
+
+
 def _release(raw: Path, import_map: ImportMap, readings: dict[str, Readings]) -> Release | None:
     """Return what was measured of the release, which is the file's first row; None where that row is not used."""
     if any(found.number[0] > 0 for found in readings.values()):
@@ -565,4 +570,4 @@ def _release(raw: Path, import_map: ImportMap, readings: dict[str, Readings]) ->
         return import_map.release
     # the place in the plan is where the track begins
     north, east = readings["track"].value[0, :2]
-    return throw.release(float(north), float(east), import_map.sensors["track"].sheet.noise_rms or 0.0)
+    return throw.release(float(north), float(east), _PLACE)

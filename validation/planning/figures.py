@@ -18,7 +18,7 @@ def draw_limits(limits: Limits, path: Path) -> None:
     rows = []
     for one in limits.effects:
         row = CATALOGUE[one.id]
-        scales = np.array([row.scale[row.parameters.index(name)] for name in one.parameters])
+        scales = np.array([row.fitted_scale[name] for name in one.parameters])
         seen, named = np.array(one.seen) / scales, np.array(one.named) / scales
         rows.append((one.id, seen[np.isfinite(seen)], named[np.isfinite(named)]))
     rows.sort(key=lambda item: -float(np.min(item[2])) if item[2].size else -np.inf)

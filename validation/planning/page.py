@@ -39,7 +39,7 @@ def _effects(found: Planned, out: Path) -> Section:
     for one in found.limits.effects:
         row = CATALOGUE[one.id]
         for name, seen, named in zip(one.parameters, one.seen, one.named, strict=True):
-            scale = row.scale[row.parameters.index(name)]
+            scale = row.fitted_scale[name]
             rows.append(
                 (one.id, name, _number(seen), _number(named), f"{scale:g}", one.rival, f"{100 * one.taken:.1f} %")
             )

@@ -14,8 +14,9 @@ from types import MappingProxyType
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import CATALOGUE, Effect, effect, row
+from discsim.effects.catalogue import CATALOGUE, Effect, catalogued, effect, row
 from discsim.effects.setup import UNITS, axes_of, permutation
+from discsim.effects.track_rows import Camera
 from discsim.recording import Plant
 from validation.challenge.cases.case import Case
 
@@ -64,7 +65,8 @@ def draw_fault(id: str, case: Case, rng: np.random.Generator) -> Effect:
     """Draw the setting, or the sizes, of a fault that shows in a case.
 
     Offsets run from 5 to 100 ms, a board is turned by 2 to 180 degrees about any line; a field is off by 2 to 40
-    degrees in declination, 2 to 20 in dip and 2 to 10 per cent in size.
+    degrees in declination, 2 to 20 in dip and 2 to 10 per cent in size. A camera is 30 to 120 m high, as drones are
+    that film throws, above a place within 40 m north and east of the release.
     """
     if id in _AXES:
         kinds = [kind for kind in _mistakes(id, case) if kind]
@@ -81,6 +83,8 @@ def draw_fault(id: str, case: Case, rng: np.random.Generator) -> Effect:
     if id == "site.field":
         declination, dip, size = _off(rng, 2.0, 40.0), _off(rng, 2.0, 20.0), _off(rng, 0.02, 0.1)
         return _sized(id, [np.radians(declination), np.radians(dip), 1.0 + size])
+    if id == catalogued(Camera).id:
+        return _sized(id, [float(np.exp(rng.uniform(np.log(30.0), np.log(120.0)))), *rng.uniform(-40.0, 40.0, 2)])
     return _sized(id, [float(np.exp(rng.uniform(np.log(0.005), np.log(0.1)))) * rng.choice([-1.0, 1.0])])
 
 

@@ -7,7 +7,7 @@ Golub and Pereyra, 1973).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from discsim.effects.catalogue import CATALOGUE, Row
@@ -17,7 +17,7 @@ from validation.identification.competing_effects import CATALOGUED, Competing
 from validation.identification.parameters import Parameter
 from validation.identification.propagation import Column
 
-__all__ = ["CandidateEffect", "candidates_for", "free_candidate", "parameters_of"]
+__all__ = ["CandidateEffect", "candidates_for", "free_candidate", "in_parameters", "parameters_of"]
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ _STEP = 0.1
 def _step(row: Row, name: str) -> float:
     if name == row.per_turn:
         return 1e-6  # times the angle turned, hundreds of turns, this is what moves the phase
-    return _STEP * row.scale[row.parameters.index(name)]
+    return _STEP * row.fitted_scale[name]
 
 
 def _prior_sigma(row: Row, column: Column) -> float:
@@ -107,14 +107,14 @@ def free_candidate(
 ) -> CandidateEffect:
     """Return the candidate of an effect in all recordings with every parameter free but those of its ``shape``."""
     row = CATALOGUE[id] if user is None else user.row
-    free = [name for name in row.parameters if name not in {name for name, _ in shape}]
+    free = [name for name in row.fitted if name not in {name for name, _ in shape}]
     return CandidateEffect(id, tuple(Column(id, name, _step(row, name), shape) for name in free), user=user)
 
 
 def parameters_of(candidate: CandidateEffect, *, shaped: bool = True) -> tuple[Parameter, ...]:
     """Return the parameters of a candidate for a fit, its shapes among them where ``shaped``."""
     row = candidate.row
-    baseline = row.sizes
+    baseline = row.fitted
     found = [
         Parameter(c.group, c.name, float(baseline[c.name]), c.step, _prior_sigma(row, c), candidate.recordings)
         for c in candidate.columns
@@ -124,3 +124,11 @@ def parameters_of(candidate: CandidateEffect, *, shaped: bool = True) -> tuple[P
             sigma = row.grid_sigma.get(name, float("inf"))
             found.append(Parameter(candidate.id, name, value, _step(row, name), sigma, candidate.recordings))
     return tuple(found)
+
+
+def in_parameters(row: Row, numbers: Mapping[str, float]) -> dict[str, float]:
+    """Return an effect's parameters by name from the numbers that a fit moves, which are the same for most."""
+    if row.regular is None or set(numbers) != set(row.fitted):
+        return dict(numbers)
+    sizes: dict[str, float] = row.regular.effect(row.regular.type(**numbers))._asdict()
+    return sizes

@@ -12,6 +12,9 @@ from itertools import combinations
 import numpy as np
 
 from discsim.effects import Effect
+from discsim.effects.catalogue import catalogued
+from discsim.effects.track_rows import Camera
+from discsim.recording import Recording
 from validation.diagnosis.selection.candidates import CandidateEffect, free_candidate, parameters_of
 from validation.diagnosis.selection.evidence import ONE_SIDED
 from validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
@@ -72,6 +75,21 @@ def hinted(effect: Effect) -> ScreenedCandidate:
     return ScreenedCandidate(
         candidate, np.inf, {((effect.id, name), None): size for name, size in effect.sizes.items()}
     )
+
+
+def pictured_from_above(
+    recordings: Sequence[Recording], candidates: Sequence[CandidateEffect]
+) -> tuple[ScreenedCandidate, ...]:
+    """Return the camera of tracks without heights, to be tried first: a plan alone comes from pictures from above.
+
+    Where nothing else tells the motion, algebra from far away lets winds and blows take up anything before.
+    """
+    tracks = [recording.get("track") for recording in recordings]
+    plans = all(track is not None and not np.any(np.isfinite(track.value[:, 2])) for track in tracks)
+    id = catalogued(Camera).id
+    if not plans or any(len(recording.samples) > 1 for recording in recordings):
+        return ()
+    return tuple(ScreenedCandidate(candidate, np.inf, {}) for candidate in candidates if candidate.id == id)
 
 
 def scope_price(recordings: int) -> float:

@@ -21,7 +21,7 @@ from discsim.recording import Recording
 from validation.diagnosis.detectors.all import searched
 from validation.diagnosis.detectors.dropped_samples import PhaseLosses, Shifted
 from validation.diagnosis.relaxed_fit import relaxed, unknowns, without_outliers
-from validation.diagnosis.selection.candidates import CandidateEffect, candidates_for, parameters_of
+from validation.diagnosis.selection.candidates import CandidateEffect, candidates_for, in_parameters, parameters_of
 from validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from validation.diagnosis.selection.evidence import ONE_SIDED, price
 from validation.diagnosis.selection.exchange import eliminated_backward, exchanged, rivals_of, widened
@@ -32,6 +32,7 @@ from validation.diagnosis.selection.score_tests import (
     hinted,
     one_per_effect,
     pairs,
+    pictured_from_above,
     screened_candidates,
     start_of,
 )
@@ -114,6 +115,7 @@ def screened(
     report("fitting the baseline", 2, 4)
     base = _baseline(relaxed_fit, equations, own, noise)
     asked = tuple(hinted(hint) for hint in hints if any(candidate.id == hint.id for candidate in candidates))
+    asked += pictured_from_above(recordings, candidates)
     stated = tuple(as_stated or recordings)
     return Search(
         stated,
@@ -342,7 +344,9 @@ def _considering(
         if q.group == candidate.id and q.recordings == candidate.recordings
     }
     gained = score - refitted.score, chi2_before - chi2_in(refitted, found.relaxed_noise)
-    return replace(found, considered=(*found.considered, Considered(candidate, *gained, values)))
+    return replace(
+        found, considered=(*found.considered, Considered(candidate, *gained, in_parameters(candidate.row, values)))
+    )
 
 
 def _together(found: Search) -> tuple[Search, ContinuousFit | None]:

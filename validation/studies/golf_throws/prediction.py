@@ -24,6 +24,9 @@ THROWS = ("throw1", "throw6", "throw15")
 #: what a throw's inputs are, in the order in which they are drawn
 INPUTS = ("speed", "pitch", "yaw", "roll", "nose", "spin", "wobble", "height", "wind")
 
+#: no disc is released lower than its own radius, m: a fit far from what is stated may ask for it
+LOWEST = 0.1
+
 
 @dataclass(frozen=True)
 class Prediction:
@@ -145,7 +148,7 @@ def drawn(
             measured,
             conditions=measured.conditions + measured.sigma * row[:5],
             spin=measured.spin + measured.spin_sigma * row[5],
-            height=measured.height + measured.height_sigma * row[8],
+            height=max(measured.height + measured.height_sigma * row[8], LOWEST),
         )
         release: Release = thrown.release(float(place[0]), float(place[1]), 0.0)
         assert release.body_rate is not None

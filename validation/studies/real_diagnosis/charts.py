@@ -13,7 +13,7 @@ from discsim.recording import Recording
 from estimators.methods import estimate
 from validation.reporting.figures import COLOURS, new_figure, save_figure
 from validation.studies.real_diagnosis.flatball import Rows, restamped
-from validation.studies.real_diagnosis.golf_causes import CauseFit, CauseHeldOut, Throw
+from validation.studies.real_diagnosis.golf_causes import CauseHeldOut, Throw
 from validation.studies.real_diagnosis.golf_flight import Flown
 from validation.studies.real_recordings.turns import field_phase
 
@@ -25,21 +25,30 @@ TRACK, STATED, FITTED, HELD_OUT = COLOURS["truth"], COLOURS["accelerometer"], CO
 
 
 def draw_golf(
-    throws: Mapping[str, Throw], stated: Mapping[str, Flown], none: CauseFit, best: CauseHeldOut, path: Path
+    throws: Mapping[str, Throw], stated: Mapping[str, Flown], none: CauseHeldOut, best: CauseHeldOut, path: Path
 ) -> None:
-    """Draw each throw from above: its track, the flight as stated, as fitted, and by what the others say."""
-    figure, axes = new_figure(1, len(throws), width=12.0, height=4.6)
-    for panel, (name, throw) in zip(axes, throws.items(), strict=True):
-        track, other = throw.recording.need("track").value, best.landings[name]
-        panel.plot(track[:, 1], track[:, 0], ".", ms=2.5, color=TRACK, label="tracked by the drone")
+    """Draw each throw from above, and below it how far what was fitted is off along the track.
+
+    Both fits are of the throw's own release, with no cause and with the cause as the other two throws have it.
+    """
+    figure, axes = new_figure(2, len(throws), width=12.0, height=7.0)
+    name_of = best.together.cause.name.strip("`")
+    for column, (name, throw) in enumerate(throws.items()):
+        panel, beside = axes[0, column], axes[1, column]
+        track = throw.recording.need("track")
+        panel.plot(track.value[:, 1], track.value[:, 0], ".", ms=2.5, color=TRACK, label="tracked by the drone")
         _flight(panel, stated[name], STATED, "as stated")
-        fitted = none.paths[name]
-        panel.plot(fitted[:, 1], fitted[:, 0], "--", color=FITTED, label="release and wind fitted, no cause")
-        cause = best.together.cause.name.split(",")[0]
-        _flight(panel, other, HELD_OUT, f"by the other two throws' {cause}")
+        for fit, colour, style, label in (
+            (none.tried[name], FITTED, "--", "release and wind fitted, no cause"),
+            (best.tried[name], HELD_OUT, "-", f"with the other two throws' {name_of}"),
+        ):
+            panel.plot(fit.paths[name][:, 1], fit.paths[name][:, 0], style, color=colour, label=label)
+            off = np.linalg.norm(fit.seen[name] - throw.plan, axis=1)
+            beside.plot(track.t[throw.kept], off, style, color=colour, label=label)
         panel.set(title=name, xlabel="east (m)", ylabel="down range (m)")
         panel.set_aspect("equal", adjustable="datalim")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
+        beside.set(xlabel="time (s)", ylabel="off the track, as seen (m)", ylim=(0.0, None))
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
     save_figure(figure, path)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from discsim.model_file import Model
 from discsim.recording import Samples
 from validation.diagnosis.consistency.spin_agreement import agreement_of
 from validation.diagnosis.report.consistency_tables import tables_of
+from validation.diagnosis.track_ends import flight_of
 from validation.importing import find_map, import_recording, read_map
 from validation.reporting import markdown
 from validation.reporting.run import package_version
@@ -21,16 +23,18 @@ from validation.studies.real_diagnosis.charts import draw_fields, draw_golf, dra
 from validation.studies.real_diagnosis.flatball import Rows, rows_of
 from validation.studies.real_diagnosis.golf_causes import (
     APART,
-    CAUSES,
     GROUND,
     LEFT,
-    NONE,
+    LITTLE,
     CauseHeldOut,
     Throw,
     held_out,
+    likely_pairs,
     without_cause,
 )
-from validation.studies.real_diagnosis.golf_flight import Flown, flown
+from validation.studies.real_diagnosis.golf_decision import decided
+from validation.studies.real_diagnosis.golf_flight import flown
+from validation.studies.real_diagnosis.golf_worlds import CAUSES, pair
 from validation.studies.real_diagnosis.runs import diagnosed, diagnosis_digest
 from validation.studies.real_diagnosis.sensors import Checked, Linear, against_cameras, checked_log, field_in_body
 from validation.studies.real_recordings.sources import SOURCES, Source, load, raw_columns
@@ -41,6 +45,8 @@ Say = Callable[[str], None]
 #: what a part of the page is filled with, by the names in its template
 Content = dict[str, Any]
 GOLF = "shotshaper-dd2-drone-tracked-throws"
+#: pairs of causes that are fitted in full, the likeliest by algebra
+PAIRS = 3
 #: a field this far from its usual size is disturbed
 DISTURBED = 0.1
 #: sources whose sensors are looked at one by one
@@ -141,11 +147,13 @@ def _pm(value: Mapping[str, Any]) -> str:
 
 def _golf(real: Path, figures: Path, work: Path, seed: int, say: Say) -> Content:
     shipped = read_map(find_map("shotshaper"))
+    whole = {name: import_recording(real / GOLF / f"{name}.tsv", shipped).recording for name in THROWS}
+    answer = diagnosed(whole, work / "golf", say, seed)
+    cuts = {name: flight_of(one.need("track"), one.sheets["track"].noise_rms) for name, one in whole.items()}
     throws = {
-        name: Throw(import_recording(real / GOLF / f"{name}.tsv", shipped).recording, shipped.throws[name])
-        for name in THROWS
+        name: Throw(replace(one, samples={"track": cuts[name].flight}), shipped.throws[name])
+        for name, one in whole.items()
     }
-    answer = diagnosed({name: throw.recording for name, throw in throws.items()}, work / "golf", say, seed)
     stated = {
         name: flown(throw.recording, Model(throw.recording.environment, throw.recording.disc))
         for name, throw in throws.items()
@@ -155,52 +163,45 @@ def _golf(real: Path, figures: Path, work: Path, seed: int, say: Say) -> Content
     for cause in CAUSES:
         say(f"golf throws: {cause.name}")
         found.append(held_out(cause, throws, plain))
-    best = min((one for one in found if one.together.cause is not NONE), key=lambda one: one.together.merit)
-    draw_golf(throws, stated, found[0].together, best, figures / "golf.png")
+    say("golf throws: pairs")
+    likely = likely_pairs(CAUSES[1:], throws, plain[tuple(throws)])
+    pairs = [held_out(pair(*one.causes), throws, plain) for one in likely[:PAIRS]]
+    free = sorted(found[1:], key=lambda one: (one.worsens, -sum(one.gains.values())))
+    draw_golf(throws, stated, found[0], free[0], figures / "golf.png")
     noise = max(throw.recording.sheets["track"].noise_rms or 0.0 for throw in throws.values())
     return {
         "answer": answer,
-        "named": ", ".join(f"`{one['id']}`" for one in answer.answer["effects"]),
+        "partly": answer.answer.get("partly_explained", []),
+        "cuts": [(name, cut.before, cut.after) for name, cut in cuts.items() if cut.before or cut.after],
         "noise": noise,
-        "left": noise * answer.chi2("final") ** 0.5,
-        "reached": max(found[0].together.rms.values()),
         "stated": stated,
         "APART": APART,
         "LEFT": LEFT,
         "GROUND": GROUND,
-        **_causes(found, best, stated),
+        "LITTLE": LITTLE,
+        "named": ", ".join(f"`{one['id']}`" for one in answer.answer["effects"]),
+        "names": list(throws),
+        "without": found[0],
+        "causes": [_cause_cells(one, list(throws)) for one in free],
+        "pairs": [_cause_cells(one, list(throws)) for one in pairs],
+        "asked": len(likely),
+        "free": free,
+        "better_pairs": [one for one in pairs if max(one.left.values()) < max(free[0].left.values())],
+        "decided": decided(throws, free[0].together, free[1].together),
+        "off": lambda flights: ", ".join(f"{flights[name].distance:.1f}" for name in throws),
     }
 
 
-def _causes(found: Sequence[CauseHeldOut], best: CauseHeldOut, stated: Mapping[str, Flown]) -> Content:
-    """Return what the fits of single causes say; the first of them has none."""
-    none, names = found[0], list(stated)
-    sizes = [best.others[name].x for name in names]
-    nearer = [name for name in names if best.landings[name].distance < stated[name].distance]
-    return {
-        "without": none,
-        "best": best,
-        "names": names,
-        "causes": [_cause_cells(one, none, names) for one in sorted(found, key=lambda one: one.together.merit)],
-        "off": lambda flights: ", ".join(f"{flights[name].distance:.1f}" for name in names),
-        "sizes": ", ".join(f"{x:+.2g}" for x in sizes),
-        "spread": (max(sizes) - min(sizes)) / max(one.sd for one in best.others.values()),
-        "nearer": nearer,
-        "farther": [name for name in names if name not in nearer],
-        "worst": max(names, key=lambda name: best.landings[name].distance - stated[name].distance),
-        "by_wind": sum(none.landings[name].distance < stated[name].distance for name in names),
-    }
-
-
-def _cause_cells(one: CauseHeldOut, none: CauseHeldOut, names: Sequence[str]) -> list[str]:
-    fit, free = one.together, one.together.cause is not NONE
+def _cause_cells(one: CauseHeldOut, names: Sequence[str]) -> list[str]:
+    fit = one.together
     return [
         fit.cause.name,
-        f"{fit.x:+.3g} ± {fit.sd:.1g}" if free else "",
-        f"{none.together.merit - fit.merit:.1f}" if free else "",
-        ", ".join(f"{one.others[name].x:+.2g}" for name in names) if free else "",
-        ", ".join(f"{one.landings[name].distance:.1f}" for name in names),
-        ", ".join(f"{one.gains[name]:+.1f}" for name in names) if free else "",
+        fit.cause.told(fit.x),
+        "; ".join(fit.cause.told(one.others[name].x) for name in names),
+        ", ".join(f"{one.tried[name].rms[name]:.2f}" for name in names),
+        ", ".join(f"{100.0 * (one.left[name] - 1.0):+.0f} %" for name in names),
+        ", ".join(f"{one.tried[name].touch_down[name]:.1f}" for name in names),
+        ", ".join(f"{one.gains[name]:+.1f}" for name in names),
     ]
 
 
