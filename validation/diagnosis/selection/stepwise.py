@@ -21,6 +21,7 @@ from discsim.recording import Recording
 from validation.diagnosis.detectors.all import searched
 from validation.diagnosis.detectors.dropped_samples import PhaseLosses, Shifted
 from validation.diagnosis.relaxed_fit import relaxed, unknowns, without_outliers
+from validation.diagnosis.selection.all_at_once import all_at_once
 from validation.diagnosis.selection.candidates import CandidateEffect, candidates_for, parameters_of
 from validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from validation.diagnosis.selection.evidence import ONE_SIDED, price
@@ -154,7 +155,13 @@ def _baseline(
 
 def _selected_forward(found: Search) -> Search:
     """Return the search with effects added as long as one is worth its price."""
-    for step in range(SELECTION.most_effects):
+    most = SELECTION.most_effects
+    if (begun := all_at_once(found)) is not None:
+        found = _with_final(found, eliminated_backward(found, begun))
+        if far(found, found.final):
+            return found
+        most += len(found.final.hypothesis.candidates)
+    for step in range(len(found.final.hypothesis.candidates), most):
         current = found.final
         found, better = next_effect(found, current, step)
         if step == 0 and far(found, current) and (better is None or far(found, better)) and not _told(better):
@@ -162,7 +169,7 @@ def _selected_forward(found: Search) -> Search:
             if together is not None:
                 found = _with_final(found, eliminated_backward(found, together))
                 continue
-        if better is None or len(better.hypothesis.candidates) > SELECTION.most_effects:
+        if better is None or len(better.hypothesis.candidates) > most:
             break
         if step == 0 and far(found, better) and not _told(better) and no_nearer(found, current, better):
             # neither one effect nor two come near the data, nor does any lead there
