@@ -16,7 +16,7 @@ import numpy as np
 
 from discsim.effects import Effect
 from discsim.effects.catalogue import catalogued
-from discsim.effects.sensors import DroppedSamples
+from discsim.effects.sensors import DroppedSamples, Lag
 from discsim.recording import Recording
 from validation.diagnosis.detectors.all import searched
 from validation.diagnosis.detectors.dropped_samples import PhaseLosses, Shifted
@@ -62,6 +62,8 @@ Report: TypeAlias = Callable[[str, int, int], None]
 Offer: TypeAlias = tuple[ScreenedCandidate, Fit, float]
 
 _DROPPED = catalogued(DroppedSamples, "magnetometer").id
+#: the lag that holds what was there before a recording began
+_HELD = catalogued(Lag, "accelerometer").id
 
 
 # a hypothesis far from the data may send a motion beyond all numbers: such a fit is not finite, and is passed over
@@ -108,6 +110,9 @@ def screened(
     )
     noise = estimate_noise(relaxed_fit.linears, [linear.residual for linear in relaxed_fit.linears])
     given = {q.group for q in free}
+    if relaxed_fit.plant.held and _HELD not in {hint.id for hint in hints}:
+        # of means over turns a lag changes nothing but how what it holds dies away, which was asked before any fit
+        given.add(_HELD)
     candidates = tuple(candidate for candidate in candidates_for(recordings, effects) if candidate.id not in given)
     report("asking every effect", 1, 4)
     equations = normal_equations_of(relaxed_fit, candidates, noise, relaxed_fit.plant.sizes.continuous)
