@@ -157,8 +157,8 @@ class Instruments:
             elif isinstance(value, LostRows | LateRows | ImuClock):
                 for name, sensor in module.sensors.items():
                     if not isinstance(value, ImuClock) or name in ("gyroscope", "accelerometer"):
-                        place = str(_field_for(Sampling, type(value)))
-                        module = module.fitted(name, sampling=replace(sensor.sampling, **{place: value}))
+                        timed: dict[str, Any] = {str(_field_for(Sampling, type(value))): value}
+                        module = module.fitted(name, sampling=replace(sensor.sampling, **timed))
             elif target == "clock":
                 module = replace(module, clock=value)
             elif target == "board":

@@ -105,8 +105,11 @@ class RowTimes:
     @property
     def sentences(self) -> tuple[str, ...]:
         """What was counted, for an answer that names no effect."""
-        values = [(effect.id, *effect.parameters.items()) for effect in self.effects()]
-        told = "; ".join(f"{id} ({name} = {value.value:.4g})" for id, (name, value) in values)
+        told = "; ".join(
+            f"{effect.id} ({name} = {value.value:.4g})"
+            for effect in self.effects()
+            for name, value in effect.parameters.items()
+        )
         return (f"counted before the fit, row by row: {told}. What is left beyond that is told below.",)
 
 
