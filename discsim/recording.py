@@ -162,6 +162,8 @@ class Recording(Recorded):
     samples: Mapping[str, Samples] = field(default_factory=dict)
     command: Samples | None = None
     path: Path | None = None
+    #: sensor -> times (w, n) s and weights (w, n) of the samples that its n readings are means of, where that is known
+    averaged: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for sensor, samples in self.samples.items():

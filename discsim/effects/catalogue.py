@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["CATALOGUE", "Effect", "Row", "catalogued", "effect", "effect_of", "row"]
 
 #: what comes first, in this order; modules of single effects follow by name
-_FIRST = ("motion_rows", "sensor_rows", "setup_rows")
+_FIRST = ("motion_rows", "sensor_rows", "mount_rows", "timing_rows", "setup_rows")
 
 
 def _rows() -> Iterator[Row]:

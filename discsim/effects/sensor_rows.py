@@ -27,9 +27,8 @@ def _lag(prefix: str, sensor: str) -> Row:
         form="{tau_s} ẏ = x − y, y the reading",
         grows_with="spin",
         trace="readings are late and too small, more so the faster the disc spins",
-        bounds={"tau_s": (0.0, 0.2)},
+        bounds={"tau_s": (0.0, 0.5)},
         sign={"tau_s": 1.0},
-        unseen_on=UNSEEN_IN_MEANS.get(sensor, ()),
     )
 
 

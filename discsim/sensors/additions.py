@@ -13,6 +13,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect
 from discsim.effects.sensors import Lag
+from discsim.effects.timing_rows import Average
 from discsim.law import Law
 from discsim.motion import Motion, State, Surroundings
 from discsim.recording import SENSORS, Samples, SensorSheet
@@ -47,6 +48,8 @@ class BoardSensor(MotionSensor):
 
     sampling: Sampling
     lag: Lag
+    #: how far its rows show means of two samples
+    average: Average = Average()
     noise: Noise
     resolution: float
     range: float
@@ -60,8 +63,11 @@ class BoardSensor(MotionSensor):
 
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
         """Return the samples of a motion, value (n, 3) in the sensor's unit."""
-        written, taken = self.sampling.instants(motion.start, motion.end, rng)
+        written, taken, before = self.sampling.acquired(motion.start, motion.end, rng)
         value = filtered(self.lag, motion, lambda t: self.ideal(motion, t), taken)
+        if self.average.weight > 0.0:
+            earlier = filtered(self.lag, motion, lambda t: self.ideal(motion, t), np.minimum(before, taken))
+            value = (1.0 - self.average.weight) * value + self.average.weight * earlier
         step, axes = self.resolution, np.array(self.axes)
         return Samples(written, digitise(value, written, self.noise, rng, resolution=step, limit=self.limit, axes=axes))
 

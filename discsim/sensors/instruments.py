@@ -15,6 +15,7 @@ from discsim.disc import Disc, Rig
 from discsim.effects.catalogue import CATALOGUE, Effect, by_id
 from discsim.effects.kind import BOARD
 from discsim.effects.sensors import AccelerometerBias, ClockRate, CrossAxis, GSensitivity, GyroscopeBias, Scale
+from discsim.effects.timing_rows import ImuClock, LateRows, LostRows
 from discsim.errors import InputError
 from discsim.files import model_file
 from discsim.law import Law
@@ -153,6 +154,11 @@ class Instruments:
             id, value, target = item.id, item.value, item.row.acts_on
             if item.row.settings:
                 module = replace(module, written=(*(one for one in module.written if one.id != id), item))
+            elif isinstance(value, LostRows | LateRows | ImuClock):
+                for name, sensor in module.sensors.items():
+                    if not isinstance(value, ImuClock) or name in ("gyroscope", "accelerometer"):
+                        timed: dict[str, Any] = {str(_field_for(Sampling, type(value))): value}
+                        module = module.fitted(name, sampling=replace(sensor.sampling, **timed))
             elif target == "clock":
                 module = replace(module, clock=value)
             elif target == "board":
@@ -201,12 +207,13 @@ def record(
     """
     streams = dict(zip(SENSORS, rng.spawn(len(SENSORS)), strict=True))
     samples, sheets = {}, {}
+    seed = int(rng.spawn(1)[0].integers(2**32))  # of the pattern of rows, which is one for all
     for sensor_name in SENSORS:
         sensor = instruments.sensors.get(sensor_name)
         if sensor is None:
             continue
         own = sensor.sampling
-        shared = replace(own, clock=ClockRate(own.clock.ratio * instruments.clock.ratio))
+        shared = replace(own, clock=ClockRate(own.clock.ratio * instruments.clock.ratio), rows_seed=seed)
         taken = replace(sensor, sampling=shared).measure(motion, streams[sensor_name])
         if len(taken):
             samples[sensor_name], sheets[sensor_name] = taken, sensor.sheet

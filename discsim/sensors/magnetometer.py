@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from discsim.arrays import FloatArray, readonly, vector3
 from discsim.effects.sensors import HardIron, Lag, SoftIron, StrayField, hard_iron, soft_iron, stray_field
 from discsim.effects.setup import BoardRotation, SiteField, field_there, on_board
+from discsim.effects.timing_rows import Average
 from discsim.errors import InputError
 from discsim.motion import State, Surroundings
 from discsim.sensors.additions import Addition, BoardSensor
@@ -29,6 +30,7 @@ class Magnetometer(BoardSensor):
     hard_iron: HardIron = field(default_factory=HardIron)
     stray_field: StrayField = field(default_factory=StrayField)
     lag: Lag = field(default_factory=Lag)
+    average: Average = field(default_factory=Average)
     noise: Noise = field(default_factory=Noise)
     resolution: float = 0.0
     range: float = float("inf")

@@ -12,6 +12,7 @@ from discsim.arrays import BoolArray, FloatArray
 from discsim.compiled import compiled
 from discsim.effects.sensors import ClockRate, DroppedSamples, Lag, lag, true_time
 from discsim.effects.setup import TimeOffset
+from discsim.effects.timing_rows import ImuClock, LateRows, LostRows, OwnClock, held_since, late_by, written_rows
 from discsim.errors import InputError
 from discsim.limits import MOST_ROWS
 from discsim.motion import Motion
@@ -33,7 +34,8 @@ class Sampling:
     Sample k is written as ``phase_s + k/rate_hz``. It was taken at the written time less the offset, over the clock's
     ratio, plus a jitter of ``jitter_s`` rms that nobody knows; there is none from before the motion. Of the samples a
     share ``gaps`` is lost honestly (their time stamps are missing), and a share ``dropped`` silently: the rest are
-    written at the nominal spacing.
+    written at the nominal spacing. Rows that a logger loses or writes late, and parts that free-run beside it, are
+    those of `discsim.effects.timing_rows`.
     """
 
     rate_hz: float
@@ -43,6 +45,12 @@ class Sampling:
     clock: ClockRate = field(default_factory=ClockRate)
     dropped: DroppedSamples = field(default_factory=DroppedSamples)
     offset: TimeOffset = field(default_factory=TimeOffset)
+    lost_rows: LostRows = field(default_factory=LostRows)
+    late_rows: LateRows = field(default_factory=LateRows)
+    own_clock: OwnClock = field(default_factory=OwnClock)
+    imu_clock: ImuClock = field(default_factory=ImuClock)
+    #: from which the pattern of rows is drawn, which all sensors of a recording share
+    rows_seed: int = 0
 
     def __post_init__(self) -> None:
         for name, value, unit in (("rate", self.rate_hz, " Hz"), ("clock rate", self.clock.ratio, "")):
@@ -60,6 +68,13 @@ class Sampling:
 
         ``start`` is time zero of the recording.
         """
+        written, taken, _ = self.acquired(start, stop, rng)
+        return written, taken
+
+    def acquired(
+        self, start: float, stop: float, rng: np.random.Generator
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return written and true times (n,) s as `instants` does, and the true times (n,) one step before each."""
         late = self.offset.offset_s - self.phase_s
         rows = ((stop - start) * self.clock.ratio + late) * self.rate_hz
         if not rows < MOST_ROWS:
@@ -72,16 +87,34 @@ class Sampling:
         if self.offset.offset_s > 0.0:
             nominal = nominal[nominal >= self.offset.offset_s - 1e-9 / self.rate_hz]
         taken = start + true_time(self.clock, nominal - self.offset.offset_s)
-        written = nominal
+        taken, wrote = self._in_rows(start, taken)
+        before = np.concatenate([taken[:1], taken[:-1]])
+        taken, before = taken[wrote], before[wrote]
+        written = nominal[: taken.size]
         if self.dropped.fraction > 0:
-            taken = taken[rng.random(taken.size) >= self.dropped.fraction]
+            kept = rng.random(taken.size) >= self.dropped.fraction
+            taken, before = taken[kept], before[kept]
             written = nominal[: taken.size]
         if self.gaps > 0:
             kept = rng.random(taken.size) >= self.gaps
-            taken, written = taken[kept], written[kept]
+            taken, before, written = taken[kept], before[kept], written[kept]
         if self.jitter_s > 0:
-            taken = taken + self.jitter_s * rng.standard_normal(taken.size)
-        return written, np.clip(taken, start, stop)
+            shaken = self.jitter_s * rng.standard_normal(taken.size)
+            taken, before = taken + shaken, before + shaken
+        return written, np.clip(taken, start, stop), np.clip(before, start, stop)
+
+    def _in_rows(self, start: float, t: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Return when what a logger's steps at t (n,) s show was taken, and which of them wrote a row."""
+        rows = np.random.default_rng(self.rows_seed)
+        wrote = np.ones(t.size, dtype=np.bool_)
+        if self.lost_rows.fraction > 0.0:
+            wrote = written_rows(self.lost_rows, t.size, rows)
+        if self.late_rows.fraction > 0.0:
+            t = t + late_by(self.late_rows, t.size, rows)
+        for clock, stream in ((self.own_clock, 1), (self.imu_clock, 2)):
+            if clock.period_s > 0.0:
+                t = start + held_since(clock, t - start, np.random.default_rng([self.rows_seed, stream]))
+        return t, wrote
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from discsim.disc import Aero, aero_key
 from discsim.effects.catalogue import effect as catalogued
 from discsim.model_file import Model, ModelEffect
 from validation.diagnosis.consistency.driven import turning_of
-from validation.diagnosis.consistency.spin_agreement import Agreement, agreement_of
+from validation.diagnosis.consistency.spin_agreement import Agreement
 from validation.diagnosis.contradicted import contradicted_outcome
 from validation.diagnosis.design.next_recording import advise, confusions, in_words
 from validation.diagnosis.held_out import Choice, choices_without_each, heldout_chi2, heldout_gain
@@ -310,7 +310,9 @@ def outcome_of(judged: Judged, question: Question) -> Outcome:
     tried = judged.tried
     ready, found = tried.prepared, tried.found
     setup = answer_of_setup(ready.setup, question.recordings, tried.fit, judged.verdict)
-    warnings, agreement = (*setup.warnings, *ready.notes), agreement_of(ready.meant, question.names, ready.agreeing)
+    rows, agreement = ready.rows, ready.agreement
+    unsaid = () if rows is None or judged.verdict != "unexplained" else rows.sentences
+    warnings = (*setup.warnings, *unsaid, *ready.notes)
     turning = None
     if judged.verdict == "unexplained" and not plant_of(ready.meant[0]).path_known:
         turning = turning_of(question.recordings, question.names)
@@ -342,6 +344,10 @@ def _outcome_of_search(
     named = tuple(_named(found, candidate, less[candidate.name], names, choices, advice) for candidate in candidates)
     named = on_board_axes(named, judged.tried.prepared.setup, found.final.fit)
     partly = partly_explained(found, names) if unexplained and law is None else ()
+    rows = None if unexplained else judged.tried.prepared.rows
+    counted = () if rows is None else rows.effects()
+    places = () if rows is None else rows.located(max(float(one.nodes[-1]) for one in found.final.fit.trajectories))
+    missed = 0.0 if rows is None else rows.excess(found.final.fit.noise, found.final.fit.count)
     moved = recalibrations(best)
     baseline, final, held = _figures(found, unexplained, choices) if law is None else _with_law(found, law)
     diagnosis = Diagnosis(
@@ -349,10 +355,10 @@ def _outcome_of_search(
         found.recordings[0].plant,
         question.seed,
         judged.verdict,
-        _raised(baseline, setup.excess),
+        _raised(baseline, setup.excess + missed),
         final,
-        (*setup.located, *_located(found, candidates, names, unexplained, moved)),
-        (*setup.effects, *named),
+        (*setup.located, *places, *_located(found, candidates, names, unexplained, moved)),
+        (*setup.effects, *counted, *named),
         # what is missing, or put into a law that only resembles it, moves them by more than any noise
         {name: replace(item, sd=None) for name, item in moved.items()} if unexplained else moved,
         None if law is None else replace(law.law, also=law.also, leaves=_leaves(law, names)),
@@ -368,7 +374,7 @@ def _outcome_of_search(
         agreement,
         partly,
     )
-    model = _model(best, (*named, *setup.effects), diagnosis.law)
+    model = _model(best, (*named, *counted, *setup.effects), diagnosis.law)
     shown = _residuals(best, names, unexplained and law is None)
     return Outcome(diagnosis, model, tuple(shown), _candidates(found, candidates, names), settings_told())
 

@@ -8,8 +8,9 @@ from discsim.effects.own import UserEffect
 from discsim.recording import Recording
 from validation.diagnosis.assemble import outcome_of
 from validation.diagnosis.consistency.early_verdict import contradiction_after, contradiction_in
-from validation.diagnosis.consistency.spin_agreement import compared
+from validation.diagnosis.consistency.spin_agreement import agreement_of, compared
 from validation.diagnosis.datasets import recording_names
+from validation.diagnosis.detectors.row_times import row_times
 from validation.diagnosis.inertia import with_inertia
 from validation.diagnosis.prepared import prepared
 from validation.diagnosis.relaxed_fit import relaxed
@@ -65,19 +66,24 @@ def tried_under(setup: SetupFindings, question: Question) -> Tried:
     if contradiction is not None:
         return Tried(ready, contradiction)
     progress("following the data", 1, 5)
-    followed = relaxed(ready.fitted, known, agreeing=ready.agreeing)
+    followed = relaxed(ready.fitted, known, agreeing=ready.agreeing, supposed=ready.supposed)
     contradiction = contradiction_after(followed)
     if contradiction is not None:
         return Tried(ready, contradiction)
-    found = search(ready.fitted, progress, ready.meant, followed, free, setup.hints, question.effects)
+    hints = (*ready.supposed, *setup.hints)
+    found = search(ready.fitted, progress, ready.meant, followed, free, hints, question.effects)
     return Tried(ready, None, found)
 
 
 def prepared_under(setup: SetupFindings, question: Question) -> Prepared:
     """Return recordings as a setup says that they were meant, as a fit can use them."""
     meant, warnings = prepared(setup.recordings, question.names)
-    fitted, notes = with_inertia(meant)
-    return Prepared(setup, tuple(meant), tuple(fitted), (*warnings, *notes), compared(meant, question.names))
+    agreeing = compared(meant, question.names)
+    agreement = agreement_of(meant, question.names, agreeing)
+    rows = row_times(meant, question.names, agreement)
+    timed = meant if rows is None else rows.applied(meant)
+    fitted, notes = with_inertia(timed)
+    return Prepared(setup, tuple(meant), tuple(fitted), (*warnings, *notes), agreeing, agreement, rows)
 
 
 def likeliest_fault(tried: Tried) -> SetupFindings | None:

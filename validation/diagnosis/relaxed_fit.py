@@ -14,15 +14,16 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.arrays import FloatArray, sd_by_median
-from discsim.effects.catalogue import CATALOGUE, catalogued
+from discsim.effects.catalogue import CATALOGUE, Effect, catalogued
 from discsim.effects.sensors import ClockRate
 from discsim.frames import conjugate, multiply
 from discsim.recording import Recording
+from validation.diagnosis.consistency.followed import true_noise
 from validation.diagnosis.consistency.spin_agreement import Comparison, compared, written_ratios
 from validation.diagnosis.settings import CONSISTENCY, RELAXED_FIT
 from validation.identification.gauss_newton import Fit, linearised, merit_of, refit
 from validation.identification.linear import Linear
-from validation.identification.noise import channel_of, estimate_noise, stated_noise, whitened
+from validation.identification.noise import channel_of, estimate_noise, robust_noise, stated_noise, whitened
 from validation.identification.ordinary_errors import ordinary_errors
 from validation.identification.parameters import Parameter, Values
 from validation.identification.plants import plant_of
@@ -67,10 +68,11 @@ def first_trajectory(recording: Recording, ratio: float = 1.0, nodes: FloatArray
     return trajectory_of(recording, nodes, plant_of(recording).initial.states(recording, nodes[:-1], ratio))
 
 
-def ordinary(sensors: set[str], plant: str) -> tuple[Parameter, ...]:
+def ordinary(sensors: set[str], plant: str, *, small: bool = False) -> tuple[Parameter, ...]:
     """Return the parameters that a relaxed fit sets free within a prior, of the sensors that are there."""
-    chosen = []
-    for id, name, sigma, _ in ordinary_errors("relaxed fit"):
+    chosen = list[Parameter]()
+    uses = ("relaxed fit", "relaxed fit of free-running parts") if small else ("relaxed fit",)
+    for id, name, sigma, _ in [error for use in uses for error in ordinary_errors(use)]:
         row = CATALOGUE[id]
         if plant in row.plants and (row.acts_on == "motion" or row.acts_on in sensors):
             size = row.scale[row.parameters.index(name)]
@@ -80,13 +82,19 @@ def ordinary(sensors: set[str], plant: str) -> tuple[Parameter, ...]:
 
 def unknowns(recordings: Sequence[Recording]) -> tuple[Parameter, ...]:
     """Return what each recording leaves open beside its states: how the wobble of a free spin dies and turns."""
-    own = plant_of(recordings[0]).own
-    return tuple(replace(q, recordings=frozenset([i])) for i in range(len(recordings)) for q in own)
+    plant = plant_of(recordings[0])
+    return tuple(
+        replace(q, recordings=frozenset([i]))
+        for i, recording in enumerate(recordings)
+        for q in (*plant.own, *(plant.held if "accelerometer" in recording else ()))
+    )
 
 
-def relaxed_parameters(recordings: Sequence[Recording], sensors: set[str]) -> tuple[Parameter, ...]:
+def relaxed_parameters(
+    recordings: Sequence[Recording], sensors: set[str], *, small: bool = False
+) -> tuple[Parameter, ...]:
     """Return all that a relaxed fit of recordings with some sensors sets free beside stated numbers."""
-    return (*unknowns(recordings), *ordinary(sensors, recordings[0].plant))
+    return (*unknowns(recordings), *ordinary(sensors, recordings[0].plant, small=small))
 
 
 # far from the data a motion may run beyond all numbers: such a step is not finite, and is not taken
@@ -96,10 +104,12 @@ def relaxed(
     known: Sequence[Parameter] = (),
     iterations: int = 12,
     agreeing: Sequence[Sequence[Comparison]] | None = None,
+    supposed: Sequence[Effect] = (),
 ) -> Fit:
     """Fit recordings of one plant so loosely that any effect of ordinary size finds room.
 
-    ``agreeing`` is what their sensors say of one another (`compared`), where that is known.
+    ``agreeing`` is what their sensors say of one another (`compared`), where that is known; ``supposed`` are effects of
+    about the right size that they ask for, whose numbers are free beside the ordinary ones.
     """
     plant = plant_of(recordings[0])
     ratio = _wrong_time(recordings, agreeing)
@@ -108,12 +118,14 @@ def relaxed(
     )
     sensors = {readings.sensor for one in trajectories for readings in one.readings}
     clock = () if ratio == 1.0 else (Parameter(*_CLOCK, 1.0, 1e-6, RELAXED_FIT.time_sigma),)
-    parameters = (*known, *relaxed_parameters(recordings, sensors), *clock)
+    parameters = (*known, *relaxed_parameters(recordings, sensors, small=bool(supposed)), *clock, *_supposed(supposed))
     at = np.array([ratio if q.key == _CLOCK else q.stated for q in parameters])
     fit = Fit(trajectories, parameters, at, plant.sizes.relaxed, {})
     bare = linearised(fit, ())
-    fit = replace(fit, noise=stated_noise(bare))
-    fit = refit(fit, iterations=iterations, tolerance=1e-4 * sum(linear.raw.size for linear in bare))
+    seen = true_noise([readings for trajectory in trajectories for readings in trajectory.readings])
+    fit = replace(fit, noise=stated_noise(bare, {group: level.sd for group, level in seen.items()}))
+    few = 1e-4 * sum(linear.raw.size for linear in bare)
+    fit = _reweighted(fit, iterations, few) if supposed else refit(fit, iterations=iterations, tolerance=few)
     fit = from_other_initial_states(fit)
     if not plant.airborne:
         fit = _with_own_clock(fit)
@@ -125,6 +137,38 @@ def relaxed(
     fit = replace(fit, trajectories=trajectories)
     linears = linearised(fit)
     return replace(fit, linears=linears, merit=merit_of(fit, linears))
+
+
+#: rounds in which what a fit leaves weighs the sensors anew, and steps in each
+_ROUNDS, _EACH = 3, 5
+
+
+def _reweighted(fit: Fit, iterations: int, tolerance: float) -> Fit:
+    """Fit in rounds, each in the noise that the one before has left, where that is above what is stated.
+
+    Of sensors whose errors are many the one with the least noise would bend the motion until the others are lost.
+    """
+    stated = fit.noise
+    for k in range(_ROUNDS):
+        fit = refit(fit, iterations=iterations if k == 0 else _EACH, tolerance=tolerance)
+        left = robust_noise(fit.linears, [linear.residual for linear in fit.linears])
+        fit = replace(fit, noise={g: level if level.sd > stated[g].sd else stated[g] for g, level in left.items()})
+    return replace(fit, merit=merit_of(fit, fit.linears))
+
+
+#: one sigma of what is supposed, as a share of its size: what dies away within a recording is told to a tenth
+_SUPPOSED = 0.3
+
+
+def _supposed(effects: Sequence[Effect]) -> tuple[Parameter, ...]:
+    """Return the numbers of supposed effects, about their sizes."""
+    found = []
+    for effect in effects:
+        row = effect.row
+        for name, scale in zip(row.parameters, row.scale, strict=True):
+            value = float(getattr(effect.value, name))
+            found.append(Parameter(effect.id, name, value, 0.1 * scale, _SUPPOSED * abs(value)))
+    return tuple(found)
 
 
 def _wrong_time(recordings: Sequence[Recording], agreeing: Sequence[Sequence[Comparison]] | None) -> float:

@@ -6,15 +6,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from discsim.effects.catalogue import Effect, effect_of
+from discsim.effects.sensors import Lag
 from discsim.recording import Recording
 from validation.diagnosis.consistency.early_verdict import Contradiction
-from validation.diagnosis.consistency.spin_agreement import Comparison
+from validation.diagnosis.consistency.spin_agreement import Agreement, Comparison
+from validation.diagnosis.detectors.row_times import RowTimes
 from validation.diagnosis.result import Verdict
 from validation.diagnosis.selection.search_state import Search
 from validation.diagnosis.setup import SetupFindings
 from validation.diagnosis.unknown_law.find import FoundLaw
 from validation.identification.competing_effects import CATALOGUED, Competing
 from validation.identification.gauss_newton import Fit
+from validation.identification.plants import plant_of
 from validation.identification.plants.plan import Plan
 
 __all__ = ["Judged", "Prepared", "Progress", "Question", "Tried", "silent"]
@@ -48,7 +52,8 @@ class Question:
 class Prepared:
     """Recordings under a supposed setup: as they were ``meant``, and as they are ``fitted``; what must be known.
 
-    ``agreeing`` are the comparisons of each recording's sensors with one another.
+    ``agreeing`` are the comparisons of each recording's sensors with one another, ``agreement`` what they come to;
+    ``rows`` tells when the rows were made, where that was counted.
     """
 
     setup: SetupFindings
@@ -56,6 +61,16 @@ class Prepared:
     fitted: tuple[Recording, ...]
     notes: tuple[str, ...]
     agreeing: tuple[tuple[Comparison, ...], ...]
+    agreement: Agreement | None = None
+    rows: RowTimes | None = None
+
+    @property
+    def supposed(self) -> tuple[Effect, ...]:
+        """The effects, of about the right size, that sensors which were asked of one another leave to a fit."""
+        settling = None if self.agreement is None else self.agreement.settling
+        if settling is None or not plant_of(self.fitted[0]).held:
+            return ()
+        return (effect_of(Lag(settling.tau_s), "accelerometer"),)
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,7 +49,7 @@ def judged(tried: Tried, progress: Progress) -> Judged:
     verdict: Verdict
     if left or law is not None:
         verdict = "unexplained"
-    elif found.final.hypothesis.candidates or tried.prepared.setup.faults:
+    elif found.final.hypothesis.candidates or tried.prepared.setup.faults or tried.prepared.rows is not None:
         verdict = "explained"
     else:
         moved = any(item.beyond for item in recalibrations(found).values())

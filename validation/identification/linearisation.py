@@ -130,8 +130,8 @@ class _Around:
     def _set_parameter(self, row: int, column: Column, sign: float) -> None:
         """Move a parameter of the motion in one row of neighbours."""
         group, name, size, given = column
-        if column.key in self.plant.own_keys:
-            self.owns[row, self.plant.own_keys.index(column.key)] += sign * size
+        if column.key in self.plant.motion_keys:
+            self.owns[row, self.plant.motion_keys.index(column.key)] += sign * size
             return
         for shape, number in given:
             self.flats[row, place_in_flat(group, shape, self.effects)] = number
@@ -146,7 +146,7 @@ class _Around:
         recording = self.recording
         if group == "environment" and name.startswith("magnetic_"):
             return float(recording.environment.magnetic_field[["north", "east", "down"].index(name.split("_")[1])])
-        own = next((q for q in self.plant.own if q.key == (group, name)), None)
+        own = next((q for q in (*self.plant.own, *self.plant.held) if q.key == (group, name)), None)
         if own is not None:
             return own.stated
         return float(parameters(recording.environment, recording.disc, recording.rig)[parameter_index(group, name)])
@@ -304,7 +304,7 @@ class _Read:
                     for other, sign in ((neighbour, 1.0), (neighbour + around.half, -1.0))[: 1 + bool(around.central)]:
                         row = row_of_neighbour[other]
                         shown[row] = self._also_moved(s.sensor, t, mine[row], around.columns[j], sign)
-            self.ideal[which][o] = shown[0]
+            self.ideal[which][o] = shown[0] + s.held[o]
             slopes, ahead = around.slopes(shown, acting), acting[(acting > 0) & (acting <= around.half)]
             self.slopes[which][o[:, None], :, around.places[ahead - 1]] = np.moveaxis(slopes, 0, 1)
 
@@ -363,6 +363,10 @@ def _add_sensor_columns(around: _Around, s: Sampled, rows: FloatArray, M: FloatA
     values = around.values
     rate: FloatArray | None = None
     for j, (group, name, size, given) in enumerate(around.columns):
+        if (group, name) in around.plant.held_keys:
+            if s.dying is not None:
+                M[:, around.plant.held_keys.index((group, name)), around.d + j] = s.dying
+            continue
         if j in around.motion or not _concerns(group, s.sensor, around.effects):
             continue
         here = {**values, **{(group, shape): number for shape, number in given}}
@@ -377,6 +381,8 @@ def _add_sensor_columns(around: _Around, s: Sampled, rows: FloatArray, M: FloatA
             else:
                 late = s.lag_slope
             M[:, :, place] = -rate * late[:, None]
+            if group in _LAGS:
+                M[:, :, place] += s.held_slope
             continue
         base = around.current(group, name)
         up = around.read(s.sensor, {**here, (group, name): base + size}, s.instants, rows)
@@ -404,7 +410,7 @@ def _moves(column: Column, plant: Plant, effects: Competing) -> bool:
     """Tell whether a column is of the motion; the field of the earth is only read."""
     if column.group == "environment":
         return column.key in FLAT_ENVIRONMENT
-    return is_motion(column.group, effects) or column.key in plant.own_keys
+    return is_motion(column.group, effects) or column.key in plant.motion_keys
 
 
 def _concerns(group: str, sensor: str, effects: Competing) -> bool:
@@ -419,7 +425,7 @@ def _counted(s: Sampled, prediction: FloatArray, axis: int) -> IntArray:
     """Return the places of the readings of one axis that take part beside a prediction (n, width)."""
     readings, limit = s.readings, s.readings.limit
     good = readings.good[:, axis]
-    if s.tau > 0:
+    if s.tau > 0 and s.dying is None:
         good = good & (readings.t > _FORGOTTEN * s.tau)
     if limit is not None:
         # a clipped reading says only that the motion was beyond the range

@@ -34,7 +34,8 @@ def readings_of(recording: Recording) -> tuple[Readings, ...]:
                 clipped, limit = np.abs(measured) >= lower - 1e-9 * lower, lower
         good = np.isfinite(measured) & ~clipped
         axes = tuple(SENSORS[sensor].columns)
-        one = Readings(sensor, samples.t, measured, good, clipped, sd, axes, limit)
+        taken, weights = recording.averaged.get(sensor, (None, None))
+        one = Readings(sensor, samples.t, measured, good, clipped, sd, axes, limit, taken, weights)
         found += plant_of(recording).observed(recording, one)
     return tuple(found)
 

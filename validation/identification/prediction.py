@@ -43,20 +43,31 @@ class Sampled:
         self.tau = 0.0
         self.written = readings.t if readings.taken is None else readings.taken.ravel()
         self.weights = readings.weights
-        written = self.written
-        taken = written - self.delays(values)
-        self.tau = sized(values, Lag, self.sensor).tau_s if self.weights is None else 0.0
-        self.nodes = 1
+        taken = self.written - self.delays(values)
+        self.tau = sized(values, Lag, self.sensor).tau_s
+        #: what is left of what a lag held when the recording began, a share (m,); None where that is left out
+        self.dying: FloatArray | None = None
         if self.tau > 0:
-            self.weights = np.repeat(_LAG_WEIGHTS[:, None], written.size, axis=1)
-            # every reading is a weighted mean over its past
+            own = np.ones((1, taken.size)) if self.weights is None else self.weights
+            # every sample is a weighted mean over its past
+            self.weights = (_LAG_WEIGHTS[:, None, None] * own).reshape(-1, own.shape[1])
             past = taken[None, :] - self.tau * _LAG_NODES[:, None]
+            self.lag_slope = np.repeat(_LAG_NODES, taken.size)
+            if current.plant.held and self.sensor == "accelerometer":
+                self.lag_slope[past.ravel() < 0.0] = 0.0
+                past = np.maximum(past, 0.0)
+                self.dying = np.tile(np.exp(-np.maximum(taken, 0.0) / self.tau), _LAG_NODES.size)
             self.instants = past.ravel()
-            self.lag_slope = np.repeat(_LAG_NODES, written.size)
         else:
             self.instants = taken
-            self.lag_slope = np.ones(written.size)
+            self.lag_slope = np.ones(taken.size)
         self.nodes = 1 if self.weights is None else self.weights.shape[0]
+        #: what a lag still held (m, width) at these instants, and how that grows with its time constant
+        self.held = self.held_slope = np.zeros((self.instants.size, self.width))
+        if self.dying is not None:
+            began = np.array([values.get(key, 0.0) for key in current.plant.held_keys])
+            self.held = self.dying[:, None] * began
+            self.held_slope = self.held * np.tile(np.maximum(taken, 0.0), _LAG_NODES.size)[:, None] / self.tau**2
 
     def delays(self, values: Values) -> FloatArray:
         """Return how much earlier than written the readings (nodes n,) show the motion."""
@@ -119,7 +130,7 @@ def read(current: Trajectory, values: Values, readings: Readings) -> FloatArray:
     Noise, rounding and range are left to whoever asks.
     """
     sampled = Sampled(current, readings, values)
-    return sampled.weighted(shown(current, values, readings.sensor, sampled.instants))
+    return sampled.weighted(shown(current, values, readings.sensor, sampled.instants) + sampled.held)
 
 
 class Shiftable(NamedTuple):

@@ -564,6 +564,6 @@ def test_a_path_alone_is_flown_in_longer_steps_and_is_the_same_path():
     paths = []
     for runner in runners:
         times, last = runner.times(0.0, 0.9, 0.9, state)
-        flat, wobble = base_flat(whole, values)[None], np.zeros((1, len(FREE_SPIN.own_keys)))
+        flat, wobble = base_flat(whole, values)[None], np.zeros((1, len(FREE_SPIN.motion_keys)))
         paths.append(runner.run(flat, wobble, state[None], times, last, np.linspace(0.0, 0.9, 30))[0][0, :, :3])
     np.testing.assert_allclose(*paths, atol=1e-4)

@@ -246,6 +246,8 @@ def hiding_of(id: str) -> Hiding:
     return Hiding(alike, low, high, "the row's scale", ranges, about[first], row.sign.get(first, 0.0) > 0.0)
 
 
+#: the detector of what is counted row by row: such effects come in groups, and are concealed where they are asked for
+_COUNTED = "row_times"
 #: effects that unknowns of a plant take in: the part of a free spin's acceleration that turns with the spin is
 #: unmodelled, and the rest hardly changes
 _HIDDEN_FOR_GOOD: Mapping[Plant, frozenset[str]] = MappingProxyType(
@@ -260,6 +262,7 @@ def conceivable(plant: Plant, sensors: tuple[str, ...]) -> list[str]:
         for row in CATALOGUE.values()
         if plant in row.plants
         and not row.setup
+        and row.detector != _COUNTED
         and row.acts_with(sensors)
         and row.id not in _HIDDEN_FOR_GOOD.get(plant, ())
     ]

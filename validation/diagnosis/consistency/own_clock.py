@@ -10,7 +10,7 @@ motion is linear in its unknowns, so that nothing but whole numbers is chosen, a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -92,6 +92,12 @@ class SamplesShown:
         at = (self.newest - 0.5 * self.apart) * self.period_of_others_s
         return np.asarray(at - at[0])
 
+    def averaged(self, first: float) -> tuple[FloatArray, FloatArray]:
+        """Return the times (2, n) s and weights (2, n) of the samples of each row, whose first is of time ``first``."""
+        middle = first + self.times()
+        half = 0.5 * self.apart * self.period_of_others_s
+        return np.stack([middle + half, middle - half]), np.full((2, self.newest.size), 0.5)
+
     def to_json(self) -> dict[str, Any]:
         """Return the JSON object."""
         return {
@@ -120,7 +126,12 @@ class OwnClock:
         field = signal_of(recording, "field")
         if mine is None or field is None:
             return None
-        return retimed(recording, field.t, field.t[0] + mine.times())
+        if not np.array_equal(field.t, recording.samples["magnetometer"].t):
+            return retimed(
+                recording, field.t, field.t[0] + mine.times()
+            )  # a row without a field: its sample is unknown
+        timed = retimed(recording, field.t, field.t[0] + mine.times())
+        return replace(timed, averaged={"magnetometer": mine.averaged(float(field.t[0]))})
 
     @property
     def sentences(self) -> list[str]:

@@ -16,11 +16,12 @@ import numpy as np
 
 from discsim.effects import Effect
 from discsim.effects.catalogue import catalogued
-from discsim.effects.sensors import DroppedSamples
+from discsim.effects.sensors import DroppedSamples, Lag
 from discsim.recording import Recording
 from validation.diagnosis.detectors.all import searched
 from validation.diagnosis.detectors.dropped_samples import PhaseLosses, Shifted
 from validation.diagnosis.relaxed_fit import relaxed, unknowns, without_outliers
+from validation.diagnosis.selection.all_at_once import all_at_once
 from validation.diagnosis.selection.candidates import CandidateEffect, candidates_for, in_parameters, parameters_of
 from validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from validation.diagnosis.selection.evidence import ONE_SIDED, price
@@ -63,6 +64,8 @@ Report: TypeAlias = Callable[[str, int, int], None]
 Offer: TypeAlias = tuple[ScreenedCandidate, Fit, float]
 
 _DROPPED = catalogued(DroppedSamples, "magnetometer").id
+#: the lag that holds what was there before a recording began
+_HELD = catalogued(Lag, "accelerometer").id
 
 
 # a hypothesis far from the data may send a motion beyond all numbers: such a fit is not finite, and is passed over
@@ -109,6 +112,9 @@ def screened(
     )
     noise = estimate_noise(relaxed_fit.linears, [linear.residual for linear in relaxed_fit.linears])
     given = {q.group for q in free}
+    if relaxed_fit.plant.held and _HELD not in {hint.id for hint in hints}:
+        # of means over turns a lag changes nothing but how what it holds dies away, which was asked before any fit
+        given.add(_HELD)
     candidates = tuple(candidate for candidate in candidates_for(recordings, effects) if candidate.id not in given)
     report("asking every effect", 1, 4)
     equations = normal_equations_of(relaxed_fit, candidates, noise, relaxed_fit.plant.sizes.continuous)
@@ -157,7 +163,13 @@ def _baseline(
 
 def _selected_forward(found: Search) -> Search:
     """Return the search with effects added as long as one is worth its price."""
-    for step in range(SELECTION.most_effects):
+    most = SELECTION.most_effects
+    if (begun := all_at_once(found)) is not None:
+        found = _with_final(found, eliminated_backward(found, begun))
+        if far(found, found.final):
+            return found
+        most += len(found.final.hypothesis.candidates)
+    for step in range(len(found.final.hypothesis.candidates), most):
         current = found.final
         found, better = next_effect(found, current, step)
         if step == 0 and far(found, current) and (better is None or far(found, better)) and not _told(better):
@@ -165,7 +177,7 @@ def _selected_forward(found: Search) -> Search:
             if together is not None:
                 found = _with_final(found, eliminated_backward(found, together))
                 continue
-        if better is None or len(better.hypothesis.candidates) > SELECTION.most_effects:
+        if better is None or len(better.hypothesis.candidates) > most:
             break
         if step == 0 and far(found, better) and not _told(better) and no_nearer(found, current, better):
             # neither one effect nor two come near the data, nor does any lead there

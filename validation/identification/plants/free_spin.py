@@ -237,6 +237,10 @@ _WOBBLE = (
 )
 
 
+#: what a lagging accelerometer holds of the hand that threw, m/s^2: releases of a disc reach 100 m/s^2 and more
+_HELD = tuple(Parameter(_NAME, f"held_{axis}_m_s2", 0.0, 0.1, 100.0) for axis in "xyz")
+
+
 def _nodes(recording: Recording, segment: float) -> FloatArray:
     """Return the nodes (k + 1,) of segments, s: just after release the moments of the air change fast."""
     end = max(recording.end, 1e-3) + 1e-6
@@ -396,6 +400,7 @@ FREE_SPIN = Plant(
     ),
     nodes=_nodes,
     own=_WOBBLE,
+    held=_HELD,
     hardware=("disc",),
     observed=_observed,
     path_known=False,

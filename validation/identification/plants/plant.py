@@ -337,6 +337,10 @@ class Plant:
     own : tuple of Parameter
         Parameters of its motion that neither the catalogue nor a recording's hardware has, with what is known of them
         before any reading; their group is its name. Each recording has its own, unless a fit says otherwise.
+    held : tuple of Parameter
+        What an accelerometer that lags still holds along x, y, z when a recording begins, beyond what it would read
+        had it been there for long, m/s^2; of their group, and each recording's own, too. Where there are none, what
+        such a lag remembers is left out.
     hardware : tuple of str
         The groups of stated numbers that its motion depends on: "disc", "aero", "rig".
     lacks : function
@@ -368,6 +372,7 @@ class Plant:
     durations: Durations
     nodes: Callable[[Recording, float], FloatArray] = even_nodes
     own: tuple[Parameter, ...] = ()
+    held: tuple[Parameter, ...] = ()
     hardware: tuple[str, ...] = ()
     lacks: Callable[[Recording], str | None] = _nothing_lacks
     observed: Callable[[Recording, Readings], Sequence[Readings]] = _as_read
@@ -396,8 +401,18 @@ class Plant:
 
     @cached_property
     def own_keys(self) -> tuple[tuple[str, str], ...]:
-        """Group and name of its own parameters."""
-        return tuple(parameter.key for parameter in self.own)
+        """Group and name of its own parameters, those of the motion first."""
+        return tuple(parameter.key for parameter in (*self.own, *self.held))
+
+    @cached_property
+    def motion_keys(self) -> tuple[tuple[str, str], ...]:
+        """Group and name of its own parameters that act on the motion."""
+        return self.own_keys[: len(self.own)]
+
+    @cached_property
+    def held_keys(self) -> tuple[tuple[str, str], ...]:
+        """Group and name of what a lag holds when a recording begins."""
+        return self.own_keys[len(self.own) :]
 
     def own_values(self, values: Values) -> FloatArray:
         """Return its own parameters (o,), as given or as they stand without a fit."""

@@ -2,58 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import cache
-
 import numpy as np
 import pytest
-from support.made import MODULE, throws
+from support.logger_loop import LOOP, NAMES, PERIOD, logged, motions
 
-from discsim.recording import Recording, Samples
-from discsim.sensors.sampling import Noise, Sampling
 from validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
 from validation.diagnosis.consistency.time_stamp_recovery import rows_of
-
-#: the logger's loop and the part's period, s: the loop skips a sample every 1 / (LOOP / PERIOD - 1) steps
-LOOP, PERIOD = 0.01, 0.0094
-NAMES = ["a", "b"]
-
-
-@cache
-def motions() -> tuple[Recording, ...]:
-    """Return throws whose sensors are read so often that any instant's readings lie on a line between two."""
-    often = Sampling(1000.0)
-    board = MODULE.without("gps").fitted("gyroscope", range=100.0, sampling=often)
-    board = board.fitted("magnetometer", sampling=often, noise=Noise(0.02), resolution=0.0).fitted(
-        "accelerometer", sampling=often
-    )
-    return tuple(throws(module=board, plant="free_spin", seconds=2.0))
-
-
-def logged(recording: Recording, seed: int, *, own_clock: bool, weight: float) -> tuple[Recording, np.ndarray]:
-    """Return what a loop writes of a motion that loses a fifth of its rows, and the newest sample of each row."""
-    rng = np.random.default_rng(seed)
-    steps = np.arange(2, int(1.9 / LOOP))
-    kept = steps[rng.random(steps.size) > 0.2]
-    phase = rng.uniform(0.0, PERIOD)
-
-    def sampled(step: np.ndarray) -> np.ndarray:
-        t = step * LOOP
-        return phase + PERIOD * np.floor((t - phase) / PERIOD) if own_clock else t
-
-    samples = {}
-    for name, own in recording.samples.items():
-
-        def at(t: np.ndarray, own: Samples = own) -> np.ndarray:
-            return np.column_stack([np.interp(t, own.t, column) for column in own.value.T])
-
-        if name == "magnetometer":
-            value = (1.0 - weight) * at(sampled(kept)) + weight * at(sampled(kept - 1))
-            value = np.round((value + rng.normal(0.0, 0.1, value.shape)) / 0.01) * 0.01
-        else:
-            value = at(kept * LOOP)
-        samples[name] = Samples(LOOP * np.arange(kept.size), value)
-    return replace(recording, samples=samples), np.rint((sampled(kept) - phase) / PERIOD).astype(int)
 
 
 def found(seed: int, *, own_clock: bool, weight: float) -> tuple[OwnClock | None, list[np.ndarray]]:

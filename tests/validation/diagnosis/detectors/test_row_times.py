@@ -1,0 +1,82 @@
+"""Rows that are counted before any fit: believed where another sensor gains, applied, and named as effects."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from support import logger_loop as loop
+
+from discsim.effects import effect
+from discsim.recording import Recording, Samples
+from validation.diagnosis.consistency.spin_agreement import agreement_of
+from validation.diagnosis.detectors.row_times import RowTimes, row_times
+from validation.identification.noise import GroupNoise
+from validation.identification.observations import readings_of
+
+NAMES = tuple(loop.NAMES)
+HIDDEN = (
+    effect("clock.lost_rows", fraction=0.2),
+    effect("mag.own_clock", period_s=0.0094),
+    effect("mag.average", weight=0.5),
+)
+
+
+@cache
+def logged() -> tuple[Recording, ...]:
+    """Return free spins as a logger without time writes them: lost rows, and a magnetometer with its own clock."""
+    return tuple(loop.logged(one, 1 + k, own_clock=True, weight=0.5)[0] for k, one in enumerate(loop.motions()))
+
+
+@cache
+def counted() -> RowTimes:
+    found = row_times(logged(), NAMES, agreement_of(logged(), NAMES))
+    assert found is not None
+    return found
+
+
+def test_what_was_counted_is_named_with_its_sizes():
+    named = {one.id: one for one in counted().effects()}
+    assert list(named) == [one.id for one in HIDDEN]
+    assert named["clock.lost_rows"].parameters["fraction"].value == pytest.approx(0.2, abs=0.06)
+    assert named["mag.own_clock"].parameters["period_s"].value == pytest.approx(0.0094, rel=5e-3)
+    for one in named.values():
+        assert one.evidence.delta_bic > 100.0
+        assert one.evidence.heldout_delta_log_likelihood is not None
+        assert one.evidence.heldout_delta_log_likelihood > 50.0
+
+
+def test_a_fit_sees_the_field_as_means_of_two_samples_at_their_times():
+    for before, after in zip(logged(), counted().applied(logged()), strict=True):
+        field = next(one for one in readings_of(after) if one.sensor == "magnetometer")
+        assert field.taken is not None
+        assert field.weights is not None
+        assert field.taken.mean(axis=0) == pytest.approx(field.t)
+        assert np.all(np.isin(np.rint((field.taken[0] - field.taken[1]) / 0.0094), (1.0, 2.0)))
+        # a fifth of the rows is missing, so that it lasted longer than it is written
+        assert after.end / before.end == pytest.approx(1.25, abs=0.1)
+        assert {len(own) for own in after.samples.values()} == {len(own) for own in before.samples.values()}
+
+
+def test_the_baseline_is_charged_for_the_field_as_it_is_written():
+    found = counted()
+    loud, still = (found.excess({"magnetometer": GroupNoise(sd)}, 1000) for sd in (0.2, 0.1))
+    assert still == pytest.approx(4.0 * loud)
+    assert loud > 10.0
+
+
+def test_counts_that_no_other_sensor_bears_out_are_not_believed():
+    rng = np.random.default_rng(1)
+
+    def still(one: Recording) -> Recording:
+        rates = one.samples["gyroscope"]
+        value = rates.value.copy()
+        value[:, :2] = rng.normal(0.0, 0.01, (len(rates), 2))
+        return replace(one, samples={**one.samples, "gyroscope": Samples(rates.t, value)})
+
+    agreement = agreement_of(logged(), NAMES)
+    assert row_times([still(one) for one in logged()], NAMES, agreement) is None
+    assert row_times(logged()[:1], NAMES[:1], agreement) is None
+    assert row_times(logged(), NAMES, None) is None

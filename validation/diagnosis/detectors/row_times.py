@@ -1,0 +1,154 @@
+"""When rows were made, as counted before any motion is fitted: lost rows, a magnetometer's own clock, means of two.
+
+Takes what the sensors of recordings say of one another (`Agreement`); gives the recordings in the times that their rows
+were made, and the effects that stand for that in an answer. The counts stand fixed while the physics is fitted: if they
+moved with a fit they would follow whatever it lacks. They are believed only where a sensor that took no part in them
+gains by the same times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from discsim.arrays import FloatArray
+from discsim.effects.catalogue import catalogued
+from discsim.effects.timing_rows import Average, LostRows, OwnClock
+from discsim.recording import Recording
+from validation.diagnosis.answer.measured import Located
+from validation.diagnosis.answer.named import SMALLEST_P_VALUE, Evidence, NamedEffect, ParameterValue
+from validation.diagnosis.consistency.own_clock import OwnClock as FoundClock
+from validation.diagnosis.consistency.phase_regression import angle_turned, signal_of
+from validation.diagnosis.consistency.spin_agreement import Agreement, RowProof
+from validation.identification.noise import NoiseModel
+
+__all__ = ["RowTimes", "row_times"]
+
+#: what a second sensor must gain in twice the log likelihood by times that it took no part in: an effect's entry
+_SECOND = 24.0
+#: recordings of one logger have one period: their own ones may differ by this share
+_ALIKE = 5e-3
+#: knots of the wobble's amplitude, s, as in the count itself by half: it halves in 0.3 s or more
+_KNOTS_S = 0.15
+
+
+@dataclass(frozen=True)
+class RowTimes:
+    """What was counted of recordings (called ``names``), and what each gains by it."""
+
+    names: tuple[str, ...]
+    clock: FoundClock
+    proofs: tuple[RowProof, ...]
+
+    def applied(self, recordings: Sequence[Recording]) -> list[Recording]:
+        """Return the recordings in the times that their rows were made, their fields as means of two samples."""
+        pairs = zip(recordings, self.names, strict=True)
+        return [self.clock.counted(recording, name) or recording for recording, name in pairs]
+
+    @property
+    def _gains(self) -> tuple[float, float]:
+        """Twice the log likelihood of the field that counted rows gain, and the samples that they show beyond that."""
+        rows = clock = 0.0
+        for shown in self.clock.shown:
+            proof = next((one for one in self.proofs if one.recording == shown.recording), None)
+            if proof is not None:
+                # x and y of each row; the pattern costs what its numbers are unlikely
+                _, times = np.unique(np.diff(shown.newest), return_counts=True)
+                price = -2.0 * float(np.sum(times * np.log(times / times.sum())))
+                rows += 4.0 * shown.newest.size * float(np.log(proof.left[1] / proof.left[2])) - price
+            clock += 4.0 * shown.newest.size * float(np.log(shown.left[0] / shown.left[1]))
+        return rows, clock
+
+    def effects(self) -> tuple[NamedEffect, ...]:
+        """Return what was counted as effects of an answer; figures of each recording are by the period of others."""
+        rows, clock = self._gains
+        lost = np.array([shown.lost for shown in self.clock.shown])
+        error = float(np.std(lost, ddof=1) / np.sqrt(lost.size)) if lost.size > 1 else None
+        held = len(self.clock.shown) > 1
+
+        def named(kind: type, acts_on: str, value: float, sd: float | None, gain: float) -> NamedEffect:
+            row = catalogued(kind, acts_on)
+            bic = gain - float(np.log(max(sum(shown.newest.size for shown in self.clock.shown), 2)))
+            evidence = Evidence(bic, 0.5 * gain if held else None, SMALLEST_P_VALUE)
+            return NamedEffect(row.id, {row.parameters[0]: ParameterValue(value, sd)}, evidence, None, ())
+
+        return (
+            named(LostRows, "clock", float(np.mean(lost)), error, rows),
+            named(OwnClock, "magnetometer", self.clock.period_s, self.clock.sd_s, clock),
+            named(Average, "magnetometer", 0.5, None, clock),
+        )
+
+    def located(self, end: float) -> tuple[Located, ...]:
+        """Return where recordings that end by ``end`` s part from a baseline for it: in the field, all along."""
+        rows, clock = self._gains
+        share = float(np.clip(rows / max(rows + clock, 1e-300), 0.0, 1.0))
+        row, own = catalogued(LostRows, "clock"), catalogued(OwnClock, "magnetometer")
+        return (
+            Located("all", "all", "all", 0.0, end, share, row.trace, row.grows_with),
+            Located("all", "magnetometer", "all", 0.0, end, 1.0 - share, own.trace, own.grows_with),
+        )
+
+    def excess(self, noise: NoiseModel, count: int) -> float:
+        """Return the chi-squared per reading, of ``count``, by which a baseline misses the field as it is written."""
+        variance = noise["magnetometer"].sd ** 2
+        left = {proof.recording: proof.left[0] for proof in self.proofs}
+        squares = [
+            shown.newest.size * max(left[shown.recording] ** 2 - shown.left[1] ** 2, 0.0)
+            for shown in self.clock.shown
+            if shown.recording in left
+        ]
+        return sum(squares) / variance / max(count, 1)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What was counted, for an answer that names no effect."""
+        told = "; ".join(
+            f"{effect.id} ({name} = {value.value:.4g})"
+            for effect in self.effects()
+            for name, value in effect.parameters.items()
+        )
+        return (f"counted before the fit, row by row: {told}. What is left beyond that is told below.",)
+
+
+def row_times(recordings: Sequence[Recording], names: Sequence[str], agreement: Agreement | None) -> RowTimes | None:
+    """Return when the rows of recordings (called ``names``) were made, None where nothing sure was counted."""
+    if agreement is None or agreement.own_clock is None or len(recordings) < 2:
+        return None
+    clock = agreement.own_clock
+    periods = np.array([shown.period_of_others_s for shown in clock.shown])
+    if len(clock.shown) < len(recordings) or np.ptp(periods) > _ALIKE * float(np.mean(periods)):
+        return None
+    found = RowTimes(tuple(names), clock, agreement.row_proofs)
+    if min(found._gains) < _SECOND or _gained(recordings, found.applied(recordings)) < _SECOND:
+        return None
+    return found
+
+
+def _gained(before: Sequence[Recording], after: Sequence[Recording]) -> float:
+    """Return what the wobble gains by other times, in twice the log likelihood."""
+    gain = 0.0
+    for one, other in zip(before, after, strict=True):
+        left = [_left_of_wobble(recording) for recording in (one, other)]
+        if left[0] is not None and left[1] is not None:
+            size = one.samples["gyroscope"].t.size
+            gain += 4.0 * size * float(np.log(left[0] / left[1]))
+    return gain
+
+
+def _left_of_wobble(recording: Recording) -> float | None:
+    """Return what a smooth wobble leaves of the gyroscope's x and y, rms rad/s; None where there is none."""
+    wobble = signal_of(recording, "wobble")
+    if wobble is None:
+        return None
+    psi: FloatArray = angle_turned(recording, wobble.t)
+    t = wobble.t - wobble.t[0]
+    end = float(t[-1])
+    count = 4 + int(end / _KNOTS_S)
+    knots = np.concatenate([np.zeros(3), np.linspace(0.0, end, count - 2), np.full(3, end)])
+    slow = BSpline.design_matrix(np.clip(t, 0.0, end * (1.0 - 1e-12)), knots, 3).toarray()
+    columns = np.hstack([np.exp(1j * wobble.order * psi)[:, None] * slow, np.ones((t.size, 1))])
+    x = np.linalg.lstsq(columns, wobble.value, rcond=None)[0]
+    return float(np.sqrt(np.mean(np.abs(wobble.value - columns @ x) ** 2)))
