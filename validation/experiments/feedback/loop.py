@@ -123,6 +123,6 @@ def _slopes(results: Sequence[ThrowResult], paper: PaperTable) -> float:
     """
     true = 0.0
     for result, line in zip(results, paper.slopes, strict=True):
-        t = np.linspace(*line.t, TRUE_INSTANTS)
+        t = np.linspace(float(line.t[0]), float(line.t[-1]), TRUE_INSTANTS)
         true += float(np.polyfit(t, np.abs(result.motion.at(t).rate[:, 2]), 1)[0])
     return 100 * (sum(line.slope for line in paper.slopes) / true - 1)
