@@ -19,6 +19,7 @@ from types import MappingProxyType
 import numpy as np
 
 from discsim.effects.catalogue import CATALOGUE
+from discsim.effects.mount_rows import Mount
 from discsim.effects.sensors import Lag
 from discsim.recording import SENSORS, Recording
 from validation.diagnosis.consistency.followed import left_of, left_when_shifted, true_noise
@@ -185,6 +186,8 @@ def contradiction_in(recordings: Sequence[Recording], known: Sequence[Parameter]
             continue
         if _reconciled(recordings, look, sensor) or _follows_lagging(recordings, known, sensors, sensor):
             return None
+        if _follows_turned(recordings, known, sensors, sensor):
+            return None
         if _pulses(recordings, whole, sensor):
             return None
         apart[sensor] = others
@@ -220,6 +223,27 @@ def _follows_lagging(
         return False
     lag = Parameter(lags[lagging], "tau_s", 0.0, _LAG_STEP, _LAG_SIGMA)
     look = look_at(recordings, known, sensors, CONSISTENCY.again, {lag: _LAG})
+    return look is not None and look.follows
+
+
+#: one sigma of how a sensor is turned in its board, and half the width of its differences, rad: parts glued in by hand
+_TURNED_SIGMA, _TURNED_STEP = 0.05, 1e-4
+
+
+def _follows_turned(
+    recordings: Sequence[Recording], known: Sequence[Parameter], sensors: Sequence[str], turned: str
+) -> bool:
+    """Tell whether a motion follows all sensors where one of them may be turned in its board by a few degrees.
+
+    Of a disc at 75 rad/s a degree puts 1.3 rad/s of its spin on the other axes of a gyroscope.
+    """
+    mounts = {row.acts_on: row for row in CATALOGUE.values() if row.type is Mount}
+    if turned not in mounts:
+        return False
+    free = {
+        Parameter(mounts[turned].id, name, 0.0, _TURNED_STEP, _TURNED_SIGMA): 0.0 for name in mounts[turned].parameters
+    }
+    look = look_at(recordings, known, sensors, CONSISTENCY.again, free)
     return look is not None and look.follows
 
 

@@ -9,6 +9,7 @@ from support.made import throws
 
 from discsim.effects import effect
 from discsim.environment import Environment
+from discsim.frames import C2
 from discsim.recording import Samples
 from discsim.rig import default_profile, turn_table
 from discsim.sensors import Instruments, record
@@ -94,6 +95,17 @@ def test_a_delay_and_lost_samples_are_reconciled_and_another_throw_is_not(sound,
     assert left(replace(own, t=own.t + 0.05)) < CONSISTENCY.reconciled
     assert left(lost) < CONSISTENCY.reconciled
     assert left(other) > CONSISTENCY.reconciled
+
+
+@pytest.mark.parametrize("sensor", ["gyroscope", "magnetometer"])
+def test_a_sensor_that_is_turned_in_its_board_by_a_degree_is_no_contradiction(sound, sensor):
+    """Such a gyroscope shows more than 1 rad/s of the spin on its other axes: a hundred times its noise."""
+    turned = [
+        replace(one, samples={**one.samples, sensor: Samples(own.t, own.value @ C2(0.02).T)})
+        for one in sound
+        for own in (one.samples[sensor],)
+    ]
+    assert contradiction_in(turned, ()) is None
 
 
 @pytest.mark.parametrize(("order", "amplitude"), [(1.0, 0.05), (3.0, 0.6), (6.0, 1.2)])
