@@ -38,6 +38,9 @@ class Consistency:
     left_of_ripple : float
         Share of a ripple that a look with one may leave of a sensor: relaxed segments place its phase to some
         milliradians, 0.5 % are left at order 6 and 1.2 rad/s; sensors of another run leave as much as without it.
+    left_of_turn : float
+        Share of a contradiction that a small turn in its board may leave of a sensor: of 1 to 3 degrees 2 to 12 % are
+        left, of a sensor of another throw as much as without a turn.
     ripples : int
         Ripples of a table's speed that are tried, the likeliest first.
     lost : float
@@ -51,6 +54,7 @@ class Consistency:
     reconciled: float = 6.0
     ripple: float = 0.1
     left_of_ripple: float = 0.01
+    left_of_turn: float = 0.2
     ripples: int = 2
     lost: float = 100.0
     few: int = 3

@@ -19,10 +19,9 @@ from types import MappingProxyType
 import numpy as np
 
 from discsim.effects.catalogue import CATALOGUE
-from discsim.effects.mount_rows import Mount
 from discsim.effects.sensors import Lag
 from discsim.recording import SENSORS, Recording
-from validation.diagnosis.consistency.followed import left_of, left_when_shifted, true_noise
+from validation.diagnosis.consistency.followed import left_of, left_when_shifted, left_when_turned, true_noise
 from validation.diagnosis.consistency.spin_rates import RatesApart, rates_apart
 from validation.diagnosis.detectors.speed_ripple import ripple
 from validation.diagnosis.relaxed_fit import (
@@ -186,7 +185,7 @@ def contradiction_in(recordings: Sequence[Recording], known: Sequence[Parameter]
             continue
         if _reconciled(recordings, look, sensor) or _follows_lagging(recordings, known, sensors, sensor):
             return None
-        if _follows_turned(recordings, known, sensors, sensor):
+        if _turned(recordings, look, sensor):
             return None
         if _pulses(recordings, whole, sensor):
             return None
@@ -226,25 +225,20 @@ def _follows_lagging(
     return look is not None and look.follows
 
 
-#: one sigma of how a sensor is turned in its board, and half the width of its differences, rad: parts glued in by hand
-_TURNED_SIGMA, _TURNED_STEP = 0.05, 1e-4
+def _turned(recordings: Sequence[Recording], look: Look, sensor: str) -> bool:
+    """Tell whether a motion that others tell is that of a sensor, too, if it is turned in its board by a few degrees.
 
-
-def _follows_turned(
-    recordings: Sequence[Recording], known: Sequence[Parameter], sensors: Sequence[str], turned: str
-) -> bool:
-    """Tell whether a motion follows all sensors where one of them may be turned in its board by a few degrees.
-
-    Of a disc at 75 rad/s a degree puts 1.3 rad/s of its spin on the other axes of a gyroscope.
+    Of a disc at 75 rad/s a degree puts 1.3 rad/s of its spin on the other axes of a gyroscope. What others tell is not
+    told to within its noise: it is enough that a turn leaves little of the contradiction.
     """
-    mounts = {row.acts_on: row for row in CATALOGUE.values() if row.type is Mount}
-    if turned not in mounts:
-        return False
-    free = {
-        Parameter(mounts[turned].id, name, 0.0, _TURNED_STEP, _TURNED_SIGMA): 0.0 for name in mounts[turned].parameters
-    }
-    look = look_at(recordings, known, sensors, CONSISTENCY.again, free)
-    return look is not None and look.follows
+    shares = []
+    for i, trajectory in enumerate(look.fit.trajectories):
+        readings = next((r for r in readings_of(recordings[look.places[i]]) if r.sensor == sensor), None)
+        if readings is not None:
+            before, after = left_when_turned(trajectory, look.fit.values(i), readings, true_noise([readings]))
+            shares.append(after / before)
+    told = [share for share in shares if np.isfinite(share)]
+    return bool(told) and float(np.median(told)) <= CONSISTENCY.left_of_turn
 
 
 #: half the widths of a ripple's differences: of its order, amplitude (rad/s) and phase (rad)

@@ -20,7 +20,7 @@ from validation.identification.readings import Readings, group_of
 from validation.identification.segments import Trajectory
 from validation.identification.sensor_model import Values
 
-__all__ = ["left_of", "left_when_shifted", "true_noise"]
+__all__ = ["left_of", "left_when_shifted", "left_when_turned", "true_noise"]
 
 #: orders of the differences by which a signal that turns is told from noise
 _ORDERS = range(1, 9)
@@ -119,3 +119,29 @@ def left_when_shifted(
                 left[part[0]] = min(left.get(part[0], np.inf), float(np.min(off)))
         levels.append(float(np.median(list(left.values()))) if left else np.nan)
     return float(sd_by_median(np.nanmin(levels))) if np.any(np.isfinite(levels)) else np.nan
+
+
+#: rounds in which readings far off lose their weight, and how far that is, in what half of them leave
+_ROUNDS, _FAR_OFF = 3, 4.0
+
+
+def left_when_turned(
+    trajectory: Trajectory, values: Values, readings: Readings, noise: Mapping[str, GroupNoise]
+) -> tuple[float, float]:
+    """Return what a motion leaves of a sensor of three axes as it is, and turned in its board by a small angle.
+
+    Both as robust root mean squares in its noise; NaN without readings.
+    """
+    at, value, grid, told = shiftable(trajectory, values, readings, noise, _GRID)
+    inside = (at >= grid[0]) & (at <= grid[-1]) if grid.size > 1 else np.zeros(at.size, dtype=bool)
+    if value.shape[1] != 3 or np.count_nonzero(np.isfinite(value[inside])) < _FEWEST:
+        return np.nan, np.nan
+    y = np.stack([np.interp(at[inside], grid, told[:, axis]) for axis in range(3)], axis=1)
+    off, columns = value[inside] - y, np.stack([np.cross(y, axis) for axis in np.eye(3)], axis=2)
+    known = np.isfinite(off)  # an axis at its range says nothing
+    off, columns = off[known], columns[known]
+    left, kept = off, np.ones(off.size, dtype=bool)
+    for _ in range(_ROUNDS):
+        left = off - columns @ np.linalg.lstsq(columns[kept], off[kept], rcond=None)[0]
+        kept = np.abs(left) <= _FAR_OFF * np.median(np.abs(left))
+    return float(sd_by_median(off)), float(sd_by_median(left))
