@@ -228,7 +228,7 @@ def test_a_rig_states_no_release():
     current = first_trajectory(tables()[0])
     residual, rows = release_rows(current)
     assert residual.size == 0
-    # upon the table's angle, and upon what its ripple adds to it
+    # upon turning further, and upon having started elsewhere
     assert rows.shape == (0, 2)
 
 
