@@ -288,7 +288,7 @@ def test_debug_shows_the_traceback(monkeypatch, capsys):
 def test_validate_scores_everything_and_leaves_its_report(monkeypatch, tmp_path, capsys):
     """With the concealed case that has something in it; the other is drawn and scored the same way."""
     monkeypatch.setattr(headless, "QUICK_CASES", headless.QUICK_CASES[1:])
-    kept = {name: limit for name, limit in shipped_limits(True).items() if not name.startswith("concealed, noise")}
+    kept = {name: limit for name, limit in shipped_limits(True).items() if not name.startswith("concealed, consistent")}
     monkeypatch.setattr("validation.reporting.limits.shipped_limits", lambda quick: kept)
     out, junit = tmp_path / "report", tmp_path / "scores.xml"
     assert run(monkeypatch, "validate", "--quick", "--out", str(out), "--junit", str(junit)) == 0

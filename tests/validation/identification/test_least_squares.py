@@ -228,7 +228,8 @@ def test_a_rig_states_no_release():
     current = first_trajectory(tables()[0])
     residual, rows = release_rows(current)
     assert residual.size == 0
-    assert rows.shape == (0, 1)
+    # upon turning further, and upon having started elsewhere
+    assert rows.shape == (0, 2)
 
 
 def test_a_tied_fit_of_a_throw_comes_down_to_the_noise():

@@ -105,9 +105,10 @@ def _small(item: Effect, case: Case) -> tuple[Effect, float]:
     """Return the effect at a size where readings are linear in it, and the share of its size that this is."""
     hiding = hiding_of(item.id)
     values = item.value._asdict()
-    if item.id.endswith("dropped_samples"):
+    if item.id.endswith(("dropped_samples", "lost_rows")):
         # what the losses do on average: a clock that runs slow by the share that is lost
-        return effect(item.id.replace("dropped_samples", "clock_rate"), ratio=1.0 - 1e-5), 1e-5 / values["fraction"]
+        clock = item.id.replace("dropped_samples", "clock_rate").replace("lost_rows", "rate")
+        return effect(clock, ratio=1.0 - 1e-5), 1e-5 / values["fraction"]
     if item.id == "accel.saturation":
         return item, 1.0  # a clipped reading is not linear in the limit
     size = float(np.linalg.norm([values[name] - hiding.about for name in hiding.sized]))

@@ -13,7 +13,7 @@ from discsim.errors import InputError
 from validation.challenge.cases.case import Case, Concealed
 from validation.challenge.cases.off_catalogue import OFF_CATALOGUE, OffCatalogue
 from validation.challenge.cases.setups import draw_fault, possible_faults
-from validation.challenge.cases.sizes import conceivable, draw_effect, ordinary
+from validation.challenge.cases.sizes import ON_REQUEST, conceivable, draw_effect, ordinary
 
 __all__ = ["can_act", "choose", "choose_secret", "hide", "possible"]
 
@@ -51,7 +51,7 @@ def _faulty_setup(case: Case, effects: Sequence[str], rng: np.random.Generator) 
     if len(faults) > 1:
         raise InputError(f"{' and '.join(faults)}: expected one fault of the setup in a case")
     there = possible_faults(case)
-    id = faults[0] if faults else str(rng.choice(there))
+    id = faults[0] if faults else str(rng.choice([id for id in there if id not in ON_REQUEST]))
     if id not in there:
         raise InputError(f"{id}: does not show on a {case.plant} with {', '.join(case.instruments.sensors)}")
     fault = Concealed(draw_fault(id, case, rng))
@@ -80,7 +80,8 @@ def choose(
     """Draw one effect that goes with those ``beside`` it (or take the one of ``id``), its size or its ``largest``."""
     if id is None:
         others = [item.effect.id for item in beside]
-        id = str(rng.choice([id for id in possible(case) if all(_goes_with(id, other) for other in others)]))
+        there = [id for id in possible(case) if id not in ON_REQUEST]
+        id = str(rng.choice([id for id in there if all(_goes_with(id, other) for other in others)]))
     only = int(rng.integers(len(case.runs))) if row(id).event else None
     return Concealed(draw_effect(id, case.plant, rng, case.recorded, largest=largest), only)
 

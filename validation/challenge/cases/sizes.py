@@ -16,7 +16,7 @@ import numpy as np
 from discsim.effects.catalogue import CATALOGUE, Effect, effect
 from discsim.recording import Plant
 
-__all__ = ["HIDING", "Hiding", "conceivable", "draw_effect", "hiding_of", "ordinary", "scaled"]
+__all__ = ["HIDING", "ON_REQUEST", "Hiding", "conceivable", "draw_effect", "hiding_of", "ordinary", "scaled"]
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,9 @@ class Hiding:
 _WIND = ("w_north_m_s", "w_east_m_s")
 _CLOCK = "phase of the spin slips by ratio x turns; two per cent is a poor RC oscillator"
 _LOST = "one lost sample shifts all that follow; a twentieth lost is a bus that chokes"
+_TURNED = ("rx_rad", "ry_rad", "rz_rad")
+_GLUED = "a module glued in by eye is turned by up to 6 degrees"
+_FREE = "parts that free-run make 50 to 2000 samples a second"
 
 HIDING: Mapping[str, Hiding] = MappingProxyType(
     {
@@ -219,6 +222,19 @@ HIDING: Mapping[str, Hiding] = MappingProxyType(
         "clock.rate": Hiding(
             ("ratio",), 5e-5, 0.02, _CLOCK, about=1.0, by_plant={"rate_table": (1e-5, 0.02), "free_spin": (1e-3, 0.02)}
         ),
+        "mag.mount": Hiding(_TURNED, 0.002, 0.1, _GLUED),
+        "gyro.mount": Hiding(_TURNED, 0.002, 0.1, _GLUED),
+        "accel.mount": Hiding(_TURNED, 0.002, 0.1, _GLUED),
+        "gyro.cross_axis": Hiding(
+            ("sxy", "sxz", "syx", "syz", "szx", "szy"), 0.0005, 0.05, "the data sheet allows 2 %"
+        ),
+        "clock.lost_rows": Hiding(("fraction",), 0.004, 0.3, "a loop that writes to a slow card", positive=True),
+        "clock.late_rows": Hiding(
+            ("tick_s",), 2e-4, 5e-3, "a loop's tick is 1 to 5 ms", {"fraction": (0.05, 0.5)}, positive=True
+        ),
+        "mag.own_clock": Hiding(("period_s",), 1e-3, 0.02, _FREE, positive=True),
+        "imu.own_clock": Hiding(("period_s",), 5e-4, 0.01, _FREE, positive=True),
+        "mag.average": Hiding(("weight",), 0.005, 0.5, "a mean of two samples weighs them alike", positive=True),
     }
 )
 
@@ -246,8 +262,21 @@ def hiding_of(id: str) -> Hiding:
     return Hiding(alike, low, high, "the row's scale", ranges, about[first], row.sign.get(first, 0.0) > 0.0)
 
 
-#: the detector of what is counted row by row: such effects come in groups, and are concealed where they are asked for
-_COUNTED = "row_times"
+#: what is concealed only where it is asked for by name: it came after cases whose seeds are known, which stay the same
+ON_REQUEST = frozenset(
+    {
+        "mag.mount",
+        "gyro.mount",
+        "accel.mount",
+        "gyro.cross_axis",
+        "clock.lost_rows",
+        "clock.late_rows",
+        "mag.own_clock",
+        "imu.own_clock",
+        "mag.average",
+        "track.camera",
+    }
+)
 #: effects that unknowns of a plant take in: the part of a free spin's acceleration that turns with the spin is
 #: unmodelled, and the rest hardly changes
 _HIDDEN_FOR_GOOD: Mapping[Plant, frozenset[str]] = MappingProxyType(
@@ -262,7 +291,6 @@ def conceivable(plant: Plant, sensors: tuple[str, ...]) -> list[str]:
         for row in CATALOGUE.values()
         if plant in row.plants
         and not row.setup
-        and row.detector != _COUNTED
         and row.acts_with(sensors)
         and row.id not in _HIDDEN_FOR_GOOD.get(plant, ())
     ]
