@@ -29,7 +29,7 @@ from discsim.errors import InputError
 from discsim.files import beside, named_in_errors, read_pieces, replacing, write_pieces
 from discsim.limits import MOST_ROWS, reading_fault, written_time_fault
 from discsim.recorded import Recorded
-from discsim.toml_table import TomlTable, read_toml
+from discsim.toml_table import TomlTable, obeyed_by_terminals, read_toml
 from discsim.toml_text import disc_toml, environment_toml, release_toml, rig_toml, toml_table, toml_value
 
 __all__ = [
@@ -444,8 +444,9 @@ def write_recording(recording: Recording, folder: Path | str) -> None:
 
     A new folder appears whole or not at all. In a folder that is there, the files of a recording are replaced one by
     one once all are written, ``recording.toml`` last: a folder that has it is complete. Other files stay.
-    Raises `InputError` for what the reader would refuse (a sensor without samples, an uncertainty of nothing), and for
-    a folder with files by the names of the format that are no recording: they are somebody else's.
+    Raises `InputError` for what the reader would refuse (a sensor without samples, an uncertainty of nothing, a name
+    with control characters), and for a folder with files by the names of the format that are no recording: they are
+    somebody else's.
     """
     folder = Path(folder)
     texts = _texts(recording)
@@ -494,6 +495,8 @@ def _replace_files(stage: Path, folder: Path) -> None:
 
 def _texts(recording: Recording) -> dict[str, Iterable[str]]:
     """Return the text of every file of the folder by its name, in pieces."""
+    if obeyed_by_terminals(recording.name):
+        raise InputError(f"{recording.name!r}: a recording's name; expected a text without control characters")
     texts: dict[str, Iterable[str]] = {"recording.toml": [recording_toml(recording)]}
     for sensor, samples in recording.samples.items():
         if len(samples) == 0:

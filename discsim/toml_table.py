@@ -20,7 +20,7 @@ from discsim.errors import InputError
 from discsim.files import read_text
 from discsim.limits import ANY_NUMBER, Limit, limit_of
 
-__all__ = ["TomlTable", "read_toml"]
+__all__ = ["TomlTable", "obeyed_by_terminals", "read_toml"]
 
 # a table's name, not a row of a matrix that is written over several lines
 _HEADER = re.compile(r"""^\s*\[+\s*(["'A-Za-z_][\w\-.\s"']*?)\s*\]+\s*(?:#.*)?$""")
@@ -29,6 +29,11 @@ _LONG_WORD = re.compile(r"\S{120,}")
 #: control characters but tabs and line ends, and marks that turn the direction of what follows (Unicode's Bidi_Control)
 _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 _KEY = re.compile(r"""^\s*(["']?)([A-Za-z0-9_\-.]+)\1\s*=""")
+
+
+def obeyed_by_terminals(text: str) -> bool:
+    """Tell whether a text holds control characters, which a terminal would obey; tabs and line ends are none."""
+    return _CONTROL.search(text) is not None
 
 
 def _line_index(text: str) -> dict[str, int]:
@@ -160,7 +165,7 @@ class TomlTable:
         """Take a string without control characters, which a terminal would obey; one of ``choices`` where given."""
         expected = f"one of {', '.join(choices)}" if choices else "a text"
         value = self._take(key, expected, required)
-        if isinstance(value, str) and _CONTROL.search(value):
+        if isinstance(value, str) and obeyed_by_terminals(value):
             raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected a text without control characters")
         if value is not None and (not isinstance(value, str) or (choices and value not in choices)):
             raise self.error(key, f"'{self._full(key)}' is {_shown(value)}, expected {expected}")

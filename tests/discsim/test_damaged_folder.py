@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import IO, Any
 
 import pytest
 from support.recording_folder import (
@@ -87,14 +88,14 @@ def test_a_link_that_leads_nowhere_is_no_absent_sensor(flight):
 @pytest.mark.parametrize("name", ["recording.toml", "magnetometer.csv"])
 def test_a_file_that_may_not_be_read_is_refused(flight, name, monkeypatch):
     """The reading itself is made to fail, because the superuser may read what nobody else may."""
-    read_bytes = Path.read_bytes
+    opened = Path.open
 
-    def forbidden(path: Path) -> bytes:
+    def forbidden(path: Path, *how: str, **more: str) -> IO[Any]:
         if path.name == name:
             raise PermissionError(13, "Permission denied", str(path))
-        return read_bytes(path)
+        return opened(path, *how, **more)
 
-    monkeypatch.setattr(Path, "read_bytes", forbidden)
+    monkeypatch.setattr(Path, "open", forbidden)
     assert refusal(flight) == f"{name}: cannot be read (Permission denied); expected a readable UTF-8 file"
 
 

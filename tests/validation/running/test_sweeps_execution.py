@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -71,9 +72,15 @@ def sweep(plan: Path, out: Path, *options: str) -> int:
 
 
 def data_files(out: Path) -> dict[str, bytes]:
-    """Return the bytes of all that a sweep leaves, checkpoints included, less run.json with its duration."""
+    """Return the bytes of all that a sweep leaves, checkpoints included, less what tells the command itself.
+
+    That is run.json, with its duration, and the report's foot, with the command line.
+    """
     found = {str(path.relative_to(out)): path.read_bytes() for path in out.rglob("*") if path.is_file()}
     found.pop("run.json", None)
+    if "report.html" in found:
+        found["report.html"], feet = re.subn(rb"<footer>discsim sweep [^<]*</footer>", b"", found["report.html"])
+        assert feet == 1
     return found
 
 

@@ -22,12 +22,15 @@ __all__ = ["left_by_short_fit"]
 
 #: how much of a flight is followed, s, in how many recordings, with how many steps
 _LENGTH, _RECORDINGS, _STEPS = 1.5, 2, 5
+#: readings later than this, s, are left aside: no throw takes so long, nor does a start that is followed for _LENGTH
+#: depend on them; a clock that jumped by a day would have the path looked for at every tenth of a second of that day
+_LATEST = 60.0
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def left_by_short_fit(recordings: Sequence[Recording]) -> float:
     """Return the merit per reading that a relaxed fit to the beginnings of flights leaves; infinite where it fails."""
-    some = list(recordings)[:_RECORDINGS]
+    some = [_early(one) for one in list(recordings)[:_RECORDINGS]]
     trajectories = tuple(beginning(first_trajectory(one), _LENGTH) for one in some)
     sensors = {readings.sensor for one in trajectories for readings in one.readings}
     parameters = (*stated_parameters(some), *unknowns(some), *ordinary(sensors, some[0].plant))
@@ -37,3 +40,12 @@ def left_by_short_fit(recordings: Sequence[Recording]) -> float:
     fit = refit(replace(fit, noise=stated_noise(bare)), iterations=_STEPS, tolerance=1e-3 * fit.count)
     merit = fit.merit / max(fit.count, 1)
     return float(merit) if np.isfinite(merit) else float("inf")
+
+
+def _early(recording: Recording) -> Recording:
+    """Return a recording without what was read more than `_LATEST` after its first reading."""
+    start = min((float(one.t[0]) for one in recording.samples.values() if len(one)), default=0.0)
+    if recording.end <= start + _LATEST:
+        return recording
+    samples = {name: one.between(start, start + _LATEST) for name, one in recording.samples.items()}
+    return replace(recording, samples={name: one for name, one in samples.items() if len(one)})
