@@ -123,6 +123,10 @@ class Selection:
     other_disc : float
         What it costs more that a disc's aerodynamics or build should differ in some recordings: one disc is thrown, and
         what does so is mostly something else; the benchmark measures how much room chance leaves.
+    turned : float
+        What it costs more that one sensor is turned in its board, where another effect explains as much: parts are
+        soldered square to within a degree, and at one spin a turn about its axis is a delay. As much as to believe in
+        an effect at all.
     rival : float
         What a parameter costs between effects that are both worth their price: the Bayesian information criterion's
         logarithm of the number of readings, at 3000 of them.
@@ -179,6 +183,7 @@ class Selection:
     event_entry: float = 42.0
     gust_entry: float = 60.0
     other_disc: float = 40.0
+    turned: float = 24.0
     rival: float = 8.0
     far: float = 1.6
     near: float = 1.2

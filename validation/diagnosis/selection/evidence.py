@@ -11,10 +11,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from discsim.effects.catalogue import CATALOGUE
+from discsim.effects.mount_rows import Mount
 from validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from validation.diagnosis.settings import SELECTION
 
-__all__ = ["price"]
+__all__ = ["charge", "price"]
 
 #: within which parameters make sense, the effects' and a rig's own
 BOUNDS: Mapping[tuple[str, str], tuple[float, float]] = {
@@ -27,6 +28,16 @@ BOUNDS: Mapping[tuple[str, str], tuple[float, float]] = {
 ONE_SIDED: Mapping[tuple[str, str], float] = {
     (row.id, name): sign for row in CATALOGUE.values() for name, sign in row.sign.items()
 }
+
+
+#: sensors that are not built as their sheet says: what else explains as much is likelier
+TURNED = (Mount,)
+
+
+def charge(candidate: CandidateEffect) -> float:
+    """Return what an effect is charged where it stands against others: its parameters, and that it is unusual."""
+    unusual = SELECTION.turned if candidate.row.type in TURNED else 0.0
+    return SELECTION.rival * len(parameters_of(candidate)) + unusual
 
 
 def price(candidate: CandidateEffect) -> float:

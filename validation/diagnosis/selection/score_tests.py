@@ -15,8 +15,8 @@ from discsim.effects import Effect
 from discsim.effects.catalogue import catalogued
 from discsim.effects.track_rows import Camera
 from discsim.recording import Recording
-from validation.diagnosis.selection.candidates import CandidateEffect, free_candidate, parameters_of
-from validation.diagnosis.selection.evidence import ONE_SIDED
+from validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
+from validation.diagnosis.selection.evidence import ONE_SIDED, charge
 from validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
 from validation.diagnosis.selection.screening import NormalEquations, ScoreTest, free_columns
 from validation.diagnosis.settings import SELECTION
@@ -66,7 +66,7 @@ def screened_candidates(
                 best = screened
         if best is not None:
             found.append(best)
-    return sorted(found, key=lambda p: SELECTION.rival * len(parameters_of(p.candidate)) - p.gain)
+    return sorted(found, key=lambda p: charge(p.candidate) - p.gain)
 
 
 def hinted(effect: Effect) -> ScreenedCandidate:

@@ -24,7 +24,7 @@ from validation.diagnosis.relaxed_fit import relaxed, unknowns, without_outliers
 from validation.diagnosis.selection.all_at_once import all_at_once
 from validation.diagnosis.selection.candidates import CandidateEffect, candidates_for, in_parameters, parameters_of
 from validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from validation.diagnosis.selection.evidence import ONE_SIDED, price
+from validation.diagnosis.selection.evidence import ONE_SIDED, TURNED, charge, price
 from validation.diagnosis.selection.exchange import eliminated_backward, exchanged, rivals_of, widened
 from validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
 from validation.diagnosis.selection.refits import refitting
@@ -277,17 +277,18 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
     fits: list[tuple[float, ContinuousFit, Fit, float]] = []
     seen: set[tuple[str, frozenset[int] | None]] = set()
     different = len({(offer[0].candidate.id, offer[0].candidate.recordings) for offer in offers})
-    near_data = chi2_now < SELECTION.near * current.fit.count
+    near_data, usual = chi2_now < SELECTION.near * current.fit.count, 0
     best_chi2, merit_now = chi2_now, merit_of(current.fit, current.fit.linears)
     for screened, fit, cost in offers:
         key = (screened.candidate.id, screened.candidate.recordings)
         if key in seen:
             continue
         most = SELECTION.refitted if near_data else SELECTION.refitted_at_most
-        if len(seen) >= most:
+        if usual >= most:
             break
         refitting(f"effect {step + 1}, refitting with", screened.candidate.id, len(seen), min(most, different))
         seen.add(key)
+        usual += screened.candidate.row.type not in TURNED
         if screened.candidate.row.hides_readings:
             # readings at the limit take no part in a fit: what the motion asks for beyond it is the evidence
             cost = -screened.gain
@@ -309,7 +310,7 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
         gain, chi2 = found.considered[-1].gain, chi2_in(refitted, noise)
         if gain > price(screened.candidate) and possible(refitted):
             # far from the data chi-squared says more than a likelihood that has swallowed the mismatch as noise
-            merit = (chi2 + cost if distant else refitted.score) + SELECTION.rival * refitted.hypothesis.size
+            merit = (chi2 + cost if distant else refitted.score) + sum(map(charge, refitted.hypothesis.candidates))
             merit -= SELECTION.right_sign * any(q.key in ONE_SIDED for q in parameters_of(screened.candidate))
             fits.append((merit, refitted, fit, cost))
             best_chi2 = min(best_chi2, chi2)
@@ -339,7 +340,7 @@ def in_turn(*offers: Sequence[Offer]) -> list[Offer]:
 
     def later(offer: Offer) -> tuple[bool, float]:
         # lost samples first: they bend what algebra says of everything else
-        return offer[2] <= 0.0, SELECTION.rival * len(parameters_of(offer[0].candidate)) - offer[0].gain
+        return offer[2] <= 0.0, charge(offer[0].candidate) - offer[0].gain
 
     worth = [sorted((o for o in some if o[0].gain > 0.5 * price(o[0].candidate)), key=later) for some in offers]
     return [offer for turn in zip_longest(*worth) for offer in turn if offer is not None]
