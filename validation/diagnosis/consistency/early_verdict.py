@@ -229,16 +229,15 @@ def _turned(recordings: Sequence[Recording], look: Look, sensor: str) -> bool:
     """Tell whether a motion that others tell is that of a sensor, too, if it is turned in its board by a few degrees.
 
     Of a disc at 75 rad/s a degree puts 1.3 rad/s of its spin on the other axes of a gyroscope. What others tell is not
-    told to within its noise: it is enough that a turn leaves little of the contradiction.
+    told to within its noise: it is enough that a turn leaves little of the contradiction, or of the noise.
     """
-    shares = []
+    told = []
     for i, trajectory in enumerate(look.fit.trajectories):
         readings = next((r for r in readings_of(recordings[look.places[i]]) if r.sensor == sensor), None)
         if readings is not None:
             before, after = left_when_turned(trajectory, look.fit.values(i), readings, true_noise([readings]))
-            shares.append(after / before)
-    told = [share for share in shares if np.isfinite(share)]
-    return bool(told) and float(np.median(told)) <= CONSISTENCY.left_of_turn
+            told.append(after <= max(CONSISTENCY.reconciled, CONSISTENCY.left_of_turn * before))
+    return 2 * sum(told) > len(told)
 
 
 #: half the widths of a ripple's differences: of its order, amplitude (rad/s) and phase (rad)

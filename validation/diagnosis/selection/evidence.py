@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from discsim.effects.catalogue import CATALOGUE
-from discsim.effects.mount_rows import Mount
+from discsim.effects.mount_rows import ROWS as MOUNTS
 from validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from validation.diagnosis.settings import SELECTION
 
@@ -30,13 +30,13 @@ ONE_SIDED: Mapping[tuple[str, str], float] = {
 }
 
 
-#: sensors that are not built as their sheet says: what else explains as much is likelier
-TURNED = (Mount,)
+#: how a sensor that turns with the spin sits in its board: what else explains as much, as a delay, is likelier
+TURNED = frozenset(row.id for row in MOUNTS if row.acts_on != "accelerometer")
 
 
 def charge(candidate: CandidateEffect) -> float:
     """Return what an effect is charged where it stands against others: its parameters, and that it is unusual."""
-    unusual = SELECTION.turned if candidate.row.type in TURNED else 0.0
+    unusual = SELECTION.turned if candidate.id in TURNED else 0.0
     return SELECTION.rival * len(parameters_of(candidate)) + unusual
 
 

@@ -288,7 +288,7 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
             break
         refitting(f"effect {step + 1}, refitting with", screened.candidate.id, len(seen), min(most, different))
         seen.add(key)
-        usual += screened.candidate.row.type not in TURNED
+        usual += screened.candidate.id not in TURNED
         if screened.candidate.row.hides_readings:
             # readings at the limit take no part in a fit: what the motion asks for beyond it is the evidence
             cost = -screened.gain
