@@ -6,8 +6,10 @@ Run by the interpreter that has the wheel, in a folder that has no sources: ``py
 from __future__ import annotations
 
 import pkgutil
+import sys
 import tomllib
 from importlib import import_module
+from importlib.metadata import distribution
 from pathlib import Path
 
 import mujoco
@@ -19,10 +21,12 @@ installed = Path(discsim.__file__).parent
 assert "site-packages" in installed.parts, f"discsim comes from {installed}, expected site-packages"
 
 modules = 0
-for package in ("discsim", "estimators", "validation"):
-    for module in pkgutil.walk_packages(import_module(package).__path__, f"{package}."):
-        import_module(module.name)
-        modules += 1
+for module in pkgutil.walk_packages(discsim.__path__, "discsim."):
+    import_module(module.name)
+    modules += 1
+assert {"discsim.estimators.rate", "discsim.validation.cli"} <= set(sys.modules)
+taken = {file.parts[0] for file in distribution("discsim").files or () if file.suffix == ".py"}
+assert taken == {"discsim"}, f"top-level names taken: {sorted(taken)}"
 
 names = {folder: model_names(folder) for folder in ("discs", "parts", "sites", "throws", "imports")}
 for folder, found in names.items():

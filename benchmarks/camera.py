@@ -25,7 +25,7 @@ from discsim.launch import Launch, released
 from discsim.recording import Recording
 from discsim.sensors import Instruments, Noise, Sampling, Tracker, record
 from discsim.shipped import load_disc
-from validation.diagnosis.pipeline import diagnose
+from discsim.validation.diagnosis.pipeline import diagnose
 
 DISC, FIELD = load_disc("driver")
 KINDS = ("camera", "nothing", "wind", "lift")

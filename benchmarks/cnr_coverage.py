@@ -29,8 +29,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # a file beside
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
 from discsim.trajectory import predict
-from validation.scenarios.throws import Throw
-from validation.yaw_damping import fit_yaw_damping, observe
+from discsim.validation.scenarios.throws import Throw
+from discsim.validation.yaw_damping import fit_yaw_damping, observe
 
 #: C_Nr of a data set is even between these; the recordings state the driver's -0.0045
 LEAST, MOST = -0.0060, -0.0030

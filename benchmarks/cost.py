@@ -29,10 +29,10 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from discsim.arrays import FloatArray  # noqa: E402
+from discsim.estimators.fft import FftSettings, fft  # noqa: E402
+from discsim.estimators.fft_fast import padded_peak  # noqa: E402
+from discsim.estimators.streaming import StreamingRate  # noqa: E402
 from discsim.recording import Samples  # noqa: E402
-from estimators.fft import FftSettings, fft  # noqa: E402
-from estimators.fft_fast import padded_peak  # noqa: E402
-from estimators.streaming import StreamingRate  # noqa: E402
 
 
 def spin(seconds: float, seed: int = 0) -> Samples:

@@ -25,11 +25,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # a file beside this one is called estimators too
 
 from discsim.recording import Plant, Recording
-from validation.challenge.cases.case import Case, Kind
-from validation.challenge.cases.conceal import Answer
-from validation.challenge.cases.conceal import recordings as simulated
-from validation.challenge.cases.draw import draw_case
-from validation.diagnosis.pipeline import diagnose
+from discsim.validation.challenge.cases.case import Case, Kind
+from discsim.validation.challenge.cases.conceal import Answer
+from discsim.validation.challenge.cases.conceal import recordings as simulated
+from discsim.validation.challenge.cases.draw import draw_case
+from discsim.validation.diagnosis.pipeline import diagnose
 
 
 @dataclass(frozen=True)

@@ -14,16 +14,16 @@ from matplotlib.ticker import ScalarFormatter
 from support.spinning_sensor import Faults, Spin, record
 
 from discsim.arrays import FloatArray
+from discsim.estimators.accelerometer import accelerometer
+from discsim.estimators.fft import FftSettings, fft
+from discsim.estimators.fusion import accelerometer_calibrated, fusion
+from discsim.estimators.likelihood import likelihood
+from discsim.estimators.methods import best as best_of_recording
+from discsim.estimators.precession import phase_rate
+from discsim.estimators.rate import YawRate
+from discsim.estimators.tracking import tracking
 from discsim.recording import Recording
-from estimators.accelerometer import accelerometer
-from estimators.fft import FftSettings, fft
-from estimators.fusion import accelerometer_calibrated, fusion
-from estimators.likelihood import likelihood
-from estimators.methods import best as best_of_recording
-from estimators.precession import phase_rate
-from estimators.rate import YawRate
-from estimators.tracking import tracking
-from validation.reporting.figures import new_figure, save_figure
+from discsim.validation.reporting.figures import new_figure, save_figure
 
 
 def random_throw(rng: np.random.Generator) -> tuple[Spin, Faults]:

@@ -17,13 +17,13 @@ from support.spinning_sensor import MPU9250, Faults, Spin, Truth, move, record, 
 
 from discsim.arrays import FloatArray
 from discsim.errors import InputError
+from discsim.estimators.bound import tone_bound
+from discsim.estimators.fft_fast import padded_peak
+from discsim.estimators.likelihood import LikelihoodSettings, likelihood
+from discsim.estimators.methods import best as best_of_recording
+from discsim.estimators.tracking import Segment, TrackingSettings, track_bound
 from discsim.recording import Recording, Samples
-from estimators.bound import tone_bound
-from estimators.fft_fast import padded_peak
-from estimators.likelihood import LikelihoodSettings, likelihood
-from estimators.methods import best as best_of_recording
-from estimators.tracking import Segment, TrackingSettings, track_bound
-from validation.reporting.figures import new_figure, save_figure
+from discsim.validation.reporting.figures import new_figure, save_figure
 
 WINDOWS = (0.25, 0.5, 1.0, 2.0, 4.0)
 DECIBELS = (20.0, 40.0, 60.0)

@@ -30,11 +30,11 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 from support.spinning_sensor import Spin, record, without  # noqa: E402
 
+from discsim.estimators.fft_fast import padded_peak  # noqa: E402
+from discsim.estimators.streaming import StreamingRate  # noqa: E402
 from discsim.files import write_text  # noqa: E402
-from estimators.fft_fast import padded_peak  # noqa: E402
-from estimators.streaming import StreamingRate  # noqa: E402
-from validation.reporting import markdown  # noqa: E402
-from validation.reporting.run import package_version  # noqa: E402
+from discsim.validation.reporting import markdown  # noqa: E402
+from discsim.validation.reporting.run import package_version  # noqa: E402
 
 # isort: split
 from estimator_throws import Flown, draw_throws, fly, pooled, throws_table  # noqa: E402
@@ -96,7 +96,7 @@ def cost_table() -> list[str]:
     quick, slow = 1e6 * min(fast) / 2048, 1e6 * min(padded) / 2048
     lines.append(f"| padded transform of (P-4), 2^14 points, and its peak | {slow:.0f} us per window |")
     lines.append(
-        f"| the same peak by `estimators.fft_fast` | {quick:.1f} us per window, {slow / quick:.1f} times less |"
+        f"| the same peak by `discsim.estimators.fft_fast` | {quick:.1f} us per window, {slow / quick:.1f} times less |"
     )
     return lines
 

@@ -126,7 +126,7 @@ class Used(NamedTuple):
 
 def used(arguments: Sequence[str]) -> Used:
     """Run the command and return what it used."""
-    code = "import sys; sys.path.insert(0, sys.argv.pop(1)); from validation.cli import main; main()"
+    code = "import sys; sys.path.insert(0, sys.argv.pop(1)); from discsim.validation.cli import main; main()"
     start = time.perf_counter()
     process = subprocess.Popen([sys.executable, "-c", code, str(ROOT), *arguments], stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)

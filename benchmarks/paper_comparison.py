@@ -27,8 +27,8 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 from support.spinning_sensor import move, record  # noqa: E402
 
+from discsim.estimators import AccelerometerErrors, Options, YawRate, estimate  # noqa: E402
 from discsim.recording import Recording  # noqa: E402
-from estimators import AccelerometerErrors, Options, YawRate, estimate  # noqa: E402
 
 #: Installation errors, m.
 MOUNTS = (0.0, 0.001, 0.005)

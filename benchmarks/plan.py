@@ -23,15 +23,15 @@ sys.path[0] = str(Path(__file__).resolve().parent.parent)
 
 from discsim.disc import Release  # noqa: E402
 from discsim.trajectory import release_state  # noqa: E402
-from validation.challenge.cases.case import Case, Concealed  # noqa: E402
-from validation.challenge.cases.conceal import recordings  # noqa: E402
-from validation.challenge.cases.draw import draw_case  # noqa: E402
-from validation.challenge.cases.sizes import hiding_of, scaled  # noqa: E402
-from validation.diagnosis.pipeline import diagnose  # noqa: E402
-from validation.identification.plants.plan import Plan  # noqa: E402
-from validation.planning.information import information_of, questions_of  # noqa: E402
-from validation.planning.limits import limits_of  # noqa: E402
-from validation.planning.recordings import Bench, planned_trajectory  # noqa: E402
+from discsim.validation.challenge.cases.case import Case, Concealed  # noqa: E402
+from discsim.validation.challenge.cases.conceal import recordings  # noqa: E402
+from discsim.validation.challenge.cases.draw import draw_case  # noqa: E402
+from discsim.validation.challenge.cases.sizes import hiding_of, scaled  # noqa: E402
+from discsim.validation.diagnosis.pipeline import diagnose  # noqa: E402
+from discsim.validation.identification.plants.plan import Plan  # noqa: E402
+from discsim.validation.planning.information import information_of, questions_of  # noqa: E402
+from discsim.validation.planning.limits import limits_of  # noqa: E402
+from discsim.validation.planning.recordings import Bench, planned_trajectory  # noqa: E402
 
 EFFECTS = ("air.wind", "aero.spin_lift", "aero.yaw_reynolds", "mag.hard_iron", "accel.bias", "gps.latency")
 

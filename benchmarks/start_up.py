@@ -37,7 +37,7 @@ def main() -> None:
     given = parser.parse_args()
     if given.rounds < 1:
         parser.error("expected at least one round")
-    command = ["-m", "validation.cli"]
+    command = ["-m", "discsim.validation.cli"]
     with tempfile.TemporaryDirectory() as scratch:
         out = str(Path(scratch) / "flight")
         kinds = {

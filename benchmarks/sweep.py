@@ -23,12 +23,12 @@ sys.path[0] = str(Path(__file__).resolve().parent.parent)
 
 from discsim.arrays import FloatArray  # noqa: E402
 from discsim.effects.sensors import PositionOffset  # noqa: E402
+from discsim.estimators.accelerometer import accelerometer  # noqa: E402
 from discsim.rig import turn_table  # noqa: E402
 from discsim.sensors import Accelerometer  # noqa: E402
-from estimators.accelerometer import accelerometer  # noqa: E402
-from validation.scenarios.rate_table import errors_within, true_rate  # noqa: E402
-from validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, segments  # noqa: E402
-from validation.sweeps.plan import Plan, plan_file, read_plan  # noqa: E402
+from discsim.validation.scenarios.rate_table import errors_within, true_rate  # noqa: E402
+from discsim.validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, segments  # noqa: E402
+from discsim.validation.sweeps.plan import Plan, plan_file, read_plan  # noqa: E402
 
 
 def one_simulation(plan: Plan, number: int, mount: FloatArray) -> FloatArray:

@@ -33,28 +33,28 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # a file beside
 from discsim.arrays import FloatArray
 from discsim.files import write_text
 from discsim.recording import PLANTS, Recording, Samples
-from validation.challenge.cases.case import Case, Coast, Kind, Run, Turning
-from validation.challenge.cases.conceal import recordings as simulated
-from validation.challenge.cases.draw import draw_case
-from validation.diagnosis.detectors.events import events
-from validation.diagnosis.detectors.gusts import gusts
-from validation.diagnosis.detectors.local_problem import local_problems
-from validation.diagnosis.detectors.speed_ripple import ripple
-from validation.diagnosis.detectors.time_offsets import time_offsets
-from validation.diagnosis.inertia import with_inertia
-from validation.diagnosis.pipeline import diagnose
-from validation.diagnosis.prepared import prepared
-from validation.diagnosis.selection.candidates import parameters_of
-from validation.diagnosis.selection.continuous_fit import continuous_fit
-from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.selection.score_tests import ScreenedCandidate, screened_candidates
-from validation.diagnosis.selection.search_state import Search, chi2_in, values_of_fit
-from validation.diagnosis.selection.stepwise import screened
-from validation.diagnosis.settings import RELAXED_FIT, SELECTION
-from validation.identification.noise import robust_noise, stated_noise, whitened
-from validation.identification.residual_tests import RESIDUAL_TESTS, unmodelled_residuals
-from validation.reporting.figures import new_figure, save_figure
-from validation.reporting.progress import shown
+from discsim.validation.challenge.cases.case import Case, Coast, Kind, Run, Turning
+from discsim.validation.challenge.cases.conceal import recordings as simulated
+from discsim.validation.challenge.cases.draw import draw_case
+from discsim.validation.diagnosis.detectors.events import events
+from discsim.validation.diagnosis.detectors.gusts import gusts
+from discsim.validation.diagnosis.detectors.local_problem import local_problems
+from discsim.validation.diagnosis.detectors.speed_ripple import ripple
+from discsim.validation.diagnosis.detectors.time_offsets import time_offsets
+from discsim.validation.diagnosis.inertia import with_inertia
+from discsim.validation.diagnosis.pipeline import diagnose
+from discsim.validation.diagnosis.prepared import prepared
+from discsim.validation.diagnosis.selection.candidates import parameters_of
+from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate, screened_candidates
+from discsim.validation.diagnosis.selection.search_state import Search, chi2_in, values_of_fit
+from discsim.validation.diagnosis.selection.stepwise import screened
+from discsim.validation.diagnosis.settings import RELAXED_FIT, SELECTION
+from discsim.validation.identification.noise import robust_noise, stated_noise, whitened
+from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, unmodelled_residuals
+from discsim.validation.reporting.figures import new_figure, save_figure
+from discsim.validation.reporting.progress import shown
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "thresholds.md"
 MARKS = ("<!-- rates: benchmarks/thresholds.py -->", "<!-- end of rates -->")

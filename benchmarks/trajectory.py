@@ -22,7 +22,7 @@ import numpy as np
 from discsim.parameters import flight_parameters, tables
 from discsim.shipped import load_disc, load_throw
 from discsim.trajectory import Flight, integrate, predict, predict_many, release_state
-from validation.scenarios.engine_comparison import DISCS, compare_engines, strong_throw
+from discsim.validation.scenarios.engine_comparison import DISCS, compare_engines, strong_throw
 
 DISC, ENVIRONMENT = load_disc("driver")
 THROW = load_throw("driver")

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from discsim.engine import fly
     from discsim.environment import Environment
     from discsim.errors import InputError
+    from discsim.estimators.plain_arrays import fft
+    from discsim.estimators.rate import YawRate
     from discsim.model_file import read_model, write_model
     from discsim.motion import Motion
     from discsim.plain_arrays import recording_from_arrays
@@ -37,15 +39,13 @@ if TYPE_CHECKING:
     from discsim.sensors.instruments import read_part as load_part
     from discsim.shipped import load_disc, load_site, load_throw
     from discsim.trajectory import predict
-    from estimators.plain_arrays import fft
-    from estimators.rate import YawRate
-    from validation.challenge.challenged import blind_test as challenge
-    from validation.checking.checked import check
-    from validation.diagnosis.diagnosed import diagnose_recordings as diagnose
-    from validation.estimating.spin_estimates import estimate_spin as estimate
-    from validation.importing.imported_log import import_log
-    from validation.sweeps.swept import sweep
-    from validation.yaw_damping.fitted import fit_recordings as fit
+    from discsim.validation.challenge.challenged import blind_test as challenge
+    from discsim.validation.checking.checked import check
+    from discsim.validation.diagnosis.diagnosed import diagnose_recordings as diagnose
+    from discsim.validation.estimating.spin_estimates import estimate_spin as estimate
+    from discsim.validation.importing.imported_log import import_log
+    from discsim.validation.sweeps.swept import sweep
+    from discsim.validation.yaw_damping.fitted import fit_recordings as fit
 
     __version__: str
 
@@ -98,17 +98,17 @@ _HOMES = {
     "Result": "discsim.result",
     "Samples": "discsim.recording",
     "SensorSheet": "discsim.recording",
-    "YawRate": "estimators.rate",
+    "YawRate": "discsim.estimators.rate",
     "__version__": "discsim.version:version",
-    "challenge": "validation.challenge.challenged:blind_test",
-    "check": "validation.checking.checked",
-    "diagnose": "validation.diagnosis.diagnosed:diagnose_recordings",
+    "challenge": "discsim.validation.challenge.challenged:blind_test",
+    "check": "discsim.validation.checking.checked",
+    "diagnose": "discsim.validation.diagnosis.diagnosed:diagnose_recordings",
     "effect": "discsim.effects.catalogue",
-    "estimate": "validation.estimating.spin_estimates:estimate_spin",
-    "fft": "estimators.plain_arrays",
-    "fit": "validation.yaw_damping.fitted:fit_recordings",
+    "estimate": "discsim.validation.estimating.spin_estimates:estimate_spin",
+    "fft": "discsim.estimators.plain_arrays",
+    "fit": "discsim.validation.yaw_damping.fitted:fit_recordings",
     "fly": "discsim.engine",
-    "import_log": "validation.importing.imported_log",
+    "import_log": "discsim.validation.importing.imported_log",
     "load_disc": "discsim.shipped",
     "load_part": "discsim.sensors.instruments:read_part",
     "load_site": "discsim.shipped",
@@ -119,7 +119,7 @@ _HOMES = {
     "read_recording": "discsim.recording",
     "record": "discsim.sensors.instruments",
     "recording_from_arrays": "discsim.plain_arrays",
-    "sweep": "validation.sweeps.swept",
+    "sweep": "discsim.validation.sweeps.swept",
     "write_model": "discsim.model_file",
     "write_recording": "discsim.recording",
 }

@@ -35,11 +35,12 @@ F = TypeVar("F", bound=Callable[..., Any])
 def _cache_folder() -> Path:
     here = Path(__file__).resolve().parent
     digest = hashlib.sha256(numba.__version__.encode())
-    for package in (here, here.parent / "estimators", here.parent / "validation"):
-        for source in sorted(package.rglob("*.py")):
-            text = source.read_bytes()
-            if package.name != "validation" or b"compiled" in text:
-                digest.update(text)
+    inner = [here / "estimators", here / "validation"]  # in a checkout links, which rglob does not follow
+    own = [source for source in here.rglob("*.py") if not set(inner) & set(source.parents)]
+    for source in sorted(own) + [source for package in inner for source in sorted(package.rglob("*.py"))]:
+        text = source.read_bytes()
+        if inner[1] not in source.parents or b"compiled" in text:
+            digest.update(text)
     try:
         base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     except RuntimeError:  # a user without a home: nowhere to keep anything

@@ -44,6 +44,7 @@ def rooms() -> tuple[dict[str, str], dict[str, set[str]]]:
     }
     packages = {".".join(path.parent.parts) for path in files.values() if path.name == "__init__.py"}
     known = {".".join(path.with_suffix("").parts) for path in files.values()} | packages
+    inner = tuple(f"discsim.{top}" for top in ("estimators", "validation"))  # rooms are called as folders are
     said: dict[str, str] = {}
     edges: dict[str, set[str]] = defaultdict(set)
     for path, relative in files.items():
@@ -60,8 +61,10 @@ def rooms() -> tuple[dict[str, str], dict[str, set[str]]]:
         edges[room] |= set()
         for node in ast.walk(tree):
             if isinstance(node, ast.ImportFrom) and node.module and not node.level:
-                for name in (f"{node.module}.{alias.name}" for alias in node.names):
-                    target = name if name in known else node.module
+                origin = node.module.removeprefix("discsim.") if node.module.startswith(inner) else node.module
+                for name in (f"{origin}.{alias.name}" for alias in node.names):
+                    name = name.removeprefix("discsim.") if name in inner else name
+                    target = name if name in known else origin
                     if target in known and room_of(target, packages) != room:
                         edges[room].add(room_of(target, packages))
     return said, edges

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from discsim.effects import CATALOGUE, Row
-from validation.diagnosis.report.wording import form
+from discsim.validation.diagnosis.report.wording import form
 
 PAGE = Path(__file__).resolve().parent / "effects.md"
 HEAD = """# The effects

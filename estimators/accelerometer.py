@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from discsim.arrays import FloatArray, vector3
 from discsim.clipping import step_of
 from discsim.errors import InputError
+from discsim.estimators.rate import YawRate
 from discsim.recording import Samples, SensorSheet
-from estimators.rate import YawRate
 
 __all__ = ["AccelerometerErrors", "accelerometer", "envelope", "rate_with_known_terms"]
 

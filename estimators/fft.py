@@ -11,12 +11,12 @@ from numpy.lib.stride_tricks import sliding_window_view
 from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.compiled import compiled_nogil
 from discsim.errors import InputError
+from discsim.estimators.fft_fast import dirichlet, highest, spectra, transform_at
+from discsim.estimators.precession import AxialField, axial_field
+from discsim.estimators.rate import YawRate
+from discsim.estimators.spin_spline import IndexArray
 from discsim.recording import Samples
 from discsim.threads import side_by_side
-from estimators.fft_fast import dirichlet, highest, spectra, transform_at
-from estimators.precession import AxialField, axial_field
-from estimators.rate import YawRate
-from estimators.spin_spline import IndexArray
 
 __all__ = ["FftSettings", "fft"]
 
@@ -426,10 +426,10 @@ def _mean_known(windows: FloatArray) -> FloatArray:
 def _precession(amplitude: FloatArray, axial: FloatArray, iron: AxialField, strength: float | None) -> FloatArray:
     """Return what an axis that turns at an unseen 1 rad/s along the field moves the phase's rate by, (w,) rad/s.
 
-    The phase turns at ``-r + m_z (p m_x + q m_y)/(m_x^2 + m_y^2)`` (`estimators.precession`): the part along the field
-    of the axis's turning, times the field along the disc's axis over that across it. ``amplitude`` (w,) uT is the
-    latter and ``axial`` (w,) the former with its hard iron; where that is unknown the field has its ``strength``, or a
-    usual one.
+    The phase turns at ``-r + m_z (p m_x + q m_y)/(m_x^2 + m_y^2)`` (`discsim.estimators.precession`): the part along
+    the field of the axis's turning, times the field along the disc's axis over that across it. ``amplitude`` (w,) uT is
+    the latter and ``axial`` (w,) the former with its hard iron; where that is unknown the field has its ``strength``,
+    or a usual one.
     """
     rest = np.sqrt(np.maximum((strength or USUAL_STRENGTH) ** 2 - amplitude**2, 0.0))
     along = np.where(np.isfinite(axial), np.hypot(axial - iron.offset, iron.sd), rest)

@@ -24,7 +24,7 @@ import scipy.fft
 
 from discsim.arrays import ComplexArray, FloatArray, readonly
 from discsim.compiled import compiled, compiled_nogil
-from estimators.spin_spline import IndexArray
+from discsim.estimators.spin_spline import IndexArray
 
 __all__ = ["Spectra", "dirichlet", "highest", "padded_peak", "spectra", "transform_at"]
 

@@ -1,6 +1,6 @@
 """Spin rate from magnetometer, accelerometer and gyroscope together, each with its faults estimated along.
 
-The magnetometer counts turns and needs no calibration, so it leads (`estimators.tracking`). The accelerometer's
+The magnetometer counts turns and needs no calibration, so it leads (`discsim.estimators.tracking`). The accelerometer's
 centripetal part is separated from gravity and translation, which turn with the spin and average out over a turn; its
 mount offset, scale and bias are unknowns with priors. The gyroscope's z counts where it does not clip, with unknown
 scale and bias. A sensor that contradicts the magnetometer beyond its faults' priors is named with numbers and never
@@ -17,12 +17,12 @@ import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray, sd_by_median
 from discsim.errors import InputError
+from discsim.estimators.centripetal import centripetal
+from discsim.estimators.likelihood import LEAST, span_of
+from discsim.estimators.rate import YawRate
+from discsim.estimators.tracking import RateRows, Track, TrackingSettings, joined, plain_tracks, tracks_of
+from discsim.estimators.usable import remembered
 from discsim.recording import Recording, Samples, SensorSheet
-from estimators.centripetal import centripetal
-from estimators.likelihood import LEAST, span_of
-from estimators.rate import YawRate
-from estimators.tracking import RateRows, Track, TrackingSettings, joined, plain_tracks, tracks_of
-from estimators.usable import remembered
 
 __all__ = [
     "Agreement",

@@ -6,8 +6,8 @@ import numpy as np
 
 from discsim.arrays import FloatArray, sd_by_median
 from discsim.clipping import SAME, step_of
+from discsim.estimators.rate import YawRate
 from discsim.recording import Samples, SensorSheet
-from estimators.rate import YawRate
 
 __all__ = ["gyroscope", "rate_reference"]
 

@@ -1,7 +1,7 @@
 """Spin rate from the magnetometer by maximum likelihood in a moving window: two axes as one complex signal.
 
 In each window the field across the spin axis is a tone whose phase is a polynomial of time; hard iron and the
-ellipse of soft iron are unknown along with it (`estimators.tone`). Two axes tell the direction of spin, have no
+ellipse of soft iron are unknown along with it (`discsim.estimators.tone`). Two axes tell the direction of spin, have no
 leakage from the negative frequency, and reach the Cramer-Rao bound. The field's phase does not turn at -r but at
 ``-r + m_z (p m_x + q m_y)/(m_x^2 + m_y^2)`` (docs/spin-phase.md): with a gyroscope the difference is removed, without
 one its stated size is part of the standard deviation.
@@ -15,12 +15,12 @@ import numpy as np
 
 from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.errors import InputError
+from discsim.estimators.precession import AxialField, axial_field, transverse_gyroscope, transverse_rates
+from discsim.estimators.rate import YawRate
+from discsim.estimators.spin_spline import IndexArray
+from discsim.estimators.window_fit import COLUMNS, search_windows, turn_windows
 from discsim.recording import Recording, Samples, SensorSheet
 from discsim.threads import side_by_side
-from estimators.precession import AxialField, axial_field, transverse_gyroscope, transverse_rates
-from estimators.rate import YawRate
-from estimators.spin_spline import IndexArray
-from estimators.window_fit import COLUMNS, search_windows, turn_windows
 
 __all__ = [
     "LEAST",

@@ -11,16 +11,16 @@ import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray, sd_by_median
 from discsim.errors import InputError
+from discsim.estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors, accelerometer
+from discsim.estimators.fft import FftSettings, fft
+from discsim.estimators.fusion import accelerometer_calibrated, compare_sensors, contradictions, fusion
+from discsim.estimators.gyroscope import gyroscope, rate_reference
+from discsim.estimators.likelihood import likelihood
+from discsim.estimators.rate import YawRate
+from discsim.estimators.tracking import tracking
+from discsim.estimators.usable import FASTEST, Usable, unclipped, usable
 from discsim.recording import Recording
 from discsim.threads import one_thread
-from estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors, accelerometer
-from estimators.fft import FftSettings, fft
-from estimators.fusion import accelerometer_calibrated, compare_sensors, contradictions, fusion
-from estimators.gyroscope import gyroscope, rate_reference
-from estimators.likelihood import likelihood
-from estimators.rate import YawRate
-from estimators.tracking import tracking
-from estimators.usable import FASTEST, Usable, unclipped, usable
 
 __all__ = [
     "METHODS",
@@ -172,8 +172,8 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 def estimate(recording: Recording, name: str, options: Options | None = None) -> YawRate:
     """Spin rate of a recording by the method of that name, or by `best`.
 
-    What no estimator may use is taken out first (`estimators.usable`). Raises `InputError` for an unknown name (listing
-    those there are), a missing sensor, or what the method raises.
+    What no estimator may use is taken out first (`discsim.estimators.usable`). Raises `InputError` for an unknown name
+    (listing those there are), a missing sensor, or what the method raises.
     """
     options = options or Options()
     if name == "best":

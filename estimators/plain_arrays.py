@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from discsim.errors import InputError
+from discsim.estimators import fft as of_samples
+from discsim.estimators.fft import FftSettings
+from discsim.estimators.rate import YawRate
 from discsim.recording import Samples
-from estimators import fft as of_samples
-from estimators.fft import FftSettings
-from estimators.rate import YawRate
 
 __all__ = ["fft"]
 
@@ -30,7 +30,7 @@ def fft(t: ArrayLike, xyz: ArrayLike, settings: FftSettings | None = None) -> Ya
     -------
     YawRate
         Magnitude of the rate, rad/s, at the centre of each window, with its standard deviation; NaN where the data
-        cannot tell (see `estimators.fft.fft`).
+        cannot tell (see `discsim.estimators.fft.fft`).
 
     Raises
     ------

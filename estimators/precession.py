@@ -14,8 +14,8 @@ from scipy.interpolate import make_interp_spline
 
 from discsim.arrays import ComplexArray, FloatArray
 from discsim.errors import InputError
+from discsim.estimators.usable import unclipped
 from discsim.recording import Recording, Samples
-from estimators.usable import unclipped
 
 __all__ = ["AxialField", "axial_field", "phase_rate", "transverse_gyroscope", "transverse_rates"]
 

@@ -1,9 +1,9 @@
 """Spin rate while the data come in: the likelihood window, moved on by one sample at a time, in bounded memory.
 
 Each magnetometer sample moves the window; the fit starts from the last one, carried on in time, and takes a step or two
-of Newton's method. The compiled functions are those of the batch estimator (`estimators.likelihood`), so where both
-fit the same window they give the same numbers. Latency: an answer is for the window's middle, half a window ago; the
-rate at the newest sample is given too, from the same polynomial, with the larger standard deviation that it has.
+of Newton's method. The compiled functions are those of the batch estimator (`discsim.estimators.likelihood`), so where
+both fit the same window they give the same numbers. Latency: an answer is for the window's middle, half a window ago;
+the rate at the newest sample is given too, from the same polynomial, with the larger standard deviation that it has.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import numpy as np
 
 from discsim.arrays import ComplexArray, FloatArray
 from discsim.errors import InputError
-from estimators.likelihood import LikelihoodSettings, fit_windows
-from estimators.precession import STRENGTH_SD
-from estimators.tone import field_shape, fit_tone
+from discsim.estimators.likelihood import LikelihoodSettings, fit_windows
+from discsim.estimators.precession import STRENGTH_SD
+from discsim.estimators.tone import field_shape, fit_tone
 
 __all__ = ["Answer", "StreamingRate"]
 

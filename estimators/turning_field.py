@@ -13,7 +13,7 @@ import numpy as np
 
 from discsim.arrays import ComplexArray, FloatArray
 from discsim.compiled import compiled, compiled_nogil, compiled_nogil_sums, compiled_sums
-from estimators.spin_spline import IndexArray
+from discsim.estimators.spin_spline import IndexArray
 
 __all__ = ["SOFT", "add_normal_equations", "integrate"]
 

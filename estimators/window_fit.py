@@ -13,8 +13,8 @@ import numpy as np
 
 from discsim.arrays import ComplexArray, FloatArray
 from discsim.compiled import compiled, compiled_nogil
-from estimators.spin_spline import IndexArray
-from estimators.tone import field_shape, fit_tone, turns
+from discsim.estimators.spin_spline import IndexArray
+from discsim.estimators.tone import field_shape, fit_tone, turns
 
 __all__ = ["COLUMNS", "search_windows", "turn_windows"]
 
@@ -25,7 +25,7 @@ MOST_STEPS = 15
 #: readings lie as far from the circle as a third of its radius, and turns are miscounted.
 LARGEST_SHARE = 0.1
 
-#: What is told of a window, in this order; see `estimators.likelihood.ToneFit`.
+#: What is told of a window, in this order; see `discsim.estimators.likelihood.ToneFit`.
 COLUMNS = (
     "phase", "phase_sd", "phase_rate", "phase_rate_sd", "chirp", "amplitude", "axial", "noise", "length", "along",
     "correlation", "wobble", "offset_x", "offset_y",

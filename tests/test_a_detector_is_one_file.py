@@ -16,7 +16,7 @@ from discsim.environment import Environment
 from discsim.rig import spin_down
 from discsim.sensors import Instruments, record
 from discsim.sensors.sampling import Noise
-from validation.diagnosis import diagnose
+from discsim.validation.diagnosis import diagnose
 
 rig = Rig(Izz=0.0025, viscous=1.5e-5)
 part = Instruments.from_parts("mpu9250").without("accelerometer")

@@ -14,8 +14,8 @@ from discsim import engine
 from discsim.recording import read_recording, write_recording
 from discsim.sensors.instruments import Instruments, record
 from discsim.shipped import load_disc, load_throw
-from validation.checking.check import check_recording
-from validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.checking.check import check_recording
+from discsim.validation.diagnosis.relaxed_fit import relaxed
 
 folder = Path(sys.argv[1])
 part = "[barometer]\\nrate_hz = 25\\nnoise_rms_m = 0.1\\n"

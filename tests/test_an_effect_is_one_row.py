@@ -99,15 +99,15 @@ from discsim.recording import read_recording
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc, load_throw
 from discsim.trajectory import predict
-from validation.challenge.cases.conceal import Answer, recordings
-from validation.challenge.cases.draw import draw_case
-from validation.challenge.cases.sizes import conceivable
-from validation.commands.fly import command as fly
-from validation.diagnosis.relaxed_fit import first_trajectory
-from validation.diagnosis.report.wording import form, name_of
-from validation.diagnosis.selection.candidates import candidates_for
-from validation.identification.linearisation import linearise
-from validation.identification.plants.flight import FLIGHT
+from discsim.validation.challenge.cases.conceal import Answer, recordings
+from discsim.validation.challenge.cases.draw import draw_case
+from discsim.validation.challenge.cases.sizes import conceivable
+from discsim.validation.commands.fly import command as fly
+from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.diagnosis.report.wording import form, name_of
+from discsim.validation.diagnosis.selection.candidates import candidates_for
+from discsim.validation.identification.linearisation import linearise
+from discsim.validation.identification.plants.flight import FLIGHT
 
 out, ids = Path(sys.argv[1]), ("air.rim_damping", "gyro.bending")
 told = {"listed": [id for id in CATALOGUE if id in ids]}

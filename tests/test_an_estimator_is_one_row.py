@@ -10,8 +10,9 @@ ASKED = """
 import json, sys
 from pathlib import Path
 import numpy as np
-import discsim, estimators, validation
-from validation.commands.estimate import command as estimate
+import discsim
+from discsim import estimators, validation
+from discsim.validation.commands.estimate import command as estimate
 
 t = np.arange(0.0, 3.0, 0.005)
 rate = 40.0 - 2.0 * t

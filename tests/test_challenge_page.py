@@ -6,8 +6,8 @@ from pathlib import Path
 
 from support.page_table import with_table
 
-from validation.challenge.cases.case import MASKS
-from validation.challenge.cases.sizes import HIDING
+from discsim.validation.challenge.cases.case import MASKS
+from discsim.validation.challenge.cases.sizes import HIDING
 
 PAGE = Path(__file__).parents[1] / "docs" / "challenge.md"
 METHOD = PAGE.with_name("challenge-method.md")

@@ -12,7 +12,7 @@ import yaml
 from discsim.disc import Aero, aero_key
 from discsim.recording import COMMAND_HEADER, PLANTS, SENSORS, read_recording
 from discsim.toml_text import sigma_key
-from validation.commands.validate import command as validate
+from discsim.validation.commands.validate import command as validate
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]

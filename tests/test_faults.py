@@ -22,8 +22,8 @@ from faults.harness import COMMANDS, content, disturbed, doubled, prepare, run
 
 from discsim.errors import InputError
 from discsim.files import write_text
-from validation.reporting.run import start_run
-from validation.reporting.written import alone_in
+from discsim.validation.reporting.run import start_run
+from discsim.validation.reporting.written import alone_in
 
 #: moments tried of each signal: the command tries fifty
 MOMENTS = 1
@@ -136,7 +136,7 @@ def test_runs_in_two_threads_list_each_its_own_files(tmp_path):
         }
 
 
-DISCSIM = f"{sys.executable} -m validation.cli"
+DISCSIM = f"{sys.executable} -m discsim.validation.cli"
 
 
 @pytest.mark.parametrize(

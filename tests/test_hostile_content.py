@@ -12,10 +12,10 @@ from fuzz.seeds import RAW, recording_files
 from support import outcomes
 
 from discsim.recording import read_recording, write_recording
-from validation.diagnosis.report.files import write_outcome
-from validation.diagnosis.result import NamedEffect, ParameterValue
-from validation.reporting.figures import new_figure, save_figure
-from validation.reporting.html import Section, write_report
+from discsim.validation.diagnosis.report.files import write_outcome
+from discsim.validation.diagnosis.result import NamedEffect, ParameterValue
+from discsim.validation.reporting.figures import new_figure, save_figure
+from discsim.validation.reporting.html import Section, write_report
 
 #: ends a cell, a paragraph, an attribute and a script, and begins an element, a formula and a template
 MARKUP = "</td></p>\"'><img src=x onerror=alert(1)><script>alert(2)</script> $\\frac{$ {{ 7 * 7 }} `code` |"

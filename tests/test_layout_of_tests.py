@@ -61,12 +61,12 @@ def test_no_test_drives_a_private_name(path):
     "text",
     [
         "from discsim.native import _passive",
-        "from validation.identification import gauss_newton\ngauss_newton._solved(1)",
+        "from discsim.validation.identification import gauss_newton\ngauss_newton._solved(1)",
         "import discsim.native\ndiscsim.native._passive()",
         "from discsim.law import Law as L\nL._symbols",
         "from discsim import native\nmonkeypatch.setattr(native, '_passive', None)",
         "monkeypatch.setattr('discsim.native._passive', None)",
-        "from validation.diagnosis._hidden import what",
+        "from discsim.validation.diagnosis._hidden import what",
     ],
 )
 def test_a_private_name_that_a_test_drives_is_found(text):

@@ -17,6 +17,8 @@ ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 CI = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+#: what lies in discsim/ as links of a checkout, and as folders of an installation
+LINKS = ("/discsim/estimators", "/discsim/validation")
 
 
 def shell_lines(text: str) -> list[str]:
@@ -56,15 +58,21 @@ def test_the_wheel_holds_every_package_and_the_models():
     wheel = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
     packages = sorted(path.parent.name for path in ROOT.glob("*/__init__.py") if path.parent.name != "tests")
     assert sorted(wheel["packages"]) == packages
+    assert wheel["sources"] == {link.rpartition("/")[2]: link[1:] for link in LINKS}
+    for link in LINKS:
+        assert (ROOT / link[1:]).resolve() == ROOT.resolve() / link.rpartition("/")[2]
+        assert {link} <= set(wheel["exclude"]) & set(PROJECT["tool"]["hatch"]["build"]["targets"]["sdist"]["exclude"])
     assert wheel["force-include"] == {"models": "discsim/models", "docs/glossary.md": "discsim/glossary.md"}
     for package in packages:
         assert (ROOT / package / "py.typed").exists()
 
 
 def test_what_leaves_the_wheel_is_imported_by_nothing_that_stays():
-    left = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["exclude"]
+    left = [
+        folder for folder in PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["exclude"] if folder not in LINKS
+    ]
     assert all((ROOT / folder / "__init__.py").is_file() for folder in left)
-    names = [folder.replace("/", ".") for folder in left]
+    names = [f"discsim.{folder}".replace("/", ".") for folder in left]
     for package in ("discsim", "estimators", "validation"):
         for source in (ROOT / package).rglob("*.py"):
             if not any((ROOT / folder) in source.parents for folder in left):

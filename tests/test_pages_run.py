@@ -16,8 +16,8 @@ from pathlib import Path
 
 import pytest
 
-from validation.cli import main
-from validation.commands import COMMANDS
+from discsim.validation.cli import main
+from discsim.validation.commands import COMMANDS
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -75,7 +75,7 @@ def test_every_block_is_run_or_says_why_it_is_not(page):
 
 def options(command: str) -> set[str]:
     """Return the options that a command declares, as typer names them."""
-    function = import_module(f"validation.commands.{COMMANDS[command][0]}").command
+    function = import_module(f"discsim.validation.commands.{COMMANDS[command][0]}").command
     known = {"--help", "-h", "--debug"}
     hints = typing.get_type_hints(function, include_extras=True)
     for name, parameter in inspect.signature(function).parameters.items():

@@ -20,12 +20,12 @@ from fuzz.seeds import recording_files
 from threadpoolctl import threadpool_info
 
 from discsim.errors import InputError
+from discsim.estimators.methods import Options
 from discsim.recording import Recording, read_recording
-from estimators.methods import Options
-from validation.diagnosis.diagnosed import diagnose_recordings
-from validation.estimating.spin_estimates import estimate_all
-from validation.reporting.figures import new_figure, save_figure
-from validation.reporting.run import json_text, start_run
+from discsim.validation.diagnosis.diagnosed import diagnose_recordings
+from discsim.validation.estimating.spin_estimates import estimate_all
+from discsim.validation.reporting.figures import new_figure, save_figure
+from discsim.validation.reporting.run import json_text, start_run
 
 
 def globals_of_the_process() -> dict[str, object]:

@@ -1,6 +1,6 @@
 """The command ``discsim``: parses, calls, and turns errors into one clear line and an exit status.
 
-Each sub-command lives in ``validation.commands`` in a module of its own name and is imported only when it runs.
+Each sub-command lives in ``discsim.validation.commands`` in a module of its own name and is imported only when it runs.
 Exit status: 0 done, 1 done but outside tolerance, 2 bad input or usage, or a place that cannot be read or written,
 3 a fault of the program itself, 130 interrupted.
 """
@@ -14,8 +14,8 @@ import traceback
 import typer
 
 from discsim.errors import InputError
-from validation.commands import register
-from validation.reporting.spoken import speaking
+from discsim.validation.commands import register
+from discsim.validation.reporting.spoken import speaking
 
 __all__ = ["app", "main"]
 
@@ -34,7 +34,7 @@ app = typer.Typer(
 
 def _version(show: bool) -> None:
     if show:
-        from validation.reporting.run import package_version
+        from discsim.validation.reporting.run import package_version
 
         typer.echo(f"discsim {package_version()}")
         raise typer.Exit
@@ -59,7 +59,7 @@ def main() -> None:
     arguments = sys.argv[1:]
     debug = "--debug" in arguments
     if "--force" in arguments:
-        from validation.reporting.written import OVERWRITE
+        from discsim.validation.reporting.written import OVERWRITE
 
         OVERWRITE.set(True)
     sys.argv[1:] = [argument for argument in arguments if argument not in ("--debug", "--force")]

@@ -8,10 +8,10 @@ in the frame that does not spin, and what the field cannot show of them stays in
 Derivation, and what is unobservable: docs/spin-phase.md.
 """
 
-from estimators.tracking.problem import Segment
-from estimators.tracking.recordings import joined, plain_tracks, tracking, tracks_of
-from estimators.tracking.smoother import track_bound, track_spin
-from estimators.tracking.track import RateRows, Track, TrackingSettings
+from discsim.estimators.tracking.problem import Segment
+from discsim.estimators.tracking.recordings import joined, plain_tracks, tracking, tracks_of
+from discsim.estimators.tracking.smoother import track_bound, track_spin
+from discsim.estimators.tracking.track import RateRows, Track, TrackingSettings
 
 __all__ = [
     "RateRows",

@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.estimators.precession import transverse_rates
+from discsim.estimators.spin_spline import SpinSpline
+from discsim.estimators.tracking.track import RateRows, TrackingSettings
+from discsim.estimators.turning_field import add_normal_equations, integrate
 from discsim.recording import Samples
-from estimators.precession import transverse_rates
-from estimators.spin_spline import SpinSpline
-from estimators.tracking.track import RateRows, TrackingSettings
-from estimators.turning_field import add_normal_equations, integrate
 
 __all__ = ["Linear", "Problem", "Segment", "Turned"]
 

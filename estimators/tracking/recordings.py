@@ -9,15 +9,23 @@ from math import sqrt
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
+from discsim.estimators.likelihood import (
+    LEAST,
+    LikelihoodSettings,
+    ToneFit,
+    fit_windows,
+    span_of,
+    usable_field,
+    window_centres,
+)
+from discsim.estimators.precession import AxialField, axial_field, transverse_gyroscope
+from discsim.estimators.rate import YawRate
+from discsim.estimators.tracking.problem import Segment
+from discsim.estimators.tracking.smoother import track_spin
+from discsim.estimators.tracking.track import RateRows, Track, TrackingSettings
+from discsim.estimators.usable import remembered, unclipped
 from discsim.recording import Recording, Samples
 from discsim.threads import side_by_side
-from estimators.likelihood import LEAST, LikelihoodSettings, ToneFit, fit_windows, span_of, usable_field, window_centres
-from estimators.precession import AxialField, axial_field, transverse_gyroscope
-from estimators.rate import YawRate
-from estimators.tracking.problem import Segment
-from estimators.tracking.smoother import track_spin
-from estimators.tracking.track import RateRows, Track, TrackingSettings
-from estimators.usable import remembered, unclipped
 
 __all__ = ["joined", "plain_tracks", "tracking", "tracks_of"]
 
@@ -62,7 +70,7 @@ def tracks_of(
     """Return the segments' tracks, in time order; none where no window shows a spin.
 
     ``rows`` are other sensors' readings of the rate. ``unfold`` turns more per sampling interval than the field shows
-    are made by a spin faster than half the sampling rate; only another sensor can tell (`estimators.fusion`).
+    are made by a spin faster than half the sampling rate; only another sensor can tell (`discsim.estimators.fusion`).
     """
     magnetometer = recording.need("magnetometer")
     sheet = recording.sheets.get("magnetometer")

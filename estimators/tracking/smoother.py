@@ -9,11 +9,11 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from discsim.arrays import FloatArray, IntArray
-from estimators.precession import AxialField
-from estimators.spin_spline import SpinSpline
-from estimators.tracking.problem import Linear, Problem, Segment
-from estimators.tracking.solution import Mixture, Point, adapt, linearise, mean_roughness, solve, with_roughness
-from estimators.tracking.track import Track
+from discsim.estimators.precession import AxialField
+from discsim.estimators.spin_spline import SpinSpline
+from discsim.estimators.tracking.problem import Linear, Problem, Segment
+from discsim.estimators.tracking.solution import Mixture, Point, adapt, linearise, mean_roughness, solve, with_roughness
+from discsim.estimators.tracking.track import Track
 
 __all__ = ["track_bound", "track_spin"]
 

@@ -10,7 +10,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 
 from discsim.arrays import FloatArray
-from estimators.tracking.problem import Linear, Problem, Turned
+from discsim.estimators.tracking.problem import Linear, Problem, Turned
 
 __all__ = ["Mixture", "Point", "adapt", "linearise", "mean_roughness", "solve", "with_roughness"]
 

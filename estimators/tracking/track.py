@@ -9,7 +9,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray, IntArray
 from discsim.errors import InputError
-from estimators.precession import STRENGTH_SD
+from discsim.estimators.precession import STRENGTH_SD
 
 __all__ = ["RateRows", "Track", "TrackingSettings"]
 

@@ -17,7 +17,7 @@ from discsim.frames import rotation_error
 from discsim.sensitivity import RELEASE_COLUMNS, sensitivities
 from discsim.shipped import load_disc
 from discsim.trajectory import Flight, predict, predict_many, release_state
-from validation.scenarios.engine_comparison import DISCS, compare_engines, strong_throw
+from discsim.validation.scenarios.engine_comparison import DISCS, compare_engines, strong_throw
 
 WOBBLING = throw(wobble=(4.0, -3.0))
 

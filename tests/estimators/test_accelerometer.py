@@ -10,8 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from discsim.errors import InputError
+from discsim.estimators import AccelerometerErrors, accelerometer, envelope, rate_with_known_terms
 from discsim.recording import Samples, SensorSheet
-from estimators import AccelerometerErrors, accelerometer, envelope, rate_with_known_terms
 
 POSITION = np.array([-0.0161, 0.0, 0.0])
 G = 9.80665

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.bounds import flight_bound, regular_bound
 
-from estimators.bound import tone_bound
+from discsim.estimators.bound import tone_bound
 
 
 def test_a_long_window_has_the_closed_form():

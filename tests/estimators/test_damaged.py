@@ -10,10 +10,10 @@ import pytest
 from support.spinning_sensor import Spin, record
 
 from discsim.errors import InputError
+from discsim.estimators import gyroscope
+from discsim.estimators.methods import all_methods, best_of, estimate
+from discsim.estimators.usable import FASTEST, usable
 from discsim.recording import Samples, SensorSheet
-from estimators import gyroscope
-from estimators.methods import all_methods, best_of, estimate
-from estimators.usable import FASTEST, usable
 
 SENSORS = ("magnetometer", "accelerometer", "gyroscope")
 

@@ -13,10 +13,10 @@ from support.places import PRACTICE
 from support.spinning_sensor import Spin, move, record
 
 from discsim.errors import InputError
+from discsim.estimators import FftSettings, fft
+from discsim.estimators.methods import estimate
+from discsim.estimators.precession import phase_rate
 from discsim.recording import Samples, read_recording
-from estimators import FftSettings, fft
-from estimators.methods import estimate
-from estimators.precession import phase_rate
 
 BIN_DEG_S = 360 * 100 / 128  # sampling rate over window, the width of a line
 GRID_DEG_S = 360 * 100 / 2**14  # (PE1)

@@ -8,7 +8,7 @@ import scipy.fft
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimators.fft_fast import highest, padded_peak, spectra, transform_at
+from discsim.estimators.fft_fast import highest, padded_peak, spectra, transform_at
 
 
 def padded(x, total, first, last):

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from support.spinning_sensor import MPU9250, Faults, Spin, move, record, without
 
-from discsim.recording import Recording, Samples, SensorSheet
-from estimators.centripetal import centripetal
-from estimators.fusion import (
+from discsim.estimators.centripetal import centripetal
+from discsim.estimators.fusion import (
     FusionSettings,
     accelerometer_calibrated,
     compare_sensors,
@@ -18,7 +17,8 @@ from estimators.fusion import (
     fusion,
     unfolding,
 )
-from estimators.tracking import tracking
+from discsim.estimators.tracking import tracking
+from discsim.recording import Recording, Samples, SensorSheet
 
 FAULTS = Faults(
     hard_iron=(11.0, 4.0, -12.0),

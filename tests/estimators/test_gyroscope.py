@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from discsim.estimators import gyroscope, rate_reference
 from discsim.recording import Samples, SensorSheet
-from estimators import gyroscope, rate_reference
 
 RANGE = np.radians(2000.0)
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from support.spinning_sensor import Faults, Spin, Truth, move, record
 
+from discsim.estimators.fusion import fusion
+from discsim.estimators.likelihood import likelihood
+from discsim.estimators.rate import YawRate
+from discsim.estimators.tracking import TrackingSettings, tracking
 from discsim.recording import Recording
-from estimators.fusion import fusion
-from estimators.likelihood import likelihood
-from estimators.rate import YawRate
-from estimators.tracking import TrackingSettings, tracking
 
 PRIORS = TrackingSettings()
 

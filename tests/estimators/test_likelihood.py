@@ -7,10 +7,10 @@ import pytest
 from support.spinning_sensor import MPU9250, Faults, Spin, move, record, tone, without
 
 from discsim.errors import InputError
+from discsim.estimators.bound import tone_bound
+from discsim.estimators.likelihood import LikelihoodSettings, likelihood, likelihood_from_samples
+from discsim.estimators.precession import axial_field, phase_rate, transverse_rates
 from discsim.recording import Samples
-from estimators.bound import tone_bound
-from estimators.likelihood import LikelihoodSettings, likelihood, likelihood_from_samples
-from estimators.precession import axial_field, phase_rate, transverse_rates
 
 
 def one_window(window: float, **changes: float) -> LikelihoodSettings:
@@ -208,7 +208,7 @@ def test_windows_fitted_in_parts_are_those_of_the_whole(monkeypatch, precession)
     spin = Spin() if precession else without(Spin(), precession=False)
     recording, _ = record(spin, np.random.default_rng(12), sensors=("magnetometer", "gyroscope"))
     whole = likelihood(recording)
-    monkeypatch.setattr("estimators.likelihood.TOGETHER", 20)
+    monkeypatch.setattr("discsim.estimators.likelihood.TOGETHER", 20)
     parts = likelihood(recording)
     assert len(whole) > 60
     assert np.array_equal(np.isnan(parts.rate), np.isnan(whole.rate))

@@ -9,9 +9,9 @@ import pytest
 
 from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.estimators import METHODS, best, estimate
+from discsim.estimators.methods import all_methods, folding_notes, sampling_notes
 from discsim.recording import Recording, Samples, SensorSheet
-from estimators import METHODS, best, estimate
-from estimators.methods import all_methods, folding_notes, sampling_notes
 
 SHEETS = {
     "magnetometer": SensorSheet(100.0, 0.6, 0.15, 4912.0),

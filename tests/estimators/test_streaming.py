@@ -10,8 +10,8 @@ import pytest
 from support.spinning_sensor import Faults, Spin, move, record, without
 
 from discsim.errors import InputError
-from estimators.likelihood import LikelihoodSettings, fit_windows, usable_field
-from estimators.streaming import StreamingRate
+from discsim.estimators.likelihood import LikelihoodSettings, fit_windows, usable_field
+from discsim.estimators.streaming import StreamingRate
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ from support.bounds import flight_bound
 from support.spinning_sensor import Faults, Spin, move, record, without
 
 from discsim.errors import InputError
+from discsim.estimators.tracking import TrackingSettings, tracking, tracks_of
 from discsim.recording import Recording, Samples
-from estimators.tracking import TrackingSettings, tracking, tracks_of
 
 IRON = Faults(
     hard_iron=(11.0, 4.0, -20.0),
@@ -224,7 +224,7 @@ def test_the_evidence_near_its_peak_is_all_that_matters(thrown, monkeypatch):
     spin, truth = thrown
     recording, _ = record(spin, np.random.default_rng(21), IRON, truth=truth, sensors=PHASE)
     near = tracking(recording)
-    monkeypatch.setattr("estimators.tracking.solution.FAR", np.inf)
+    monkeypatch.setattr("discsim.estimators.tracking.solution.FAR", np.inf)
     whole = tracking(Recording(**vars(recording)))
     np.testing.assert_allclose(near.rate, whole.rate, rtol=1e-12)
     np.testing.assert_allclose(near.sd, whole.sd, rtol=1e-9)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from discsim.estimators.precession import transverse_rates
+from discsim.estimators.tone import turns
+from discsim.estimators.tracking import Segment, TrackingSettings
+from discsim.estimators.tracking.problem import Problem
 from discsim.recording import Samples
-from estimators.precession import transverse_rates
-from estimators.tone import turns
-from estimators.tracking import Segment, TrackingSettings
-from estimators.tracking.problem import Problem
 
 
 def test_turns_are_cosine_and_sine_to_the_last_digit():

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from support.spinning_sensor import MPU9250, Faults, Spin, move, record, without
 
+from discsim.estimators import METHODS, estimate
+from discsim.estimators.methods import sampling_notes
+from discsim.estimators.streaming import StreamingRate
 from discsim.recording import Recording, Samples, SensorSheet
-from estimators import METHODS, estimate
-from estimators.methods import sampling_notes
-from estimators.streaming import StreamingRate
 
 SHEETS = {**MPU9250, "gyroscope": SensorSheet(200.0, 0.003, 0.0010653, np.radians(4000.0))}
 FAULTS = Faults(hard_iron=(11.0, 4.0, -12.0), mount_error=(0.0005, -0.0003))

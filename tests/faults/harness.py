@@ -21,7 +21,7 @@ from types import MappingProxyType
 from fuzz.analyses import SETS, SWEEPS
 from fuzz.seeds import RAW
 
-from validation.cli import main
+from discsim.validation.cli import main
 
 __all__ = ["COMMANDS", "content", "disturbed", "doubled", "prepare", "run"]
 

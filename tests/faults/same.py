@@ -30,7 +30,7 @@ def run_again(words: Sequence[str], out: Path, desk: Path, **environment: str) -
     desk.mkdir(parents=True, exist_ok=True)
     path = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH", ""))))
     done = subprocess.run(
-        [sys.executable, "-m", "validation.cli", *words, "--out", str(out)],
+        [sys.executable, "-m", "discsim.validation.cli", *words, "--out", str(out)],
         cwd=desk,
         env={**os.environ, "PYTHONPATH": path, **environment},
         capture_output=True,

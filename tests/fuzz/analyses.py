@@ -15,13 +15,13 @@ from support import made
 
 from discsim.recording import Recording, read_recording, write_recording
 from discsim.sensors import Instruments
-from validation.diagnosis.diagnosed import diagnose_recordings
-from validation.estimating.rate_files import read_rates, read_truth
-from validation.estimating.scored import score_rates
-from validation.reporting.run import json_text
-from validation.sweeps.plan import read_plan
-from validation.sweeps.swept import sweep
-from validation.yaw_damping.fitted import fit_recordings
+from discsim.validation.diagnosis.diagnosed import diagnose_recordings
+from discsim.validation.estimating.rate_files import read_rates, read_truth
+from discsim.validation.estimating.scored import score_rates
+from discsim.validation.reporting.run import json_text
+from discsim.validation.sweeps.plan import read_plan
+from discsim.validation.sweeps.swept import sweep
+from discsim.validation.yaw_damping.fitted import fit_recordings
 
 from .judge import possible
 

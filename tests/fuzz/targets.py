@@ -15,6 +15,9 @@ from discsim.effects.catalogue import CATALOGUE, Effect, effect
 from discsim.engine import fly
 from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.estimators.methods import Options
+from discsim.estimators.rate import YawRate
+from discsim.estimators.usable import FASTEST
 from discsim.model_file import read_model, write_model
 from discsim.motion import Motion
 from discsim.recording import Recording, read_recording, write_recording
@@ -22,19 +25,16 @@ from discsim.rig import read_profile, spin_down
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc, load_site, load_throw
 from discsim.trajectory import predict
-from estimators.methods import Options
-from estimators.rate import YawRate
-from estimators.usable import FASTEST
-from validation.checking import check_recording
-from validation.diagnosis.design.plans import read_plans
-from validation.diagnosis.setup import find_setup_faults
-from validation.estimating.spin_estimates import all_notes, estimate_all, estimate_json, rate_csv
-from validation.importing import import_recording, read_map, read_readings
-from validation.importing.sniffing import map_text, opened, sniff, stretches
-from validation.reporting.run import json_text
-from validation.scenarios.method_disagreement import disagreements
-from validation.scenarios.rate_table import plateau_table, rate_table_checks, run_rate_table
-from validation.sweeps.plan import read_plan
+from discsim.validation.checking import check_recording
+from discsim.validation.diagnosis.design.plans import read_plans
+from discsim.validation.diagnosis.setup import find_setup_faults
+from discsim.validation.estimating.spin_estimates import all_notes, estimate_all, estimate_json, rate_csv
+from discsim.validation.importing import import_recording, read_map, read_readings
+from discsim.validation.importing.sniffing import map_text, opened, sniff, stretches
+from discsim.validation.reporting.run import json_text
+from discsim.validation.scenarios.method_disagreement import disagreements
+from discsim.validation.scenarios.rate_table import plateau_table, rate_table_checks, run_rate_table
+from discsim.validation.sweeps.plan import read_plan
 
 from . import analyses
 from .judge import possible

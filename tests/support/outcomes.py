@@ -9,7 +9,7 @@ import numpy as np
 from discsim.effects import effect
 from discsim.model_file import Model, ModelEffect
 from discsim.shipped import load_disc
-from validation.diagnosis.result import (
+from discsim.validation.diagnosis.result import (
     Candidate,
     Confusion,
     Diagnosis,

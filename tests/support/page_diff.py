@@ -49,7 +49,7 @@ def told_by_a_copy(heading: str, folder: Path, asked: str) -> dict[str, Any]:
     The program gets the folder of the copy as its argument.
     """
     for package in ("discsim", "estimators", "validation", "models"):
-        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / package, folder / package, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
     applied(diff_of(heading), folder)
     answer = subprocess.run(
         [sys.executable, "-c", asked, str(folder)],

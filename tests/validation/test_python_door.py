@@ -15,18 +15,24 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import discsim
-import validation
+from discsim import validation
+from discsim.estimators import estimate, fft
 from discsim.recording import Recording, SensorSheet
 from discsim.threads import limited, one_thread
-from estimators import estimate, fft
-from validation.cli import main
-from validation.reporting.run import start_run
-from validation.running.tasks import Task, run_tasks
-from validation.studies.catalogue import STUDIES, run_study
+from discsim.validation.cli import main
+from discsim.validation.reporting.run import start_run
+from discsim.validation.running.tasks import Task, run_tasks
+from discsim.validation.studies.catalogue import STUDIES, run_study
 
 #: modules with examples: each is run as it stands
 EXAMPLES = (
-    *("discsim", "discsim.plain_arrays", "estimators.plain_arrays", "validation", "validation.checking.checked"),
+    *(
+        "discsim",
+        "discsim.plain_arrays",
+        "discsim.estimators.plain_arrays",
+        "validation",
+        "discsim.validation.checking.checked",
+    ),
 )
 RATE = 30.0
 
@@ -174,7 +180,7 @@ def test_linear_algebra_has_one_thread_inside_and_as_many_as_before_outside():
 
 
 def test_importing_sets_no_environment_variable():
-    code = "import os; old = dict(os.environ); import discsim, validation, estimators; print(old == os.environ)"
+    code = "import os; old = dict(os.environ); import discsim.estimators, discsim.validation; print(old == os.environ)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "True\n"
 
@@ -233,7 +239,7 @@ def test_a_log_imported_from_python_is_the_recording_of_the_command(tmp_path, mo
 
 
 def test_recordings_are_taken_as_they_come(recording, tmp_path):
-    from validation.running.given import given_recordings
+    from discsim.validation.running.given import given_recordings
 
     discsim.write_recording(recording, tmp_path / "01")
     given = given_recordings([recording, tmp_path, str(tmp_path / "01")])
@@ -257,7 +263,7 @@ class Asked:
 
 
 def test_the_package_of_the_blind_test_is_called_as_its_function(monkeypatch):
-    import validation.challenge.challenged as home
+    import discsim.validation.challenge.challenged as home
 
     monkeypatch.setattr(home, "blind_test", lambda *given, **named: Asked(given, named))
     assert validation.challenge(3, seed=5) == Asked((3,), {"seed": 5})
@@ -294,6 +300,6 @@ def test_every_study_is_there_in_a_checkout(study):
 def test_a_study_that_is_unknown_or_not_installed_is_refused_in_a_sentence(monkeypatch):
     with pytest.raises(discsim.InputError, match="no study 'papre'; expected one of paper, "):
         run_study("papre", [])
-    monkeypatch.setattr("validation.studies.catalogue.find_spec", lambda name: None)
+    monkeypatch.setattr("discsim.validation.studies.catalogue.find_spec", lambda name: None)
     with pytest.raises(discsim.InputError, match=r"not part of an installed discsim; expected a checkout"):
         run_study("golf-throws", [])

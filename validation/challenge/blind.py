@@ -16,14 +16,14 @@ from typing import Any, NamedTuple
 from discsim.errors import InputError
 from discsim.files import digest, write_text
 from discsim.recording import Plant
-from validation.challenge.cases.case import Kind, Mask
-from validation.challenge.cases.conceal import Answer, read_answer, write_recordings
-from validation.challenge.cases.draw import draw_case
+from discsim.validation.challenge.cases.case import Kind, Mask
+from discsim.validation.challenge.cases.conceal import Answer, read_answer, write_recordings
+from discsim.validation.challenge.cases.draw import draw_case
 
 __all__ = ["DIAGNOSE", "Request", "diagnose_blind", "open_answers", "seal_answers"]
 
 #: the command that is put to the test; the folder of recordings and ``--out DIR`` are appended
-DIAGNOSE = (sys.executable, "-m", "validation.cli", "diagnose")
+DIAGNOSE = (sys.executable, "-m", "discsim.validation.cli", "diagnose")
 #: what a diagnosis gets of the environment: where programs and compiled code are, how many threads it may use
 _PASSED_ON = ("PATH", "HOME", "LANG", "TMPDIR", "NUMBA_CACHE_DIR", "OMP_NUM_THREADS", "VIRTUAL_ENV")
 #: a diagnosis that takes longer has failed, s
@@ -31,7 +31,7 @@ PATIENCE_S = 1800.0
 
 
 class Request(NamedTuple):
-    """What a case is drawn from; see `validation.challenge.cases.draw.draw_case`."""
+    """What a case is drawn from; see `discsim.validation.challenge.cases.draw.draw_case`."""
 
     seed: int
     plant: Plant | None = None

@@ -14,15 +14,15 @@ from matplotlib.figure import Figure
 
 from discsim.recording import Plant
 from discsim.result import Result
-from validation.challenge.blind import Request
-from validation.challenge.cases.case import Kind, Mask
-from validation.challenge.report.figures import draw_detection
-from validation.challenge.report.page import MANY, goals_met
-from validation.challenge.run import challenge, write_challenge
-from validation.challenge.scores.detection import Curve, detections, fit_curve
-from validation.challenge.scores.result import Scored, rates_of, times
-from validation.challenge.scores.scoring import Rate
-from validation.reporting.run import Run
+from discsim.validation.challenge.blind import Request
+from discsim.validation.challenge.cases.case import Kind, Mask
+from discsim.validation.challenge.report.figures import draw_detection
+from discsim.validation.challenge.report.page import MANY, goals_met
+from discsim.validation.challenge.run import challenge, write_challenge
+from discsim.validation.challenge.scores.detection import Curve, detections, fit_curve
+from discsim.validation.challenge.scores.result import Scored, rates_of, times
+from discsim.validation.challenge.scores.scoring import Rate
+from discsim.validation.reporting.run import Run
 
 __all__ = ["Challenged", "blind_test"]
 

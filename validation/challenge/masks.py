@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from validation.challenge.blind import Request
-from validation.challenge.cases.case import MASKS, Mask
-from validation.challenge.report.page import percent
-from validation.challenge.run import challenge
-from validation.challenge.scores.result import RESULT, Result, Scored, rates_of, read_result, times
-from validation.reporting.html import Section, write_report
-from validation.reporting.run import Run
+from discsim.validation.challenge.blind import Request
+from discsim.validation.challenge.cases.case import MASKS, Mask
+from discsim.validation.challenge.report.page import percent
+from discsim.validation.challenge.run import challenge
+from discsim.validation.challenge.scores.result import RESULT, Result, Scored, rates_of, read_result, times
+from discsim.validation.reporting.html import Section, write_report
+from discsim.validation.reporting.run import Run
 
 __all__ = ["MASK_HEADER", "challenge_masks", "mask_row", "masked_results"]
 
@@ -45,7 +45,7 @@ def challenge_masks(
 ) -> dict[Mask | None, list[Scored]]:
     """Put the diagnosis to the test under each mask, in a folder of its own in the run's; write a table of them.
 
-    The options are those of `validation.challenge.run.challenge`. What is done is not done again.
+    The options are those of `discsim.validation.challenge.run.challenge`. What is done is not done again.
     """
     masked = {mask: [request._replace(mask=mask) for request in requests] for mask in MASKS}
     for group in masked.values():

@@ -11,13 +11,13 @@ from typing import Any
 
 import discsim
 from discsim.files import digest, model_file, model_names, write_text
-from validation.challenge.blind import DIAGNOSE, Request, diagnose_blind, open_answers, seal_answers
-from validation.challenge.cases.detection_limit import sizes
-from validation.challenge.report.page import write_page
-from validation.challenge.scores.detection import detections, fit_curve
-from validation.challenge.scores.result import RESULT, Scored, rates_of, times
-from validation.reporting.run import Run, json_text, package_version, source_digest
-from validation.running.tasks import Task, claim, discard, run_tasks
+from discsim.validation.challenge.blind import DIAGNOSE, Request, diagnose_blind, open_answers, seal_answers
+from discsim.validation.challenge.cases.detection_limit import sizes
+from discsim.validation.challenge.report.page import write_page
+from discsim.validation.challenge.scores.detection import detections, fit_curve
+from discsim.validation.challenge.scores.result import RESULT, Scored, rates_of, times
+from discsim.validation.reporting.run import Run, json_text, package_version, source_digest
+from discsim.validation.running.tasks import Task, claim, discard, run_tasks
 
 __all__ = ["challenge", "limit_of", "write_challenge"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from discsim.effects.catalogue import CATALOGUE
+from discsim.estimators.methods import METHODS, missing_sensors
 from discsim.recording import Recording
-from estimators.methods import METHODS, missing_sensors
 
 __all__ = ["methods_that_run", "not_told"]
 

@@ -7,11 +7,11 @@ from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 from discsim.recording import Recording
-from validation.checking.abilities import methods_that_run, not_told
-from validation.checking.finding import SEVERITIES, Finding
-from validation.checking.readings import reading_findings
-from validation.checking.sensors import SensorCheck, check_sensor, sensor_findings
-from validation.checking.statements import statement_findings
+from discsim.validation.checking.abilities import methods_that_run, not_told
+from discsim.validation.checking.finding import SEVERITIES, Finding
+from discsim.validation.checking.readings import reading_findings
+from discsim.validation.checking.sensors import SensorCheck, check_sensor, sensor_findings
+from discsim.validation.checking.statements import statement_findings
 
 __all__ = ["Check", "SetupFault", "check_recording"]
 

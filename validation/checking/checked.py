@@ -13,12 +13,12 @@ from rich.console import Console
 from discsim.files import write_text
 from discsim.result import Result
 from discsim.threads import one_thread
-from validation.checking.check import Check, check_recording
-from validation.checking.table import print_checks
-from validation.diagnosis.setup import find_setup_faults
-from validation.reporting.figures import COLOURS, new_figure
-from validation.reporting.run import json_text
-from validation.running.given import Given, given_recordings
+from discsim.validation.checking.check import Check, check_recording
+from discsim.validation.checking.table import print_checks
+from discsim.validation.diagnosis.setup import find_setup_faults
+from discsim.validation.reporting.figures import COLOURS, new_figure
+from discsim.validation.reporting.run import json_text
+from discsim.validation.running.given import Given, given_recordings
 
 __all__ = ["Checked", "check"]
 

@@ -11,8 +11,8 @@ from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import Scale
 from discsim.effects.setup import AccelerometerUnit, GpsAxes, GyroscopeUnit, MagnetometerUnit
 from discsim.recording import Recording
-from validation.checking.finding import Finding
-from validation.checking.statements import FASTEST_SPIN, FIELD
+from discsim.validation.checking.finding import Finding
+from discsim.validation.checking.statements import FASTEST_SPIN, FIELD
 
 __all__ = ["at_rest", "reading_findings"]
 

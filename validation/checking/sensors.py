@@ -11,15 +11,15 @@ from discsim.arrays import BoolArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.setup import ClockUnit
 from discsim.recording import SENSORS, Recording
-from validation.checking.finding import Finding
-from validation.checking.noise import noise_of
-from validation.importing.cleaning import CONSTANT, Readings, frozen_runs
-from validation.importing.held import find_held, step_of
-from validation.importing.timing import row_timing
+from discsim.validation.checking.finding import Finding
+from discsim.validation.checking.noise import noise_of
+from discsim.validation.importing.cleaning import CONSTANT, Readings, frozen_runs
+from discsim.validation.importing.held import find_held, step_of
+from discsim.validation.importing.timing import row_timing
 
 __all__ = ["SensorCheck", "check_sensor", "clipped", "sensor_findings"]
 
-#: a rate from time stamps further than this from the sheet's is worth a word (as in estimators.methods)
+#: a rate from time stamps further than this from the sheet's is worth a word (as in discsim.estimators.methods)
 RATE_TOLERANCE = 0.01
 #: rows that came late or were lost are worth a word from this share on
 SHARE = 0.01

@@ -9,7 +9,7 @@ import numpy as np
 
 from discsim.disc import Disc, Release
 from discsim.recording import Recording
-from validation.checking.finding import Finding, Severity
+from discsim.validation.checking.finding import Finding, Severity
 
 __all__ = ["FASTEST_SPIN", "FIELD", "statement_findings"]
 

@@ -9,8 +9,8 @@ from rich.markup import escape
 from rich.table import Column, Table
 
 from discsim.recording import SENSORS
-from validation.checking.check import Check
-from validation.checking.sensors import SensorCheck
+from discsim.validation.checking.check import Check
+from discsim.validation.checking.sensors import SensorCheck
 
 __all__ = ["print_checks"]
 

@@ -56,7 +56,7 @@ def register(app: typer.Typer, asked: str | None) -> None:
     """Add every sub-command to ``app``, of which only the one asked for is loaded: ``--help`` is there at once."""
     for name, (module, line) in COMMANDS.items():
         if name == asked:
-            loaded = import_module(f"validation.commands.{module}")
+            loaded = import_module(f"discsim.validation.commands.{module}")
             app.command(name, context_settings=getattr(loaded, "CONTEXT", None))(loaded.command)
         else:
             app.command(name, help=line)(_not_loaded)

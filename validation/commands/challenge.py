@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from validation.reporting.options import OutOption, SeedOption
+from discsim.validation.reporting.options import OutOption, SeedOption
 
 if TYPE_CHECKING:
     from discsim.recording import Plant
-    from validation.challenge.cases.case import Kind, Mask
-    from validation.challenge.scores.result import Scored
+    from discsim.validation.challenge.cases.case import Kind, Mask
+    from discsim.validation.challenge.scores.result import Scored
 
 __all__ = ["command"]
 
@@ -88,11 +88,11 @@ def command(
     Example: discsim challenge --cases 20 --out challenge
     """
     from discsim.errors import InputError
-    from validation.challenge.blind import Request
-    from validation.challenge.challenged import Challenged
-    from validation.challenge.masks import challenge_masks
-    from validation.challenge.run import challenge
-    from validation.reporting.run import start_run
+    from discsim.validation.challenge.blind import Request
+    from discsim.validation.challenge.challenged import Challenged
+    from discsim.validation.challenge.masks import challenge_masks
+    from discsim.validation.challenge.run import challenge
+    from discsim.validation.reporting.run import start_run
 
     if scheduler is not None and workers is not None:
         raise InputError("--workers counts local processes, and --scheduler uses none; expected one of the two")

@@ -26,9 +26,9 @@ def command(
 
     Example: discsim check throw-01
     """
-    from validation.checking.checked import check
-    from validation.checking.table import print_checks
-    from validation.reporting.run import start_run
+    from discsim.validation.checking.checked import check
+    from discsim.validation.checking.table import print_checks
+    from discsim.validation.reporting.run import start_run
 
     found = check(recordings)
     if out is not None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from validation.reporting.options import DateOption, OutOption, PlaceOption, SeedOption
+from discsim.validation.reporting.options import DateOption, OutOption, PlaceOption, SeedOption
 
 __all__ = ["command"]
 
@@ -47,12 +47,12 @@ def command(
     from dataclasses import replace
 
     from discsim.effects.own import load_user_effects
-    from validation.diagnosis.datasets import need_field, read_datasets
-    from validation.diagnosis.design.plans import read_plans
-    from validation.diagnosis.diagnosed import diagnose_named
-    from validation.reporting.options import at_place
-    from validation.reporting.progress import shown
-    from validation.reporting.run import start_run
+    from discsim.validation.diagnosis.datasets import need_field, read_datasets
+    from discsim.validation.diagnosis.design.plans import read_plans
+    from discsim.validation.diagnosis.diagnosed import diagnose_named
+    from discsim.validation.reporting.options import at_place
+    from discsim.validation.reporting.progress import shown
+    from discsim.validation.reporting.run import start_run
 
     files = user_effects or []
     effects = load_user_effects(files)

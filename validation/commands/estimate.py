@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from validation.reporting.options import DateOption, OutOption, PlaceOption
+from discsim.validation.reporting.options import DateOption, OutOption, PlaceOption
 
 if TYPE_CHECKING:
     from discsim.recording import Recording
-    from validation.estimating.spin_estimates import SpinEstimates
+    from discsim.validation.estimating.spin_estimates import SpinEstimates
 
 __all__ = ["command"]
 
@@ -52,13 +52,13 @@ def command(
 
     import numpy as np
 
+    from discsim.estimators.accelerometer import AccelerometerErrors
+    from discsim.estimators.fft import FftSettings
+    from discsim.estimators.methods import Options
     from discsim.recording import read_dataset
-    from estimators.accelerometer import AccelerometerErrors
-    from estimators.fft import FftSettings
-    from estimators.methods import Options
-    from validation.estimating.spin_estimates import estimate_spin
-    from validation.reporting.options import at_place
-    from validation.reporting.run import Run, start_run
+    from discsim.validation.estimating.spin_estimates import estimate_spin
+    from discsim.validation.reporting.options import at_place
+    from discsim.validation.reporting.run import Run, start_run
 
     zeros = max(0, 2**14 - window) if pad is None else pad
     options = Options(
@@ -90,7 +90,7 @@ def _print(found: SpinEstimates) -> None:
     from rich.console import Console
     from rich.table import Column, Table
 
-    from validation.estimating.spin_estimates import figures_of
+    from discsim.validation.estimating.spin_estimates import figures_of
 
     # names are what --method takes: whole on a narrow terminal, too
     first = Column("method", no_wrap=True, min_width=max((len(rate.method) for rate in found.rates), default=0))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from validation.reporting.options import EffectOption
+from discsim.validation.reporting.options import EffectOption
 
 __all__ = ["command"]
 
@@ -26,8 +26,8 @@ def command(
     Example: discsim example-log my-log.csv --throws 3 --spin 1700 --effect mag.hard_iron:bx_uT=9,by_uT=-6
     """
     from discsim.errors import InputError
-    from validation.reporting.options import all_effects
-    from validation.scenarios.example_log import write_example_log
+    from discsim.validation.reporting.options import all_effects
+    from discsim.validation.scenarios.example_log import write_example_log
 
     if file.exists():
         raise InputError(f"{file}: is there already; expected a new file (nothing is overwritten)")

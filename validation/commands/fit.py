@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from validation.reporting.options import OutOption
+from discsim.validation.reporting.options import OutOption
 
 if TYPE_CHECKING:
-    from validation.yaw_damping.fitted import FittedYawDamping
+    from discsim.validation.yaw_damping.fitted import FittedYawDamping
 
 __all__ = ["command"]
 
@@ -34,8 +34,8 @@ def command(
     Example: discsim fit practice/calm-evening --out calm-evening-fit
     """
     from discsim.recording import read_dataset
-    from validation.reporting.run import start_run
-    from validation.yaw_damping.fitted import check_method, fit_recordings
+    from discsim.validation.reporting.run import start_run
+    from discsim.validation.yaw_damping.fitted import check_method, fit_recordings
 
     check_method(method)
     recordings = read_dataset(dataset)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from validation.reporting.options import (
+from discsim.validation.reporting.options import (
     EffectOption,
     ModelOption,
     ModuleOption,
@@ -98,8 +98,8 @@ def command(
     from discsim.recording import write_recording
     from discsim.sensors import Instruments, record
     from discsim.shipped import load_throw
-    from validation.reporting.run import start_run
-    from validation.reporting.truth import write_flight_truth
+    from discsim.validation.reporting.run import start_run
+    from discsim.validation.reporting.truth import write_flight_truth
 
     fly = _flown_by(engine, ground)
     mine = load_user_effects(own or [])

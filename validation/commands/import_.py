@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import typer
 
-from validation.reporting.options import DateOption, OutOption, PlaceOption
+from discsim.validation.reporting.options import DateOption, OutOption, PlaceOption
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from validation.importing import ImportMap
-    from validation.importing.sniffing import Proposal
-    from validation.reporting.run import Run
+    from discsim.validation.importing import ImportMap
+    from discsim.validation.importing.sniffing import Proposal
+    from discsim.validation.reporting.run import Run
 
 __all__ = ["command"]
 
@@ -61,11 +61,11 @@ def command(
     Example: discsim import my-log.csv --throw 1 --out throw-1
     or, with a map: discsim import 2025-08-31-001-rb.csv --map flatball --rows 1590:1830 --out throw-1
     """
-    from validation.importing import find_map, parse_rows, read_map
-    from validation.importing.imported_log import LogPart, take
-    from validation.importing.sniffing import opened, recognised, sniff
-    from validation.reporting.options import at_place
-    from validation.reporting.run import start_run
+    from discsim.validation.importing import find_map, parse_rows, read_map
+    from discsim.validation.importing.imported_log import LogPart, take
+    from discsim.validation.importing.sniffing import opened, recognised, sniff
+    from discsim.validation.reporting.options import at_place
+    from discsim.validation.reporting.run import start_run
 
     part = LogPart(None if rows is None else parse_rows(rows), throw, all_throws)
     part.check()
@@ -106,8 +106,8 @@ def _leave_alone(raw: Path, out: Path) -> None:
 def _proposed(run: Run, proposal: Proposal | None, target: Path) -> ImportMap:
     """Write a proposed map, say what was decided, and return the map as it is read."""
     from discsim.files import write_text
-    from validation.importing import read_map
-    from validation.importing.sniffing import map_text
+    from discsim.validation.importing import read_map
+    from discsim.validation.importing.sniffing import map_text
 
     assert proposal is not None
     write_text(target, map_text(proposal))

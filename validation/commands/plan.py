@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from validation.reporting.options import ModelOption, OutOption
+from discsim.validation.reporting.options import ModelOption, OutOption
 
 if TYPE_CHECKING:
     from discsim.recording import Recording
-    from validation.identification.plants.plan import Plan
+    from discsim.validation.identification.plants.plan import Plan
 
 __all__ = ["command"]
 
@@ -55,10 +55,10 @@ def command(
     from discsim.errors import InputError
     from discsim.recording import read_dataset
     from discsim.shipped import load_throw
-    from validation.diagnosis.design.plans import read_plans
-    from validation.planning.planned import plan as tell
-    from validation.reporting.options import disc_to_fly, known_plant, rig_of
-    from validation.reporting.run import start_run
+    from discsim.validation.diagnosis.design.plans import read_plans
+    from discsim.validation.planning.planned import plan as tell
+    from discsim.validation.reporting.options import disc_to_fly, known_plant, rig_of
+    from discsim.validation.reporting.run import start_run
 
     if like is not None and plan is not None:
         raise InputError(f"{plan} and --like {like} both say what is recorded; expected one of them")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
-from validation.reporting.options import (
+from discsim.validation.reporting.options import (
     EffectOption,
     ModelOption,
     OutOption,
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from discsim.environment import Environment
     from discsim.law import Law
     from discsim.recording import Samples
-    from validation.experiments.table_recording import MeasuredRun
-    from validation.reporting.run import Run
-    from validation.scenarios.rate_table import Bench, Plateau, RateTableRun
-    from validation.scenarios.table_scores import TableScores
+    from discsim.validation.experiments.table_recording import MeasuredRun
+    from discsim.validation.reporting.run import Run
+    from discsim.validation.scenarios.rate_table import Bench, Plateau, RateTableRun
+    from discsim.validation.scenarios.table_scores import TableScores
 
 __all__ = ["command"]
 
@@ -89,8 +89,8 @@ def command(
     from discsim.environment import Environment
     from discsim.errors import InputError
     from discsim.rig import default_profile, read_profile
-    from validation.experiments.table_recording import read_run
-    from validation.reporting.run import start_run
+    from discsim.validation.experiments.table_recording import read_run
+    from discsim.validation.reporting.run import start_run
 
     if recording is not None and (parts is not None or radius is not None):
         raise InputError("--recording states the parts and their places; expected it without --parts and --radius")
@@ -132,7 +132,7 @@ class _Asked(NamedTuple):
 
     def run(self, run: Run, name: str) -> RateTableRun:
         """Turn the table, with progress told by ``run``, and score by all methods where they are asked for."""
-        from validation.scenarios.rate_table import run_rate_table, with_all_methods
+        from discsim.validation.scenarios.rate_table import run_rate_table, with_all_methods
 
         run.step("turning the table and measuring")
         result = run_rate_table(
@@ -152,7 +152,7 @@ def _bench(table: str | None, parts: str | None, radius: float | None, mount: st
     """Return what turns and what sits on it, as the options say; raises `InputError`."""
     from discsim.errors import InputError
     from discsim.rate_tables import RateTable, load_table
-    from validation.scenarios.rate_table import Bench
+    from discsim.validation.scenarios.rate_table import Bench
 
     if radius is not None and not 1e-4 <= radius <= 1.0:
         raise InputError(f"--radius {radius:g}: expected 0.0001 to 1 m (is it in millimetres?)")
@@ -181,9 +181,9 @@ def _acting(
 def _emulate(run: Run, asked: _Asked) -> None:
     import numpy as np
 
-    from validation.scenarios.rate_table import plateau_table, rate_table_checks
-    from validation.scenarios.table_page import write_table_page
-    from validation.scenarios.table_scores import score_rates
+    from discsim.validation.scenarios.rate_table import plateau_table, rate_table_checks
+    from discsim.validation.scenarios.table_page import write_table_page
+    from discsim.validation.scenarios.table_scores import score_rates
 
     result = asked.run(run, run.out.resolve().name or "rate-table")
     _write(run.out, result)
@@ -205,8 +205,8 @@ def _emulate(run: Run, asked: _Asked) -> None:
 def _compare(run: Run, real: MeasuredRun, asked: _Asked) -> None:
     from dataclasses import replace
 
-    from validation.experiments.table_recording import compare, draw_comparison
-    from validation.scenarios.table_page import write_table_page
+    from discsim.validation.experiments.table_recording import compare, draw_comparison
+    from discsim.validation.scenarios.table_page import write_table_page
 
     bench = replace(asked.bench, stated=real.instruments)
     emulated = asked._replace(bench=bench).run(run, f"{real.recording.name or 'run'}-emulated")
@@ -228,7 +228,7 @@ def _compare(run: Run, real: MeasuredRun, asked: _Asked) -> None:
 
 def _write(out: Path, result: RateTableRun) -> None:
     from discsim.recording import write_recording
-    from validation.reporting.truth import write_rate_truth
+    from discsim.validation.reporting.truth import write_rate_truth
 
     write_recording(result.recording, out)
     if result.wide is not None:
@@ -237,7 +237,7 @@ def _write(out: Path, result: RateTableRun) -> None:
 
 
 def _write_scores(out: Path, scores: TableScores, table: list[Plateau]) -> None:
-    from validation.scenarios.rate_table import write_plateaus
+    from discsim.validation.scenarios.rate_table import write_plateaus
 
     scores.write(out)
     if table:
@@ -247,8 +247,8 @@ def _write_scores(out: Path, scores: TableScores, table: list[Plateau]) -> None:
 
 
 def _draw(out: Path, result: RateTableRun) -> None:
-    from validation.scenarios.rate_table import plateaus
-    from validation.scenarios.rate_table_figures import draw_methods, draw_waveform
+    from discsim.validation.scenarios.rate_table import plateaus
+    from discsim.validation.scenarios.rate_table_figures import draw_methods, draw_waveform
 
     draw_methods(result, out / "methods.png")
     if "magnetometer" in result.recording and plateaus(result.profile):

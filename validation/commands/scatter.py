@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from validation.reporting.options import EffectOption, ModelOption, OutOption, SeedOption
+from discsim.validation.reporting.options import EffectOption, ModelOption, OutOption, SeedOption
 
 __all__ = ["command"]
 
@@ -42,10 +42,10 @@ def command(
     Example: discsim scatter --disc driver --sd speed=0.5,launch=1,hyzer=2,nose=1,spin=50,wind=1 --out scatter
     """
     from discsim.shipped import load_throw
-    from validation.reporting.options import disc_to_fly, flight_effects, parse_sizes
-    from validation.reporting.run import start_run
-    from validation.scattering.fitted import read_fitted
-    from validation.scattering.scattered import scatter
+    from discsim.validation.reporting.options import disc_to_fly, flight_effects, parse_sizes
+    from discsim.validation.reporting.run import start_run
+    from discsim.validation.scattering.fitted import read_fitted
+    from discsim.validation.scattering.scattered import scatter
 
     body, place, stated = disc_to_fly(disc, model)
     effects, sigma, notes = flight_effects(stated, effect)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from validation.reporting.options import OutOption
+from discsim.validation.reporting.options import OutOption
 
 __all__ = ["command"]
 
@@ -35,11 +35,11 @@ def command(
 
     Example: discsim score firmware.csv --against table/truth.csv --limit rms=0.5 --limit known=0.95 --junit score.xml
     """
-    from validation.estimating.rate_files import read_rates, read_truth
-    from validation.estimating.scored import score_rates
-    from validation.reporting.options import parse_sizes
-    from validation.reporting.run import start_run
-    from validation.reporting.scores import write_junit
+    from discsim.validation.estimating.rate_files import read_rates, read_truth
+    from discsim.validation.estimating.scored import score_rates
+    from discsim.validation.reporting.options import parse_sizes
+    from discsim.validation.reporting.run import start_run
+    from discsim.validation.reporting.scores import write_junit
 
     started = time.monotonic()
     limits = parse_sizes(",".join(limit or ()), "--limit")

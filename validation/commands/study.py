@@ -22,7 +22,7 @@ def command(
 
     Example: discsim study paper --page docs/paper.md
     """
-    from validation.studies.catalogue import STUDIES, run_study
+    from discsim.validation.studies.catalogue import STUDIES, run_study
 
     if name is None:
         for known, study in STUDIES.items():

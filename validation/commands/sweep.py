@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from validation.reporting.options import OutOption
+from discsim.validation.reporting.options import OutOption
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from validation.sweeps.swept import Swept
+    from discsim.validation.sweeps.swept import Swept
 
 __all__ = ["command"]
 
@@ -45,9 +45,9 @@ def command(
     Example: discsim sweep installation --mounts 4096 --below 1 --out sweep
     """
     from discsim.errors import InputError
-    from validation.reporting.run import start_run
-    from validation.sweeps.plan import plan_file, read_plan
-    from validation.sweeps.swept import CHECKPOINTS, sweep
+    from discsim.validation.reporting.run import start_run
+    from discsim.validation.sweeps.plan import plan_file, read_plan
+    from discsim.validation.sweeps.swept import CHECKPOINTS, sweep
 
     if scheduler is not None and workers is not None:
         raise InputError("--workers counts local processes, and --scheduler uses none; expected one of the two")
@@ -71,7 +71,7 @@ def command(
 
 def _tell(found: Swept, below: float, out: Path) -> None:
     """Write and say which tolerance of mount stays below a share of the rate."""
-    from validation.sweeps.tolerance import draw_tolerances, sentences_of, write_tolerances
+    from discsim.validation.sweeps.tolerance import draw_tolerances, sentences_of, write_tolerances
 
     told = found.tolerances(below)
     if not told:
@@ -88,7 +88,7 @@ def _print(scores: xr.Dataset) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from validation.sweeps.swept import error_rows
+    from discsim.validation.sweeps.swept import error_rows
 
     table = Table("estimator", "scored", "known", "median rms, deg/s", "95 % below, deg/s", title="errors of the rate")
     for row in error_rows(scores):

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from discsim.errors import InputError
-from validation.reporting.options import ModelOption, OutOption, SeedOption, disc_to_fly, given_files
+from discsim.validation.reporting.options import ModelOption, OutOption, SeedOption, disc_to_fly, given_files
 
 if TYPE_CHECKING:
-    from validation.experiments.validation_run import Validated
+    from discsim.validation.experiments.validation_run import Validated
 
 __all__ = ["command"]
 
@@ -65,10 +65,10 @@ def command(
     or: discsim validate --disc mine.toml --throws mine-1.toml,mine-2.toml --limits limits.toml --against last-report
     """
     from discsim.recording import read_dataset
-    from validation.experiments.subject import stated_subject
-    from validation.experiments.validation_run import Judging, validate
-    from validation.reporting.limits import shipped_limits
-    from validation.reporting.run import start_run
+    from discsim.validation.experiments.subject import stated_subject
+    from discsim.validation.experiments.validation_run import Judging, validate
+    from discsim.validation.reporting.limits import shipped_limits
+    from discsim.validation.reporting.run import start_run
 
     _check_places({"--junit": junit, "--summary": summary, "--record-limits": record_limits})
     body, surroundings, stated = disc_to_fly(disc, model)
@@ -107,7 +107,7 @@ def _check_places(files: Mapping[str, Path | None]) -> None:
 def _leave(done: Validated, summary: Path | None) -> None:
     """Write the summary where it was asked for, and where GitHub runs this onto its job's page, with annotations."""
     from discsim.files import write_text
-    from validation.reporting.ci import github_commands, markdown_summary
+    from discsim.validation.reporting.ci import github_commands, markdown_summary
 
     text = markdown_summary("discsim validate", done.scores, done.changes)
     if summary is not None:

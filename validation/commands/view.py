@@ -9,11 +9,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from discsim.errors import InputError
-from validation.reporting.options import ModelOption, WithOption, all_effects, disc_to_fly, given_files, laws_upon
+from discsim.validation.reporting.options import (
+    ModelOption,
+    WithOption,
+    all_effects,
+    disc_to_fly,
+    given_files,
+    laws_upon,
+)
 
 if TYPE_CHECKING:
-    from validation.viewing.replay import Replay
-    from validation.viewing.scene import Look
+    from discsim.validation.viewing.replay import Replay
+    from discsim.validation.viewing.scene import Look
 
 __all__ = ["command"]
 
@@ -61,8 +68,8 @@ def command(
     cut = None if span is None else _span(span)
     if video is not None:
         _check_opengl()
-    from validation.reporting.run import start_run
-    from validation.viewing.scene import Look, show
+    from discsim.validation.reporting.run import start_run
+    from discsim.validation.viewing.scene import Look, show
 
     replay = _replay(recording, disc, model, throw or "driver", own or [])
     replay = replay if cut is None else replay.between(*cut)
@@ -97,7 +104,7 @@ def _check_video(video: Path | None, at: str | None) -> None:
 
 def _check_opengl() -> None:
     """Refuse a wrong MUJOCO_GL before MuJoCo is imported, which gives no clear error for it."""
-    from validation.viewing.offscreen import opengl
+    from discsim.validation.viewing.offscreen import opengl
 
     opengl()
 
@@ -106,7 +113,7 @@ def _replay(recording: Path | None, disc: str | None, model: Path | None, throw:
     from discsim.effects.own import load_user_effects
     from discsim.engine import fly
     from discsim.shipped import load_throw
-    from validation.viewing.replay import replay_motion, replay_recording
+    from discsim.validation.viewing.replay import replay_motion, replay_recording
 
     if recording is not None:
         return replay_recording(recording)
@@ -119,13 +126,13 @@ def _replay(recording: Path | None, disc: str | None, model: Path | None, throw:
 
 def _draw_picture(file: Path, replay: Replay, look: Look, times: list[float] | None) -> None:
     """Draw stills at some times, or the whole flight."""
-    from validation.viewing.scene import draw_stills, draw_whole, write_picture
+    from discsim.validation.viewing.scene import draw_stills, draw_whole, write_picture
 
     write_picture(file, draw_whole(replay, look) if times is None else draw_stills(replay, look, times))
 
 
 def _draw_video(file: Path, replay: Replay, look: Look, fps: float, speed: float) -> None:
-    from validation.viewing.scene import frame_times, write_video
+    from discsim.validation.viewing.scene import frame_times, write_video
 
     times = frame_times(file, replay, fps, speed)
     if not sys.stderr.isatty():

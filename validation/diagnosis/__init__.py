@@ -1,5 +1,5 @@
 """Diagnosis: where recordings part from the baseline, which physics was left out, and its size."""
 
-from validation.diagnosis.pipeline import diagnose
+from discsim.validation.diagnosis.pipeline import diagnose
 
 __all__ = ["diagnose"]

@@ -12,15 +12,15 @@ from discsim.arrays import FloatArray
 from discsim.disc import Aero, aero_key
 from discsim.effects.catalogue import effect as catalogued
 from discsim.model_file import Model, ModelEffect
-from validation.diagnosis.consistency.driven import turning_of
-from validation.diagnosis.consistency.spin_agreement import Agreement
-from validation.diagnosis.contradicted import contradicted_outcome
-from validation.diagnosis.design.next_recording import advise, confusions, in_words
-from validation.diagnosis.held_out import Choice, choices_without_each, heldout_chi2, heldout_gain
-from validation.diagnosis.localisation import located_effect, located_unmodelled
-from validation.diagnosis.partly import partly_explained
-from validation.diagnosis.report.wording import telling_apart
-from validation.diagnosis.result import (
+from discsim.validation.diagnosis.consistency.driven import turning_of
+from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
+from discsim.validation.diagnosis.contradicted import contradicted_outcome
+from discsim.validation.diagnosis.design.next_recording import advise, confusions, in_words
+from discsim.validation.diagnosis.held_out import Choice, choices_without_each, heldout_chi2, heldout_gain
+from discsim.validation.diagnosis.localisation import located_effect, located_unmodelled
+from discsim.validation.diagnosis.partly import partly_explained
+from discsim.validation.diagnosis.report.wording import telling_apart
+from discsim.validation.diagnosis.result import (
     SMALLEST_P_VALUE,
     Advice,
     Candidate,
@@ -39,20 +39,20 @@ from validation.diagnosis.result import (
     Recalibration,
     Residuals,
 )
-from validation.diagnosis.selection.candidates import CandidateEffect, in_parameters, parameters_of
-from validation.diagnosis.selection.continuous_fit import ContinuousFit
-from validation.diagnosis.selection.evidence import price
-from validation.diagnosis.selection.search_state import Considered, Search, chi2_in
-from validation.diagnosis.selection.stepwise import tried_without
-from validation.diagnosis.settings import settings_told
-from validation.diagnosis.setup_effects import SetupAnswer, answer_of_setup, on_board_axes
-from validation.diagnosis.stages import Judged, Question
-from validation.diagnosis.unknown_law.find import FoundLaw
-from validation.diagnosis.verdict import RECALIBRATED_NAMES, recalibrations, standard_errors
-from validation.identification.linear import Linear
-from validation.identification.noise import NoiseModel, chi_squared
-from validation.identification.plants import plant_of
-from validation.identification.residual_tests import unmodelled_residuals
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, in_parameters, parameters_of
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.selection.evidence import price
+from discsim.validation.diagnosis.selection.search_state import Considered, Search, chi2_in
+from discsim.validation.diagnosis.selection.stepwise import tried_without
+from discsim.validation.diagnosis.settings import settings_told
+from discsim.validation.diagnosis.setup_effects import SetupAnswer, answer_of_setup, on_board_axes
+from discsim.validation.diagnosis.stages import Judged, Question
+from discsim.validation.diagnosis.unknown_law.find import FoundLaw
+from discsim.validation.diagnosis.verdict import RECALIBRATED_NAMES, recalibrations, standard_errors
+from discsim.validation.identification.linear import Linear
+from discsim.validation.identification.noise import NoiseModel, chi_squared
+from discsim.validation.identification.plants import plant_of
+from discsim.validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = ["outcome_of", "reason_for"]
 

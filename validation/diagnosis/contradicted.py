@@ -9,11 +9,11 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.model_file import Model
 from discsim.recording import Recording
-from validation.diagnosis.consistency.driven import Turning
-from validation.diagnosis.consistency.early_verdict import Contradiction, Look
-from validation.diagnosis.consistency.spin_agreement import Agreement
-from validation.diagnosis.result import Diagnosis, FitFigures, Located, Outcome, Residuals
-from validation.diagnosis.settings import settings_told
+from discsim.validation.diagnosis.consistency.driven import Turning
+from discsim.validation.diagnosis.consistency.early_verdict import Contradiction, Look
+from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
+from discsim.validation.diagnosis.result import Diagnosis, FitFigures, Located, Outcome, Residuals
+from discsim.validation.diagnosis.settings import settings_told
 
 __all__ = ["contradicted_outcome"]
 

@@ -15,15 +15,15 @@ from discsim.model_file import Model
 from discsim.recording import Recording
 from discsim.result import Result
 from discsim.threads import one_thread
-from validation.diagnosis.datasets import need_field
-from validation.diagnosis.pipeline import diagnose
-from validation.diagnosis.report.figures import draw_overview
-from validation.diagnosis.report.files import write_outcome
-from validation.diagnosis.report.page import verdict_sentence
-from validation.diagnosis.result import Diagnosis, NamedEffect, Outcome
-from validation.diagnosis.stages import Progress, silent
-from validation.identification.plants.plan import Plan
-from validation.running.given import Given, given_recordings
+from discsim.validation.diagnosis.datasets import need_field
+from discsim.validation.diagnosis.pipeline import diagnose
+from discsim.validation.diagnosis.report.figures import draw_overview
+from discsim.validation.diagnosis.report.files import write_outcome
+from discsim.validation.diagnosis.report.page import verdict_sentence
+from discsim.validation.diagnosis.result import Diagnosis, NamedEffect, Outcome
+from discsim.validation.diagnosis.stages import Progress, silent
+from discsim.validation.identification.plants.plan import Plan
+from discsim.validation.running.given import Given, given_recordings
 
 __all__ = ["Diagnosed", "diagnose_named", "diagnose_recordings"]
 
@@ -35,7 +35,7 @@ class Diagnosed(Result):
     Attributes
     ----------
     outcome : Outcome
-        Everything: the answer, the improved model, residuals and candidates (`validation.diagnosis.result`).
+        Everything: the answer, the improved model, residuals and candidates (`discsim.validation.diagnosis.result`).
     counts : mapping
         Number of recordings by the name of their data set.
     """
@@ -86,7 +86,7 @@ class Diagnosed(Result):
         """Return the figure of residuals over the noise, by recording and axis, before and after."""
         return draw_overview(self.outcome.residuals)
 
-    def report(self, folder: Path | str, command: str = "validation.diagnose") -> Path:
+    def report(self, folder: Path | str, command: str = "discsim.validation.diagnose") -> Path:
         """Write diagnosis.json, report.html, figures and model.toml into ``folder``; return the report's path.
 
         ``command`` is what the report says that it was made by.
@@ -123,7 +123,7 @@ def diagnose_recordings(
     user_effects
         Effects of your own (`discsim.effects.own.load_user_effects`), which compete with the catalogue's.
     plans
-        Recordings that you could make (`validation.diagnosis.design.plans`), to choose the next one from.
+        Recordings that you could make (`discsim.validation.diagnosis.design.plans`), to choose the next one from.
     progress
         Called with a stage, the steps done, and the steps in all.
 

@@ -11,16 +11,16 @@ from typing import TypeAlias
 import numpy as np
 
 from discsim.arrays import FloatArray
-from validation.diagnosis.selection.candidates import CandidateEffect
-from validation.diagnosis.selection.continuous_fit import ContinuousFit
-from validation.diagnosis.selection.evidence import price
-from validation.diagnosis.selection.exchange import takes_its_place
-from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
-from validation.diagnosis.selection.screening import free_columns
-from validation.diagnosis.selection.search_state import Search, possible
-from validation.identification.gauss_newton import mapped
-from validation.identification.noise import chi_squared, log_likelihood
-from validation.identification.normal_equations import common_step, reduce
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.selection.evidence import price
+from discsim.validation.diagnosis.selection.exchange import takes_its_place
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
+from discsim.validation.diagnosis.selection.screening import free_columns
+from discsim.validation.diagnosis.selection.search_state import Search, possible
+from discsim.validation.identification.gauss_newton import mapped
+from discsim.validation.identification.noise import chi_squared, log_likelihood
+from discsim.validation.identification.normal_equations import common_step, reduce
 
 __all__ = ["Choice", "choices_without_each", "heldout_chi2", "heldout_gain"]
 

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from discsim.arrays import FloatArray
-from validation.diagnosis.result import Located
-from validation.diagnosis.selection.candidates import CandidateEffect
-from validation.diagnosis.selection.hypothesis import fitted_parameters
-from validation.diagnosis.selection.search_state import Search
-from validation.identification.linear import Linear
-from validation.identification.normal_equations import nuisance_step
+from discsim.validation.diagnosis.result import Located
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect
+from discsim.validation.diagnosis.selection.hypothesis import fitted_parameters
+from discsim.validation.diagnosis.selection.search_state import Search
+from discsim.validation.identification.linear import Linear
+from discsim.validation.identification.normal_equations import nuisance_step
 
 __all__ = ["located_effect", "located_unmodelled"]
 

@@ -12,15 +12,15 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.arrays import FloatArray
-from validation.diagnosis.answer.named import ParameterValue
-from validation.diagnosis.answer.partly import PartlyExplained
-from validation.diagnosis.held_out import heldout_chi2
-from validation.diagnosis.selection.candidates import CandidateEffect, in_parameters
-from validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
-from validation.diagnosis.selection.search_state import Search, values_of_fit
-from validation.diagnosis.settings import UNKNOWN_LAW
-from validation.identification.noise import chi_squared
+from discsim.validation.diagnosis.answer.named import ParameterValue
+from discsim.validation.diagnosis.answer.partly import PartlyExplained
+from discsim.validation.diagnosis.held_out import heldout_chi2
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, in_parameters
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
+from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
+from discsim.validation.diagnosis.settings import UNKNOWN_LAW
+from discsim.validation.identification.noise import chi_squared
 
 __all__ = ["partly_explained"]
 

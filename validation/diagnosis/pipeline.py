@@ -1,4 +1,4 @@
-"""One call from data sets to an outcome, through the stages of `validation.diagnosis.stages`."""
+"""One call from data sets to an outcome, through the stages of `discsim.validation.diagnosis.stages`."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ from collections.abc import Sequence
 
 from discsim.effects.own import UserEffect
 from discsim.recording import Recording
-from validation.diagnosis.assemble import outcome_of
-from validation.diagnosis.consistency.early_verdict import contradiction_after, contradiction_in
-from validation.diagnosis.consistency.spin_agreement import agreement_of, compared
-from validation.diagnosis.datasets import recording_names
-from validation.diagnosis.detectors.row_times import row_times
-from validation.diagnosis.inertia import with_inertia
-from validation.diagnosis.prepared import prepared
-from validation.diagnosis.relaxed_fit import relaxed
-from validation.diagnosis.result import Outcome
-from validation.diagnosis.selection.refits import told_to
-from validation.diagnosis.selection.stepwise import search
-from validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault
-from validation.diagnosis.setup_effects import free_parameters, with_reversed_axes
-from validation.diagnosis.stages import Prepared, Progress, Question, Tried, silent
-from validation.diagnosis.verdict import judged
-from validation.identification.competing_effects import Competing
-from validation.identification.plants.plan import Plan
-from validation.identification.stated_parameters import stated_parameters
+from discsim.validation.diagnosis.assemble import outcome_of
+from discsim.validation.diagnosis.consistency.early_verdict import contradiction_after, contradiction_in
+from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of, compared
+from discsim.validation.diagnosis.datasets import recording_names
+from discsim.validation.diagnosis.detectors.row_times import row_times
+from discsim.validation.diagnosis.inertia import with_inertia
+from discsim.validation.diagnosis.prepared import prepared
+from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.result import Outcome
+from discsim.validation.diagnosis.selection.refits import told_to
+from discsim.validation.diagnosis.selection.stepwise import search
+from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault
+from discsim.validation.diagnosis.setup_effects import free_parameters, with_reversed_axes
+from discsim.validation.diagnosis.stages import Prepared, Progress, Question, Tried, silent
+from discsim.validation.diagnosis.verdict import judged
+from discsim.validation.identification.competing_effects import Competing
+from discsim.validation.identification.plants.plan import Plan
+from discsim.validation.identification.stated_parameters import stated_parameters
 
 __all__ = ["diagnose"]
 

@@ -11,10 +11,10 @@ from discsim.arrays import BoolArray, FloatArray
 from discsim.clipping import constant_axes
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
+from discsim.validation.diagnosis.track_ends import flight_of
+from discsim.validation.identification.initial.smoothing import FEWEST
+from discsim.validation.identification.plants import plant_of
 from discsim.written import require_seconds
-from validation.diagnosis.track_ends import flight_of
-from validation.identification.initial.smoothing import FEWEST
-from validation.identification.plants import plant_of
 
 __all__ = ["prepared"]
 

@@ -18,19 +18,19 @@ from discsim.effects.catalogue import CATALOGUE, Effect, catalogued
 from discsim.effects.sensors import ClockRate
 from discsim.frames import conjugate, multiply
 from discsim.recording import Recording
-from validation.diagnosis.consistency.followed import true_noise
-from validation.diagnosis.consistency.spin_agreement import Comparison, compared, written_ratios
-from validation.diagnosis.settings import CONSISTENCY, RELAXED_FIT
-from validation.identification.gauss_newton import Fit, linearised, merit_of, refit
-from validation.identification.linear import Linear
-from validation.identification.noise import channel_of, estimate_noise, robust_noise, stated_noise, whitened
-from validation.identification.ordinary_errors import ordinary_errors
-from validation.identification.parameters import Parameter, Values
-from validation.identification.plants import plant_of
-from validation.identification.prediction import shown
-from validation.identification.readings import Readings
-from validation.identification.segments import Trajectory, trajectory_of
-from validation.identification.sensor_model import delay
+from discsim.validation.diagnosis.consistency.followed import true_noise
+from discsim.validation.diagnosis.consistency.spin_agreement import Comparison, compared, written_ratios
+from discsim.validation.diagnosis.settings import CONSISTENCY, RELAXED_FIT
+from discsim.validation.identification.gauss_newton import Fit, linearised, merit_of, refit
+from discsim.validation.identification.linear import Linear
+from discsim.validation.identification.noise import channel_of, estimate_noise, robust_noise, stated_noise, whitened
+from discsim.validation.identification.ordinary_errors import ordinary_errors
+from discsim.validation.identification.parameters import Parameter, Values
+from discsim.validation.identification.plants import plant_of
+from discsim.validation.identification.prediction import shown
+from discsim.validation.identification.readings import Readings
+from discsim.validation.identification.segments import Trajectory, trajectory_of
+from discsim.validation.identification.sensor_model import delay
 
 __all__ = [
     "beginning",

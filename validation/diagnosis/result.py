@@ -1,7 +1,7 @@
 """The answer of a diagnosis: what ``diagnosis.json`` holds, and what its report shows beside it.
 
 Every type here refuses what may not be written: a number that is no number, a verdict that its effects contradict. Its
-parts are those of `validation.diagnosis.answer`.
+parts are those of `discsim.validation.diagnosis.answer`.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from discsim.arrays import FloatArray, readonly
 from discsim.effects.catalogue import CATALOGUE
 from discsim.model_file import Model
 from discsim.recording import PLANTS, Plant
-from validation.diagnosis.answer.checked import Recordings, finite, plain, shared
-from validation.diagnosis.answer.measured import FitFigures, HeldOut, Located, NoiseNote, Outlier
-from validation.diagnosis.answer.named import (
+from discsim.validation.diagnosis.answer.checked import Recordings, finite, plain, shared
+from discsim.validation.diagnosis.answer.measured import FitFigures, HeldOut, Located, NoiseNote, Outlier
+from discsim.validation.diagnosis.answer.named import (
     MOVE_LIMIT,
     SMALLEST_P_VALUE,
     Advice,
@@ -29,8 +29,8 @@ from validation.diagnosis.answer.named import (
     Recalibration,
     Separation,
 )
-from validation.diagnosis.answer.partly import PartlyExplained
-from validation.diagnosis.consistency.spin_agreement import Agreement
+from discsim.validation.diagnosis.answer.partly import PartlyExplained
+from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
 
 __all__ = [
     "DIAGNOSIS_FORMAT",

@@ -2,8 +2,9 @@
 
 What chance alone reaches against the limits that decide is measured by ``benchmarks/thresholds.py`` (docs/thresholds.md
 has the picture). Limits that only save time say so: too wide a one costs a refit, and changes no answer. The residual
-tests have theirs in `validation.identification.residual_tests`, faults of the setup in `validation.diagnosis.setup`,
-beside the relations that they limit. A gain is in twice the log likelihood, or in chi-squared.
+tests have theirs in `discsim.validation.identification.residual_tests`, faults of the setup in
+`discsim.validation.diagnosis.setup`, beside the relations that they limit. A gain is in twice the log likelihood, or in
+chi-squared.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from validation.identification.residual_tests import RESIDUAL_TESTS
+from discsim.validation.identification.residual_tests import RESIDUAL_TESTS
 
 __all__ = ["CONSISTENCY", "DETECTORS", "RELAXED_FIT", "SELECTION", "UNKNOWN_LAW", "settings_told"]
 

@@ -1,7 +1,8 @@
 """Faults of the setup in a diagnosis: numbers that the fit refines, and effects of the answer.
 
-The recordings are corrected before the fit (`validation.diagnosis.setup`). What of a fault is a number (an offset, a
-rotation, a field) stays free about its first value in every fit, so that it gets its error beside everything else.
+The recordings are corrected before the fit (`discsim.validation.diagnosis.setup`). What of a fault is a number (an
+offset, a rotation, a field) stays free about its first value in every fit, so that it gets its error beside everything
+else.
 """
 
 from __future__ import annotations
@@ -19,8 +20,7 @@ from discsim.effects.kind import BOARD
 from discsim.effects.sensors import Scale
 from discsim.effects.setup import Axes, BoardRotation, ClockUnit, SiteField, TimeOffset
 from discsim.recording import Recording
-from discsim.written import corrected
-from validation.diagnosis.result import (
+from discsim.validation.diagnosis.result import (
     SMALLEST_P_VALUE,
     Confusion,
     Evidence,
@@ -29,9 +29,10 @@ from validation.diagnosis.result import (
     ParameterValue,
     Verdict,
 )
-from validation.diagnosis.setup import SetupFault, SetupFindings, said
-from validation.identification.gauss_newton import Fit
-from validation.identification.parameters import Parameter
+from discsim.validation.diagnosis.setup import SetupFault, SetupFindings, said
+from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.parameters import Parameter
+from discsim.written import corrected
 
 __all__ = ["SetupAnswer", "answer_of_setup", "free_parameters", "on_board_axes", "with_reversed_axes"]
 

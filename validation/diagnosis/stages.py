@@ -9,17 +9,17 @@ from typing import TypeAlias
 from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.sensors import Lag
 from discsim.recording import Recording
-from validation.diagnosis.consistency.early_verdict import Contradiction
-from validation.diagnosis.consistency.spin_agreement import Agreement, Comparison
-from validation.diagnosis.detectors.row_times import RowTimes
-from validation.diagnosis.result import Verdict
-from validation.diagnosis.selection.search_state import Search
-from validation.diagnosis.setup import SetupFindings
-from validation.diagnosis.unknown_law.find import FoundLaw
-from validation.identification.competing_effects import CATALOGUED, Competing
-from validation.identification.gauss_newton import Fit
-from validation.identification.plants import plant_of
-from validation.identification.plants.plan import Plan
+from discsim.validation.diagnosis.consistency.early_verdict import Contradiction
+from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, Comparison
+from discsim.validation.diagnosis.detectors.row_times import RowTimes
+from discsim.validation.diagnosis.result import Verdict
+from discsim.validation.diagnosis.selection.search_state import Search
+from discsim.validation.diagnosis.setup import SetupFindings
+from discsim.validation.diagnosis.unknown_law.find import FoundLaw
+from discsim.validation.identification.competing_effects import CATALOGUED, Competing
+from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.plants import plant_of
+from discsim.validation.identification.plants.plan import Plan
 
 __all__ = ["Judged", "Prepared", "Progress", "Question", "Tried", "silent"]
 

@@ -7,16 +7,16 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.disc import aero_key
 from discsim.effects.catalogue import CATALOGUE
-from validation.diagnosis.result import (
+from discsim.validation.diagnosis.result import (
     Recalibration,
     Verdict,
 )
-from validation.diagnosis.selection.continuous_fit import ContinuousFit
-from validation.diagnosis.selection.search_state import Search, misses
-from validation.diagnosis.settings import UNKNOWN_LAW
-from validation.diagnosis.stages import Judged, Progress, Tried
-from validation.diagnosis.unknown_law.find import find_law
-from validation.identification.residual_tests import unmodelled_residuals
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.selection.search_state import Search, misses
+from discsim.validation.diagnosis.settings import UNKNOWN_LAW
+from discsim.validation.diagnosis.stages import Judged, Progress, Tried
+from discsim.validation.diagnosis.unknown_law.find import find_law
+from discsim.validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = ["RECALIBRATED_NAMES", "judged", "recalibrations", "standard_errors"]
 

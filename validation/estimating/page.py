@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from discsim.estimators.rate import YawRate
 from discsim.recording import Recording
-from estimators.rate import YawRate
-from validation.reporting.html import Section, Tone, write_report
+from discsim.validation.reporting.html import Section, Tone, write_report
 
 __all__ = ["answer_of", "write_estimate_page"]
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.errors import InputError
+from discsim.estimators.rate import YawRate
 from discsim.files import read_text
-from estimators.rate import YawRate
 
 __all__ = ["read_rates", "read_truth"]
 

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from discsim.errors import InputError
+from discsim.estimators.rate import YawRate
 from discsim.files import write_text
-from estimators.rate import YawRate
-from validation.reporting.figures import draw_differences, draw_rates, new_figure, save_figure
-from validation.reporting.html import Section, write_report
-from validation.reporting.run import json_text
-from validation.reporting.scores import Score, at_most, score
+from discsim.validation.reporting.figures import draw_differences, draw_rates, new_figure, save_figure
+from discsim.validation.reporting.html import Section, write_report
+from discsim.validation.reporting.run import json_text
+from discsim.validation.reporting.scores import Score, at_most, score
 
 __all__ = ["FIGURES", "RateErrors", "ScoredRates", "score_rates"]
 

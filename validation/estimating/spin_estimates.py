@@ -11,13 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from discsim.errors import InputError
-from discsim.files import write_pieces, write_text
-from discsim.recording import Recording
-from discsim.result import Result
-from discsim.threads import one_thread
-from discsim.written import require_seconds
-from estimators.fusion import contradictions
-from estimators.methods import (
+from discsim.estimators.fusion import contradictions
+from discsim.estimators.methods import (
     METHODS,
     Options,
     all_methods,
@@ -29,15 +24,20 @@ from estimators.methods import (
     folding_notes,
     sampling_notes,
 )
-from estimators.rate import YawRate
-from estimators.usable import usable
-from validation.diagnosis.setup import find_setup_faults
-from validation.estimating.page import write_estimate_page
-from validation.reporting.figures import draw_differences, draw_rates, new_figure, save_figure
-from validation.reporting.run import json_text
-from validation.running.given import Given, given_recordings
-from validation.running.progress import Progress, silent
-from validation.scenarios.method_disagreement import Disagreement, disagreements
+from discsim.estimators.rate import YawRate
+from discsim.estimators.usable import usable
+from discsim.files import write_pieces, write_text
+from discsim.recording import Recording
+from discsim.result import Result
+from discsim.threads import one_thread
+from discsim.validation.diagnosis.setup import find_setup_faults
+from discsim.validation.estimating.page import write_estimate_page
+from discsim.validation.reporting.figures import draw_differences, draw_rates, new_figure, save_figure
+from discsim.validation.reporting.run import json_text
+from discsim.validation.running.given import Given, given_recordings
+from discsim.validation.running.progress import Progress, silent
+from discsim.validation.scenarios.method_disagreement import Disagreement, disagreements
+from discsim.written import require_seconds
 
 __all__ = [
     "SpinEstimates",
@@ -130,8 +130,8 @@ def estimate_spin(
 ) -> SpinEstimates:
     """Estimate the spin rate of one recording by a method, by the best that its sensors allow, or by all.
 
-    Setup faults (an axis, a unit, an offset in time) are mended first, and noted; `estimators.estimate` does without.
-    Raises `InputError` for an unknown method, more than one recording, or where nothing can be estimated.
+    Setup faults (an axis, a unit, an offset in time) are mended first, and noted; `discsim.estimators.estimate` does
+    without. Raises `InputError` for an unknown method, more than one recording, or where nothing can be estimated.
     """
     given = given_recordings(recording)
     if len(given) != 1:

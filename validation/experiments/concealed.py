@@ -11,11 +11,11 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from discsim.threads import cores
-from validation.challenge.blind import Request, diagnose_blind
-from validation.challenge.cases.conceal import Answer
-from validation.challenge.scores.scoring import CaseScore, score_case
-from validation.diagnosis.answer.named import MOVE_LIMIT
-from validation.reporting.scores import Score, at_most, score
+from discsim.validation.challenge.blind import Request, diagnose_blind
+from discsim.validation.challenge.cases.conceal import Answer
+from discsim.validation.challenge.scores.scoring import CaseScore, score_case
+from discsim.validation.diagnosis.answer.named import MOVE_LIMIT
+from discsim.validation.reporting.scores import Score, at_most, score
 
 __all__ = ["FULL_CASES", "QUICK_CASES", "Concealed", "concealed_cases", "concealed_checks"]
 

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from discsim.errors import InputError
+from discsim.estimators.methods import METHODS, estimate, missing_sensors
+from discsim.estimators.rate import YawRate
 from discsim.recording import Recording
-from estimators.methods import METHODS, estimate, missing_sensors
-from estimators.rate import YawRate
-from validation.reporting.scores import Score, at_most, score
-from validation.yaw_damping import fit_yaw_damping, observe
+from discsim.validation.reporting.scores import Score, at_most, score
+from discsim.validation.yaw_damping import fit_yaw_damping, observe
 
 __all__ = ["recording_checks"]
 

@@ -13,7 +13,7 @@ from discsim.recording import Samples
 from discsim.rig import PLATEAUS_DEG_S, default_profile, read_profile
 from discsim.sensors import Instruments
 from discsim.shipped import load_disc, load_throw
-from validation.scenarios.throws import FULL_SET, PARTS, QUICK_SET, StatedThrow, Throw
+from discsim.validation.scenarios.throws import FULL_SET, PARTS, QUICK_SET, StatedThrow, Throw
 
 __all__ = ["QUICK_PLATEAUS", "Subject", "shipped_subject", "stated_subject"]
 

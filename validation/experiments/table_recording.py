@@ -10,18 +10,25 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.errors import InputError
+from discsim.estimators.methods import all_methods
+from discsim.estimators.rate import YawRate
 from discsim.files import write_text
 from discsim.rate_tables import RateTable
 from discsim.recording import Recording, Samples, read_recording, write_recording
 from discsim.rig import measured_profile
 from discsim.sensors import Accelerometer, Gyroscope, Instruments, Magnetometer, RateReference, Sensor
 from discsim.sensors.sampling import Noise, Sampling
-from estimators.methods import all_methods
-from estimators.rate import YawRate
-from validation.diagnosis.setup import find_setup_faults
-from validation.reporting.figures import colour, new_figure, save_figure, symmetric_log
-from validation.scenarios.rate_table import Plateau, RateTableRun, errors_within, papers_rates, plateau_rows, plateaus
-from validation.scenarios.table_scores import Band, TableScores, score_rates
+from discsim.validation.diagnosis.setup import find_setup_faults
+from discsim.validation.reporting.figures import colour, new_figure, save_figure, symmetric_log
+from discsim.validation.scenarios.rate_table import (
+    Plateau,
+    RateTableRun,
+    errors_within,
+    papers_rates,
+    plateau_rows,
+    plateaus,
+)
+from discsim.validation.scenarios.table_scores import Band, TableScores, score_rates
 
 __all__ = ["Comparison", "MeasuredRun", "compare", "draw_comparison", "read_run"]
 

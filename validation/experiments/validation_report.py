@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from validation.experiments.concealed import Concealed
-from validation.experiments.feedback.experiment import INSIDE
-from validation.experiments.feedback.loop import Loop
-from validation.experiments.feedback.scoring import OUTPUT_ERROR
-from validation.reporting.figures import COLOURS, new_figure, save_figure, symmetric_log
-from validation.reporting.html import Section, write_report
-from validation.reporting.run import Run
-from validation.reporting.scores import Score
-from validation.scenarios.throws import EDGE_S, ThrowResult, rms
+from discsim.validation.experiments.concealed import Concealed
+from discsim.validation.experiments.feedback.experiment import INSIDE
+from discsim.validation.experiments.feedback.loop import Loop
+from discsim.validation.experiments.feedback.scoring import OUTPUT_ERROR
+from discsim.validation.reporting.figures import COLOURS, new_figure, save_figure, symmetric_log
+from discsim.validation.reporting.html import Section, write_report
+from discsim.validation.reporting.run import Run
+from discsim.validation.reporting.scores import Score
+from discsim.validation.scenarios.throws import EDGE_S, ThrowResult, rms
 
 __all__ = ["draw_throws", "write_validation_report"]
 

@@ -12,18 +12,18 @@ import numpy as np
 from discsim.errors import InputError
 from discsim.files import write_text
 from discsim.recording import Recording
-from validation.experiments.concealed import FULL_CASES, QUICK_CASES, concealed_cases, concealed_checks
-from validation.experiments.feedback.figures import draw_fig_13
-from validation.experiments.feedback.loop import Loop, close_loop
-from validation.experiments.recorded import recording_checks
-from validation.experiments.subject import Subject, shipped_subject
-from validation.experiments.validation_report import draw_throws, write_validation_report
-from validation.reporting.limits import Limit, limited, limits_text, read_limits
-from validation.reporting.regression import Change, compare_scores, read_scores, write_regression
-from validation.reporting.run import Run
-from validation.reporting.scores import Score, write_junit
-from validation.scenarios.closed_forms import closed_form_checks
-from validation.scenarios.rate_table import (
+from discsim.validation.experiments.concealed import FULL_CASES, QUICK_CASES, concealed_cases, concealed_checks
+from discsim.validation.experiments.feedback.figures import draw_fig_13
+from discsim.validation.experiments.feedback.loop import Loop, close_loop
+from discsim.validation.experiments.recorded import recording_checks
+from discsim.validation.experiments.subject import Subject, shipped_subject
+from discsim.validation.experiments.validation_report import draw_throws, write_validation_report
+from discsim.validation.reporting.limits import Limit, limited, limits_text, read_limits
+from discsim.validation.reporting.regression import Change, compare_scores, read_scores, write_regression
+from discsim.validation.reporting.run import Run
+from discsim.validation.reporting.scores import Score, write_junit
+from discsim.validation.scenarios.closed_forms import closed_form_checks
+from discsim.validation.scenarios.rate_table import (
     Plateau,
     RateTableRun,
     plateau_table,
@@ -32,9 +32,9 @@ from validation.scenarios.rate_table import (
     run_rate_table,
     write_plateaus,
 )
-from validation.scenarios.rate_table_figures import draw_methods, draw_waveform
-from validation.scenarios.throws import ThrowResult, fly_throws, throw_checks
-from validation.yaw_damping.figures import draw_fit, draw_sources, draw_surface
+from discsim.validation.scenarios.rate_table_figures import draw_methods, draw_waveform
+from discsim.validation.scenarios.throws import ThrowResult, fly_throws, throw_checks
+from discsim.validation.yaw_damping.figures import draw_fit, draw_sources, draw_surface
 
 __all__ = ["Judging", "Validated", "validate"]
 

@@ -18,16 +18,22 @@ from typing import Any
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
-from validation.identification.competing_effects import Competing
-from validation.identification.linear import Linear
-from validation.identification.linearisation import linearise, moved, reread
-from validation.identification.noise import NoiseModel, chi_squared
-from validation.identification.normal_equations import OWN_TRUST_RADIUS, Reduced, common_step, nuisance_step, reduce
-from validation.identification.parameters import AllowedDefects, Parameter, Values, values_of
-from validation.identification.plants import Plant
-from validation.identification.propagation import Column
-from validation.identification.release_prior import release_rows
-from validation.identification.segments import Trajectory, stepped
+from discsim.validation.identification.competing_effects import Competing
+from discsim.validation.identification.linear import Linear
+from discsim.validation.identification.linearisation import linearise, moved, reread
+from discsim.validation.identification.noise import NoiseModel, chi_squared
+from discsim.validation.identification.normal_equations import (
+    OWN_TRUST_RADIUS,
+    Reduced,
+    common_step,
+    nuisance_step,
+    reduce,
+)
+from discsim.validation.identification.parameters import AllowedDefects, Parameter, Values, values_of
+from discsim.validation.identification.plants import Plant
+from discsim.validation.identification.propagation import Column
+from discsim.validation.identification.release_prior import release_rows
+from discsim.validation.identification.segments import Trajectory, stepped
 
 __all__ = ["Fit", "linearised_columns", "refit"]
 

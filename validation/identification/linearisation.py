@@ -20,13 +20,13 @@ from discsim.arrays import BoolArray, FloatArray, IntArray
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.sensors import Lag
 from discsim.parameters import parameter_index, parameters
-from validation.identification.competing_effects import Competing
-from validation.identification.dynamics import ROW
-from validation.identification.linear import Channel, Linear
-from validation.identification.parameters import Values
-from validation.identification.plants import Plant
-from validation.identification.prediction import Sampled
-from validation.identification.propagation import (
+from discsim.validation.identification.competing_effects import Competing
+from discsim.validation.identification.dynamics import ROW
+from discsim.validation.identification.linear import Channel, Linear
+from discsim.validation.identification.parameters import Values
+from discsim.validation.identification.plants import Plant
+from discsim.validation.identification.prediction import Sampled
+from discsim.validation.identification.propagation import (
     EVENT_REACH,
     EVENTS,
     FLAT_ENVIRONMENT,
@@ -35,9 +35,9 @@ from validation.identification.propagation import (
     place_in_flat,
     runner_of,
 )
-from validation.identification.readings import group_of
-from validation.identification.segments import Trajectory, stepped
-from validation.identification.sensor_model import CLOCKS, is_motion, predicted
+from discsim.validation.identification.readings import group_of
+from discsim.validation.identification.segments import Trajectory, stepped
+from discsim.validation.identification.sensor_model import CLOCKS, is_motion, predicted
 
 __all__ = ["linearise", "moved", "reread"]
 

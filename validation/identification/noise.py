@@ -17,7 +17,7 @@ from scipy.signal import lfilter
 from scipy.special import expit, logit
 
 from discsim.arrays import FloatArray, IntArray, sd_by_median
-from validation.identification.linear import Channel, Linear
+from discsim.validation.identification.linear import Channel, Linear
 
 __all__ = ["GroupNoise", "NoiseModel", "chi_squared", "estimate_noise", "likeliest_noise", "log_likelihood", "whitened"]
 

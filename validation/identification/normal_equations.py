@@ -13,11 +13,11 @@ import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 
 from discsim.arrays import FloatArray
-from validation.identification.linear import Linear
-from validation.identification.noise import NoiseModel, whitened
-from validation.identification.parameters import AllowedDefects, Parameter
-from validation.identification.release_prior import release_rows
-from validation.identification.segments import Trajectory
+from discsim.validation.identification.linear import Linear
+from discsim.validation.identification.noise import NoiseModel, whitened
+from discsim.validation.identification.parameters import AllowedDefects, Parameter
+from discsim.validation.identification.release_prior import release_rows
+from discsim.validation.identification.segments import Trajectory
 
 __all__ = [
     "CUT_OFF",

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from discsim.recording import SENSORS, Recording
-from validation.identification.clipping import clipping_level
-from validation.identification.plants import plant_of
-from validation.identification.readings import Readings
+from discsim.validation.identification.clipping import clipping_level
+from discsim.validation.identification.plants import plant_of
+from discsim.validation.identification.readings import Readings
 
 __all__ = ["readings_of"]
 

@@ -14,13 +14,13 @@ import numpy as np
 
 from discsim.arrays import FloatArray, IntArray
 from discsim.effects.sensors import Lag
-from validation.identification.dynamics import ROW
-from validation.identification.noise import GroupNoise
-from validation.identification.parameters import Values
-from validation.identification.propagation import Runner, base_flat, runner_of
-from validation.identification.readings import Readings, group_of
-from validation.identification.segments import Trajectory
-from validation.identification.sensor_model import delay, predicted, sized
+from discsim.validation.identification.dynamics import ROW
+from discsim.validation.identification.noise import GroupNoise
+from discsim.validation.identification.parameters import Values
+from discsim.validation.identification.propagation import Runner, base_flat, runner_of
+from discsim.validation.identification.readings import Readings, group_of
+from discsim.validation.identification.segments import Trajectory
+from discsim.validation.identification.sensor_model import delay, predicted, sized
 
 __all__ = ["Sampled", "Shiftable", "read", "shiftable", "shown"]
 

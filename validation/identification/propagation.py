@@ -13,12 +13,12 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE
 from discsim.parameters import PARAMETERS, parameter_index, parameters, tables
 from discsim.recording import Recording
-from validation.identification.competing_effects import CATALOGUED, Competing
-from validation.identification.dynamics import LAW_PLACES, SIZE
-from validation.identification.parameters import Values
-from validation.identification.plants import Plant, plant_of
-from validation.identification.plants.plant import Given
-from validation.identification.sensor_model import is_motion, value
+from discsim.validation.identification.competing_effects import CATALOGUED, Competing
+from discsim.validation.identification.dynamics import LAW_PLACES, SIZE
+from discsim.validation.identification.parameters import Values
+from discsim.validation.identification.plants import Plant, plant_of
+from discsim.validation.identification.plants.plant import Given
+from discsim.validation.identification.sensor_model import is_motion, value
 
 __all__ = ["FLAT_ENVIRONMENT", "Column", "Runner", "place_in_flat", "runner_of"]
 

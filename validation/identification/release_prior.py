@@ -6,7 +6,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.frames import euler_angles
-from validation.identification.segments import Trajectory
+from discsim.validation.identification.segments import Trajectory
 
 __all__ = []
 

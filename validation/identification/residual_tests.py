@@ -18,9 +18,9 @@ from numpy.polynomial.legendre import legvander
 from scipy.stats import chi2
 
 from discsim.arrays import FloatArray
-from validation.identification.linear import Linear
-from validation.identification.noise import NoiseModel, estimate_noise, log_likelihood, whitened
-from validation.identification.normal_equations import inverse_of
+from discsim.validation.identification.linear import Linear
+from discsim.validation.identification.noise import NoiseModel, estimate_noise, log_likelihood, whitened
+from discsim.validation.identification.normal_equations import inverse_of
 
 __all__ = ["RESIDUAL_TESTS", "ResidualTests", "UnmodelledResidual", "Whiteness", "unmodelled_residuals", "whiteness"]
 

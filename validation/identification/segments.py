@@ -9,12 +9,12 @@ import numpy as np
 
 from discsim.arrays import FloatArray, IntArray
 from discsim.recording import Recording
-from validation.identification.competing_effects import CATALOGUED, Competing
-from validation.identification.observations import readings_of
-from validation.identification.parameters import Values
-from validation.identification.plants import Plant, plant_of
-from validation.identification.propagation import base_flat, runner_of
-from validation.identification.readings import Readings
+from discsim.validation.identification.competing_effects import CATALOGUED, Competing
+from discsim.validation.identification.observations import readings_of
+from discsim.validation.identification.parameters import Values
+from discsim.validation.identification.plants import Plant, plant_of
+from discsim.validation.identification.propagation import base_flat, runner_of
+from discsim.validation.identification.readings import Readings
 
 __all__ = ["Trajectory", "resegmented", "stepped", "trajectory_of", "undone"]
 

@@ -1,8 +1,8 @@
 """What the sensors of a recording would read of a motion, with any effect on them.
 
 The sensors are those of `discsim.sensors`, their errors as the parameters of a fit have them; motions come as rows
-(19,) of `validation.identification.dynamics`, any number of neighbouring ones at once. Noise, rounding and the range
-are the fit's business.
+(19,) of `discsim.validation.identification.dynamics`, any number of neighbouring ones at once. Noise, rounding and the
+range are the fit's business.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from discsim.motion import State, Surroundings
 from discsim.recording import Recording
 from discsim.sensors import Gyroscope
 from discsim.sensors.instruments import FIELDS, KINDS, Sensor
-from validation.identification.competing_effects import CATALOGUED, Competing
-from validation.identification.parameters import Values
-from validation.identification.plants import plant_of
+from discsim.validation.identification.competing_effects import CATALOGUED, Competing
+from discsim.validation.identification.parameters import Values
+from discsim.validation.identification.plants import plant_of
 
 __all__ = ["CLOCKS", "Values", "delay", "is_motion", "predicted", "sized", "value"]
 

@@ -12,8 +12,8 @@ from discsim.disc import Aero, aero_key
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import PositionOffset
 from discsim.recording import Recording
-from validation.identification.parameters import Parameter
-from validation.identification.plants import plant_of
+from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.plants import plant_of
 
 __all__ = ["stated_parameters"]
 

@@ -1,6 +1,6 @@
 """Raw logger files to recordings by a map: `find_map`, `read_map`, `import_recording` (docs/importing.md)."""
 
-from validation.importing.conversion import (
+from discsim.validation.importing.conversion import (
     Imported,
     RawReadings,
     import_recording,
@@ -9,8 +9,8 @@ from validation.importing.conversion import (
     recording_of,
     repairs_csv,
 )
-from validation.importing.import_map import ImportMap, find_map, read_map
-from validation.importing.raw_table import Repair
+from discsim.validation.importing.import_map import ImportMap, find_map, read_map
+from discsim.validation.importing.raw_table import Repair
 
 __all__ = [
     "ImportMap",

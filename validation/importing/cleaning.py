@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
-from validation.importing.held import find_held, find_interpolated, fresh_rows, step_of
-from validation.importing.timing import row_timing
+from discsim.validation.importing.held import find_held, find_interpolated, fresh_rows, step_of
+from discsim.validation.importing.timing import row_timing
 
 __all__ = ["Cleaned", "Readings", "body_moves", "cleaned", "frozen_runs"]
 

@@ -18,11 +18,11 @@ from discsim.disc import Release
 from discsim.errors import InputError
 from discsim.limits import LARGEST_READING, time_fault
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
-from validation.importing.cleaning import Readings, cleaned
-from validation.importing.import_map import ImportMap, SensorMap, TimeBase
-from validation.importing.raw_table import RawRow, RawTable, Repair, RepairList, number, read_raw
-from validation.importing.row_clock import RowClock, row_clock
-from validation.importing.timing import row_timing
+from discsim.validation.importing.cleaning import Readings, cleaned
+from discsim.validation.importing.import_map import ImportMap, SensorMap, TimeBase
+from discsim.validation.importing.raw_table import RawRow, RawTable, Repair, RepairList, number, read_raw
+from discsim.validation.importing.row_clock import RowClock, row_clock
+from discsim.validation.importing.timing import row_timing
 
 __all__ = [
     "Imported",
@@ -36,7 +36,8 @@ __all__ = [
 
 #: Share of a sensor's rows that may be left out before the import says that the file is in a bad state.
 MUCH_LOST = 0.05
-#: A sensor's own rate is said to be another than the map's from this on, as of time stamps (estimators.methods).
+#: A sensor's own rate is said to be another than the map's from this on, as of time stamps
+#: (discsim.estimators.methods).
 OTHER_RATE = 0.01
 #: Share of rows that may come late before the import says so.
 LATE_SHARE = 0.01

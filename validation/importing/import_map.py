@@ -23,8 +23,8 @@ from discsim.files import model_file
 from discsim.recording import PLANTS, SENSORS, Plant, SensorSheet, read_sheet
 from discsim.shipped import load_disc, load_site
 from discsim.toml_table import TomlTable, read_toml
-from validation.importing.raw_table import REPAIRS, Layout
-from validation.importing.throw import MeasuredThrow
+from discsim.validation.importing.raw_table import REPAIRS, Layout
+from discsim.validation.importing.throw import MeasuredThrow
 
 __all__ = ["ImportMap", "SensorMap", "TimeBase", "find_map", "read_map"]
 

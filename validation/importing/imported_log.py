@@ -16,12 +16,12 @@ from discsim.files import write_text
 from discsim.recording import Recording, write_recording
 from discsim.result import Result
 from discsim.threads import one_thread
-from validation.checking import check_recording
-from validation.diagnosis.setup import find_setup_faults
-from validation.importing.conversion import Imported, RawReadings, read_readings, repairs_csv
-from validation.importing.import_map import ImportMap, find_map, read_map
-from validation.importing.raw_table import Repair
-from validation.importing.sniffing import (
+from discsim.validation.checking import check_recording
+from discsim.validation.diagnosis.setup import find_setup_faults
+from discsim.validation.importing.conversion import Imported, RawReadings, read_readings, repairs_csv
+from discsim.validation.importing.import_map import ImportMap, find_map, read_map
+from discsim.validation.importing.raw_table import Repair
+from discsim.validation.importing.sniffing import (
     Decision,
     Stretch,
     map_text,
@@ -31,7 +31,7 @@ from validation.importing.sniffing import (
     stretches,
     write_raw_page,
 )
-from validation.importing.sniffing.chosen import chosen_recordings
+from discsim.validation.importing.sniffing.chosen import chosen_recordings
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from validation.importing.clock import Break, iso_seconds, mended
-from validation.importing.import_map import ImportMap, TimeBase
-from validation.importing.raw_table import RawRow, RawTable, RepairList, number
+from discsim.validation.importing.clock import Break, iso_seconds, mended
+from discsim.validation.importing.import_map import ImportMap, TimeBase
+from discsim.validation.importing.raw_table import RawRow, RawTable, RepairList, number
 
 __all__ = ["RowClock", "row_clock"]
 

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.recording import SENSORS
-from validation.identification.plants.plan import Plan
-from validation.identification.readings import group_of
-from validation.planning.information import Information, information_of
-from validation.planning.limits import Limits, coefficients_of, limits_of
-from validation.planning.recordings import Bench, planned_trajectory
+from discsim.validation.identification.plants.plan import Plan
+from discsim.validation.identification.readings import group_of
+from discsim.validation.planning.information import Information, information_of
+from discsim.validation.planning.limits import Limits, coefficients_of, limits_of
+from discsim.validation.planning.recordings import Bench, planned_trajectory
 
 __all__ = ["Bought", "NextThrow", "bought", "next_throws"]
 

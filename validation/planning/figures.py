@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from discsim.effects.catalogue import CATALOGUE
-from validation.planning.limits import Limits
-from validation.reporting.figures import new_figure, save_figure
+from discsim.validation.planning.limits import Limits
+from discsim.validation.reporting.figures import new_figure, save_figure
 
 __all__ = ["draw_limits"]
 

@@ -16,17 +16,17 @@ from discsim.arrays import FloatArray
 from discsim.disc import Aero
 from discsim.errors import InputError
 from discsim.recording import Recording
-from validation.diagnosis.relaxed_fit import unknowns
-from validation.diagnosis.selection.candidates import CandidateEffect, available, candidates_for, free_candidate
-from validation.diagnosis.selection.screening import normal_equations_of
-from validation.identification.gauss_newton import Fit, linearised
-from validation.identification.linear import Linear
-from validation.identification.noise import GroupNoise, NoiseModel, stated_noise
-from validation.identification.normal_equations import reduce
-from validation.identification.parameters import Parameter
-from validation.identification.propagation import Column
-from validation.identification.segments import Trajectory
-from validation.identification.stated_parameters import stated_parameters
+from discsim.validation.diagnosis.relaxed_fit import unknowns
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, available, candidates_for, free_candidate
+from discsim.validation.diagnosis.selection.screening import normal_equations_of
+from discsim.validation.identification.gauss_newton import Fit, linearised
+from discsim.validation.identification.linear import Linear
+from discsim.validation.identification.noise import GroupNoise, NoiseModel, stated_noise
+from discsim.validation.identification.normal_equations import reduce
+from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.propagation import Column
+from discsim.validation.identification.segments import Trajectory
+from discsim.validation.identification.stated_parameters import stated_parameters
 
 __all__ = ["Information", "Questions", "information_of", "inverse", "questions_of"]
 

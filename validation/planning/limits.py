@@ -12,10 +12,10 @@ from scipy.optimize import brentq
 from scipy.stats import ncx2
 
 from discsim.arrays import FloatArray
-from validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
-from validation.diagnosis.selection.evidence import price
-from validation.diagnosis.settings import SELECTION
-from validation.planning.information import Information, inverse
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
+from discsim.validation.diagnosis.selection.evidence import price
+from discsim.validation.diagnosis.settings import SELECTION
+from discsim.validation.planning.information import Information, inverse
 
 __all__ = ["Coefficient", "EffectLimit", "Limits", "Pair", "coefficients_of", "limits_of", "needed"]
 

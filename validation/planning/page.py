@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from discsim.effects.catalogue import CATALOGUE
-from validation.planning.figures import draw_limits
-from validation.planning.planned import Planned
-from validation.reporting.html import Section, write_report
+from discsim.validation.planning.figures import draw_limits
+from discsim.validation.planning.planned import Planned
+from discsim.validation.reporting.html import Section, write_report
 
 __all__ = ["write_plan_page"]
 

@@ -17,14 +17,14 @@ from discsim.frames import quaternion_from_matrix
 from discsim.launch import launch_of, released
 from discsim.recording import Plant, Recording
 from discsim.shipped import load_disc, load_throw
-from validation.diagnosis.design.plans import plans_about
-from validation.identification.plants.plan import Plan, towards
-from validation.identification.segments import Trajectory
-from validation.planning.advice import Bought, NextThrow, bought, next_throws
-from validation.planning.information import Information, Questions, information_of, questions_of
-from validation.planning.limits import Coefficient, Limits, coefficients_of, limits_of
-from validation.planning.recordings import Bench, planned_trajectory, plans_like
-from validation.reporting.run import json_text
+from discsim.validation.diagnosis.design.plans import plans_about
+from discsim.validation.identification.plants.plan import Plan, towards
+from discsim.validation.identification.segments import Trajectory
+from discsim.validation.planning.advice import Bought, NextThrow, bought, next_throws
+from discsim.validation.planning.information import Information, Questions, information_of, questions_of
+from discsim.validation.planning.limits import Coefficient, Limits, coefficients_of, limits_of
+from discsim.validation.planning.recordings import Bench, planned_trajectory, plans_like
+from discsim.validation.reporting.run import json_text
 
 __all__ = ["Planned", "plan", "throws_about"]
 
@@ -127,7 +127,7 @@ class Planned:
 
     def report(self, folder: Path | str, command: str = "") -> Path:
         """Write plan.json, plan.png and report.html into ``folder``; return the path of the page."""
-        from validation.planning.page import write_plan_page
+        from discsim.validation.planning.page import write_plan_page
 
         out = Path(folder)
         write_text(out / "plan.json", json_text(self.to_json()))
@@ -165,8 +165,8 @@ def plan(
     Parameters
     ----------
     plans
-        The recordings (`validation.diagnosis.design.plans.read_plans`); or recordings in hand, to be made again with
-        their own hardware; or a number of throws like ``throw`` with headings round the compass.
+        The recordings (`discsim.validation.diagnosis.design.plans.read_plans`); or recordings in hand, to be made again
+        with their own hardware; or a number of throws like ``throw`` with headings round the compass.
     disc, environment, rig
         The hardware, and where it is; a disc by name brings its place.
     parts

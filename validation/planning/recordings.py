@@ -12,13 +12,13 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Plant, Recording, Samples, SensorSheet
 from discsim.sensors import Instruments
-from validation.diagnosis.relaxed_fit import first_trajectory
-from validation.identification.parameters import Values
-from validation.identification.plants import PLANTS
-from validation.identification.plants.plan import Plan
-from validation.identification.prediction import read, shown
-from validation.identification.readings import Readings
-from validation.identification.segments import Trajectory, resegmented, trajectory_of
+from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.identification.parameters import Values
+from discsim.validation.identification.plants import PLANTS
+from discsim.validation.identification.plants.plan import Plan
+from discsim.validation.identification.prediction import read, shown
+from discsim.validation.identification.readings import Readings
+from discsim.validation.identification.segments import Trajectory, resegmented, trajectory_of
 
 __all__ = ["Bench", "planned_trajectory", "plans_like"]
 

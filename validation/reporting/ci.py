@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from validation.reporting.regression import Change
-from validation.reporting.scores import Score
+from discsim.validation.reporting.regression import Change
+from discsim.validation.reporting.scores import Score
 
 __all__ = ["github_commands", "markdown_summary"]
 

@@ -18,10 +18,10 @@ from matplotlib.text import Text
 from matplotlib.ticker import LogFormatter, NullLocator
 
 from discsim.arrays import FloatArray
+from discsim.estimators.rate import YawRate
+from discsim.estimators.spin_spline import IndexArray
 from discsim.files import write_bytes
-from estimators.rate import YawRate
-from estimators.spin_spline import IndexArray
-from validation.reporting.drawn_values import KEY, drawn_values
+from discsim.validation.reporting.drawn_values import KEY, drawn_values
 
 __all__ = ["COLOURS", "STYLE", "colour", "draw_differences", "draw_rates", "new_figure", "save_figure", "symmetric_log"]
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from discsim.files import write_text
+from discsim.validation.reporting.glossary import with_terms
+from discsim.validation.reporting.run import current_run, package_version
 from discsim.version import commit
-from validation.reporting.glossary import with_terms
-from validation.reporting.run import current_run, package_version
 
 __all__ = ["Section", "Tone", "write_page", "write_report"]
 
@@ -52,7 +52,7 @@ def write_page(path: Path, template: str, **content: Any) -> None:
     from markupsafe import Markup
 
     environment = Environment(
-        loader=PackageLoader("validation"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+        loader=PackageLoader("discsim.validation"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
     environment.tests["number_cell"] = lambda cell: bool(_NUMBER.match(str(cell)))
     loader = environment.loader

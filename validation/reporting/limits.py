@@ -13,7 +13,7 @@ from scipy.stats import chi2, norm
 
 from discsim.errors import InputError
 from discsim.files import model_file, model_names, read_text
-from validation.reporting.scores import Score, score
+from discsim.validation.reporting.scores import Score, score
 
 __all__ = ["Limit", "limited", "limits_text", "margin", "read_limits", "shipped_limits"]
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from discsim.errors import InputError
 from discsim.files import read_text
-from validation.reporting.figures import COLOURS, new_figure, save_figure
-from validation.reporting.html import Section, write_report
-from validation.reporting.scores import Score, score
+from discsim.validation.reporting.figures import COLOURS, new_figure, save_figure
+from discsim.validation.reporting.html import Section, write_report
+from discsim.validation.reporting.scores import Score, score
 
 __all__ = ["Change", "compare_scores", "read_scores", "write_regression"]
 

@@ -18,8 +18,8 @@ import numpy as np
 
 from discsim.errors import InputError
 from discsim.files import digest, write_text
+from discsim.validation.reporting.written import alone_in, watching
 from discsim.version import commit, version
-from validation.reporting.written import alone_in, watching
 
 __all__ = ["Run", "current_run", "package_version", "source_digest", "start_run"]
 

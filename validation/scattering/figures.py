@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from validation.reporting.figures import COLOURS, new_figure, save_figure
-from validation.scattering.scattered import Scattered
+from discsim.validation.reporting.figures import COLOURS, new_figure, save_figure
+from discsim.validation.scattering.scattered import Scattered
 
 __all__ = ["draw_landings", "draw_shares"]
 

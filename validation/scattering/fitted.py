@@ -9,7 +9,7 @@ import numpy as np
 
 from discsim.errors import InputError
 from discsim.files import read_text
-from validation.scattering.inputs import Fitted
+from discsim.validation.scattering.inputs import Fitted
 
 __all__ = ["read_fitted"]
 

@@ -12,8 +12,8 @@ from discsim.disc import Disc
 from discsim.effects.catalogue import Effect
 from discsim.environment import Environment
 from discsim.trajectory import predict_many
-from validation.running.tasks import Task
-from validation.scattering.inputs import Inputs
+from discsim.validation.running.tasks import Task
+from discsim.validation.scattering.inputs import Inputs
 
 __all__ = ["CHUNK", "Flown", "Throws", "chunk_tasks", "fly_chunk"]
 

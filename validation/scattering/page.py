@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from validation.reporting.html import Section, write_report
-from validation.scattering.figures import draw_landings, draw_shares
-from validation.scattering.scattered import PERCENTILES, Scattered
+from discsim.validation.reporting.html import Section, write_report
+from discsim.validation.scattering.figures import draw_landings, draw_shares
+from discsim.validation.scattering.scattered import PERCENTILES, Scattered
 
 __all__ = ["write_scatter_page"]
 

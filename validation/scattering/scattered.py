@@ -21,13 +21,13 @@ from discsim.errors import InputError
 from discsim.files import write_text
 from discsim.launch import launch_of
 from discsim.shipped import load_disc, load_throw
-from validation.reporting.run import json_text, package_version
-from validation.reporting.truth import write_csv
-from validation.running.progress import Progress, silent
-from validation.running.tasks import claim, run_tasks
-from validation.scattering.inputs import Fitted, Inputs, inputs_of
-from validation.scattering.landings import Flown, Throws, chunk_tasks, fly_chunk
-from validation.scattering.sensitivities import Shares, sensitivities
+from discsim.validation.reporting.run import json_text, package_version
+from discsim.validation.reporting.truth import write_csv
+from discsim.validation.running.progress import Progress, silent
+from discsim.validation.running.tasks import claim, run_tasks
+from discsim.validation.scattering.inputs import Fitted, Inputs, inputs_of
+from discsim.validation.scattering.landings import Flown, Throws, chunk_tasks, fly_chunk
+from discsim.validation.scattering.sensitivities import Shares, sensitivities
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -180,7 +180,7 @@ class Scattered:
 
     def report(self, folder: Path | str, command: str = "") -> Path:
         """Write scatter.json, landings.csv, scatter.png and report.html; return the path of the page."""
-        from validation.scattering.page import write_scatter_page
+        from discsim.validation.scattering.page import write_scatter_page
 
         out = Path(folder)
         write_text(out / "scatter.json", json_text(self.to_json()))
@@ -226,7 +226,7 @@ def scatter(
         Standard deviations by name in people's units, in the place of any stated: ``{"speed": 0.5, "launch": 1.0,
         "hyzer": 2.0, "nose": 1.0, "spin": 50.0, "wind": 1.0, "CD0": 0.002}`` are m/s, deg, deg, deg, rpm, m/s, none.
     fitted : Fitted, optional
-        Coefficients with their covariance, `validation.scattering.fitted.read_fitted`.
+        Coefficients with their covariance, `discsim.validation.scattering.fitted.read_fitted`.
     effects, sigma
         Effects upon the flight; one sigma of their parameters by (id, parameter).
     workers, scheduler

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray
-from validation.scattering.inputs import Inputs
+from discsim.validation.scattering.inputs import Inputs
 
 __all__ = ["Share", "Shares", "sensitivities"]
 

@@ -15,8 +15,8 @@ from discsim.frames import multiply, rotation_error, turn
 from discsim.motion import Motion
 from discsim.rig import spin_down
 from discsim.trajectory import predict
-from validation.reporting.scores import Score, at_most, score
-from validation.scenarios.plain_flight import plain_landing
+from discsim.validation.reporting.scores import Score, at_most, score
+from discsim.validation.scenarios.plain_flight import plain_landing
 
 #: MuJoCo's RK4 of 1 ms and the plain formulation touch down within 5e-5 m of each other on two throws of each of the
 #: six shipped discs (the worst has tables with kinks): four times that, m

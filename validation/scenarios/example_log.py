@@ -16,7 +16,7 @@ from discsim.recording import Recording
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc, load_site
 from discsim.trajectory import predict
-from validation.scenarios.throws import Throw
+from discsim.validation.scenarios.throws import Throw
 
 __all__ = ["SEED", "write_example_log"]
 

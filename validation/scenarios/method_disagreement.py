@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from discsim.arrays import FloatArray
-from estimators.rate import YawRate
+from discsim.estimators.rate import YawRate
 
 __all__ = ["Disagreement", "compare", "disagreements"]
 

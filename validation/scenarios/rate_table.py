@@ -16,17 +16,17 @@ from discsim.effects.catalogue import Effect
 from discsim.effects.sensors import PositionOffset
 from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.estimators.accelerometer import AccelerometerErrors, accelerometer
+from discsim.estimators.fft import FftSettings, fft
+from discsim.estimators.gyroscope import gyroscope
+from discsim.estimators.rate import YawRate
 from discsim.files import write_text
 from discsim.law import Law
 from discsim.motion import Motion
 from discsim.rate_tables import RateTable
 from discsim.recording import Recording, Samples
 from discsim.sensors import Instruments, Sensor, record
-from estimators.accelerometer import AccelerometerErrors, accelerometer
-from estimators.fft import FftSettings, fft
-from estimators.gyroscope import gyroscope
-from estimators.rate import YawRate
-from validation.reporting.scores import Score, at_most, score
+from discsim.validation.reporting.scores import Score, at_most, score
 
 __all__ = [
     "MOUNT_ERRORS",
@@ -204,7 +204,7 @@ def _envelopes(recording: Recording, rates: Mapping[str, YawRate]) -> dict[float
 
 def with_all_methods(run: RateTableRun) -> RateTableRun:
     """Return the run with the rates of every method that its sensors allow, the paper's ones as they are."""
-    from estimators.methods import all_methods
+    from discsim.estimators.methods import all_methods
 
     found, _ = all_methods(run.recording)
     others = {rate.method: rate for rate in found if rate.method not in (*run.rates, "rate_reference")}

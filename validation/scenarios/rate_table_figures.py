@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from estimators.fft import FftSettings
-from validation.reporting.figures import COLOURS, colour, new_figure, save_figure, symmetric_log
-from validation.scenarios.rate_table import RateTableRun, errors_within, plateaus
+from discsim.estimators.fft import FftSettings
+from discsim.validation.reporting.figures import COLOURS, colour, new_figure, save_figure, symmetric_log
+from discsim.validation.scenarios.rate_table import RateTableRun, errors_within, plateaus
 
 __all__ = ["draw_methods", "draw_waveform"]
 

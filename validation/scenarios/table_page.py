@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from validation.reporting.html import Section, Tone, write_report
-from validation.reporting.scores import Score
-from validation.scenarios.rate_table import Plateau
-from validation.scenarios.table_scores import MethodScore, TableScores
+from discsim.validation.reporting.html import Section, Tone, write_report
+from discsim.validation.reporting.scores import Score
+from discsim.validation.scenarios.rate_table import Plateau
+from discsim.validation.scenarios.table_scores import MethodScore, TableScores
 
 __all__ = ["write_table_page"]
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.estimators.rate import YawRate
 from discsim.files import write_text
-from estimators.rate import YawRate
-from validation.scenarios.rate_table import errors_within
+from discsim.validation.scenarios.rate_table import errors_within
 
 __all__ = ["BANDS_DEG_S", "Band", "MethodScore", "TableScores", "score_rates"]
 

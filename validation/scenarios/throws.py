@@ -12,13 +12,13 @@ from discsim.disc import Disc, Release
 from discsim.effects.sensors import PositionOffset
 from discsim.engine import fly
 from discsim.environment import Environment
+from discsim.estimators.methods import estimate, missing_sensors
+from discsim.estimators.rate import YawRate
 from discsim.frames import C1, C2, C3, euler_angles, quaternion_from_matrix
 from discsim.motion import Motion
 from discsim.recording import Recording
 from discsim.sensors import Instruments, record
-from estimators.methods import estimate, missing_sensors
-from estimators.rate import YawRate
-from validation.reporting.scores import Score, at_most, score
+from discsim.validation.reporting.scores import Score, at_most, score
 
 __all__ = [
     "ACCELEROMETER_PERCENT",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from discsim.shipped import load_disc
-from validation.scenarios.throws import FULL_SET
-from validation.yaw_damping.bias import paper_biases
+from discsim.validation.scenarios.throws import FULL_SET
+from discsim.validation.yaw_damping.bias import paper_biases
 
 __all__ = ["command"]
 

@@ -9,11 +9,11 @@ import typer
 
 from discsim.errors import InputError
 from discsim.files import read_text, write_text
-from validation.challenge.masks import masked_results
-from validation.challenge.report.document import PREFIX, masks_text, pooled, result_text, with_part
-from validation.challenge.report.page import draw_all
-from validation.challenge.scores.result import Result, read_result
-from validation.challenge.scores.scoring import NOTHING
+from discsim.validation.challenge.masks import masked_results
+from discsim.validation.challenge.report.document import PREFIX, masks_text, pooled, result_text, with_part
+from discsim.validation.challenge.report.page import draw_all
+from discsim.validation.challenge.scores.result import Result, read_result
+from discsim.validation.challenge.scores.scoring import NOTHING
 
 __all__ = ["command"]
 

@@ -22,14 +22,24 @@ class Study(NamedTuple):
 
 
 STUDIES = {
-    "paper": Study("validation.studies.paper.command", "the paper's equations, numbers and figures beside ours"),
-    "feedback": Study("validation.experiments.feedback.command", "flights predicted by C_Nr of each source of spin"),
-    "bias": Study("validation.studies.bias", "the bias of the paper's way to C_Nr, against the truth"),
-    "conceal": Study("validation.studies.conceal", "conceal effects in recordings, without diagnosing them"),
-    "blind-test": Study("validation.studies.blind_test", "write finished challenges into their page"),
-    "real-recordings": Study("validation.studies.real_recordings.command", "the methods on measured recordings"),
-    "real-diagnosis": Study("validation.studies.real_diagnosis.command", "the diagnosis of measured recordings"),
-    "golf-throws": Study("validation.studies.golf_throws.command", "three tracked golf throws beside their flights"),
+    "paper": Study(
+        "discsim.validation.studies.paper.command", "the paper's equations, numbers and figures beside ours"
+    ),
+    "feedback": Study(
+        "discsim.validation.experiments.feedback.command", "flights predicted by C_Nr of each source of spin"
+    ),
+    "bias": Study("discsim.validation.studies.bias", "the bias of the paper's way to C_Nr, against the truth"),
+    "conceal": Study("discsim.validation.studies.conceal", "conceal effects in recordings, without diagnosing them"),
+    "blind-test": Study("discsim.validation.studies.blind_test", "write finished challenges into their page"),
+    "real-recordings": Study(
+        "discsim.validation.studies.real_recordings.command", "the methods on measured recordings"
+    ),
+    "real-diagnosis": Study(
+        "discsim.validation.studies.real_diagnosis.command", "the diagnosis of measured recordings"
+    ),
+    "golf-throws": Study(
+        "discsim.validation.studies.golf_throws.command", "three tracked golf throws beside their flights"
+    ),
 }
 
 

@@ -10,10 +10,10 @@ import typer
 
 from discsim.files import write_text
 from discsim.recording import Plant
-from validation.challenge.cases.case import Kind, Mask
-from validation.challenge.cases.conceal import conceal
-from validation.challenge.cases.draw import draw_case
-from validation.reporting.options import SeedOption
+from discsim.validation.challenge.cases.case import Kind, Mask
+from discsim.validation.challenge.cases.conceal import conceal
+from discsim.validation.challenge.cases.draw import draw_case
+from discsim.validation.reporting.options import SeedOption
 
 __all__ = ["command"]
 

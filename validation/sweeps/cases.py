@@ -14,7 +14,7 @@ from discsim.arrays import FloatArray, readonly
 from discsim.files import write_text
 from discsim.shipped import load_disc, load_throw
 from discsim.trajectory import predict
-from validation.scenarios.throws import rms
+from discsim.validation.scenarios.throws import rms
 
 if TYPE_CHECKING:
     import xarray as xr

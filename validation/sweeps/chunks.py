@@ -12,20 +12,20 @@ from discsim.arrays import FloatArray
 from discsim.effects.sensors import PositionOffset
 from discsim.engine import fly
 from discsim.errors import InputError
+from discsim.estimators.accelerometer import accelerometer
+from discsim.estimators.fft import FftSettings, fft
+from discsim.estimators.methods import Options, estimate
+from discsim.estimators.rate import YawRate
 from discsim.motion import Motion
 from discsim.recording import SENSORS, Recording
 from discsim.rig import turn_table
 from discsim.sensors import Accelerometer, Instruments, Magnetometer, record
 from discsim.shipped import load_disc, load_throw
-from estimators.accelerometer import accelerometer
-from estimators.fft import FftSettings, fft
-from estimators.methods import Options, estimate
-from estimators.rate import YawRate
-from validation.running.tasks import Task
-from validation.scenarios.rate_table import plateaus
-from validation.scenarios.throws import EDGE_S
-from validation.sweeps.mounts import look_with_accelerometer, look_with_magnetometer
-from validation.sweeps.plan import CHUNK, Case, Plan
+from discsim.validation.running.tasks import Task
+from discsim.validation.scenarios.rate_table import plateaus
+from discsim.validation.scenarios.throws import EDGE_S
+from discsim.validation.sweeps.mounts import look_with_accelerometer, look_with_magnetometer
+from discsim.validation.sweeps.plan import CHUNK, Case, Plan
 
 __all__ = ["SCORES", "Sweep", "chunk_tasks", "fly_truth", "motion_from", "score_chunk", "segments", "truth_tasks"]
 

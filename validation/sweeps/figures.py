@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
 from discsim.arrays import FloatArray
-from validation.reporting.figures import colour, new_figure, save_figure
-from validation.scenarios.throws import rms
-from validation.sweeps.chunks import Sweep
-from validation.sweeps.mounts import closed_form
+from discsim.validation.reporting.figures import colour, new_figure, save_figure
+from discsim.validation.scenarios.throws import rms
+from discsim.validation.sweeps.chunks import Sweep
+from discsim.validation.sweeps.mounts import closed_form
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from validation.reporting.html import Section, write_report
-from validation.sweeps.cases import Row, described
+from discsim.validation.reporting.html import Section, write_report
+from discsim.validation.sweeps.cases import Row, described
 
 __all__ = ["write_sweep_page"]
 

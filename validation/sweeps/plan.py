@@ -18,6 +18,7 @@ from discsim.effects.catalogue import Effect, effect, row
 from discsim.effects.sensors import PositionOffset
 from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.estimators.methods import METHODS
 from discsim.files import digest, model_file, model_names
 from discsim.recording import Samples
 from discsim.rig import default_profile, profile_fault, read_profile
@@ -25,8 +26,7 @@ from discsim.sensors import Instruments
 from discsim.sensors.sampling import Noise
 from discsim.shipped import load_disc, load_site, load_throw
 from discsim.toml_table import TomlTable, read_toml
-from estimators.methods import METHODS
-from validation.sweeps.mounts import MOUNT_FIELDS, MountDesign
+from discsim.validation.sweeps.mounts import MOUNT_FIELDS, MountDesign
 
 __all__ = ["Axis", "Case", "Plan", "plan_file", "read_plan"]
 
@@ -60,8 +60,8 @@ class Case(NamedTuple):
 class Plan:
     """A sweep: every combination of ``axes`` with every mount.
 
-    ``estimators`` maps a method of `estimators.methods` (or ``best``) to the number of mounts that it is scored on.
-    ``drawn`` gives every mount a specimen of its own, with errors within what the data sheets allow. ``profile`` is
+    ``estimators`` maps a method of `discsim.estimators.methods` (or ``best``) to the number of mounts that it is scored
+    on. ``drawn`` gives every mount a specimen of its own, with errors within what the data sheets allow. ``profile`` is
     the rate table's where no axis names others; ``duration`` the longest flight, s. Holds no open file and no path:
     a worker elsewhere needs nothing but this.
     """
@@ -287,7 +287,7 @@ def read_plan(path: Path, *, count: int | None = None, seed: int | None = None) 
 
 
 def _level(profile: Samples) -> bool:
-    from validation.scenarios.rate_table import plateaus
+    from discsim.validation.scenarios.rate_table import plateaus
 
     return bool(plateaus(profile))
 

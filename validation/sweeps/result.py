@@ -10,8 +10,8 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.files import write_bytes
-from validation.sweeps.chunks import SCORES, Sweep, segments
-from validation.sweeps.mounts import MOUNT_FIELDS, closed_form
+from discsim.validation.sweeps.chunks import SCORES, Sweep, segments
+from discsim.validation.sweeps.mounts import MOUNT_FIELDS, closed_form
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,10 +11,10 @@ from scipy.stats import sobol_indices
 
 from discsim.arrays import FloatArray
 from discsim.files import write_text
-from validation.reporting.figures import new_figure, save_figure
-from validation.sweeps.cases import cases_of, described
-from validation.sweeps.chunks import Sweep
-from validation.sweeps.mounts import MOUNT_FIELDS
+from discsim.validation.reporting.figures import new_figure, save_figure
+from discsim.validation.sweeps.cases import cases_of, described
+from discsim.validation.sweeps.chunks import Sweep
+from discsim.validation.sweeps.mounts import MOUNT_FIELDS
 
 if TYPE_CHECKING:
     import xarray as xr

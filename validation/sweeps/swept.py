@@ -13,17 +13,17 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from discsim.result import Result, require
-from validation.reporting.run import package_version
-from validation.running.progress import Progress, silent
-from validation.running.tasks import Task, claim, discard, run_tasks
-from validation.sweeps.cases import landing_of, rows_of, write_rows
-from validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, truth_tasks
-from validation.sweeps.figures import draw_sweep
-from validation.sweeps.page import write_sweep_page
-from validation.sweeps.plan import Plan, plan_file, read_plan
-from validation.sweeps.result import labelled, write_netcdf
-from validation.sweeps.shares import draw_shares, shares_of, write_shares
-from validation.sweeps.tolerance import Tolerance, tolerances_of
+from discsim.validation.reporting.run import package_version
+from discsim.validation.running.progress import Progress, silent
+from discsim.validation.running.tasks import Task, claim, discard, run_tasks
+from discsim.validation.sweeps.cases import landing_of, rows_of, write_rows
+from discsim.validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, truth_tasks
+from discsim.validation.sweeps.figures import draw_sweep
+from discsim.validation.sweeps.page import write_sweep_page
+from discsim.validation.sweeps.plan import Plan, plan_file, read_plan
+from discsim.validation.sweeps.result import labelled, write_netcdf
+from discsim.validation.sweeps.shares import draw_shares, shares_of, write_shares
+from discsim.validation.sweeps.tolerance import Tolerance, tolerances_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -127,8 +127,8 @@ def sweep(
     Parameters
     ----------
     plan
-        A shipped plan's name, a TOML file, or a `Plan` (`validation.sweeps.plan.read_plan` takes a number of mounts
-        and a seed).
+        A shipped plan's name, a TOML file, or a `Plan` (`discsim.validation.sweeps.plan.read_plan` takes a number of
+        mounts and a seed).
     scheduler, workers
         Address of a running Dask scheduler, or the number of local processes; 1 works in this one.
     checkpoints : Path, optional

@@ -10,9 +10,9 @@ from scipy.stats import qmc
 
 from discsim.arrays import FloatArray
 from discsim.files import write_text
-from validation.reporting.figures import new_figure, save_figure
-from validation.sweeps.cases import READ, cases_of, described
-from validation.sweeps.chunks import Sweep
+from discsim.validation.reporting.figures import new_figure, save_figure
+from discsim.validation.sweeps.cases import READ, cases_of, described
+from discsim.validation.sweeps.chunks import Sweep
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,11 +12,11 @@ from scipy.integrate import cumulative_trapezoid
 from discsim.arrays import FloatArray, readonly
 from discsim.engine import RELEASE_HEIGHT
 from discsim.errors import InputError
+from discsim.estimators.methods import best
 from discsim.frames import body_to_ned, conjugate, multiply, rotation_vector, turn
 from discsim.motion import Motion
 from discsim.recording import COMMAND_HEADER, Recording, Samples, read_csv, read_recording
-from estimators.methods import best
-from validation.reporting.truth import FLIGHT_HEADER
+from discsim.validation.reporting.truth import FLIGHT_HEADER
 
 __all__ = ["Replay", "replay_motion", "replay_recording"]
 

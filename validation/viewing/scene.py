@@ -28,8 +28,8 @@ from discsim.arrays import FloatArray
 from discsim.errors import InputError
 from discsim.files import model_file, write_bytes
 from discsim.frames import C3, FLIP, flip_yz
-from validation.viewing.offscreen import Pixels, canvas, has_display
-from validation.viewing.replay import DRIVER_DIAMETER, Replay
+from discsim.validation.viewing.offscreen import Pixels, canvas, has_display
+from discsim.validation.viewing.replay import DRIVER_DIAMETER, Replay
 
 __all__ = [
     "CAMERAS",
@@ -431,7 +431,7 @@ def show(replay: Replay, look: Look, speed: float) -> None:
         window = mujoco.viewer.launch_passive(scene.model, scene.data, show_left_ui=False, show_right_ui=False)
     except RuntimeError as error:
         if sys.platform == "darwin":
-            raise InputError(f"on macOS it needs `mjpython -m validation.cli view ...`, or {remedy}") from error
+            raise InputError(f"on macOS it needs `mjpython -m discsim.validation.cli view ...`, or {remedy}") from error
         raise
     with window as viewer:
         with viewer.lock():

@@ -12,9 +12,9 @@ from discsim.disc import Disc
 from discsim.environment import Environment
 from discsim.motion import Motion
 from discsim.trajectory import predict
-from validation.scenarios.closed_forms import yaw_damping_from_motion
-from validation.scenarios.throws import Throw
-from validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S, damping_by_26
+from discsim.validation.scenarios.closed_forms import yaw_damping_from_motion
+from discsim.validation.scenarios.throws import Throw
+from discsim.validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S, damping_by_26
 
 __all__ = ["Bias", "paper_biases"]
 

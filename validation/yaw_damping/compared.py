@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from discsim.errors import InputError
 from discsim.recording import Recording
-from validation.yaw_damping.observations import misplaced, observe
-from validation.yaw_damping.output_error import Fit, fit_yaw_damping
-from validation.yaw_damping.paper_table import PaperTable, paper_table
+from discsim.validation.yaw_damping.observations import misplaced, observe
+from discsim.validation.yaw_damping.output_error import Fit, fit_yaw_damping
+from discsim.validation.yaw_damping.paper_table import PaperTable, paper_table
 
 __all__ = ["SOURCES", "Compared", "Source", "as_mounted", "compare_sources"]
 

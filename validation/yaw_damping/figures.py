@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from validation.reporting.figures import COLOURS, new_figure, save_figure
-from validation.yaw_damping.compared import Compared
-from validation.yaw_damping.observations import Throw
-from validation.yaw_damping.output_error import Fit
-from validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S, PaperTable
+from discsim.validation.reporting.figures import COLOURS, new_figure, save_figure
+from discsim.validation.yaw_damping.compared import Compared
+from discsim.validation.yaw_damping.observations import Throw
+from discsim.validation.yaw_damping.output_error import Fit
+from discsim.validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S, PaperTable
 
 __all__ = ["draw_fit", "draw_sources", "draw_surface", "draw_surface_on"]
 

@@ -10,22 +10,22 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from discsim.errors import InputError
+from discsim.estimators.methods import METHODS
 from discsim.files import write_text
 from discsim.model_file import Model, write_model
 from discsim.recording import Recording
 from discsim.result import Result
 from discsim.threads import one_thread
-from estimators.methods import METHODS
-from validation.reporting.run import json_text
-from validation.running.given import Given, given_recordings
-from validation.running.progress import Progress, silent
-from validation.yaw_damping.compared import SOURCES, Compared, Source, compare_sources
-from validation.yaw_damping.figures import draw_fit, draw_sources, draw_surface
-from validation.yaw_damping.model import fitted_model, tabulated_model
-from validation.yaw_damping.observations import Throw, observe
-from validation.yaw_damping.output_error import Fit, fit_yaw_damping
-from validation.yaw_damping.page import write_fit_page
-from validation.yaw_damping.paper_table import PaperTable, paper_table, table_csv
+from discsim.validation.reporting.run import json_text
+from discsim.validation.running.given import Given, given_recordings
+from discsim.validation.running.progress import Progress, silent
+from discsim.validation.yaw_damping.compared import SOURCES, Compared, Source, compare_sources
+from discsim.validation.yaw_damping.figures import draw_fit, draw_sources, draw_surface
+from discsim.validation.yaw_damping.model import fitted_model, tabulated_model
+from discsim.validation.yaw_damping.observations import Throw, observe
+from discsim.validation.yaw_damping.output_error import Fit, fit_yaw_damping
+from discsim.validation.yaw_damping.page import write_fit_page
+from discsim.validation.yaw_damping.paper_table import PaperTable, paper_table, table_csv
 
 __all__ = ["FittedYawDamping", "check_method", "cnr_json", "fit_recordings", "notes"]
 
@@ -140,8 +140,8 @@ def fit_recordings(
     """Fit the yaw damping derivative C_Nr to throws of one disc, by output error of the whole model flight.
 
     ``recordings`` are flights with what tells the spin, and a track or GPS: recordings, a folder, or a sequence of
-    either. ``method`` of `estimators.estimate` gives the spin; with ``compare`` C_Nr is fitted by the paper's sources,
-    too. Raises `InputError` for an unknown method, throws of several discs, or nothing that tells the release.
+    either. ``method`` of `discsim.estimators.estimate` gives the spin; with ``compare`` C_Nr is fitted by the paper's
+    sources, too. Raises `InputError` for an unknown method, throws of several discs, or nothing that tells the release.
     """
     check_method(method)
     given = given_recordings(recordings)

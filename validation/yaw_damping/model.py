@@ -7,8 +7,8 @@ from dataclasses import replace
 from discsim.disc import Disc
 from discsim.model_file import Model
 from discsim.recording import Recording
-from validation.yaw_damping.output_error import Fit
-from validation.yaw_damping.paper_table import PaperTable
+from discsim.validation.yaw_damping.output_error import Fit
+from discsim.validation.yaw_damping.paper_table import PaperTable
 
 __all__ = ["fitted_model", "tabulated_model"]
 

@@ -10,9 +10,9 @@ import numpy as np
 from discsim.arrays import FloatArray, readonly
 from discsim.disc import Disc
 from discsim.errors import InputError
+from discsim.estimators.methods import estimate
+from discsim.estimators.rate import YawRate
 from discsim.recording import Recording
-from estimators.methods import estimate
-from estimators.rate import YawRate
 
 __all__ = ["SHARED_S", "Throw", "misplaced", "observe"]
 

@@ -6,8 +6,8 @@ what the fixes leave open of V and alpha reaches the standard error of C_Nr. One
 throw has its own release: position, velocity, attitude, p, q, r. What is stated with a sigma (coefficients, inertia,
 density, wind) is a parameter with that prior and is shared too; what is stated without one is exact.
 
-To `validation.identification` a throw is one segment of the plant `FLIGHT` with two sensors: fixes, and a spin rate
-whose noise is known reading by reading.
+To `discsim.validation.identification` a throw is one segment of the plant `FLIGHT` with two sensors: fixes, and a spin
+rate whose noise is known reading by reading.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from discsim.parameters import flight_parameters, parameter_index, tables
 from discsim.recording import SENSORS, Recording, SensorSheet
 from discsim.sensitivity import sensitivities
 from discsim.trajectory import Flight, integrate
-from validation.identification.gauss_newton import Fit as Solution
-from validation.identification.gauss_newton import polished, refit
-from validation.identification.noise import GroupNoise, NoiseModel
-from validation.identification.normal_equations import Reduced, local_covariance
-from validation.identification.parameters import Parameter
-from validation.identification.plants.flight import FLIGHT
-from validation.identification.propagation import FLAT_ENVIRONMENT
-from validation.identification.readings import Readings
-from validation.identification.residual_tests import Whiteness, whiteness
-from validation.identification.segments import Trajectory
-from validation.identification.stated_parameters import stated_parameters
-from validation.yaw_damping.observations import SHARED_S, Throw
-from validation.yaw_damping.paper_table import damping_by_26
-from validation.yaw_damping.start import release_candidates
+from discsim.validation.identification.gauss_newton import Fit as Solution
+from discsim.validation.identification.gauss_newton import polished, refit
+from discsim.validation.identification.noise import GroupNoise, NoiseModel
+from discsim.validation.identification.normal_equations import Reduced, local_covariance
+from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.plants.flight import FLIGHT
+from discsim.validation.identification.propagation import FLAT_ENVIRONMENT
+from discsim.validation.identification.readings import Readings
+from discsim.validation.identification.residual_tests import Whiteness, whiteness
+from discsim.validation.identification.segments import Trajectory
+from discsim.validation.identification.stated_parameters import stated_parameters
+from discsim.validation.yaw_damping.observations import SHARED_S, Throw
+from discsim.validation.yaw_damping.paper_table import damping_by_26
+from discsim.validation.yaw_damping.start import release_candidates
 
 __all__ = ["Fit", "FittedThrow", "fit_yaw_damping"]
 

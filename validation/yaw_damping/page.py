@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from validation.reporting.html import Section, write_report
-from validation.yaw_damping.compared import Compared
-from validation.yaw_damping.output_error import Fit
+from discsim.validation.reporting.html import Section, write_report
+from discsim.validation.yaw_damping.compared import Compared
+from discsim.validation.yaw_damping.output_error import Fit
 
 __all__ = ["write_fit_page"]
 

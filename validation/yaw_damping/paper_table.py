@@ -15,7 +15,7 @@ from scipy.interpolate import RectBivariateSpline
 from discsim.arrays import FloatArray, readonly
 from discsim.disc import Disc, YawDampingTable
 from discsim.errors import InputError
-from validation.yaw_damping.observations import Throw
+from discsim.validation.yaw_damping.observations import Throw
 
 __all__ = ["RATES_DEG_S", "SPEEDS_M_S", "PaperTable", "Slope", "damping_by_26", "paper_table", "table_csv"]
 

@@ -10,7 +10,7 @@ from discsim.arrays import FloatArray
 from discsim.disc import Disc
 from discsim.errors import InputError
 from discsim.frames import attitude_matrix, quaternion_from_matrix
-from validation.yaw_damping.observations import Throw
+from discsim.validation.yaw_damping.observations import Throw
 
 __all__ = ["release_candidates"]
 

@@ -14,16 +14,16 @@ from scipy.stats import binom
 
 from discsim.effects.catalogue import effect
 from discsim.errors import InputError
-from validation.challenge.blind import Request, diagnose_blind, open_answers, seal_answers
-from validation.challenge.cases.case import Concealed
-from validation.challenge.cases.conceal import Answer
-from validation.challenge.cases.detection_limit import noncentrality, strength
-from validation.challenge.cases.draw import draw_case
-from validation.challenge.report.page import GOALS, goal_rows, goals_met
-from validation.challenge.run import challenge
-from validation.challenge.scores.result import Scored, rates_of, read_result
-from validation.challenge.scores.scoring import CaseScore, clustered_rate, confusion, rate, score_case, summary
-from validation.reporting.run import start_run
+from discsim.validation.challenge.blind import Request, diagnose_blind, open_answers, seal_answers
+from discsim.validation.challenge.cases.case import Concealed
+from discsim.validation.challenge.cases.conceal import Answer
+from discsim.validation.challenge.cases.detection_limit import noncentrality, strength
+from discsim.validation.challenge.cases.draw import draw_case
+from discsim.validation.challenge.report.page import GOALS, goal_rows, goals_met
+from discsim.validation.challenge.run import challenge
+from discsim.validation.challenge.scores.result import Scored, rates_of, read_result
+from discsim.validation.challenge.scores.scoring import CaseScore, clustered_rate, confusion, rate, score_case, summary
+from discsim.validation.reporting.run import start_run
 
 #: two throws are enough to be diagnosed by what only counts files
 WIND = Request(8, "flight", ("air.wind",))
@@ -423,7 +423,7 @@ def test_answers_are_sealed_before_and_opened_as_they_were(tmp_path):
 
 
 def test_a_challenge_scores_reports_and_goes_on_where_it_was_stopped(tmp_path, spy, monkeypatch):
-    monkeypatch.setattr("validation.challenge.run.code_digest", lambda: "as it is")
+    monkeypatch.setattr("discsim.validation.challenge.run.code_digest", lambda: "as it is")
     requests = [Request(seed, "flight", (), kind) for seed, kind in ((40, "nothing"), (41, "off_catalogue"))]
     requests.append(Request(42, "flight", ("air.wind",)))
     with start_run(tmp_path / "out", 40) as run:
@@ -447,7 +447,7 @@ def test_a_challenge_scores_reports_and_goes_on_where_it_was_stopped(tmp_path, s
         again = challenge(run, requests, workers=1, command=spy)
     assert [item.seconds for item in again] == [item.seconds for item in scored]
     # of other code these would be no results
-    monkeypatch.setattr("validation.challenge.run.code_digest", lambda: "as it is now")
+    monkeypatch.setattr("discsim.validation.challenge.run.code_digest", lambda: "as it is now")
     with start_run(tmp_path / "out", 40) as run, pytest.raises(InputError, match="versions differ"):
         challenge(run, requests, workers=1, command=spy)
 

@@ -12,17 +12,17 @@ import numpy as np
 import pytest
 
 from discsim.errors import InputError
-from validation.challenge.blind import Request
-from validation.challenge.cases.conceal import Answer
-from validation.challenge.masks import challenge_masks, masked_results
-from validation.challenge.report.document import masks_text, plain_command, pooled, with_part
-from validation.challenge.report.page import fault_of, goals_met
-from validation.challenge.run import challenge
-from validation.challenge.scores.detection import Sized, allowed, detections, fit_curve, has_curve
-from validation.challenge.scores.result import Scored, rates_of, read_result, times
-from validation.challenge.scores.scoring import score_case
-from validation.reporting.run import start_run
-from validation.studies.catalogue import run_study
+from discsim.validation.challenge.blind import Request
+from discsim.validation.challenge.cases.conceal import Answer
+from discsim.validation.challenge.masks import challenge_masks, masked_results
+from discsim.validation.challenge.report.document import masks_text, plain_command, pooled, with_part
+from discsim.validation.challenge.report.page import fault_of, goals_met
+from discsim.validation.challenge.run import challenge
+from discsim.validation.challenge.scores.detection import Sized, allowed, detections, fit_curve, has_curve
+from discsim.validation.challenge.scores.result import Scored, rates_of, read_result, times
+from discsim.validation.challenge.scores.scoring import score_case
+from discsim.validation.reporting.run import start_run
+from discsim.validation.studies.catalogue import run_study
 
 #: a "diagnosis" that finds nothing in anything
 BLIND = """
@@ -230,7 +230,7 @@ def masked(tmp_path_factory) -> Path:
     """The same under two masks of seven."""
     folder = tmp_path_factory.mktemp("masked")
     with pytest.MonkeyPatch.context() as patch, start_run(folder / "masks", 40) as run:
-        patch.setattr("validation.challenge.masks.MASKS", {"short": "short", "few_recordings": "two only"})
+        patch.setattr("discsim.validation.challenge.masks.MASKS", {"short": "short", "few_recordings": "two only"})
         assert list(challenge_masks(run, REQUESTS, workers=1, command=blind(folder))) == ["short", "few_recordings"]
     return folder / "masks"
 
@@ -287,7 +287,7 @@ def test_effects_near_their_limit_count_in_the_curve(tmp_path, plain, monkeypatc
     near = tmp_path / "near" / "challenge.json"
     near.parent.mkdir()
     near.write_text(json.dumps({**json.loads((plain / "challenge.json").read_text()), "mask": "near_limit"}))
-    monkeypatch.setattr("validation.challenge.masks.MASKS", {"near_limit": "near"})
+    monkeypatch.setattr("discsim.validation.challenge.masks.MASKS", {"near_limit": "near"})
     assert len(pooled(read_result(plain), read_result(near.parent))) == 2
     text = documented(tmp_path / "docs" / "page.md", plain, "--masks", near.parent)
     assert "whose sizes lie near the limit: `discsim" in text

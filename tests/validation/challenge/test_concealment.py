@@ -15,14 +15,14 @@ from discsim.files import digest
 from discsim.recording import PLANTS, SENSORS, Samples, read_dataset
 from discsim.rig import spin_down
 from discsim.sensors import Noise
-from validation.challenge.cases.case import MASKS, Case, Coast, Turning
-from validation.challenge.cases.conceal import Answer, conceal, read_answer, recordings
-from validation.challenge.cases.detection_limit import sizes
-from validation.challenge.cases.draw import draw_case
-from validation.challenge.cases.hiding import possible
-from validation.challenge.cases.off_catalogue import OFF_CATALOGUE, coast, play
-from validation.challenge.cases.sizes import HIDING, conceivable, draw_effect, scaled
-from validation.experiments.concealed import FULL_CASES, QUICK_CASES
+from discsim.validation.challenge.cases.case import MASKS, Case, Coast, Turning
+from discsim.validation.challenge.cases.conceal import Answer, conceal, read_answer, recordings
+from discsim.validation.challenge.cases.detection_limit import sizes
+from discsim.validation.challenge.cases.draw import draw_case
+from discsim.validation.challenge.cases.hiding import possible
+from discsim.validation.challenge.cases.off_catalogue import OFF_CATALOGUE, coast, play
+from discsim.validation.challenge.cases.sizes import HIDING, conceivable, draw_effect, scaled
+from discsim.validation.experiments.concealed import FULL_CASES, QUICK_CASES
 
 #: which plant each effect is tried on here: the first of its own
 TRIED = [(id, row.plants[0]) for id, row in CATALOGUE.items() if not row.setup]

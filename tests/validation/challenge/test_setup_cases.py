@@ -12,16 +12,16 @@ from discsim.effects import effect
 from discsim.effects.setup import axes_of, permutation
 from discsim.errors import InputError
 from discsim.recording import PLANTS, Plant
+from discsim.validation.challenge.cases.case import Case, Coast, Concealed, Turning
+from discsim.validation.challenge.cases.conceal import Answer, read_answer, recordings
+from discsim.validation.challenge.cases.detection_limit import sizes
+from discsim.validation.challenge.cases.draw import draw_case
+from discsim.validation.challenge.cases.setups import draw_fault, equivalents, possible_faults
+from discsim.validation.challenge.cases.sizes import HIDING, ordinary
+from discsim.validation.diagnosis.consistency.early_verdict import contradiction_in
+from discsim.validation.diagnosis.selection.stepwise import search
+from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault
 from discsim.written import corrected
-from validation.challenge.cases.case import Case, Coast, Concealed, Turning
-from validation.challenge.cases.conceal import Answer, read_answer, recordings
-from validation.challenge.cases.detection_limit import sizes
-from validation.challenge.cases.draw import draw_case
-from validation.challenge.cases.setups import draw_fault, equivalents, possible_faults
-from validation.challenge.cases.sizes import HIDING, ordinary
-from validation.diagnosis.consistency.early_verdict import contradiction_in
-from validation.diagnosis.selection.stepwise import search
-from validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault
 
 CASES = {plant: draw_case(3, plant, kind="nothing") for plant in PLANTS}
 

@@ -13,15 +13,15 @@ from support.places import PRACTICE
 
 from discsim.disc import Disc, Release
 from discsim.environment import Environment
+from discsim.estimators.methods import all_methods
 from discsim.files import model_names
 from discsim.recording import Recording, Samples, SensorSheet, read_dataset, write_recording
 from discsim.shipped import load_disc
-from estimators.methods import all_methods
-from validation.checking import Check, check_recording
-from validation.checking.noise import noise_of
-from validation.checking.table import print_checks
-from validation.commands.check import command
-from validation.diagnosis.setup import find_setup_faults
+from discsim.validation.checking import Check, check_recording
+from discsim.validation.checking.noise import noise_of
+from discsim.validation.checking.table import print_checks
+from discsim.validation.commands.check import command
+from discsim.validation.diagnosis.setup import find_setup_faults
 
 practice = pytest.mark.skipif(not PRACTICE.is_dir(), reason="no practice sets here (DISCSIM_RECORDINGS)")
 

@@ -17,12 +17,12 @@ from discsim.effects import effect
 from discsim.model_file import Model, ModelEffect, write_model
 from discsim.recording import read_recording
 from discsim.shipped import load_disc
+from discsim.validation.cli import main
+from discsim.validation.commands import COMMANDS
+from discsim.validation.experiments import validation_run as headless
+from discsim.validation.reporting.limits import shipped_limits
+from discsim.validation.reporting.scores import at_most
 from discsim.written import as_written
-from validation.cli import main
-from validation.commands import COMMANDS
-from validation.experiments import validation_run as headless
-from validation.reporting.limits import shipped_limits
-from validation.reporting.scores import at_most
 
 
 def run(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
@@ -43,7 +43,7 @@ def short_profile(tmp_path: Path) -> Path:
 def test_the_help_says_of_each_command_what_the_command_itself_says():
     """Its first lines stand in a table, so that the commands need not be loaded to be listed."""
     for module, line in COMMANDS.values():
-        command = import_module(f"validation.commands.{module}").command
+        command = import_module(f"discsim.validation.commands.{module}").command
         assert line == command.__doc__.strip().splitlines()[0]
         assert len(line) <= 63, f"{line}: cut off on a terminal of 80 columns"
 
@@ -58,11 +58,11 @@ def test_a_command_loads_neither_the_others_nor_what_it_does_not_need():
 
     assert "numpy" not in loaded("import discsim; discsim.InputError")
     shown = loaded(
-        "sys.argv = ['discsim', '--help']\ntry:\n import validation.cli as c; c.main()\nexcept SystemExit: pass"
+        "sys.argv = ['discsim', '--help']\ntry:\n import discsim.validation.cli as c; c.main()\nexcept SystemExit: pass"
     )
-    assert "validation.commands" in shown
-    assert not shown & {"numpy", "validation.commands.fly"}
-    flown = loaded("import validation.commands.fly, discsim.engine, discsim.sensors, discsim.many_flights")
+    assert "discsim.validation.commands" in shown
+    assert not shown & {"numpy", "discsim.validation.commands.fly"}
+    flown = loaded("import discsim.validation.commands.fly, discsim.engine, discsim.sensors, discsim.many_flights")
     assert "mujoco" in flown
     assert not flown & {"scipy.interpolate", "scipy.optimize", "scipy.special", "matplotlib"}
 
@@ -289,7 +289,7 @@ def test_validate_scores_everything_and_leaves_its_report(monkeypatch, tmp_path,
     """With the concealed case that has something in it; the other is drawn and scored the same way."""
     monkeypatch.setattr(headless, "QUICK_CASES", headless.QUICK_CASES[1:])
     kept = {name: limit for name, limit in shipped_limits(True).items() if not name.startswith("concealed, consistent")}
-    monkeypatch.setattr("validation.reporting.limits.shipped_limits", lambda quick: kept)
+    monkeypatch.setattr("discsim.validation.reporting.limits.shipped_limits", lambda quick: kept)
     out, junit = tmp_path / "report", tmp_path / "scores.xml"
     assert run(monkeypatch, "validate", "--quick", "--out", str(out), "--junit", str(junit)) == 0
     scores = json.loads((out / "scores.json").read_text())

@@ -12,7 +12,7 @@ from discsim.arrays import FloatArray
 from discsim.law import Law
 from discsim.model_file import Model, read_model, write_model
 from discsim.shipped import load_disc
-from validation.cli import main
+from discsim.validation.cli import main
 
 DISC, FIELD = load_disc("driver")
 #: a brake that takes a tenth of the spin in a second beside what the air takes

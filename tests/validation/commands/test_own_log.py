@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from support.places import ROOT
 
-from validation.cli import main
-from validation.scenarios.example_log import write_example_log
+from discsim.validation.cli import main
+from discsim.validation.scenarios.example_log import write_example_log
 
 PAGE = (ROOT / "docs" / "your-own-log.md").read_text(encoding="utf-8")
 

@@ -10,7 +10,7 @@ import sys
 import pytest
 from support.places import REAL, ROOT, real
 
-from validation.cli import main
+from discsim.validation.cli import main
 
 LOG = REAL / "flatball-ins-ultimate-disc" / "2025-08-31-001-rb.csv"
 PAGE = (ROOT / "docs" / "a-strangers-log.md").read_text(encoding="utf-8")

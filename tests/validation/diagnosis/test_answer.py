@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from discsim.errors import InputError
-from validation.diagnosis.result import (
+from discsim.validation.diagnosis.result import (
     Confusion,
     Diagnosis,
     Evidence,

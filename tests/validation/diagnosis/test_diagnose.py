@@ -21,8 +21,8 @@ from discsim.effects import Effect, effect
 from discsim.motion import Motion
 from discsim.recording import Recording, Samples, read_dataset
 from discsim.sensors.sampling import Noise
-from validation.diagnosis.pipeline import diagnose
-from validation.diagnosis.result import Diagnosis
+from discsim.validation.diagnosis.pipeline import diagnose
+from discsim.validation.diagnosis.result import Diagnosis
 
 KEYS = {
     "format",

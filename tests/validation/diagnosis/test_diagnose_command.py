@@ -16,8 +16,8 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.model_file import read_model
 from discsim.recording import Recording, Samples, SensorSheet, write_recording
-from validation.cli import main
-from validation.diagnosis.datasets import dataset_names, read_datasets, recording_names
+from discsim.validation.cli import main
+from discsim.validation.diagnosis.datasets import dataset_names, read_datasets, recording_names
 
 EFFECT = """from typing import NamedTuple
 class Bias(NamedTuple):
@@ -61,7 +61,7 @@ def asked(monkeypatch):
         calls.append((datasets, names, options))
         return replace(explained(), residuals=explained().residuals[:3])
 
-    monkeypatch.setattr("validation.diagnosis.diagnosed.diagnose", diagnose)
+    monkeypatch.setattr("discsim.validation.diagnosis.diagnosed.diagnose", diagnose)
     return calls
 
 

@@ -7,9 +7,9 @@ from support.made import tables
 
 from discsim.effects import effect
 from discsim.recording import Recording
-from validation.diagnosis.relaxed_fit import relaxed
-from validation.diagnosis.selection.stepwise import search
-from validation.identification.stated_parameters import stated_parameters
+from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.selection.stepwise import search
+from discsim.validation.identification.stated_parameters import stated_parameters
 
 FAST = effect("gyro.clock_rate", ratio=1.017)
 KEY = ("gyro.clock_rate", "ratio")

@@ -15,18 +15,18 @@ from discsim.engine import fly
 from discsim.recording import Recording
 from discsim.sensors import record
 from discsim.shipped import load_disc
-from validation.diagnosis.relaxed_fit import first_trajectory, relaxed, unknowns
-from validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.selection.search_state import possible
-from validation.identification.gauss_newton import Fit, GaussNewtonStep, linearised, linearised_columns
-from validation.identification.noise import estimate_noise, stated_noise, whitened
-from validation.identification.normal_equations import reduce
-from validation.identification.parameters import AllowedDefects, Parameter
-from validation.identification.plants import PLANTS
-from validation.identification.plants.free_spin import FREE_SPIN
-from validation.identification.propagation import Column
-from validation.identification.sensor_model import predicted
+from discsim.validation.diagnosis.relaxed_fit import first_trajectory, relaxed, unknowns
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.search_state import possible
+from discsim.validation.identification.gauss_newton import Fit, GaussNewtonStep, linearised, linearised_columns
+from discsim.validation.identification.noise import estimate_noise, stated_noise, whitened
+from discsim.validation.identification.normal_equations import reduce
+from discsim.validation.identification.parameters import AllowedDefects, Parameter
+from discsim.validation.identification.plants import PLANTS
+from discsim.validation.identification.plants.free_spin import FREE_SPIN
+from discsim.validation.identification.propagation import Column
+from discsim.validation.identification.sensor_model import predicted
 
 #: numbers of a gyroscope's and a magnetometer's module without a path
 BLIND = MODULE.without("gps").fitted("gyroscope", range=104.72)

@@ -8,8 +8,8 @@ import pytest
 from support.made import coasts
 
 from discsim.effects import effect
-from validation.diagnosis.pipeline import diagnose
-from validation.diagnosis.result import Diagnosis
+from discsim.validation.diagnosis.pipeline import diagnose
+from discsim.validation.diagnosis.result import Diagnosis
 
 FRICTION = "rig.coulomb_friction"
 

@@ -12,10 +12,10 @@ from support.made import DRIVER, flight, release_of
 from discsim.effects import effect
 from discsim.recording import Recording
 from discsim.sensors import Instruments, Noise, Sampling, Tracker, record
-from validation.diagnosis.answer.named import ParameterValue
-from validation.diagnosis.answer.partly import PartlyExplained
-from validation.diagnosis.partly import partly_explained
-from validation.diagnosis.selection.stepwise import screened
+from discsim.validation.diagnosis.answer.named import ParameterValue
+from discsim.validation.diagnosis.answer.partly import PartlyExplained
+from discsim.validation.diagnosis.partly import partly_explained
+from discsim.validation.diagnosis.selection.stepwise import screened
 
 CAMERA = effect("track.camera", height_m=30.0, north_m=10.0, east_m=-8.0)
 SPREAD = {"position_ned_m": 1.0, "velocity_ned_m_s": 0.1, "roll_rad": 0.01, "pitch_rad": 0.01, "body_rate_rad_s": 0.2}

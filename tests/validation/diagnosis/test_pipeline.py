@@ -8,9 +8,9 @@ from dataclasses import FrozenInstanceError, fields
 
 import pytest
 
-from validation.diagnosis import pipeline, stages
-from validation.diagnosis.selection.search_state import Search
-from validation.diagnosis.setup import SetupFindings
+from discsim.validation.diagnosis import pipeline, stages
+from discsim.validation.diagnosis.selection.search_state import Search
+from discsim.validation.diagnosis.setup import SetupFindings
 
 
 def test_the_whole_way_is_a_few_lines():

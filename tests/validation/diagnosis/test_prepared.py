@@ -9,10 +9,10 @@ from support.made import FIELD as SITE
 
 from discsim.errors import InputError
 from discsim.recording import Recording, Samples, SensorSheet
-from validation.diagnosis.inertia import DISC as BARE
-from validation.diagnosis.inertia import with_inertia
-from validation.diagnosis.prepared import FASTEST, prepared
-from validation.identification.plants.free_spin import FREE_SPIN
+from discsim.validation.diagnosis.inertia import DISC as BARE
+from discsim.validation.diagnosis.inertia import with_inertia
+from discsim.validation.diagnosis.prepared import FASTEST, prepared
+from discsim.validation.identification.plants.free_spin import FREE_SPIN
 
 RATE, NOISE = 200.0, 0.01
 

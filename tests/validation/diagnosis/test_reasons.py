@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from validation.diagnosis.assemble import reason_for
-from validation.diagnosis.selection.candidates import CandidateEffect
-from validation.diagnosis.selection.evidence import price
-from validation.diagnosis.selection.search_state import Considered
+from discsim.validation.diagnosis.assemble import reason_for
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect
+from discsim.validation.diagnosis.selection.evidence import price
+from discsim.validation.diagnosis.selection.search_state import Considered
 
 BIAS, IMPULSE = CandidateEffect("gyro.bias", ()), CandidateEffect("event.impulse", ())
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from validation.diagnosis import settings
-from validation.diagnosis.settings import settings_told
-from validation.identification.residual_tests import RESIDUAL_TESTS
+from discsim.validation.diagnosis import settings
+from discsim.validation.diagnosis.settings import settings_told
+from discsim.validation.identification.residual_tests import RESIDUAL_TESTS
 
 ROOT = Path(__file__).parents[3] / "validation"
 STAGES = [

@@ -10,8 +10,8 @@ from support.made import DRIVER, FIELD
 
 from discsim.arrays import FloatArray
 from discsim.recording import Recording, Samples, SensorSheet
-from validation.diagnosis.prepared import prepared
-from validation.diagnosis.track_ends import flight_of
+from discsim.validation.diagnosis.prepared import prepared
+from discsim.validation.diagnosis.track_ends import flight_of
 
 FRAME = 1.0 / 30.0
 

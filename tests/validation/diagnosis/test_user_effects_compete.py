@@ -27,17 +27,17 @@ from discsim.rig import spin_down
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc, load_throw
 from discsim.trajectory import predict
-from validation.cli import main
-from validation.diagnosis.pipeline import diagnose
-from validation.diagnosis.relaxed_fit import first_trajectory
-from validation.diagnosis.result import Diagnosis
-from validation.diagnosis.selection.candidates import available, candidates_for, parameters_of
-from validation.identification.competing_effects import Competing
-from validation.identification.linearisation import linearise
-from validation.identification.prediction import shown
-from validation.identification.propagation import Column
-from validation.identification.segments import trajectory_of
-from validation.identification.sensor_model import is_motion, predicted
+from discsim.validation.cli import main
+from discsim.validation.diagnosis.pipeline import diagnose
+from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.diagnosis.result import Diagnosis
+from discsim.validation.diagnosis.selection.candidates import available, candidates_for, parameters_of
+from discsim.validation.identification.competing_effects import Competing
+from discsim.validation.identification.linearisation import linearise
+from discsim.validation.identification.prediction import shown
+from discsim.validation.identification.propagation import Column
+from discsim.validation.identification.segments import trajectory_of
+from discsim.validation.identification.sensor_model import is_motion, predicted
 
 FIELD, RIG = Environment(air_density=None), Rig(1e-3, 8e-5)
 MODULE = Instruments.from_parts("mpu9250")

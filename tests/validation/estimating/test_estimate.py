@@ -10,10 +10,10 @@ import pytest
 
 from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.estimators import YawRate
 from discsim.recording import Recording, Samples, SensorSheet, read_recording, write_recording
-from estimators import YawRate
-from validation.commands.estimate import command
-from validation.scenarios.method_disagreement import compare
+from discsim.validation.commands.estimate import command
+from discsim.validation.scenarios.method_disagreement import compare
 
 
 @pytest.fixture

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from discsim.errors import InputError
-from estimators.rate import YawRate
-from validation.cli import main
-from validation.estimating.rate_files import read_rates, read_truth
-from validation.estimating.scored import score_rates
+from discsim.estimators.rate import YawRate
+from discsim.validation.cli import main
+from discsim.validation.estimating.rate_files import read_rates, read_truth
+from discsim.validation.estimating.scored import score_rates
 
 T = np.linspace(0.0, 10.0, 1001)
 SPIN = 50.0 + 5.0 * np.sin(T)

@@ -10,7 +10,7 @@ import pytest
 from discsim.recording import Recording
 from discsim.shipped import load_disc, load_throw
 from discsim.trajectory import predict
-from validation.experiments.feedback.scoring import (
+from discsim.validation.experiments.feedback.scoring import (
     LINE,
     OUTPUT_ERROR,
     TABLE,
@@ -20,8 +20,8 @@ from validation.experiments.feedback.scoring import (
     feedback_checks,
     rate_at_release,
 )
-from validation.experiments.feedback.sensitivity import touch_down_shifts
-from validation.yaw_damping import Throw, paper_table
+from discsim.validation.experiments.feedback.sensitivity import touch_down_shifts
+from discsim.validation.yaw_damping import Throw, paper_table
 
 DISC, AIR = load_disc("driver")
 RELEASE = load_throw("driver")

@@ -8,9 +8,9 @@ import pytest
 from discsim.effects.catalogue import CATALOGUE
 from discsim.parameters import flight_parameters, tables
 from discsim.shipped import load_disc
-from validation.identification.dynamics import ROW
-from validation.identification.plants.flight import flight_segments
-from validation.identification.propagation import place_in_flat
+from discsim.validation.identification.dynamics import ROW
+from discsim.validation.identification.plants.flight import flight_segments
+from discsim.validation.identification.propagation import place_in_flat
 
 #: the numbers of a row that an instrument shows: acceleration, attitude, rates; and place and velocity
 SHOWN = {"a": slice(6, 9), "q": slice(9, 13), "w": slice(13, 16), "dw": slice(16, 19)}

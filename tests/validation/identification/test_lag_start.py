@@ -13,12 +13,12 @@ from discsim.environment import Environment
 from discsim.motion import Motion
 from discsim.recording import Recording, Samples
 from discsim.sensors import record
-from validation.identification.gauss_newton import Fit, linearised, refit
-from validation.identification.noise import GroupNoise
-from validation.identification.parameters import Parameter
-from validation.identification.plants.free_spin import FREE_SPIN
-from validation.identification.prediction import read
-from validation.identification.segments import Trajectory, trajectory_of
+from discsim.validation.identification.gauss_newton import Fit, linearised, refit
+from discsim.validation.identification.noise import GroupNoise
+from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.plants.free_spin import FREE_SPIN
+from discsim.validation.identification.prediction import read
+from discsim.validation.identification.segments import Trajectory, trajectory_of
 
 SPIN, TAU, HELD = 60.0, 0.15, np.array([70.0, -35.0])
 KEYS = FREE_SPIN.held_keys[:2]

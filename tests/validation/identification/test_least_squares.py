@@ -12,9 +12,9 @@ from support.made import RIG, coasts, flight, release_of, states_of, tables, thr
 
 from discsim.arrays import FloatArray
 from discsim.effects import effect
-from validation.diagnosis.relaxed_fit import first_trajectory
-from validation.identification import gauss_newton, normal_equations
-from validation.identification.gauss_newton import (
+from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.identification import gauss_newton, normal_equations
+from discsim.validation.identification.gauss_newton import (
     Fit,
     GaussNewtonStep,
     discontinuous,
@@ -23,13 +23,19 @@ from validation.identification.gauss_newton import (
     refit,
     residuals_after,
 )
-from validation.identification.noise import stated_noise, whitened
-from validation.identification.normal_equations import common_step, normal_matrix, nuisance_step, reduce, unknown_prior
-from validation.identification.parameters import AllowedDefects, Parameter, values_of
-from validation.identification.plants.flight import FLIGHT
-from validation.identification.plants.spin_down import SPIN_DOWN
-from validation.identification.release_prior import release_rows
-from validation.identification.segments import Trajectory, stepped, trajectory_of
+from discsim.validation.identification.noise import stated_noise, whitened
+from discsim.validation.identification.normal_equations import (
+    common_step,
+    normal_matrix,
+    nuisance_step,
+    reduce,
+    unknown_prior,
+)
+from discsim.validation.identification.parameters import AllowedDefects, Parameter, values_of
+from discsim.validation.identification.plants.flight import FLIGHT
+from discsim.validation.identification.plants.spin_down import SPIN_DOWN
+from discsim.validation.identification.release_prior import release_rows
+from discsim.validation.identification.segments import Trajectory, stepped, trajectory_of
 
 FRICTION = Parameter("rig.coulomb_friction", "torque_N_m", 0.0, 1e-6)
 VISCOUS = Parameter("rig", "viscous", RIG.viscous, 1e-8, 2e-7)

@@ -8,8 +8,8 @@ from scipy.signal import lfilter
 from scipy.stats import multivariate_normal
 
 from discsim.arrays import FloatArray
-from validation.identification.linear import Channel, Linear
-from validation.identification.noise import (
+from discsim.validation.identification.linear import Channel, Linear
+from discsim.validation.identification.noise import (
     GroupNoise,
     estimate_noise,
     likeliest_noise,

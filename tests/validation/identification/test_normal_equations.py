@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import validation
-from validation.identification.linear import Channel, Linear
-from validation.identification.noise import GroupNoise, whitened
-from validation.identification.normal_equations import CUT_OFF, Reduced, inverse_of, local_covariance
-from validation.identification.parameters import Parameter, values_of
+from discsim import validation
+from discsim.validation.identification.linear import Channel, Linear
+from discsim.validation.identification.noise import GroupNoise, whitened
+from discsim.validation.identification.normal_equations import CUT_OFF, Reduced, inverse_of, local_covariance
+from discsim.validation.identification.parameters import Parameter, values_of
 
 
 def sums_of_squares(size: int, rows: int = 40) -> np.ndarray:

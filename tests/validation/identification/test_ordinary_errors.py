@@ -6,10 +6,10 @@ import pytest
 
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import AccelerometerBias, HardIron
-from estimators.precession import HARD_IRON_SD
-from estimators.tracking import TrackingSettings
-from validation.diagnosis.relaxed_fit import ordinary
-from validation.identification.ordinary_errors import ordinary_errors, ordinary_sigma
+from discsim.estimators.precession import HARD_IRON_SD
+from discsim.estimators.tracking import TrackingSettings
+from discsim.validation.diagnosis.relaxed_fit import ordinary
+from discsim.validation.identification.ordinary_errors import ordinary_errors, ordinary_sigma
 
 IRON = catalogued(HardIron).id
 
@@ -28,7 +28,7 @@ def test_each_ordinary_error_says_where_it_is_from():
 
 @pytest.mark.parametrize(
     ("use", "taken"),
-    [("estimators.precession", HARD_IRON_SD), ("estimators.tracking", TrackingSettings().hard_iron)],
+    [("discsim.estimators.precession", HARD_IRON_SD), ("discsim.estimators.tracking", TrackingSettings().hard_iron)],
 )
 def test_the_estimators_take_the_iron_that_the_table_says(use, taken):
     assert {error.effect for error in ordinary_errors(use)} == {IRON}

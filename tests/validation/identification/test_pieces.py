@@ -34,17 +34,17 @@ from discsim.recording import Recording, Samples
 from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, record
 from discsim.trajectory import predict
-from validation.diagnosis.relaxed_fit import beginning
-from validation.identification import linearisation
-from validation.identification.linear import Linear
-from validation.identification.linearisation import linearise
-from validation.identification.observations import readings_of
-from validation.identification.plants.flight import FLIGHT
-from validation.identification.plants.free_spin import FREE_SPIN
-from validation.identification.prediction import shown
-from validation.identification.propagation import Column, base_flat, runner_of
-from validation.identification.segments import Trajectory, resegmented, trajectory_of
-from validation.identification.sensor_model import is_motion, predicted
+from discsim.validation.diagnosis.relaxed_fit import beginning
+from discsim.validation.identification import linearisation
+from discsim.validation.identification.linear import Linear
+from discsim.validation.identification.linearisation import linearise
+from discsim.validation.identification.observations import readings_of
+from discsim.validation.identification.plants.flight import FLIGHT
+from discsim.validation.identification.plants.free_spin import FREE_SPIN
+from discsim.validation.identification.prediction import shown
+from discsim.validation.identification.propagation import Column, base_flat, runner_of
+from discsim.validation.identification.segments import Trajectory, resegmented, trajectory_of
+from discsim.validation.identification.sensor_model import is_motion, predicted
 
 #: sizes that show well within half a second of flight
 IN_THE_AIR = (

@@ -14,13 +14,13 @@ from support.places import ROOT
 from discsim.environment import Environment
 from discsim.recording import PLANTS as NAMES
 from discsim.recording import Recording, Samples, SensorSheet
-from validation.identification.dynamics import ROW
-from validation.identification.gauss_newton import Fit, discontinuous, linearised, refit
-from validation.identification.noise import stated_noise
-from validation.identification.parameters import AllowedDefects, Parameter
-from validation.identification.plants import PLANTS, Plant
-from validation.identification.plants.plant import Durations, Dynamics, Initial, Layout, Sizes
-from validation.identification.segments import resegmented, trajectory_of
+from discsim.validation.identification.dynamics import ROW
+from discsim.validation.identification.gauss_newton import Fit, discontinuous, linearised, refit
+from discsim.validation.identification.noise import stated_noise
+from discsim.validation.identification.parameters import AllowedDefects, Parameter
+from discsim.validation.identification.plants import PLANTS, Plant
+from discsim.validation.identification.plants.plant import Durations, Dynamics, Initial, Layout, Sizes
+from discsim.validation.identification.segments import resegmented, trajectory_of
 
 ROOMS = [ROOT / "validation" / "diagnosis", ROOT / "validation" / "identification"]
 #: source -> (name, why it may stand there)

@@ -7,8 +7,8 @@ import pytest
 from test_noise import coloured, rows
 
 from discsim.arrays import FloatArray
-from validation.identification.noise import estimate_noise
-from validation.identification.residual_tests import UnmodelledResidual, unmodelled_residuals
+from discsim.validation.identification.noise import estimate_noise
+from discsim.validation.identification.residual_tests import UnmodelledResidual, unmodelled_residuals
 
 N, AXES, RECORDINGS = 600, 3, 4
 

@@ -26,8 +26,8 @@ from discsim.recording import Recording, Samples, SensorSheet, read_dataset
 from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
-from validation.identification.initial.flight import InitialStates, flight_initial_states, spin_initial_states
-from validation.identification.initial.spin_phase import rig_initial_states
+from discsim.validation.identification.initial.flight import InitialStates, flight_initial_states, spin_initial_states
+from discsim.validation.identification.initial.spin_phase import rig_initial_states
 
 DRIVER, FIELD = load_disc("driver")
 MODULE = Instruments.from_parts("mpu9250", "neo_m8n")

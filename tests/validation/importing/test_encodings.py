@@ -6,9 +6,9 @@ from numpy.testing import assert_allclose
 from support.made_logs import made_log, three, write_table
 
 from discsim.errors import InputError
-from validation.importing import import_recording, read_map
-from validation.importing.sniffing import map_text, sniff
-from validation.importing.sniffing.text import encoding_of
+from discsim.validation.importing import import_recording, read_map
+from discsim.validation.importing.sniffing import map_text, sniff
+from discsim.validation.importing.sniffing.text import encoding_of
 
 LOG = made_log()
 #: Time, gyroscope and accelerometer as phones and loggers call them there.

@@ -16,11 +16,11 @@ from support.places import ROOT
 
 from discsim.errors import InputError
 from discsim.recording import read_recording
-from validation.checking import check_recording
-from validation.cli import main
-from validation.commands.diagnose import command as diagnose
-from validation.commands.estimate import command as estimate
-from validation.commands.import_ import command as import_
+from discsim.validation.checking import check_recording
+from discsim.validation.cli import main
+from discsim.validation.commands.diagnose import command as diagnose
+from discsim.validation.commands.estimate import command as estimate
+from discsim.validation.commands.import_ import command as import_
 
 MAPS = sorted(path.stem for path in (ROOT / "models" / "imports").glob("*.toml"))
 ROTATING = [name for name in MAPS if LOGGERS[name].methods]

@@ -16,9 +16,9 @@ from support.flight_log import BOOT, LATE, battery, combined, flight, integrals,
 from support.made_logs import LANDING, RELEASE, Log, made_log
 
 from discsim.recording import Recording, read_recording
-from validation.cli import main
-from validation.importing import import_recording, read_map
-from validation.importing.sniffing import map_text, opened, sniff
+from discsim.validation.cli import main
+from discsim.validation.importing import import_recording, read_map
+from discsim.validation.importing.sniffing import map_text, opened, sniff
 
 needs_reader = pytest.mark.skipif(
     find_spec("pyulog") is None, reason='no reader of ULog here: pip install "discsim[logs]"'

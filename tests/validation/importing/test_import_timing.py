@@ -10,11 +10,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from discsim.errors import InputError
-from validation.importing import Imported, find_map, import_recording, parse_rows, read_map
-from validation.importing.clock import iso_seconds, mended
-from validation.importing.held import find_held, find_interpolated, fresh_rows, step_of
-from validation.importing.raw_table import number
-from validation.importing.timing import row_timing
+from discsim.validation.importing import Imported, find_map, import_recording, parse_rows, read_map
+from discsim.validation.importing.clock import iso_seconds, mended
+from discsim.validation.importing.held import find_held, find_interpolated, fresh_rows, step_of
+from discsim.validation.importing.raw_table import number
+from discsim.validation.importing.timing import row_timing
 
 
 def spinning(t: np.ndarray, rate_deg_s: float = 2000.0) -> np.ndarray:

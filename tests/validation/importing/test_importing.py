@@ -13,8 +13,8 @@ from support.places import ROOT
 from discsim.errors import InputError
 from discsim.files import model_names
 from discsim.recording import read_recording, write_recording
-from validation.commands.import_ import command
-from validation.importing import Imported, find_map, import_recording, parse_rows, read_map, repairs_csv
+from discsim.validation.commands.import_ import command
+from discsim.validation.importing import Imported, find_map, import_recording, parse_rows, read_map, repairs_csv
 
 G0 = 9.80665
 DEG = np.pi / 180

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from support.places import REAL, real
 
 from discsim.recording import read_recording, write_recording
-from validation.importing import Imported, find_map, import_recording, parse_rows, read_map
+from discsim.validation.importing import Imported, find_map, import_recording, parse_rows, read_map
 
 G0, DEG = 9.80665, np.pi / 180
 

@@ -16,11 +16,11 @@ from support import message_logs as made
 from support.made_logs import DEG, G0, LANDING, RELEASE, SPIN, Log, made_log
 
 from discsim.recording import Recording, read_recording
-from validation.cli import main
-from validation.importing import import_recording, read_map
-from validation.importing.logs import kind_of
-from validation.importing.logs.tables import Table
-from validation.importing.sniffing import map_text, opened, sniff
+from discsim.validation.cli import main
+from discsim.validation.importing import import_recording, read_map
+from discsim.validation.importing.logs import kind_of
+from discsim.validation.importing.logs.tables import Table
+from discsim.validation.importing.sniffing import map_text, opened, sniff
 
 LIBRARIES = ("pynmeagps", "pyubx2", "pymavlink", "mcap", "mcap_ros2")
 needs_readers = pytest.mark.skipif(

@@ -9,8 +9,8 @@ from support.made_logs import made_log
 
 from discsim.errors import InputError
 from discsim.recording import Recording
-from validation.importing import import_recording, read_map
-from validation.importing.sniffing import map_text, sniff
+from discsim.validation.importing import import_recording, read_map
+from discsim.validation.importing.sniffing import map_text, sniff
 
 SLOW = 0.0223  # s from a reading of the magnetometer to the next
 LATE = 0.1503  # s by which its first one comes after the gyroscope's

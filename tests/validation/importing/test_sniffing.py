@@ -26,10 +26,10 @@ from support.places import REAL, real
 
 from discsim.errors import InputError
 from discsim.recording import read_dataset, read_recording
-from validation.cli import main
-from validation.importing import find_map, import_recording, read_map, read_readings
-from validation.importing.sniffing import Proposal, map_text, opened, recognised, sniff, stretches
-from validation.importing.sniffing.raw_page import envelope
+from discsim.validation.cli import main
+from discsim.validation.importing import find_map, import_recording, read_map, read_readings
+from discsim.validation.importing.sniffing import Proposal, map_text, opened, recognised, sniff, stretches
+from discsim.validation.importing.sniffing.raw_page import envelope
 
 
 def proposed(raw: Path, place: Path) -> Proposal:

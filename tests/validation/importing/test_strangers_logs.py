@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose
 from support.made_logs import DEG, G0, RELEASE, made_log, three, write_table
 
 from discsim.errors import InputError
-from validation.importing import import_recording, read_map, read_readings
-from validation.importing.clock import iso_seconds
-from validation.importing.sniffing import map_text, opened, sniff, stretches
+from discsim.validation.importing import import_recording, read_map, read_readings
+from discsim.validation.importing.clock import iso_seconds
+from discsim.validation.importing.sniffing import map_text, opened, sniff, stretches
 
 XYZ = ("x", "y", "z")
 LOG = made_log()

@@ -15,16 +15,16 @@ from discsim.disc import Release
 from discsim.errors import InputError
 from discsim.shipped import load_disc, load_throw
 from discsim.trajectory import release_state
-from validation.challenge.cases.detection_limit import noncentrality
-from validation.challenge.cases.draw import draw_case
-from validation.cli import main
-from validation.diagnosis.design.plans import read_plans
-from validation.identification.plants.plan import Plan
-from validation.planning.advice import bought, next_throws
-from validation.planning.information import Information, information_of, questions_of
-from validation.planning.limits import coefficients_of, limits_of, needed
-from validation.planning.planned import throws_about
-from validation.planning.recordings import Bench, planned_trajectory
+from discsim.validation.challenge.cases.detection_limit import noncentrality
+from discsim.validation.challenge.cases.draw import draw_case
+from discsim.validation.cli import main
+from discsim.validation.diagnosis.design.plans import read_plans
+from discsim.validation.identification.plants.plan import Plan
+from discsim.validation.planning.advice import bought, next_throws
+from discsim.validation.planning.information import Information, information_of, questions_of
+from discsim.validation.planning.limits import coefficients_of, limits_of, needed
+from discsim.validation.planning.planned import throws_about
+from discsim.validation.planning.recordings import Bench, planned_trajectory
 
 DISC, FIELD = load_disc("driver")
 TABLE = """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from jinja2 import UndefinedError
 
-from validation.reporting.markdown import page_text, span, table, wrapped
+from discsim.validation.reporting.markdown import page_text, span, table, wrapped
 
 LONG = "- no entry of a list, however long the line " + 20 * "and on "
 CODE = f"```sh\ndiscsim study   paper\n\n{LONG}\n```"

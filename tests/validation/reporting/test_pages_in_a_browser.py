@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from support.browser import browse, needs_browser
 
-from validation.reporting.drawn_values import drawn_values
-from validation.reporting.figures import new_figure, save_figure
-from validation.reporting.html import Section, write_report
+from discsim.validation.reporting.drawn_values import drawn_values
+from discsim.validation.reporting.figures import new_figure, save_figure
+from discsim.validation.reporting.html import Section, write_report
 
 
 def made(folder: Path) -> Path:

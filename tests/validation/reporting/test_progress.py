@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from validation.reporting.progress import Pace, shown
+from discsim.validation.reporting.progress import Pace, shown
 
 
 def test_what_is_left_takes_as_long_as_what_is_done():

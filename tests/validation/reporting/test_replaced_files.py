@@ -13,9 +13,9 @@ import pytest
 from discsim.errors import InputError
 from discsim.files import write_text
 from discsim.recording import read_recording, write_recording
-from validation.cli import main
-from validation.reporting.run import start_run
-from validation.reporting.written import OVERWRITE
+from discsim.validation.cli import main
+from discsim.validation.reporting.run import start_run
+from discsim.validation.reporting.written import OVERWRITE
 
 
 def run(out: Path, text: str) -> None:
@@ -66,7 +66,7 @@ def test_a_run_that_was_killed_does_not_stand_in_the_way_of_the_next(tmp_path):
     """Nothing runs behind a signal that kills: what is being written is said before it is."""
     killed = (
         "import os, signal, sys; from pathlib import Path; from discsim.files import write_text\n"
-        "from validation.reporting.run import start_run\n"
+        "from discsim.validation.reporting.run import start_run\n"
         "out = Path(sys.argv[1])\n"
         "with start_run(out):\n"
         "    write_text(out / 'answer.txt', 'half')\n"

@@ -10,16 +10,16 @@ import pytest
 from support.browser import browse, needs_browser
 
 import discsim
-from estimators.rate import YawRate
-from validation.estimating.page import write_estimate_page
-from validation.estimating.spin_estimates import draw_estimates
-from validation.reporting.figures import new_figure, save_figure
-from validation.reporting.scores import at_most, score
-from validation.scenarios.rate_table import Plateau
-from validation.scenarios.table_page import write_table_page
-from validation.scenarios.table_scores import Band, MethodScore, TableScores
-from validation.sweeps.cases import Row
-from validation.sweeps.page import write_sweep_page
+from discsim.estimators.rate import YawRate
+from discsim.validation.estimating.page import write_estimate_page
+from discsim.validation.estimating.spin_estimates import draw_estimates
+from discsim.validation.reporting.figures import new_figure, save_figure
+from discsim.validation.reporting.scores import at_most, score
+from discsim.validation.scenarios.rate_table import Plateau
+from discsim.validation.scenarios.table_page import write_table_page
+from discsim.validation.scenarios.table_scores import Band, MethodScore, TableScores
+from discsim.validation.sweeps.cases import Row
+from discsim.validation.sweeps.page import write_sweep_page
 
 NAN = float("nan")
 

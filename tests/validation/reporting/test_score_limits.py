@@ -11,11 +11,11 @@ import pytest
 
 from discsim.errors import InputError
 from discsim.files import model_file
-from validation.reporting.ci import github_commands, markdown_summary
-from validation.reporting.limits import SHARE, Limit, limited, limits_text, margin, read_limits, shipped_limits
-from validation.reporting.regression import compare_scores, read_scores, write_regression
-from validation.reporting.run import json_text
-from validation.reporting.scores import Score, at_most, score
+from discsim.validation.reporting.ci import github_commands, markdown_summary
+from discsim.validation.reporting.limits import SHARE, Limit, limited, limits_text, margin, read_limits, shipped_limits
+from discsim.validation.reporting.regression import compare_scores, read_scores, write_regression
+from discsim.validation.reporting.run import json_text
+from discsim.validation.reporting.scores import Score, at_most, score
 
 NOISE = score("rate table: noise", 15.0, "deg/s", 14.0, 1.4)
 ERROR = at_most("throws: worst error", 0.3, "deg/s", 0.5)

@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from validation.reporting.run import json_text
-from validation.reporting.scores import Score, at_most, score, write_junit
+from discsim.validation.reporting.run import json_text
+from discsim.validation.reporting.scores import Score, at_most, score, write_junit
 
 GOOD = score("engine: attitude of a top", 1e-5, "deg", 0.0, 1e-4)
 BAD = score("rate table: noise of a <gyroscope> & its range", 18.0, "deg/s", 14.0, 1.4)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from validation.reporting.glossary import glossary, with_terms
+from discsim.validation.reporting.glossary import glossary, with_terms
 
 
 def page(body: str) -> str:

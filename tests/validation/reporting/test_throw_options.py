@@ -9,7 +9,7 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.launch import launch_of
 from discsim.shipped import load_throw
-from validation.reporting.options import at_wind, throw_as_said
+from discsim.validation.reporting.options import at_wind, throw_as_said
 
 THROW = load_throw("driver")
 

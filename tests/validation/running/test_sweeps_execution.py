@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 
 from discsim.errors import InputError
-from validation.cli import main
-from validation.running import tasks as execution
-from validation.running.tasks import Task, claim, discard, run_tasks
+from discsim.validation.cli import main
+from discsim.validation.running import tasks as execution
+from discsim.validation.running.tasks import Task, claim, discard, run_tasks
 
 #: twelve chunks of some tenth of a second each
 PLAN = """
@@ -42,7 +42,7 @@ accelerometer = "all"
 fft = "all"
 """
 CHUNKS = 12
-COMMAND = [sys.executable, "-m", "validation.cli", "sweep"]
+COMMAND = [sys.executable, "-m", "discsim.validation.cli", "sweep"]
 #: a process of ours starts, and works, within this, s
 PATIENCE = 120.0
 

@@ -13,12 +13,12 @@ import pytest
 from discsim.errors import InputError
 from discsim.launch import launch_of
 from discsim.shipped import load_disc, load_throw
-from validation.cli import main
-from validation.scattering import landings, scattered
-from validation.scattering.fitted import read_fitted
-from validation.scattering.inputs import Fitted, Input, Inputs, inputs_of
-from validation.scattering.scattered import scatter
-from validation.scattering.sensitivities import sensitivities
+from discsim.validation.cli import main
+from discsim.validation.scattering import landings, scattered
+from discsim.validation.scattering.fitted import read_fitted
+from discsim.validation.scattering.inputs import Fitted, Input, Inputs, inputs_of
+from discsim.validation.scattering.scattered import scatter
+from discsim.validation.scattering.sensitivities import sensitivities
 
 DISC, FIELD = load_disc("driver")
 THROW = load_throw("driver")

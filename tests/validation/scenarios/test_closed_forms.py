@@ -10,8 +10,8 @@ import pytest
 from discsim.disc import Aero
 from discsim.shipped import load_disc, load_throw
 from discsim.trajectory import predict
-from validation.scenarios.closed_forms import PLAIN_TOLERANCE, closed_form_checks
-from validation.scenarios.plain_flight import plain_landing
+from discsim.validation.scenarios.closed_forms import PLAIN_TOLERANCE, closed_form_checks
+from discsim.validation.scenarios.plain_flight import plain_landing
 
 DISC, AIR = load_disc("driver")
 RELEASE = load_throw("driver")

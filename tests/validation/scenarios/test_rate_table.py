@@ -12,12 +12,12 @@ import pytest
 from discsim.effects import effect
 from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.estimators.rate import YawRate
 from discsim.recording import Samples
 from discsim.rig import default_profile
-from estimators.rate import YawRate
-from validation.reporting.options import parse_vector
-from validation.reporting.scores import Score
-from validation.scenarios.rate_table import (
+from discsim.validation.reporting.options import parse_vector
+from discsim.validation.reporting.scores import Score
+from discsim.validation.scenarios.rate_table import (
     MARGIN_S,
     Bench,
     Plateau,

@@ -16,16 +16,16 @@ from hypothesis import strategies as st
 from discsim.effects.sensors import PositionOffset
 from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.estimators.rate import YawRate
 from discsim.profiles import sine, trapezoids
 from discsim.rate_tables import load_table
 from discsim.recording import Samples, read_recording, write_recording
 from discsim.rig import read_profile, turn_table
 from discsim.sensors import Instruments, record
-from estimators.rate import YawRate
-from validation.cli import main
-from validation.experiments.table_recording import compare, lines_through, read_run
-from validation.scenarios.rate_table import Bench, plateaus, rate_table_checks, run_rate_table, with_all_methods
-from validation.scenarios.table_scores import delay_of, score_rates
+from discsim.validation.cli import main
+from discsim.validation.experiments.table_recording import compare, lines_through, read_run
+from discsim.validation.scenarios.rate_table import Bench, plateaus, rate_table_checks, run_rate_table, with_all_methods
+from discsim.validation.scenarios.table_scores import delay_of, score_rates
 
 FIELD = Environment()
 SINE = sine(30.0, 10.0, 0.25, 8.0)

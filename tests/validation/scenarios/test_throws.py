@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from discsim.estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors
+from discsim.estimators.rate import YawRate
 from discsim.frames import C3, attitude_matrix
 from discsim.shipped import load_disc, load_throw
-from estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors
-from estimators.rate import YawRate
-from validation.scenarios.throws import (
+from discsim.validation.scenarios.throws import (
     ACCELEROMETER_PERCENT,
     EDGE_S,
     FULL_SET,

@@ -8,10 +8,10 @@ from support.places import REAL
 
 from discsim.frames import body_to_ned
 from discsim.shipped import load_disc
-from validation.importing import find_map, read_map
-from validation.studies.golf_throws.page import write_page
-from validation.studies.golf_throws.prediction import INPUTS, THROWS, predict_throw
-from validation.studies.golf_throws.prediction import drawn as drawn_inputs
+from discsim.validation.importing import find_map, read_map
+from discsim.validation.studies.golf_throws.page import write_page
+from discsim.validation.studies.golf_throws.prediction import INPUTS, THROWS, predict_throw
+from discsim.validation.studies.golf_throws.prediction import drawn as drawn_inputs
 
 FOLDER = REAL / "shotshaper-dd2-drone-tracked-throws"
 tracked = pytest.mark.skipif(not FOLDER.is_dir(), reason="needs the measured recordings (DISCSIM_RECORDINGS)")
@@ -67,7 +67,7 @@ class TestThrows:
             assert np.linalg.norm(throw.nominal[k] - throw.track[k]) < 2.0
 
     def test_the_same_seed_gives_the_same_page(self, tmp_path, monkeypatch):
-        monkeypatch.setattr("validation.studies.golf_throws.page.DRAWS", 33)
+        monkeypatch.setattr("discsim.validation.studies.golf_throws.page.DRAWS", 33)
         texts = []
         for folder in ("a", "b"):
             write_page(REAL, tmp_path / folder / "golf-throws.md", seed=3)

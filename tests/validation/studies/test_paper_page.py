@@ -11,18 +11,18 @@ import pytest
 from support.places import ROOT
 
 from discsim.shipped import load_disc
-from validation.studies.paper.beside import BLOCKS, FIGURES
-from validation.studies.paper.command import SEED, read_numbers
-from validation.studies.paper.distance import UNKNOWNS
-from validation.studies.paper.equations import EQUATIONS, STEPS, find
-from validation.studies.paper.figures import draw_fig_9
-from validation.studies.paper.modules import compare_modules
-from validation.studies.paper.numbers import compute
-from validation.studies.paper.page import page_text
-from validation.studies.paper.prediction import FLOWN
-from validation.studies.paper.releases import carry
-from validation.studies.paper.spectrum import whole_flight
-from validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S
+from discsim.validation.studies.paper.beside import BLOCKS, FIGURES
+from discsim.validation.studies.paper.command import SEED, read_numbers
+from discsim.validation.studies.paper.distance import UNKNOWNS
+from discsim.validation.studies.paper.equations import EQUATIONS, STEPS, find
+from discsim.validation.studies.paper.figures import draw_fig_9
+from discsim.validation.studies.paper.modules import compare_modules
+from discsim.validation.studies.paper.numbers import compute
+from discsim.validation.studies.paper.page import page_text
+from discsim.validation.studies.paper.prediction import FLOWN
+from discsim.validation.studies.paper.releases import carry
+from discsim.validation.studies.paper.spectrum import whole_flight
+from discsim.validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S
 
 PAGE = ROOT / "docs" / "paper.md"
 NUMBERS = read_numbers(PAGE.parent / PAGE.stem)

@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 from discsim.model_file import Model
 from discsim.recording import Recording, Samples, SensorSheet
 from discsim.shipped import load_disc
-from validation.importing import find_map, read_map
-from validation.studies.golf_throws.prediction import drawn
-from validation.studies.real_diagnosis.flatball import decay, restamped, rows_of, wobble_rate
-from validation.studies.real_diagnosis.golf_causes import (
+from discsim.validation.importing import find_map, read_map
+from discsim.validation.studies.golf_throws.prediction import drawn
+from discsim.validation.studies.real_diagnosis.flatball import decay, restamped, rows_of, wobble_rate
+from discsim.validation.studies.real_diagnosis.golf_causes import (
     Throw,
     fit_cause,
     held_out,
@@ -24,10 +24,10 @@ from validation.studies.real_diagnosis.golf_causes import (
     positions,
     without_cause,
 )
-from validation.studies.real_diagnosis.golf_decision import decided
-from validation.studies.real_diagnosis.golf_flight import flown
-from validation.studies.real_diagnosis.golf_worlds import CAMERA, CAUSES, NONE, Cause, World, pair
-from validation.studies.real_diagnosis.sensors import (
+from discsim.validation.studies.real_diagnosis.golf_decision import decided
+from discsim.validation.studies.real_diagnosis.golf_flight import flown
+from discsim.validation.studies.real_diagnosis.golf_worlds import CAMERA, CAUSES, NONE, Cause, World, pair
+from discsim.validation.studies.real_diagnosis.sensors import (
     against_cameras,
     check,
     field_in_body,

@@ -7,8 +7,8 @@ from types import SimpleNamespace as Made
 
 import numpy as np
 
-import validation.studies.real_diagnosis as study
-from validation.reporting.markdown import page_text
+import discsim.validation.studies.real_diagnosis as study
+from discsim.validation.reporting.markdown import page_text
 
 PAGE = Path(study.__file__).with_name("page.md.j2")
 NAMES = ("throw1", "throw6", "throw15")

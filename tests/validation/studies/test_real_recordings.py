@@ -12,18 +12,18 @@ from scipy.spatial.transform import Rotation
 from support.places import REAL, RECORDINGS, real
 
 from discsim.errors import InputError
+from discsim.estimators.rate import YawRate
 from discsim.recording import Samples
-from estimators.rate import YawRate
-from validation.cli import main
-from validation.studies.catalogue import run_study
-from validation.studies.real_recordings import road
-from validation.studies.real_recordings.agreement import LOWERED, Attempt, agreement, attempts, mean_between
-from validation.studies.real_recordings.findings import SHIFTS, shifted_rms, turns_of
-from validation.studies.real_recordings.optical import HALF, optical_rate
-from validation.studies.real_recordings.page import write_page
-from validation.studies.real_recordings.road import LOGS, Answers, Log, Said, road_section
-from validation.studies.real_recordings.sources import SOURCES, find_recordings, load
-from validation.studies.real_recordings.turns import field_phase, phase_rate, turned, turned_by_rate
+from discsim.validation.cli import main
+from discsim.validation.studies.catalogue import run_study
+from discsim.validation.studies.real_recordings import road
+from discsim.validation.studies.real_recordings.agreement import LOWERED, Attempt, agreement, attempts, mean_between
+from discsim.validation.studies.real_recordings.findings import SHIFTS, shifted_rms, turns_of
+from discsim.validation.studies.real_recordings.optical import HALF, optical_rate
+from discsim.validation.studies.real_recordings.page import write_page
+from discsim.validation.studies.real_recordings.road import LOGS, Answers, Log, Said, road_section
+from discsim.validation.studies.real_recordings.sources import SOURCES, find_recordings, load
+from discsim.validation.studies.real_recordings.turns import field_phase, phase_rate, turned, turned_by_rate
 
 SOURCE = {source.key: source for source in SOURCES}
 DEG = np.pi / 180

@@ -10,13 +10,13 @@ import xarray as xr
 
 from discsim.errors import InputError
 from discsim.shipped import load_disc, load_throw
-from validation.sweeps.cases import READ, carried_on, landing_of, rows_of, write_rows
-from validation.sweeps.chunks import Sweep
-from validation.sweeps.mounts import MountDesign, closed_form
-from validation.sweeps.plan import plan_file, read_plan
-from validation.sweeps.shares import MODULE, shares_of
-from validation.sweeps.swept import sweep
-from validation.sweeps.tolerance import SHARE, sentences_of, tolerances_of
+from discsim.validation.sweeps.cases import READ, carried_on, landing_of, rows_of, write_rows
+from discsim.validation.sweeps.chunks import Sweep
+from discsim.validation.sweeps.mounts import MountDesign, closed_form
+from discsim.validation.sweeps.plan import plan_file, read_plan
+from discsim.validation.sweeps.shares import MODULE, shares_of
+from discsim.validation.sweeps.swept import sweep
+from discsim.validation.sweeps.tolerance import SHARE, sentences_of, tolerances_of
 
 LOWER, UPPER = np.array([-0.004] * 3 + [-0.05] * 3), np.array([0.004] * 3 + [0.05] * 3)
 RATES, RADII = np.array([1000.0, 4000.0]), np.array([0.02, 0.08])

@@ -16,25 +16,25 @@ from discsim.effects.sensors import AccelerometerBias, BiasDrift, CrossAxis, Lag
 from discsim.engine import fly
 from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.estimators.accelerometer import accelerometer
+from discsim.estimators.fft import FftSettings, fft
 from discsim.motion import Motion
 from discsim.rig import default_profile, turn_table
 from discsim.sensors import Accelerometer, Instruments, Magnetometer, Noise, Sampling, record
 from discsim.shipped import load_disc, load_throw
-from estimators.accelerometer import accelerometer
-from estimators.fft import FftSettings, fft
-from validation.scenarios.rate_table import errors_within, true_rate
-from validation.sweeps import chunks as chunks_module
-from validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, segments
-from validation.sweeps.figures import draw_sweep
-from validation.sweeps.mounts import (
+from discsim.validation.scenarios.rate_table import errors_within, true_rate
+from discsim.validation.sweeps import chunks as chunks_module
+from discsim.validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, segments
+from discsim.validation.sweeps.figures import draw_sweep
+from discsim.validation.sweeps.mounts import (
     MountDesign,
     closed_form,
     look_with_accelerometer,
     look_with_magnetometer,
     stretched,
 )
-from validation.sweeps.plan import Plan, plan_file, read_plan
-from validation.sweeps.result import labelled, write_netcdf
+from discsim.validation.sweeps.plan import Plan, plan_file, read_plan
+from discsim.validation.sweeps.result import labelled, write_netcdf
 
 SMALL = """
 name = "small"

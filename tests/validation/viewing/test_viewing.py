@@ -20,20 +20,29 @@ from discsim.effects.catalogue import effect
 from discsim.engine import fly
 from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.estimators.rate import YawRate
 from discsim.files import model_file
 from discsim.frames import body_to_ned, flip_yz, rotation_error, rotation_vector, turn
 from discsim.recording import Recording, Samples, SensorSheet, write_recording
 from discsim.rig import turn_table
 from discsim.shipped import load_disc, load_throw
-from estimators.rate import YawRate
-from validation.cli import main
-from validation.reporting.truth import write_flight_truth, write_rate_truth
-from validation.viewing import offscreen
-from validation.viewing import replay as replays
-from validation.viewing import scene as viewing
-from validation.viewing.offscreen import opengl
-from validation.viewing.replay import Replay, replay_motion, replay_recording
-from validation.viewing.scene import Look, Scene, draw_stills, draw_whole, frame_times, show, write_gif, write_mp4
+from discsim.validation.cli import main
+from discsim.validation.reporting.truth import write_flight_truth, write_rate_truth
+from discsim.validation.viewing import offscreen
+from discsim.validation.viewing import replay as replays
+from discsim.validation.viewing import scene as viewing
+from discsim.validation.viewing.offscreen import opengl
+from discsim.validation.viewing.replay import Replay, replay_motion, replay_recording
+from discsim.validation.viewing.scene import (
+    Look,
+    Scene,
+    draw_stills,
+    draw_whole,
+    frame_times,
+    show,
+    write_gif,
+    write_mp4,
+)
 
 DRIVER, FIELD = load_disc("driver")
 ULTRASTAR, _ = load_disc("ultrastar")

@@ -15,14 +15,14 @@ from discsim.recording import Recording, read_recording, write_recording
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
 from discsim.trajectory import predict
-from validation.commands.fit import command
-from validation.identification.residual_tests import whiteness
-from validation.scenarios.throws import FULL_SET
-from validation.yaw_damping import fit_yaw_damping, observe, paper_table
-from validation.yaw_damping.bias import paper_biases
-from validation.yaw_damping.fitted import notes
-from validation.yaw_damping.observations import SHARED_S, Throw, misplaced
-from validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S, damping_by_26, table_csv
+from discsim.validation.commands.fit import command
+from discsim.validation.identification.residual_tests import whiteness
+from discsim.validation.scenarios.throws import FULL_SET
+from discsim.validation.yaw_damping import fit_yaw_damping, observe, paper_table
+from discsim.validation.yaw_damping.bias import paper_biases
+from discsim.validation.yaw_damping.fitted import notes
+from discsim.validation.yaw_damping.observations import SHARED_S, Throw, misplaced
+from discsim.validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S, damping_by_26, table_csv
 
 DISC, AIR = load_disc("driver")
 TRUE_CNR = -0.0036

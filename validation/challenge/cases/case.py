@@ -11,7 +11,7 @@ from discsim.effects.catalogue import Effect
 from discsim.environment import Environment
 from discsim.recording import Plant, Samples
 from discsim.sensors import Instruments
-from validation.challenge.cases.off_catalogue import OffCatalogue
+from discsim.validation.challenge.cases.off_catalogue import OffCatalogue
 
 __all__ = ["LONGEST_FLIGHT_S", "MASKS", "Case", "Coast", "Concealed", "Kind", "Mask", "Run", "Turning"]
 

@@ -22,9 +22,9 @@ from discsim.rig import turn_table
 from discsim.sensors import record
 from discsim.toml_table import read_toml
 from discsim.toml_text import toml_lines
-from validation.challenge.cases.case import Case, Coast, Kind, Run, Turning
-from validation.challenge.cases.off_catalogue import HiddenDisc, coast, haunted
-from validation.challenge.cases.setups import equivalents
+from discsim.validation.challenge.cases.case import Case, Coast, Kind, Run, Turning
+from discsim.validation.challenge.cases.off_catalogue import HiddenDisc, coast, haunted
+from discsim.validation.challenge.cases.setups import equivalents
 
 __all__ = ["Answer", "conceal", "read_answer", "recordings", "write_recordings"]
 

@@ -25,8 +25,8 @@ from discsim.motion import Motion, State
 from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, Noise, record
 from discsim.trajectory import predict
-from validation.challenge.cases.case import Case, Coast, Concealed, Run, Turning
-from validation.challenge.cases.sizes import hiding_of
+from discsim.validation.challenge.cases.case import Case, Coast, Concealed, Run, Turning
+from discsim.validation.challenge.cases.sizes import hiding_of
 
 __all__ = ["THRESHOLD", "sizes", "strength"]
 

@@ -14,13 +14,13 @@ from discsim.errors import InputError
 from discsim.recording import Plant, Samples
 from discsim.sensors import Instruments
 from discsim.shipped import load_disc
-from validation.challenge.cases.case import Case, Coast, Kind, Mask, Run, Turning
-from validation.challenge.cases.hiding import hide
-from validation.challenge.cases.masking import masked
-from validation.challenge.cases.off_catalogue import OFF_CATALOGUE
-from validation.challenge.cases.sensor_kits import sensors_wanted, with_sensors
-from validation.challenge.cases.stating import noisy, stated
-from validation.scenarios.throws import Throw
+from discsim.validation.challenge.cases.case import Case, Coast, Kind, Mask, Run, Turning
+from discsim.validation.challenge.cases.hiding import hide
+from discsim.validation.challenge.cases.masking import masked
+from discsim.validation.challenge.cases.off_catalogue import OFF_CATALOGUE
+from discsim.validation.challenge.cases.sensor_kits import sensors_wanted, with_sensors
+from discsim.validation.challenge.cases.stating import noisy, stated
+from discsim.validation.scenarios.throws import Throw
 
 __all__ = ["KINDS", "PLANT_SHARES", "draw_case"]
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from discsim.effects.catalogue import row
 from discsim.errors import InputError
-from validation.challenge.cases.case import Case, Concealed
-from validation.challenge.cases.off_catalogue import OFF_CATALOGUE, OffCatalogue
-from validation.challenge.cases.setups import draw_fault, possible_faults
-from validation.challenge.cases.sizes import ON_REQUEST, conceivable, draw_effect, ordinary
+from discsim.validation.challenge.cases.case import Case, Concealed
+from discsim.validation.challenge.cases.off_catalogue import OFF_CATALOGUE, OffCatalogue
+from discsim.validation.challenge.cases.setups import draw_fault, possible_faults
+from discsim.validation.challenge.cases.sizes import ON_REQUEST, conceivable, draw_effect, ordinary
 
 __all__ = ["can_act", "choose", "choose_secret", "hide", "possible"]
 

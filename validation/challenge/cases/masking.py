@@ -14,13 +14,13 @@ from discsim.effects.catalogue import effect, row
 from discsim.errors import InputError
 from discsim.sensors import Instruments
 from discsim.shipped import load_disc
-from validation.challenge.cases.case import Case, Coast, Concealed, Mask
-from validation.challenge.cases.detection_limit import sizes
-from validation.challenge.cases.hiding import can_act, choose, choose_secret, possible
-from validation.challenge.cases.off_catalogue import log_uniform
-from validation.challenge.cases.sensor_kits import module
-from validation.challenge.cases.sizes import scaled
-from validation.challenge.cases.stating import noisy, with_sigmas
+from discsim.validation.challenge.cases.case import Case, Coast, Concealed, Mask
+from discsim.validation.challenge.cases.detection_limit import sizes
+from discsim.validation.challenge.cases.hiding import can_act, choose, choose_secret, possible
+from discsim.validation.challenge.cases.off_catalogue import log_uniform
+from discsim.validation.challenge.cases.sensor_kits import module
+from discsim.validation.challenge.cases.sizes import scaled
+from discsim.validation.challenge.cases.stating import noisy, with_sigmas
 
 __all__ = ["masked"]
 

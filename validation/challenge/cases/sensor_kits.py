@@ -22,7 +22,7 @@ from discsim.sensors import (
     Tracker,
 )
 from discsim.sensors.instruments import Sensor
-from validation.challenge.cases.case import Case
+from discsim.validation.challenge.cases.case import Case
 
 __all__ = ["module", "sensors_wanted", "with_sensors"]
 

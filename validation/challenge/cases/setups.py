@@ -18,7 +18,7 @@ from discsim.effects.catalogue import CATALOGUE, Effect, catalogued, effect, row
 from discsim.effects.setup import UNITS, axes_of, permutation
 from discsim.effects.track_rows import Camera
 from discsim.recording import Plant
-from validation.challenge.cases.case import Case
+from discsim.validation.challenge.cases.case import Case
 
 __all__ = ["draw_fault", "equivalents", "possible_faults"]
 

@@ -1,8 +1,8 @@
 """How large concealed effects are: from about what data like these can show up to far more than anybody would miss.
 
-The smallest sizes are detection limits as `validation.challenge.cases.detection_limit` computes them on ordinary cases
-(each case has its own, by which it is scored), rounded; larger where something else in the catalogue does the same to
-the data.
+The smallest sizes are detection limits as `discsim.validation.challenge.cases.detection_limit` computes them on
+ordinary cases (each case has its own, by which it is scored), rounded; larger where something else in the catalogue
+does the same to the data.
 """
 
 from __future__ import annotations

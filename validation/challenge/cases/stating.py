@@ -9,7 +9,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.disc import Release, Rig
 from discsim.sensors import Noise
-from validation.challenge.cases.case import Case, Run
+from discsim.validation.challenge.cases.case import Case, Run
 
 __all__ = ["noisy", "stated", "with_sigmas"]
 

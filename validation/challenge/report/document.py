@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from discsim.errors import InputError
-from validation.challenge.cases.draw import KINDS, PLANT_SHARES
-from validation.challenge.masks import MASK_HEADER, mask_row, masked_results
-from validation.challenge.report.page import deviates_of, fault_of, found_of, goal_rows, hidden_of, percent
-from validation.challenge.scores.detection import Sized, detections, fit_curve
-from validation.challenge.scores.result import Result, Scored, rates_of, times
-from validation.challenge.scores.scoring import confusion, has_power_law
-from validation.reporting.markdown import table
+from discsim.validation.challenge.cases.draw import KINDS, PLANT_SHARES
+from discsim.validation.challenge.masks import MASK_HEADER, mask_row, masked_results
+from discsim.validation.challenge.report.page import deviates_of, fault_of, found_of, goal_rows, hidden_of, percent
+from discsim.validation.challenge.scores.detection import Sized, detections, fit_curve
+from discsim.validation.challenge.scores.result import Result, Scored, rates_of, times
+from discsim.validation.challenge.scores.scoring import confusion, has_power_law
+from discsim.validation.reporting.markdown import table
 
 __all__ = ["masks_text", "result_text", "with_part"]
 

@@ -13,9 +13,9 @@ from matplotlib.ticker import FixedLocator, NullLocator
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE
-from validation.challenge.scores.detection import HALF_GOAL, Curve, Sized, allowed, fit_curve, has_curve
-from validation.challenge.scores.scoring import Deviation, rate
-from validation.reporting.figures import new_figure, save_figure
+from discsim.validation.challenge.scores.detection import HALF_GOAL, Curve, Sized, allowed, fit_curve, has_curve
+from discsim.validation.challenge.scores.scoring import Deviation, rate
+from discsim.validation.reporting.figures import new_figure, save_figure
 
 __all__ = ["draw_confusion", "draw_detection", "draw_deviates", "draw_effects", "draw_exponents"]
 

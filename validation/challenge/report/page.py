@@ -11,17 +11,17 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE
-from validation.challenge.report.figures import (
+from discsim.validation.challenge.report.figures import (
     draw_confusion,
     draw_detection,
     draw_deviates,
     draw_effects,
     draw_exponents,
 )
-from validation.challenge.scores.detection import HALF_GOAL, Curve, Sized, detections, fit_curve, has_curve
-from validation.challenge.scores.result import Scored, rates_of, times
-from validation.challenge.scores.scoring import NOTHING, Rate, confusion, has_power_law, median, rate
-from validation.reporting.html import Section, write_report
+from discsim.validation.challenge.scores.detection import HALF_GOAL, Curve, Sized, detections, fit_curve, has_curve
+from discsim.validation.challenge.scores.result import Scored, rates_of, times
+from discsim.validation.challenge.scores.scoring import NOTHING, Rate, confusion, has_power_law, median, rate
+from discsim.validation.reporting.html import Section, write_report
 
 __all__ = [
     "GOALS",

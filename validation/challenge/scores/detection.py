@@ -1,7 +1,7 @@
 """How small an effect is found: the share of effects named against their size, and the size at which half are.
 
-Sizes are in units of the detection limit of the very case (`validation.challenge.cases.detection_limit`), so that
-effects of all kinds can be pooled: 1 is where the information in the recordings is worth `THRESHOLD` in chi2.
+Sizes are in units of the detection limit of the very case (`discsim.validation.challenge.cases.detection_limit`), so
+that effects of all kinds can be pooled: 1 is where the information in the recordings is worth `THRESHOLD` in chi2.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from scipy.special import expit, logit
 from scipy.stats import chi2, norm
 
 from discsim.arrays import FloatArray
-from validation.challenge.cases.detection_limit import THRESHOLD
-from validation.challenge.scores.result import Scored
+from discsim.validation.challenge.cases.detection_limit import THRESHOLD
+from discsim.validation.challenge.scores.result import Scored
 
 __all__ = ["HALF_GOAL", "Curve", "Sized", "allowed", "detections", "fit_curve", "has_curve"]
 

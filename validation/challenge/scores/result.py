@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from discsim.errors import InputError
-from validation.challenge.cases.conceal import Answer
-from validation.challenge.scores.scoring import CaseScore, Rate, score_case, summary
+from discsim.validation.challenge.cases.conceal import Answer
+from discsim.validation.challenge.scores.scoring import CaseScore, Rate, score_case, summary
 
 __all__ = ["RESULT", "Result", "Scored", "Times", "rates_of", "read_result", "times"]
 
@@ -148,7 +148,7 @@ class Result(NamedTuple):
 
 
 def read_result(folder: Path) -> Result:
-    """Read what `validation.challenge.run.challenge` left in a folder; raises `InputError` where it is not there."""
+    """Read what `discsim.validation.challenge.run.challenge` left; raises `InputError` where it is not there."""
     file = folder / RESULT
     try:
         kept = json.loads(file.read_text("utf-8"))

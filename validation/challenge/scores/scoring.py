@@ -17,7 +17,7 @@ from scipy.stats import beta
 
 from discsim.effects.catalogue import CATALOGUE, row
 from discsim.errors import InputError
-from validation.challenge.cases.conceal import Answer
+from discsim.validation.challenge.cases.conceal import Answer
 
 __all__ = [
     "NOTHING",

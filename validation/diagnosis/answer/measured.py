@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from validation.diagnosis.answer.checked import Told, finite, not_negative, plain
+from discsim.validation.diagnosis.answer.checked import Told, finite, not_negative, plain
 
 __all__ = ["FitFigures", "HeldOut", "Located", "NoiseNote", "Outlier"]
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import discsim.law
 from discsim.effects.catalogue import CATALOGUE, effect
-from validation.diagnosis.answer.checked import Recordings, Told, finite, not_negative, plain, shared
+from discsim.validation.diagnosis.answer.checked import Recordings, Told, finite, not_negative, plain, shared
 
 __all__ = [
     "MOVE_LIMIT",

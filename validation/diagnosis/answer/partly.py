@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from validation.diagnosis.answer.checked import plain
-from validation.diagnosis.answer.named import ParameterValue
+from discsim.validation.diagnosis.answer.checked import plain
+from discsim.validation.diagnosis.answer.named import ParameterValue
 
 __all__ = ["PartlyExplained"]
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from discsim.recording import Recording
-from validation.diagnosis.answer.partly import PartlyExplained
-from validation.diagnosis.consistency.turned_field import turned_field
+from discsim.validation.diagnosis.answer.partly import PartlyExplained
+from discsim.validation.diagnosis.consistency.turned_field import turned_field
 
 __all__ = ["Turning", "turning_of"]
 

@@ -21,25 +21,25 @@ import numpy as np
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.sensors import Lag
 from discsim.recording import SENSORS, Recording
-from validation.diagnosis.consistency.followed import left_of, left_when_shifted, left_when_turned, true_noise
-from validation.diagnosis.consistency.spin_rates import RatesApart, rates_apart
-from validation.diagnosis.detectors.speed_ripple import ripple
-from validation.diagnosis.relaxed_fit import (
+from discsim.validation.diagnosis.consistency.followed import left_of, left_when_shifted, left_when_turned, true_noise
+from discsim.validation.diagnosis.consistency.spin_rates import RatesApart, rates_apart
+from discsim.validation.diagnosis.detectors.speed_ripple import ripple
+from discsim.validation.diagnosis.relaxed_fit import (
     beginning,
     first_trajectory,
     free_clocks,
     from_other_initial_states,
     relaxed_parameters,
 )
-from validation.diagnosis.selection.evidence import BOUNDS
-from validation.diagnosis.settings import CONSISTENCY
-from validation.identification.gauss_newton import Fit, refit
-from validation.identification.noise import GroupNoise
-from validation.identification.observations import readings_of
-from validation.identification.parameters import Parameter
-from validation.identification.plants import plant_of
-from validation.identification.readings import group_of
-from validation.identification.segments import Trajectory
+from discsim.validation.diagnosis.selection.evidence import BOUNDS
+from discsim.validation.diagnosis.settings import CONSISTENCY
+from discsim.validation.identification.gauss_newton import Fit, refit
+from discsim.validation.identification.noise import GroupNoise
+from discsim.validation.identification.observations import readings_of
+from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.plants import plant_of
+from discsim.validation.identification.readings import group_of
+from discsim.validation.identification.segments import Trajectory
 
 __all__ = [
     "Contradiction",

@@ -13,12 +13,12 @@ import numpy as np
 from scipy.signal import lfilter
 
 from discsim.arrays import FloatArray, sd_by_median
-from validation.identification.gauss_newton import Fit
-from validation.identification.noise import DEFAULT, GroupNoise
-from validation.identification.prediction import shiftable
-from validation.identification.readings import Readings, group_of
-from validation.identification.segments import Trajectory
-from validation.identification.sensor_model import Values
+from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.noise import DEFAULT, GroupNoise
+from discsim.validation.identification.prediction import shiftable
+from discsim.validation.identification.readings import Readings, group_of
+from discsim.validation.identification.segments import Trajectory
+from discsim.validation.identification.sensor_model import Values
 
 __all__ = ["left_of", "left_when_shifted", "left_when_turned", "true_noise"]
 

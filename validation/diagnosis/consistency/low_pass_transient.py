@@ -17,8 +17,8 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import Lag
 from discsim.recording import Recording
-from validation.diagnosis.consistency.phase_regression import centripetal_of
-from validation.identification.plants import plant_of
+from discsim.validation.diagnosis.consistency.phase_regression import centripetal_of
+from discsim.validation.identification.plants import plant_of
 
 __all__ = ["LowPassTransient", "TransientProof", "low_pass_transient_of"]
 

@@ -19,8 +19,8 @@ from scipy.interpolate import BSpline
 from discsim.arrays import ComplexArray, FloatArray, IntArray
 from discsim.compiled import compiled
 from discsim.recording import Recording
-from validation.diagnosis.consistency.phase_regression import rate_of, retimed, signal_of
-from validation.diagnosis.consistency.time_stamp_recovery import Rows
+from discsim.validation.diagnosis.consistency.phase_regression import rate_of, retimed, signal_of
+from discsim.validation.diagnosis.consistency.time_stamp_recovery import Rows
 
 __all__ = ["OwnClock", "SamplesShown", "own_clock_of"]
 

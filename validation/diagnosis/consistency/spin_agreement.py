@@ -19,9 +19,9 @@ import numpy as np
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import ClockRate, Scale
 from discsim.recording import Recording
-from validation.diagnosis.consistency.low_pass_transient import LowPassTransient, low_pass_transient_of
-from validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
-from validation.diagnosis.consistency.phase_regression import (
+from discsim.validation.diagnosis.consistency.low_pass_transient import LowPassTransient, low_pass_transient_of
+from discsim.validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
+from discsim.validation.diagnosis.consistency.phase_regression import (
     REACH,
     angle_turned,
     centripetal,
@@ -33,7 +33,7 @@ from validation.diagnosis.consistency.phase_regression import (
     steps,
     tone,
 )
-from validation.diagnosis.consistency.time_stamp_recovery import Rows, rows_of
+from discsim.validation.diagnosis.consistency.time_stamp_recovery import Rows, rows_of
 
 __all__ = ["Agreement", "Cause", "Comparison", "Proof", "RowProof", "agreement_of", "compared", "written_ratios"]
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.recording import Recording
-from validation.diagnosis.consistency.phase_regression import angle_turned, retimed, signal_of, steps
+from discsim.validation.diagnosis.consistency.phase_regression import angle_turned, retimed, signal_of, steps
 
 __all__ = ["Durations", "Rows", "durations", "rows_of"]
 

@@ -19,8 +19,8 @@ from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import GyroscopeBias, HardIron
 from discsim.effects.setup import TimeOffset
 from discsim.recording import Recording
-from validation.diagnosis.answer.named import ParameterValue
-from validation.diagnosis.answer.partly import PartlyExplained
+from discsim.validation.diagnosis.answer.named import ParameterValue
+from discsim.validation.diagnosis.answer.partly import PartlyExplained
 
 __all__ = ["TurnedField", "turned_field"]
 

@@ -19,24 +19,24 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE, catalogued
 from discsim.effects.rig import AxisTilt
 from discsim.recording import SENSORS, Recording, Samples
-from validation.diagnosis.design.plans import plans_about
-from validation.diagnosis.relaxed_fit import unknowns
-from validation.diagnosis.result import Advice, Separation
-from validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
-from validation.diagnosis.selection.evidence import BOUNDS
-from validation.diagnosis.selection.search_state import Rival, Search
-from validation.diagnosis.settings import SELECTION
-from validation.identification.gauss_newton import Fit, mapped
-from validation.identification.linearisation import linearise, moved
-from validation.identification.noise import NoiseModel
-from validation.identification.normal_equations import common_step, nuisance_step, reduce
-from validation.identification.parameters import Parameter, Values, values_of
-from validation.identification.plants import Plant
-from validation.identification.plants.plan import Plan
-from validation.identification.prediction import read, shown
-from validation.identification.propagation import Column
-from validation.identification.readings import Readings, group_of
-from validation.identification.segments import Trajectory, resegmented, trajectory_of
+from discsim.validation.diagnosis.design.plans import plans_about
+from discsim.validation.diagnosis.relaxed_fit import unknowns
+from discsim.validation.diagnosis.result import Advice, Separation
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
+from discsim.validation.diagnosis.selection.evidence import BOUNDS
+from discsim.validation.diagnosis.selection.search_state import Rival, Search
+from discsim.validation.diagnosis.settings import SELECTION
+from discsim.validation.identification.gauss_newton import Fit, mapped
+from discsim.validation.identification.linearisation import linearise, moved
+from discsim.validation.identification.noise import NoiseModel
+from discsim.validation.identification.normal_equations import common_step, nuisance_step, reduce
+from discsim.validation.identification.parameters import Parameter, Values, values_of
+from discsim.validation.identification.plants import Plant
+from discsim.validation.identification.plants.plan import Plan
+from discsim.validation.identification.prediction import read, shown
+from discsim.validation.identification.propagation import Column
+from discsim.validation.identification.readings import Readings, group_of
+from discsim.validation.identification.segments import Trajectory, resegmented, trajectory_of
 
 __all__ = ["ENOUGH", "advise", "confusions", "expected_evidence", "in_words"]
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from discsim.errors import InputError
 from discsim.toml_table import read_toml
-from validation.identification.plants import PLANTS, Plant
-from validation.identification.plants.plan import Plan
-from validation.identification.plants.plant import Design
-from validation.identification.segments import Trajectory
+from discsim.validation.identification.plants import PLANTS, Plant
+from discsim.validation.identification.plants.plan import Plan
+from discsim.validation.identification.plants.plant import Design
+from discsim.validation.identification.segments import Trajectory
 
 __all__ = ["plans_about", "read_plans"]
 

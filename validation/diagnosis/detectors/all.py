@@ -7,19 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from validation.diagnosis.detectors.dropped_samples import Shifted, dropped_accelerometer
-from validation.diagnosis.detectors.events import events
-from validation.diagnosis.detectors.gusts import gusts
-from validation.diagnosis.detectors.local_problem import local_problems
-from validation.diagnosis.detectors.saturation import saturation
-from validation.diagnosis.detectors.speed_ripple import ripple
-from validation.diagnosis.detectors.time_offsets import time_offsets
-from validation.diagnosis.selection.continuous_fit import ContinuousFit
-from validation.diagnosis.selection.score_tests import ScreenedCandidate
-from validation.diagnosis.settings import DETECTORS
-from validation.identification.gauss_newton import Fit
-from validation.identification.noise import NoiseModel
-from validation.identification.parameters import Parameter
+from discsim.validation.diagnosis.detectors.dropped_samples import Shifted, dropped_accelerometer
+from discsim.validation.diagnosis.detectors.events import events
+from discsim.validation.diagnosis.detectors.gusts import gusts
+from discsim.validation.diagnosis.detectors.local_problem import local_problems
+from discsim.validation.diagnosis.detectors.saturation import saturation
+from discsim.validation.diagnosis.detectors.speed_ripple import ripple
+from discsim.validation.diagnosis.detectors.time_offsets import time_offsets
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
+from discsim.validation.diagnosis.settings import DETECTORS
+from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.noise import NoiseModel
+from discsim.validation.identification.parameters import Parameter
 
 __all__ = ["searched"]
 

@@ -13,15 +13,15 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import DroppedSamples
-from validation.diagnosis.detectors.sample_alignment import first_yaw, lost_along, phase_counts, repaired
-from validation.diagnosis.relaxed_fit import relaxed
-from validation.diagnosis.selection.candidates import CandidateEffect
-from validation.diagnosis.selection.score_tests import ScreenedCandidate
-from validation.diagnosis.settings import DETECTORS
-from validation.identification.gauss_newton import Fit, mapped, refit
-from validation.identification.noise import NoiseModel
-from validation.identification.parameters import Parameter
-from validation.identification.segments import Trajectory, resegmented
+from discsim.validation.diagnosis.detectors.sample_alignment import first_yaw, lost_along, phase_counts, repaired
+from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect
+from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
+from discsim.validation.diagnosis.settings import DETECTORS
+from discsim.validation.identification.gauss_newton import Fit, mapped, refit
+from discsim.validation.identification.noise import NoiseModel
+from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.segments import Trajectory, resegmented
 
 __all__ = ["PhaseLosses", "Shifted", "dropped_accelerometer", "dropped_magnetometer"]
 

@@ -14,15 +14,15 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.events import Impulse, SpinStep
-from validation.diagnosis.detectors.local_problem import LocalProblem, LocalProblems, gain_of, peaks
-from validation.diagnosis.selection.candidates import CandidateEffect, detected
-from validation.diagnosis.selection.score_tests import ScreenedCandidate
-from validation.diagnosis.settings import DETECTORS
-from validation.identification.gauss_newton import Fit, mapped
-from validation.identification.linearisation import linearise
-from validation.identification.plants.plant import Layout
-from validation.identification.propagation import Column
-from validation.identification.segments import undone
+from discsim.validation.diagnosis.detectors.local_problem import LocalProblem, LocalProblems, gain_of, peaks
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, detected
+from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
+from discsim.validation.diagnosis.settings import DETECTORS
+from discsim.validation.identification.gauss_newton import Fit, mapped
+from discsim.validation.identification.linearisation import linearise
+from discsim.validation.identification.plants.plant import Layout
+from discsim.validation.identification.propagation import Column
+from discsim.validation.identification.segments import undone
 
 __all__ = ["events"]
 

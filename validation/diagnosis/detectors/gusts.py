@@ -9,13 +9,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from validation.diagnosis.detectors.local_problem import WIND, LocalProblem, LocalProblems, gain_of
-from validation.diagnosis.selection.candidates import CandidateEffect, detected
-from validation.diagnosis.selection.score_tests import ScreenedCandidate
-from validation.diagnosis.settings import DETECTORS
-from validation.identification.gauss_newton import mapped
-from validation.identification.propagation import Column
-from validation.identification.segments import undone
+from discsim.validation.diagnosis.detectors.local_problem import WIND, LocalProblem, LocalProblems, gain_of
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, detected
+from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
+from discsim.validation.diagnosis.settings import DETECTORS
+from discsim.validation.identification.gauss_newton import mapped
+from discsim.validation.identification.propagation import Column
+from discsim.validation.identification.segments import undone
 
 __all__ = ["gusts"]
 

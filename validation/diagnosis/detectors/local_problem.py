@@ -14,15 +14,15 @@ import numpy as np
 from discsim.arrays import FloatArray, IntArray
 from discsim.effects.air import Wind
 from discsim.effects.catalogue import catalogued
-from validation.diagnosis.selection.candidates import CandidateEffect
-from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
-from validation.diagnosis.selection.score_tests import ScreenedCandidate
-from validation.identification.gauss_newton import Fit, linearised
-from validation.identification.linear import Linear
-from validation.identification.noise import NoiseModel, whitened
-from validation.identification.normal_equations import inverse_of, known_directions, reduce, unknown_prior
-from validation.identification.parameters import Parameter
-from validation.identification.segments import Trajectory, resegmented
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
+from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
+from discsim.validation.identification.gauss_newton import Fit, linearised
+from discsim.validation.identification.linear import Linear
+from discsim.validation.identification.noise import NoiseModel, whitened
+from discsim.validation.identification.normal_equations import inverse_of, known_directions, reduce, unknown_prior
+from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.segments import Trajectory, resegmented
 
 __all__ = ["WIND", "LocalProblem", "LocalProblems", "gain_of", "local_problems", "peaks"]
 

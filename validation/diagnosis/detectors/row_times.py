@@ -18,12 +18,12 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.timing_rows import Average, LostRows, OwnClock
 from discsim.recording import Recording
-from validation.diagnosis.answer.measured import Located
-from validation.diagnosis.answer.named import SMALLEST_P_VALUE, Evidence, NamedEffect, ParameterValue
-from validation.diagnosis.consistency.own_clock import OwnClock as FoundClock
-from validation.diagnosis.consistency.phase_regression import angle_turned, signal_of
-from validation.diagnosis.consistency.spin_agreement import Agreement, RowProof
-from validation.identification.noise import NoiseModel
+from discsim.validation.diagnosis.answer.measured import Located
+from discsim.validation.diagnosis.answer.named import SMALLEST_P_VALUE, Evidence, NamedEffect, ParameterValue
+from discsim.validation.diagnosis.consistency.own_clock import OwnClock as FoundClock
+from discsim.validation.diagnosis.consistency.phase_regression import angle_turned, signal_of
+from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, RowProof
+from discsim.validation.identification.noise import NoiseModel
 
 __all__ = ["RowTimes", "row_times"]
 

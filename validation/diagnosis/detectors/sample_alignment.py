@@ -14,9 +14,9 @@ import numpy as np
 from discsim.arrays import ComplexArray, FloatArray, IntArray, sd_by_median
 from discsim.compiled import compiled_nogil
 from discsim.recording import Recording, Samples
-from validation.identification.prediction import shown
-from validation.identification.segments import Trajectory
-from validation.identification.sensor_model import Values, delay
+from discsim.validation.identification.prediction import shown
+from discsim.validation.identification.segments import Trajectory
+from discsim.validation.identification.sensor_model import Values, delay
 
 __all__ = ["circle_through", "first_yaw", "lost_along", "phase_counts", "repaired", "viterbi_counts"]
 

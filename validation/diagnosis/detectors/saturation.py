@@ -12,14 +12,14 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import AccelerometerSaturation
-from validation.diagnosis.selection.candidates import CandidateEffect
-from validation.diagnosis.selection.score_tests import ScreenedCandidate
-from validation.identification.clipping import clipping_level, equal_beyond_chance
-from validation.identification.gauss_newton import Fit
-from validation.identification.noise import NoiseModel
-from validation.identification.prediction import shown
-from validation.identification.segments import Trajectory
-from validation.identification.sensor_model import delay
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect
+from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
+from discsim.validation.identification.clipping import clipping_level, equal_beyond_chance
+from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.noise import NoiseModel
+from discsim.validation.identification.prediction import shown
+from discsim.validation.identification.segments import Trajectory
+from discsim.validation.identification.sensor_model import delay
 
 __all__ = ["saturation"]
 

@@ -13,14 +13,14 @@ from scipy.integrate import cumulative_trapezoid
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.rig import SpeedRipple
-from validation.diagnosis.detectors.local_problem import gain_of, peaks
-from validation.diagnosis.selection.candidates import CandidateEffect
-from validation.diagnosis.selection.score_tests import ScreenedCandidate
-from validation.diagnosis.settings import DETECTORS
-from validation.identification.gauss_newton import Fit
-from validation.identification.noise import NoiseModel
-from validation.identification.propagation import Column
-from validation.identification.sensor_model import delay
+from discsim.validation.diagnosis.detectors.local_problem import gain_of, peaks
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect
+from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
+from discsim.validation.diagnosis.settings import DETECTORS
+from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.noise import NoiseModel
+from discsim.validation.identification.propagation import Column
+from discsim.validation.identification.sensor_model import delay
 
 __all__ = ["ripple"]
 

@@ -3,7 +3,7 @@
 Takes a fit of rigs; gives screened candidates of ``accel.time_offset`` and ``gyro.time_offset``, and of the lag that
 looks alike where a sensor is late. A linear question finds small offsets; a ramp and its corners are not linear over
 tens of milliseconds. In the air, where all sensors turn, phases tell the same before anything is fitted
-(`validation.diagnosis.setup`).
+(`discsim.validation.diagnosis.setup`).
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import Lag
 from discsim.effects.setup import TimeOffset
-from validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
-from validation.diagnosis.selection.score_tests import ScreenedCandidate
-from validation.diagnosis.settings import DETECTORS
-from validation.identification.gauss_newton import Fit
-from validation.identification.noise import NoiseModel
-from validation.identification.prediction import shiftable
-from validation.identification.segments import Trajectory
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
+from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
+from discsim.validation.diagnosis.settings import DETECTORS
+from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.noise import NoiseModel
+from discsim.validation.identification.prediction import shiftable
+from discsim.validation.identification.segments import Trajectory
 
 __all__ = ["time_offsets"]
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
-from validation.diagnosis.consistency.low_pass_transient import TransientProof
-from validation.diagnosis.consistency.own_clock import SamplesShown
-from validation.diagnosis.consistency.spin_agreement import Agreement, Cause, RowProof
-from validation.diagnosis.report.wording import plus_minus
+from discsim.validation.diagnosis.consistency.low_pass_transient import TransientProof
+from discsim.validation.diagnosis.consistency.own_clock import SamplesShown
+from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, Cause, RowProof
+from discsim.validation.diagnosis.report.wording import plus_minus
 
 __all__ = ["Table", "tables_of"]
 

@@ -13,8 +13,8 @@ from matplotlib.ticker import NullLocator
 
 from discsim.arrays import FloatArray
 from discsim.recording import SENSORS
-from validation.diagnosis.result import Located, Residuals
-from validation.reporting.figures import new_figure
+from discsim.validation.diagnosis.result import Located, Residuals
+from discsim.validation.reporting.figures import new_figure
 
 __all__ = ["draw_overview", "draw_sensor", "readable_axis", "sensors_of"]
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from discsim.files import write_text
 from discsim.model_file import write_model
-from validation.diagnosis.report.page import draw_figures, write_diagnosis_report
-from validation.diagnosis.result import Outcome
-from validation.reporting.run import json_text
+from discsim.validation.diagnosis.report.page import draw_figures, write_diagnosis_report
+from discsim.validation.diagnosis.result import Outcome
+from discsim.validation.reporting.run import json_text
 
 __all__ = ["write_outcome"]
 

@@ -13,10 +13,10 @@ import numpy as np
 from markupsafe import Markup
 
 from discsim.recording import SENSORS
-from validation.diagnosis.consistency.spin_agreement import Agreement
-from validation.diagnosis.report.consistency_tables import tables_of
-from validation.diagnosis.report.figures import draw_overview, draw_sensor, readable_axis, sensors_of
-from validation.diagnosis.report.wording import (
+from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
+from discsim.validation.diagnosis.report.consistency_tables import tables_of
+from discsim.validation.diagnosis.report.figures import draw_overview, draw_sensor, readable_axis, sensors_of
+from discsim.validation.diagnosis.report.wording import (
     everyday,
     form,
     found,
@@ -28,7 +28,7 @@ from validation.diagnosis.report.wording import (
     unit,
     wind_in_words,
 )
-from validation.diagnosis.result import (
+from discsim.validation.diagnosis.result import (
     Confusion,
     Diagnosis,
     FitFigures,
@@ -39,8 +39,8 @@ from validation.diagnosis.result import (
     Outcome,
     Recalibration,
 )
-from validation.reporting.figures import save_figure
-from validation.reporting.html import write_page
+from discsim.validation.reporting.figures import save_figure
+from discsim.validation.reporting.html import write_page
 
 __all__ = ["draw_figures", "verdict_sentence", "write_diagnosis_report"]
 

@@ -13,7 +13,7 @@ from math import atan2, degrees, floor, hypot, log10
 from types import MappingProxyType
 
 from discsim.effects.catalogue import CATALOGUE
-from validation.diagnosis.result import Confusion, ParameterValue
+from discsim.validation.diagnosis.result import Confusion, ParameterValue
 
 __all__ = [
     "everyday",

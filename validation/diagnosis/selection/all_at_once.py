@@ -11,12 +11,12 @@ import numpy as np
 
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.sensors import Lag
-from validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
-from validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from validation.diagnosis.selection.evidence import price
-from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.selection.search_state import Search, far, on_the_disc, possible
-from validation.identification.gauss_newton import Fit
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.selection.evidence import price
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.search_state import Search, far, on_the_disc, possible
+from discsim.validation.identification.gauss_newton import Fit
 
 __all__ = ["all_at_once"]
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from discsim.effects.catalogue import CATALOGUE, Row
 from discsim.effects.own import UserEffect
 from discsim.recording import Recording
-from validation.identification.competing_effects import CATALOGUED, Competing
-from validation.identification.parameters import Parameter
-from validation.identification.propagation import Column
+from discsim.validation.identification.competing_effects import CATALOGUED, Competing
+from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.propagation import Column
 
 __all__ = ["CandidateEffect", "candidates_for", "free_candidate", "in_parameters", "parameters_of"]
 

@@ -14,14 +14,14 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import ClockRate
-from validation.diagnosis.relaxed_fit import beginning
-from validation.diagnosis.selection.evidence import BOUNDS
-from validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
-from validation.identification.gauss_newton import Fit, penalty_of, refit
-from validation.identification.noise import NoiseModel, estimate_noise, likeliest_noise, log_likelihood
-from validation.identification.parameters import Parameter, values_of
-from validation.identification.segments import Trajectory
-from validation.identification.sensor_model import CLOCKS
+from discsim.validation.diagnosis.relaxed_fit import beginning
+from discsim.validation.diagnosis.selection.evidence import BOUNDS
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
+from discsim.validation.identification.gauss_newton import Fit, penalty_of, refit
+from discsim.validation.identification.noise import NoiseModel, estimate_noise, likeliest_noise, log_likelihood
+from discsim.validation.identification.parameters import Parameter, values_of
+from discsim.validation.identification.segments import Trajectory
+from discsim.validation.identification.sensor_model import CLOCKS
 
 __all__ = ["ContinuousFit", "continuous_fit"]
 

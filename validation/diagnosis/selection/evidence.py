@@ -12,8 +12,8 @@ import numpy as np
 
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.mount_rows import ROWS as MOUNTS
-from validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
-from validation.diagnosis.settings import SELECTION
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
+from discsim.validation.diagnosis.settings import SELECTION
 
 __all__ = ["charge", "price"]
 

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
-from validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from validation.diagnosis.selection.evidence import charge, price
-from validation.diagnosis.selection.hypothesis import fitted_parameters
-from validation.diagnosis.selection.refits import refitting
-from validation.diagnosis.selection.score_tests import ScreenedCandidate, scope_price, start_of
-from validation.diagnosis.selection.screening import free_columns
-from validation.diagnosis.selection.search_state import Rival, Search, from_here, lost, possible, values_of_fit
-from validation.diagnosis.settings import SELECTION
-from validation.identification.gauss_newton import merit_of
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.selection.evidence import charge, price
+from discsim.validation.diagnosis.selection.hypothesis import fitted_parameters
+from discsim.validation.diagnosis.selection.refits import refitting
+from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate, scope_price, start_of
+from discsim.validation.diagnosis.selection.screening import free_columns
+from discsim.validation.diagnosis.selection.search_state import Rival, Search, from_here, lost, possible, values_of_fit
+from discsim.validation.diagnosis.settings import SELECTION
+from discsim.validation.identification.gauss_newton import merit_of
 
 __all__ = ["eliminated_backward", "exchanged", "rivals_of", "takes_its_place", "widened"]
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-from validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
-from validation.identification.parameters import Parameter
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
+from discsim.validation.identification.parameters import Parameter
 
 __all__ = ["Hypothesis", "Start"]
 

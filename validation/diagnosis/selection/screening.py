@@ -14,15 +14,15 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.errors import InputError
-from validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
-from validation.diagnosis.selection.to_stated import to_baseline
-from validation.identification.gauss_newton import Fit, linearised_columns, mapped
-from validation.identification.linear import Linear
-from validation.identification.noise import NoiseModel
-from validation.identification.normal_equations import Reduced, inverse_of, reduce
-from validation.identification.parameters import AllowedDefects, Parameter
-from validation.identification.plants import PLANTS
-from validation.identification.propagation import Column
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
+from discsim.validation.diagnosis.selection.to_stated import to_baseline
+from discsim.validation.identification.gauss_newton import Fit, linearised_columns, mapped
+from discsim.validation.identification.linear import Linear
+from discsim.validation.identification.noise import NoiseModel
+from discsim.validation.identification.normal_equations import Reduced, inverse_of, reduce
+from discsim.validation.identification.parameters import AllowedDefects, Parameter
+from discsim.validation.identification.plants import PLANTS
+from discsim.validation.identification.propagation import Column
 
 __all__ = ["NormalEquations", "ScoreTest", "normal_equations_of"]
 

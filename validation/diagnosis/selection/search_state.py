@@ -10,18 +10,18 @@ import numpy as np
 from discsim.effects.catalogue import CATALOGUE, catalogued
 from discsim.effects.events import SpinStep
 from discsim.recording import Recording
-from validation.diagnosis.detectors.dropped_samples import PhaseLosses
-from validation.diagnosis.selection.candidates import CandidateEffect
-from validation.diagnosis.selection.continuous_fit import ContinuousFit
-from validation.diagnosis.selection.evidence import ONE_SIDED
-from validation.diagnosis.selection.hypothesis import Start
-from validation.diagnosis.selection.score_tests import ScreenedCandidate
-from validation.diagnosis.selection.screening import NormalEquations, normal_equations_of
-from validation.diagnosis.settings import SELECTION
-from validation.identification.gauss_newton import Fit
-from validation.identification.noise import NoiseModel, chi_squared
-from validation.identification.parameters import Parameter
-from validation.identification.residual_tests import unmodelled_residuals
+from discsim.validation.diagnosis.detectors.dropped_samples import PhaseLosses
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.selection.evidence import ONE_SIDED
+from discsim.validation.diagnosis.selection.hypothesis import Start
+from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
+from discsim.validation.diagnosis.selection.screening import NormalEquations, normal_equations_of
+from discsim.validation.diagnosis.settings import SELECTION
+from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.noise import NoiseModel, chi_squared
+from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = [
     "Considered",

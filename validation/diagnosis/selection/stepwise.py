@@ -18,17 +18,22 @@ from discsim.effects import Effect
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import DroppedSamples, Lag
 from discsim.recording import Recording
-from validation.diagnosis.detectors.all import searched
-from validation.diagnosis.detectors.dropped_samples import PhaseLosses, Shifted
-from validation.diagnosis.relaxed_fit import relaxed, unknowns, without_outliers
-from validation.diagnosis.selection.all_at_once import all_at_once
-from validation.diagnosis.selection.candidates import CandidateEffect, candidates_for, in_parameters, parameters_of
-from validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from validation.diagnosis.selection.evidence import ONE_SIDED, TURNED, charge, price
-from validation.diagnosis.selection.exchange import eliminated_backward, exchanged, rivals_of, widened
-from validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
-from validation.diagnosis.selection.refits import refitting
-from validation.diagnosis.selection.score_tests import (
+from discsim.validation.diagnosis.detectors.all import searched
+from discsim.validation.diagnosis.detectors.dropped_samples import PhaseLosses, Shifted
+from discsim.validation.diagnosis.relaxed_fit import relaxed, unknowns, without_outliers
+from discsim.validation.diagnosis.selection.all_at_once import all_at_once
+from discsim.validation.diagnosis.selection.candidates import (
+    CandidateEffect,
+    candidates_for,
+    in_parameters,
+    parameters_of,
+)
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.selection.evidence import ONE_SIDED, TURNED, charge, price
+from discsim.validation.diagnosis.selection.exchange import eliminated_backward, exchanged, rivals_of, widened
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
+from discsim.validation.diagnosis.selection.refits import refitting
+from discsim.validation.diagnosis.selection.score_tests import (
     ScreenedCandidate,
     hinted,
     one_per_effect,
@@ -37,8 +42,8 @@ from validation.diagnosis.selection.score_tests import (
     screened_candidates,
     start_of,
 )
-from validation.diagnosis.selection.screening import NormalEquations, normal_equations_of
-from validation.diagnosis.selection.search_state import (
+from discsim.validation.diagnosis.selection.screening import NormalEquations, normal_equations_of
+from discsim.validation.diagnosis.selection.search_state import (
     Considered,
     Search,
     chi2_in,
@@ -50,12 +55,12 @@ from validation.diagnosis.selection.search_state import (
     possible,
     values_of_fit,
 )
-from validation.diagnosis.settings import SELECTION
-from validation.identification.competing_effects import CATALOGUED, Competing
-from validation.identification.gauss_newton import Fit, merit_of
-from validation.identification.noise import NoiseModel, estimate_noise, robust_noise
-from validation.identification.parameters import Parameter
-from validation.identification.stated_parameters import stated_parameters
+from discsim.validation.diagnosis.settings import SELECTION
+from discsim.validation.identification.competing_effects import CATALOGUED, Competing
+from discsim.validation.identification.gauss_newton import Fit, merit_of
+from discsim.validation.identification.noise import NoiseModel, estimate_noise, robust_noise
+from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.stated_parameters import stated_parameters
 
 __all__ = ["screened", "search", "tried_without"]
 

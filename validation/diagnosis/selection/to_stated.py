@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from discsim.arrays import FloatArray
-from validation.identification.gauss_newton import Fit
+from discsim.validation.identification.gauss_newton import Fit
 
 __all__ = ["to_baseline"]
 

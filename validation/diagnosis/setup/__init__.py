@@ -1,6 +1,6 @@
 """Faults of the setup, found before anything is fitted: `find_setup_faults`."""
 
-from validation.diagnosis.setup.find import (
+from discsim.validation.diagnosis.setup.find import (
     SetupFault,
     SetupFindings,
     find_setup_faults,

@@ -18,12 +18,12 @@ from discsim.effects.kind import BOARD
 from discsim.effects.sensors import ClockRate, HardIron, Lag
 from discsim.effects.setup import Axes, BoardRotation, ClockUnit, GpsAxes, SiteField, TimeOffset, axes_of
 from discsim.recording import Recording, Samples
+from discsim.validation.diagnosis.setup.hypotheses import Hypothesis, Ranking, board_effect, chosen, hypotheses, pairs
+from discsim.validation.diagnosis.setup.proof import left_by_short_fit
+from discsim.validation.diagnosis.setup.remedy import MapAxes, remedy
+from discsim.validation.diagnosis.setup.units import clock_unit, sensor_units
+from discsim.validation.identification.plants import Plant, plant_of
 from discsim.written import corrected
-from validation.diagnosis.setup.hypotheses import Hypothesis, Ranking, board_effect, chosen, hypotheses, pairs
-from validation.diagnosis.setup.proof import left_by_short_fit
-from validation.diagnosis.setup.remedy import MapAxes, remedy
-from validation.diagnosis.setup.units import clock_unit, sensor_units
-from validation.identification.plants import Plant, plant_of
 
 __all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said", "with_likeliest_fault"]
 

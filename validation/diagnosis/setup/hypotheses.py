@@ -18,13 +18,13 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.setup import Axes, BoardRotation, axes_of
 from discsim.recording import Recording
+from discsim.validation.diagnosis.settings import RELAXED_FIT
+from discsim.validation.diagnosis.setup.relations import Columns, misfit, wanted_force
+from discsim.validation.diagnosis.setup.rotation import board_turns, spin_axis
+from discsim.validation.diagnosis.setup.spin_signals import SpinSignals, spin_signals
+from discsim.validation.identification.ordinary_errors import ordinary_sigma
+from discsim.validation.identification.plants import plant_of
 from discsim.written import corrected
-from validation.diagnosis.settings import RELAXED_FIT
-from validation.diagnosis.setup.relations import Columns, misfit, wanted_force
-from validation.diagnosis.setup.rotation import board_turns, spin_axis
-from validation.diagnosis.setup.spin_signals import SpinSignals, spin_signals
-from validation.identification.ordinary_errors import ordinary_sigma
-from validation.identification.plants import plant_of
 
 __all__ = ["PERMUTATIONS", "Hypothesis", "Ranking", "board_effect", "chosen", "hypotheses", "pairs"]
 

@@ -2,7 +2,7 @@
 
 A board upside down on a disc that spins the other way reads the same as a sound one in every relation between its
 sensors; the air knows the difference, for a disc has a top. So a second or so of a flight is followed under each
-hypothesis, loosely (`validation.diagnosis.relaxed_fit`), and the one that leaves least is taken.
+hypothesis, loosely (`discsim.validation.diagnosis.relaxed_fit`), and the one that leaves least is taken.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.recording import Recording
-from validation.diagnosis.relaxed_fit import beginning, first_trajectory, ordinary, unknowns
-from validation.identification.gauss_newton import Fit, linearised, refit
-from validation.identification.noise import stated_noise
-from validation.identification.stated_parameters import stated_parameters
+from discsim.validation.diagnosis.relaxed_fit import beginning, first_trajectory, ordinary, unknowns
+from discsim.validation.identification.gauss_newton import Fit, linearised, refit
+from discsim.validation.identification.noise import stated_noise
+from discsim.validation.identification.stated_parameters import stated_parameters
 
 __all__ = ["left_by_short_fit"]
 

@@ -26,9 +26,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discsim.arrays import ComplexArray, FloatArray
-from validation.diagnosis.setup.spin_signals import STEP, Locked, SpinSignals
-from validation.identification.ordinary_errors import ordinary_sigma
-from validation.identification.plants import plant_of
+from discsim.validation.diagnosis.setup.spin_signals import STEP, Locked, SpinSignals
+from discsim.validation.identification.ordinary_errors import ordinary_sigma
+from discsim.validation.identification.plants import plant_of
 
 __all__ = ["Columns", "Misfit", "misfit", "misfits", "wanted_force"]
 

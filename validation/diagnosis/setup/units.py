@@ -18,7 +18,7 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.setup import UNITS, AccelerometerUnit, ClockUnit, GyroscopeUnit, MagnetometerUnit
 from discsim.recording import Recording, Samples
-from validation.diagnosis.setup.spin_signals import FEWEST, PURE, turning_axis
+from discsim.validation.diagnosis.setup.spin_signals import FEWEST, PURE, turning_axis
 
 __all__ = ["clock_unit", "sensor_units"]
 

@@ -16,20 +16,20 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.kind import BOARD
 from discsim.recording import Recording
-from validation.diagnosis.result import Law
-from validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
-from validation.diagnosis.unknown_law.formula import as_laws, as_sensor_laws
-from validation.diagnosis.unknown_law.motion_law import candidate_laws, fitted_law, reference_of, state_of
-from validation.diagnosis.unknown_law.sensor_law import asked_of_sensors, fitted_sensor_law, sensor_library
-from validation.diagnosis.unknown_law.terms import SensorTerm
-from validation.identification.gauss_newton import Fit, mapped, refit
-from validation.identification.noise import GroupNoise, NoiseModel, chi_squared, log_likelihood
-from validation.identification.normal_equations import common_step, nuisance_step, reduce
-from validation.identification.parameters import Parameter
-from validation.identification.plants.law_terms import Term
-from validation.identification.residual_tests import unmodelled_residuals
+from discsim.validation.diagnosis.result import Law
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
+from discsim.validation.diagnosis.unknown_law.formula import as_laws, as_sensor_laws
+from discsim.validation.diagnosis.unknown_law.motion_law import candidate_laws, fitted_law, reference_of, state_of
+from discsim.validation.diagnosis.unknown_law.sensor_law import asked_of_sensors, fitted_sensor_law, sensor_library
+from discsim.validation.diagnosis.unknown_law.terms import SensorTerm
+from discsim.validation.identification.gauss_newton import Fit, mapped, refit
+from discsim.validation.identification.noise import GroupNoise, NoiseModel, chi_squared, log_likelihood
+from discsim.validation.identification.normal_equations import common_step, nuisance_step, reduce
+from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.plants.law_terms import Term
+from discsim.validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = ["FoundLaw", "find_law"]
 

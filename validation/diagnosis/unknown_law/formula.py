@@ -7,12 +7,12 @@ from math import exp, log
 
 import numpy as np
 
-from validation.diagnosis.result import Law, ParameterValue
-from validation.diagnosis.settings import SELECTION
-from validation.diagnosis.unknown_law.terms import SensorTerm
-from validation.identification.gauss_newton import Fit
-from validation.identification.normal_equations import inverse_of
-from validation.identification.plants.law_terms import Term
+from discsim.validation.diagnosis.result import Law, ParameterValue
+from discsim.validation.diagnosis.settings import SELECTION
+from discsim.validation.diagnosis.unknown_law.terms import SensorTerm
+from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.normal_equations import inverse_of
+from discsim.validation.identification.plants.law_terms import Term
 
 __all__ = ["as_laws", "as_sensor_laws"]
 

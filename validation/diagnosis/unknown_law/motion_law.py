@@ -9,19 +9,19 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.law import WRENCH_TARGETS
-from validation.diagnosis.selection.continuous_fit import ContinuousFit, noise_of, scored
-from validation.diagnosis.selection.evidence import BOUNDS
-from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.selection.screening import NormalEquations, ScoreTest, column_of
-from validation.diagnosis.selection.to_stated import to_baseline
-from validation.identification.gauss_newton import Fit, linearised_columns, mapped, refit
-from validation.identification.linear import Linear
-from validation.identification.normal_equations import reduce
-from validation.identification.parameters import Parameter
-from validation.identification.plants import Plant
-from validation.identification.plants.law_terms import Term
-from validation.identification.propagation import Column
-from validation.identification.segments import Trajectory, resegmented
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, noise_of, scored
+from discsim.validation.diagnosis.selection.evidence import BOUNDS
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.screening import NormalEquations, ScoreTest, column_of
+from discsim.validation.diagnosis.selection.to_stated import to_baseline
+from discsim.validation.identification.gauss_newton import Fit, linearised_columns, mapped, refit
+from discsim.validation.identification.linear import Linear
+from discsim.validation.identification.normal_equations import reduce
+from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.plants import Plant
+from discsim.validation.identification.plants.law_terms import Term
+from discsim.validation.identification.propagation import Column
+from discsim.validation.identification.segments import Trajectory, resegmented
 
 __all__ = ["candidate_laws", "fitted_law"]
 

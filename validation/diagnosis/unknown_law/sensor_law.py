@@ -10,18 +10,18 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from discsim.arrays import FloatArray, IntArray
-from validation.diagnosis.selection.continuous_fit import ContinuousFit, noise_of, scored
-from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.selection.screening import NormalEquations, column_of
-from validation.diagnosis.selection.to_stated import to_baseline
-from validation.diagnosis.unknown_law.terms import SENSORS, SHAPES, SensorTerm
-from validation.identification.gauss_newton import Fit, linearised, mapped, whole_step
-from validation.identification.linear import Linear
-from validation.identification.noise import chi_squared
-from validation.identification.normal_equations import common_step, reduce
-from validation.identification.parameters import Parameter
-from validation.identification.propagation import Column
-from validation.identification.segments import Trajectory
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, noise_of, scored
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.screening import NormalEquations, column_of
+from discsim.validation.diagnosis.selection.to_stated import to_baseline
+from discsim.validation.diagnosis.unknown_law.terms import SENSORS, SHAPES, SensorTerm
+from discsim.validation.identification.gauss_newton import Fit, linearised, mapped, whole_step
+from discsim.validation.identification.linear import Linear
+from discsim.validation.identification.noise import chi_squared
+from discsim.validation.identification.normal_equations import common_step, reduce
+from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.propagation import Column
+from discsim.validation.identification.segments import Trajectory
 
 __all__ = ["asked_of_sensors", "fitted_sensor_law"]
 

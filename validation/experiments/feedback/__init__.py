@@ -1,6 +1,6 @@
 """The paper's loop closed: C_Nr from each source of spin rate, the flight that it predicts, the flight that was."""
 
-from validation.experiments.feedback.scoring import (
+from discsim.validation.experiments.feedback.scoring import (
     Damping,
     Predicted,
     dampings,

@@ -9,14 +9,14 @@ import numpy as np
 import typer
 
 from discsim.shipped import load_throw
-from validation.experiments.feedback.experiment import Experiment, run_experiment
-from validation.experiments.feedback.figures import draw_fig_11, draw_fig_13, draw_what_matters
-from validation.experiments.feedback.scoring import Predicted, feedback_checks
-from validation.experiments.feedback.sensitivity import CHANGES, touch_down_shifts
-from validation.reporting.options import OutOption, SeedOption
-from validation.reporting.run import Run, start_run
-from validation.reporting.scores import at_most
-from validation.yaw_damping.figures import draw_sources
+from discsim.validation.experiments.feedback.experiment import Experiment, run_experiment
+from discsim.validation.experiments.feedback.figures import draw_fig_11, draw_fig_13, draw_what_matters
+from discsim.validation.experiments.feedback.scoring import Predicted, feedback_checks
+from discsim.validation.experiments.feedback.sensitivity import CHANGES, touch_down_shifts
+from discsim.validation.reporting.options import OutOption, SeedOption
+from discsim.validation.reporting.run import Run, start_run
+from discsim.validation.reporting.scores import at_most
+from discsim.validation.yaw_damping.figures import draw_sources
 
 __all__ = ["command"]
 

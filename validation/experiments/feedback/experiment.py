@@ -14,13 +14,21 @@ from discsim.motion import Motion
 from discsim.recording import Recording
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc, load_throw
-from validation.experiments.feedback.scoring import Predicted, dampings, feed_back
-from validation.reporting.run import Run
-from validation.scenarios.throws import FULL_SET
-from validation.yaw_damping import SOURCES, Compared, Fit, compare_sources, fit_yaw_damping, observe, paper_table
-from validation.yaw_damping.compared import as_mounted
-from validation.yaw_damping.observations import Throw
-from validation.yaw_damping.paper_table import PaperTable
+from discsim.validation.experiments.feedback.scoring import Predicted, dampings, feed_back
+from discsim.validation.reporting.run import Run
+from discsim.validation.scenarios.throws import FULL_SET
+from discsim.validation.yaw_damping import (
+    SOURCES,
+    Compared,
+    Fit,
+    compare_sources,
+    fit_yaw_damping,
+    observe,
+    paper_table,
+)
+from discsim.validation.yaw_damping.compared import as_mounted
+from discsim.validation.yaw_damping.observations import Throw
+from discsim.validation.yaw_damping.paper_table import PaperTable
 
 __all__ = ["Experiment", "Flown", "run_experiment"]
 

@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from discsim.arrays import FloatArray
 from discsim.motion import Motion
 from discsim.trajectory import Flight
-from validation.experiments.feedback.experiment import Experiment, Flown
-from validation.experiments.feedback.scoring import LINE, OUTPUT_ERROR, Predicted
-from validation.reporting.figures import COLOURS, new_figure, save_figure
-from validation.yaw_damping.figures import draw_surface_on
+from discsim.validation.experiments.feedback.experiment import Experiment, Flown
+from discsim.validation.experiments.feedback.scoring import LINE, OUTPUT_ERROR, Predicted
+from discsim.validation.reporting.figures import COLOURS, new_figure, save_figure
+from discsim.validation.yaw_damping.figures import draw_surface_on
 
 __all__ = ["draw_fig_11", "draw_fig_13", "draw_what_matters"]
 

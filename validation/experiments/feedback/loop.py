@@ -11,12 +11,12 @@ from discsim.disc import Disc
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.trajectory import predict
-from validation.experiments.feedback.experiment import INSIDE, Flown
-from validation.experiments.feedback.scoring import dampings, feed_back, feedback_checks
-from validation.reporting.scores import Score, at_most
-from validation.scenarios.throws import MOUNT_ERROR, ThrowResult
-from validation.yaw_damping import Compared, Fit, PaperTable, Source, fit_yaw_damping, observe, paper_table
-from validation.yaw_damping.observations import Throw
+from discsim.validation.experiments.feedback.experiment import INSIDE, Flown
+from discsim.validation.experiments.feedback.scoring import dampings, feed_back, feedback_checks
+from discsim.validation.reporting.scores import Score, at_most
+from discsim.validation.scenarios.throws import MOUNT_ERROR, ThrowResult
+from discsim.validation.yaw_damping import Compared, Fit, PaperTable, Source, fit_yaw_damping, observe, paper_table
+from discsim.validation.yaw_damping.observations import Throw
 
 __all__ = ["Loop", "close_loop", "fly_by_table"]
 

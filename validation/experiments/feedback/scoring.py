@@ -17,9 +17,9 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.motion import Motion
 from discsim.trajectory import Flight, predict
-from validation.reporting.scores import Score, at_most
-from validation.yaw_damping.compared import Compared
-from validation.yaw_damping.observations import Throw
+from discsim.validation.reporting.scores import Score, at_most
+from discsim.validation.yaw_damping.compared import Compared
+from discsim.validation.yaw_damping.observations import Throw
 
 __all__ = ["OUTPUT_ERROR", "Damping", "Predicted", "dampings", "feed_back", "feedback_checks", "rate_at_release"]
 

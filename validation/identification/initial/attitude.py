@@ -17,7 +17,7 @@ from discsim.compiled import compiled
 from discsim.disc import Release
 from discsim.frames import attitude_matrix, body_to_ned, multiply, quaternion_from_matrix, rotation_vector, turn
 from discsim.recording import Recording
-from validation.identification.initial.smoothing import (
+from discsim.validation.identification.initial.smoothing import (
     GRID,
     SLOW,
     TUMBLING,
@@ -26,7 +26,7 @@ from validation.identification.initial.smoothing import (
     readings_for,
     smoothed,
 )
-from validation.identification.initial.spin_phase import (
+from discsim.validation.identification.initial.spin_phase import (
     PHASE_SIGMA,
     RATE_SIGMA,
     Spin,
@@ -35,7 +35,7 @@ from validation.identification.initial.spin_phase import (
     gaussian_kernel,
     phase_spin,
 )
-from validation.identification.ordinary_errors import ordinary_sigma
+from discsim.validation.identification.ordinary_errors import ordinary_sigma
 
 __all__ = ["Attitude", "field_in_start", "frame_of", "other_attitudes", "states_from", "turned_to_ned", "windowed"]
 

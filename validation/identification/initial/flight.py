@@ -20,7 +20,7 @@ from discsim.errors import InputError
 from discsim.frames import body_to_ned, turn
 from discsim.recording import Recording
 from discsim.trajectory import predict
-from validation.identification.initial.attitude import (
+from discsim.validation.identification.initial.attitude import (
     VECTOR_SIGMA,
     Attitude,
     field_in_start,
@@ -30,7 +30,7 @@ from validation.identification.initial.attitude import (
     turned_to_ned,
     windowed,
 )
-from validation.identification.initial.path import (
+from discsim.validation.identification.initial.path import (
     SpecificForce,
     compared,
     dead_reckoning,
@@ -40,7 +40,7 @@ from validation.identification.initial.path import (
     path_states,
     specific_force_by,
 )
-from validation.identification.initial.smoothing import GRID
+from discsim.validation.identification.initial.smoothing import GRID
 
 __all__ = ["InitialStates", "flight_initial_states", "spin_initial_states"]
 

@@ -16,8 +16,8 @@ from discsim.arrays import BoolArray, FloatArray
 from discsim.frames import body_to_ned, multiply, turn
 from discsim.recording import Recording
 from discsim.sensors.accelerometer import force_at
-from validation.identification.initial.attitude import VECTOR_SIGMA, Attitude
-from validation.identification.initial.smoothing import FEWEST, median_of, readings_for
+from discsim.validation.identification.initial.attitude import VECTOR_SIGMA, Attitude
+from discsim.validation.identification.initial.smoothing import FEWEST, median_of, readings_for
 
 __all__ = [
     "Fixes",

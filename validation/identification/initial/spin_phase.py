@@ -19,14 +19,14 @@ from scipy.ndimage import median_filter
 
 from discsim.arrays import ComplexArray, FloatArray
 from discsim.recording import Recording
-from validation.identification.initial.smoothing import (
+from discsim.validation.identification.initial.smoothing import (
     FEWEST,
     SLOW,
     median_of,
     readings_for,
     smoothed,
 )
-from validation.identification.ordinary_errors import ordinary_sigma
+from discsim.validation.identification.ordinary_errors import ordinary_sigma
 
 __all__ = [
     "Spin",

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from discsim.recording import Recording
-from validation.identification.plants.flight import FLIGHT
-from validation.identification.plants.free_spin import FREE_SPIN
-from validation.identification.plants.plant import Plant
-from validation.identification.plants.rate_table import RATE_TABLE
-from validation.identification.plants.spin_down import SPIN_DOWN
+from discsim.validation.identification.plants.flight import FLIGHT
+from discsim.validation.identification.plants.free_spin import FREE_SPIN
+from discsim.validation.identification.plants.plant import Plant
+from discsim.validation.identification.plants.rate_table import RATE_TABLE
+from discsim.validation.identification.plants.spin_down import SPIN_DOWN
 
 __all__ = ["PLANTS", "Plant", "plant_of"]
 

@@ -25,13 +25,13 @@ from discsim.law import WRENCH_TARGETS
 from discsim.parameters import PARAMETERS, Tables
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
-from validation.identification.dynamics import FASTEST, SIZE, acting_tables
-from validation.identification.initial.flight import flight_initial_states
-from validation.identification.parameters import AllowedDefects, Values
-from validation.identification.plants.flight_neighbours import SLOWEST, add_neighbours
-from validation.identification.plants.law_terms import Term
-from validation.identification.plants.plan import Plan, towards, turns
-from validation.identification.plants.plant import (
+from discsim.validation.identification.dynamics import FASTEST, SIZE, acting_tables
+from discsim.validation.identification.initial.flight import flight_initial_states
+from discsim.validation.identification.parameters import AllowedDefects, Values
+from discsim.validation.identification.plants.flight_neighbours import SLOWEST, add_neighbours
+from discsim.validation.identification.plants.law_terms import Term
+from discsim.validation.identification.plants.plan import Plan, towards, turns
+from discsim.validation.identification.plants.plant import (
     Design,
     Durations,
     Dynamics,

@@ -24,7 +24,7 @@ from discsim.effects.events import EVENT_WIDTH_S
 from discsim.flight_equations import derivative
 from discsim.frames import rotate_by_quaternion
 from discsim.parameters import PARAMETERS, Tables
-from validation.identification.dynamics import ROW, SIZE, acting_tables
+from discsim.validation.identification.dynamics import ROW, SIZE, acting_tables
 
 __all__ = ["SLOWEST", "add_neighbours"]
 

@@ -30,11 +30,11 @@ from discsim.frames import body_to_ned, multiply, quaternion_from_euler, turn
 from discsim.parameters import PARAMETERS
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
-from validation.identification.dynamics import FASTEST, SIZE
-from validation.identification.initial.flight import spin_initial_states
-from validation.identification.parameters import AllowedDefects, Parameter
-from validation.identification.plants.plan import Plan, turns
-from validation.identification.plants.plant import (
+from discsim.validation.identification.dynamics import FASTEST, SIZE
+from discsim.validation.identification.initial.flight import spin_initial_states
+from discsim.validation.identification.parameters import AllowedDefects, Parameter
+from discsim.validation.identification.plants.plan import Plan, turns
+from discsim.validation.identification.plants.plant import (
     Design,
     Durations,
     Dynamics,
@@ -45,7 +45,7 @@ from validation.identification.plants.plant import (
     Sizes,
     propagated_by,
 )
-from validation.identification.readings import Readings
+from discsim.validation.identification.readings import Readings
 
 __all__ = ["FREE_SPIN"]
 

@@ -1,8 +1,8 @@
 """What a plant is to a fit: everything in which a throw, a free spin, a run-down and a rate table differ.
 
 A plant is one value of `Plant`, in a file of its own beside this one, and one line of the registry
-(`validation.identification.plants`). Numbers and functions of its file are all that the packages ask it for; none of
-them asks for a plant by its name.
+(`discsim.validation.identification.plants`). Numbers and functions of its file are all that the packages ask it for;
+none of them asks for a plant by its name.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from discsim.frames import conjugate, multiply, rotation_vector, turn
 from discsim.parameters import Tables
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
-from validation.identification.dynamics import ROW
-from validation.identification.parameters import AllowedDefects, Parameter, Values
-from validation.identification.plants.law_terms import Term
-from validation.identification.plants.plan import Plan
-from validation.identification.readings import Readings
+from discsim.validation.identification.dynamics import ROW
+from discsim.validation.identification.parameters import AllowedDefects, Parameter, Values
+from discsim.validation.identification.plants.law_terms import Term
+from discsim.validation.identification.plants.plan import Plan
+from discsim.validation.identification.readings import Readings
 
 __all__ = [
     "Design",
@@ -126,7 +126,7 @@ class Given:
 
 #: given, flats (c, k) with the parameters of the physics, those of the plant's own (c, o), states (c, s), the steps of
 #: the integrator (n,), the place of a segment's end in them, instants (m,); gives rows (c, m, 19) of the motion at the
-#: instants, as `validation.identification.dynamics` has them, and the states (c, s) at the end
+#: instants, as `discsim.validation.identification.dynamics` has them, and the states (c, s) at the end
 Propagate: TypeAlias = Callable[
     [Given, FloatArray, FloatArray, FloatArray, FloatArray, int, FloatArray], tuple[FloatArray, FloatArray]
 ]

@@ -14,11 +14,11 @@ from discsim.effects.rig import speed_ripple
 from discsim.parameters import PARAMETERS
 from discsim.recording import Recording, Samples
 from discsim.toml_table import TomlTable
-from validation.identification.dynamics import SIZE
-from validation.identification.initial.spin_phase import rig_initial_states
-from validation.identification.parameters import AllowedDefects
-from validation.identification.plants.plan import Plan, turns
-from validation.identification.plants.plant import (
+from discsim.validation.identification.dynamics import SIZE
+from discsim.validation.identification.initial.spin_phase import rig_initial_states
+from discsim.validation.identification.parameters import AllowedDefects
+from discsim.validation.identification.plants.plan import Plan, turns
+from discsim.validation.identification.plants.plant import (
     Design,
     Durations,
     Dynamics,
@@ -29,8 +29,8 @@ from validation.identification.plants.plant import (
     Sizes,
     propagated_by,
 )
-from validation.identification.plants.rig import LEAN, YAW, leaning, read_lean, rig_row_within
-from validation.identification.readings import Readings
+from discsim.validation.identification.plants.rig import LEAN, YAW, leaning, read_lean, rig_row_within
+from discsim.validation.identification.readings import Readings
 
 __all__ = ["RATE_TABLE"]
 

@@ -9,7 +9,7 @@ from discsim.arrays import FloatArray
 from discsim.compiled import compiled
 from discsim.effects.rig import axis
 from discsim.toml_table import TomlTable
-from validation.identification.plants.plan import towards
+from discsim.validation.identification.plants.plan import towards
 
 __all__ = ["LEAN", "YAW", "leaning", "read_lean", "rig_row_within"]
 

@@ -13,12 +13,12 @@ from discsim.effects.events import spin_step
 from discsim.parameters import PARAMETERS, Tables
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
-from validation.identification.dynamics import SIZE, acting_tables
-from validation.identification.initial.spin_phase import rig_initial_states
-from validation.identification.parameters import AllowedDefects, Values
-from validation.identification.plants.law_terms import Term
-from validation.identification.plants.plan import Plan, turns
-from validation.identification.plants.plant import (
+from discsim.validation.identification.dynamics import SIZE, acting_tables
+from discsim.validation.identification.initial.spin_phase import rig_initial_states
+from discsim.validation.identification.parameters import AllowedDefects, Values
+from discsim.validation.identification.plants.law_terms import Term
+from discsim.validation.identification.plants.plan import Plan, turns
+from discsim.validation.identification.plants.plant import (
     Design,
     Durations,
     Dynamics,
@@ -30,7 +30,7 @@ from validation.identification.plants.plant import (
     Sizes,
     propagated_by,
 )
-from validation.identification.plants.rig import LEAN, YAW, leaning, read_lean, rig_row_within
+from discsim.validation.identification.plants.rig import LEAN, YAW, leaning, read_lean, rig_row_within
 
 __all__ = ["SPIN_DOWN"]
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from discsim.errors import InputError
-from validation.importing.logs import dataflash, mavlink, mcap, nmea, ubx, ulog
-from validation.importing.logs.tables import Log, write_table
+from discsim.validation.importing.logs import dataflash, mavlink, mcap, nmea, ubx, ulog
+from discsim.validation.importing.logs.tables import Log, write_table
 
 __all__ = ["Kind", "kind_of", "write_tables"]
 

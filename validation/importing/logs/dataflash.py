@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from validation.importing.logs.tables import Log, Rows, chosen, course_velocity
+from discsim.validation.importing.logs.tables import Log, Rows, chosen, course_velocity
 
 __all__ = ["MESSAGES", "begins", "read"]
 

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from validation.importing.import_map import G0
-from validation.importing.logs.tables import Log, Rows, Table, chosen, course_velocity
+from discsim.validation.importing.import_map import G0
+from discsim.validation.importing.logs.tables import Log, Rows, Table, chosen, course_velocity
 
 __all__ = ["MESSAGES", "begins", "read"]
 

@@ -13,7 +13,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from validation.importing.logs.tables import Log, Rows, chosen
+from discsim.validation.importing.logs.tables import Log, Rows, chosen
 
 __all__ = ["MESSAGES", "begins", "read"]
 

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray
-from validation.importing.logs import nmea
-from validation.importing.logs.tables import Log, Rows, Table, chosen
+from discsim.validation.importing.logs import nmea
+from discsim.validation.importing.logs.tables import Log, Rows, Table, chosen
 
 __all__ = ["begins", "read"]
 

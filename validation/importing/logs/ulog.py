@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray
-from validation.importing.logs.tables import Log, Table
+from discsim.validation.importing.logs.tables import Log, Table
 
 __all__ = ["TOPICS", "begins", "read"]
 

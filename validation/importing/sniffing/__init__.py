@@ -4,13 +4,13 @@
 the logger, `stretches` finds the throws and `write_raw_page` draws it all.
 """
 
-from validation.importing.sniffing.archive import opened
-from validation.importing.sniffing.decision import Decision
-from validation.importing.sniffing.proposal import Proposal, map_text
-from validation.importing.sniffing.raw_page import write_raw_page
-from validation.importing.sniffing.recognise import recognised
-from validation.importing.sniffing.sniffer import sniff
-from validation.importing.sniffing.stretches import Stretch, stretches
+from discsim.validation.importing.sniffing.archive import opened
+from discsim.validation.importing.sniffing.decision import Decision
+from discsim.validation.importing.sniffing.proposal import Proposal, map_text
+from discsim.validation.importing.sniffing.raw_page import write_raw_page
+from discsim.validation.importing.sniffing.recognise import recognised
+from discsim.validation.importing.sniffing.sniffer import sniff
+from discsim.validation.importing.sniffing.stretches import Stretch, stretches
 
 __all__ = [
     "Decision",

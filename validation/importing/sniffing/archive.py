@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
 from discsim.errors import InputError
-from validation.importing.logs import kind_of, write_tables
+from discsim.validation.importing.logs import kind_of, write_tables
 
 __all__ = ["MAX_BYTES", "MAX_FILES", "opened"]
 

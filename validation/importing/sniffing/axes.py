@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
-from validation.importing.import_map import G0
-from validation.importing.sniffing.decision import Decision, Sureness
-from validation.importing.sniffing.turning import Fit, best_axes, steps_between
+from discsim.validation.importing.import_map import G0
+from discsim.validation.importing.sniffing.decision import Decision, Sureness
+from discsim.validation.importing.sniffing.turning import Fit, best_axes, steps_between
 
 __all__ = ["BodyAxes", "Reading3", "body_axes", "letters"]
 

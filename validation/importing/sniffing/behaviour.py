@@ -8,10 +8,10 @@ from itertools import permutations
 import numpy as np
 
 from discsim.arrays import FloatArray
-from validation.importing.sniffing.decision import Decision
-from validation.importing.sniffing.groups import Triple
-from validation.importing.sniffing.magnitudes import FIELD, PER_G, REST, field_size, gravity_norm, rest_norm
-from validation.importing.sniffing.turning import best_worth, steps_between
+from discsim.validation.importing.sniffing.decision import Decision
+from discsim.validation.importing.sniffing.groups import Triple
+from discsim.validation.importing.sniffing.magnitudes import FIELD, PER_G, REST, field_size, gravity_norm, rest_norm
+from discsim.validation.importing.sniffing.turning import best_worth, steps_between
 
 __all__ = ["WORTHS", "by_behaviour"]
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from discsim.errors import InputError
-from validation.importing.conversion import Imported, RawReadings, recording_of
-from validation.importing.sniffing.stretches import Stretch
+from discsim.validation.importing.conversion import Imported, RawReadings, recording_of
+from discsim.validation.importing.sniffing.stretches import Stretch
 
 __all__ = ["chosen_recordings"]
 

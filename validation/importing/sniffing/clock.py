@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discsim.arrays import FloatArray
-from validation.importing.clock import is_stamp, iso_seconds
-from validation.importing.sniffing.decision import Decision, Sureness
-from validation.importing.sniffing.groups import Numbers
-from validation.importing.sniffing.names import is_time_name, read_name, sensor_of, timeless
-from validation.importing.sniffing.preamble import stated_rate
-from validation.importing.sniffing.units import readings_of, split_unit
+from discsim.validation.importing.clock import is_stamp, iso_seconds
+from discsim.validation.importing.sniffing.decision import Decision, Sureness
+from discsim.validation.importing.sniffing.groups import Numbers
+from discsim.validation.importing.sniffing.names import is_time_name, read_name, sensor_of, timeless
+from discsim.validation.importing.sniffing.preamble import stated_rate
+from discsim.validation.importing.sniffing.units import readings_of, split_unit
 
 __all__ = ["Clock", "clocks_of", "seconds"]
 

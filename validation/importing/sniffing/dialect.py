@@ -10,9 +10,9 @@ from itertools import islice, product
 from pathlib import Path
 
 from discsim.errors import InputError
-from validation.importing.clock import is_stamp
-from validation.importing.raw_table import GAPS, Layout, RepairList, read_raw
-from validation.importing.sniffing.text import encoding_of, lines_of
+from discsim.validation.importing.clock import is_stamp
+from discsim.validation.importing.raw_table import GAPS, Layout, RepairList, read_raw
+from discsim.validation.importing.sniffing.text import encoding_of, lines_of
 
 __all__ = ["Dialect", "dialect_of"]
 
@@ -201,7 +201,7 @@ def _fitting(cells: list[str], width: int, record: str, layout: Layout) -> tuple
 
 
 def _looks_like_units(cells: list[str], layout: Layout) -> bool:
-    from validation.importing.sniffing.units import readings_of
+    from discsim.validation.importing.sniffing.units import readings_of
 
     full = [cell.strip("()[]{}<> ") for cell in cells if cell.strip("()[]{}<>- ")]
     known = sum(bool(readings_of(cell)) for cell in full)

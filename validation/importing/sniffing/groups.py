@@ -12,10 +12,10 @@ import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
 from discsim.recording import SENSORS
-from validation.importing.raw_table import RawTable, number
-from validation.importing.sniffing.dialect import Dialect
-from validation.importing.sniffing.names import Name, penalty_of, read_name, says_nothing, sensor_of
-from validation.importing.sniffing.units import COUNTS, OTHER, Reading, readings_of
+from discsim.validation.importing.raw_table import RawTable, number
+from discsim.validation.importing.sniffing.dialect import Dialect
+from discsim.validation.importing.sniffing.names import Name, penalty_of, read_name, says_nothing, sensor_of
+from discsim.validation.importing.sniffing.units import COUNTS, OTHER, Reading, readings_of
 
 __all__ = ["FEWEST_ROWS", "Numbers", "Triple", "triples_of"]
 

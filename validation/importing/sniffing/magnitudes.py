@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray
-from validation.importing.import_map import G0, UNITS
-from validation.importing.sniffing.decision import Decision, Sureness
-from validation.importing.sniffing.units import COUNTS, Reading
+from discsim.validation.importing.import_map import G0, UNITS
+from discsim.validation.importing.sniffing.decision import Decision, Sureness
+from discsim.validation.importing.sniffing.units import COUNTS, Reading
 
 __all__ = [
     "Unit",

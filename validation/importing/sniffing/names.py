@@ -6,7 +6,7 @@ import re
 import unicodedata
 from typing import NamedTuple
 
-from validation.importing.sniffing.units import readings_of, split_unit
+from discsim.validation.importing.sniffing.units import readings_of, split_unit
 
 __all__ = ["Name", "foreign_words", "is_time_name", "penalty_of", "read_name", "says_nothing", "sensor_of", "timeless"]
 

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray
-from validation.importing.sniffing.clock import Clock, clocks_of, seconds
-from validation.importing.sniffing.decision import Decision
-from validation.importing.sniffing.groups import Numbers, Triple
-from validation.importing.sniffing.names import sensor_of, timeless
+from discsim.validation.importing.sniffing.clock import Clock, clocks_of, seconds
+from discsim.validation.importing.sniffing.decision import Decision
+from discsim.validation.importing.sniffing.groups import Numbers, Triple
+from discsim.validation.importing.sniffing.names import sensor_of, timeless
 
 __all__ = ["OwnClocks", "own_clocks"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from validation.importing.sniffing.units import COUNTS, Reading, readings_of
+from discsim.validation.importing.sniffing.units import COUNTS, Reading, readings_of
 
 __all__ = ["stated_rate", "stated_worths"]
 

@@ -10,12 +10,12 @@ from pathlib import Path
 
 from discsim.arrays import FloatArray
 from discsim.recording import SENSORS, Plant
-from validation.importing.raw_table import Layout
-from validation.importing.sniffing.axes import letters
-from validation.importing.sniffing.clock import Clock
-from validation.importing.sniffing.decision import Decision
-from validation.importing.sniffing.groups import Numbers, Triple
-from validation.importing.sniffing.magnitudes import Unit
+from discsim.validation.importing.raw_table import Layout
+from discsim.validation.importing.sniffing.axes import letters
+from discsim.validation.importing.sniffing.clock import Clock
+from discsim.validation.importing.sniffing.decision import Decision
+from discsim.validation.importing.sniffing.groups import Numbers, Triple
+from discsim.validation.importing.sniffing.magnitudes import Unit
 
 __all__ = ["Proposal", "ProposedSensor", "map_text"]
 

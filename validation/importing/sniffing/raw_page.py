@@ -11,11 +11,11 @@ from matplotlib.axes import Axes
 
 from discsim.arrays import FloatArray
 from discsim.recording import SENSORS
-from validation.importing.conversion import RawReadings
-from validation.importing.sniffing.decision import Decision
-from validation.importing.sniffing.stretches import Stretch
-from validation.reporting.figures import new_figure, save_figure
-from validation.reporting.html import Section, write_report
+from discsim.validation.importing.conversion import RawReadings
+from discsim.validation.importing.sniffing.decision import Decision
+from discsim.validation.importing.sniffing.stretches import Stretch
+from discsim.validation.reporting.figures import new_figure, save_figure
+from discsim.validation.reporting.html import Section, write_report
 
 __all__ = ["envelope", "write_raw_page"]
 

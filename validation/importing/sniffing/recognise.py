@@ -8,8 +8,8 @@ from pathlib import Path
 
 from discsim.errors import InputError
 from discsim.files import model_names
-from validation.importing.import_map import ImportMap, find_map, read_map
-from validation.importing.raw_table import RepairList, read_raw
+from discsim.validation.importing.import_map import ImportMap, find_map, read_map
+from discsim.validation.importing.raw_table import RepairList, read_raw
 
 __all__ = ["recognised"]
 

@@ -13,16 +13,16 @@ from discsim.arrays import FloatArray
 from discsim.errors import InputError
 from discsim.files import model_names
 from discsim.recording import SENSORS, Plant
-from validation.importing.import_map import G0
-from validation.importing.raw_table import REPAIRS, Layout, RepairList, read_raw
-from validation.importing.sniffing.archive import MAX_FILES
-from validation.importing.sniffing.axes import Reading3, body_axes
-from validation.importing.sniffing.behaviour import WORTHS, by_behaviour
-from validation.importing.sniffing.clock import SPACING, Clock, clocks_of, seconds
-from validation.importing.sniffing.decision import Decision
-from validation.importing.sniffing.dialect import dialect_of
-from validation.importing.sniffing.groups import FEWEST_ROWS, Numbers, Triple, triples_of
-from validation.importing.sniffing.magnitudes import (
+from discsim.validation.importing.import_map import G0
+from discsim.validation.importing.raw_table import REPAIRS, Layout, RepairList, read_raw
+from discsim.validation.importing.sniffing.archive import MAX_FILES
+from discsim.validation.importing.sniffing.axes import Reading3, body_axes
+from discsim.validation.importing.sniffing.behaviour import WORTHS, by_behaviour
+from discsim.validation.importing.sniffing.clock import SPACING, Clock, clocks_of, seconds
+from discsim.validation.importing.sniffing.decision import Decision
+from discsim.validation.importing.sniffing.dialect import dialect_of
+from discsim.validation.importing.sniffing.groups import FEWEST_ROWS, Numbers, Triple, triples_of
+from discsim.validation.importing.sniffing.magnitudes import (
     PER_G,
     REST,
     Unit,
@@ -32,12 +32,12 @@ from validation.importing.sniffing.magnitudes import (
     magnetometer_unit,
     rest_norm,
 )
-from validation.importing.sniffing.names import sensor_of, timeless
-from validation.importing.sniffing.own_clock import OwnClocks, own_clocks
-from validation.importing.sniffing.preamble import stated_worths
-from validation.importing.sniffing.proposal import Proposal, ProposedSensor
-from validation.importing.sniffing.turning import Fit, best_worth, steps_between
-from validation.importing.sniffing.units import COUNTS, Reading
+from discsim.validation.importing.sniffing.names import sensor_of, timeless
+from discsim.validation.importing.sniffing.own_clock import OwnClocks, own_clocks
+from discsim.validation.importing.sniffing.preamble import stated_worths
+from discsim.validation.importing.sniffing.proposal import Proposal, ProposedSensor
+from discsim.validation.importing.sniffing.turning import Fit, best_worth, steps_between
+from discsim.validation.importing.sniffing.units import COUNTS, Reading
 
 __all__ = ["sniff"]
 

@@ -18,8 +18,8 @@ from scipy.signal import savgol_filter
 
 from discsim.arrays import BoolArray, FloatArray
 from discsim.clipping import clipped
-from validation.importing.conversion import RawReadings
-from validation.importing.sniffing.axes import FAST
+from discsim.validation.importing.conversion import RawReadings
+from discsim.validation.importing.sniffing.axes import FAST
 
 __all__ = ["Stretch", "stretches"]
 

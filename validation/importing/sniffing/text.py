@@ -6,8 +6,8 @@ import codecs
 from pathlib import Path
 
 from discsim.errors import InputError
-from validation.importing.logs import kind_of
-from validation.importing.sniffing.names import foreign_words
+from discsim.validation.importing.logs import kind_of
+from discsim.validation.importing.sniffing.names import foreign_words
 
 __all__ = ["encoding_of", "lines_of"]
 

@@ -8,9 +8,9 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from validation.reporting.options import SeedOption
-from validation.studies.golf_throws.page import write_page
-from validation.studies.real_recordings.sources import RecordingsOption, find_recordings
+from discsim.validation.reporting.options import SeedOption
+from discsim.validation.studies.golf_throws.page import write_page
+from discsim.validation.studies.real_recordings.sources import RecordingsOption, find_recordings
 
 __all__ = ["command"]
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from validation.reporting import markdown
-from validation.reporting.figures import COLOURS, new_figure, save_figure
-from validation.studies.golf_throws.prediction import THROWS, Prediction, predict_throw
+from discsim.validation.reporting import markdown
+from discsim.validation.reporting.figures import COLOURS, new_figure, save_figure
+from discsim.validation.studies.golf_throws.prediction import THROWS, Prediction, predict_throw
 
 __all__ = ["DRAWS", "draw", "write_page"]
 

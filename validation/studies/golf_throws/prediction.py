@@ -14,8 +14,8 @@ from discsim.effects.catalogue import Effect
 from discsim.environment import Environment
 from discsim.parameters import flight_parameters, parameter_index
 from discsim.trajectory import predict_many, release_state
-from validation.importing import find_map, import_recording, read_map
-from validation.importing.throw import MeasuredThrow
+from discsim.validation.importing import find_map, import_recording, read_map
+from discsim.validation.importing.throw import MeasuredThrow
 
 __all__ = ["INPUTS", "THROWS", "Prediction", "drawn", "predict_throw"]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from discsim.estimators.accelerometer import AccelerometerErrors
+from discsim.estimators.fft import FftSettings
 from discsim.rig import PLATEAUS_DEG_S
 from discsim.sensors.instruments import read_part
-from estimators.accelerometer import AccelerometerErrors
-from estimators.fft import FftSettings
-from validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S
+from discsim.validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S
 
 __all__ = ["BLOCKS", "FIGURES", "figure_rows", "number_rows"]
 
@@ -17,17 +17,17 @@ __all__ = ["BLOCKS", "FIGURES", "figure_rows", "number_rows"]
 FIGURES: tuple[tuple[str, str, tuple[str, ...], str], ...] = (
     ("1", "geometry of the mount", ("discsim.effects.sensors.PositionOffset",), "a drawing; Eq. (2)"),
     ("2", "the idea: a field that turns", ("discsim.sensors.magnetometer.Magnetometer",), "a drawing"),
-    ("3", "waveform and spectrum of a flight", ("validation.studies.paper.spectrum.whole_flight",), "below"),
-    ("4", "block diagram of the algorithm", ("estimators.fft.fft",), "(P-1) to (P-7)"),
+    ("3", "waveform and spectrum of a flight", ("discsim.validation.studies.paper.spectrum.whole_flight",), "below"),
+    ("4", "block diagram of the algorithm", ("discsim.estimators.fft.fft",), "(P-1) to (P-7)"),
     ("5", "prototype module", ("discsim.sensors.instruments.read_part",), "parts `mpu9250`, `adxrs649`, `neo_m8n`"),
     ("6", "module on the rate table", ("discsim.rig.turn_table",), "`discsim rate-table`"),
-    ("7", "methods on the rate table", ("validation.scenarios.rate_table_figures.draw_methods",), "below"),
+    ("7", "methods on the rate table", ("discsim.validation.scenarios.rate_table_figures.draw_methods",), "below"),
     ("8", "miniature module", ("discsim.module.Module",), "`discsim fly --module`"),
-    ("9", "two modules compared", ("validation.studies.paper.modules.compare_modules",), "below"),
+    ("9", "two modules compared", ("discsim.validation.studies.paper.modules.compare_modules",), "below"),
     ("10", "disc, module, map of a throw", ("discsim.shipped.load_disc",), "the printed text has no inertia in it"),
-    ("11", "lines through spins, table", ("validation.studies.paper.prediction.predict_by_table",), "below"),
+    ("11", "lines through spins, table", ("discsim.validation.studies.paper.prediction.predict_by_table",), "below"),
     ("12", "structure of the simulator", ("discsim.trajectory.predict",), "a block diagram, below"),
-    ("13", "predicted path and spin", ("validation.studies.paper.prediction.predict_by_table",), "below"),
+    ("13", "predicted path and spin", ("discsim.validation.studies.paper.prediction.predict_by_table",), "below"),
     ("A1", "order of the Euler angles", ("discsim.frames.attitude_matrix",), "a drawing; (A1)"),
     ("A2", "aerodynamic angles", ("discsim.frames.heading_angles",), "a drawing; (A2)"),
 )

@@ -9,10 +9,10 @@ from typing import Annotated, Any
 import typer
 
 from discsim.files import write_text
-from validation.reporting.options import SeedOption
-from validation.reporting.run import json_text
-from validation.studies.paper.numbers import compute
-from validation.studies.paper.page import page_text
+from discsim.validation.reporting.options import SeedOption
+from discsim.validation.reporting.run import json_text
+from discsim.validation.studies.paper.numbers import compute
+from discsim.validation.studies.paper.page import page_text
 
 __all__ = ["NUMBERS", "SEED", "command", "read_numbers"]
 

@@ -13,8 +13,8 @@ from discsim.arrays import FloatArray
 from discsim.disc import Disc
 from discsim.environment import Environment
 from discsim.shipped import load_disc, load_throw
-from validation.studies.paper.releases import PaperThrow, carry
-from validation.yaw_damping.paper_table import SPEEDS_M_S
+from discsim.validation.studies.paper.releases import PaperThrow, carry
+from discsim.validation.yaw_damping.paper_table import SPEEDS_M_S
 
 __all__ = ["PAPER_M", "UNKNOWNS", "distances"]
 

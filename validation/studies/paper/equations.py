@@ -21,11 +21,11 @@ class Row(NamedTuple):
 
 _FLIGHT = "discsim.flight_equations.derivative"
 _AIR = "discsim.aerodynamics.air_wrench"
-_METHOD = "estimators.accelerometer.accelerometer"
-_KNOWN = "estimators.accelerometer.rate_with_known_terms"
-_ENVELOPE = "estimators.accelerometer.envelope"
+_METHOD = "discsim.estimators.accelerometer.accelerometer"
+_KNOWN = "discsim.estimators.accelerometer.rate_with_known_terms"
+_ENVELOPE = "discsim.estimators.accelerometer.envelope"
 _SENSOR = "discsim.sensors.accelerometer.Accelerometer"
-_BY_26 = "validation.yaw_damping.paper_table.damping_by_26"
+_BY_26 = "discsim.validation.yaw_damping.paper_table.damping_by_26"
 
 EQUATIONS = (
     Row(
@@ -41,11 +41,11 @@ EQUATIONS = (
     Row("6", "its x component", ("discsim.sensors.accelerometer.specific_force",), "sign of g as in (1)"),
     Row("7", "fast spin about z alone", (_METHOD,), "an estimator assumes it; the simulation keeps every term"),
     Row("8", "rate with all error terms", (_KNOWN,), "specific force of the origin in place of R'' + g"),
-    Row("9", "the same, errors gathered", (_METHOD, "validation.sweeps.mounts.closed_form")),
+    Row("9", "the same, errors gathered", (_METHOD, "discsim.validation.sweeps.mounts.closed_form")),
     Row("10", "the numerator's error, axis vertical", (_ENVELOPE,), "g enters by S_xz alone, as printed"),
     Row("11", "bounds of the rate", (_ENVELOPE,), "S_Ax has one sign in e_n and e_d; the paper takes each worst"),
     Row("12", "rate from centripetal acceleration", (_METHOD,), "also for a sensor off the x axis"),
-    Row("13", "worst S_T of an MPU-9250", ("estimators.accelerometer.AccelerometerErrors",)),
+    Row("13", "worst S_T of an MPU-9250", ("discsim.estimators.accelerometer.AccelerometerErrors",)),
     Row("14", "forces and moments by coefficients", (_AIR,), "V relative to the air; C_Y may be other than 0"),
     Row("15", "advance ratio", ("discsim.aerodynamics.advance_ratio",)),
     Row("16", "rolling moment", ("discsim.aerodynamics.rolling_coefficient",), "p in H; constants or tables"),
@@ -59,11 +59,11 @@ EQUATIONS = (
     Row("24", "C_N by C_Nr", (_BY_26,)),
     Row("25", "yawing moment by C_Nr", (_BY_26,)),
     Row("26", "C_Nr by the spin's decay", (_BY_26,), "leaves R sin(alpha) out, which (23) has about z_B"),
-    Row("27", "table of one throw", ("validation.yaw_damping.paper_table.paper_table",)),
+    Row("27", "table of one throw", ("discsim.validation.yaw_damping.paper_table.paper_table",)),
     Row(
         "28",
         "mean of the tables",
-        ("validation.yaw_damping.paper_table.paper_table", "discsim.aerodynamics.yaw_damping"),
+        ("discsim.validation.yaw_damping.paper_table.paper_table", "discsim.aerodynamics.yaw_damping"),
         "outside its nodes an error; the paper does not say what it does there",
     ),
     Row("A1", "rotations about x, y, z", ("discsim.frames.C1", "discsim.frames.C2", "discsim.frames.C3")),
@@ -72,15 +72,17 @@ EQUATIONS = (
     ),
 )
 
-_FFT = "estimators.fft.fft"
-_SETTINGS = "estimators.fft.FftSettings"
+_FFT = "discsim.estimators.fft.fft"
+_SETTINGS = "discsim.estimators.fft.FftSettings"
 STEPS = (
     Row("P-1", "window of 128 samples at 100 Hz", (_SETTINGS,)),
     Row("P-2", "2^14 - n zeros", (_SETTINGS,)),
     Row("P-3", "padded window", (_FFT,)),
-    Row("P-4", "transform, amplitudes", ("estimators.fft_fast.highest",), "only the orders above the threshold"),
+    Row(
+        "P-4", "transform, amplitudes", ("discsim.estimators.fft_fast.highest",), "only the orders above the threshold"
+    ),
     Row("PE1", "frequencies", (_FFT,), "prints n + k + 1 of them for n + k amplitudes; the last has no meaning"),
-    Row("P-5", "order of the greatest amplitude", ("estimators.fft_fast.highest",), "must be a local maximum"),
+    Row("P-5", "order of the greatest amplitude", ("discsim.estimators.fft_fast.highest",), "must be a local maximum"),
     Row("P-6", "rate by (PE2)", (_FFT,)),
     Row("PE2", "rate by frequency", (_FFT,)),
     Row("P-7", "shift the window", (_SETTINGS, _FFT), "unknown where the line does not stand out"),

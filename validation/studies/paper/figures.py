@@ -10,17 +10,17 @@ from matplotlib.axes import Axes
 
 from discsim.disc import Disc
 from discsim.environment import Environment
+from discsim.estimators.fft import fft
 from discsim.sensors import Instruments, record
 from discsim.trajectory import Flight, predict
-from estimators.fft import fft
-from validation.reporting.figures import COLOURS, new_figure, save_figure
-from validation.studies.paper.distance import PAPER_M
-from validation.studies.paper.modules import MORE_DISTANCE, MORE_SPIN, TWO_MODULES, two_throws
-from validation.studies.paper.prediction import Prediction
-from validation.studies.paper.releases import PaperThrow
-from validation.studies.paper.spectrum import PAPER_HZ, WholeFlight
-from validation.yaw_damping.figures import draw_surface_on
-from validation.yaw_damping.paper_table import RATES_DEG_S
+from discsim.validation.reporting.figures import COLOURS, new_figure, save_figure
+from discsim.validation.studies.paper.distance import PAPER_M
+from discsim.validation.studies.paper.modules import MORE_DISTANCE, MORE_SPIN, TWO_MODULES, two_throws
+from discsim.validation.studies.paper.prediction import Prediction
+from discsim.validation.studies.paper.releases import PaperThrow
+from discsim.validation.studies.paper.spectrum import PAPER_HZ, WholeFlight
+from discsim.validation.yaw_damping.figures import draw_surface_on
+from discsim.validation.yaw_damping.paper_table import RATES_DEG_S
 
 __all__ = ["draw_distances", "draw_fig_3", "draw_fig_9", "draw_fig_11", "draw_fig_13"]
 

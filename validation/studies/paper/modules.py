@@ -13,7 +13,7 @@ from discsim.environment import Environment
 from discsim.module import Module, loaded
 from discsim.shipped import load_throw
 from discsim.trajectory import predict
-from validation.studies.paper.releases import PaperThrow, carry
+from discsim.validation.studies.paper.releases import PaperThrow, carry
 
 __all__ = ["NEW", "OLD", "TWO_MODULES", "bare_disc", "compare_modules", "two_throws"]
 

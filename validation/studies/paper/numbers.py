@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from discsim.shipped import load_disc
-from validation.scenarios.rate_table_figures import draw_methods
-from validation.studies.paper.distance import distances
-from validation.studies.paper.figures import draw_distances, draw_fig_3, draw_fig_9, draw_fig_11, draw_fig_13
-from validation.studies.paper.modules import compare_modules
-from validation.studies.paper.prediction import predict_by_table
-from validation.studies.paper.spectrum import whole_flight
-from validation.studies.paper.table_run import run_fig_7, table_numbers
+from discsim.validation.scenarios.rate_table_figures import draw_methods
+from discsim.validation.studies.paper.distance import distances
+from discsim.validation.studies.paper.figures import draw_distances, draw_fig_3, draw_fig_9, draw_fig_11, draw_fig_13
+from discsim.validation.studies.paper.modules import compare_modules
+from discsim.validation.studies.paper.prediction import predict_by_table
+from discsim.validation.studies.paper.spectrum import whole_flight
+from discsim.validation.studies.paper.table_run import run_fig_7, table_numbers
 
 __all__ = ["compute", "rounded"]
 

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from validation.reporting import markdown
-from validation.studies.paper.beside import BLOCKS, figure_rows, number_rows
-from validation.studies.paper.distance import PAPER_M
-from validation.studies.paper.equations import EQUATIONS, STEPS, Row, summary
+from discsim.validation.reporting import markdown
+from discsim.validation.studies.paper.beside import BLOCKS, figure_rows, number_rows
+from discsim.validation.studies.paper.distance import PAPER_M
+from discsim.validation.studies.paper.equations import EQUATIONS, STEPS, Row, summary
 
 __all__ = ["page_text"]
 

@@ -12,15 +12,15 @@ from discsim.arrays import FloatArray
 from discsim.disc import Disc, Release
 from discsim.environment import Environment
 from discsim.errors import InputError
+from discsim.estimators.methods import estimate
 from discsim.motion import Motion
 from discsim.recording import Recording
 from discsim.sensors import Instruments, record
 from discsim.trajectory import Flight, predict, predict_many, release_state
-from estimators.methods import estimate
-from validation.studies.paper.releases import PaperThrow, carry
-from validation.yaw_damping import PaperTable, Source, Throw, observe, paper_table
-from validation.yaw_damping.compared import as_mounted
-from validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S
+from discsim.validation.studies.paper.releases import PaperThrow, carry
+from discsim.validation.yaw_damping import PaperTable, Source, Throw, observe, paper_table
+from discsim.validation.yaw_damping.compared import as_mounted
+from discsim.validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S
 
 __all__ = ["FLOWN", "SOURCES", "Predicted", "Prediction", "predict_by_table"]
 

@@ -12,7 +12,7 @@ from discsim.disc import Disc
 from discsim.environment import Environment
 from discsim.recording import Samples
 from discsim.sensors import Instruments, record
-from validation.studies.paper.releases import PaperThrow, carry
+from discsim.validation.studies.paper.releases import PaperThrow, carry
 
 __all__ = ["WholeFlight", "whole_flight"]
 

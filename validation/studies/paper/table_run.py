@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from discsim.environment import Environment
+from discsim.estimators.accelerometer import STANDARD_GRAVITY
 from discsim.rig import default_profile
-from estimators.accelerometer import STANDARD_GRAVITY
-from validation.scenarios.rate_table import (
+from discsim.validation.scenarios.rate_table import (
     MOUNT_ERRORS,
     RateTableRun,
     envelope_on,

@@ -1,5 +1,5 @@
 """Measured recordings diagnosed, as a page of the documentation: ``discsim study real-diagnosis``."""
 
-from validation.studies.real_diagnosis.page import write_page
+from discsim.validation.studies.real_diagnosis.page import write_page
 
 __all__ = ["write_page"]

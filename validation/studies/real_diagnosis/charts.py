@@ -9,13 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from discsim.arrays import FloatArray
+from discsim.estimators.methods import estimate
 from discsim.recording import Recording
-from estimators.methods import estimate
-from validation.reporting.figures import COLOURS, new_figure, save_figure
-from validation.studies.real_diagnosis.flatball import Rows, restamped
-from validation.studies.real_diagnosis.golf_causes import CauseHeldOut, Throw
-from validation.studies.real_diagnosis.golf_flight import Flown
-from validation.studies.real_recordings.turns import field_phase
+from discsim.validation.reporting.figures import COLOURS, new_figure, save_figure
+from discsim.validation.studies.real_diagnosis.flatball import Rows, restamped
+from discsim.validation.studies.real_diagnosis.golf_causes import CauseHeldOut, Throw
+from discsim.validation.studies.real_diagnosis.golf_flight import Flown
+from discsim.validation.studies.real_recordings.turns import field_phase
 
 __all__ = ["draw_fields", "draw_golf", "draw_rows"]
 

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray
+from discsim.estimators.methods import estimate
 from discsim.recording import Recording, Samples
-from estimators.methods import estimate
-from validation.studies.real_recordings.turns import field_phase
+from discsim.validation.studies.real_recordings.turns import field_phase
 
 __all__ = ["Rows", "decay", "restamped", "rows_of", "wobble_rate"]
 

@@ -19,9 +19,9 @@ from discsim.arrays import FloatArray
 from discsim.environment import Environment
 from discsim.recording import Recording
 from discsim.trajectory import predict_many
-from validation.importing.throw import MeasuredThrow
-from validation.studies.golf_throws.prediction import drawn
-from validation.studies.real_diagnosis.golf_worlds import INPUTS, NONE, Cause, World
+from discsim.validation.importing.throw import MeasuredThrow
+from discsim.validation.studies.golf_throws.prediction import drawn
+from discsim.validation.studies.real_diagnosis.golf_worlds import INPUTS, NONE, Cause, World
 
 __all__ = [
     "OWN",

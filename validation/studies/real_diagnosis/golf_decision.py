@@ -13,8 +13,8 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.recording import Samples
-from validation.studies.real_diagnosis.golf_causes import OWN, CauseFit, Throw, positions
-from validation.studies.real_diagnosis.golf_worlds import World
+from discsim.validation.studies.real_diagnosis.golf_causes import OWN, CauseFit, Throw, positions
+from discsim.validation.studies.real_diagnosis.golf_worlds import World
 
 __all__ = ["Decision", "decided"]
 

@@ -24,7 +24,7 @@ __all__ = ["CAMERA", "CAUSES", "NONE", "Cause", "World", "pair"]
 
 #: a rate derivative is within this of what is stated: discs have -0.2 to 0.01 (models/discs), and a fit asks for -9
 _RATES = 0.5
-#: inputs of a throw (`validation.studies.golf_throws.prediction.drawn`)
+#: inputs of a throw (`discsim.validation.studies.golf_throws.prediction.drawn`)
 INPUTS = 12
 
 

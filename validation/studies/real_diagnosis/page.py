@@ -12,16 +12,16 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.model_file import Model
 from discsim.recording import Samples
-from validation.diagnosis.consistency.spin_agreement import agreement_of
-from validation.diagnosis.report.consistency_tables import tables_of
-from validation.diagnosis.track_ends import flight_of
-from validation.importing import find_map, import_recording, read_map
-from validation.reporting import markdown
-from validation.reporting.run import package_version
-from validation.studies.golf_throws.prediction import THROWS
-from validation.studies.real_diagnosis.charts import draw_fields, draw_golf, draw_rows
-from validation.studies.real_diagnosis.flatball import Rows, rows_of
-from validation.studies.real_diagnosis.golf_causes import (
+from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of
+from discsim.validation.diagnosis.report.consistency_tables import tables_of
+from discsim.validation.diagnosis.track_ends import flight_of
+from discsim.validation.importing import find_map, import_recording, read_map
+from discsim.validation.reporting import markdown
+from discsim.validation.reporting.run import package_version
+from discsim.validation.studies.golf_throws.prediction import THROWS
+from discsim.validation.studies.real_diagnosis.charts import draw_fields, draw_golf, draw_rows
+from discsim.validation.studies.real_diagnosis.flatball import Rows, rows_of
+from discsim.validation.studies.real_diagnosis.golf_causes import (
     APART,
     GROUND,
     LEFT,
@@ -32,12 +32,18 @@ from validation.studies.real_diagnosis.golf_causes import (
     likely_pairs,
     without_cause,
 )
-from validation.studies.real_diagnosis.golf_decision import decided
-from validation.studies.real_diagnosis.golf_flight import flown
-from validation.studies.real_diagnosis.golf_worlds import CAUSES, pair
-from validation.studies.real_diagnosis.runs import diagnosed, diagnosis_digest
-from validation.studies.real_diagnosis.sensors import Checked, Linear, against_cameras, checked_log, field_in_body
-from validation.studies.real_recordings.sources import SOURCES, Source, load, raw_columns
+from discsim.validation.studies.real_diagnosis.golf_decision import decided
+from discsim.validation.studies.real_diagnosis.golf_flight import flown
+from discsim.validation.studies.real_diagnosis.golf_worlds import CAUSES, pair
+from discsim.validation.studies.real_diagnosis.runs import diagnosed, diagnosis_digest
+from discsim.validation.studies.real_diagnosis.sensors import (
+    Checked,
+    Linear,
+    against_cameras,
+    checked_log,
+    field_in_body,
+)
+from discsim.validation.studies.real_recordings.sources import SOURCES, Source, load, raw_columns
 
 __all__ = ["write_page"]
 

@@ -12,10 +12,10 @@ import discsim
 from discsim.files import digest, write_text
 from discsim.model_file import Model, read_model
 from discsim.recording import Recording, write_recording
-from validation.diagnosis import diagnose
-from validation.diagnosis.datasets import read_datasets
-from validation.diagnosis.report.files import write_outcome
-from validation.reporting.run import source_digest
+from discsim.validation.diagnosis import diagnose
+from discsim.validation.diagnosis.datasets import read_datasets
+from discsim.validation.diagnosis.report.files import write_outcome
+from discsim.validation.reporting.run import source_digest
 
 __all__ = ["Found", "diagnosed", "diagnosis_digest"]
 

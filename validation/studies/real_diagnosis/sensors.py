@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from discsim.arrays import FloatArray, sd_by_median
 from discsim.recording import Recording, Samples, SensorSheet
-from validation.importing import ImportMap, find_map, import_recording, read_map
+from discsim.validation.importing import ImportMap, find_map, import_recording, read_map
 
 __all__ = [
     "Checked",

@@ -10,12 +10,12 @@ from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray
 from discsim.errors import InputError
+from discsim.estimators.fft import FftSettings
+from discsim.estimators.methods import METHODS, Options, estimate, missing_sensors
+from discsim.estimators.rate import YawRate
 from discsim.recording import Recording
-from estimators.fft import FftSettings
-from estimators.methods import METHODS, Options, estimate, missing_sensors
-from estimators.rate import YawRate
-from validation.studies.real_recordings.sources import Measured, Source
-from validation.studies.real_recordings.turns import phase_rate
+from discsim.validation.studies.real_recordings.sources import Measured, Source
+from discsim.validation.studies.real_recordings.turns import phase_rate
 
 __all__ = [
     "LOWERED",

@@ -12,12 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
+from discsim.estimators.rate import YawRate
 from discsim.files import write_bytes
-from estimators.rate import YawRate
-from validation.reporting.figures import COLOURS, draw_rates, new_figure
-from validation.studies.real_recordings.agreement import LOWERED, Attempt, run_fft
-from validation.studies.real_recordings.findings import SHIFTS, shifted_rms
-from validation.studies.real_recordings.sources import Measured, Source
+from discsim.validation.reporting.figures import COLOURS, draw_rates, new_figure
+from discsim.validation.studies.real_recordings.agreement import LOWERED, Attempt, run_fft
+from discsim.validation.studies.real_recordings.findings import SHIFTS, shifted_rms
+from discsim.validation.studies.real_recordings.sources import Measured, Source
 
 __all__ = ["draw"]
 

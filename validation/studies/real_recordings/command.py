@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
-from validation.studies.real_recordings.page import write_page
-from validation.studies.real_recordings.road import LOGS, walk
-from validation.studies.real_recordings.sources import RecordingsOption, find_recordings
+from discsim.validation.studies.real_recordings.page import write_page
+from discsim.validation.studies.real_recordings.road import LOGS, walk
+from discsim.validation.studies.real_recordings.sources import RecordingsOption, find_recordings
 
 __all__ = ["command"]
 

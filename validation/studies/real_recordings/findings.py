@@ -9,13 +9,13 @@ from types import MappingProxyType
 import numpy as np
 
 from discsim.arrays import FloatArray, readonly
+from discsim.estimators.fft import FftSettings
+from discsim.estimators.methods import estimate
+from discsim.estimators.rate import YawRate
 from discsim.recording import Samples
-from estimators.fft import FftSettings
-from estimators.methods import estimate
-from estimators.rate import YawRate
-from validation.studies.real_recordings.agreement import LOWERED, PHASE_WINDOW, Agreement, run_fft
-from validation.studies.real_recordings.sources import Measured, Source
-from validation.studies.real_recordings.turns import field_phase, phase_rate, turned, turned_by_rate
+from discsim.validation.studies.real_recordings.agreement import LOWERED, PHASE_WINDOW, Agreement, run_fft
+from discsim.validation.studies.real_recordings.sources import Measured, Source
+from discsim.validation.studies.real_recordings.turns import field_phase, phase_rate, turned, turned_by_rate
 
 __all__ = ["FINDINGS", "SHIFTS", "Findings", "Turns", "shifted_rms", "turns_of"]
 

@@ -8,14 +8,21 @@ from typing import Any
 
 import numpy as np
 
+from discsim.estimators.fft import FftSettings
 from discsim.recording import SENSORS
-from estimators.fft import FftSettings
-from validation.reporting import markdown
-from validation.studies.real_recordings.agreement import LOWERED, PHASE_WINDOW, RATIO_FROM, Agreement, attempts, held
-from validation.studies.real_recordings.charts import draw
-from validation.studies.real_recordings.findings import FINDINGS
-from validation.studies.real_recordings.road import Answers, road_section
-from validation.studies.real_recordings.sources import SOURCES, Measured, Source, load
+from discsim.validation.reporting import markdown
+from discsim.validation.studies.real_recordings.agreement import (
+    LOWERED,
+    PHASE_WINDOW,
+    RATIO_FROM,
+    Agreement,
+    attempts,
+    held,
+)
+from discsim.validation.studies.real_recordings.charts import draw
+from discsim.validation.studies.real_recordings.findings import FINDINGS
+from discsim.validation.studies.real_recordings.road import Answers, road_section
+from discsim.validation.studies.real_recordings.sources import SOURCES, Measured, Source, load
 
 __all__ = ["write_page"]
 

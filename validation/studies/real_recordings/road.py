@@ -20,7 +20,7 @@ from typing import Any, Literal
 import numpy as np
 
 from discsim.files import write_text
-from validation.reporting.markdown import table
+from discsim.validation.reporting.markdown import table
 
 __all__ = ["LOGS", "Answers", "Log", "Said", "answers", "road_section", "walk"]
 
@@ -172,7 +172,7 @@ def run_command(command: Sequence[str], home: Path) -> Said:
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     # wide enough that no sentence is broken
     environment = {**os.environ, "COLUMNS": "1000"}
-    program = [sys.executable, "-m", "validation.cli", *command[1:]]
+    program = [sys.executable, "-m", "discsim.validation.cli", *command[1:]]
     try:
         done = subprocess.run(program, capture_output=True, text=True, timeout=PATIENCE, env=environment, check=False)
         status, text = done.returncode, done.stdout + done.stderr

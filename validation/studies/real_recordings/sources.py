@@ -14,12 +14,12 @@ import typer
 
 from discsim.arrays import FloatArray
 from discsim.errors import InputError
+from discsim.estimators.fft import FftSettings
+from discsim.estimators.gyroscope import gyroscope
+from discsim.estimators.rate import YawRate
 from discsim.recording import Recording, Samples
-from estimators.fft import FftSettings
-from estimators.gyroscope import gyroscope
-from estimators.rate import YawRate
-from validation.importing import find_map, import_recording, read_map
-from validation.studies.real_recordings.optical import optical_rate
+from discsim.validation.importing import find_map, import_recording, read_map
+from discsim.validation.studies.real_recordings.optical import optical_rate
 
 __all__ = ["SOURCES", "Cut", "Measured", "RecordingsOption", "Source", "find_recordings", "load", "raw_columns"]
 
@@ -229,7 +229,7 @@ def find_recordings(chosen: Path | None = None) -> Path:
     It is ``real`` in ``chosen``, else in DISCSIM_RECORDINGS, else in ``../shared/recordings`` beside the checkout.
     Raises `InputError` where it is not there.
     """
-    beside = Path(__file__).parents[4] / "shared" / "recordings"
+    beside = Path(__file__).resolve().parents[4] / "shared" / "recordings"
     folder = chosen or Path(os.environ.get("DISCSIM_RECORDINGS") or beside)
     if not (folder / "real").is_dir():
         raise InputError.at(folder, None, "no folder 'real' in it; expected the recordings (--recordings DIR)")

@@ -13,10 +13,10 @@ from support.places import REAL
 
 from discsim.effects import Effect, effect
 from discsim.recording import Recording, Samples
-from validation.diagnosis import diagnose
-from validation.diagnosis.consistency.spin_agreement import Agreement, agreement_of, compared, written_ratios
-from validation.diagnosis.report.consistency_tables import tables_of
-from validation.importing import find_map, import_recording, read_map
+from discsim.validation.diagnosis import diagnose
+from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, agreement_of, compared, written_ratios
+from discsim.validation.diagnosis.report.consistency_tables import tables_of
+from discsim.validation.importing import find_map, import_recording, read_map
 
 #: a gyroscope that shows the spin, which an MPU-9250 does not
 BOARD = MODULE.without("gps").fitted("gyroscope", range=100.0)

@@ -9,8 +9,8 @@ from support.made import FIELD
 
 from discsim.arrays import FloatArray
 from discsim.recording import Recording, Samples, SensorSheet
-from validation.diagnosis.consistency.driven import turning_of
-from validation.diagnosis.consistency.turned_field import turned_field
+from discsim.validation.diagnosis.consistency.driven import turning_of
+from discsim.validation.diagnosis.consistency.turned_field import turned_field
 
 RATE = 100.0
 

@@ -13,12 +13,12 @@ from discsim.frames import C2
 from discsim.recording import Samples
 from discsim.rig import default_profile, turn_table
 from discsim.sensors import Instruments, record
-from validation.diagnosis.consistency.early_verdict import contradiction_in
-from validation.diagnosis.consistency.followed import left_of, left_when_shifted, true_noise
-from validation.diagnosis.contradicted import contradicted_outcome
-from validation.diagnosis.relaxed_fit import part_of, relaxed
-from validation.diagnosis.settings import CONSISTENCY
-from validation.identification.observations import readings_of
+from discsim.validation.diagnosis.consistency.early_verdict import contradiction_in
+from discsim.validation.diagnosis.consistency.followed import left_of, left_when_shifted, true_noise
+from discsim.validation.diagnosis.contradicted import contradicted_outcome
+from discsim.validation.diagnosis.relaxed_fit import part_of, relaxed
+from discsim.validation.diagnosis.settings import CONSISTENCY
+from discsim.validation.identification.observations import readings_of
 
 
 @pytest.fixture(scope="module")

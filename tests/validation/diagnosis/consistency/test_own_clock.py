@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from support.logger_loop import LOOP, NAMES, PERIOD, logged, motions
 
-from validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
-from validation.diagnosis.consistency.time_stamp_recovery import rows_of
+from discsim.validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
+from discsim.validation.diagnosis.consistency.time_stamp_recovery import rows_of
 
 
 def found(seed: int, *, own_clock: bool, weight: float) -> tuple[OwnClock | None, list[np.ndarray]]:

@@ -7,8 +7,8 @@ import pytest
 from support.made import throws
 
 from discsim.recording import Samples
-from validation.diagnosis.consistency.early_verdict import contradiction_in
-from validation.diagnosis.consistency.spin_rates import APART, rates_apart
+from discsim.validation.diagnosis.consistency.early_verdict import contradiction_in
+from discsim.validation.diagnosis.consistency.spin_rates import APART, rates_apart
 
 
 @pytest.fixture(scope="module")

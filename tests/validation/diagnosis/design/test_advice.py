@@ -12,22 +12,22 @@ from support.made import FIELD, RIG, coasting, coasts, tables, throws
 from discsim.effects import effect
 from discsim.errors import InputError
 from discsim.rig import spin_down
-from validation.diagnosis.assemble import outcome_of
-from validation.diagnosis.design.next_recording import ENOUGH, advise, confusions, expected_evidence, in_words
-from validation.diagnosis.design.plans import plans_about, read_plans
-from validation.diagnosis.relaxed_fit import relaxed
-from validation.diagnosis.result import Advice, Diagnosis, Separation
-from validation.diagnosis.selection.candidates import CandidateEffect, candidates_for
-from validation.diagnosis.selection.continuous_fit import continuous_fit
-from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.selection.search_state import Rival, Search, values_of_fit
-from validation.diagnosis.selection.stepwise import search
-from validation.diagnosis.setup import SetupFindings
-from validation.diagnosis.stages import Prepared, Question, Tried, silent
-from validation.diagnosis.verdict import judged
-from validation.identification.plants import PLANTS
-from validation.identification.plants.plan import Plan
-from validation.identification.plants.rig import LEAN
+from discsim.validation.diagnosis.assemble import outcome_of
+from discsim.validation.diagnosis.design.next_recording import ENOUGH, advise, confusions, expected_evidence, in_words
+from discsim.validation.diagnosis.design.plans import plans_about, read_plans
+from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.result import Advice, Diagnosis, Separation
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, candidates_for
+from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.search_state import Rival, Search, values_of_fit
+from discsim.validation.diagnosis.selection.stepwise import search
+from discsim.validation.diagnosis.setup import SetupFindings
+from discsim.validation.diagnosis.stages import Prepared, Question, Tried, silent
+from discsim.validation.diagnosis.verdict import judged
+from discsim.validation.identification.plants import PLANTS
+from discsim.validation.identification.plants.plan import Plan
+from discsim.validation.identification.plants.rig import LEAN
 
 STRETCHED = effect("accel.scale", sx=0.02, sy=0.02, sz=0.0)
 

@@ -11,10 +11,10 @@ from support import logger_loop as loop
 
 from discsim.effects import effect
 from discsim.recording import Recording, Samples
-from validation.diagnosis.consistency.spin_agreement import agreement_of
-from validation.diagnosis.detectors.row_times import RowTimes, row_times
-from validation.identification.noise import GroupNoise
-from validation.identification.observations import readings_of
+from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of
+from discsim.validation.diagnosis.detectors.row_times import RowTimes, row_times
+from discsim.validation.identification.noise import GroupNoise
+from discsim.validation.identification.observations import readings_of
 
 NAMES = tuple(loop.NAMES)
 HIDDEN = (

@@ -16,23 +16,23 @@ from discsim.recording import Recording, Samples
 from discsim.rig import turn_table
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
-from validation.diagnosis.detectors import dropped_samples
-from validation.diagnosis.detectors.dropped_samples import dropped_accelerometer
-from validation.diagnosis.detectors.events import events
-from validation.diagnosis.detectors.gusts import gusts
-from validation.diagnosis.detectors.local_problem import LocalProblems, local_problems
-from validation.diagnosis.detectors.sample_alignment import phase_counts, viterbi_counts
-from validation.diagnosis.detectors.saturation import saturation
-from validation.diagnosis.detectors.speed_ripple import ripple
-from validation.diagnosis.detectors.time_offsets import time_offsets
-from validation.diagnosis.relaxed_fit import first_trajectory, relaxed
-from validation.diagnosis.selection.continuous_fit import continuous_fit
-from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.identification.clipping import clipping_level_of, equal_beyond_chance
-from validation.identification.gauss_newton import Fit
-from validation.identification.noise import estimate_noise
-from validation.identification.plants.rate_table import RATE_TABLE
-from validation.identification.prediction import shown
+from discsim.validation.diagnosis.detectors import dropped_samples
+from discsim.validation.diagnosis.detectors.dropped_samples import dropped_accelerometer
+from discsim.validation.diagnosis.detectors.events import events
+from discsim.validation.diagnosis.detectors.gusts import gusts
+from discsim.validation.diagnosis.detectors.local_problem import LocalProblems, local_problems
+from discsim.validation.diagnosis.detectors.sample_alignment import phase_counts, viterbi_counts
+from discsim.validation.diagnosis.detectors.saturation import saturation
+from discsim.validation.diagnosis.detectors.speed_ripple import ripple
+from discsim.validation.diagnosis.detectors.time_offsets import time_offsets
+from discsim.validation.diagnosis.relaxed_fit import first_trajectory, relaxed
+from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.identification.clipping import clipping_level_of, equal_beyond_chance
+from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.noise import estimate_noise
+from discsim.validation.identification.plants.rate_table import RATE_TABLE
+from discsim.validation.identification.prediction import shown
 
 DRIVER, FIELD = load_disc("driver")
 MODULE = Instruments.from_parts("mpu9250", "neo_m8n")

@@ -12,10 +12,10 @@ import pytest
 from support.outcomes import OUTCOMES, explained, unexplained
 
 from discsim.effects import CATALOGUE
-from validation.diagnosis.report.figures import draw_overview, draw_sensor
-from validation.diagnosis.report.page import draw_figures, verdict_sentence, write_diagnosis_report
-from validation.diagnosis.report.wording import everyday, form, found, law_text, plus_minus, unit
-from validation.diagnosis.result import Confusion, Evidence, NamedEffect, Outcome, ParameterValue, Residuals
+from discsim.validation.diagnosis.report.figures import draw_overview, draw_sensor
+from discsim.validation.diagnosis.report.page import draw_figures, verdict_sentence, write_diagnosis_report
+from discsim.validation.diagnosis.report.wording import everyday, form, found, law_text, plus_minus, unit
+from discsim.validation.diagnosis.result import Confusion, Evidence, NamedEffect, Outcome, ParameterValue, Residuals
 
 
 class Page(HTMLParser):

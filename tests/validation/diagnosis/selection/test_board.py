@@ -12,15 +12,20 @@ from support.made import RIG, coasts
 
 from discsim.arrays import FloatArray
 from discsim.effects import effect
-from validation.diagnosis.relaxed_fit import first_trajectory
-from validation.diagnosis.selection.candidates import candidates_for
-from validation.diagnosis.selection.screening import NormalEquations, column_of, free_columns, normal_equations_of
-from validation.identification.gauss_newton import Fit, linearised, refit
-from validation.identification.noise import stated_noise, whitened
-from validation.identification.normal_equations import unknown_prior
-from validation.identification.parameters import Parameter
-from validation.identification.plants.spin_down import SPIN_DOWN
-from validation.identification.propagation import Column
+from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.diagnosis.selection.candidates import candidates_for
+from discsim.validation.diagnosis.selection.screening import (
+    NormalEquations,
+    column_of,
+    free_columns,
+    normal_equations_of,
+)
+from discsim.validation.identification.gauss_newton import Fit, linearised, refit
+from discsim.validation.identification.noise import stated_noise, whitened
+from discsim.validation.identification.normal_equations import unknown_prior
+from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.plants.spin_down import SPIN_DOWN
+from discsim.validation.identification.propagation import Column
 
 VISCOUS = Parameter("rig", "viscous", RIG.viscous, 1e-8, 2e-7)
 TORQUE = 1.5e-4

@@ -10,19 +10,19 @@ import pytest
 from support.made import throws
 
 from discsim.effects import Effect, effect
-from validation.diagnosis.design.next_recording import confusions
-from validation.diagnosis.relaxed_fit import relaxed, unknowns
-from validation.diagnosis.selection import stepwise as searching
-from validation.diagnosis.selection.candidates import CandidateEffect, candidates_for
-from validation.diagnosis.selection.continuous_fit import ContinuousFit
-from validation.diagnosis.selection.exchange import exchanged, rivals_of
-from validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
-from validation.diagnosis.selection.score_tests import Pair, ScreenedCandidate, pairs
-from validation.diagnosis.selection.screening import normal_equations_of
-from validation.diagnosis.selection.search_state import Rival, possible
-from validation.identification.noise import estimate_noise
-from validation.identification.plants.flight import FLIGHT
-from validation.identification.stated_parameters import stated_parameters
+from discsim.validation.diagnosis.design.next_recording import confusions
+from discsim.validation.diagnosis.relaxed_fit import relaxed, unknowns
+from discsim.validation.diagnosis.selection import stepwise as searching
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, candidates_for
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.selection.exchange import exchanged, rivals_of
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
+from discsim.validation.diagnosis.selection.score_tests import Pair, ScreenedCandidate, pairs
+from discsim.validation.diagnosis.selection.screening import normal_equations_of
+from discsim.validation.diagnosis.selection.search_state import Rival, possible
+from discsim.validation.identification.noise import estimate_noise
+from discsim.validation.identification.plants.flight import FLIGHT
+from discsim.validation.identification.stated_parameters import stated_parameters
 
 YAW, CLOCK = effect("aero.yaw_reynolds", exponent=0.3), effect("mag.clock_rate", ratio=0.9996)
 

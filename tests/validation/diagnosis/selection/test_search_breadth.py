@@ -12,20 +12,20 @@ import pytest
 from support.made import coasts, throws
 
 from discsim.effects.catalogue import CATALOGUE, effect
-from validation.diagnosis.relaxed_fit import first_trajectory
-from validation.diagnosis.selection import exchange
-from validation.diagnosis.selection import search_state as finding
-from validation.diagnosis.selection import stepwise as searching
-from validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
-from validation.diagnosis.selection.continuous_fit import ContinuousFit
-from validation.diagnosis.selection.evidence import price
-from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.selection.score_tests import ScreenedCandidate, hinted
-from validation.diagnosis.selection.search_state import on_the_disc
-from validation.identification.gauss_newton import Fit, linearised, merit_of
-from validation.identification.noise import stated_noise
-from validation.identification.plants.flight import FLIGHT
-from validation.identification.plants.spin_down import SPIN_DOWN
+from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.diagnosis.selection import exchange
+from discsim.validation.diagnosis.selection import search_state as finding
+from discsim.validation.diagnosis.selection import stepwise as searching
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.selection.evidence import price
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate, hinted
+from discsim.validation.diagnosis.selection.search_state import on_the_disc
+from discsim.validation.identification.gauss_newton import Fit, linearised, merit_of
+from discsim.validation.identification.noise import stated_noise
+from discsim.validation.identification.plants.flight import FLIGHT
+from discsim.validation.identification.plants.spin_down import SPIN_DOWN
 
 #: what algebra ranks, best first; none but the seventh comes near the data
 RANKED = [

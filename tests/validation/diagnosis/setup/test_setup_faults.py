@@ -9,11 +9,11 @@ import pytest
 from support.made import tables, throws
 
 from discsim.effects import CATALOGUE, Effect, effect
+from discsim.validation.diagnosis.selection.candidates import available, candidates_for, parameters_of
+from discsim.validation.diagnosis.selection.stepwise import search
+from discsim.validation.diagnosis.setup import SetupFindings
+from discsim.validation.diagnosis.setup_effects import with_reversed_axes
 from discsim.written import as_written
-from validation.diagnosis.selection.candidates import available, candidates_for, parameters_of
-from validation.diagnosis.selection.stepwise import search
-from validation.diagnosis.setup import SetupFindings
-from validation.diagnosis.setup_effects import with_reversed_axes
 
 
 def test_a_setting_is_no_trial_of_the_search_and_a_size_is():

@@ -12,12 +12,12 @@ from support.places import ROOT
 from discsim.disc import Release
 from discsim.effects import Effect, effect
 from discsim.recording import PLANTS, Recording, Samples, read_recording, write_recording
+from discsim.validation.challenge.cases.case import Case, Coast, Concealed
+from discsim.validation.challenge.cases.conceal import recordings
+from discsim.validation.challenge.cases.draw import draw_case
+from discsim.validation.commands.import_ import command as import_
+from discsim.validation.diagnosis.setup import SetupFault, find_setup_faults
 from discsim.written import as_written
-from validation.challenge.cases.case import Case, Coast, Concealed
-from validation.challenge.cases.conceal import recordings
-from validation.challenge.cases.draw import draw_case
-from validation.commands.import_ import command as import_
-from validation.diagnosis.setup import SetupFault, find_setup_faults
 
 MAP = ROOT / "models" / "imports" / "csv.toml"
 

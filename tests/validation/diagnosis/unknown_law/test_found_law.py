@@ -16,7 +16,7 @@ from discsim.recording import Recording, Samples
 from discsim.rig import turn_table
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
-from validation.challenge.cases.off_catalogue import (
+from discsim.validation.challenge.cases.off_catalogue import (
     OffCatalogue,
     PowerLawTorque,
     RotatingMagnet,
@@ -24,12 +24,12 @@ from validation.challenge.cases.off_catalogue import (
     coast,
     haunted,
 )
-from validation.diagnosis.relaxed_fit import relaxed
-from validation.diagnosis.selection.continuous_fit import continuous_fit
-from validation.diagnosis.selection.hypothesis import Hypothesis
-from validation.diagnosis.unknown_law.find import FoundLaw, find_law
-from validation.identification.noise import estimate_noise
-from validation.identification.stated_parameters import stated_parameters
+from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.unknown_law.find import FoundLaw, find_law
+from discsim.validation.identification.noise import estimate_noise
+from discsim.validation.identification.stated_parameters import stated_parameters
 
 MODULE = Instruments.from_parts("mpu9250")
 FIELD = Environment(magnetic_field=np.array([30.1, -4.3, 39.2]), gravity=9.8)
