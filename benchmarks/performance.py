@@ -121,7 +121,7 @@ def main() -> None:
     given = parser.parse_args()
     rounds, flights = ("3", ["10", "30", "100"]) if given.quick else ("15", ["10", "100", "1000"])
     minutes = ["0.5", "1", "2"] if given.quick else ["1", "10", "60"]
-    each = "3" if given.quick else "9"
+    each = "2" if given.quick else "9"
     frispy = ["frispy", "--frispy", given.frispy] if given.frispy else []
     text = TEXT.partition("## A long log")[0].rstrip() + "\n" if given.no_log else TEXT
     page = text.format(

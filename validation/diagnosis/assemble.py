@@ -314,7 +314,8 @@ def outcome_of(judged: Judged, question: Question) -> Outcome:
     unsaid = () if rows is None or judged.verdict != "unexplained" else rows.sentences
     warnings = (*setup.warnings, *unsaid, *ready.notes)
     turning = None
-    if judged.verdict == "unexplained" and not plant_of(ready.meant[0]).path_known:
+    # where rows had to be counted, what sensors say of one another at the times as written is not so
+    if judged.verdict == "unexplained" and rows is None and not plant_of(ready.meant[0]).path_known:
         turning = turning_of(question.recordings, question.names)
     if found is not None:
         told = () if turning is None else turning.sentences
