@@ -24,7 +24,7 @@ from discsim.effects.events import impulse, spin_step
 from discsim.frames import heading_angles, rotate_by_quaternion
 from discsim.parameters import PARAMETERS, Tables
 
-__all__ = ["WIDTH", "derivative", "in_body", "incidence"]
+__all__ = ["WIDTH", "body_row", "derivative", "in_body", "incidence"]
 
 #: places of the state: position and velocity in N, quaternion of S, rates P, Q (in S) and r, spin angle psi
 WIDTH = 14
@@ -83,26 +83,33 @@ def derivative(p: Any, tables: Tables, t: float, y: FloatArray, dy: FloatArray) 
     dy[13] = r
 
 
+@inlined
+def body_row(y: FloatArray, dy: FloatArray, row: FloatArray) -> None:
+    """Write a state (14,) and its derivative as a row of motion (19,), as `in_body` gives them."""
+    for i in range(6):
+        row[i] = y[i]
+    for i in range(3):
+        row[6 + i] = dy[3 + i]
+    # C_NB = C_NS C3(psi)^T
+    c, s = cos(0.5 * y[13]), sin(0.5 * y[13])
+    row[9], row[10] = y[6] * c - y[9] * s, y[7] * c + y[8] * s
+    row[11], row[12] = y[8] * c - y[7] * s, y[9] * c + y[6] * s
+    c, s, r = cos(y[13]), sin(y[13]), y[12]
+    p_B, q_B = c * y[10] + s * y[11], c * y[11] - s * y[10]
+    row[13], row[14], row[15] = p_B, q_B, r
+    row[16] = c * dy[10] + s * dy[11] + r * q_B
+    row[17] = c * dy[11] - s * dy[10] - r * p_B
+    row[18] = dy[12]
+
+
 @compiled_nogil
 def in_body(flat: FloatArray, tables: Tables, t: FloatArray, states: FloatArray) -> FloatArray:
     """Return motion (m, 19) of states (m, 14): position to acceleration in N, attitude, body rates and theirs in B."""
     p = flat.view(PARAMETERS)[0]
     rows, dy = np.empty((t.size, 19)), np.empty(WIDTH)
     for k in range(t.size):
-        y, row = states[k], rows[k]
-        derivative(p, tables, t[k], y, dy)
-        row[:6] = y[:6]
-        row[6:9] = dy[3:6]
-        # C_NB = C_NS C3(psi)^T
-        c, s = cos(0.5 * y[13]), sin(0.5 * y[13])
-        row[9], row[10] = y[6] * c - y[9] * s, y[7] * c + y[8] * s
-        row[11], row[12] = y[8] * c - y[7] * s, y[9] * c + y[6] * s
-        c, s, r = cos(y[13]), sin(y[13]), y[12]
-        p_B, q_B = c * y[10] + s * y[11], c * y[11] - s * y[10]
-        row[13], row[14], row[15] = p_B, q_B, r
-        row[16] = c * dy[10] + s * dy[11] + r * q_B
-        row[17] = c * dy[11] - s * dy[10] - r * p_B
-        row[18] = dy[12]
+        derivative(p, tables, t[k], states[k], dy)
+        body_row(states[k], dy, rows[k])
     return rows
 
 

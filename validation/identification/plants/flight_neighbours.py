@@ -21,7 +21,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.compiled import compiled, inlined
 from discsim.effects.events import EVENT_WIDTH_S
-from discsim.flight_equations import derivative
+from discsim.flight_equations import body_row, derivative
 from discsim.frames import rotate_by_quaternion
 from discsim.parameters import PARAMETERS, Tables
 from discsim.validation.identification.dynamics import ROW, SIZE, acting_tables
@@ -146,23 +146,6 @@ def _subtract(first: FloatArray, other: FloatArray) -> None:
 
 
 @inlined
-def _in_body(y: FloatArray, dy: FloatArray, row: FloatArray) -> None:
-    """Write state and derivative (14,) as a row of motion (19,), as `discsim.flight_equations.in_body` does."""
-    for i in range(6):
-        row[i] = y[i]
-    row[6], row[7], row[8] = dy[3], dy[4], dy[5]
-    c, s = cos(0.5 * y[13]), sin(0.5 * y[13])
-    row[9], row[10] = y[6] * c - y[9] * s, y[7] * c + y[8] * s
-    row[11], row[12] = y[8] * c - y[7] * s, y[9] * c + y[6] * s
-    c, s, r = c * c - s * s, 2.0 * c * s, y[12]
-    p_B, q_B = c * y[10] + s * y[11], c * y[11] - s * y[10]
-    row[13], row[14], row[15] = p_B, q_B, r
-    row[16] = c * dy[10] + s * dy[11] + r * q_B
-    row[17] = c * dy[11] - s * dy[10] - r * p_B
-    row[18] = dy[12]
-
-
-@inlined
 def _turn_to(
     y0: FloatArray, H: FloatArray, ahead: float, larger: float, about: float, body: FloatArray, y: FloatArray
 ) -> None:
@@ -267,7 +250,7 @@ def _fly(p: Any, tables: Tables, state: FloatArray, start: float, h: float, work
             k[3], k[4], k[5] = Ixx * dy[10] + Izz * r * Q, Ixx * dy[11] - Izz * r * P, Izz * dy[12]
             k[6], k[7], k[8] = rotate_by_quaternion(y[6], y[7], y[8], y[9], k[3], k[4], k[5])
             if stage == 0:
-                _in_body(y, dy, rows[2 * step])
+                body_row(y, dy, rows[2 * step])
                 if step == steps:
                     return
             if stage == 3:
@@ -284,7 +267,7 @@ def _fly(p: Any, tables: Tables, state: FloatArray, start: float, h: float, work
         middle = _larger(H, body)
         _turn_to(y0, H, 0.5 * h, middle, 0.5 * middle, body, y)
         derivative(p, tables, start + (step + 0.5) * h, y, dy)
-        _in_body(y, dy, rows[2 * step + 1])
+        body_row(y, dy, rows[2 * step + 1])
         body[4], body[5] = c * c - s * s, 2.0 * c * s
         _moved(y0, h, K, _SQUARES[4], _WEIGHTS[4], H, y)
         larger = _larger(H, body)
