@@ -302,6 +302,13 @@ def test_a_late_gyroscope_that_few_relations_show_is_borne_out_by_the_air():
     assert found.value.offset_s == pytest.approx(case.concealed[0].effect.value.offset_s, abs=2e-3)  # type: ignore[attr-defined]
 
 
+def test_lost_samples_of_an_accelerometer_are_no_offset_of_its_times():
+    """One offset for all throws gains a fault's price by chance, and the motion follows it no better."""
+    case = draw_case(511, "flight", kind="two")
+    assert [item.effect.id for item in case.concealed] == ["accel.dropped_samples", "accel.scale"]
+    assert find_setup_faults(recordings(case)).faults == ()
+
+
 def test_a_clock_by_whose_error_phases_run_away_is_no_fault_of_the_setup_and_a_hint_to_the_fit():
     case = draw_case(92011, kind="setup")
     assert [item.effect.id for item in case.concealed] == ["accel.units", "gyro.clock_rate"]

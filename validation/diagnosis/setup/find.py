@@ -196,7 +196,7 @@ def _next(recordings: Sequence[Recording]) -> tuple[list[SetupFault], tuple[Effe
     if found and found[0].kind == "rival" and _gains(as_written, found[0], 0.5):
         return [], _hints(ranking)
     found = tuple(item for item in found if item.kind != "rival")
-    if found and _agrees(found[0]) and (_gains(as_written, found[0]) or _borne_out(as_written, found[0], recordings)):
+    if found and _agrees(found[0]) and _worth_naming(as_written, found[0], recordings):
         return [_fault(as_written, found, recordings)], ()
     if as_written is not None and _agrees(as_written):
         return [], ()
@@ -258,6 +258,18 @@ def _told_apart(
 def _turned_round(item: Hypothesis, stated: FloatArray) -> bool:
     """Tell whether a hypothesis is a field that points the other way than the stated one: no place on a map has it."""
     return item.columns.site is not None and float(item.columns.site @ stated) < 0.0
+
+
+def _worth_naming(as_written: Hypothesis | None, item: Hypothesis, recordings: Sequence[Recording]) -> bool:
+    """Tell whether a hypothesis gains its price and leaves no more than sound recordings do, or the air bears it out.
+
+    Lost samples of one sensor turn its phase by a radian and more, and one offset may gain its price by chance. What
+    is named so leaves more than sound recordings do; what gains twice its price is a fault beside other physics.
+    """
+    clear = (
+        item.cost <= SOUND * item.weight or _gains(as_written, item, 2.0) or not plant_of(recordings[0]).air_modelled
+    )
+    return (clear and _gains(as_written, item)) or _borne_out(as_written, item, recordings)
 
 
 def _borne_out(as_written: Hypothesis | None, item: Hypothesis, recordings: Sequence[Recording]) -> bool:
