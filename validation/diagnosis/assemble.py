@@ -12,6 +12,7 @@ from discsim.arrays import FloatArray
 from discsim.disc import Aero, aero_key
 from discsim.effects.catalogue import effect as catalogued
 from discsim.model_file import Model, ModelEffect
+from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.driven import turning_of
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
 from discsim.validation.diagnosis.contradicted import contradicted_outcome
@@ -312,7 +313,8 @@ def outcome_of(judged: Judged, question: Question) -> Outcome:
     setup = answer_of_setup(ready.setup, question.recordings, tried.fit, judged.verdict)
     rows, agreement = ready.rows, ready.agreement
     unsaid = () if rows is None or judged.verdict != "unexplained" else rows.sentences
-    warnings = (*setup.warnings, *unsaid, *ready.notes)
+    searched_for = _speed_searched_for(ready.meant) if judged.verdict == "unexplained" else ()
+    warnings = (*setup.warnings, *unsaid, *searched_for, *ready.notes)
     turning = None
     # where rows had to be counted, what sensors say of one another at the times as written is not so
     if judged.verdict == "unexplained" and rows is None and not plant_of(ready.meant[0]).path_known:
@@ -323,6 +325,24 @@ def outcome_of(judged: Judged, question: Question) -> Outcome:
     assert tried.contradiction is not None
     datasets, names, seed = question.datasets, question.names, question.seed
     return contradicted_outcome(tried.contradiction, ready.meant, datasets, names, seed, warnings, agreement, turning)
+
+
+def _speed_searched_for(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """Return what to state where a flight's velocity had to be searched for: a search may end beside the true one."""
+    if not plant_of(recordings[0]).air_modelled:
+        return ()
+    blind = [
+        one.name
+        for one in recordings
+        if not {"gps", "track"} & set(one.samples) and (one.release is None or one.release.velocity is None)
+    ]
+    if not blind:
+        return ()
+    return (
+        f"{', '.join(blind)}: neither GPS, a track nor a stated release tells how fast the disc was. Its velocity was "
+        "searched for and may have been missed: state velocity_ned_m_s with its sigma in [release] of recording.toml, "
+        "as a radar or a video tells it.",
+    )
 
 
 def _outcome_of_search(

@@ -191,25 +191,15 @@ def _astray(fit: Fit) -> list[int]:
 
 
 def from_other_initial_states(fit: Fit) -> Fit:
-    """Try other attitudes at release for recordings whose fit went astray, each by itself."""
-    attitude = fit.plant.layout.attitude
-    if attitude is None:
+    """Try other attitudes at release, or other starts, for recordings whose fit went astray, each by itself."""
+    if fit.plant.layout.attitude is None:
         return fit
     better = dict[int, Trajectory]()
     for i in _astray(fit)[: CONSISTENCY.few]:
-        recording = fit.trajectories[i].recording
         ratio = fit.values(i).get(_CLOCK, 1.0)
-        first = (
-            first_trajectory(recording, nodes=fit.trajectories[i].nodes)
-            if ratio == 1.0
-            else trajectory_in_true_time(recording, ratio)
-        )
         alone = part_of(fit, [i])
         alone = replace(alone, merit=merit_of(alone, alone.linears))
-        for other in fit.plant.initial.other_attitudes(recording)[:3]:
-            turned = multiply(other, conjugate(first.states[0, attitude]))
-            states = first.states[: len(fit.trajectories[i].states)].copy()
-            states[:, attitude] = multiply(np.broadcast_to(turned, (len(states), 4)), states[:, attitude])
+        for states in _other_states(fit.trajectories[i], ratio):
             candidate = replace(alone, trajectories=(replace(fit.trajectories[i], states=states),))
             candidate = refit(candidate, iterations=6, tolerance=1e-3 * fit.count)
             if candidate.merit < RELAXED_FIT.rescued * alone.merit:
@@ -219,6 +209,26 @@ def from_other_initial_states(fit: Fit) -> Fit:
     together = replace(fit, trajectories=tuple(better.get(i, one) for i, one in enumerate(fit.trajectories)))
     together = refit(together, iterations=6, tolerance=1e-3 * fit.count)
     return together if together.merit < fit.merit else fit
+
+
+def _other_states(trajectory: Trajectory, ratio: float) -> list[FloatArray]:
+    """Return other states (k, s) at a trajectory's starts that are worth trying; times are ``ratio`` the true ones."""
+    recording, plant, count = trajectory.recording, trajectory.plant, len(trajectory.states)
+    first = (
+        first_trajectory(recording, nodes=trajectory.nodes)
+        if ratio == 1.0
+        else trajectory_in_true_time(recording, ratio)
+    )
+    found = list(plant.initial.other_states(recording, ratio * trajectory.nodes[:-1], 1.0))
+    for states in found:
+        states[:, list(plant.layout.per_time)] *= ratio
+    for other in plant.initial.other_attitudes(recording)[:3]:
+        attitude = plant.layout.attitude
+        turned = multiply(other, conjugate(first.states[0, attitude]))
+        states = first.states[:count].copy()
+        states[:, attitude] = multiply(np.broadcast_to(turned, (count, 4)), states[:, attitude])
+        found.append(states)
+    return found
 
 
 def part_of(fit: Fit, chosen: Sequence[int]) -> Fit:

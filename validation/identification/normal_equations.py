@@ -201,10 +201,11 @@ def common_step(
     right = gram[:p, -1] + prior * off
     if p == 0:
         return np.empty(0), np.empty((0, 0)), float(gram[-1, -1])
-    if not np.all(np.isfinite(gram)):
-        return np.full(p, np.nan), np.full((p, p), np.nan), np.nan
     scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
-    scaled = H * scale[:, None] * scale[None, :]
+    with np.errstate(over="ignore", invalid="ignore"):
+        scaled = H * scale[:, None] * scale[None, :]
+    if not (np.all(np.isfinite(gram)) and np.all(np.isfinite(scaled))):
+        return np.full(p, np.nan), np.full((p, p), np.nan), np.nan
     covariance = inverse_of(scaled) * scale[:, None] * scale[None, :]
     step = covariance @ right
     expected = float(gram[-1, -1] + prior @ off**2 - step @ right)

@@ -144,8 +144,12 @@ def test_a_shared_step_obeys_priors_and_leaves_alone_what_no_reading_shows():
     assert expected == pytest.approx(2.0 * direct.cost)
 
 
-def test_a_step_from_predictions_that_are_not_finite_is_no_number():
-    step, covariance, expected = common_step(np.full((2, 2), np.nan), (FRICTION,), np.zeros(1))
+@pytest.mark.parametrize(
+    "gram", [np.full((2, 2), np.nan), np.array([[-1.0, 1e200, 0.0], [1e200, 1.0, 0.0], [0.0, 0.0, 1.0]])]
+)
+def test_a_step_from_predictions_that_are_not_finite_is_no_number(gram):
+    parameters = (FRICTION, FRICTION)[: len(gram) - 1]
+    step, covariance, expected = common_step(gram, parameters, np.zeros(len(parameters)))
     assert np.isnan(step).all()
     assert np.isnan(covariance).all()
     assert np.isnan(expected)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from itertools import combinations
 
@@ -89,6 +90,35 @@ def test_a_throw_is_found_from_its_own_sensors_for_either_hand_and_any_spin(spin
     starts = flight_initial_states(measured(motion), instants(motion))
     assert_near(starts, motion)
     assert starts.ambiguous == ()
+
+
+@pytest.mark.parametrize("missing", [(), ("accelerometer",), ("magnetometer",)])
+def test_what_the_air_does_tells_a_velocity_that_nothing_else_does(missing):
+    """Within what a fit converges from; where a sensor is missing, one of the starts that are offered is.
+
+    Without a magnetometer nothing tells the heading, and what is compared is in the disc's own frame.
+    """
+    motion = flight()
+    recording = replace(measured(motion, without=("gps", *missing)), release=None)
+    first = np.zeros(1)
+    offered = [
+        flight_initial_states(recording, first, k) for k in range(flight_initial_states(recording, first).choices)
+    ]
+    if missing:
+        assert len(offered) > 1
+    apart, turned = [], []
+    for one in offered:
+        assert np.all(np.isfinite(one.velocity))
+        felt, true = (
+            to_body(a, v)[0] for a, v in ((one.attitude, one.velocity), (motion.attitude[:1], motion.velocity[:1]))
+        )
+        apart.append(float(np.linalg.norm(felt - true)))
+        turned.append(rotation_error(one.attitude[0], motion.attitude[0]))
+    assert min(apart) < 5.0
+    if not missing:
+        assert apart[0] < 5.0
+        assert np.linalg.norm(offered[0].velocity[0] - motion.velocity[0]) < 6.0
+        assert turned[0] < np.radians(25.0)
 
 
 def test_a_tumbling_disc_is_followed_by_its_gyroscope():

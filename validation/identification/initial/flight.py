@@ -40,6 +40,7 @@ from discsim.validation.identification.initial.path import (
     path_states,
     specific_force_by,
 )
+from discsim.validation.identification.initial.release_from_forces import Told, release_from_forces
 from discsim.validation.identification.initial.smoothing import GRID
 
 __all__ = ["InitialStates", "flight_initial_states", "spin_initial_states"]
@@ -55,7 +56,8 @@ class InitialStates(NamedTuple):
     """States at instants, for a fit to start from.
 
     ``t`` (k,) s in written time; ``position`` (k, 3) m and ``velocity`` (k, 3) m/s in N; ``attitude`` (k, 4)
-    quaternions of C_NB; ``rate`` (k, 3) rad/s in B; ``ambiguous`` holds other attitudes (4,) worth trying at t[0].
+    quaternions of C_NB; ``rate`` (k, 3) rad/s in B; ``ambiguous`` holds other attitudes (4,) worth trying at t[0],
+    ``choices`` is how many starts there are to choose from, likeliest first.
     """
 
     t: FloatArray
@@ -64,15 +66,17 @@ class InitialStates(NamedTuple):
     attitude: FloatArray
     rate: FloatArray
     ambiguous: tuple[FloatArray, ...]
+    choices: int = 1
 
 
 # ---------------------------------------------------------------------------------------------- the three plants
 
 
-def flight_initial_states(recording: Recording, t: FloatArray) -> InitialStates:
+def flight_initial_states(recording: Recording, t: FloatArray, choice: int = 0) -> InitialStates:
     """Return states at instants t (k,) s of a flight; always finite.
 
-    Without GPS and track the path is dead reckoning from the stated release, or from a guess. Without path or
+    Without GPS and track the path is dead reckoning from the stated release, or from what the air does
+    (`release_from_forces`), of whose starts the likeliest is taken unless another ``choice`` is. Without path or
     accelerometer the attitude's turn about the field is the one that keeps the disc most level, unless the release
     states it; the others are in ``ambiguous``. With no sensor on board at all, the flight that the baseline predicts
     from a stated release is the start.
@@ -94,16 +98,20 @@ def flight_initial_states(recording: Recording, t: FloatArray) -> InitialStates:
             force_felt = _turned_about_axis(force_felt, frame, -np.interp(force_felt.grid, grid, phase_drift))
             pair = compared(fixes, force_felt, grid, recording.environment.gravity)
     G, certain = turned_to_ned(recording, frame, grid, pair, normals)
+    told: tuple[Told, ...] = ()
+    if fixes is None and (recording.release is None or recording.release.velocity is None):
+        told = release_from_forces(recording, frame, grid, G, force_felt)
+    if told:
+        G = told[choice].turn @ G
     attitude, rate = states_from(recording, frame, grid, G, t)
     if force_felt is not None:
         force_felt = in_ned(force_felt, grid, G, recording.environment.gravity)
     if fixes is not None:
         position, velocity = path_states(fixes, force_felt, t)
     else:
-        position, velocity = dead_reckoning(recording, force_felt, t)
-    return _finite(
-        InitialStates(t, position, velocity, attitude, rate, () if certain else other_attitudes(recording, attitude[0]))
-    )
+        position, velocity = dead_reckoning(recording, force_felt, t, told[choice].velocity if told else None)
+    others = () if certain or told else other_attitudes(recording, attitude[0])
+    return _finite(InitialStates(t, position, velocity, attitude, rate, others, max(len(told), 1)))
 
 
 def _predicted(recording: Recording, t: FloatArray) -> InitialStates | None:

@@ -295,12 +295,15 @@ def path_states(fixes: Fixes, force_felt: SpecificForce | None, t: FloatArray) -
 
 
 def dead_reckoning(
-    recording: Recording, force_felt: SpecificForce | None, t: FloatArray
+    recording: Recording, force_felt: SpecificForce | None, t: FloatArray, told: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Return position and velocity (k, 3) at t from the stated release, or a guess, and the acceleration in N."""
+    """Return position and velocity (k, 3) at t from the stated release and the acceleration in N.
+
+    A velocity that is not stated is the one that is ``told`` otherwise (3,) m/s, or a guess.
+    """
     release = recording.release
     position = np.array([0.0, 0.0, -GUESSED_HEIGHT])
-    velocity = np.array([GUESSED_SPEED, 0.0, 0.0])
+    velocity = np.array([GUESSED_SPEED, 0.0, 0.0]) if told is None else told
     if release is not None and release.position is not None:
         position = np.array(release.position)
     if release is not None and release.velocity is not None:

@@ -115,8 +115,8 @@ def flight_segments(
         add_neighbours(flats, given, states, times[0], times[last], times[n - 1], out, rows, ends)
 
 
-def _states(recording: Recording, t: FloatArray, ratio: float) -> FloatArray:
-    starts = flight_initial_states(recording, np.minimum(t * ratio, recording.end))
+def _states(recording: Recording, t: FloatArray, ratio: float, choice: int = 0) -> FloatArray:
+    starts = flight_initial_states(recording, np.minimum(t * ratio, recording.end), choice)
     states = np.hstack([starts.position, starts.velocity, starts.attitude, starts.rate])
     states[:, _SPIN] *= ratio
     return states
@@ -124,6 +124,11 @@ def _states(recording: Recording, t: FloatArray, ratio: float) -> FloatArray:
 
 def _other_attitudes(recording: Recording) -> tuple[FloatArray, ...]:
     return flight_initial_states(recording, np.zeros(1)).ambiguous
+
+
+def _other_states(recording: Recording, t: FloatArray, ratio: float) -> tuple[FloatArray, ...]:
+    choices = flight_initial_states(recording, np.zeros(1)).choices
+    return tuple(_states(recording, t, ratio, choice) for choice in range(1, choices))
 
 
 def _lacks(recording: Recording) -> str | None:
@@ -280,7 +285,7 @@ FLIGHT = Plant(
     motion="flight",
     layout=Layout(13, 12, _POSITION, _VELOCITY, _ATTITUDE, _RATE, _SPIN, per_time=(_SPIN,)),
     dynamics=Dynamics(propagated_by(flight_segments), _longest_step),
-    initial=Initial(_states, _other_attitudes),
+    initial=Initial(_states, _other_attitudes, _other_states),
     sizes=Sizes(  # m, m/s, rad, rad/s
         differences=np.repeat([1e-3, 1e-3, 1e-5, 1e-4], 3),
         unknown=np.repeat([1e4, 300.0, 30.0, 1e3], 3),

@@ -188,16 +188,22 @@ def _no_attitudes(recording: Recording) -> tuple[FloatArray, ...]:
     return ()
 
 
+def _no_states(recording: Recording, t: FloatArray, ratio: float) -> tuple[FloatArray, ...]:
+    del recording, t, ratio
+    return ()
+
+
 @dataclass(frozen=True)
 class Initial:
     """Where a fit starts, from the data alone.
 
     ``states`` (k, s) at instants (k,) s where times are written as a ratio of the true ones; ``other_attitudes`` (4,)
-    at release are worth trying, too.
+    at release are worth trying, too, and so are ``other_states``, as ``states``.
     """
 
     states: Callable[[Recording, FloatArray, float], FloatArray]
     other_attitudes: Callable[[Recording], tuple[FloatArray, ...]] = _no_attitudes
+    other_states: Callable[[Recording, FloatArray, float], tuple[FloatArray, ...]] = _no_states
 
 
 # -------------------------------------------------------------------------------------------------- sizes and times

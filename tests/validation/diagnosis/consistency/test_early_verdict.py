@@ -13,6 +13,8 @@ from discsim.frames import C2
 from discsim.recording import Samples
 from discsim.rig import default_profile, turn_table
 from discsim.sensors import Instruments, record
+from discsim.validation.challenge.cases.conceal import recordings
+from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.diagnosis.consistency.early_verdict import contradiction_in
 from discsim.validation.diagnosis.consistency.followed import left_of, left_when_shifted, true_noise
 from discsim.validation.diagnosis.contradicted import contradicted_outcome
@@ -47,6 +49,17 @@ def contradiction(mixed):
 
 def test_sound_throws_are_followed_and_nothing_is_said(sound):
     assert contradiction_in(sound, ()) is None
+
+
+def test_throws_whose_velocity_nothing_tells_but_the_air_are_followed():
+    """No path, and no release stated: a start at the guess of a throw to the north left 40 times the noise."""
+    case = draw_case(547, "flight", kind="nothing")
+    short = replace(case, runs=case.runs[:2], stated_releases=case.stated_releases[:2], longest=2.0)
+    blind = [
+        replace(one, release=None, samples={name: own for name, own in one.samples.items() if name != "gps"})
+        for one in recordings(short)
+    ]
+    assert contradiction_in(blind, ()) is None
 
 
 def test_a_magnetometer_of_another_throw_contradicts_the_rest(contradiction):
