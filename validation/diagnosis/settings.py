@@ -128,6 +128,9 @@ class Selection:
         What it costs more that one sensor is turned in its board, where another effect explains as much: parts are
         soldered square to within a degree, and at one spin a turn about its axis is a delay. As much as to believe in
         an effect at all.
+    mistimed : float
+        What it costs more that a sensor's times are off by as much all along, where another effect explains as much: a
+        lag of 4 ms has lost up to 7 to such an offset, for what its starts may have been is charged to it.
     rival : float
         What a parameter costs between effects that are both worth their price: the Bayesian information criterion's
         logarithm of the number of readings, at 3000 of them.
@@ -185,6 +188,7 @@ class Selection:
     gust_entry: float = 60.0
     other_disc: float = 40.0
     turned: float = 24.0
+    mistimed: float = 12.0
     rival: float = 8.0
     far: float = 1.6
     near: float = 1.2

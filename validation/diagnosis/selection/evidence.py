@@ -12,6 +12,7 @@ import numpy as np
 
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.mount_rows import ROWS as MOUNTS
+from discsim.effects.setup import TimeOffset
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from discsim.validation.diagnosis.settings import SELECTION
 
@@ -34,9 +35,13 @@ ONE_SIDED: Mapping[tuple[str, str], float] = {
 TURNED = frozenset(row.id for row in MOUNTS if row.acts_on != "accelerometer")
 
 
+#: times that are off by as much all along: a part that is late has a filter, mostly
+MISTIMED = frozenset(row.id for row in CATALOGUE.values() if row.type is TimeOffset)
+
+
 def charge(candidate: CandidateEffect) -> float:
     """Return what an effect is charged where it stands against others: its parameters, and that it is unusual."""
-    unusual = SELECTION.turned if candidate.id in TURNED else 0.0
+    unusual = SELECTION.turned if candidate.id in TURNED else SELECTION.mistimed if candidate.id in MISTIMED else 0.0
     return SELECTION.rival * len(parameters_of(candidate)) + unusual
 
 
