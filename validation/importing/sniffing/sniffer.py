@@ -204,7 +204,7 @@ def _others(found: dict[str, tuple[Triple, Decision]], left: Sequence[Triple]) -
 
 
 def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) -> InputError:
-    rows = max(len(file.numbers.table.rows) for file in files)
+    rows = max(len(file.numbers.table) for file in files)
     if rows < FEWEST_ROWS:
         return InputError.at(raw, None, f"{rows} rows of numbers in it; expected a log of {FEWEST_ROWS} at least")
     columns = ", ".join(f"'{name}'" for name in files[0].numbers.table.columns[:12])
