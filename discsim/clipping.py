@@ -117,7 +117,7 @@ def clipped_anew(value: FloatArray, stated_range: float | None, resolution: floa
     table = value if value.ndim == 2 else value[:, None]
     step = resolution or step_of(table)
     found = at_range(table, stated_range, step)
-    lower, upper = limits(table, resolution)
+    lower, upper = limits(table, resolution, step)
     tolerance = np.maximum(0.5 * step, SAME * np.fmax(np.abs(lower), np.abs(upper)))
     with np.errstate(invalid="ignore"):
         found |= (table >= upper - tolerance) | (table <= lower + tolerance)
@@ -138,15 +138,16 @@ def at_range(value: FloatArray, stated_range: float | None, step: float) -> Bool
     return np.asarray(np.abs(value) >= stated_range - margin)
 
 
-def limits(value: FloatArray, resolution: float | None = None) -> Limits:
-    """Return the limits that a sensor's readings, (n, k), show by themselves."""
+def limits(value: FloatArray, resolution: float | None = None, step: float | None = None) -> Limits:
+    """Return the limits that a sensor's readings, (n, k), show by themselves; ``step`` is their `step_of` if known."""
     lower, upper = np.full(value.shape[1], np.nan), np.full(value.shape[1], np.nan)
     rows = _not_held(value)
     known = np.isfinite(rows)
     largest = float(np.max(np.abs(rows[known]), initial=0.0))
     if largest == 0:
         return Limits(lower, upper)
-    step = resolution or step_of(rows)
+    if step is None or resolution is None and rows is not value:
+        step = resolution or step_of(rows)
     quiet = _Noise(value, rows, max(step, SAME * largest))
     for axis in range(value.shape[1]):
         for sign, out in ((1.0, upper), (-1.0, lower)):
@@ -204,8 +205,8 @@ def _not_held(value: FloatArray) -> FloatArray:
     """Return the rows (m, k) that differ from the one before: a faster log repeats a slow sensor's readings."""
     if value.shape[1] == 1 or len(value) < 2:
         return value
-    same = (value[1:] == value[:-1]) | (np.isnan(value[1:]) & np.isnan(value[:-1]))
-    return np.asarray(value[np.concatenate([[True], ~np.all(same, axis=1)])])
+    held = np.all((value[1:] == value[:-1]) | (np.isnan(value[1:]) & np.isnan(value[:-1])), axis=1)
+    return np.asarray(value[np.concatenate([[True], ~held])]) if np.any(held) else value
 
 
 def _axis_step(column: FloatArray) -> float:
@@ -234,7 +235,8 @@ class _Noise:
     def __init__(self, value: FloatArray, rows: FloatArray, step: float) -> None:
         self.rows, self.step = rows, step
         moving = np.flatnonzero(~constant_axes(rows))
-        self.each = {i: min(_quietest(value[:, i]), _quietest(rows[:, i])) for i in moving.tolist()}
+        each = [rows] if rows is value else [value, rows]
+        self.each = {i: min(_quietest(one[:, i]) for one in each) for i in moving.tolist()}
 
     def steps(self, axis: int, without: BoolArray) -> float:
         """Return it in steps for the readings of an axis that are not ``without`` (n,), or else of the other axes.

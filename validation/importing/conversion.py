@@ -98,6 +98,9 @@ def read_readings(raw: Path, import_map: ImportMap, rows: slice | None = None) -
     repairs = RepairList(import_map.repairs)
     tables = _read_tables(raw, import_map, repairs)
     readings, notes = _read_sensors(raw, tables, import_map, rows, repairs)
+    # what was read as numbers is no longer needed as text
+    emptied = {id(table): table.emptied() for table in tables.values()}
+    tables = {sensor: emptied[id(table)] for sensor, table in tables.items()}
     main = tables[next(iter(readings))]
     return RawReadings(raw, import_map, tables, main, readings, tuple(repairs.listed()), tuple(notes))
 
@@ -425,6 +428,8 @@ def _readings(
         # + 0.0 turns the -0.0 of a reversed zero into 0.0
         columns = [unseen if axis is None else axis[1] * read[:, axis[0]] + 0.0 for axis in sensor_map.axes]
         read = np.column_stack(columns)
+    if kept.size == len(table):  # sensors of one table share what they have in common
+        return Readings(table.number, clock.time, read)
     return Readings(table.number[rows[kept]], clock.time[rows[kept]], read)
 
 

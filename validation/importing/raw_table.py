@@ -145,6 +145,10 @@ class RawTable:
         """Return the cells of a row, by its place in the table."""
         return [column[row] for column in self.texts]
 
+    def emptied(self) -> RawTable:
+        """Return the table without its cells."""
+        return replace(self, texts=())
+
     def select(self, rows: BoolArray) -> RawTable:
         """Return the table of some rows (n,)."""
         columns = tuple(column.select(rows) for column in self.texts)

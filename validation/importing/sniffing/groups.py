@@ -113,7 +113,8 @@ class Triple:
     @cached_property
     def values(self) -> FloatArray:
         """Its readings as written, (n, 3)."""
-        return np.asarray(self.numbers.values[self.rows][:, list(self.columns)])
+        value = np.asarray(self.numbers.values[:, list(self.columns)])
+        return value if self.where is None else value[self.rows]
 
     @property
     def label(self) -> str:

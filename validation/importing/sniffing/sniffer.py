@@ -275,7 +275,8 @@ def _proposal(
     fit = _turned(found, times)
     units: dict[str, Unit] = {}
     for sensor, (triple, _) in found.items():
-        value = triple.values[np.isfinite(triple.values).all(axis=1)]
+        sound = np.isfinite(triple.values).all(axis=1)
+        value = triple.values if sound.all() else triple.values[sound]
         stated, above = _stated(sensor, triple, value)
         if sensor == "gyroscope":
             turned = fit.worth if fit is not None and fit.ratio < TELLING and clock.column is not None else None
@@ -317,6 +318,8 @@ def _stated(sensor: str, triple: Triple, value: FloatArray) -> tuple[Reading | N
 
 def _reading(t: FloatArray, value: FloatArray) -> Reading3:
     """Return the rows with a time, in its order."""
+    if np.all(np.diff(t) >= 0):
+        return Reading3(t, value)
     order = np.argsort(t, kind="stable")
     order = order[np.isfinite(t[order])]
     return Reading3(t[order], value[order])
