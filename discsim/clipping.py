@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
+from discsim.threads import side_by_side
 
 if TYPE_CHECKING:
     from discsim.recording import Recording
@@ -146,7 +147,7 @@ def limits(value: FloatArray, resolution: float | None = None, step: float | Non
     largest = float(np.max(np.abs(rows[known]), initial=0.0))
     if largest == 0:
         return Limits(lower, upper)
-    if step is None or resolution is None and rows is not value:
+    if step is None or (resolution is None and rows is not value):
         step = resolution or step_of(rows)
     quiet = _Noise(value, rows, max(step, SAME * largest))
     for axis in range(value.shape[1]):
@@ -336,14 +337,17 @@ _SENSORS = {"magnetometer": "uT", "accelerometer": "m_s2", "gyroscope": "rad_s",
 
 def clipping_notes(recording: Recording) -> list[str]:
     """Say of each sensor which axes stand at a limit and for how long, and which never change."""
+    there = {s: samples for s in _SENSORS if (samples := recording.get(s)) is not None and len(samples)}
+
+    def found(sensor: str) -> BoolArray:
+        sheet, value = recording.sheets[sensor], there[sensor].value
+        return clipped(value if value.ndim == 2 else value[:, None], sheet.range, sheet.resolution)
+
     notes = []
-    for sensor, unit in _SENSORS.items():
-        samples = recording.get(sensor)
-        if samples is None or len(samples) == 0:
-            continue
-        sheet = recording.sheets[sensor]
+    # sorting millions of readings lets other threads run
+    for sensor, at_limit in zip(there, side_by_side(found, list(there)), strict=True):
+        unit, samples = _SENSORS[sensor], there[sensor]
         table = samples.value if samples.value.ndim == 2 else samples.value[:, None]
-        at_limit = clipped(table, sheet.range, sheet.resolution)
         constant = constant_axes(table)
         name, worth = _READ[unit]
         if constant.all() and sensor != "rate_reference":

@@ -130,10 +130,10 @@ def _even(t: FloatArray, interval: float) -> bool:
 
     So near that the first of its terms is all there is.
     """
+    furthest = 0.0
     for k in range(t.size):
-        if abs((t[k] - t[0]) - k * interval) > 1e-4 * interval:
-            return False
-    return True
+        furthest = max(furthest, abs((t[k] - t[0]) - k * interval))
+    return furthest <= 1e-4 * interval
 
 
 @compiled
@@ -466,13 +466,24 @@ def search_windows(
             mean = np.sum(z) / n
             _powers_of(tone, work[size:], mean, n, size, power)
             count = _peaks(power, size, 1.0 / (size * interval), rates)
-            starts = np.zeros((count + known, 2))
-            if known:
-                starts[0, 0], starts[0, 1] = before + slope * (centre - at), slope
-            starts[int(known) :, 0] = rates[:count]
             # of a type, not the number itself: for that one numba would compile the function once more
-            none = int(np.int64(0))
-            count = _fits(tau, x, z, u, half, interval, starts, powers, ellipse_sd, found, spread, variances, none)
+            found_so_far = int(np.int64(0))
+            if known:
+                starts = np.empty((1, 2))
+                starts[0, 0], starts[0, 1] = before + slope * (centre - at), slope
+                found_so_far = _fits(
+                    tau, x, z, u, half, interval, starts, powers, ellipse_sd, found, spread, variances, found_so_far
+                )
+                # the highest peak, where that fit has found it, leads to the same one
+                if found_so_far and count and abs(rates[0] - found[0, 1] / half) < pi / (n * interval):
+                    count -= 1
+                    for k in range(count):
+                        rates[k] = rates[k + 1]
+            starts = np.zeros((count, 2))
+            starts[:, 0] = rates[:count]
+            count = _fits(
+                tau, x, z, u, half, interval, starts, powers, ellipse_sd, found, spread, variances, found_so_far
+            )
             about = 0.0
             for k in range(n):
                 about += (z[k] - mean).real ** 2 + (z[k] - mean).imag ** 2
