@@ -93,9 +93,8 @@ def tracks_of(
     if sheet is not None and sheet.noise_rms is not None:
         noise = float(np.hypot(sheet.noise_rms, (sheet.resolution or 0.0) / np.sqrt(12)))
     pieces: list[tuple[Segment, FloatArray]] = []
-    for first, last, rate in _runs(
-        t, replace(fits, phase_rate=fits.phase_rate - fold), unclipped(recording, "gyroscope")
-    ):
+    unfolded = replace(fits, phase_rate=fits.phase_rate - fold)
+    for first, last, rate in _runs(t, unfolded, unclipped(recording, "gyroscope")):
         for start, stop in _segments(t[first:last], settings):
             chosen = slice(
                 first + int(np.searchsorted(t[first:last], start - 1e-9)),
@@ -119,7 +118,7 @@ def tracks_of(
     known = {(one.start, one.stop): one for one in near}
 
     def track(piece: tuple[Segment, FloatArray]) -> Track | None:
-        span = float(piece[0].t[0]), float(piece[0].t[-1])
+        span = tuple(piece[0].t[[0, -1]].tolist())
         # readings so unlike a turning field that nothing can be solved have no track
         with suppress(np.linalg.LinAlgError):
             return track_spin(*piece, axial=axial, noise=noise, near=known.get(span))

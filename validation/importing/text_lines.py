@@ -18,7 +18,7 @@ from discsim.errors import InputError
 __all__ = ["TextLines"]
 
 #: signs of a text that are split into lines at once: some MB as lines
-_PIECE = 1 << 20
+PIECE = 1 << 20
 #: lines at the beginning that are kept once they are read: where a table begins is asked again and again
 _HEAD = 2048
 
@@ -44,10 +44,10 @@ class TextLines:
         left = ""
         try:
             with self._opened() as stream:
-                left = stream.read(_PIECE).removeprefix("\ufeff")
+                left = stream.read(PIECE).removeprefix("\ufeff")
                 *whole, left = left.split("\n")
                 yield whole
-                while piece := stream.read(_PIECE):
+                while piece := stream.read(PIECE):
                     *whole, left = (left + piece).split("\n")
                     if whole:
                         yield whole
