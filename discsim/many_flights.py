@@ -51,7 +51,7 @@ class Ends(NamedTuple):
 
 
 @compiled
-def _first_below(path: FloatArray, ex: float, ey: float, ez: float, first: IntArray) -> None:
+def _first_below(path: FloatArray, first: IntArray, ex: float, ey: float, ez: float) -> None:
     """Write the place of the first row of each flight (n, m, 14) whose centre of mass is below the ground or nowhere.
 
     It is m where none is.
@@ -101,7 +101,7 @@ def fly_many(
             path[:, 1:] = advance(flying, batch, ids, length)
             done += length
             first = np.empty(ids.size, dtype=np.int64)
-            _first_below(path, *flying.centre_of_mass, first)
+            _first_below(path, first, *flying.centre_of_mass)
             with np.errstate(invalid="ignore"):
                 too_fast = np.max(np.sum(path[:, :, 11:14] ** 2, axis=2), axis=1) > (LARGEST_TURN / timestep) ** 2
             flies = ~too_fast & (first > length)
