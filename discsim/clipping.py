@@ -90,6 +90,8 @@ class Limits(NamedTuple):
 _KNOWN: dict[int, tuple[weakref.ref[FloatArray], tuple[float | None, float | None], BoolArray]] = {}
 #: sensors of a recording, as read, made usable, and corrected
 _MOST_KNOWN = 16
+#: readings from which on sensors are looked at side by side: a second of work, and threads begin in a millisecond
+LARGE = 1 << 20
 _LOCK = Lock()
 
 
@@ -343,9 +345,11 @@ def clipping_notes(recording: Recording) -> list[str]:
         sheet, value = recording.sheets[sensor], there[sensor].value
         return clipped(value if value.ndim == 2 else value[:, None], sheet.range, sheet.resolution)
 
+    # sorting millions of readings lets other threads run; for fewer it is not worth to begin them
+    large = sum(len(samples) for samples in there.values()) > LARGE
+    at_limits = side_by_side(found, list(there)) if large else [found(sensor) for sensor in there]
     notes = []
-    # sorting millions of readings lets other threads run
-    for sensor, at_limit in zip(there, side_by_side(found, list(there)), strict=True):
+    for sensor, at_limit in zip(there, at_limits, strict=True):
         unit, samples = _SENSORS[sensor], there[sensor]
         table = samples.value if samples.value.ndim == 2 else samples.value[:, None]
         constant = constant_axes(table)
