@@ -15,7 +15,10 @@ import argparse
 import dataclasses
 import os
 import platform
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from time import perf_counter, process_time, thread_time
 from typing import Any
 
@@ -27,6 +30,7 @@ from rich.console import Console
 from rich.table import Table
 
 from discsim.callbacks import passive_force
+from discsim.disc import Release
 from discsim.engine import FlyingDisc, fly, follow
 from discsim.many_flights import fly_many
 from discsim.shipped import load_disc, load_throw
@@ -118,18 +122,47 @@ def step(sizes: list[int], rounds: int) -> None:
     Console(width=110).print(table)
 
 
+def drawn(count: int, share: slice = slice(None)) -> list[Release]:
+    """Return some of ``count`` releases of speeds drawn anew for each count."""
+    rng = np.random.default_rng(count)
+    return [dataclasses.replace(THROW, velocity=THROW.velocity * k) for k in rng.uniform(0.25, 0.35, count)][share]
+
+
+def alone(count: int, cores: int) -> float:
+    """Return the CPU seconds of the busiest of processes that fly a share of the flights each and share nothing.
+
+    That is what the machine allows: cores share caches, memory and their clock's speed.
+    """
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1]); from step_cost import *\n"
+        "count, first, cores = map(int, sys.argv[2:])\n"
+        "some = drawn(count, slice(first, None, cores)); fly_many(DISC, ENVIRONMENT, [THROW], duration=0.01)\n"
+        "print(flush=True); input(); start = process_time()\n"
+        "fly_many(DISC, ENVIRONMENT, some, threads=1); print(process_time() - start)"
+    )
+    words = [sys.executable, "-c", code, str(Path(__file__).parent), str(count)]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    processes = [subprocess.Popen([*words, str(k), str(cores)], **pipes) for k in range(cores)]
+    for process in processes:
+        process.stdout.readline()
+    for process in processes:
+        process.stdin.write("\n")
+        process.stdin.flush()
+    return max(float(process.communicate()[0]) for process in processes)
+
+
 def batch(sizes: list[int]) -> None:
     """Print how many flights at once compare with one after another.
 
     By the clock, which other work on the machine spoils, and by the processor time of the busiest thread, with all that
-    one thread does alone, which it spoils less: on a quiet machine that thread is the clock.
+    one thread does alone, which it spoils less: on a quiet machine that thread is the clock. Beside it what processes
+    that share nothing but the machine reach.
     """
     cores = len(os.sched_getaffinity(0))
-    rng = np.random.default_rng(0)
     fly_many(DISC, ENVIRONMENT, [THROW], duration=0.01)
     print(f"flights until they land, by mujoco.batch on one thread and on {cores}")
     for count in sizes:
-        releases = [dataclasses.replace(THROW, velocity=THROW.velocity * k) for k in rng.uniform(0.25, 0.35, count)]
+        releases = drawn(count)
         clock, busiest, total = {}, {}, {}
         for threads in (1, cores):
             start, process, own = perf_counter(), process_time(), thread_time()
@@ -142,13 +175,14 @@ def batch(sizes: list[int]) -> None:
         some = releases[:20]
         for release in some:
             fly(DISC, ENVIRONMENT, release)
-        alone = (thread_time() - start) / len(some) * count
-        ratio = busiest[1] / busiest[cores]
+        singly = (thread_time() - start) / len(some) * count
+        ratio, apart = busiest[1] / busiest[cores], busiest[1] / alone(count, cores)
         print(
             f"{count:5d} flights of {ends.state.t.mean():.2f} s: {total[1]:.2f} s of CPU on one thread "
-            f"({alone:.2f} s by fly() one after another), {total[cores]:.2f} s on {cores}, its busiest thread "
+            f"({singly:.2f} s by fly() one after another), {total[cores]:.2f} s on {cores}, its busiest thread "
             f"{busiest[cores]:.2f} s: {ratio:.2f} times less, {ratio / cores:.2f} of the cores; "
-            f"by the clock {clock[1] / clock[cores]:.2f}"
+            f"by the clock {clock[1] / clock[cores]:.2f}; {cores} processes that share nothing: {apart:.2f}, "
+            f"{apart / cores:.2f} of the cores"
         )
 
 

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
+from discsim.threads import side_by_side
 
 if TYPE_CHECKING:
     from discsim.recording import Recording
@@ -89,6 +90,8 @@ class Limits(NamedTuple):
 _KNOWN: dict[int, tuple[weakref.ref[FloatArray], tuple[float | None, float | None], BoolArray]] = {}
 #: sensors of a recording, as read, made usable, and corrected
 _MOST_KNOWN = 16
+#: readings from which on sensors are looked at side by side: a second of work, and threads begin in a millisecond
+LARGE = 1 << 20
 _LOCK = Lock()
 
 
@@ -117,7 +120,7 @@ def clipped_anew(value: FloatArray, stated_range: float | None, resolution: floa
     table = value if value.ndim == 2 else value[:, None]
     step = resolution or step_of(table)
     found = at_range(table, stated_range, step)
-    lower, upper = limits(table, resolution)
+    lower, upper = limits(table, resolution, step)
     tolerance = np.maximum(0.5 * step, SAME * np.fmax(np.abs(lower), np.abs(upper)))
     with np.errstate(invalid="ignore"):
         found |= (table >= upper - tolerance) | (table <= lower + tolerance)
@@ -138,15 +141,16 @@ def at_range(value: FloatArray, stated_range: float | None, step: float) -> Bool
     return np.asarray(np.abs(value) >= stated_range - margin)
 
 
-def limits(value: FloatArray, resolution: float | None = None) -> Limits:
-    """Return the limits that a sensor's readings, (n, k), show by themselves."""
+def limits(value: FloatArray, resolution: float | None = None, step: float | None = None) -> Limits:
+    """Return the limits that a sensor's readings, (n, k), show by themselves; ``step`` is their `step_of` if known."""
     lower, upper = np.full(value.shape[1], np.nan), np.full(value.shape[1], np.nan)
     rows = _not_held(value)
     known = np.isfinite(rows)
     largest = float(np.max(np.abs(rows[known]), initial=0.0))
     if largest == 0:
         return Limits(lower, upper)
-    step = resolution or step_of(rows)
+    if step is None or (resolution is None and rows is not value):
+        step = resolution or step_of(rows)
     quiet = _Noise(value, rows, max(step, SAME * largest))
     for axis in range(value.shape[1]):
         for sign, out in ((1.0, upper), (-1.0, lower)):
@@ -204,8 +208,8 @@ def _not_held(value: FloatArray) -> FloatArray:
     """Return the rows (m, k) that differ from the one before: a faster log repeats a slow sensor's readings."""
     if value.shape[1] == 1 or len(value) < 2:
         return value
-    same = (value[1:] == value[:-1]) | (np.isnan(value[1:]) & np.isnan(value[:-1]))
-    return np.asarray(value[np.concatenate([[True], ~np.all(same, axis=1)])])
+    held = np.all((value[1:] == value[:-1]) | (np.isnan(value[1:]) & np.isnan(value[:-1])), axis=1)
+    return np.asarray(value[np.concatenate([[True], ~held])]) if np.any(held) else value
 
 
 def _axis_step(column: FloatArray) -> float:
@@ -234,7 +238,8 @@ class _Noise:
     def __init__(self, value: FloatArray, rows: FloatArray, step: float) -> None:
         self.rows, self.step = rows, step
         moving = np.flatnonzero(~constant_axes(rows))
-        self.each = {i: min(_quietest(value[:, i]), _quietest(rows[:, i])) for i in moving.tolist()}
+        each = [rows] if rows is value else [value, rows]
+        self.each = {i: min(_quietest(one[:, i]) for one in each) for i in moving.tolist()}
 
     def steps(self, axis: int, without: BoolArray) -> float:
         """Return it in steps for the readings of an axis that are not ``without`` (n,), or else of the other axes.
@@ -334,14 +339,19 @@ _SENSORS = {"magnetometer": "uT", "accelerometer": "m_s2", "gyroscope": "rad_s",
 
 def clipping_notes(recording: Recording) -> list[str]:
     """Say of each sensor which axes stand at a limit and for how long, and which never change."""
+    there = {s: samples for s in _SENSORS if (samples := recording.get(s)) is not None and len(samples)}
+
+    def found(sensor: str) -> BoolArray:
+        sheet, value = recording.sheets[sensor], there[sensor].value
+        return clipped(value if value.ndim == 2 else value[:, None], sheet.range, sheet.resolution)
+
+    # sorting millions of readings lets other threads run; for fewer it is not worth to begin them
+    large = sum(len(samples) for samples in there.values()) > LARGE
+    at_limits = side_by_side(found, list(there)) if large else [found(sensor) for sensor in there]
     notes = []
-    for sensor, unit in _SENSORS.items():
-        samples = recording.get(sensor)
-        if samples is None or len(samples) == 0:
-            continue
-        sheet = recording.sheets[sensor]
+    for sensor, at_limit in zip(there, at_limits, strict=True):
+        unit, samples = _SENSORS[sensor], there[sensor]
         table = samples.value if samples.value.ndim == 2 else samples.value[:, None]
-        at_limit = clipped(table, sheet.range, sheet.resolution)
         constant = constant_axes(table)
         name, worth = _READ[unit]
         if constant.all() and sensor != "rate_reference":

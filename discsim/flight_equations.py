@@ -24,10 +24,20 @@ from discsim.effects.events import impulse, spin_step
 from discsim.frames import heading_angles, rotate_by_quaternion
 from discsim.parameters import PARAMETERS, Tables
 
-__all__ = ["WIDTH", "body_row", "derivative", "in_body", "incidence"]
+__all__ = ["WIDTH", "body_row", "copied", "derivative", "in_body", "incidence"]
 
 #: places of the state: position and velocity in N, quaternion of S, rates P, Q (in S) and r, spin angle psi
 WIDTH = 14
+
+
+@inlined
+def copied(state: FloatArray, to: FloatArray) -> None:
+    """Write a state (14,) into another.
+
+    For ``to[:] = state`` the compiler writes the text of an error that cannot be, which takes it seconds.
+    """
+    for i in range(WIDTH):
+        to[i] = state[i]
 
 
 @inlined

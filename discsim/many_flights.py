@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, IntArray
 from discsim.callbacks import own_warnings, stepped_by_c
 from discsim.compiled import compiled
 from discsim.disc import Disc, Release
@@ -51,12 +51,17 @@ class Ends(NamedTuple):
 
 
 @compiled
-def _first_below(rows: FloatArray, ex: float, ey: float, ez: float) -> int:
-    """Place of the first of rows (m, 14) whose centre of mass is below the ground or nowhere; m where none is."""
-    for k in range(rows.shape[0]):
-        if not height(rows[k, 1:], ex, ey, ez) > 0.0:
-            return k
-    return int(rows.shape[0])
+def _first_below(path: FloatArray, first: IntArray, ex: float, ey: float, ez: float) -> None:
+    """Write the place of the first row of each flight (n, m, 14) whose centre of mass is below the ground or nowhere.
+
+    It is m where none is.
+    """
+    for flight in range(path.shape[0]):
+        first[flight] = path.shape[1]
+        for k in range(path.shape[1]):
+            if not height(path[flight, k, 1:], ex, ey, ez) > 0.0:
+                first[flight] = k
+                break
 
 
 def fly_many(
@@ -95,19 +100,17 @@ def fly_many(
             path[:, 0] = batch.state[ids, :_WIDTH]
             path[:, 1:] = advance(flying, batch, ids, length)
             done += length
-            flies = np.ones(ids.size, dtype=np.bool_)
-            for place, k in enumerate(ids.tolist()):
-                way = path[place]
-                with np.errstate(invalid="ignore"):
-                    too_fast = np.max(np.sum(way[:, 11:14] ** 2, axis=1)) > (LARGEST_TURN / timestep) ** 2
-                if too_fast:
-                    flies[place] = False
-                    continue
-                first = _first_below(way, *flying.centre_of_mass)
-                touched[k] = first <= length and bool(np.isfinite(way[first]).all())
-                if touched[k] or (first > length and done == steps):
-                    rows[k] = _last_row(last, way[min(first, length + 1) - 1], bool(touched[k]))
-                flies[place] = first > length and not batch.warning[k, DIVERGED, 1].any()
+            first = np.empty(ids.size, dtype=np.int64)
+            _first_below(path, first, *flying.centre_of_mass)
+            with np.errstate(invalid="ignore"):
+                too_fast = np.max(np.sum(path[:, :, 11:14] ** 2, axis=2), axis=1) > (LARGEST_TURN / timestep) ** 2
+            flies = ~too_fast & (first > length)
+            for place in np.flatnonzero(~too_fast & ((first <= length) | (done == steps))).tolist():
+                way, k = path[place], ids[place]
+                touched[k] = first[place] <= length and bool(np.isfinite(way[first[place]]).all())
+                if touched[k] or first[place] > length:
+                    rows[k] = _last_row(last, way[min(first[place], length + 1) - 1], bool(touched[k]))
+            flies &= ~batch.warning[ids][:, DIVERGED, 1].any(axis=1)
             ids = ids[flies]
         for each in (flying, last):
             each.lost_air()  # those flights are NaN

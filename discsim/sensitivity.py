@@ -20,7 +20,7 @@ from discsim.compiled import compiled_nogil
 from discsim.dormand_prince import evaluate, interpolant, step
 from discsim.effects.catalogue import CATALOGUE
 from discsim.errors import InputError
-from discsim.flight_equations import WIDTH, derivative, in_body
+from discsim.flight_equations import WIDTH, copied, derivative, in_body
 from discsim.frames import conjugate, multiply, rotation_vector, turn
 from discsim.parameters import PARAMETERS, Tables, parameter_index
 from discsim.trajectory import Flight
@@ -58,7 +58,7 @@ def _fly_in_steps(flat: FloatArray, tables: Tables, times: FloatArray, state: Fl
         step(p, tables, times[k], states[k], h, K, states[k + 1])
         derivative(p, tables, times[k + 1], states[k + 1], K[12])
         interpolant(p, tables, times[k], states[k], h, K, states[k + 1], dense[k])
-        K[0] = K[12]
+        copied(K[12], K[0])
     return evaluate(times, states, dense, t)
 
 

@@ -11,7 +11,7 @@ from discsim.arrays import FloatArray
 from discsim.compiled import compiled
 from discsim.dormand_prince import step, within
 from discsim.effects.events import EVENT_WIDTH_S
-from discsim.flight_equations import incidence
+from discsim.flight_equations import copied, incidence
 from discsim.parameters import Tables
 
 __all__ = ["land", "lowest_point", "share_to_kink", "up_to_events"]
@@ -67,7 +67,7 @@ def land(
         if abs(correction) < 1e-13 or high - low < 1e-13:
             break
         trial = trial + correction if low < trial + correction < high else 0.5 * (low + high)
-    new[:] = work
+    copied(work, new)
     return float(trial)
 
 

@@ -25,7 +25,7 @@ from discsim.effects.body import centre_of_mass
 from discsim.effects.catalogue import Effect
 from discsim.environment import Environment
 from discsim.errors import InputError
-from discsim.flight_equations import WIDTH, derivative, in_body, incidence
+from discsim.flight_equations import WIDTH, copied, derivative, in_body, incidence
 from discsim.frames import euler_angles, quaternion_from_matrix
 from discsim.law import Law
 from discsim.limits import FASTEST_SPIN
@@ -81,7 +81,8 @@ def integrate(
     kinked = tabulated or p.aero_stall.k != 0.0
     alpha, alpha_new, tries = 0.0, 0.0, 0
     shortest, chatter = SHORTEST_STEP, np.inf
-    times[0], states[0] = t, y
+    times[0] = t
+    copied(y, states[0])
     derivative(p, tables, t, y, K[0])
     if kinked:
         alpha = incidence(p, t, y)
@@ -134,19 +135,24 @@ def integrate(
                 more = 2 * times.size
                 longer_times, longer_states = np.empty(more), np.empty((more, WIDTH))
                 longer_dense = np.empty((more, POWER, WIDTH))
-                longer_times[: n + 1], longer_states[: n + 1] = times[: n + 1], states[: n + 1]
-                longer_dense[:n] = dense[:n]
+                for k in range(n + 1):
+                    longer_times[k] = times[k]
+                    copied(states[k], longer_states[k])
+                for k in range(n):
+                    for row in range(POWER):
+                        copied(dense[k, row], longer_dense[k, row])
                 times, states, dense = longer_times, longer_states, longer_dense
             interpolant(p, tables, t, y, h, K, new, dense[n])
             n += 1
         else:
             n = 1
         t = t_end if whole and ended == _LEFT else t + h
-        times[n], states[n] = t, new
+        times[n] = t
+        copied(new, states[n])
         if ended == _TOUCHED:
             break
-        y[:] = new
-        K[0] = K[STAGES]
+        copied(new, y)
+        copied(K[STAGES], K[0])
         alpha = alpha_new
         grown = max(h * min(5.0, 0.9 * error ** (-1.0 / 8.0)), shortest) if error > 0.0 else 5.0 * h
         # a step cut short for an event or a kink says little about the next one
@@ -301,11 +307,18 @@ def _integrate_range(
         flat = flats[k] if flats.shape[0] > 1 else flats[0]
         ended, times, path, dense = integrate(flat, tables, states[k], 0.0, duration, rtol, atol, t.size > 0)
         if ended == _LOST:
-            end[k], last[k], track[k], touched[k] = np.nan, np.nan, np.nan, False
+            end[k], touched[k] = np.nan, False
+            for i in range(WIDTH):
+                last[k, i] = np.nan
+                for instant in range(t.size):
+                    track[k, instant, i] = np.nan
             continue
-        end[k], last[k], touched[k] = times[-1], path[-1], ended == _TOUCHED
+        end[k], touched[k] = times[-1], ended == _TOUCHED
+        copied(path[-1], last[k])
         if t.size > 0:
-            track[k] = evaluate(times, path, dense, t)
+            found = evaluate(times, path, dense, t)
+            for instant in range(t.size):
+                copied(found[instant], track[k, instant])
 
 
 def predict_many(

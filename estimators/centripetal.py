@@ -76,18 +76,28 @@ def _readings(accelerometer: Samples, sheet: SensorSheet, t: FloatArray, rate: F
     """Return the readings with the angles turned between them; None of fewer than eight, or with no known rate."""
     known = np.isfinite(rate)
     present = np.all(np.isfinite(accelerometer.value[:, :2]), axis=1)
-    times, value = accelerometer.t[present], accelerometer.value[present, :2]
+    times, value = accelerometer.t, accelerometer.value[:, :2]
+    good = ~np.any(sheet.clipped(accelerometer.value)[:, :2], axis=1)
+    if not present.all():  # else nothing is copied: a log of hours has a hundred MB of it
+        times, value, good = times[present], value[present], good[present]
     if np.count_nonzero(known) < 2 or times.size < 8:
         return None
-    good = ~np.any(sheet.clipped(accelerometer.value)[present, :2], axis=1)
-    r = np.interp(times, t[known], rate[known], left=np.nan, right=np.nan)
+    at = t[known]
+    r = np.interp(times, at, rate[known], left=np.nan, right=np.nan)
     # a hole in the known rate is no rate
-    index = np.clip(np.searchsorted(t[known], times), 1, np.count_nonzero(known) - 1)
-    r[np.diff(t[known])[index - 1] > 0.5] = np.nan
-    steps = np.diff(times)
-    psi = np.concatenate([[0.0], np.cumsum(steps * 0.5 * np.nan_to_num(r[1:] + r[:-1]))])
-    turned = np.concatenate([[0.0], np.cumsum(steps * 0.5 * np.nan_to_num(np.abs(r[1:]) + np.abs(r[:-1])))])
-    return _Readings(times, value[:, 0] + 1j * value[:, 1], good, r, psi, turned)
+    for hole in np.flatnonzero(np.diff(at) > 0.5):
+        before, after = np.searchsorted(times, at[hole : hole + 2], side="right")
+        r[before if hole else 0 : after] = np.nan
+    a = np.empty(times.size, dtype=np.complex128)
+    a.real, a.imag = value[:, 0], value[:, 1]
+    return _Readings(times, a, good, r, _angle(times, r), _angle(times, np.abs(r)))
+
+
+def _angle(t: FloatArray, r: FloatArray) -> FloatArray:
+    """Return the angle (n,) turned at rates r (n,) by the trapezoidal rule, where they are known."""
+    angle = np.zeros(t.size)
+    np.multiply(np.diff(t) * 0.5, np.nan_to_num(r[1:] + r[:-1], copy=False), out=angle[1:])
+    return np.cumsum(angle, out=angle)
 
 
 def _blocks(readings: _Readings, interval: float, turns: float, shortest: float) -> Iterator[slice]:

@@ -404,7 +404,7 @@ def fusion(recording: Recording, settings: FusionSettings | None = None) -> YawR
     if "gyroscope" in verdict and not verdict["gyroscope"].agrees:
         return _without_magnetometer(recording, settings, verdict)
     if rows and tracks:
-        tracks = tracks_of(recording, settings.tracking, rows, unfold=turns)
+        tracks = tracks_of(recording, settings.tracking, rows, unfold=turns, near=tracks)
     return joined("fusion", tracks, settings.tracking, span_of(recording))
 
 

@@ -125,6 +125,18 @@ def _transform(
 
 
 @compiled
+def _even(t: FloatArray, interval: float) -> bool:
+    """Tell whether time stamps (n,) stand on consecutive places of the grid that `_transform` rounds them to.
+
+    So near that the first of its terms is all there is.
+    """
+    furthest = 0.0
+    for k in range(t.size):
+        furthest = max(furthest, abs((t[k] - t[0]) - k * interval))
+    return furthest <= 1e-4 * interval
+
+
+@compiled
 def _powers_of(tone: ComplexArray, value: ComplexArray, mean: complex, n: int, size: int, power: FloatArray) -> None:
     """Write the power that a tone of each frequency takes with the mean fitted along.
 
@@ -426,6 +438,7 @@ def search_windows(
     wheel = _wheel(2)
     work, tone, power = np.empty(4, dtype=np.complex128), np.empty(2, dtype=np.complex128), np.empty(2)
     known, before, slope, at = False, 0.0, 0.0, 0.0
+    shown, shown_size = 0, 0
     for index in range(centres.size):
         centre = centres[index]
         for number in range(lengths.size):
@@ -441,21 +454,36 @@ def search_windows(
             u = np.ones(n, dtype=np.complex128)
             size = int(2 ** ceil(log2(4 * (tau[-1] - tau[0] + interval) / interval)))
             if size > 2 * wheel.size:
-                wheel = _wheel(size)
+                wheel, shown = _wheel(size), 0
                 work, tone = np.empty(2 * size, dtype=np.complex128), np.empty(size, dtype=np.complex128)
                 power = np.empty(size)
-            _transform(tau - tau[0], u, interval, size, wheel, work[:size], tone)
+            # on an even grid the windows of n readings have one transform of ones
+            even = n if _even(tau, interval) else 0
+            if even == 0 or shown != even or shown_size != size:
+                _transform(tau - tau[0], u, interval, size, wheel, work[:size], tone)
+            shown, shown_size = even, size
             _transform(tau - tau[0], z, interval, size, wheel, work[:size], work[size:])
             mean = np.sum(z) / n
             _powers_of(tone, work[size:], mean, n, size, power)
             count = _peaks(power, size, 1.0 / (size * interval), rates)
-            starts = np.zeros((count + known, 2))
-            if known:
-                starts[0, 0], starts[0, 1] = before + slope * (centre - at), slope
-            starts[int(known) :, 0] = rates[:count]
             # of a type, not the number itself: for that one numba would compile the function once more
-            none = int(np.int64(0))
-            count = _fits(tau, x, z, u, half, interval, starts, powers, ellipse_sd, found, spread, variances, none)
+            found_so_far = int(np.int64(0))
+            if known:
+                starts = np.empty((1, 2))
+                starts[0, 0], starts[0, 1] = before + slope * (centre - at), slope
+                found_so_far = _fits(
+                    tau, x, z, u, half, interval, starts, powers, ellipse_sd, found, spread, variances, found_so_far
+                )
+                # the highest peak, where that fit has found it, leads to the same one
+                if found_so_far and count and abs(rates[0] - found[0, 1] / half) < pi / (n * interval):
+                    count -= 1
+                    for k in range(count):
+                        rates[k] = rates[k + 1]
+            starts = np.zeros((count, 2))
+            starts[:, 0] = rates[:count]
+            count = _fits(
+                tau, x, z, u, half, interval, starts, powers, ellipse_sd, found, spread, variances, found_so_far
+            )
             about = 0.0
             for k in range(n):
                 about += (z[k] - mean).real ** 2 + (z[k] - mean).imag ** 2

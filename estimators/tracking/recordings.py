@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from math import sqrt
@@ -65,12 +66,17 @@ def plain_tracks(recording: Recording, settings: TrackingSettings, unfold: int) 
 
 
 def tracks_of(
-    recording: Recording, settings: TrackingSettings, rows: list[RateRows] | None = None, unfold: int = 0
+    recording: Recording,
+    settings: TrackingSettings,
+    rows: list[RateRows] | None = None,
+    unfold: int = 0,
+    near: Sequence[Track] = (),
 ) -> list[Track]:
     """Return the segments' tracks, in time order; none where no window shows a spin.
 
     ``rows`` are other sensors' readings of the rate. ``unfold`` turns more per sampling interval than the field shows
     are made by a spin faster than half the sampling rate; only another sensor can tell (`discsim.estimators.fusion`).
+    ``near`` are the tracks without those rows, from which the fits go on.
     """
     magnetometer = recording.need("magnetometer")
     sheet = recording.sheets.get("magnetometer")
@@ -87,9 +93,8 @@ def tracks_of(
     if sheet is not None and sheet.noise_rms is not None:
         noise = float(np.hypot(sheet.noise_rms, (sheet.resolution or 0.0) / np.sqrt(12)))
     pieces: list[tuple[Segment, FloatArray]] = []
-    for first, last, rate in _runs(
-        t, replace(fits, phase_rate=fits.phase_rate - fold), unclipped(recording, "gyroscope")
-    ):
+    unfolded = replace(fits, phase_rate=fits.phase_rate - fold)
+    for first, last, rate in _runs(t, unfolded, unclipped(recording, "gyroscope")):
         for start, stop in _segments(t[first:last], settings):
             chosen = slice(
                 first + int(np.searchsorted(t[first:last], start - 1e-9)),
@@ -110,10 +115,13 @@ def tracks_of(
             )
             pieces.append((segment, rate[chosen.start - first : chosen.stop - first]))
 
+    known = {(one.start, one.stop): one for one in near}
+
     def track(piece: tuple[Segment, FloatArray]) -> Track | None:
+        span = tuple(piece[0].t[[0, -1]].tolist())
         # readings so unlike a turning field that nothing can be solved have no track
         with suppress(np.linalg.LinAlgError):
-            return track_spin(*piece, axial=axial, noise=noise)
+            return track_spin(*piece, axial=axial, noise=noise, near=known.get(span))
         return None
 
     return [one for one in side_by_side(track, pieces) if one is not None]

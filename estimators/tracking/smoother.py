@@ -35,16 +35,27 @@ def track_bound(segment: Segment, rate: FloatArray, noise: float, at: float) -> 
 
 
 def track_spin(
-    segment: Segment, start_rate: FloatArray, *, axial: AxialField | None = None, noise: float | None = None
+    segment: Segment,
+    start_rate: FloatArray,
+    *,
+    axial: AxialField | None = None,
+    noise: float | None = None,
+    near: Track | None = None,
 ) -> Track:
     """Smooth one segment of n readings, from a first guess ``start_rate`` (n,) rad/s.
 
-    ``axial`` is a first guess of the hard iron along z; ``noise`` the data sheet's, uT, taken as a floor.
+    ``axial`` is a first guess of the hard iron along z; ``noise`` the data sheet's, uT, taken as a floor. ``near`` is
+    the same segment's track without other sensors' rows, from which the fit goes on: it saves half of the steps.
     """
     size = np.abs(start_rate)
     problem = Problem(segment, top_rate=float(np.max(size)), typical_rate=float(np.median(size)))
-    fit = _fitted(problem, _start(problem, start_rate, axial), floor=0.7 * noise if noise else 1e-6)
-    return _track(problem, fit)
+    floor = 0.7 * noise if noise else 1e-6
+    # where the precession is not read its size is found in several rounds, which begin anew
+    if near is None or (problem.slow is not None and problem.despun):
+        return _track(problem, _fitted(problem, _start(problem, start_rate, axial), floor))
+    x = np.concatenate([near.point[: problem.parts[4].stop], *(row.calibration for row in segment.rows)])
+    problem.local = near.local
+    return _track(problem, _fitted(problem, x, floor, near))
 
 
 class _Fit(NamedTuple):
@@ -61,11 +72,16 @@ class _Fit(NamedTuple):
     mixture: Mixture
 
 
-def _fitted(problem: Problem, x: FloatArray, floor: float) -> _Fit:
-    """Fit the parameters, and in turn noise, roughness, precession and the weights of bad readings, in 4 rounds."""
+def _fitted(problem: Problem, x: FloatArray, floor: float, near: Track | None = None) -> _Fit:
+    """Fit the parameters, and in turn noise, roughness, precession and the weights of bad readings, in 4 rounds.
+
+    It ends where a round hardly changes the roughness; the first, which begins anywhere, tells that of a near track.
+    """
     settings, precession = problem.settings, problem.settings.precession
-    roughness, point = 100.0, Point(problem, x, np.ones(problem.t.size))
+    roughness, point = 100.0, Point(problem, x, np.ones(problem.t.size) if near is None else near.weights)
     sigma = max(float(np.sqrt(np.mean(point.at.residual**2))), floor)
+    if near is not None:
+        roughness, sigma = near.roughness, max(near.noise, floor)
     for outer in range(4):
         point, linear, target = solve(problem, point, sigma, roughness, precession, 15)
         length = np.sqrt(np.mean(point.at.residual**2, axis=1))
@@ -82,7 +98,7 @@ def _fitted(problem: Problem, x: FloatArray, floor: float) -> _Fit:
             weight = np.clip(shown, 0, 1)
             seen = float(np.sum(weight * PQ**2) + 2 * settings.precession**2) / (float(np.sum(weight)) + 2)
             precession = max(settings.precession, float(np.sqrt(seen)))
-        if outer > 0 and abs(np.log(roughness / previous)) < 0.2:
+        if (outer > 0 or near is not None) and abs(np.log(roughness / previous)) < 0.2:
             break
     return _Fit(point, linear, target, sigma, mixture)
 
@@ -118,6 +134,9 @@ def _track(problem: Problem, fit: _Fit) -> Track:
         calibration_sd=[np.sqrt(np.diag(everything)[part]) for part in calibrations],
         chi2=[float(np.mean(error**2)) for error, _ in fit.point.rows],
         gyroscope_gain=complex(*x[problem.parts[1]][2:4]) if problem.read else 0j,
+        point=x,
+        weights=fit.point.weights,
+        local=problem.local,
     )
 
 

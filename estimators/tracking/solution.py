@@ -154,12 +154,19 @@ class _Reduced:
         count, size, local = problem.spline.size - 2, self.right.size, problem.local
         penalty, pull = problem.penalty(), problem.spline.pulled(local * self.gap)
         squares = float(local @ self.gap**2)
+        # the penalty has five diagonals, and a factor needs those on and below the middle
+        whole = np.asfortranarray(self.information.T)
+        below = [(slice(d, (size - d) * size, size + 1), np.diagonal(penalty, -d)) for d in range(3)]
         log, solved = np.full(_GRID.size, -np.inf), {}
 
         def look(place: int) -> float:
             roughness = _GRID[place]
-            # symmetric: the transpose, in which LAPACK works without a copy, has the same factor
-            factor, failed = dpotrf((self.information + penalty / roughness).T, lower=1, clean=0, overwrite_a=1)
+            # columns one after another, in which LAPACK works without a copy
+            matrix = whole.copy(order="F")
+            entries = matrix.ravel(order="F")
+            for places, values in below:
+                entries[places] += values / roughness
+            factor, failed = dpotrf(matrix, lower=1, clean=0, overwrite_a=1)
             if failed:
                 raise np.linalg.LinAlgError("the spin's normal equations are not positive")
             right = self.right + pull / roughness

@@ -89,7 +89,9 @@ class Track:
     corner; ``start`` and ``stop`` of the magnetometer's readings, s, and of their residual about each t the mean square
     per axis ``left`` (n,) with the number of readings ``count`` (n,), and ``usual`` that of most readings, uT^2;
     ``noise`` per axis, uT; ``hard_iron`` (3,) uT; ``field`` (3,) uT at the start; ``calibration`` of other sensors;
-    ``chi2`` of their rows per degree of freedom; ``roughness`` the spectral density of r'' found.
+    ``chi2`` of their rows per degree of freedom; ``roughness`` the spectral density of r'' found. Where a
+    fit of the same readings with more rows goes on from: ``point`` all unknowns, ``weights`` of the readings, ``local``
+    of the roughness.
     """
 
     t: FloatArray
@@ -109,3 +111,6 @@ class Track:
     calibration_sd: list[FloatArray] = dataclass_field(default_factory=list)
     chi2: list[float] = dataclass_field(default_factory=list)
     gyroscope_gain: complex = 0j
+    point: FloatArray = dataclass_field(default_factory=lambda: np.zeros(0))
+    weights: FloatArray = dataclass_field(default_factory=lambda: np.zeros(0))
+    local: FloatArray = dataclass_field(default_factory=lambda: np.zeros(0))

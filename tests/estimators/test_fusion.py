@@ -18,6 +18,8 @@ from discsim.estimators.fusion import (
     unfolding,
 )
 from discsim.estimators.tracking import tracking
+from discsim.estimators.tracking.recordings import plain_tracks, tracks_of
+from discsim.estimators.tracking.track import RateRows, TrackingSettings
 from discsim.recording import Recording, Samples, SensorSheet
 
 FAULTS = Faults(
@@ -269,3 +271,20 @@ def test_standing_still_is_no_spin():
     recording, _ = record(spin, np.random.default_rng(9), sensors=("magnetometer", "accelerometer"))
     assert np.all(np.isnan(fusion(recording).rate))
     assert np.all(np.isnan(accelerometer_calibrated(recording, FusionSettings()).rate))
+
+
+def test_a_fit_that_goes_on_from_the_magnetometers_ends_where_one_from_the_start_does(thrown):
+    """Both end where a step is worth less than a hundredth of a standard deviation."""
+    spin, truth = thrown
+    recording, _ = record(spin, np.random.default_rng(3), FAULTS, truth=truth)
+    gyroscope, settings = recording.need("gyroscope"), TrackingSettings()
+    reading = gyroscope.value[:, 2]
+    rows = [RateRows("linear", gyroscope.t, reading, np.full(reading.size, 0.02), np.zeros(2), np.array([0.03, 0.1]))]
+    plain = plain_tracks(recording, settings, 0)
+    anew = tracks_of(recording, settings, rows)
+    on = tracks_of(recording, settings, rows, near=plain)
+    assert len(anew) == len(on) == len(plain) > 0
+    for alone, one, other in zip(plain, anew, on, strict=True):
+        assert np.max(np.abs(one.rate - alone.rate) / one.sd) > 0.05  # the rows say something
+        assert np.max(np.abs(one.rate - other.rate) / one.sd) < 1e-2
+        assert np.max(np.abs(other.sd / one.sd - 1.0)) < 1e-2

@@ -132,7 +132,7 @@ def _clipped_shares(recording: Recording, sensor: str) -> tuple[float, dict[str,
 
 def _frozen(recording: Recording, sensor: str, standing: float) -> tuple[tuple[float, float], ...]:
     readings = {
-        name: Readings(np.arange(len(samples), dtype=float), samples.t, samples.value.reshape(len(samples), -1))
+        name: Readings(np.arange(len(samples)), samples.t, samples.value.reshape(len(samples), -1))
         for name, samples in recording.samples.items()
     }
     runs = frozen_runs(sensor, readings[sensor], readings, standing)

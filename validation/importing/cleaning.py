@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, IntArray
 from discsim.validation.importing.held import find_held, find_interpolated, fresh_rows, step_of
 from discsim.validation.importing.timing import row_timing
 
@@ -35,7 +35,7 @@ MOVES = {"gyroscope": 0.5, "magnetometer": 20.0, "accelerometer": 5.0}
 class Readings(NamedTuple):
     """A sensor's sound rows: number (n,), time (n,) s on the file's clock, value (n, k) in recording units and axes."""
 
-    number: FloatArray
+    number: IntArray
     time: FloatArray
     value: FloatArray
 

@@ -142,7 +142,7 @@ def _dated(text: str) -> float | None:
         return None
 
 
-def mended(time: Sequence[float], scale: float) -> Clock:
+def mended(time: FloatArray, scale: float) -> Clock:
     """Return times (n,) s, written in units of ``scale`` s, with wraps taken out and new starts told apart.
 
     A single stamp that went wrong is left as it is; so is a small step back of a clock that was set (less than

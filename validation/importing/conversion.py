@@ -13,14 +13,16 @@ from pathlib import Path
 
 import numpy as np
 
+from discsim.arrays import BoolArray, FloatArray, IntArray
 from discsim.clipping import clipping_notes
 from discsim.disc import Release
 from discsim.errors import InputError
 from discsim.limits import LARGEST_READING, time_fault
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
+from discsim.validation.importing.cell_texts import CellTexts, number
 from discsim.validation.importing.cleaning import Readings, cleaned
 from discsim.validation.importing.import_map import ImportMap, SensorMap, TimeBase
-from discsim.validation.importing.raw_table import RawRow, RawTable, Repair, RepairList, number, read_raw
+from discsim.validation.importing.raw_table import RawTable, Repair, RepairList, read_raw
 from discsim.validation.importing.row_clock import RowClock, row_clock
 from discsim.validation.importing.timing import row_timing
 
@@ -96,6 +98,9 @@ def read_readings(raw: Path, import_map: ImportMap, rows: slice | None = None) -
     repairs = RepairList(import_map.repairs)
     tables = _read_tables(raw, import_map, repairs)
     readings, notes = _read_sensors(raw, tables, import_map, rows, repairs)
+    # what was read as numbers is no longer needed as text
+    emptied = {id(table): table.emptied() for table in tables.values()}
+    tables = {sensor: emptied[id(table)] for sensor, table in tables.items()}
     main = tables[next(iter(readings))]
     return RawReadings(raw, import_map, tables, main, readings, tuple(repairs.listed()), tuple(notes))
 
@@ -195,10 +200,11 @@ def _read_sensors(
         if found.time.size == 1 and chosen > 2 and sensor_map.where is None:
             raise InputError.at(table.path, None, _no_time(sensor, chosen, base, clock))
         if lost > MUCH_LOST * chosen and not clock.starts:
-            times = len(set(clock.time.values()))
-            coarse = sensor_map.where is None and times < (1 - MUCH_LOST) * len(clock.time)
+            stamps = clock.time[clock.known]
+            times = np.unique(stamps).size
+            coarse = sensor_map.where is None and times < (1 - MUCH_LOST) * stamps.size
             why = (
-                f"the file has {times} different times in {len(clock.time)} rows: rows stand twice, or the stamps are "
+                f"the file has {times} different times in {stamps.size} rows: rows stand twice, or the stamps are "
                 "coarser than the rows (then take another column, or step_s)"
                 if coarse
                 else "is this the right map?"
@@ -219,19 +225,13 @@ def _own_rows(table: RawTable, names: Sequence[str]) -> RawTable:
     Where sensors of several rates stand side by side, a slower one's cells end earlier, or its reading stands with its
     stamp until the next one.
     """
-    indices = [table.columns.index(name) for name in names]
-    rows: list[RawRow] = []
-    before: list[str] = []
-    for row in table.rows:
-        cells = [row.cells[index] for index in indices]
-        if any(cells) and cells != before:
-            rows.append(row)
-            before = cells
-    return replace(table, rows=tuple(rows))
+    columns = [table.column(name) for name in names]
+    table = table.select(~np.all([column.equal("") for column in columns], axis=0))
+    return table.select(~np.all([table.column(name).repeated() for name in names], axis=0))
 
 
 def _no_time(sensor: str, rows: int, base: TimeBase, clock: RowClock) -> str:
-    times = list(clock.time.values())
+    times = clock.time[clock.known]
     column = base.column or base.counter
     return (
         f"time does not go on over the {sensor}'s {rows} rows: '{column}' runs from {times[0]:.9g} s to "
@@ -256,8 +256,8 @@ def _fresh(
         notes += result.notes
         kept = np.isin(found.number, [] if result.readings is None else result.readings.number)
         if not np.all(kept):
-            lines = {row.number: row.line for row in tables[sensor].rows}
-            line = lines[int(found.number[~kept][0])]
+            table = tables[sensor]
+            line = int(table.line[np.searchsorted(table.number, found.number[~kept][0])])
             what = f"{sensor}: {result.notes[0].removeprefix(f'{sensor}: ')}"
             action = f"{np.count_nonzero(~kept)} rows left out of {sensor}, the first here"
             repairs.add(None, tables[sensor].path, line, what, action)
@@ -392,11 +392,10 @@ def _there(tables: dict[str, RawTable], raw: Path) -> str:
 
 def _chosen_rows(table: RawTable, sensor_map: SensorMap) -> int:
     if sensor_map.time is not None:
-        return len(table.rows)
+        return len(table)
     if sensor_map.where is None:
         return table.total
-    column = table.columns.index(sensor_map.where[0])
-    return sum(row.cells[column] == sensor_map.where[1] for row in table.rows)
+    return int(np.count_nonzero(table.column(sensor_map.where[0]).equal(sensor_map.where[1])))
 
 
 def _readings(
@@ -410,79 +409,97 @@ def _readings(
     repairs: RepairList,
 ) -> Readings:
     """Return the rows of one sensor that hold numbers and whose time ascends, of one stretch of the clock."""
-    indices = [table.columns.index(name) for name in names]
-    filter_at = table.columns.index(sensor_map.where[0]) if sensor_map.where is not None else -1
-    wanted = range(table.total)[cut] if cut is not None else range(table.total)
-    here = [row for row in table.rows if row.number in clock.time]
+    here = clock.known
     if sensor_map.where is not None:
-        here = [row for row in here if row.cells[filter_at] == sensor_map.where[1]]
-    if clock.starts and here:
-        kept_stretch = clock.longest([row.number for row in here if row.number in wanted] or [here[0].number])
-        here = [row for row in here if clock.stretch[row.number] == kept_stretch]
-    rows: list[RawRow] = []
-    values: list[list[float]] = []
-    hollow = _hollow(table, here, dict(zip(indices, names, strict=True)), repairs)
-    for row in here:
-        value = _value(table, row, sensor, names, indices, hollow, import_map, repairs)
-        if value is not None:
-            rows.append(row)
-            values.append(value)
-    times = [clock.time[row.number] for row in rows]
-    kept = _ascending(table, rows, times, repairs)
-    read = sensor_map.factor * np.array([values[k] for k in kept]).reshape(len(kept), len(names))
+        here &= table.column(sensor_map.where[0]).equal(sensor_map.where[1])
+    if clock.starts and here.any():
+        wanted = np.zeros(table.total, dtype=np.bool_)
+        wanted[slice(None) if cut is None else cut] = True
+        counted = here & wanted[table.number]
+        counted[np.argmax(here)] |= not counted.any()
+        here &= clock.stretch == clock.longest(counted)
+    rows = np.flatnonzero(here)
+    value, sound = _values(table, rows, sensor, names, import_map, repairs)
+    kept = np.flatnonzero(sound)
+    kept = kept[_ascending(table, rows[kept], clock.time[rows[kept]], repairs)]
+    read = sensor_map.factor * value[kept]
     if len(SENSORS[sensor].columns) == 3:
         unseen = np.full(len(kept), np.nan)
         # + 0.0 turns the -0.0 of a reversed zero into 0.0
         columns = [unseen if axis is None else axis[1] * read[:, axis[0]] + 0.0 for axis in sensor_map.axes]
         read = np.column_stack(columns)
-    return Readings(np.array([rows[k].number for k in kept]), np.array([times[k] for k in kept]), read)
+    if kept.size == len(table):  # sensors of one table share what they have in common
+        return Readings(table.number, clock.time, read)
+    return Readings(table.number[rows[kept]], clock.time[rows[kept]], read)
 
 
-def _hollow(table: RawTable, rows: list[RawRow], names: dict[int, str], repairs: RepairList) -> set[int]:
-    """Return the columns that are empty in every row, each of which is listed once."""
-    hollow = {index for index in names if rows and not any(row.cells[index] for row in rows)}
-    for index in hollow:
-        repairs.add("number", table.path, rows[0].line, f"'{names[index]}' is empty in every row", "gaps throughout")
-    return hollow
+def _values(
+    table: RawTable, rows: IntArray, sensor: str, names: list[str], import_map: ImportMap, repairs: RepairList
+) -> tuple[FloatArray, BoolArray]:
+    """Return a sensor's readings (n, k) in some rows (n,) as written, NaN for gaps, and which rows hold no other text.
+
+    A column that is empty in every row is listed once.
+    """
+    decimal, factor = import_map.layout.decimal, import_map.sensors[sensor].factor
+    value = np.empty((rows.size, len(names)))
+    hollow = set()
+    odd = np.zeros(rows.size, dtype=np.bool_)
+    for k, name in enumerate(names):
+        column = CellTexts(table.column(name).cells[rows])
+        if rows.size and np.all(column.equal("")):
+            hollow.add(name)
+            what = f"'{name}' is empty in every row"
+            repairs.add("number", table.path, int(table.line[rows[0]]), what, "gaps throughout")
+        value[:, k], _ = column.numbers(decimal)
+        with np.errstate(invalid="ignore"):
+            odd |= ~(np.abs(value[:, k] * factor) <= LARGEST_READING) & (name not in hollow)
+    sound = np.ones(rows.size, dtype=np.bool_)
+    for row in np.flatnonzero(odd).tolist():
+        found = _value(table, int(rows[row]), sensor, names, hollow, import_map, repairs)
+        sound[row] = found is not None
+        value[row] = np.nan if found is None else found
+    return value, sound
 
 
 def _value(
     table: RawTable,
-    row: RawRow,
+    row: int,
     sensor: str,
     names: list[str],
-    indices: list[int],
-    hollow: set[int],
+    hollow: set[str],
     import_map: ImportMap,
     repairs: RepairList,
 ) -> list[float] | None:
-    """Return a row's readings of a sensor, NaN for gaps; None where a cell is no number."""
-    factor = import_map.sensors[sensor].factor
+    """Return a row's readings of a sensor, NaN for gaps; None where a cell is no number. Each is listed."""
+    factor, line = import_map.sensors[sensor].factor, int(table.line[row])
     value = []
-    for name, index in zip(names, indices, strict=True):
-        reading = number(row.cells[index], import_map.layout.decimal)
+    for name in names:
+        cell = table.column(name)[row]
+        reading = number(cell, import_map.layout.decimal)
         if reading is None:
-            what = f"'{name}' is '{row.cells[index][:40]}', no number"
-            repairs.add("number", table.path, row.line, what, f"row left out of {sensor}")
+            what = f"'{name}' is '{cell[:40]}', no number"
+            repairs.add("number", table.path, line, what, f"row left out of {sensor}")
             return None
-        if np.isnan(reading) and index not in hollow:
-            what = f"'{row.cells[index][:40]}'" if row.cells[index] else "empty"
-            repairs.add("number", table.path, row.line, f"'{name}' is {what}", "gap")
+        if np.isnan(reading) and name not in hollow:
+            what = f"'{cell[:40]}'" if cell else "empty"
+            repairs.add("number", table.path, line, f"'{name}' is {what}", "gap")
         elif abs(reading * factor) > LARGEST_READING:
-            what = f"'{name}' is '{row.cells[index][:40]}', more than {LARGEST_READING:g} in the {sensor}'s unit"
-            repairs.add("number", table.path, row.line, what, "gap")
+            what = f"'{name}' is '{cell[:40]}', more than {LARGEST_READING:g} in the {sensor}'s unit"
+            repairs.add("number", table.path, line, what, "gap")
             reading = float("nan")
         value.append(reading)
     return value
 
 
-def _ascending(table: RawTable, rows: list[RawRow], times: list[float], repairs: RepairList) -> list[int]:
-    """Return the indices to keep so that time ascends strictly and the fewest rows are lost."""
+def _ascending(table: RawTable, rows: IntArray, times: FloatArray, repairs: RepairList) -> IntArray:
+    """Return the indices to keep of times (n,) s of rows (n,) so that time ascends strictly and the fewest are lost."""
+    if np.all(np.diff(times) > 0):
+        return np.arange(times.size)
     # longest strictly ascending subsequence; of two equal stamps the first stays
     ends: list[float] = []
     chain: list[int] = []
     before: list[int] = []
-    for index, time in enumerate(times):
+    for index, time in enumerate(times.tolist()):
         place = bisect_left(ends, time)
         before.append(chain[place - 1] if place else -1)
         if place == len(ends):
@@ -496,17 +513,15 @@ def _ascending(table: RawTable, rows: list[RawRow], times: list[float], repairs:
         kept.append(index)
         index = before[index]
     kept.reverse()
-    sound = set(kept)
     first = {times[index]: index for index in reversed(kept)}
-    for index, row in enumerate(rows):
-        if index in sound:
-            continue
+    for index in np.setdiff1d(np.arange(times.size), kept).tolist():
         what = f"time {times[index]:.9g} s is out of order"
         if times[index] in first:
-            again = rows[first[times[index]]]
-            what = f"time {times[index]:.9g} s is doubled" + ", and so is the row" * (row.cells == again.cells)
-        repairs.add("time", table.path, row.line, what, "row left out")
-    return kept
+            again = int(rows[first[times[index]]])
+            whole = table.cells(int(rows[index])) == table.cells(again)
+            what = f"time {times[index]:.9g} s is doubled" + ", and so is the row" * whole
+        repairs.add("time", table.path, int(table.line[rows[index]]), what, "row left out")
+    return np.array(kept)
 
 
 # --------------------------------------------------------------------------------------------- the recording

@@ -1,19 +1,24 @@
-"""A raw logger file as rows of cells: what is damaged is mended or left out, and every such line is listed."""
+"""A raw logger file as columns of cells: what is damaged is mended or left out, and every such line is listed."""
 
 from __future__ import annotations
 
-import codecs
 import csv
 import json
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from discsim.arrays import BoolArray, IntArray
 from discsim.errors import InputError
+from discsim.validation.importing.cell_texts import CellTexts, number, packed
+from discsim.validation.importing.text_lines import TextLines
 
-__all__ = ["REPAIRS", "Layout", "RawRow", "RawTable", "Repair", "RepairList", "number", "read_raw"]
+__all__ = ["REPAIRS", "Layout", "RawTable", "Repair", "RepairList", "read_raw"]
 
 #: What a map may allow, and what is then done.
 REPAIRS = {
@@ -54,6 +59,8 @@ class RepairList:
         return sorted(self._found, key=lambda repair: (repair.file, repair.line))
 
 
+#: blanks of ASCII beside the end of a line
+_BLANKS = " \t\x0b\x0c\x1c\x1d\x1e\x1f"
 #: What Arduino's serial monitor puts before a line.
 _MONITOR = re.compile(r"^(\d\d?:\d\d:\d\d(?:\.\d+)?) -> ")
 
@@ -112,23 +119,40 @@ class Layout:
         return cell.replace(self.thousands, "") if grouped else cell
 
 
-class RawRow(NamedTuple):
-    """A record: its number among the data rows, its line in the file (1-based) and its cells."""
-
-    number: int
-    line: int
-    cells: list[str]
-
-
 @dataclass(frozen=True)
 class RawTable:
-    """The sound rows of a raw file; ``total`` counts the data rows with those left out."""
+    """The sound rows of a raw file, column by column; ``total`` counts the data rows with those left out.
+
+    ``number`` (n,) are the rows' numbers among the data rows, ``line`` (n,) their lines in the file, from 1.
+    """
 
     path: Path
     columns: tuple[str, ...]
     header_line: int
-    rows: tuple[RawRow, ...]
+    number: IntArray
+    line: IntArray
+    texts: tuple[CellTexts, ...]
     total: int
+
+    def __len__(self) -> int:
+        return self.number.size
+
+    def column(self, name: str) -> CellTexts:
+        """Return the cells (n,) of the first column of a name."""
+        return self.texts[self.columns.index(name)]
+
+    def cells(self, row: int) -> list[str]:
+        """Return the cells of a row, by its place in the table."""
+        return [column[row] for column in self.texts]
+
+    def emptied(self) -> RawTable:
+        """Return the table without its cells."""
+        return replace(self, texts=())
+
+    def select(self, rows: BoolArray) -> RawTable:
+        """Return the table of some rows (n,)."""
+        columns = tuple(column.select(rows) for column in self.texts)
+        return replace(self, number=self.number[rows], line=self.line[rows], texts=columns)
 
 
 def _spread(cell: str) -> list[str]:
@@ -142,100 +166,109 @@ def _spread(cell: str) -> list[str]:
     return [str(item) for item in items]
 
 
-#: what tools write where there is no number (pandas, R, spreadsheets, C libraries), and for one that is too large
-GAPS = frozenset(
-    {
-        "nan",
-        "-nan",
-        "+nan",
-        "na",
-        "n/a",
-        "#n/a",
-        "null",
-        "none",
-        "nil",
-        "-",
-        "--",
-        "?",
-        "#num!",
-        "#value!",
-        "#div/0!",
-        "1.#qnan",
-        "-1.#ind",
-        "1.#ind",
-        "nan(ind)",
-        "-nan(ind)",
-        "inf",
-        "-inf",
-        "+inf",
-        "infinity",
-        "-infinity",
-        "+infinity",
-        "1.#inf",
-        "-1.#inf",
-        "ovf",
-        "ovfl",
-        "overflow",
-    }
-)
-
-
-def number(cell: str, decimal: str = ".") -> float | None:
-    """Return a cell's finite number, NaN where it is empty or one of `GAPS`, None where it is neither."""
-    text = cell.replace(",", ".") if decimal == "," else cell
-    if text == "" or text.lower() in GAPS:
-        return float("nan")
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    # float() takes 1_000, and 1e999 as infinite; no logger means a number by them
-    return value if "_" not in text and abs(value) < float("inf") else None
-
-
 def read_raw(path: Path, layout: Layout, repairs: RepairList) -> RawTable:
-    """Read a raw file into rows of cells, all as wide as the header.
+    """Read a raw file into columns of cells, all as wide as the header.
 
     Data rows are numbered from 0 in the order of the file; the header, blank lines, comments and pieces of a
     broken header have no number, a row that is left out keeps its own. Raises `InputError` where the file cannot
     be read, has no row, or has a damage that may not be repaired.
     """
-    lines = _lines(path, layout.encoding, repairs)
+    lines = TextLines(path, layout.encoding)
+    if lines.marked:
+        repairs.add(None, path, 1, "byte-order mark", "mark left out")
     at = layout.skip_lines
     columns, header_line = layout.columns, 0
     if not columns:
         at, header_line, columns = _header(path, lines, at, layout, repairs)
-    rows: list[RawRow] = []
-    total = 0
-    for index in range(at, len(lines)):
-        text = _without_comment(path, index + 1, lines[index], layout, repairs)
-        if not text.strip():
-            if index < len(lines) - 1 and not lines[index].strip():
-                repairs.add(None, path, index + 1, "blank line", "line left out")
-            continue
-        cells = layout.cells(text)
-        if len(cells) == len(columns):
-            rows.append(RawRow(total, index + 1, cells))
-        else:
-            what = f"data row {total} has {len(cells)} cells, expected {len(columns)}"
-            repairs.add("width", path, index + 1, what, "row left out")
-        total += 1
-    if not rows:
+    rows = _Rows(path, layout, len(columns), repairs)
+    before = 0
+    for block in lines.blocks():
+        rows.add(block, max(at - before, 0), before)
+        before += len(block)
+    table = rows.table(columns, header_line)
+    if not len(table):
         raise InputError.at(path, None, f"no usable row; expected rows of {len(columns)} cells: {', '.join(columns)}")
-    return RawTable(path, columns, header_line, tuple(rows), total)
+    return table
 
 
-def _lines(path: Path, encoding: str, repairs: RepairList) -> list[str]:
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError.at(path, None, f"cannot be read ({error.strerror})") from None
-    if content.startswith(codecs.BOM_UTF8):
-        repairs.add(None, path, 1, "byte-order mark", "mark left out")
-        content = content.removeprefix(codecs.BOM_UTF8)
-    # a byte that is no text becomes a sign that no number has, so that its cell is found below
-    text = content.decode(encoding, errors="replace").removeprefix("\ufeff")
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+class _Rows:
+    """The rows of a file as they are read, block by block."""
+
+    def __init__(self, path: Path, layout: Layout, width: int, repairs: RepairList) -> None:
+        self.path, self.layout, self.width, self.repairs = path, layout, width, repairs
+        self.total = 0
+        self.number: list[IntArray] = []
+        self.line: list[IntArray] = []
+        self.texts: list[list[NDArray[Any]]] = [[] for _ in range(width)]
+        self.blank: int | None = None
+
+    def add(self, lines: list[str], start: int, before: int) -> None:
+        """Add the lines of a block from ``start`` on; ``before`` lines stand above the block."""
+        if start >= len(lines):
+            return
+        lines = lines[start:]
+        first = before + start + 1
+        cells = self._even(lines)
+        if cells is not None:
+            number, line = np.arange(self.total, self.total + len(lines)), np.arange(first, first + len(lines))
+            self.total += len(lines)
+        else:
+            number, line, cells = self._one_by_one(lines, first)
+        if number.size:
+            self.number.append(number)
+            self.line.append(line)
+            for texts, column in zip(self.texts, zip(*cells, strict=True), strict=True):
+                texts.append(packed(column))
+
+    def _even(self, lines: list[str]) -> list[list[str]] | None:
+        """Return the cells of lines that are all sound rows, plainly written; None where one may be otherwise."""
+        layout, text = self.layout, "\n".join(lines)
+        marks = ('"', "-> ", *([layout.comment] if layout.comment else []))
+        if self.width < 2 or layout.lists or layout.thousands or any(mark in text for mark in marks):
+            return None
+        if layout.separator == "blank":
+            cells = [line.split() for line in lines]
+        elif not text.isascii() or any(blank in text for blank in _BLANKS if blank != layout.separator):
+            return None  # blanks about cells are taken off one by one
+        else:
+            cells = [line.split(layout.separator) for line in lines]
+        self._tell_blank(None)
+        return cells if all(len(row) == self.width for row in cells) else None
+
+    def _one_by_one(self, lines: list[str], first: int) -> tuple[IntArray, IntArray, list[list[str]]]:
+        """Return numbers, lines and cells of the sound rows; what is damaged is listed."""
+        numbers, places, rows = [], [], []
+        for line, whole in enumerate(lines, start=first):
+            self._tell_blank(line)
+            text = _without_comment(self.path, line, whole, self.layout, self.repairs)
+            if not text.strip():
+                self.blank = line if not whole.strip() else None
+                continue
+            cells = self.layout.cells(text)
+            if len(cells) == self.width:
+                numbers.append(self.total)
+                places.append(line)
+                rows.append(cells)
+            else:
+                what = f"data row {self.total} has {len(cells)} cells, expected {self.width}"
+                self.repairs.add("width", self.path, line, what, "row left out")
+            self.total += 1
+        return np.array(numbers, dtype=np.int64), np.array(places, dtype=np.int64), rows
+
+    def _tell_blank(self, line: int | None) -> None:
+        """List the blank line before this one: the file's last line may be blank."""
+        if self.blank is not None:
+            self.repairs.add(None, self.path, self.blank, "blank line", "line left out")
+            self.blank = None
+
+    def table(self, columns: tuple[str, ...], header_line: int) -> RawTable:
+        """Return the table of all rows; the blocks are let go column by column."""
+        empty = np.empty(0, dtype=np.int64)
+        number, line = np.concatenate([empty, *self.number]), np.concatenate([empty, *self.line])
+        texts = []
+        while self.texts:
+            texts.append(CellTexts.joined(self.texts.pop(0)))
+        return RawTable(self.path, columns, header_line, number, line, tuple(texts), self.total)
 
 
 def _without_comment(path: Path, line: int, text: str, layout: Layout, repairs: RepairList) -> str:
@@ -253,18 +286,18 @@ def _without_comment(path: Path, line: int, text: str, layout: Layout, repairs: 
 
 
 def _header(
-    path: Path, lines: list[str], at: int, layout: Layout, repairs: RepairList
+    path: Path, lines: TextLines, at: int, layout: Layout, repairs: RepairList
 ) -> tuple[int, int, tuple[str, ...]]:
     """Return the index of the first line after the header, the header's line (1-based) and its names."""
-    while at < len(lines) and not _without_comment(path, at + 1, lines[at], layout, repairs).strip():
+    while (line := lines.find(at)) is not None and not _without_comment(path, at + 1, line, layout, repairs).strip():
         at += 1
-    if at == len(lines):
+    if line is None:
         raise InputError.at(path, None, "the file is empty; expected a header line")
-    cells = layout.cells(lines[at])
+    cells = layout.cells(line)
     stale = len(cells)
     while stale > 0 and number(cells[stale - 1], layout.decimal) is not None and cells[stale - 1]:
         stale -= 1
-    rest = lines[at + 1] if at + 1 < len(lines) else ""
+    rest, record = lines.find(at + 1) or "", lines.find(at + 2)
     goes_on = any(number(cell, layout.decimal) is None for cell in layout.cells(rest))
     if not 0 < stale < len(cells) or not goes_on:
         return at + 1, at + 1, tuple(cells)
@@ -272,7 +305,7 @@ def _header(
     name, first = _split_name(cells[stale - 1])
     separator = "\t" if layout.separator == "blank" else layout.separator
     whole = layout.cells(separator.join([*cells[: stale - 1], name]) + rest)
-    width = len(layout.cells(lines[at + 2])) if at + 2 < len(lines) else 0
+    width = 0 if record is None else len(layout.cells(record))
     if len(whole) != width:
         raise InputError.at(
             path, at + 1, f"broken header: with the next line it has {len(whole)} names, the next row {width} cells"

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from discsim.arrays import BoolArray, FloatArray
 from discsim.validation.importing.clock import Break, iso_seconds, mended
 from discsim.validation.importing.import_map import ImportMap, TimeBase
-from discsim.validation.importing.raw_table import RawRow, RawTable, RepairList, number
+from discsim.validation.importing.raw_table import RawTable, RepairList
 
 __all__ = ["RowClock", "row_clock"]
 
@@ -19,15 +20,20 @@ FURTHEST = 1e13
 
 @dataclass(frozen=True)
 class RowClock:
-    """Time (s) and stretch of each row that has a time, by the row's number; lines at which a new stretch begins."""
+    """Time (n,) s of each row of a table, NaN where it has none, its stretch (n,), lines at which a new one begins."""
 
-    time: dict[int, float]
-    stretch: dict[int, int]
+    time: FloatArray
+    stretch: FloatArray
     starts: tuple[tuple[int, str], ...]
 
-    def longest(self, numbers: list[int]) -> int:
-        """Return the stretch that holds most of these rows."""
-        found, counts = np.unique([self.stretch[number] for number in numbers], return_counts=True)
+    @property
+    def known(self) -> BoolArray:
+        """Which rows (n,) have a time."""
+        return np.isfinite(self.time)
+
+    def longest(self, rows: BoolArray) -> int:
+        """Return the stretch that holds most of these rows (n,)."""
+        found, counts = np.unique(self.stretch[rows], return_counts=True)
         return int(found[np.argmax(counts)])
 
 
@@ -35,66 +41,60 @@ def row_clock(table: RawTable, import_map: ImportMap, base: TimeBase, repairs: R
     """Return the time of each row by ``base``; raises `InputError` for damage that the map does not let repair."""
     decimal = import_map.layout.decimal
     counters = _counters(table, base.counter, decimal, repairs)
-    rows: list[RawRow] = []
-    times: list[float] = []
-    for row in table.rows:
-        time = _time(table, row, counters, base, decimal, repairs)
-        if time is not None:
-            rows.append(row)
-            times.append(time)
-    clock = mended(times, base.scale if base.step is None else base.step)
+    time = _times(table, counters, base, decimal, repairs)
+    known = np.flatnonzero(np.isfinite(time))
+    clock = mended(time[known], base.scale if base.step is None else base.step)
     starts = []
     for found in clock.breaks:
-        row = rows[found.index]
-        repairs.add("time", table.path, row.line, found.what, _action(found))
+        line = int(table.line[known[found.index]])
+        repairs.add("time", table.path, line, found.what, _action(found))
         if not found.shift:
-            starts.append((row.line, found.what))
-    numbers = [row.number for row in rows]
-    return RowClock(
-        dict(zip(numbers, clock.time.tolist(), strict=True)),
-        dict(zip(numbers, clock.stretch.astype(int).tolist(), strict=True)),
-        tuple(starts),
-    )
+            starts.append((line, found.what))
+    stretch = np.zeros(len(table))
+    time[known], stretch[known] = clock.time, clock.stretch
+    return RowClock(time, stretch, tuple(starts))
 
 
 def _action(found: Break) -> str:
     return f"time goes on: {found.shift:.9g} s added from here" if found.shift else "a new stretch begins here"
 
 
-def _counters(table: RawTable, name: str | None, decimal: str, repairs: RepairList) -> dict[int, float]:
-    """Return the counter of each row (by row number), with its jumps listed."""
+def _counters(table: RawTable, name: str | None, decimal: str, repairs: RepairList) -> FloatArray:
+    """Return the counter (n,) of each row, NaN where it has none, with its jumps listed; row numbers without a name."""
     if name is None:
-        return {}
-    index = table.columns.index(name)
-    counters: dict[int, float] = {}
-    previous = None
-    for row in table.rows:
-        count = number(row.cells[index], decimal)
-        if count is None or np.isnan(count):
-            repairs.add("number", table.path, row.line, f"'{name}' is '{row.cells[index][:40]}'", "row left out")
-            continue
-        if previous is not None and count > previous + 1:
-            lost = f"{count - previous - 1:.0f} missing; time keeps their place"
-            repairs.add("counter", table.path, row.line, f"'{name}' jumps from {previous:.0f} to {count:.0f}", lost)
-        counters[row.number] = previous = count
+        return table.number.astype(np.float64)
+    column = table.column(name)
+    counters, _ = column.numbers(decimal)
+    sound = np.flatnonzero(~np.isnan(counters))
+    jumps = np.flatnonzero(counters[sound][1:] > counters[sound][:-1] + 1) + 1
+    before = dict(zip(sound[jumps].tolist(), counters[sound[jumps - 1]].tolist(), strict=True))
+    for row in sorted([*np.flatnonzero(np.isnan(counters)).tolist(), *before]):
+        line, count = int(table.line[row]), float(counters[row])
+        if row in before:
+            lost = f"{count - before[row] - 1:.0f} missing; time keeps their place"
+            repairs.add("counter", table.path, line, f"'{name}' jumps from {before[row]:.0f} to {count:.0f}", lost)
+        else:
+            repairs.add("number", table.path, line, f"'{name}' is '{column[row][:40]}'", "row left out")
     return counters
 
 
-def _time(
-    table: RawTable, row: RawRow, counters: dict[int, float], base: TimeBase, decimal: str, repairs: RepairList
-) -> float | None:
-    if base.counter is not None and row.number not in counters:
-        return None
+def _times(table: RawTable, counters: FloatArray, base: TimeBase, decimal: str, repairs: RepairList) -> FloatArray:
+    """Return the time (n,) s of each row before any break of the clock is mended, NaN where it has none."""
     if base.column is None:
         assert base.step is not None
-        return (counters[row.number] if base.counter is not None else row.number) * base.step
-    cell = row.cells[table.columns.index(base.column)]
-    time = iso_seconds(cell) if base.iso else number(cell, decimal)
-    if time is None or np.isnan(time):
-        expected = ", expected an ISO time" if base.iso else ""
-        repairs.add("number", table.path, row.line, f"'{base.column}' is '{cell[:40]}'{expected}", "row left out")
-        return None
-    if not abs(time * base.scale) <= FURTHEST:
-        repairs.add("number", table.path, row.line, f"'{base.column}' is '{cell[:40]}', no time", "row left out")
-        return None
-    return time * base.scale
+        return np.asarray(counters * base.step)
+    column = table.column(base.column)
+    if base.iso:
+        found = [iso_seconds(cell) for cell in column]
+        time = np.array([np.nan if one is None else one for one in found], dtype=np.float64)
+    else:
+        time, _ = column.numbers(decimal)
+    counted = ~np.isnan(counters)
+    with np.errstate(invalid="ignore"):
+        sound = np.abs(time * base.scale) <= FURTHEST
+    expected = ", expected an ISO time" if base.iso else ""
+    for row in np.flatnonzero(counted & ~sound).tolist():
+        what = expected if np.isnan(time[row]) else ", no time"
+        said = f"'{base.column}' is '{column[row][:40]}'{what}"
+        repairs.add("number", table.path, int(table.line[row]), said, "row left out")
+    return np.where(counted & sound, time * base.scale, np.nan)

@@ -33,7 +33,7 @@ def drawn_values(figure: Figure) -> str:
         for label, points in _curves(axes):
             kept = points[np.isfinite(points).all(axis=1)]
             pixels = axes.transData.transform(kept) if len(kept) else np.empty((0, 2))
-            inside = np.array([axes.bbox.contains(x, y) for x, y in pixels], dtype=bool)
+            inside = np.all((pixels >= axes.bbox.min) & (pixels <= axes.bbox.max), axis=1)
             kept, pixels = kept[inside], pixels[inside]
             if not len(kept):
                 continue

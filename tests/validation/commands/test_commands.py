@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import tomllib
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -23,6 +24,8 @@ from discsim.validation.experiments import validation_run as headless
 from discsim.validation.reporting.limits import shipped_limits
 from discsim.validation.reporting.scores import at_most
 from discsim.written import as_written
+
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def run(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
@@ -65,6 +68,16 @@ def test_a_command_loads_neither_the_others_nor_what_it_does_not_need():
     flown = loaded("import discsim.validation.commands.fly, discsim.engine, discsim.sensors, discsim.many_flights")
     assert "mujoco" in flown
     assert not flown & {"scipy.interpolate", "scipy.optimize", "scipy.special", "matplotlib"}
+
+
+def test_an_interrupt_while_python_still_loads_is_one_line(tmp_path):
+    """Half a second of a command's start is loading: an interrupt then showed a traceback of the import."""
+    (tmp_path / "typer.py").write_text("raise KeyboardInterrupt\n")
+    code = "import sys; sys.path.insert(0, sys.argv[1]); from discsim.validation.start import main; main()"
+    done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True)
+    assert (done.returncode, done.stderr, done.stdout) == (130, "discsim: interrupted\n", "")
+    script = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]["discsim"]
+    assert script == "discsim.validation.start:main"
 
 
 def test_a_flight_leaves_a_recording_and_its_truth_which_ends_on_the_ground(monkeypatch, tmp_path, capsys):

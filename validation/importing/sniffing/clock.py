@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
@@ -71,7 +73,7 @@ def seconds(clock: Clock, numbers: Numbers) -> FloatArray:
     """Return the time of each row, (n,) s from an origin that tables with the same clock share."""
     if clock.column is None:
         assert clock.step is not None
-        count = np.array([row.number for row in numbers.table.rows], dtype=float)
+        count = numbers.table.number.astype(np.float64)
         if clock.counter is not None:
             count = numbers.values[:, numbers.table.columns.index(clock.counter)]
         return count * clock.step
@@ -88,7 +90,8 @@ def _rank(numbers: Numbers, k: int, clock: Clock) -> int:
 
 def _clock(numbers: Numbers, k: int, name: str) -> Clock | None:
     cells = numbers.cells(k)
-    if sum(map(is_stamp, cells[:50])) > 0.5 * len(cells[:50]):
+    first = list(islice(cells, 50))
+    if sum(map(is_stamp, first)) > 0.5 * len(first):
         time = _stamps(cells)
         why = Decision("time", f"'{name}', date and time", "certain", "its cells are dates with a time")
         return Clock(name, "iso", None, None, why) if _ascends(time) else None
@@ -176,7 +179,7 @@ def _written(name: str) -> str | None:
     return None
 
 
-def _stamps(cells: list[str]) -> FloatArray:
+def _stamps(cells: Iterable[str]) -> FloatArray:
     """Return dates with a time (or times of day) as seconds; NaN where one is neither."""
     found = [iso_seconds(cell) for cell in cells]
     return np.array([np.nan if time is None else time for time in found])
@@ -189,7 +192,9 @@ def _without(numbers: Numbers) -> Clock:
     """
     off = OFF_GUESSED
     step, sure, why = STEP, _sure("guess"), f"no time stamps; rows taken as {1 / STEP:.0f} a second: state step_s"
-    unread = [k for k, name in enumerate(numbers.names) if is_time_name(name) and any(numbers.cells(k))]
+    unread = [
+        k for k, name in enumerate(numbers.names) if is_time_name(name) and not np.all(numbers.cells(k).equal(""))
+    ]
     if unread:
         cell = next(cell for cell in numbers.cells(unread[0]) if cell)
         why = f"'{numbers.table.columns[unread[0]]}' tells no time here (its first cell is '{cell[:30]}'); {why[16:]}"

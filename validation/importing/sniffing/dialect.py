@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
 from pathlib import Path
 
 from discsim.errors import InputError
+from discsim.validation.importing.cell_texts import GAPS
 from discsim.validation.importing.clock import is_stamp
-from discsim.validation.importing.raw_table import GAPS, Layout, RepairList, read_raw
-from discsim.validation.importing.sniffing.text import encoding_of, lines_of
+from discsim.validation.importing.raw_table import Layout, RepairList, read_raw
+from discsim.validation.importing.sniffing.text import encoding_of
+from discsim.validation.importing.text_lines import TextLines
 
 __all__ = ["Dialect", "dialect_of"]
 
@@ -46,16 +48,16 @@ class Dialect:
 def dialect_of(path: Path) -> Dialect:
     """Find the layout of a text file; raises `InputError` where it has no rows of numbers."""
     encoding = encoding_of(path)
-    lines = lines_of(path, encoding)
+    lines = TextLines(path, encoding)
     comment = _comment(lines)
-    bare = [(index, line) for index, line in enumerate(lines) if line.strip() and not _is_comment(line, comment)]
-    layout, width = _separators(path, [line for _, line in _sample(bare)], Layout(comment=comment, encoding=encoding))
-    records = [index for index, _ in islice(_records(bare, width, layout), 2)]
+    sample = _sample(lines, comment)
+    layout, width = _separators(path, sample, Layout(comment=comment, encoding=encoding))
+    records = [index for index, _ in islice(_records(_bare(lines, comment), width, layout), 2)]
     if len(records) < 2:
-        raise InputError.at(path, None, _no_rows(bare[0][1]))
-    remarks = _remarks(layout)
-    above = tuple(line.strip() for line in lines[: records[0]] if line.strip())
-    return replace(_named(path, lines, layout, records[0], width, remarks), preamble=above)
+        raise InputError.at(path, None, _no_rows(sample[0]))
+    head = list(islice(lines, records[0] + 1))
+    above = tuple(line.strip() for line in head[:-1] if line.strip())
+    return replace(_named(path, head, layout, records[0], width, _remarks(layout)), preamble=above)
 
 
 def _no_rows(line: str) -> str:
@@ -76,9 +78,13 @@ def _remarks(layout: Layout) -> tuple[str, ...]:
     return tuple(words)
 
 
-def _comment(lines: Sequence[str]) -> str:
+def _comment(lines: TextLines) -> str:
     """Return what starts a comment: a mark at the beginning of a line that holds no record's number at once."""
-    counts = Counter(mark for line in lines for mark in _COMMENTS if line.lstrip().startswith(mark))
+    counts: Counter[str] = Counter()
+    for block in lines.blocks():
+        text = "\n".join(block)
+        marks = [mark for mark in _COMMENTS if mark in text]
+        counts.update(mark for line in block if marks for mark in marks if line.lstrip().startswith(mark))
     return counts.most_common(1)[0][0] if counts else ""
 
 
@@ -86,10 +92,21 @@ def _is_comment(line: str, comment: str) -> bool:
     return bool(comment) and line.lstrip().startswith(comment)
 
 
-def _sample(bare: list[tuple[int, str]]) -> list[tuple[int, str]]:
+def _bare(lines: TextLines, comment: str) -> Iterator[tuple[int, str]]:
+    """Yield the lines that are no blanks and no comments, with their index."""
+    return (
+        (index, line)
+        for index, line in enumerate(lines)
+        if not (line.isspace() or not line or _is_comment(line, comment))
+    )
+
+
+def _sample(lines: TextLines, comment: str) -> list[str]:
     """Return the first lines, and as many from all over the file, which outweigh a preamble."""
-    step = max(1, len(bare) // HEAD_LINES)
-    return bare[:HEAD_LINES] + bare[HEAD_LINES // 2 :: step]
+    count = sum(1 for _ in _bare(lines, comment))
+    step = max(1, count // HEAD_LINES)
+    first = [line for _, line in islice(_bare(lines, comment), HEAD_LINES)]
+    return first + [line for _, line in islice(_bare(lines, comment), HEAD_LINES // 2, None, step)]
 
 
 # ------------------------------------------------------------------------------------------------- separators
@@ -142,7 +159,7 @@ def _is_number(cell: str, layout: Layout) -> bool:
     return re.fullmatch(rf"[+-]?(\d+({point}\d*)?|{point}\d+)([eE][+-]?\d+)?", cell, re.ASCII) is not None
 
 
-def _records(bare: Sequence[tuple[int, str]], width: int, layout: Layout) -> Iterator[tuple[int, str]]:
+def _records(bare: Iterable[tuple[int, str]], width: int, layout: Layout) -> Iterator[tuple[int, str]]:
     """Yield the lines that are records of this width."""
     for index, line in bare:
         cells = layout.cells(line)

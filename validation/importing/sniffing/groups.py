@@ -12,7 +12,8 @@ import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
 from discsim.recording import SENSORS
-from discsim.validation.importing.raw_table import RawTable, number
+from discsim.validation.importing.cell_texts import CellTexts, number
+from discsim.validation.importing.raw_table import RawTable
 from discsim.validation.importing.sniffing.dialect import Dialect
 from discsim.validation.importing.sniffing.names import Name, penalty_of, read_name, says_nothing, sensor_of
 from discsim.validation.importing.sniffing.units import COUNTS, OTHER, Reading, readings_of
@@ -56,33 +57,26 @@ class Numbers:
     @cached_property
     def values(self) -> FloatArray:
         """The cells as numbers, (n, columns); NaN where one is none."""
-        columns = []
-        decimal = self.dialect.layout.decimal
-        for k in range(len(self.table.columns)):
-            cells = [row.cells[k] for row in self.table.rows]
-            try:
-                columns.append(np.array([cell.replace(",", ".") if decimal == "," else cell for cell in cells], float))
-            except ValueError:
-                found = [number(cell, decimal) for cell in cells]
-                columns.append(np.array([np.nan if value is None else value for value in found], dtype=float))
-        return np.column_stack(columns)
+        value = np.empty((len(self.table), len(self.table.columns)))
+        for k, column in enumerate(self.table.texts):
+            value[:, k], _ = column.numbers(self.dialect.layout.decimal)
+        return value
 
-    def cells(self, column: int) -> list[str]:
+    def cells(self, column: int) -> CellTexts:
         """Return a column's texts."""
-        return [row.cells[column] for row in self.table.rows]
+        return self.table.texts[column]
 
     @cached_property
     def ids(self) -> tuple[int, tuple[str, ...]] | None:
         """The column that says whose row it is, and its values in the order of appearance; None where there is none."""
         for k, name in enumerate(self.table.columns):
-            texts = self.cells(k)
-            few = dict.fromkeys(texts)
-            if len(few) > MAX_IDS or len(texts) <= 4 * len(few):
+            few = self.cells(k).few(MAX_IDS)
+            if few is None or len(self.table) <= 4 * len(few):
                 continue
             words = all(number(text, self.dialect.layout.decimal) is None for text in few)
             telling = sum(sensor_of(text) is not None for text in few)
             if words and (name.strip().lower() in _ID_NAMES or telling > 1):
-                return k, tuple(few)
+                return k, few
         return None
 
 
@@ -113,14 +107,14 @@ class Triple:
     def rows(self) -> BoolArray:
         """The rows that are this triple's, (n,)."""
         if self.where is None:
-            return np.ones(len(self.numbers.table.rows), dtype=np.bool_)
-        column = self.numbers.table.columns.index(self.where[0])
-        return np.array([cell == self.where[1] for cell in self.numbers.cells(column)])
+            return np.ones(len(self.numbers.table), dtype=np.bool_)
+        return self.numbers.table.column(self.where[0]).equal(self.where[1])
 
     @cached_property
     def values(self) -> FloatArray:
         """Its readings as written, (n, 3)."""
-        return np.asarray(self.numbers.values[self.rows][:, list(self.columns)])
+        value = np.asarray(self.numbers.values[:, list(self.columns)])
+        return value if self.where is None else value[self.rows]
 
     @property
     def label(self) -> str:

@@ -204,7 +204,7 @@ def _others(found: dict[str, tuple[Triple, Decision]], left: Sequence[Triple]) -
 
 
 def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) -> InputError:
-    rows = max(len(file.numbers.table.rows) for file in files)
+    rows = max(len(file.numbers.table) for file in files)
     if rows < FEWEST_ROWS:
         return InputError.at(raw, None, f"{rows} rows of numbers in it; expected a log of {FEWEST_ROWS} at least")
     columns = ", ".join(f"'{name}'" for name in files[0].numbers.table.columns[:12])
@@ -275,7 +275,8 @@ def _proposal(
     fit = _turned(found, times)
     units: dict[str, Unit] = {}
     for sensor, (triple, _) in found.items():
-        value = triple.values[np.isfinite(triple.values).all(axis=1)]
+        sound = np.isfinite(triple.values).all(axis=1)
+        value = triple.values if sound.all() else triple.values[sound]
         stated, above = _stated(sensor, triple, value)
         if sensor == "gyroscope":
             turned = fit.worth if fit is not None and fit.ratio < TELLING and clock.column is not None else None
@@ -317,6 +318,8 @@ def _stated(sensor: str, triple: Triple, value: FloatArray) -> tuple[Reading | N
 
 def _reading(t: FloatArray, value: FloatArray) -> Reading3:
     """Return the rows with a time, in its order."""
+    if np.all(np.diff(t) >= 0):
+        return Reading3(t, value)
     order = np.argsort(t, kind="stable")
     order = order[np.isfinite(t[order])]
     return Reading3(t[order], value[order])

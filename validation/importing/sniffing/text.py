@@ -6,10 +6,11 @@ import codecs
 from pathlib import Path
 
 from discsim.errors import InputError
+from discsim.files import BLOCK
 from discsim.validation.importing.logs import kind_of
 from discsim.validation.importing.sniffing.names import foreign_words
 
-__all__ = ["encoding_of", "lines_of"]
+__all__ = ["encoding_of"]
 
 #: First bytes of files that are no tables, and what to do with them.
 SIGNATURES = (
@@ -52,35 +53,47 @@ def encoding_of(path: Path) -> str:
     under which words for time and sensors stand in it, or in Windows' Latin-1.
     """
     try:
-        content = path.read_bytes()
+        head, empty = _head_of(path)
     except OSError as error:
         raise InputError.at(path, None, f"cannot be read ({error.strerror}); expected what a logger wrote") from None
-    if not content.strip():
+    if empty:
         raise InputError.at(path, None, "the file is empty; expected rows of numbers")
     kind = kind_of(path)
     if kind is not None:
         raise InputError.at(path, None, f"is {kind.name} among other files; import that file itself")
     for start, what in SIGNATURES:
-        if content.startswith(start):
+        if head.startswith(start):
             raise InputError.at(path, None, f"is {what}; expected text with rows of numbers")
     for mark, encoding in _BOMS:
-        if content.startswith(mark):
+        if head.startswith(mark):
             return encoding
-    head = content[:_LOOKED_AT]
     if sum(head.count(byte) for byte in _CONTROL) > 0.01 * len(head):  # a damaged line of a text is far below
         raise InputError.at(path, None, "is binary, no text; expected text with rows of numbers")
     if head.count(0):
         return _wide(path, head)
-    if _decodes(content, "utf-8"):
+    if _decodes(path, "utf-8"):
         return "utf-8"
-    return _foreign(head) or ("cp1252" if _decodes(content, "cp1252") else "latin-1")
+    return _foreign(head) or ("cp1252" if _decodes(path, "cp1252") else "latin-1")
 
 
-def _decodes(content: bytes, encoding: str) -> bool:
-    try:
-        content.decode(encoding)
-    except UnicodeDecodeError:
-        return False
+def _head_of(path: Path) -> tuple[bytes, bool]:
+    """Return the first bytes of a file, and whether nothing but blanks is in it."""
+    with path.open("rb") as stream:
+        head = piece = stream.read(_LOOKED_AT)
+        while piece and not piece.strip():
+            piece = stream.read(_LOOKED_AT)
+    return head, not piece
+
+
+def _decodes(path: Path, encoding: str) -> bool:
+    decoder = codecs.getincrementaldecoder(encoding)()
+    with path.open("rb") as stream:
+        try:
+            while piece := stream.read(BLOCK):
+                decoder.decode(piece)
+            decoder.decode(b"", final=True)
+        except UnicodeDecodeError:
+            return False
     return True
 
 
@@ -107,9 +120,3 @@ def _wide(path: Path, head: bytes) -> str:
     if head.count(0) < 0.01 * len(head):  # a block of zeros that a power cut left in a log
         return "utf-8"
     raise InputError.at(path, None, "is binary, no text; expected text with rows of numbers")
-
-
-def lines_of(path: Path, encoding: str) -> list[str]:
-    """Return the lines of a text as the reader of raw tables splits them."""
-    text = path.read_bytes().decode(encoding, errors="replace").removeprefix("\ufeff")
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")

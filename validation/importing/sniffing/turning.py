@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, IntArray
 
 __all__ = ["PERMUTATIONS", "Fit", "Steps", "best_axes", "best_worth", "steps_between"]
 
@@ -34,11 +34,16 @@ PERMUTATIONS = tuple(
 
 @dataclass(frozen=True)
 class Steps:
-    """Vectors before and after each step, (n, 3), and the integral of the gyroscope's readings over it, (n, 3)."""
+    """Steps of a vector (n, 3), from the rows ``first`` (k,) to the ``lag``-th next each.
 
-    before: FloatArray
-    after: FloatArray
-    turn: FloatArray
+    ``integral`` (n, 3) is that of the gyroscope's readings, ``size`` (k,) the length of its change over each step.
+    """
+
+    vector: FloatArray
+    integral: FloatArray
+    lag: int
+    first: IntArray
+    size: FloatArray
 
 
 class Fit(NamedTuple):
@@ -64,9 +69,14 @@ def steps_between(t_gyro: FloatArray, gyro: FloatArray, t_vector: FloatArray, ve
     fresh[1:] &= np.any(np.diff(vector, axis=0) != 0, axis=1)
     if sound.sum() < FEWEST or fresh.sum() < FEWEST:
         return []
-    t_gyro, gyro, t_vector, vector = t_gyro[sound], gyro[sound], t_vector[fresh], vector[fresh]
-    order = np.argsort(t_gyro, kind="stable")
-    t_gyro, gyro = t_gyro[order], gyro[order]
+    # nothing is copied where all rows count, in their order: a log of hours has hundreds of MB of each
+    if not sound.all():
+        t_gyro, gyro = t_gyro[sound], gyro[sound]
+    if not fresh.all():
+        t_vector, vector = t_vector[fresh], vector[fresh]
+    if np.any(np.diff(t_gyro) < 0):
+        order = np.argsort(t_gyro, kind="stable")
+        t_gyro, gyro = t_gyro[order], gyro[order]
     integral = cumulative_trapezoid(gyro, t_gyro, axis=0, initial=0)
     at = np.column_stack([np.interp(t_vector, t_gyro, integral[:, axis]) for axis in range(3)])
     # where it may stand at its range it tells no turn
@@ -78,17 +88,20 @@ def steps_between(t_gyro: FloatArray, gyro: FloatArray, t_vector: FloatArray, ve
         spacing = t_vector[lag:] - t_vector[:-lag]
         whole = (spacing > 0) & (spacing < 3 * np.median(spacing)) & (lost[lag:] == lost[:-lag])
         if whole.sum() >= FEWEST:
-            found.append(Steps(vector[:-lag][whole], vector[lag:][whole], (at[lag:] - at[:-lag])[whole]))
+            first = np.flatnonzero(whole)
+            found.append(Steps(vector, at, lag, first, np.linalg.norm(at[lag:] - at[:-lag], axis=1)[first]))
     return found
 
 
-def _chosen(steps: Steps, worth: float) -> Steps | None:
-    size = np.linalg.norm(steps.turn, axis=1) * worth
-    rows = np.flatnonzero((size > SMALLEST) & (size < LARGEST))
+def _chosen(steps: Steps, worth: float) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Return the vectors before and after some steps that tell, and the integrals over them; None where few do."""
+    size = steps.size * worth
+    rows = steps.first[(size > SMALLEST) & (size < LARGEST)]
     if rows.size < FEWEST:
         return None
     rows = rows[np.linspace(0, rows.size - 1, min(MOST, rows.size)).astype(int)]
-    return Steps(steps.before[rows], steps.after[rows], steps.turn[rows])
+    after = rows + steps.lag
+    return steps.vector[rows], steps.vector[after], steps.integral[after] - steps.integral[rows]
 
 
 def _rotations(turn: FloatArray) -> FloatArray:
@@ -107,14 +120,15 @@ def _fits(steps: Steps, worth: float, ways: Sequence[FloatArray]) -> list[Fit]:
     chosen = _chosen(steps, worth)
     if chosen is None:
         return []
-    rotation = _rotations(chosen.turn * worth)
+    before, after, turn = chosen
+    rotation = _rotations(turn * worth)
     design = (np.eye(3) - rotation).reshape(-1, 3)
     inverse = np.linalg.pinv(design, rcond=1e-3)
-    change = float(np.sqrt(np.mean((chosen.after - chosen.before) ** 2))) or 1.0
+    change = float(np.sqrt(np.mean((after - before) ** 2))) or 1.0
     found: list[Fit] = []
     for way in ways:
-        turned = np.einsum("nij,nj->ni", rotation, chosen.before @ way.T)
-        left = (chosen.after @ way.T - turned).reshape(-1)
+        turned = np.einsum("nij,nj->ni", rotation, before @ way.T)
+        left = (after @ way.T - turned).reshape(-1)
         offset = inverse @ left
         ratio = float(np.sqrt(np.mean((left - design @ offset) ** 2))) / change
         found.append(Fit(ratio, way, worth, offset))
