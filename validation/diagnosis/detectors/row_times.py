@@ -16,10 +16,11 @@ from scipy.interpolate import BSpline
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
-from discsim.effects.timing_rows import Average, LostRows, OwnClock
+from discsim.effects.timing_rows import Average, ImuClock, LostRows, OwnClock
 from discsim.recording import Recording
 from discsim.validation.diagnosis.answer.measured import Located
 from discsim.validation.diagnosis.answer.named import SMALLEST_P_VALUE, Evidence, NamedEffect, ParameterValue
+from discsim.validation.diagnosis.consistency.imu_clock import ImuClock as FoundImuClock
 from discsim.validation.diagnosis.consistency.own_clock import OwnClock as FoundClock
 from discsim.validation.diagnosis.consistency.phase_regression import angle_turned, signal_of
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, RowProof
@@ -42,11 +43,18 @@ class RowTimes:
     names: tuple[str, ...]
     clock: FoundClock
     proofs: tuple[RowProof, ...]
+    imu: FoundImuClock | None = None
 
     def applied(self, recordings: Sequence[Recording]) -> list[Recording]:
         """Return the recordings in the times that their rows were made, their fields as means of two samples."""
-        pairs = zip(recordings, self.names, strict=True)
-        return [self.clock.counted(recording, name) or recording for recording, name in pairs]
+        return [self._applied(recording, name) for recording, name in zip(recordings, self.names, strict=True)]
+
+    def _applied(self, recording: Recording, name: str) -> Recording:
+        counted = self.clock.counted(recording, name)
+        if counted is None or self.imu is None:
+            return counted or recording
+        shown = next(one for one in self.clock.shown if one.recording == name)
+        return self.imu.counted(recording, counted, name, shown)
 
     @property
     def _gains(self) -> tuple[float, float]:
@@ -69,6 +77,8 @@ class RowTimes:
         error = float(np.std(lost, ddof=1) / np.sqrt(lost.size)) if lost.size > 1 else None
         held = len(self.clock.shown) > 1
 
+        imu = self.imu if self.imu is not None and not self.imu.loops else None
+
         def named(kind: type, acts_on: str, value: float, sd: float | None, gain: float) -> NamedEffect:
             row = catalogued(kind, acts_on)
             bic = gain - float(np.log(max(sum(shown.newest.size for shown in self.clock.shown), 2)))
@@ -79,6 +89,7 @@ class RowTimes:
             named(LostRows, "clock", float(np.mean(lost)), error, rows),
             named(OwnClock, "magnetometer", self.clock.period_s, self.clock.sd_s, clock),
             named(Average, "magnetometer", 0.5, None, clock),
+            *(() if imu is None else (named(ImuClock, "board", imu.period_s, imu.sd_s, imu.gain),)),
         )
 
     def located(self, end: float) -> tuple[Located, ...]:
@@ -121,7 +132,7 @@ def row_times(recordings: Sequence[Recording], names: Sequence[str], agreement: 
     periods = np.array([shown.period_of_others_s for shown in clock.shown])
     if len(clock.shown) < len(recordings) or np.ptp(periods) > _ALIKE * float(np.mean(periods)):
         return None
-    found = RowTimes(tuple(names), clock, agreement.row_proofs)
+    found = RowTimes(tuple(names), clock, agreement.row_proofs, agreement.imu_clock)
     if min(found._gains) < _SECOND or _gained(recordings, found.applied(recordings)) < _SECOND:
         return None
     return found
