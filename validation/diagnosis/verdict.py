@@ -7,6 +7,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.disc import aero_key
 from discsim.effects.catalogue import CATALOGUE
+from discsim.validation.diagnosis.leftovers import leftovers_of, nothing_but_pure_error
 from discsim.validation.diagnosis.result import (
     Recalibration,
     Verdict,
@@ -38,11 +39,16 @@ def judged(tried: Tried, progress: Progress) -> Judged:
 
     Unexplained is what no motion follows, what leaves more than noise, and what a law explains better than a stack of
     effects does. Else effects, or faults of the setup, explain it. Else it is the baseline, recalibrated or not.
+    Of rows that had to be counted nobody knows the instants to within the noise of the sensors: there more is left than
+    pure error, or not.
     """
     found, law = tried.found, None
     if found is None:
         return Judged(tried, "unexplained")
-    left = _leaves_more_than_noise(found)
+    ready = tried.prepared
+    counted = found.at_once and ready.rows is not None and ready.agreement is not None
+    leftovers = leftovers_of(found, ready.rows.names, ready.agreement) if counted else ()
+    left = _leaves_more_than_noise(found) and not nothing_but_pure_error(leftovers)
     if left or _stacked(found):
         progress("looking for a law", 4, 5)
         law = find_law(found.relaxed_fit, found.final, found.own, found.relaxed_noise, tried.prepared.fitted)
@@ -54,7 +60,7 @@ def judged(tried: Tried, progress: Progress) -> Judged:
     else:
         moved = any(item.beyond for item in recalibrations(found).values())
         verdict = "recalibrated" if moved else "consistent"
-    return Judged(tried, verdict, law)
+    return Judged(tried, verdict, law, leftovers)
 
 
 def _leaves_more_than_noise(found: Search) -> bool:

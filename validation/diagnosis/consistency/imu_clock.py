@@ -3,9 +3,10 @@
 Takes recordings whose rows are counted by a magnetometer's samples (`own_clock`); gives, row by row, when the chip of
 gyroscope and accelerometer made what the row shows. The loop asked for a row within one period after the newest sample
 of the field, and the chip's newest sample is at most one of its own periods older than that. Where a wobble turns fast
-each reading tells by its phase how old it is; ages that are a sawtooth put the instants on a comb, whose period is the
-peak of a periodogram (Rayleigh's test, in N. Fisher, "Statistical Analysis of Circular Data", 1993, 4.3). The wobble
-along a flexible motion and the teeth of the comb are found in turn; nothing but whole numbers is chosen row by row.
+each reading tells by its phase how old it is; ages that are a sawtooth put the instants on a comb. The wobble along a
+flexible motion and the teeth of the comb are found in turn, the comb as that on which the instants gather most
+(Rayleigh's statistic, in N. Fisher, "Statistical Analysis of Circular Data", 1993, 4.3), from periods all over the
+range; nothing but whole numbers is chosen row by row, and each choice is paid for.
 """
 
 from __future__ import annotations
@@ -32,12 +33,13 @@ _KNOTS_S, _SLOW_S = 0.25, 0.6
 _SHORTEST, _LONGEST = 0.8, 1.2
 #: by how much the period of one recording may differ from that of the others: a slow slip of the parts' oscillators
 _ALIKE = 5e-3
-#: rounds of wobble and teeth
-_ROUNDS = 12
-#: what a comb's strength must be above the logarithm of the periods tried: chance goes beyond once in 1e5 (Rayleigh)
-_STRENGTH = 11.5
-#: twice the log likelihood that a recording must gain beyond what its choices cost, as for the field's samples
-_PRICE = 24.0
+#: rounds of wobble and teeth for each range of periods, and for the best one
+_FEW_ROUNDS, _ROUNDS = 4, 12
+#: combs that are begun with: periods as quantiles of a range, and phases
+_STARTS, _PHASES = (0.2, 0.4, 0.6, 0.8), 4
+#: twice the log likelihood that a recording must gain beyond what its choices cost, as for the field's samples, and that
+#: all must gain beyond what a comb gains whose period is another by more than the next number
+_PRICE, _ANOTHER = 24.0, 0.02
 #: what chooses one of two teeth costs, in twice the log likelihood
 _CHOICE = 2.0 * float(np.log(2.0))
 #: a comb this near to the logger's loop is the loop itself: the chip is read as it is sampled
@@ -49,8 +51,7 @@ class ImuRows:
     """When the chip made what the rows of one recording show, s after the newest sample of its first row (n,).
 
     ``written`` (n,) are the rows' times as they are written, ``left`` what is left of the wobble, rad/s rms of an axis,
-    with the times of the field's samples and with these; ``strength`` is that of the comb, ``gain`` in twice the log
-    likelihood, choices paid.
+    with the times of the field's samples and with these; ``gain`` is in twice the log likelihood, choices paid.
     """
 
     recording: str
@@ -58,7 +59,6 @@ class ImuRows:
     written: FloatArray
     times: FloatArray
     left: tuple[float, float]
-    strength: float
     gain: float
 
     def to_json(self) -> dict[str, Any]:
@@ -67,7 +67,6 @@ class ImuRows:
             "recording": self.recording,
             "period_s": self.period_s,
             "rows": int(self.times.size),
-            "strength": self.strength,
             "gain": self.gain,
             "wobble_left_rad_s": dict(zip(("as_the_field", "own_clock"), self.left, strict=True)),
         }
@@ -162,7 +161,9 @@ def _wobble_of(recording: Recording, shown: SamplesShown) -> _Wobble | None:
     both = np.isin(field.t, wobble.t)
     here = np.isin(wobble.t, field.t)
     rate = recording.samples["gyroscope"]
-    spin = np.interp(wobble.t[here], rate.t[np.isfinite(rate.value[:, 2])], rate.value[np.isfinite(rate.value[:, 2]), 2])
+    spin = np.interp(
+        wobble.t[here], rate.t[np.isfinite(rate.value[:, 2])], rate.value[np.isfinite(rate.value[:, 2]), 2]
+    )
     asked = (shown.newest[both] - shown.newest[0]) * shown.period_of_others_s
     if asked.size < 8 * int(4 + asked[-1] / _KNOTS_S):
         return None
@@ -186,7 +187,9 @@ class _Fitted:
 def _fit(wobble: _Wobble, t: FloatArray) -> _Fitted:
     """Fit the flexible wobble at the times (n,) of the rows, and say when its phase puts them."""
     columns, fast = wobble.columns(t)
-    x = np.linalg.lstsq(columns, wobble.value, rcond=None)[0]
+    gram = columns.conj().T @ columns
+    gram[np.diag_indices_from(gram)] += 1e-9 * np.trace(gram).real / len(gram)
+    x = np.linalg.solve(gram, columns.conj().T @ wobble.value)
     left = wobble.value - columns @ x
     rms = float(np.sqrt(np.sum(np.abs(left) ** 2) / (2.0 * (t.size - x.size))))
     change = 1j * wobble.order * wobble.spin(t) * (columns[:, :fast] @ x[:fast])
@@ -197,7 +200,7 @@ def _fit(wobble: _Wobble, t: FloatArray) -> _Fitted:
 
 
 def _strength(told: FloatArray, weight: FloatArray, periods: FloatArray) -> FloatArray:
-    """Return how much instants (n,) gather on combs of periods (k,): exp(-strength) is what chance goes beyond."""
+    """Return how much instants (n,) gather on combs of periods (k,)."""
     total = np.exp(2j * np.pi * told[None, :] / periods[:, None]) @ weight
     return np.asarray(np.abs(total) ** 2 / np.sum(weight**2))
 
@@ -230,28 +233,55 @@ def _in_order(teeth: FloatArray, off: FloatArray) -> FloatArray:
     return np.asarray(teeth[chosen, np.arange(off.shape[1])])
 
 
-def _followed(wobble: _Wobble, t: FloatArray, periods: FloatArray) -> tuple[FloatArray, _Fitted, float, float]:
-    """Return times (n,), their fit, the period and the strength of its comb, of the best of some rounds from times."""
-    fitted = _fit(wobble, t)
-    best = (t, fitted, float(periods[0]), 0.0)
-    for _ in range(_ROUNDS):
-        strength = _strength(fitted.told, fitted.weight, periods)
-        period = float(periods[int(np.argmax(strength))])
+@dataclass(frozen=True)
+class _Comb:
+    """When the rows of a recording were made (n,), s, its period, what is left of the wobble, and what that gains."""
+
+    times: FloatArray
+    period: float
+    rms: float
+    gain: float
+
+
+def _followed(
+    wobble: _Wobble, first: _Fitted, periods: FloatArray, rounds: int, begun: FloatArray | None = None
+) -> _Comb:
+    """Return the best comb of some periods (k,) in rounds from times (n,), by default those of the field's samples.
+
+    ``first`` is the fit at these, beyond which a comb gains.
+    """
+    t = wobble.asked if begun is None else begun
+    fitted = first if begun is None else _fit(wobble, begun)
+    best = _Comb(wobble.asked, float(periods[0]), first.rms, 0.0)
+    for _ in range(rounds):
+        period = float(periods[int(np.argmax(_strength(fitted.told, fitted.weight, periods)))])
         new = _on_teeth(wobble, fitted, period)
         same = np.array_equal(new, t)
         t, fitted = new, _fit(wobble, new)
-        if fitted.rms < best[1].rms:
-            best = (t, fitted, period, float(np.max(strength)))
+        if fitted.rms < best.rms:
+            gain = 4.0 * t.size * float(np.log(first.rms / fitted.rms)) - _CHOICE * t.size
+            best = _Comb(t, period, fitted.rms, gain)
         if same:
             break
     return best
+
+
+def _from_all_phases(wobble: _Wobble, first: _Fitted, periods: FloatArray) -> _Comb:
+    """Return the best comb of some periods (k,) from combs all over them: a slight wobble has many that are nearly as good."""
+    begun: list[FloatArray | None] = [None]
+    for period in np.quantile(periods, _STARTS):
+        for phase in period * np.arange(_PHASES) / _PHASES:
+            begun.append(phase + period * np.rint((wobble.asked - phase) / period))
+    found = [_followed(wobble, first, periods, _FEW_ROUNDS, one) for one in begun]
+    best = max(found, key=lambda one: one.gain)
+    return max(best, _followed(wobble, first, periods, _ROUNDS, best.times), key=lambda one: one.gain)
 
 
 def imu_clock_of(recordings: Sequence[Recording], names: Sequence[str], clock: OwnClock) -> ImuClock | None:
     """Return the own clock of gyroscope and accelerometer, None where the times of the field's samples do as well.
 
     Takes recordings, what to call them, and the magnetometer's samples that their rows show. Each recording must gain
-    with its period within half a per cent of what the others tell.
+    with its period within half a per cent of what the others tell, and all together more than with any other period.
     """
     wobbles = {}
     for recording, name in zip(recordings, names, strict=True):
@@ -264,34 +294,35 @@ def imu_clock_of(recordings: Sequence[Recording], names: Sequence[str], clock: O
     row = float(np.median([np.median(np.diff(wobble.written)) for wobble in wobbles.values()]))
     longest = max(float(wobble.asked[-1]) for wobble in wobbles.values())
     periods = np.arange(_SHORTEST * row, _LONGEST * row, 0.1 * row**2 / longest)
+    middles = np.exp(np.arange(np.log(_SHORTEST * row), np.log(_LONGEST * row), 1.6 * _ALIKE))
+    near = [periods[np.abs(periods / middle - 1.0) <= _ALIKE] for middle in middles]
     first = {name: _fit(wobble, wobble.asked) for name, wobble in wobbles.items()}
-    told = {name: _strength(one.told, one.weight, periods) for name, one in first.items()}
+    gains = {
+        name: np.array([_followed(wobble, first[name], some, _FEW_ROUNDS).gain for some in near])
+        for name, wobble in wobbles.items()
+    }
+    total = np.sum(list(gains.values()), axis=0)
+    another = np.abs(middles / middles[int(np.argmax(total))] - 1.0) > _ANOTHER
+    if np.max(total) - np.max(total[another]) < _PRICE:
+        return None
+    about = np.abs(periods / middles[int(np.argmax(total))] - 1.0) <= 2.0 * _ALIKE
+    rough = {name: _from_all_phases(wobble, first[name], periods[about]) for name, wobble in wobbles.items()}
     found = []
     for name, wobble in wobbles.items():
-        others = _peak(periods, [one for other, one in told.items() if other != name])
-        near = periods[np.abs(periods / others - 1.0) <= _ALIKE]
-        times, fitted, period, strength = _followed(wobble, wobble.asked, near)
-        before = first[name].rms
-        gain = 4.0 * times.size * float(np.log(before / fitted.rms)) - _CHOICE * times.size
-        if strength < _STRENGTH + np.log(periods.size) or gain < _PRICE:
+        others = [one for other, one in rough.items() if other != name]
+        told = np.average([one.period for one in others], weights=[max(one.gain, 1.0) for one in others])
+        best = rough[name]
+        if abs(best.period / told - 1.0) > _ALIKE:
+            best = _from_all_phases(wobble, first[name], periods[np.abs(periods / told - 1.0) <= _ALIKE])
+        if best.gain < _PRICE:
             return None
-        found.append(ImuRows(name, period, wobble.written, times, (before, fitted.rms), strength, gain))
+        found.append(ImuRows(name, best.period, wobble.written, best.times, (first[name].rms, best.rms), best.gain))
     own = np.array([one.period_s for one in found])
     loops = [one.loop_s for one in clock.shown if one.loop_s is not None]
-    middle = float(np.mean(own))
+    period = float(np.mean(own))
     return ImuClock(
-        middle,
+        period,
         float(np.std(own, ddof=1) / np.sqrt(own.size)),
         tuple(found),
-        bool(loops) and abs(middle / float(np.median(loops)) - 1.0) < _SAME,
+        bool(loops) and abs(period / float(np.median(loops)) - 1.0) < _SAME,
     )
-
-
-def _peak(periods: FloatArray, strengths: Sequence[FloatArray]) -> float:
-    """Return the period at which some recordings gather most, each at its own one within what they may differ."""
-    wide = max(1, int(round(0.5 * _ALIKE * float(np.mean(periods)) / float(periods[1] - periods[0]))))
-    total = np.zeros(periods.size)
-    for strength in strengths:
-        padded = np.pad(strength, wide, mode="edge")
-        total += np.max(np.lib.stride_tricks.sliding_window_view(padded, 2 * wide + 1), axis=1)
-    return float(periods[int(np.argmax(total))])

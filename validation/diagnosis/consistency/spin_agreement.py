@@ -19,8 +19,8 @@ import numpy as np
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import ClockRate, Scale
 from discsim.recording import Recording
-from discsim.validation.diagnosis.consistency.low_pass_transient import LowPassTransient, low_pass_transient_of
 from discsim.validation.diagnosis.consistency.imu_clock import ImuClock, imu_clock_of
+from discsim.validation.diagnosis.consistency.low_pass_transient import LowPassTransient, low_pass_transient_of
 from discsim.validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
 from discsim.validation.diagnosis.consistency.phase_regression import (
     REACH,

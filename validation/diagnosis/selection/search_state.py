@@ -85,6 +85,8 @@ class Search:
         What relations between sensors had asked for before any fit, with its values to start from.
     cost : float
         What choosing the samples that were lost has cost, in twice the log likelihood.
+    at_once : bool
+        Whether the effects were found together, each weighed against the others by the normal equations.
     slips
         What the magnetometer's phase told of lost samples.
     """
@@ -106,6 +108,7 @@ class Search:
     hints: tuple[ScreenedCandidate, ...] = ()
     cost: float = 0.0
     phase_losses: PhaseLosses = field(default_factory=PhaseLosses)
+    at_once: bool = False
 
     def about(self, fit: Fit) -> Search:
         """Return the search with its board about a fit, which is worked out once."""

@@ -171,10 +171,7 @@ def _selected_forward(found: Search) -> Search:
     """Return the search with effects added as long as one is worth its price."""
     most = SELECTION.most_effects
     if (begun := all_at_once(found)) is not None:
-        found = _with_final(found, eliminated_backward(found, begun))
-        if far(found, found.final):
-            return found
-        most += len(found.final.hypothesis.candidates)
+        return replace(_with_final(found, begun), at_once=True)
     for step in range(len(found.final.hypothesis.candidates), most):
         current = found.final
         found, better = next_effect(found, current, step)
@@ -206,6 +203,8 @@ def _with_final(found: Search, fitted: ContinuousFit) -> Search:
 
 def _settled(found: Search) -> Search:
     """Return a search whose effects are exchanged for rivals that explain more for their parameters."""
+    if found.at_once:
+        return found.about(found.final.fit)
     for exchanges in range(SELECTION.exchanges + 1):
         if (wide := widened(found, found.final)) is not found.final:
             found = _with_final(found, wide)
