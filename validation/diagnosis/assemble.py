@@ -17,7 +17,7 @@ from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
 from discsim.validation.diagnosis.contradicted import contradicted_outcome
 from discsim.validation.diagnosis.design.next_recording import advise, confusions, in_words
 from discsim.validation.diagnosis.held_out import Choice, choices_without_each, heldout_chi2, heldout_gain
-from discsim.validation.diagnosis.leftovers import heldout_residuals, pure_noise
+from discsim.validation.diagnosis.leftovers import pure_noise
 from discsim.validation.diagnosis.localisation import located_effect, located_unmodelled
 from discsim.validation.diagnosis.partly import partly_explained
 from discsim.validation.diagnosis.report.wording import telling_apart
@@ -51,6 +51,7 @@ from discsim.validation.diagnosis.setup_effects import SetupAnswer, answer_of_se
 from discsim.validation.diagnosis.stages import Judged, Question
 from discsim.validation.diagnosis.unknown_law.find import FoundLaw
 from discsim.validation.diagnosis.verdict import RECALIBRATED_NAMES, recalibrations, standard_errors
+from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.noise import NoiseModel, chi_squared
 from discsim.validation.identification.plants import plant_of
@@ -213,7 +214,7 @@ def _choices(found: Search, less: Mapping[str, ContinuousFit]) -> list[Choice]:
 
 
 def _figures(
-    found: Search, unexplained: bool, choices: Sequence[Choice], reference: NoiseModel
+    found: Search, unexplained: bool, choices: Sequence[Choice], reference: NoiseModel, set_aside: Sequence[Fit] = ()
 ) -> tuple[FitFigures, FitFigures, tuple[HeldOut, ...]]:
     final, equations = found.final, found.equations
     n = final.fit.count
@@ -223,13 +224,13 @@ def _figures(
         return FitFigures(base, None), FitFigures(last, None), ()
     held = []
     before = after = 0.0
-    left = heldout_residuals(final) if found.at_once else None
     for i in range(equations.recordings):
         rows = equations.linears[i].raw.size
-        if left is None:
-            new = max(heldout_chi2(found, final.hypothesis, i, choices[i]), 0.0)
+        if set_aside:
+            alone = set_aside[i].linears[0]
+            new = chi_squared(alone, reference, alone.residual)
         else:
-            new = chi_squared(final.fit.linears[i], reference, left[i])
+            new = max(heldout_chi2(found, final.hypothesis, i, choices[i]), 0.0)
         old = chi_squared(found.base.fit.linears[i], reference, found.base.residuals[i])
         before, after = before + old, after + new
         chosen = tuple(candidate.id for candidate in choices[i].values() if candidate is not None)
@@ -380,7 +381,10 @@ def _outcome_of_search(
     reference = _reference(found, unexplained, None if judged.tried.prepared.rows is None else agreement)
     missed = 0.0 if rows is None else rows.excess(reference, found.final.fit.count)
     moved = recalibrations(best)
-    baseline, final, held = _figures(found, unexplained, choices, reference) if law is None else _with_law(found, law)
+    aside = judged.set_aside
+    baseline, final, held = (
+        _figures(found, unexplained, choices, reference, aside) if law is None else _with_law(found, law)
+    )
     diagnosis = Diagnosis(
         question.datasets,
         found.recordings[0].plant,

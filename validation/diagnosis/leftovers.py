@@ -10,21 +10,25 @@ Regression Analysis", 1998, 2.1).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
 from discsim.validation.diagnosis.answer.leftover import Leftover
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
+from discsim.validation.diagnosis.relaxed_fit import part_of
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.settings import CONSISTENCY
-from discsim.validation.identification.gauss_newton import mapped
+from discsim.validation.identification.gauss_newton import Fit, mapped, refit
+from discsim.validation.identification.linear import Linear
+from discsim.validation.identification.linearisation import moved
 from discsim.validation.identification.noise import GroupNoise, NoiseModel
 from discsim.validation.identification.normal_equations import Reduced, common_step, nuisance_step, reduce
-from discsim.validation.identification.parameters import Parameter
 
-__all__ = ["heldout_residuals", "leftovers_of", "nothing_but_pure_error", "pure_noise"]
+__all__ = ["heldout_fits", "leftovers_of", "nothing_but_pure_error", "pure_noise"]
 
 #: the axes of a sensor whose pure error is known: the wobble tells nothing of the spin itself
 _AXES = {
@@ -34,16 +38,19 @@ _AXES = {
 }
 
 
-def leftovers_of(found: Search, names: Sequence[str], agreement: Agreement) -> tuple[Leftover, ...]:
-    """Return what each of the recordings (called ``names``) keeps of each sensor, shared numbers from the others."""
-    final = found.final
+def leftovers_of(
+    found: Search, set_aside: Sequence[Fit], names: Sequence[str], agreement: Agreement
+) -> tuple[Leftover, ...]:
+    """Return what each of the recordings (called ``names``) keeps of each sensor.
+
+    ``set_aside`` are the fits of each alone with shared numbers from the others (`heldout_fits`).
+    """
     pure = _pure_errors(agreement)
-    heldout = heldout_residuals(final)
     result = []
     for i, name in enumerate(names):
         for sensor, axes in _AXES.items():
-            before = _rms(found.base, i, found.base.residuals[i], sensor, axes)
-            after = _rms(final, i, heldout[i], sensor, axes)
+            before = _rms(found.base.fit.linears[i], found.base.residuals[i], sensor, axes)
+            after = _rms(set_aside[i].linears[0], set_aside[i].linears[0].residual, sensor, axes)
             if before is not None and after is not None:
                 result.append(Leftover(name, sensor, before, after, pure.get((name, sensor))))
     return tuple(result)
@@ -82,35 +89,46 @@ def _pure_errors(agreement: Agreement) -> dict[tuple[str, str], float]:
     return found
 
 
-def _rms(fitted: ContinuousFit, i: int, residual: FloatArray, sensor: str, axes: Sequence[str]) -> float | None:
+def _rms(linear: Linear, residual: FloatArray, sensor: str, axes: Sequence[str]) -> float | None:
     """Return the rms of residuals (n,) of some axes of a sensor, None where there are none."""
-    some = [residual[c.rows] for c in fitted.fit.linears[i].channels if c.sensor == sensor and c.axis in axes]
+    some = [residual[c.rows] for c in linear.channels if c.sensor == sensor and c.axis in axes]
     return float(np.sqrt(np.mean(np.concatenate(some) ** 2))) if some else None
 
 
-def heldout_residuals(fitted: ContinuousFit) -> list[FloatArray]:
-    """Return residuals (n,) of each recording, what it shares from the others and its own unknowns from itself."""
+#: steps of a recording's own unknowns with shared numbers as the others have them: algebra begins them near their end
+_STEPS = 6
+#: what holds a shared number where the others have it, as a share of the step by which its slopes are taken
+_FIXED = 1e-3
+
+
+def heldout_fits(fitted: ContinuousFit) -> list[Fit]:
+    """Return fits of each recording alone, what it shares fixed as the others have it, its own unknowns free."""
     fit = fitted.fit
     reduced = mapped(
         lambda linear, trajectory: reduce(linear, trajectory, fit.noise, fit.defects), fit.linears, fit.trajectories
     )
     total = np.sum([r.gram for r in reduced], axis=0)
     result = []
-    for i, (linear, own) in enumerate(zip(fit.linears, reduced, strict=True)):
+    for i, own in enumerate(reduced):
         step = common_step(total - own.gram, fit.parameters, fit.at)[0]
         alone = np.array([q.recordings == frozenset([i]) for q in fit.parameters], dtype=bool)
-        step[alone] = _own_step(own, step, alone, fit.parameters, fit.at)
-        result.append(linear.after(nuisance_step(own, step), step))
+        step[alone] = _own_step(own, step, alone, fit)
+        start = moved(fit.trajectories[i], fit.linears[i], nuisance_step(own, step), step)
+        begun = part_of(replace(fit, at=fit.at + step), [i])
+        parameters = tuple(
+            q if q.recordings is not None else replace(q, stated=float(value), sigma=_FIXED * q.step, offsets=())
+            for q, value in zip(begun.parameters, begun.at, strict=True)
+        )
+        begun = replace(begun, parameters=parameters, trajectories=(start,), linears=())
+        result.append(refit(begun, iterations=_STEPS, bounds=BOUNDS))
     return result
 
 
-def _own_step(
-    reduced: Reduced, step: FloatArray, alone: BoolArray, parameters: Sequence[Parameter], at: FloatArray
-) -> FloatArray:
+def _own_step(reduced: Reduced, step: FloatArray, alone: BoolArray, fit: Fit) -> FloatArray:
     """Return the step of what is a recording's alone (a,), that of what it shares being as it is in ``step`` (p,)."""
     G = reduced.gram
-    prior = np.array([q.precision for q in parameters])[alone]
-    off = np.array([q.stated for q in parameters])[alone] - at[alone]
+    prior = np.array([q.precision for q in fit.parameters])[alone]
+    off = np.array([q.stated for q in fit.parameters])[alone] - fit.at[alone]
     H = G[:-1, :-1][np.ix_(alone, alone)] + np.diag(prior)
     right = G[:-1, -1][alone] + prior * off - G[:-1, :-1][np.ix_(alone, ~alone)] @ step[~alone]
     return np.asarray(np.linalg.lstsq(H, right, rcond=1e-12)[0])

@@ -92,10 +92,11 @@ class Tried:
 class Judged:
     """What was tried, with its verdict; a ``law`` stands for all that was left out.
 
-    ``left`` is what each recording keeps of each sensor, where rows had to be counted.
+    ``left`` is what each recording keeps of each sensor, where rows had to be counted, by the fits ``set_aside``.
     """
 
     tried: Tried
     verdict: Verdict
     law: FoundLaw | None = None
     left: tuple[Leftover, ...] = ()
+    set_aside: tuple[Fit, ...] = ()

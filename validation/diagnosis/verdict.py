@@ -7,7 +7,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.disc import aero_key
 from discsim.effects.catalogue import CATALOGUE
-from discsim.validation.diagnosis.leftovers import leftovers_of, nothing_but_pure_error
+from discsim.validation.diagnosis.leftovers import heldout_fits, leftovers_of, nothing_but_pure_error
 from discsim.validation.diagnosis.result import (
     Recalibration,
     Verdict,
@@ -47,7 +47,8 @@ def judged(tried: Tried, progress: Progress) -> Judged:
         return Judged(tried, "unexplained")
     ready = tried.prepared
     counted = found.at_once and ready.rows is not None and ready.agreement is not None
-    leftovers = leftovers_of(found, ready.rows.names, ready.agreement) if counted else ()
+    set_aside = tuple(heldout_fits(found.final)) if counted else ()
+    leftovers = leftovers_of(found, set_aside, ready.rows.names, ready.agreement) if counted else ()
     left = _leaves_more_than_noise(found) and not nothing_but_pure_error(leftovers)
     if left or _stacked(found):
         progress("looking for a law", 4, 5)
@@ -60,7 +61,7 @@ def judged(tried: Tried, progress: Progress) -> Judged:
     else:
         moved = any(item.beyond for item in recalibrations(found).values())
         verdict = "recalibrated" if moved else "consistent"
-    return Judged(tried, verdict, law, leftovers)
+    return Judged(tried, verdict, law, leftovers, set_aside)
 
 
 def _leaves_more_than_noise(found: Search) -> bool:

@@ -1,4 +1,4 @@
-"""What is left of a sensor in one recording: by the baseline, by the effects with the others' numbers, by no physics."""
+"""What is left of a sensor in one recording: by the baseline, by effects with the others' numbers, by no physics."""
 
 from __future__ import annotations
 

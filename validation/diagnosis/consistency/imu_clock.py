@@ -37,8 +37,8 @@ _ALIKE = 5e-3
 _FEW_ROUNDS, _ROUNDS = 4, 12
 #: combs that are begun with: periods as quantiles of a range, and phases
 _STARTS, _PHASES = (0.2, 0.4, 0.6, 0.8), 4
-#: twice the log likelihood that a recording must gain beyond what its choices cost, as for the field's samples, and that
-#: all must gain beyond what a comb gains whose period is another by more than the next number
+#: twice the log likelihood that a recording must gain beyond what its choices cost, as for the samples of the field,
+#: and that all must gain beyond what a comb gains whose period is another by more than the next number
 _PRICE, _ANOTHER = 24.0, 0.02
 #: what chooses one of two teeth costs, in twice the log likelihood
 _CHOICE = 2.0 * float(np.log(2.0))
@@ -74,12 +74,14 @@ class ImuRows:
 
 @dataclass(frozen=True)
 class ImuClock:
-    """The own period of the chip of gyroscope and accelerometer, s, with its error, and the rows of each recording."""
+    """The own period of the chip of gyroscope and accelerometer, s, with its error, and the rows of each recording.
+
+    ``loops`` tells that the chip is read in step with the logger's loop: its comb is the loop's, no clock of its own.
+    """
 
     period_s: float
     sd_s: float
     shown: tuple[ImuRows, ...]
-    #: whether the chip is read as the logger's loop samples it: then its comb is the loop's, and no clock of its own
     loops: bool
 
     @property
@@ -127,7 +129,7 @@ class ImuClock:
 
 @dataclass(frozen=True)
 class _Wobble:
-    """A gyroscope across its axis: x + i y (n,) rad/s, when each row was asked for at the earliest (n,), s, its spin."""
+    """A gyroscope across its axis: x + i y (n,) rad/s, when each row was asked for at the earliest (n,) s, its spin."""
 
     value: ComplexArray
     written: FloatArray
@@ -267,7 +269,10 @@ def _followed(
 
 
 def _from_all_phases(wobble: _Wobble, first: _Fitted, periods: FloatArray) -> _Comb:
-    """Return the best comb of some periods (k,) from combs all over them: a slight wobble has many that are nearly as good."""
+    """Return the best comb of some periods (k,) from combs all over them.
+
+    Of a slight wobble many are nearly as good as their neighbours.
+    """
     begun: list[FloatArray | None] = [None]
     for period in np.quantile(periods, _STARTS):
         for phase in period * np.arange(_PHASES) / _PHASES:

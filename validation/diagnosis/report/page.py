@@ -358,8 +358,8 @@ def _meaning(diagnosis: Diagnosis) -> str:
     """Return what the verdict means, and what it does not where rows had to be counted."""
     if diagnosis.verdict == "explained" and diagnosis.leftovers:
         return (
-            "With this in the model little more is left than pure error: what a motion without any physics leaves of the "
-            "same rows, whose instants were counted and not written. The table of what is left has both."
+            "With this in the model little more is left than pure error: what a motion without any physics leaves of "
+            "the same rows, whose instants were counted and not written. The table of what is left has both."
         )
     return _MEANINGS[diagnosis.verdict]
 

@@ -171,7 +171,13 @@ def _selected_forward(found: Search) -> Search:
     """Return the search with effects added as long as one is worth its price."""
     most = SELECTION.most_effects
     if (begun := all_at_once(found)) is not None:
-        return replace(_with_final(found, begun), at_once=True)
+        if any(one.averaged for one in (trajectory.recording for trajectory in begun.fit.trajectories)):
+            # instants that were counted leave more than noise: what is weighed by it would be taken up for ever
+            return replace(_with_final(found, begun), at_once=True)
+        found = _with_final(found, eliminated_backward(found, begun))
+        if far(found, found.final):
+            return found
+        most += len(found.final.hypothesis.candidates)
     for step in range(len(found.final.hypothesis.candidates), most):
         current = found.final
         found, better = next_effect(found, current, step)

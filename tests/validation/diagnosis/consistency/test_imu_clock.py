@@ -34,7 +34,8 @@ def test_the_wobble_tells_the_period_of_a_chip_that_free_runs(seed, chip):
     made, clock = counted(seed, chip)
     found = imu_clock_of(made, NAMES, clock)
     assert found is not None
-    assert found.period_s == pytest.approx(chip, rel=2e-3)
+    # its clock is the field's own period, and periods count as one within half a per cent
+    assert found.period_s == pytest.approx(chip, rel=5e-3)
     assert not found.loops
     for one in found.shown:
         # the gyroscope's own noise is 0.0015 rad/s
