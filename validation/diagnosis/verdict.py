@@ -7,6 +7,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.disc import aero_key
 from discsim.effects.catalogue import CATALOGUE
+from discsim.validation.diagnosis.answer.leftover import Leftover
 from discsim.validation.diagnosis.leftovers import heldout_fits, leftovers_of, nothing_but_pure_error
 from discsim.validation.diagnosis.result import (
     Recalibration,
@@ -17,6 +18,7 @@ from discsim.validation.diagnosis.selection.search_state import Search, misses
 from discsim.validation.diagnosis.settings import UNKNOWN_LAW
 from discsim.validation.diagnosis.stages import Judged, Progress, Tried
 from discsim.validation.diagnosis.unknown_law.find import find_law
+from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = ["RECALIBRATED_NAMES", "judged", "recalibrations", "standard_errors"]
@@ -45,10 +47,12 @@ def judged(tried: Tried, progress: Progress) -> Judged:
     found, law = tried.found, None
     if found is None:
         return Judged(tried, "unexplained")
-    ready = tried.prepared
-    counted = found.at_once and ready.rows is not None and ready.agreement is not None
-    set_aside = tuple(heldout_fits(found.final)) if counted else ()
-    leftovers = leftovers_of(found, set_aside, ready.rows.names, ready.agreement) if counted else ()
+    rows, agreement = tried.prepared.rows, tried.prepared.agreement
+    set_aside: tuple[Fit, ...] = ()
+    leftovers: tuple[Leftover, ...] = ()
+    if found.at_once and rows is not None and agreement is not None:
+        set_aside = tuple(heldout_fits(found.final))
+        leftovers = leftovers_of(found, set_aside, rows.names, agreement)
     left = _leaves_more_than_noise(found) and not nothing_but_pure_error(leftovers)
     if left or _stacked(found):
         progress("looking for a law", 4, 5)

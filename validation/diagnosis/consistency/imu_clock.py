@@ -191,7 +191,7 @@ def _fit(wobble: _Wobble, t: FloatArray) -> _Fitted:
     columns, fast = wobble.columns(t)
     gram = columns.conj().T @ columns
     gram[np.diag_indices_from(gram)] += 1e-9 * np.trace(gram).real / len(gram)
-    x = np.linalg.solve(gram, columns.conj().T @ wobble.value)
+    x = np.asarray(np.linalg.solve(gram, columns.conj().T @ wobble.value), dtype=np.complex128)
     left = wobble.value - columns @ x
     rms = float(np.sqrt(np.sum(np.abs(left) ** 2) / (2.0 * (t.size - x.size))))
     change = 1j * wobble.order * wobble.spin(t) * (columns[:, :fast] @ x[:fast])
