@@ -304,6 +304,11 @@ def _next_recordings(found: Search, unexplained: bool, effects: Sequence[NamedEf
     told = [telling_apart(effect.id, other) for effect in effects for other in effect.confused_with]
     if unexplained:
         told.append("Recordings that reach further in what the mismatch grows with: they settle the form of a law.")
+    elif found.at_once:
+        told.append(
+            "What else could stand in for these effects was weighed by algebra alone. A throw that spins the other way "
+            "tells a gyroscope's bias from its cross-axis error, one upside down a magnet's z from the field's."
+        )
     elif not told and effects:
         told.append("Nothing more is needed to tell what is named from the other effects that were tried.")
     elif not told:

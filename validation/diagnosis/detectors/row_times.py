@@ -9,7 +9,7 @@ gains by the same times.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -132,10 +132,11 @@ def row_times(recordings: Sequence[Recording], names: Sequence[str], agreement: 
     periods = np.array([shown.period_of_others_s for shown in clock.shown])
     if len(clock.shown) < len(recordings) or np.ptp(periods) > _ALIKE * float(np.mean(periods)):
         return None
-    found = RowTimes(tuple(names), clock, agreement.row_proofs, agreement.imu_clock)
+    found = RowTimes(tuple(names), clock, agreement.row_proofs)
     if min(found._gains) < _SECOND or _gained(recordings, found.applied(recordings)) < _SECOND:
         return None
-    return found
+    # the chip's own samples were chosen by the wobble: they cannot bear out what it is asked for
+    return replace(found, imu=agreement.imu_clock)
 
 
 def _gained(before: Sequence[Recording], after: Sequence[Recording]) -> float:

@@ -18,7 +18,7 @@ from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit,
 from discsim.validation.diagnosis.selection.evidence import TURNED, price
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
 from discsim.validation.diagnosis.selection.screening import NormalEquations
-from discsim.validation.diagnosis.selection.search_state import Search, far, on_the_disc, possible, values_of_fit
+from discsim.validation.diagnosis.selection.search_state import Search, far, on_the_disc, possible
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.parameters import Parameter
 
@@ -40,32 +40,46 @@ def all_at_once(found: Search) -> ContinuousFit | None:
     competing = {candidate.id for candidate in found.candidates}
     every = [free_candidate(id) for id in free if id in CATALOGUE and id in competing and not CATALOGUE[id].grid]
     # what sensors told before any fit stays until a fit has it: about the relaxed fit algebra weighs it against itself
-    asked = _pruned(found.loose_board, every, found.own, kept={hint.candidate.id for hint in lags})
-    start = {
-        (q.key, q.recordings): float(v)
-        for q, v in zip(relaxed_fit.parameters, relaxed_fit.at, strict=True)
-        if q.group in {one.id for one in asked} or q.key in relaxed_fit.plant.own_keys
-    }
-    if not asked or not on_the_disc(found, start):
+    told = {hint.candidate.id for hint in lags}
+    asked = _held_out(found, _pruned(found.loose_board, every, found.own, told), told)
+    fitted = _fitted(found, asked)
+    if fitted is None:
         return None
-    fitted = continuous_fit(
-        relaxed_fit, Hypothesis(asked), found.own, found.relaxed_noise, start, iterations=_STEPS, polish=1
-    )
     about = found.about(fitted.fit)
     fewer = _held_out(about, _pruned(about.equations, asked, found.own))
     if len(fewer) < len(asked):
-        fitted = continuous_fit(
-            fitted.fit, Hypothesis(fewer), found.own, fitted.fit.noise, values_of_fit(fitted), iterations=_STEPS
-        )
+        # what two effects shared that are one in these recordings, one of them cannot have: again from the relaxed fit
+        fitted = _fitted(found, fewer)
+    if fitted is None:
+        return None
     worth = found.base.score - fitted.score > sum(map(price, fewer))
     return fitted if worth and possible(fitted) else None
 
 
-def _held_out(found: Search, candidates: tuple[CandidateEffect, ...]) -> tuple[CandidateEffect, ...]:
+def _fitted(found: Search, candidates: tuple[CandidateEffect, ...]) -> ContinuousFit | None:
+    """Return the fit of some effects from where the relaxed fit has them, None where it has them off the disc."""
+    relaxed_fit, ids = found.relaxed_fit, {one.id for one in candidates}
+    start = {
+        (q.key, q.recordings): float(v)
+        for q, v in zip(relaxed_fit.parameters, relaxed_fit.at, strict=True)
+        if q.group in ids or q.key in relaxed_fit.plant.own_keys
+    }
+    if not candidates or not on_the_disc(found, start):
+        return None
+    return continuous_fit(
+        relaxed_fit, Hypothesis(candidates), found.own, found.relaxed_noise, start, iterations=_STEPS, polish=1
+    )
+
+
+def _held_out(
+    found: Search, candidates: tuple[CandidateEffect, ...], told: Collection[str] = ()
+) -> tuple[CandidateEffect, ...]:
     """Return the effects less those by whose numbers, as the others have them, recordings set aside fit worse.
 
-    Of throws that all spin one way a bias and a cross-axis error are one: apart they are told by none of these, and go
-    wrong on one that spins the other way.
+    Those whose ids are ``told`` already stay.
+
+    Of throws that all spin one way a bias and a cross-axis error are one: apart they are told by none of these, and
+    go wrong on one that spins the other way.
     """
     some = range(len(found.recordings))
 
@@ -73,10 +87,10 @@ def _held_out(found: Search, candidates: tuple[CandidateEffect, ...]) -> tuple[C
         return sum(heldout_chi2(found, hypothesis, i) for i in some)
 
     kept = Hypothesis(candidates)
-    while kept.candidates:
+    while loose := [one for one in kept.candidates if one.id not in told]:
         whole = left(kept)
-        gains = {one.name: left(kept.without(one)) - whole for one in kept.candidates}
-        least = min(kept.candidates, key=lambda one: gains[one.name])
+        gains = {one.name: left(kept.without(one)) - whole for one in loose}
+        least = min(loose, key=lambda one: gains[one.name])
         if gains[least.name] > 0.0:
             break
         kept = kept.without(least)
