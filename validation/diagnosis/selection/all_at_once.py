@@ -26,8 +26,8 @@ __all__ = ["all_at_once", "worth_of_each"]
 
 #: most effects at once: those of the consistency stage and the ordinary errors of three sensors that it goes with
 _MOST = 8
-#: most steps of their fit: they begin where the relaxed fit has them
-_STEPS = 12
+#: most steps of their fit: it begins where the relaxed fit has them, and closes segments that this let part
+_STEPS = 20
 
 
 def all_at_once(found: Search) -> ContinuousFit | None:
@@ -67,7 +67,7 @@ def _fitted(found: Search, candidates: tuple[CandidateEffect, ...]) -> Continuou
     if not candidates or not on_the_disc(found, start):
         return None
     return continuous_fit(
-        relaxed_fit, Hypothesis(candidates), found.own, found.relaxed_noise, start, iterations=_STEPS, polish=1
+        relaxed_fit, Hypothesis(candidates), found.own, found.relaxed_noise, start, iterations=_STEPS, polish=2
     )
 
 
