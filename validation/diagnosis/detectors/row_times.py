@@ -66,7 +66,9 @@ class RowTimes:
                 # x and y of each row; the pattern costs what its numbers are unlikely
                 _, times = np.unique(np.diff(shown.newest), return_counts=True)
                 price = -2.0 * float(np.sum(times * np.log(times / times.sum())))
-                rows += 4.0 * shown.newest.size * float(np.log(proof.left[1] / proof.left[2])) - price
+                # the tick may come out as a whole period, in which means of samples that are no neighbours do not fit
+                counted = proof.left[2] if proof.left[2] < proof.left[1] else shown.left[1]
+                rows += 4.0 * shown.newest.size * float(np.log(proof.left[1] / counted)) - price
             clock += 4.0 * shown.newest.size * float(np.log(shown.left[0] / shown.left[1]))
         return rows, clock
 
