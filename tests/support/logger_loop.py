@@ -27,8 +27,13 @@ def motions() -> tuple[Recording, ...]:
     return tuple(throws(module=board, plant="free_spin", seconds=2.0))
 
 
-def logged(recording: Recording, seed: int, *, own_clock: bool, weight: float) -> tuple[Recording, np.ndarray]:
-    """Return what a loop writes of a motion that loses a fifth of its rows, and the newest sample of each row."""
+def logged(
+    recording: Recording, seed: int, *, own_clock: bool, weight: float, chip: float | None = None
+) -> tuple[Recording, np.ndarray]:
+    """Return what a loop writes of a motion that loses a fifth of its rows, and the newest sample of each row.
+
+    Gyroscope and accelerometer are read in step with the loop, or free-run with the period of a ``chip``, s.
+    """
     rng = np.random.default_rng(seed)
     steps = np.arange(2, int(1.9 / LOOP))
     kept = steps[rng.random(steps.size) > 0.2]
@@ -38,6 +43,10 @@ def logged(recording: Recording, seed: int, *, own_clock: bool, weight: float) -
         t = step * LOOP
         return phase + PERIOD * np.floor((t - phase) / PERIOD) if own_clock else t
 
+    read = kept * LOOP
+    if chip is not None:
+        began = rng.uniform(0.0, chip)
+        read = began + chip * np.floor((read - began) / chip)
     samples = {}
     for name, own in recording.samples.items():
 
@@ -48,6 +57,6 @@ def logged(recording: Recording, seed: int, *, own_clock: bool, weight: float) -
             value = (1.0 - weight) * at(sampled(kept)) + weight * at(sampled(kept - 1))
             value = np.round((value + rng.normal(0.0, 0.1, value.shape)) / 0.01) * 0.01
         else:
-            value = at(kept * LOOP)
+            value = at(read)
         samples[name] = Samples(LOOP * np.arange(kept.size), value)
     return replace(recording, samples=samples), np.rint((sampled(kept) - phase) / PERIOD).astype(int)

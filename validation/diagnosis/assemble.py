@@ -18,6 +18,7 @@ from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
 from discsim.validation.diagnosis.contradicted import contradicted_outcome
 from discsim.validation.diagnosis.design.next_recording import advise, confusions, in_words
 from discsim.validation.diagnosis.held_out import Choice, choices_without_each, heldout_chi2, heldout_gain
+from discsim.validation.diagnosis.leftovers import pure_noise
 from discsim.validation.diagnosis.localisation import located_effect, located_unmodelled
 from discsim.validation.diagnosis.partly import partly_explained
 from discsim.validation.diagnosis.report.wording import telling_apart
@@ -40,6 +41,7 @@ from discsim.validation.diagnosis.result import (
     Recalibration,
     Residuals,
 )
+from discsim.validation.diagnosis.selection.all_at_once import worth_of_each
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, in_parameters, parameters_of
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
 from discsim.validation.diagnosis.selection.evidence import price
@@ -50,6 +52,7 @@ from discsim.validation.diagnosis.setup_effects import SetupAnswer, answer_of_se
 from discsim.validation.diagnosis.stages import Judged, Question
 from discsim.validation.diagnosis.unknown_law.find import FoundLaw
 from discsim.validation.diagnosis.verdict import RECALIBRATED_NAMES, recalibrations, standard_errors
+from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.noise import NoiseModel, chi_squared
 from discsim.validation.identification.plants import plant_of
@@ -186,12 +189,35 @@ def _leaves(law: FoundLaw, names: Sequence[str]) -> str:
     return f"It explains {100.0 * law.share:.0f} % of the excess, and more than noise is left: {listed}{more}."
 
 
+def _reference(found: Search, unexplained: bool, counted: Agreement | None) -> NoiseModel:
+    """Return the noise in which baseline and final fit stand; that of the rows themselves where these were ``counted``.
+
+    What a misfit has inflated would make a good fit of a bad one.
+    """
+    noise = found.relaxed_noise if unexplained else found.final.fit.noise
+    white = {group: level._replace(correlation=0.0) for group, level in noise.items()}
+    return white if counted is None else pure_noise(counted, white)
+
+
+def _without_each(found: Search, candidates: Sequence[CandidateEffect]) -> dict[str, ContinuousFit]:
+    """Return the fits without each named effect, by its name; what was found at once was weighed by algebra."""
+    if not found.at_once:
+        return {candidate.name: tried_without(found, candidate) for candidate in candidates}
+    worth = worth_of_each(found.equations, candidates, found.own)
+    return {name: replace(found.final, score=found.final.score + gain) for name, gain in worth.items()}
+
+
+def _choices(found: Search, less: Mapping[str, ContinuousFit]) -> list[Choice]:
+    """Return for each recording what the others choose."""
+    if not found.at_once:
+        return choices_without_each(found, less)
+    return [{t.name: t for t in found.final.hypothesis.candidates} for _ in found.recordings]
+
+
 def _figures(
-    found: Search, unexplained: bool, choices: Sequence[Choice]
+    found: Search, unexplained: bool, choices: Sequence[Choice], reference: NoiseModel, set_aside: Sequence[Fit] = ()
 ) -> tuple[FitFigures, FitFigures, tuple[HeldOut, ...]]:
     final, equations = found.final, found.equations
-    white = {group: noise._replace(correlation=0.0) for group, noise in final.fit.noise.items()}
-    reference = white if not unexplained else {g: n._replace(correlation=0.0) for g, n in found.relaxed_noise.items()}
     n = final.fit.count
     base = chi2_in(found.base, reference) / found.base.fit.count
     last = chi2_in(found.base if unexplained else final, reference) / n
@@ -201,7 +227,11 @@ def _figures(
     before = after = 0.0
     for i in range(equations.recordings):
         rows = equations.linears[i].raw.size
-        new = max(heldout_chi2(found, final.hypothesis, i, choices[i]), 0.0)
+        if set_aside:
+            alone = set_aside[i].linears[0]
+            new = chi_squared(alone, reference, alone.residual)
+        else:
+            new = max(heldout_chi2(found, final.hypothesis, i, choices[i]), 0.0)
         old = chi_squared(found.base.fit.linears[i], reference, found.base.residuals[i])
         before, after = before + old, after + new
         chosen = tuple(candidate.id for candidate in choices[i].values() if candidate is not None)
@@ -275,6 +305,11 @@ def _next_recordings(found: Search, unexplained: bool, effects: Sequence[NamedEf
     told = [telling_apart(effect.id, other) for effect in effects for other in effect.confused_with]
     if unexplained:
         told.append("Recordings that reach further in what the mismatch grows with: they settle the form of a law.")
+    elif found.at_once:
+        told.append(
+            "What else could stand in for these effects was weighed by algebra alone. A throw that spins the other way "
+            "tells a gyroscope's bias from its cross-axis error, one upside down a magnet's z from the field's."
+        )
     elif not told and effects:
         told.append("Nothing more is needed to tell what is named from the other effects that were tried.")
     elif not told:
@@ -358,8 +393,8 @@ def _outcome_of_search(
     if candidates:
         question.progress("asking what to record next", 4, 5)
     advice = advise(found, names, question.plans) if candidates else {}
-    less = {candidate.name: tried_without(found, candidate) for candidate in candidates}
-    choices = [] if unexplained else choices_without_each(found, less)
+    less = _without_each(found, candidates)
+    choices = [] if unexplained else _choices(found, less)
     # where nothing explains it, the answer is about the baseline, or about the law that stands for all
     best = found if not unexplained else found.at_base() if law is None else replace(found, final=law.fitted)
     named = tuple(_named(found, candidate, less[candidate.name], names, choices, advice) for candidate in candidates)
@@ -368,9 +403,13 @@ def _outcome_of_search(
     rows = None if unexplained else judged.tried.prepared.rows
     counted = () if rows is None else rows.effects()
     places = () if rows is None else rows.located(max(float(one.nodes[-1]) for one in found.final.fit.trajectories))
-    missed = 0.0 if rows is None else rows.excess(found.final.fit.noise, found.final.fit.count)
+    reference = _reference(found, unexplained, None if judged.tried.prepared.rows is None else agreement)
+    missed = 0.0 if rows is None else rows.excess(reference, found.final.fit.count)
     moved = recalibrations(best)
-    baseline, final, held = _figures(found, unexplained, choices) if law is None else _with_law(found, law)
+    aside = judged.set_aside
+    baseline, final, held = (
+        _figures(found, unexplained, choices, reference, aside) if law is None else _with_law(found, law)
+    )
     diagnosis = Diagnosis(
         question.datasets,
         found.recordings[0].plant,
@@ -394,6 +433,7 @@ def _outcome_of_search(
         (*warnings, *(one.text for one in partly)),
         agreement,
         partly,
+        judged.left,
     )
     model = _model(best, (*named, *counted, *setup.effects), diagnosis.law)
     shown = _residuals(best, names, unexplained and law is None)

@@ -81,7 +81,11 @@ def prepared_under(setup: SetupFindings, question: Question) -> Prepared:
     agreeing = compared(meant, question.names)
     agreement = agreement_of(meant, question.names, agreeing)
     rows = row_times(meant, question.names, agreement)
-    timed = meant if rows is None else rows.applied(meant)
+    timed = meant
+    if rows is not None:
+        # rates of the times as written would have the fit undo what was counted
+        timed = rows.applied(meant)
+        agreeing = compared(timed, question.names)
     fitted, notes = with_inertia(timed)
     return Prepared(setup, tuple(meant), tuple(fitted), (*warnings, *notes), agreeing, agreement, rows)
 

@@ -86,7 +86,11 @@ def unknowns(recordings: Sequence[Recording]) -> tuple[Parameter, ...]:
     return tuple(
         replace(q, recordings=frozenset([i]))
         for i, recording in enumerate(recordings)
-        for q in (*plant.own, *(plant.held if "accelerometer" in recording else ()))
+        for q in (
+            *plant.own,
+            *(plant.held if "accelerometer" in recording else ()),
+            *(plant.zeros if "magnetometer" in recording.averaged else ()),
+        )
     )
 
 

@@ -16,6 +16,7 @@ from discsim.effects.catalogue import CATALOGUE
 from discsim.model_file import Model
 from discsim.recording import PLANTS, Plant
 from discsim.validation.diagnosis.answer.checked import Recordings, finite, plain, shared
+from discsim.validation.diagnosis.answer.leftover import Leftover
 from discsim.validation.diagnosis.answer.measured import FitFigures, HeldOut, Located, NoiseNote, Outlier
 from discsim.validation.diagnosis.answer.named import (
     MOVE_LIMIT,
@@ -89,6 +90,8 @@ class Diagnosis:
         What the reader must know: a sensor that is absent or cannot be used, sensors that contradict one another.
     partly : tuple of PartlyExplained
         Effects that explain an unexplained mismatch in part, on every recording set aside.
+    leftovers : tuple of Leftover
+        What each recording keeps of each sensor with the others' numbers, where rows had to be counted.
     agreement : Agreement or None
         Which sensors agree about the spin, and what single causes reconcile them; None where none can be compared.
     """
@@ -110,6 +113,7 @@ class Diagnosis:
     warnings: tuple[str, ...] = ()
     agreement: Agreement | None = None
     partly: tuple[PartlyExplained, ...] = ()
+    leftovers: tuple[Leftover, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.datasets:
@@ -156,6 +160,7 @@ class Diagnosis:
             "noise": _list(self.noise),
             "fit": {"baseline": self.baseline.to_json(), "final": self.final.to_json()},
             "heldout": _list(self.heldout),
+            "leftovers": _list(self.leftovers),
             "outliers": _list(self.outliers),
             "next_recordings": list(self.next_recordings),
             "warnings": list(self.warnings),

@@ -47,6 +47,10 @@ class Consistency:
     lost : float
         Two sensors of a free spin that are both astray, one by this much, follow no motion: sensors of other throws
         leave 300 and more, a clock or lost samples of one sensor stay below it.
+    beyond_pure : float
+        How many times the pure error of its rows effects may leave of a sensor that explain recordings whose rows were
+        counted: at twice, what a motion with physics lacks beside one without is less than the root of 3 of it. Throws
+        without any effect leave 5 to 300 times.
     few, again : int
         Recordings that are looked at, and those that are looked at again without some sensors: time alone.
     """
@@ -58,6 +62,7 @@ class Consistency:
     left_of_turn: float = 0.2
     ripples: int = 2
     lost: float = 100.0
+    beyond_pure: float = 2.0
     few: int = 3
     again: int = 2
 

@@ -9,6 +9,7 @@ from typing import TypeAlias
 from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.sensors import Lag
 from discsim.recording import Recording
+from discsim.validation.diagnosis.answer.leftover import Leftover
 from discsim.validation.diagnosis.consistency.early_verdict import Contradiction
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, Comparison
 from discsim.validation.diagnosis.detectors.row_times import RowTimes
@@ -89,8 +90,13 @@ class Tried:
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """What was tried, with its verdict; a ``law`` stands for all that was left out."""
+    """What was tried, with its verdict; a ``law`` stands for all that was left out.
+
+    ``left`` is what each recording keeps of each sensor, where rows had to be counted, by the fits ``set_aside``.
+    """
 
     tried: Tried
     verdict: Verdict
     law: FoundLaw | None = None
+    left: tuple[Leftover, ...] = ()
+    set_aside: tuple[Fit, ...] = ()

@@ -7,6 +7,8 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.disc import aero_key
 from discsim.effects.catalogue import CATALOGUE
+from discsim.validation.diagnosis.answer.leftover import Leftover
+from discsim.validation.diagnosis.leftovers import heldout_fits, leftovers_of, nothing_but_pure_error
 from discsim.validation.diagnosis.result import (
     Recalibration,
     Verdict,
@@ -16,6 +18,7 @@ from discsim.validation.diagnosis.selection.search_state import Search, misses
 from discsim.validation.diagnosis.settings import UNKNOWN_LAW
 from discsim.validation.diagnosis.stages import Judged, Progress, Tried
 from discsim.validation.diagnosis.unknown_law.find import find_law
+from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = ["RECALIBRATED_NAMES", "judged", "recalibrations", "standard_errors"]
@@ -38,11 +41,19 @@ def judged(tried: Tried, progress: Progress) -> Judged:
 
     Unexplained is what no motion follows, what leaves more than noise, and what a law explains better than a stack of
     effects does. Else effects, or faults of the setup, explain it. Else it is the baseline, recalibrated or not.
+    Of rows that had to be counted nobody knows the instants to within the noise of the sensors: there more is left than
+    pure error, or not.
     """
     found, law = tried.found, None
     if found is None:
         return Judged(tried, "unexplained")
-    left = _leaves_more_than_noise(found)
+    rows, agreement = tried.prepared.rows, tried.prepared.agreement
+    set_aside: tuple[Fit, ...] = ()
+    leftovers: tuple[Leftover, ...] = ()
+    if found.at_once and rows is not None and agreement is not None:
+        set_aside = tuple(heldout_fits(found.final))
+        leftovers = leftovers_of(found, set_aside, rows.names, agreement)
+    left = _leaves_more_than_noise(found) and not nothing_but_pure_error(leftovers)
     if left or _stacked(found):
         progress("looking for a law", 4, 5)
         law = find_law(found.relaxed_fit, found.final, found.own, found.relaxed_noise, tried.prepared.fitted)
@@ -54,7 +65,7 @@ def judged(tried: Tried, progress: Progress) -> Judged:
     else:
         moved = any(item.beyond for item in recalibrations(found).values())
         verdict = "recalibrated" if moved else "consistent"
-    return Judged(tried, verdict, law)
+    return Judged(tried, verdict, law, leftovers, set_aside)
 
 
 def _leaves_more_than_noise(found: Search) -> bool:

@@ -146,7 +146,7 @@ class _Around:
         recording = self.recording
         if group == "environment" and name.startswith("magnetic_"):
             return float(recording.environment.magnetic_field[["north", "east", "down"].index(name.split("_")[1])])
-        own = next((q for q in (*self.plant.own, *self.plant.held) if q.key == (group, name)), None)
+        own = next((q for q in (*self.plant.own, *self.plant.held, *self.plant.zeros) if q.key == (group, name)), None)
         if own is not None:
             return own.stated
         return float(parameters(recording.environment, recording.disc, recording.rig)[parameter_index(group, name)])
@@ -366,6 +366,10 @@ def _add_sensor_columns(around: _Around, s: Sampled, rows: FloatArray, M: FloatA
         if (group, name) in around.plant.held_keys:
             if s.dying is not None:
                 M[:, around.plant.held_keys.index((group, name)), around.d + j] = s.dying
+            continue
+        if (group, name) in around.plant.zero_keys:
+            if s.sensor == "magnetometer":
+                M[:, around.plant.zero_keys.index((group, name)), around.d + j] = 1.0
             continue
         if j in around.motion or not _concerns(group, s.sensor, around.effects):
             continue

@@ -62,8 +62,11 @@ class Sampled:
             self.instants = taken
             self.lag_slope = np.ones(taken.size)
         self.nodes = 1 if self.weights is None else self.weights.shape[0]
-        #: what a lag still held (m, width) at these instants, and how that grows with its time constant
+        #: what is read beside the motion (m, width): what a lag still held at these instants, how that grows with its
+        #: time constant, and by how much a magnetometer's zero is off
         self.held = self.held_slope = np.zeros((self.instants.size, self.width))
+        if self.sensor == "magnetometer" and current.plant.zeros:
+            self.held = self.held + np.array([values.get(key, 0.0) for key in current.plant.zero_keys])
         if self.dying is not None:
             began = np.array([values.get(key, 0.0) for key in current.plant.held_keys])
             self.held = self.dying[:, None] * began

@@ -19,6 +19,7 @@ import numpy as np
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import ClockRate, Scale
 from discsim.recording import Recording
+from discsim.validation.diagnosis.consistency.imu_clock import ImuClock, imu_clock_of
 from discsim.validation.diagnosis.consistency.low_pass_transient import LowPassTransient, low_pass_transient_of
 from discsim.validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
 from discsim.validation.diagnosis.consistency.phase_regression import (
@@ -204,6 +205,7 @@ class Agreement:
     row_proofs: tuple[RowProof, ...] = ()
     settling: LowPassTransient | None = None
     own_clock: OwnClock | None = None
+    imu_clock: ImuClock | None = None
 
     @property
     def contradiction(self) -> bool:
@@ -228,6 +230,7 @@ class Agreement:
             if self.rows is None
             else {**self.rows.to_json(), "heldout": [item.to_json() for item in self.row_proofs]},
             "own_clock": None if self.own_clock is None else self.own_clock.to_json(),
+            "imu_clock": None if self.imu_clock is None else self.imu_clock.to_json(),
             "settling": None if self.settling is None else self.settling.to_json(),
         }
 
@@ -256,10 +259,11 @@ def agreement_of(
     assert known is not None
     rows = rows_of([recording for recording, _ in some], [name for _, name in some])
     own_clock = None if rows is None else own_clock_of([r for r, _ in some], [n for _, n in some], rows)
+    imu = None if own_clock is None else imu_clock_of([r for r, _ in some], [n for _, n in some], own_clock)
     # in the times that counted rows give, where there are such
     timed = [r if rows is None else _in_true_time(r, n, rows, own_clock) for r, n in some]
     settling = low_pass_transient_of(timed, [name for _, name in some])
-    found = Agreement(known[0], comparisons, (), rows, (), settling, own_clock)
+    found = Agreement(known[0], comparisons, (), rows, (), settling, own_clock, imu)
     if not found.contradiction:
         return found
     causes = [cause for id in _CAUSES if (cause := _cause(id, comparisons, {n: r for r, n in some})) is not None]
@@ -463,6 +467,8 @@ def _sentences(found: Agreement) -> list[str]:
         ]
     if found.own_clock is not None:
         said += found.own_clock.sentences
+    if found.imu_clock is not None:
+        said += found.imu_clock.sentences
     if found.settling is not None:
         said += found.settling.sentences
     return said

@@ -9,17 +9,18 @@ gains by the same times.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import BSpline
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
-from discsim.effects.timing_rows import Average, LostRows, OwnClock
+from discsim.effects.timing_rows import Average, ImuClock, LostRows, OwnClock
 from discsim.recording import Recording
 from discsim.validation.diagnosis.answer.measured import Located
 from discsim.validation.diagnosis.answer.named import SMALLEST_P_VALUE, Evidence, NamedEffect, ParameterValue
+from discsim.validation.diagnosis.consistency.imu_clock import ImuClock as FoundImuClock
 from discsim.validation.diagnosis.consistency.own_clock import OwnClock as FoundClock
 from discsim.validation.diagnosis.consistency.phase_regression import angle_turned, signal_of
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, RowProof
@@ -42,11 +43,18 @@ class RowTimes:
     names: tuple[str, ...]
     clock: FoundClock
     proofs: tuple[RowProof, ...]
+    imu: FoundImuClock | None = None
 
     def applied(self, recordings: Sequence[Recording]) -> list[Recording]:
         """Return the recordings in the times that their rows were made, their fields as means of two samples."""
-        pairs = zip(recordings, self.names, strict=True)
-        return [self.clock.counted(recording, name) or recording for recording, name in pairs]
+        return [self._applied(recording, name) for recording, name in zip(recordings, self.names, strict=True)]
+
+    def _applied(self, recording: Recording, name: str) -> Recording:
+        counted = self.clock.counted(recording, name)
+        if counted is None or self.imu is None:
+            return counted or recording
+        shown = next(one for one in self.clock.shown if one.recording == name)
+        return self.imu.counted(recording, counted, name, shown)
 
     @property
     def _gains(self) -> tuple[float, float]:
@@ -58,7 +66,9 @@ class RowTimes:
                 # x and y of each row; the pattern costs what its numbers are unlikely
                 _, times = np.unique(np.diff(shown.newest), return_counts=True)
                 price = -2.0 * float(np.sum(times * np.log(times / times.sum())))
-                rows += 4.0 * shown.newest.size * float(np.log(proof.left[1] / proof.left[2])) - price
+                # the tick may come out as a whole period, in which means of samples that are no neighbours do not fit
+                counted = proof.left[2] if proof.left[2] < proof.left[1] else shown.left[1]
+                rows += 4.0 * shown.newest.size * float(np.log(proof.left[1] / counted)) - price
             clock += 4.0 * shown.newest.size * float(np.log(shown.left[0] / shown.left[1]))
         return rows, clock
 
@@ -68,6 +78,8 @@ class RowTimes:
         lost = np.array([shown.lost for shown in self.clock.shown])
         error = float(np.std(lost, ddof=1) / np.sqrt(lost.size)) if lost.size > 1 else None
         held = len(self.clock.shown) > 1
+
+        imu = self.imu if self.imu is not None and not self.imu.loops else None
 
         def named(kind: type, acts_on: str, value: float, sd: float | None, gain: float) -> NamedEffect:
             row = catalogued(kind, acts_on)
@@ -79,6 +91,7 @@ class RowTimes:
             named(LostRows, "clock", float(np.mean(lost)), error, rows),
             named(OwnClock, "magnetometer", self.clock.period_s, self.clock.sd_s, clock),
             named(Average, "magnetometer", 0.5, None, clock),
+            *(() if imu is None else (named(ImuClock, "board", imu.period_s, imu.sd_s, imu.gain),)),
         )
 
     def located(self, end: float) -> tuple[Located, ...]:
@@ -124,7 +137,8 @@ def row_times(recordings: Sequence[Recording], names: Sequence[str], agreement: 
     found = RowTimes(tuple(names), clock, agreement.row_proofs)
     if min(found._gains) < _SECOND or _gained(recordings, found.applied(recordings)) < _SECOND:
         return None
-    return found
+    # the chip's own samples were chosen by the wobble: they cannot bear out what it is asked for
+    return replace(found, imu=agreement.imu_clock)
 
 
 def _gained(before: Sequence[Recording], after: Sequence[Recording]) -> float:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TypeAlias
 
+import numpy as np
+
+from discsim.validation.diagnosis.answer.leftover import Leftover
+from discsim.validation.diagnosis.consistency.imu_clock import ImuRows
 from discsim.validation.diagnosis.consistency.low_pass_transient import TransientProof
 from discsim.validation.diagnosis.consistency.own_clock import SamplesShown
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, Cause, RowProof
 from discsim.validation.diagnosis.report.wording import plus_minus
 
-__all__ = ["Table", "tables_of"]
+__all__ = ["Table", "leftovers_of", "tables_of"]
 
 Table: TypeAlias = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 
@@ -25,6 +30,8 @@ def tables_of(found: Agreement) -> list[Table]:
         tables.append(_rows(found.row_proofs))
     if found.own_clock is not None:
         tables.append(_samples(found.own_clock.shown))
+    if found.imu_clock is not None:
+        tables.append(_chip(found.imu_clock.shown))
     if found.settling is not None:
         tables.append(_settling(found.settling.heldout))
     return tables
@@ -64,6 +71,31 @@ def _samples(shown: tuple[SamplesShown, ...]) -> Table:
         "field leaves in counted rows",
     )
     return "The magnetometer's own clock", (*header, "with the samples shown"), rows
+
+
+def _chip(shown: tuple[ImuRows, ...]) -> Table:
+    rows: list[tuple[str, ...]] = [
+        (item.recording, f"{1e3 * item.period_s:.3f} ms", *(f"{value:.3f} rad/s" for value in item.left))
+        for item in shown
+    ]
+    header = ("recording", "period", "wobble leaves at the field's times", "at the chip's own")
+    return "The clock of gyroscope and accelerometer", header, rows
+
+
+#: units of sensors as a reader has them, and rad/s in deg/s
+_UNITS = {"magnetometer": (1.0, "µT"), "gyroscope": (180.0 / np.pi, "°/s"), "accelerometer": (1.0, "m/s²")}
+
+
+def leftovers_of(left: Sequence[Leftover]) -> Table:
+    """Return what each recording keeps of each sensor, rms of an axis, shared numbers being those of the others."""
+    rows: list[tuple[str, ...]] = []
+    for item in left:
+        factor, unit = _UNITS[item.sensor]
+        sizes = [item.baseline, item.left, *([] if item.pure is None else [item.pure])]
+        cells = [f"{factor * size:.3g} {unit}" for size in sizes]
+        rows.append((item.recording, item.sensor, *cells, *([""] if item.pure is None else [])))
+    header = ("recording", "sensor", "baseline", "with the numbers of the others", "pure error of its rows")
+    return "What is left of each sensor", header, rows
 
 
 def _number(value: float) -> str:

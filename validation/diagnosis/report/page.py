@@ -13,8 +13,7 @@ import numpy as np
 from markupsafe import Markup
 
 from discsim.recording import SENSORS
-from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
-from discsim.validation.diagnosis.report.consistency_tables import tables_of
+from discsim.validation.diagnosis.report.consistency_tables import leftovers_of, tables_of
 from discsim.validation.diagnosis.report.figures import draw_overview, draw_sensor, readable_axis, sensors_of
 from discsim.validation.diagnosis.report.wording import (
     everyday,
@@ -92,13 +91,13 @@ def write_diagnosis_report(
         lead=f"Does the baseline simulation explain these recordings ({_plain(diagnosis.plant)}) down to their noise?",
         verdict=diagnosis.verdict,
         sentence=verdict_sentence(diagnosis),
-        meaning=_MEANINGS[diagnosis.verdict],
+        meaning=_meaning(diagnosis),
         warnings=diagnosis.warnings,
         figures=_key_figures(diagnosis),
         effects=[_effect(item) for item in diagnosis.effects],
         law=None if diagnosis.law is None else _law(diagnosis.law),
         located=[_place(item) for item in diagnosis.located],
-        agreement=_agreement(diagnosis.agreement),
+        agreement=_agreement(diagnosis),
         overview=[(caption, base64.b64encode(file.read_bytes()).decode()) for caption, file in figures],
         heldout=[
             (
@@ -355,11 +354,25 @@ def _noise(item: NoiseNote) -> tuple[str, str, str, str, str, str]:
     )
 
 
-def _agreement(found: Agreement | None) -> dict[str, Any] | None:
+def _meaning(diagnosis: Diagnosis) -> str:
+    """Return what the verdict means, and what it does not where rows had to be counted."""
+    if diagnosis.verdict == "explained" and diagnosis.leftovers:
+        return (
+            "With this in the model little more is left than pure error: what a motion without any physics leaves of "
+            "the same rows, whose instants were counted and not written. The table of what is left has both."
+        )
+    return _MEANINGS[diagnosis.verdict]
+
+
+def _agreement(diagnosis: Diagnosis) -> dict[str, Any] | None:
     """Return which sensors agree, as sentences and tables, where any contradict one another."""
+    found = diagnosis.agreement
     if found is None or not found.contradiction:
         return None
-    return {"sentences": found.sentences, "tables": tables_of(found)}
+    tables = tables_of(found)
+    if diagnosis.leftovers:
+        tables.append(leftovers_of(diagnosis.leftovers))
+    return {"sentences": found.sentences, "tables": tables}
 
 
 def _over_noise(value: float) -> str:

@@ -58,7 +58,8 @@ def continuous_fit(
     parameters = fitted_parameters(hypothesis, own)
     at = np.array([start.get((q.key, q.recordings), q.stated) for q in parameters])
     plant = relaxed_fit.plant
-    fit = Fit(_retimed(relaxed_fit, parameters, at), parameters, at, plant.sizes.continuous, noise)
+    allowed = plant.continuous_defects([one.recording for one in relaxed_fit.trajectories])
+    fit = Fit(_retimed(relaxed_fit, parameters, at), parameters, at, allowed, noise)
     if not plant.airborne and any(q.group in CLOCKS for q in parameters):
         fit = replace(fit, at=_longer_and_longer(fit))
     begun = fit

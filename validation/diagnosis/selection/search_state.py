@@ -85,6 +85,8 @@ class Search:
         What relations between sensors had asked for before any fit, with its values to start from.
     cost : float
         What choosing the samples that were lost has cost, in twice the log likelihood.
+    at_once : bool
+        Whether the effects were found together, each weighed against the others by the normal equations.
     slips
         What the magnetometer's phase told of lost samples.
     """
@@ -106,14 +108,14 @@ class Search:
     hints: tuple[ScreenedCandidate, ...] = ()
     cost: float = 0.0
     phase_losses: PhaseLosses = field(default_factory=PhaseLosses)
+    at_once: bool = False
 
     def about(self, fit: Fit) -> Search:
         """Return the search with its board about a fit, which is worked out once."""
         if self.asked is fit:
             return self
-        return replace(
-            self, equations=normal_equations_of(fit, self.candidates, fit.noise, fit.plant.sizes.continuous), asked=fit
-        )
+        allowed = fit.plant.continuous_defects([one.recording for one in fit.trajectories])
+        return replace(self, equations=normal_equations_of(fit, self.candidates, fit.noise, allowed), asked=fit)
 
     def with_step(self, fitted: ContinuousFit) -> Search:
         """Return the search with one more fit on the way."""

@@ -215,13 +215,15 @@ class Sizes:
 
     ``differences`` are half the differences by which slopes are taken; ``unknown`` is what is known of a state without
     any reading, one sigma. ``continuous`` are the defects of continuity that a fit allows whose segments are
-    continuous, ``relaxed`` those that it allows to stay beside the data whatever physics is missing.
+    continuous, ``counted`` the same of recordings whose rows were counted one by one, where they are others;
+    ``relaxed`` are those that it allows to stay beside the data whatever physics is missing.
     """
 
     differences: FloatArray
     unknown: FloatArray
     continuous: AllowedDefects
     relaxed: AllowedDefects
+    counted: AllowedDefects | None = None
 
 
 class Durations(NamedTuple):
@@ -347,6 +349,9 @@ class Plant:
         What an accelerometer that lags still holds along x, y, z when a recording begins, beyond what it would read
         had it been there for long, m/s^2; of their group, and each recording's own, too. Where there are none, what
         such a lag remembers is left out.
+    zeros : tuple of Parameter
+        What a magnetometer that free-runs beside its logger reads along x, y, z beyond the iron on board in one
+        recording, uT, as it warms; of their group, and each recording's own.
     hardware : tuple of str
         The groups of stated numbers that its motion depends on: "disc", "aero", "rig".
     lacks : function
@@ -379,6 +384,7 @@ class Plant:
     nodes: Callable[[Recording, float], FloatArray] = even_nodes
     own: tuple[Parameter, ...] = ()
     held: tuple[Parameter, ...] = ()
+    zeros: tuple[Parameter, ...] = ()
     hardware: tuple[str, ...] = ()
     lacks: Callable[[Recording], str | None] = _nothing_lacks
     observed: Callable[[Recording, Readings], Sequence[Readings]] = _as_read
@@ -408,7 +414,7 @@ class Plant:
     @cached_property
     def own_keys(self) -> tuple[tuple[str, str], ...]:
         """Group and name of its own parameters, those of the motion first."""
-        return tuple(parameter.key for parameter in (*self.own, *self.held))
+        return tuple(parameter.key for parameter in (*self.own, *self.held, *self.zeros))
 
     @cached_property
     def motion_keys(self) -> tuple[tuple[str, str], ...]:
@@ -418,7 +424,18 @@ class Plant:
     @cached_property
     def held_keys(self) -> tuple[tuple[str, str], ...]:
         """Group and name of what a lag holds when a recording begins."""
-        return self.own_keys[len(self.own) :]
+        return self.own_keys[len(self.own) : len(self.own) + len(self.held)]
+
+    @cached_property
+    def zero_keys(self) -> tuple[tuple[str, str], ...]:
+        """Group and name of what a magnetometer's zero is off by in a recording."""
+        return self.own_keys[len(self.own) + len(self.held) :]
+
+    def continuous_defects(self, recordings: Sequence[Recording]) -> AllowedDefects:
+        """Return the defects of continuity that a fit of recordings allows whose segments are continuous."""
+        if self.sizes.counted is not None and any(recording.averaged for recording in recordings):
+            return self.sizes.counted
+        return self.sizes.continuous
 
     def own_values(self, values: Values) -> FloatArray:
         """Return its own parameters (o,), as given or as they stand without a fit."""

@@ -80,3 +80,13 @@ def test_counts_that_no_other_sensor_bears_out_are_not_believed():
     assert row_times([still(one) for one in logged()], NAMES, agreement) is None
     assert row_times(logged()[:1], NAMES[:1], agreement) is None
     assert row_times(logged(), NAMES, None) is None
+
+
+def test_rows_are_believed_where_their_tick_came_out_as_a_whole_period():
+    agreement = agreement_of(logged(), NAMES)
+    assert agreement is not None
+    # counted by the wrong tick rows leave more than even ones; by the samples that they show they leave little
+    wrong = tuple(replace(one, left=(*one.left[:2], 1.5 * one.left[1], one.left[3])) for one in agreement.row_proofs)
+    found = row_times(logged(), NAMES, replace(agreement, row_proofs=wrong))
+    assert found is not None
+    assert {one.id for one in found.effects()} == {one.id for one in counted().effects()}

@@ -1,0 +1,82 @@
+"""A chip of gyroscope and accelerometer that free-runs beside its logger: its clock, and what asks for none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support import logger_loop as loop
+
+from discsim.recording import Recording, Samples
+from discsim.validation.diagnosis.consistency.imu_clock import imu_clock_of
+from discsim.validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
+from discsim.validation.diagnosis.consistency.time_stamp_recovery import rows_of
+from discsim.validation.diagnosis.detectors.row_times import RowTimes
+
+NAMES = loop.NAMES
+
+
+def counted(seed: int, chip: float | None) -> tuple[list[Recording], OwnClock]:
+    made = [
+        loop.logged(motion, seed + k, own_clock=True, weight=0.5, chip=chip)[0]
+        for k, motion in enumerate(loop.motions())
+    ]
+    rows = rows_of(made, NAMES)
+    assert rows is not None
+    clock = own_clock_of(made, NAMES, rows)
+    assert clock is not None
+    return made, clock
+
+
+@pytest.mark.parametrize(("seed", "chip"), [(1, 0.0091), (11, 0.0096), (21, 0.0104)])
+def test_the_wobble_tells_the_period_of_a_chip_that_free_runs(seed, chip):
+    made, clock = counted(seed, chip)
+    found = imu_clock_of(made, NAMES, clock)
+    assert found is not None
+    # its clock is the field's own period, and periods count as one within half a per cent
+    assert found.period_s == pytest.approx(chip, rel=5e-3)
+    assert not found.loops
+    for one in found.shown:
+        # the gyroscope's own noise is 0.0015 rad/s
+        assert one.left[1] < 0.5 * one.left[0]
+
+
+@pytest.mark.parametrize("seed", [1, 11, 21])
+def test_a_chip_that_is_read_in_step_has_no_clock_of_its_own(seed):
+    made, clock = counted(seed, None)
+    found = imu_clock_of(made, NAMES, clock)
+    assert found is None or found.loops
+    named = {effect.id for effect in RowTimes(tuple(NAMES), clock, (), found).effects()}
+    assert "imu.own_clock" not in named
+
+
+def test_a_disc_that_does_not_wobble_tells_nothing_of_its_chip():
+    made, clock = counted(1, 0.0091)
+    rng = np.random.default_rng(3)
+
+    def steady(one: Recording) -> Recording:
+        rates = one.samples["gyroscope"]
+        value = rates.value.copy()
+        value[:, :2] = rng.normal(0.0, 0.01, (len(rates), 2))
+        return replace(one, samples={**one.samples, "gyroscope": Samples(rates.t, value)})
+
+    assert imu_clock_of([steady(one) for one in made], NAMES, clock) is None
+
+
+def test_rows_stand_where_the_chip_made_them():
+    made, clock = counted(1, 0.0091)
+    found = imu_clock_of(made, NAMES, clock)
+    assert found is not None
+    for one, name in zip(made, NAMES, strict=True):
+        shown = next(item for item in clock.shown if item.recording == name)
+        timed = clock.counted(one, name)
+        assert timed is not None
+        put = found.counted(one, timed, name, shown)
+        t = put.samples["gyroscope"].t
+        assert t[0] >= 0.0
+        steps = np.diff(t) / found.period_s
+        assert np.mean(np.abs(steps - np.rint(steps)) < 0.05) > 0.95
+        assert np.array_equal(put.samples["gyroscope"].value, one.samples["gyroscope"].value)
+        # the field keeps its own times: one row's sensors are of different instants, none more than two periods apart
+        assert np.max(np.abs(put.samples["magnetometer"].t - t)) < 2.5 * loop.PERIOD

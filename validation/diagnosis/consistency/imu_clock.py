@@ -1,0 +1,333 @@
+"""A gyroscope's own clock behind a logger's rows: which of its samples each row shows, told by the wobble's phase.
+
+Takes recordings whose rows are counted by a magnetometer's samples (`own_clock`); gives, row by row, when the chip of
+gyroscope and accelerometer made what the row shows. The loop asked for a row within one period after the newest sample
+of the field, and the chip's newest sample is at most one of its own periods older than that. Where a wobble turns fast
+each reading tells by its phase how old it is; ages that are a sawtooth put the instants on a comb. The wobble along a
+flexible motion and the teeth of the comb are found in turn, the comb as that on which the instants gather most
+(Rayleigh's statistic, in N. Fisher, "Statistical Analysis of Circular Data", 1993, 4.3), from periods all over the
+range; nothing but whole numbers is chosen row by row, and each choice is paid for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from discsim.arrays import ComplexArray, FloatArray
+from discsim.recording import Recording, Samples
+from discsim.validation.diagnosis.consistency.own_clock import OwnClock, SamplesShown
+from discsim.validation.diagnosis.consistency.phase_regression import retimed, signal_of
+
+__all__ = ["ImuClock", "ImuRows", "imu_clock_of"]
+
+#: knots of the wobble's amplitude, s, as in the count of the field's samples (it halves in 0.3 s or more), and of what
+#: stands still in the body or in the air
+_KNOTS_S, _SLOW_S = 0.25, 0.6
+#: periods that are tried, as shares of the logger's rows: parts are set to the loop's rate, and their oscillators are
+#: off by 10 % and less (ISM330DHCX: the data rate of a sheet of 104 Hz is 94 to 114 Hz)
+_SHORTEST, _LONGEST = 0.8, 1.2
+#: by how much the period of one recording may differ from that of the others: a slow slip of the parts' oscillators
+_ALIKE = 5e-3
+#: rounds of wobble and teeth for each range of periods, and for the best one
+_FEW_ROUNDS, _ROUNDS = 4, 12
+#: combs that are begun with: periods as quantiles of a range, and phases
+_STARTS, _PHASES = (0.2, 0.4, 0.6, 0.8), 4
+#: twice the log likelihood that a recording must gain beyond what its choices cost, as for the samples of the field,
+#: and that all must gain beyond what a comb gains whose period is another by more than the next number
+_PRICE, _ANOTHER = 24.0, 0.02
+#: what chooses one of two teeth costs, in twice the log likelihood
+_CHOICE = 2.0 * float(np.log(2.0))
+#: a comb this near to the logger's loop is the loop itself: the chip is read as it is sampled
+_SAME = 0.02
+
+
+@dataclass(frozen=True)
+class ImuRows:
+    """When the chip made what the rows of one recording show, s after the newest sample of its first row (n,).
+
+    ``written`` (n,) are the rows' times as they are written, ``left`` what is left of the wobble, rad/s rms of an axis,
+    with the times of the field's samples and with these; ``gain`` is in twice the log likelihood, choices paid.
+    """
+
+    recording: str
+    period_s: float
+    written: FloatArray
+    times: FloatArray
+    left: tuple[float, float]
+    gain: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return {
+            "recording": self.recording,
+            "period_s": self.period_s,
+            "rows": int(self.times.size),
+            "gain": self.gain,
+            "wobble_left_rad_s": dict(zip(("as_the_field", "own_clock"), self.left, strict=True)),
+        }
+
+
+@dataclass(frozen=True)
+class ImuClock:
+    """The own period of the chip of gyroscope and accelerometer, s, with its error, and the rows of each recording.
+
+    ``loops`` tells that the chip is read in step with the logger's loop: its comb is the loop's, no clock of its own.
+    """
+
+    period_s: float
+    sd_s: float
+    shown: tuple[ImuRows, ...]
+    loops: bool
+
+    @property
+    def gain(self) -> float:
+        """Twice the log likelihood that all recordings gain."""
+        return sum(one.gain for one in self.shown)
+
+    def counted(self, recording: Recording, timed: Recording, name: str, field: SamplesShown) -> Recording:
+        """Return a recording whose rows are counted with gyroscope and accelerometer at the chip's own times.
+
+        ``timed`` is the recording at the mean times of the magnetometer's samples, ``field``, that its rows show.
+        """
+        mine = next((one for one in self.shown if one.recording == name), None)
+        if mine is None:
+            return timed
+        first = float(timed.samples["magnetometer"].t[0]) + 0.5 * float(field.apart[0]) * field.period_of_others_s
+        # what the chip made before the field's first sample must not be before the recording began
+        early = max(0.0, -(first + float(mine.times[0])))
+        # one sample in two rows: what is written must run on
+        at = np.maximum.accumulate(mine.times) + 1e-9 * np.arange(mine.times.size)
+        chip = retimed(recording, mine.written, first + at).samples
+        samples = {}
+        for sensor, own in timed.samples.items():
+            t = chip[sensor].t if sensor in ("gyroscope", "accelerometer") else own.t
+            samples[sensor] = Samples(t + early, own.value)
+        averaged = {sensor: (t + early, weights) for sensor, (t, weights) in timed.averaged.items()}
+        return replace(timed, samples=samples, averaged=averaged)
+
+    @property
+    def sentences(self) -> list[str]:
+        """What there is to say, in words."""
+        whose = "the logger's own loop" if self.loops else "a clock of its own (imu.own_clock)"
+        said = [f"The chip of gyroscope and accelerometer goes by {whose}: a period of {1e3 * self.period_s:.3f} ms."]
+        said += [
+            f"{one.recording}: along a smooth motion the wobble leaves {one.left[0]:.3f} rad/s with the times of the "
+            f"field's samples, {one.left[1]:.3f} at the chip's own."
+            for one in self.shown
+        ]
+        return said
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return {"period_s": self.period_s, "period_sd_s": self.sd_s, "rows": [one.to_json() for one in self.shown]}
+
+
+@dataclass(frozen=True)
+class _Wobble:
+    """A gyroscope across its axis: x + i y (n,) rad/s, when each row was asked for at the earliest (n,) s, its spin."""
+
+    value: ComplexArray
+    written: FloatArray
+    asked: FloatArray
+    turned: Any
+    spin: Any
+    order: float
+    #: period of the field's samples, s: a row was asked for within it
+    within: float
+
+    def columns(self, t: FloatArray) -> tuple[ComplexArray, int]:
+        """Return the columns (n, p) at times (n,), and how many of them are the wobble's."""
+        start, end = self.asked[0] - 2.0 * self.within, self.asked[-1] + 2.0 * self.within
+        psi = self.turned(t) - self.turned(0.0)
+        fast = np.exp(1j * self.order * psi)[:, None] * _splines(t - start, end - start, _KNOTS_S)
+        slow = _splines(t - start, end - start, _SLOW_S)
+        return np.hstack([fast, slow, np.exp(-1j * psi)[:, None] * slow]), fast.shape[1]
+
+
+def _splines(t: FloatArray, end: float, knots_s: float) -> FloatArray:
+    count = 4 + int(end / knots_s)
+    knots = np.concatenate([np.zeros(3), np.linspace(0.0, end, count - 2), np.full(3, end)])
+    return np.asarray(BSpline.design_matrix(np.clip(t, 0.0, end * (1.0 - 1e-12)), knots, 3).toarray())
+
+
+def _wobble_of(recording: Recording, shown: SamplesShown) -> _Wobble | None:
+    """Return the wobble of a recording at the samples of the field that its rows show, None where none is told."""
+    field, wobble = signal_of(recording, "field"), signal_of(recording, "wobble")
+    if field is None or wobble is None or field.t.size != shown.newest.size:
+        return None
+    both = np.isin(field.t, wobble.t)
+    here = np.isin(wobble.t, field.t)
+    rate = recording.samples["gyroscope"]
+    spin = np.interp(
+        wobble.t[here], rate.t[np.isfinite(rate.value[:, 2])], rate.value[np.isfinite(rate.value[:, 2]), 2]
+    )
+    asked = (shown.newest[both] - shown.newest[0]) * shown.period_of_others_s
+    if asked.size < 8 * int(4 + asked[-1] / _KNOTS_S):
+        return None
+    smooth = np.polynomial.Polynomial.fit(asked, spin, 4)
+    return _Wobble(
+        wobble.value[here], wobble.t[here], asked, smooth.integ(), smooth, wobble.order, shown.period_of_others_s
+    )
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """The wobble's coefficients (p,), what they leave (n,), its rms of an axis, and when the wobble says rows were."""
+
+    x: ComplexArray
+    left: ComplexArray
+    rms: float
+    told: FloatArray
+    weight: FloatArray
+
+
+def _fit(wobble: _Wobble, t: FloatArray) -> _Fitted:
+    """Fit the flexible wobble at the times (n,) of the rows, and say when its phase puts them."""
+    columns, fast = wobble.columns(t)
+    gram = columns.conj().T @ columns
+    gram[np.diag_indices_from(gram)] += 1e-9 * np.trace(gram).real / len(gram)
+    x = np.asarray(np.linalg.solve(gram, columns.conj().T @ wobble.value), dtype=np.complex128)
+    left = wobble.value - columns @ x
+    rms = float(np.sqrt(np.sum(np.abs(left) ** 2) / (2.0 * (t.size - x.size))))
+    change = 1j * wobble.order * wobble.spin(t) * (columns[:, :fast] @ x[:fast])
+    size = np.abs(change) ** 2
+    late = np.real(np.conj(change) * left) / (size + np.mean(np.abs(left) ** 2))
+    told = np.clip(t + late, wobble.asked - 1.2 * wobble.within, wobble.asked + 1.2 * wobble.within)
+    return _Fitted(x, left, rms, told, size / (size + np.median(size)))
+
+
+def _strength(told: FloatArray, weight: FloatArray, periods: FloatArray) -> FloatArray:
+    """Return how much instants (n,) gather on combs of periods (k,)."""
+    total = np.exp(2j * np.pi * told[None, :] / periods[:, None]) @ weight
+    return np.asarray(np.abs(total) ** 2 / np.sum(weight**2))
+
+
+def _on_teeth(wobble: _Wobble, fitted: _Fitted, period: float) -> FloatArray:
+    """Return the tooth (n,), of those that a row may show, at which the wobble is most as it reads."""
+    middle = np.sum(fitted.weight * np.exp(2j * np.pi * fitted.told / period))
+    phase = float(np.angle(middle)) / (2.0 * np.pi) * period
+    first = phase + period * np.floor((wobble.asked - phase) / period)
+    teeth = np.stack([first + k * period for k in (-1, 0, 1)])
+    reads = np.stack([wobble.columns(one)[0] @ fitted.x for one in teeth])
+    off = np.abs(wobble.value - reads) ** 2
+    # the newest sample is at most a period older than the instant of asking, which is within one of the field's
+    off[(teeth <= wobble.asked - period) | (teeth >= wobble.asked + wobble.within)] = np.inf
+    return _in_order(teeth, off)
+
+
+def _in_order(teeth: FloatArray, off: FloatArray) -> FloatArray:
+    """Return for each row the one of its teeth (k, n) that together cost least, none before the row ahead of it."""
+    total, before = off[:, 0], np.zeros(off.shape, dtype=np.int64)
+    for i in range(1, off.shape[1]):
+        # a slow chip shows one sample in two rows, to within rounding of its instant
+        allowed = np.where(teeth[None, :, i - 1] <= teeth[:, i, None] + 1e-6, total[None, :], np.inf)
+        before[:, i] = np.argmin(allowed, axis=1)
+        total = off[:, i] + np.min(allowed, axis=1)
+    chosen = np.zeros(off.shape[1], dtype=np.int64)
+    chosen[-1] = int(np.argmin(total))
+    for i in range(off.shape[1] - 1, 0, -1):
+        chosen[i - 1] = before[chosen[i], i]
+    return np.asarray(teeth[chosen, np.arange(off.shape[1])])
+
+
+@dataclass(frozen=True)
+class _Comb:
+    """When the rows of a recording were made (n,), s, its period, what is left of the wobble, and what that gains."""
+
+    times: FloatArray
+    period: float
+    rms: float
+    gain: float
+
+
+def _followed(
+    wobble: _Wobble, first: _Fitted, periods: FloatArray, rounds: int, begun: FloatArray | None = None
+) -> _Comb:
+    """Return the best comb of some periods (k,) in rounds from times (n,), by default those of the field's samples.
+
+    ``first`` is the fit at these, beyond which a comb gains.
+    """
+    t = wobble.asked if begun is None else begun
+    fitted = first if begun is None else _fit(wobble, begun)
+    best = _Comb(wobble.asked, float(periods[0]), first.rms, 0.0)
+    for _ in range(rounds):
+        period = float(periods[int(np.argmax(_strength(fitted.told, fitted.weight, periods)))])
+        new = _on_teeth(wobble, fitted, period)
+        same = np.array_equal(new, t)
+        t, fitted = new, _fit(wobble, new)
+        if fitted.rms < best.rms:
+            gain = 4.0 * t.size * float(np.log(first.rms / fitted.rms)) - _CHOICE * t.size
+            best = _Comb(t, period, fitted.rms, gain)
+        if same:
+            break
+    return best
+
+
+def _from_all_phases(wobble: _Wobble, first: _Fitted, periods: FloatArray) -> _Comb:
+    """Return the best comb of some periods (k,) from combs all over them.
+
+    Of a slight wobble many are nearly as good as their neighbours.
+    """
+    begun: list[FloatArray | None] = [None]
+    for period in np.quantile(periods, _STARTS):
+        for phase in period * np.arange(_PHASES) / _PHASES:
+            begun.append(phase + period * np.rint((wobble.asked - phase) / period))
+    found = [_followed(wobble, first, periods, _FEW_ROUNDS, one) for one in begun]
+    best = max(found, key=lambda one: one.gain)
+    return max(best, _followed(wobble, first, periods, _ROUNDS, best.times), key=lambda one: one.gain)
+
+
+def imu_clock_of(recordings: Sequence[Recording], names: Sequence[str], clock: OwnClock) -> ImuClock | None:
+    """Return the own clock of gyroscope and accelerometer, None where the times of the field's samples do as well.
+
+    Takes recordings, what to call them, and the magnetometer's samples that their rows show. Each recording must gain
+    with its period within half a per cent of what the others tell, and all together more than with any other period.
+    """
+    wobbles = {}
+    for recording, name in zip(recordings, names, strict=True):
+        shown = next((one for one in clock.shown if one.recording == name), None)
+        wobble = None if shown is None else _wobble_of(recording, shown)
+        if wobble is not None:
+            wobbles[name] = wobble
+    if len(wobbles) < 2:
+        return None
+    row = float(np.median([np.median(np.diff(wobble.written)) for wobble in wobbles.values()]))
+    longest = max(float(wobble.asked[-1]) for wobble in wobbles.values())
+    periods = np.arange(_SHORTEST * row, _LONGEST * row, 0.1 * row**2 / longest)
+    middles = np.exp(np.arange(np.log(_SHORTEST * row), np.log(_LONGEST * row), 1.6 * _ALIKE))
+    near = [periods[np.abs(periods / middle - 1.0) <= _ALIKE] for middle in middles]
+    first = {name: _fit(wobble, wobble.asked) for name, wobble in wobbles.items()}
+    gains = {
+        name: np.array([_followed(wobble, first[name], some, _FEW_ROUNDS).gain for some in near])
+        for name, wobble in wobbles.items()
+    }
+    total = np.sum(list(gains.values()), axis=0)
+    another = np.abs(middles / middles[int(np.argmax(total))] - 1.0) > _ANOTHER
+    if np.max(total) - np.max(total[another]) < _PRICE:
+        return None
+    about = np.abs(periods / middles[int(np.argmax(total))] - 1.0) <= 2.0 * _ALIKE
+    rough = {name: _from_all_phases(wobble, first[name], periods[about]) for name, wobble in wobbles.items()}
+    found = []
+    for name, wobble in wobbles.items():
+        others = [one for other, one in rough.items() if other != name]
+        told = np.average([one.period for one in others], weights=[max(one.gain, 1.0) for one in others])
+        best = rough[name]
+        if abs(best.period / told - 1.0) > _ALIKE:
+            best = _from_all_phases(wobble, first[name], periods[np.abs(periods / told - 1.0) <= _ALIKE])
+        if best.gain < _PRICE:
+            return None
+        found.append(ImuRows(name, best.period, wobble.written, best.times, (first[name].rms, best.rms), best.gain))
+    own = np.array([one.period_s for one in found])
+    loops = [one.loop_s for one in clock.shown if one.loop_s is not None]
+    period = float(np.mean(own))
+    return ImuClock(
+        period,
+        float(np.std(own, ddof=1) / np.sqrt(own.size)),
+        tuple(found),
+        bool(loops) and abs(period / float(np.median(loops)) - 1.0) < _SAME,
+    )
