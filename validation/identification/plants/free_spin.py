@@ -261,7 +261,8 @@ def _states(recording: Recording, t: FloatArray, ratio: float) -> FloatArray:
     states[:, _ATTITUDE], states[:, _RATE] = starts.attitude, starts.rate
     states[:, _SPIN] *= ratio
     r = starts.rate[:, 2]
-    states[:, _DECAY] = np.gradient(r, t) / r if r.size > 1 else 0.0
+    if r.size > 1:
+        np.divide(np.gradient(r, t), r, out=states[:, _DECAY], where=r != 0.0)
     return states
 
 
