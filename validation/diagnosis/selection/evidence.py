@@ -41,7 +41,9 @@ MISTIMED = frozenset(row.id for row in CATALOGUE.values() if row.type is TimeOff
 
 def charge(candidate: CandidateEffect) -> float:
     """Return what an effect is charged where it stands against others: its parameters, and that it is unusual."""
-    unusual = SELECTION.turned if candidate.id in TURNED else SELECTION.mistimed if candidate.id in MISTIMED else 0.0
+    # a turn about the axis of spin stands in for an offset, too: it stays as far behind that as behind anything else
+    unusual = SELECTION.mistimed if candidate.id in MISTIMED | TURNED else 0.0
+    unusual += SELECTION.turned if candidate.id in TURNED else 0.0
     return SELECTION.rival * len(parameters_of(candidate)) + unusual
 
 
