@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -60,3 +61,16 @@ def logged(
             value = at(read)
         samples[name] = Samples(LOOP * np.arange(kept.size), value)
     return replace(recording, samples=samples), np.rint((sampled(kept) - phase) / PERIOD).astype(int)
+
+
+def without_wobble(recordings: Sequence[Recording], seed: int) -> list[Recording]:
+    """Return recordings whose gyroscope reads nothing but noise across the axis."""
+    rng = np.random.default_rng(seed)
+
+    def steady(one: Recording) -> Recording:
+        rates = one.samples["gyroscope"]
+        value = rates.value.copy()
+        value[:, :2] = rng.normal(0.0, 0.01, (len(rates), 2))
+        return replace(one, samples={**one.samples, "gyroscope": Samples(rates.t, value)})
+
+    return [steady(one) for one in recordings]

@@ -18,9 +18,9 @@ from discsim.validation.diagnosis.selection.exchange import takes_its_place
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
 from discsim.validation.diagnosis.selection.screening import free_columns
 from discsim.validation.diagnosis.selection.search_state import Search, possible
-from discsim.validation.identification.gauss_newton import mapped
+from discsim.validation.identification.gauss_newton import reduced_each
 from discsim.validation.identification.noise import chi_squared, log_likelihood
-from discsim.validation.identification.normal_equations import common_step, reduce
+from discsim.validation.identification.normal_equations import common_step
 
 __all__ = ["Choice", "choices_without_each", "heldout_chi2", "heldout_gain"]
 
@@ -61,9 +61,7 @@ def _by_others(candidate: CandidateEffect) -> bool:
 def _scores_without_each(fitted: ContinuousFit) -> FloatArray:
     """Return what the score of a fit (r,) is without each recording, its parameters as the others have them."""
     fit = fitted.fit
-    reduced = mapped(
-        lambda linear, trajectory: reduce(linear, trajectory, fit.noise, fit.defects), fit.linears, fit.trajectories
-    )
+    reduced = reduced_each(fit)
     total = np.sum([r.gram for r in reduced], axis=0)
     whole = common_step(total, fit.parameters, fit.at)[2]
     scores = []

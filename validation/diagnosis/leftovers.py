@@ -22,11 +22,11 @@ from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.settings import CONSISTENCY
-from discsim.validation.identification.gauss_newton import Fit, mapped, refit
+from discsim.validation.identification.gauss_newton import Fit, reduced_each, refit
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.linearisation import moved
 from discsim.validation.identification.noise import GroupNoise, NoiseModel
-from discsim.validation.identification.normal_equations import Reduced, common_step, nuisance_step, reduce
+from discsim.validation.identification.normal_equations import Reduced, common_step, nuisance_step
 
 __all__ = ["heldout_fits", "leftovers_of", "nothing_but_pure_error", "pure_noise"]
 
@@ -104,9 +104,7 @@ _FIXED = 1e-3
 def heldout_fits(fitted: ContinuousFit) -> list[Fit]:
     """Return fits of each recording alone, what it shares fixed as the others have it, its own unknowns free."""
     fit = fitted.fit
-    reduced = mapped(
-        lambda linear, trajectory: reduce(linear, trajectory, fit.noise, fit.defects), fit.linears, fit.trajectories
-    )
+    reduced = reduced_each(fit)
     total = np.sum([r.gram for r in reduced], axis=0)
     result = []
     for i, own in enumerate(reduced):

@@ -218,16 +218,19 @@ def from_other_initial_states(fit: Fit) -> Fit:
 def _other_states(trajectory: Trajectory, ratio: float) -> list[FloatArray]:
     """Return other states (k, s) at a trajectory's starts that are worth trying; times are ``ratio`` the true ones."""
     recording, plant, count = trajectory.recording, trajectory.plant, len(trajectory.states)
+    found = list(plant.initial.other_states(recording, ratio * trajectory.nodes[:-1], 1.0))
+    for states in found:
+        states[:, list(plant.layout.per_time)] *= ratio
+    others = plant.initial.other_attitudes(recording)[:3]
+    if not others:
+        return found
+    attitude = plant.layout.attitude
     first = (
         first_trajectory(recording, nodes=trajectory.nodes)
         if ratio == 1.0
         else trajectory_in_true_time(recording, ratio)
     )
-    found = list(plant.initial.other_states(recording, ratio * trajectory.nodes[:-1], 1.0))
-    for states in found:
-        states[:, list(plant.layout.per_time)] *= ratio
-    for other in plant.initial.other_attitudes(recording)[:3]:
-        attitude = plant.layout.attitude
+    for other in others:
         turned = multiply(other, conjugate(first.states[0, attitude]))
         states = first.states[:count].copy()
         states[:, attitude] = multiply(np.broadcast_to(turned, (count, 4)), states[:, attitude])

@@ -74,6 +74,11 @@ class Fit:
         return self.trajectories[0].effects
 
     @property
+    def continuous_defects(self) -> AllowedDefects:
+        """The defects of continuity that its recordings allow where segments are continuous."""
+        return self.plant.continuous_defects([one.recording for one in self.trajectories])
+
+    @property
     def count(self) -> int:
         """Number of scalar readings that take part."""
         return sum(linear.residual.size for linear in self.linears)
@@ -455,6 +460,13 @@ def discontinuous(fit: Fit) -> bool:
     steps = fit.plant.sizes.differences
     return any(
         bool(np.any(np.abs(linear.mismatch[:, forbidden]) > _CLOSED * steps[forbidden])) for linear in fit.linears
+    )
+
+
+def reduced_each(fit: Fit) -> list[Reduced]:
+    """Return what each recording says of the shared parameters where a fit stands, nothing held."""
+    return mapped(
+        lambda linear, trajectory: reduce(linear, trajectory, fit.noise, fit.defects), fit.linears, fit.trajectories
     )
 
 

@@ -27,7 +27,12 @@ from discsim.recording import Recording, Samples, SensorSheet, read_dataset
 from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
-from discsim.validation.identification.initial.flight import InitialStates, flight_initial_states, spin_initial_states
+from discsim.validation.identification.initial.flight import (
+    InitialStates,
+    flight_initial_states,
+    flight_starts,
+    spin_initial_states,
+)
 from discsim.validation.identification.initial.spin_phase import rig_initial_states
 
 DRIVER, FIELD = load_disc("driver")
@@ -101,9 +106,7 @@ def test_what_the_air_does_tells_a_velocity_that_nothing_else_does(missing):
     motion = flight()
     recording = replace(measured(motion, without=("gps", *missing)), release=None)
     first = np.zeros(1)
-    offered = [
-        flight_initial_states(recording, first, k) for k in range(flight_initial_states(recording, first).choices)
-    ]
+    offered = list(flight_starts(recording, first))
     if missing:
         assert len(offered) > 1
     apart, turned = [], []

@@ -16,12 +16,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from discsim.arrays import ComplexArray, FloatArray
 from discsim.recording import Recording, Samples
 from discsim.validation.diagnosis.consistency.own_clock import OwnClock, SamplesShown
-from discsim.validation.diagnosis.consistency.phase_regression import retimed, signal_of
+from discsim.validation.diagnosis.consistency.phase_regression import retimed, signal_of, slow_columns
 
 __all__ = ["ImuClock", "ImuRows", "imu_clock_of"]
 
@@ -144,15 +143,9 @@ class _Wobble:
         """Return the columns (n, p) at times (n,), and how many of them are the wobble's."""
         start, end = self.asked[0] - 2.0 * self.within, self.asked[-1] + 2.0 * self.within
         psi = self.turned(t) - self.turned(0.0)
-        fast = np.exp(1j * self.order * psi)[:, None] * _splines(t - start, end - start, _KNOTS_S)
-        slow = _splines(t - start, end - start, _SLOW_S)
+        fast = np.exp(1j * self.order * psi)[:, None] * slow_columns(t - start, end - start, _KNOTS_S)
+        slow = slow_columns(t - start, end - start, _SLOW_S)
         return np.hstack([fast, slow, np.exp(-1j * psi)[:, None] * slow]), fast.shape[1]
-
-
-def _splines(t: FloatArray, end: float, knots_s: float) -> FloatArray:
-    count = 4 + int(end / knots_s)
-    knots = np.concatenate([np.zeros(3), np.linspace(0.0, end, count - 2), np.full(3, end)])
-    return np.asarray(BSpline.design_matrix(np.clip(t, 0.0, end * (1.0 - 1e-12)), knots, 3).toarray())
 
 
 def _wobble_of(recording: Recording, shown: SamplesShown) -> _Wobble | None:

@@ -14,12 +14,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from discsim.arrays import ComplexArray, FloatArray, IntArray
 from discsim.compiled import compiled
 from discsim.recording import Recording
-from discsim.validation.diagnosis.consistency.phase_regression import rate_of, retimed, signal_of
+from discsim.validation.diagnosis.consistency.phase_regression import rate_of, retimed, signal_of, slow_columns
 from discsim.validation.diagnosis.consistency.time_stamp_recovery import Rows
 
 __all__ = ["OwnClock", "SamplesShown", "own_clock_of"]
@@ -188,9 +187,7 @@ class _Flexible:
 
     def columns(self, t: FloatArray) -> ComplexArray:
         """Return the columns (n, p) at times (n,)."""
-        count = self._count
-        knots = np.concatenate([np.zeros(3), np.linspace(0.0, self.end, count - 2), np.full(3, self.end)])
-        slow = BSpline.design_matrix(np.clip(t, 0.0, self.end * (1.0 - 1e-12)), knots, 3).toarray()
+        slow = slow_columns(t, self.end, _KNOTS_S)
         psi = self.angle(t) - self.angle(0.0)
         parts = [np.ones((t.size, 1), dtype=np.complex128), np.exp(-1j * psi)[:, None] * slow]
         if self.wobble is not None:

@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
+from scipy.interpolate import BSpline
 
 from discsim.arrays import ComplexArray, FloatArray, sd_by_median
 from discsim.recording import Recording, Samples
@@ -31,6 +32,7 @@ __all__ = [
     "retimed",
     "signal_of",
     "signals_of",
+    "slow_columns",
     "steps",
     "still_part",
     "tone",
@@ -128,6 +130,12 @@ def signals_of(recording: Recording) -> list[Signal]:
         t, w = rates
         add("wobble", "gyroscope", t, w[:, 0], w[:, 1], (disc.Izz - disc.Ixx) / disc.Ixx)
     return found
+
+
+def slow_columns(t: FloatArray, end: float, knots_s: float) -> FloatArray:
+    """Return cubic splines (n, p) at times (n,) s, for what is slow from 0 to ``end``: a knot each ``knots_s``."""
+    knots = np.concatenate([np.zeros(3), np.linspace(0.0, end, 2 + int(end / knots_s)), np.full(3, end)])
+    return np.asarray(BSpline.design_matrix(np.clip(t, 0.0, end * (1.0 - 1e-12)), knots, 3).toarray())
 
 
 def signal_of(recording: Recording, name: str) -> Signal | None:

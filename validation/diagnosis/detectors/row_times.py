@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
@@ -22,7 +21,7 @@ from discsim.validation.diagnosis.answer.measured import Located
 from discsim.validation.diagnosis.answer.named import SMALLEST_P_VALUE, Evidence, NamedEffect, ParameterValue
 from discsim.validation.diagnosis.consistency.imu_clock import ImuClock as FoundImuClock
 from discsim.validation.diagnosis.consistency.own_clock import OwnClock as FoundClock
-from discsim.validation.diagnosis.consistency.phase_regression import angle_turned, signal_of
+from discsim.validation.diagnosis.consistency.phase_regression import angle_turned, signal_of, slow_columns
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, RowProof
 from discsim.validation.identification.noise import NoiseModel
 
@@ -160,9 +159,7 @@ def _left_of_wobble(recording: Recording) -> float | None:
     psi: FloatArray = angle_turned(recording, wobble.t)
     t = wobble.t - wobble.t[0]
     end = float(t[-1])
-    count = 4 + int(end / _KNOTS_S)
-    knots = np.concatenate([np.zeros(3), np.linspace(0.0, end, count - 2), np.full(3, end)])
-    slow = BSpline.design_matrix(np.clip(t, 0.0, end * (1.0 - 1e-12)), knots, 3).toarray()
+    slow = slow_columns(t, end, _KNOTS_S)
     columns = np.hstack([np.exp(1j * wobble.order * psi)[:, None] * slow, np.ones((t.size, 1))])
     x = np.linalg.lstsq(columns, wobble.value, rcond=None)[0]
     return float(np.sqrt(np.mean(np.abs(wobble.value - columns @ x) ** 2)))

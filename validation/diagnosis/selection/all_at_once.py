@@ -8,7 +8,7 @@ no step by step selection comes nearer; beside the data algebra knows what each 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.sensors import Lag
@@ -86,26 +86,23 @@ def _held_out(
     def left(hypothesis: Hypothesis) -> float:
         return sum(heldout_chi2(found, hypothesis, i) for i in some)
 
-    kept = Hypothesis(candidates)
-    while loose := [one for one in kept.candidates if one.id not in told]:
-        whole = left(kept)
-        gains = {one.name: left(kept.without(one)) - whole for one in loose}
-        least = min(loose, key=lambda one: gains[one.name])
-        if gains[least.name] > 0.0:
-            break
-        kept = kept.without(least)
-    return kept.candidates
+    return _eliminated(candidates, told, lambda kept: _rises(left, kept))
 
 
 def worth_of_each(
     equations: NormalEquations, candidates: Sequence[CandidateEffect], own: Sequence[Parameter]
 ) -> dict[str, float]:
     """Return by how much chi-squared rises without each of some effects, by its name, as algebra has it."""
-    every = Hypothesis(tuple(candidates))
 
     def left(hypothesis: Hypothesis) -> float:
         return equations.solve(equations.columns_of(fitted_parameters(hypothesis, own))).chi2
 
+    return _rises(left, candidates)
+
+
+def _rises(left: Callable[[Hypothesis], float], candidates: Sequence[CandidateEffect]) -> dict[str, float]:
+    """Return by how much what is ``left`` of readings rises without each of some effects, by its name."""
+    every = Hypothesis(tuple(candidates))
     whole = left(every)
     return {one.name: left(every.without(one)) - whole for one in candidates}
 
@@ -120,12 +117,28 @@ def _pruned(
 
     Those whose ids are ``kept`` stay.
     """
+
+    def spare(left: Sequence[CandidateEffect]) -> dict[str, float]:
+        worth = worth_of_each(equations, left, own)
+        return {one.name: worth[one.name] - price(one) - SELECTION.turned * (one.id in TURNED) for one in left}
+
+    return _eliminated(candidates, kept, spare)
+
+
+def _eliminated(
+    candidates: Sequence[CandidateEffect],
+    kept: Collection[str],
+    gains: Callable[[Sequence[CandidateEffect]], Mapping[str, float]],
+) -> tuple[CandidateEffect, ...]:
+    """Return the effects less, one by one, that by which those left gain least, until each gains and they are few.
+
+    Those whose ids are ``kept`` stay.
+    """
     left = list(candidates)
     while loose := [one for one in left if one.id not in kept]:
-        worth = worth_of_each(equations, left, own)
-        spare = {one.name: worth[one.name] - price(one) - SELECTION.turned * (one.id in TURNED) for one in loose}
-        least = min(loose, key=lambda one: spare[one.name])
-        if len(left) <= _MOST and spare[least.name] > 0.0:
+        gain = gains(left)
+        least = min(loose, key=lambda one: gain[one.name])
+        if len(left) <= _MOST and gain[least.name] > 0.0:
             break
         left.remove(least)
     return tuple(left)

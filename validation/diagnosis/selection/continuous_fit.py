@@ -58,8 +58,7 @@ def continuous_fit(
     parameters = fitted_parameters(hypothesis, own)
     at = np.array([start.get((q.key, q.recordings), q.stated) for q in parameters])
     plant = relaxed_fit.plant
-    allowed = plant.continuous_defects([one.recording for one in relaxed_fit.trajectories])
-    fit = Fit(_retimed(relaxed_fit, parameters, at), parameters, at, allowed, noise)
+    fit = Fit(_retimed(relaxed_fit, parameters, at), parameters, at, relaxed_fit.continuous_defects, noise)
     if not plant.airborne and any(q.group in CLOCKS for q in parameters):
         fit = replace(fit, at=_longer_and_longer(fit))
     begun = fit

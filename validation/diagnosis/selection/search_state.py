@@ -114,8 +114,8 @@ class Search:
         """Return the search with its board about a fit, which is worked out once."""
         if self.asked is fit:
             return self
-        allowed = fit.plant.continuous_defects([one.recording for one in fit.trajectories])
-        return replace(self, equations=normal_equations_of(fit, self.candidates, fit.noise, allowed), asked=fit)
+        equations = normal_equations_of(fit, self.candidates, fit.noise, fit.continuous_defects)
+        return replace(self, equations=equations, asked=fit)
 
     def with_step(self, fitted: ContinuousFit) -> Search:
         """Return the search with one more fit on the way."""

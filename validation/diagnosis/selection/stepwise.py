@@ -122,8 +122,7 @@ def screened(
         given.add(_HELD)
     candidates = tuple(candidate for candidate in candidates_for(recordings, effects) if candidate.id not in given)
     report("asking every effect", 1, 4)
-    allowed = relaxed_fit.plant.continuous_defects([one.recording for one in relaxed_fit.trajectories])
-    equations = normal_equations_of(relaxed_fit, candidates, noise, allowed)
+    equations = normal_equations_of(relaxed_fit, candidates, noise, relaxed_fit.continuous_defects)
     report("fitting the baseline", 2, 4)
     base = _baseline(relaxed_fit, equations, own, noise)
     asked = tuple(hinted(hint) for hint in hints if any(candidate.id == hint.id for candidate in candidates))
@@ -171,7 +170,7 @@ def _selected_forward(found: Search) -> Search:
     """Return the search with effects added as long as one is worth its price."""
     most = SELECTION.most_effects
     if (begun := all_at_once(found)) is not None:
-        if any(one.averaged for one in (trajectory.recording for trajectory in begun.fit.trajectories)):
+        if any(one.recording.averaged for one in begun.fit.trajectories):
             # instants that were counted leave more than noise: what is weighed by it would be taken up for ever
             return replace(_with_final(found, begun), at_once=True)
         found = _with_final(found, eliminated_backward(found, begun))

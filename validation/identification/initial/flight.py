@@ -10,6 +10,7 @@ whose clocks differ by some per cent still agree within each comparison.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -43,7 +44,7 @@ from discsim.validation.identification.initial.path import (
 from discsim.validation.identification.initial.release_from_forces import Told, release_from_forces
 from discsim.validation.identification.initial.smoothing import GRID
 
-__all__ = ["InitialStates", "flight_initial_states", "spin_initial_states"]
+__all__ = ["InitialStates", "flight_initial_states", "flight_starts", "spin_initial_states"]
 
 
 #: sensors that fly with the disc
@@ -56,8 +57,7 @@ class InitialStates(NamedTuple):
     """States at instants, for a fit to start from.
 
     ``t`` (k,) s in written time; ``position`` (k, 3) m and ``velocity`` (k, 3) m/s in N; ``attitude`` (k, 4)
-    quaternions of C_NB; ``rate`` (k, 3) rad/s in B; ``ambiguous`` holds other attitudes (4,) worth trying at t[0],
-    ``choices`` is how many starts there are to choose from, likeliest first.
+    quaternions of C_NB; ``rate`` (k, 3) rad/s in B; ``ambiguous`` holds other attitudes (4,) worth trying at t[0].
     """
 
     t: FloatArray
@@ -66,17 +66,21 @@ class InitialStates(NamedTuple):
     attitude: FloatArray
     rate: FloatArray
     ambiguous: tuple[FloatArray, ...]
-    choices: int = 1
 
 
 # ---------------------------------------------------------------------------------------------- the three plants
 
 
-def flight_initial_states(recording: Recording, t: FloatArray, choice: int = 0) -> InitialStates:
-    """Return states at instants t (k,) s of a flight; always finite.
+def flight_initial_states(recording: Recording, t: FloatArray) -> InitialStates:
+    """Return the likeliest of `flight_starts`."""
+    return next(flight_starts(recording, t))
+
+
+def flight_starts(recording: Recording, t: FloatArray) -> Iterator[InitialStates]:
+    """Yield states at instants t (k,) s of a flight, likeliest first; always finite.
 
     Without GPS and track the path is dead reckoning from the stated release, or from what the air does
-    (`release_from_forces`), of whose starts the likeliest is taken unless another ``choice`` is. Without path or
+    (`release_from_forces`): that alone leaves several to choose from. Without path or
     accelerometer the attitude's turn about the field is the one that keeps the disc most level, unless the release
     states it; the others are in ``ambiguous``. With no sensor on board at all, the flight that the baseline predicts
     from a stated release is the start.
@@ -85,7 +89,8 @@ def flight_initial_states(recording: Recording, t: FloatArray, choice: int = 0) 
     if not any(sensor in recording for sensor in ON_BOARD):
         predicted = _predicted(recording, t)
         if predicted is not None:
-            return predicted
+            yield predicted
+            return
     frame = frame_of(recording)
     grid = _even(t, recording)
     fixes = path_fixes(recording)
@@ -101,17 +106,16 @@ def flight_initial_states(recording: Recording, t: FloatArray, choice: int = 0) 
     told: tuple[Told, ...] = ()
     if fixes is None and (recording.release is None or recording.release.velocity is None):
         told = release_from_forces(recording, frame, grid, G, force_felt)
-    if told:
-        G = told[choice].turn @ G
-    attitude, rate = states_from(recording, frame, grid, G, t)
-    if force_felt is not None:
-        force_felt = in_ned(force_felt, grid, G, recording.environment.gravity)
-    if fixes is not None:
-        position, velocity = path_states(fixes, force_felt, t)
-    else:
-        position, velocity = dead_reckoning(recording, force_felt, t, told[choice].velocity if told else None)
-    others = () if certain or told else other_attitudes(recording, attitude[0])
-    return _finite(InitialStates(t, position, velocity, attitude, rate, others, max(len(told), 1)))
+    for start in told or (None,):
+        turns = G if start is None else start.turn @ G
+        attitude, rate = states_from(recording, frame, grid, turns, t)
+        force = None if force_felt is None else in_ned(force_felt, grid, turns, recording.environment.gravity)
+        if fixes is not None:
+            position, velocity = path_states(fixes, force, t)
+        else:
+            position, velocity = dead_reckoning(recording, force, t, None if start is None else start.velocity)
+        others = () if certain or told else other_attitudes(recording, attitude[0])
+        yield _finite(InitialStates(t, position, velocity, attitude, rate, others))
 
 
 def _predicted(recording: Recording, t: FloatArray) -> InitialStates | None:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, IntArray
 from discsim.frames import body_to_ned, multiply, turn
 from discsim.recording import Recording
 from discsim.sensors.accelerometer import force_at
@@ -146,9 +146,14 @@ def integrated(grid: FloatArray, force: FloatArray) -> SpecificForce:
     return SpecificForce(grid, force, gained, np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]))
 
 
+def nearest_places(grid: FloatArray, t: FloatArray) -> IntArray:
+    """Return the places (k,) on an even grid (n,) that are nearest to instants (k,)."""
+    return np.asarray(np.clip(np.rint((t - grid[0]) / (grid[1] - grid[0])).astype(int), 0, grid.size - 1))
+
+
 def in_ned(force_felt: SpecificForce, grid: FloatArray, G: FloatArray, gravity: float) -> SpecificForce:
     """Return the acceleration in N, and its integrals, that attitudes G (n, 3, 3) on ``grid`` make of a force felt."""
-    nearest = np.clip(np.rint((force_felt.grid - grid[0]) / (grid[1] - grid[0])).astype(int), 0, grid.size - 1)
+    nearest = nearest_places(grid, force_felt.grid)
     # a wrong reading must not carry the disc away: the specific force of a throw is below 4 g
     size = np.linalg.norm(force_felt.force, axis=1, keepdims=True)
     force = force_felt.force * np.minimum(1.0, 40.0 / np.maximum(size, 1e-9))

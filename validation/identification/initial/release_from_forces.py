@@ -21,8 +21,8 @@ from discsim.frames import body_to_ned
 from discsim.parameters import PARAMETERS, Tables, flight_parameters, tables
 from discsim.recording import Recording
 from discsim.validation.identification.initial.attitude import Attitude
-from discsim.validation.identification.initial.path import GUESSED_HEIGHT, SpecificForce
-from discsim.validation.identification.initial.smoothing import GRID, smoothed
+from discsim.validation.identification.initial.path import GUESSED_HEIGHT, SpecificForce, nearest_places
+from discsim.validation.identification.initial.smoothing import smoothed
 
 __all__ = ["MOST", "Told", "release_from_forces"]
 
@@ -126,7 +126,7 @@ def release_from_forces(
     if t.size < 2:
         return ()
     D = body_to_ned(frame.D_at(t))
-    attitude = np.ascontiguousarray(G[np.clip(np.rint((t - grid[0]) / GRID).astype(int), 0, len(G) - 1)] @ D)
+    attitude = np.ascontiguousarray(G[nearest_places(grid, t)] @ D)
     force, turning = np.full((t.size, 3), np.nan), np.full((t.size, 2), np.nan)
     if force_felt is not None:
         there = np.column_stack([np.interp(t, force_felt.grid, column) for column in force_felt.force.T])

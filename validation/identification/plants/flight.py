@@ -6,7 +6,7 @@ A state is position and velocity in N, attitude and body rates.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
+from itertools import islice, product
 from math import asin, atan2, cos, degrees, radians, sin
 
 import numpy as np
@@ -26,7 +26,7 @@ from discsim.parameters import PARAMETERS, Tables
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
 from discsim.validation.identification.dynamics import FASTEST, SIZE, acting_tables
-from discsim.validation.identification.initial.flight import flight_initial_states
+from discsim.validation.identification.initial.flight import InitialStates, flight_initial_states, flight_starts
 from discsim.validation.identification.parameters import AllowedDefects, Values
 from discsim.validation.identification.plants.flight_neighbours import SLOWEST, add_neighbours
 from discsim.validation.identification.plants.law_terms import Term
@@ -115,8 +115,11 @@ def flight_segments(
         add_neighbours(flats, given, states, times[0], times[last], times[n - 1], out, rows, ends)
 
 
-def _states(recording: Recording, t: FloatArray, ratio: float, choice: int = 0) -> FloatArray:
-    starts = flight_initial_states(recording, np.minimum(t * ratio, recording.end), choice)
+def _states(recording: Recording, t: FloatArray, ratio: float) -> FloatArray:
+    return _rows(flight_initial_states(recording, np.minimum(t * ratio, recording.end)), ratio)
+
+
+def _rows(starts: InitialStates, ratio: float) -> FloatArray:
     states = np.hstack([starts.position, starts.velocity, starts.attitude, starts.rate])
     states[:, _SPIN] *= ratio
     return states
@@ -127,8 +130,8 @@ def _other_attitudes(recording: Recording) -> tuple[FloatArray, ...]:
 
 
 def _other_states(recording: Recording, t: FloatArray, ratio: float) -> tuple[FloatArray, ...]:
-    choices = flight_initial_states(recording, np.zeros(1)).choices
-    return tuple(_states(recording, t, ratio, choice) for choice in range(1, choices))
+    starts = flight_starts(recording, np.minimum(t * ratio, recording.end))
+    return tuple(_rows(one, ratio) for one in islice(starts, 1, None))
 
 
 def _lacks(recording: Recording) -> str | None:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from support import logger_loop as loop
 
-from discsim.recording import Recording, Samples
+from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.imu_clock import imu_clock_of
 from discsim.validation.diagnosis.consistency.own_clock import OwnClock, own_clock_of
 from discsim.validation.diagnosis.consistency.time_stamp_recovery import rows_of
@@ -53,15 +51,7 @@ def test_a_chip_that_is_read_in_step_has_no_clock_of_its_own(seed):
 
 def test_a_disc_that_does_not_wobble_tells_nothing_of_its_chip():
     made, clock = counted(1, 0.0091)
-    rng = np.random.default_rng(3)
-
-    def steady(one: Recording) -> Recording:
-        rates = one.samples["gyroscope"]
-        value = rates.value.copy()
-        value[:, :2] = rng.normal(0.0, 0.01, (len(rates), 2))
-        return replace(one, samples={**one.samples, "gyroscope": Samples(rates.t, value)})
-
-    assert imu_clock_of([steady(one) for one in made], NAMES, clock) is None
+    assert imu_clock_of(loop.without_wobble(made, 3), NAMES, clock) is None
 
 
 def test_rows_stand_where_the_chip_made_them():
