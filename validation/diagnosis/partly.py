@@ -1,4 +1,4 @@
-"""What is explained in part: effects that take most of a mismatch away on every recording set aside, and leave more.
+"""What is explained in part: effects that take most of a mismatch away on recordings set aside, and leave more.
 
 Takes a search whose verdict is unexplained; gives the effects, their numbers by the jackknife, and what they leave. An
 answer names nothing then: a wrong effect, too, may take most of a mismatch away where all recordings are alike.
@@ -15,11 +15,13 @@ from discsim.arrays import FloatArray
 from discsim.validation.diagnosis.answer.named import ParameterValue
 from discsim.validation.diagnosis.answer.partly import PartlyExplained
 from discsim.validation.diagnosis.held_out import heldout_chi2
+from discsim.validation.diagnosis.leftovers import heldout_fits
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, in_parameters
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.diagnosis.settings import UNKNOWN_LAW
+from discsim.validation.identification.gauss_newton import refit
 from discsim.validation.identification.noise import chi_squared
 
 __all__ = ["partly_explained"]
@@ -29,17 +31,23 @@ _STEPS = 20
 
 
 def partly_explained(found: Search, names: Sequence[str]) -> tuple[PartlyExplained, ...]:
-    """Return the effects of the best fit that take most away on each of the recordings (called ``names``), or none.
+    """Return the effects of the best fit that take most away from the recordings (called ``names``), or none.
 
-    They act in all recordings; each is tried with its numbers as the others have them.
+    They act in all recordings; each is tried with its numbers as the others have them. All together must keep half of
+    their mismatch at most, and none may be worse off.
     """
     if len(names) < 2:
         return ()
     for fitted, before in _tried(found):
         candidates = fitted.hypothesis.candidates
         about = replace(found, final=fitted, base=before).about(fitted.fit)
-        heldout = {name: _heldout(about, i) for i, name in enumerate(names)}
-        if all(after <= (1.0 - UNKNOWN_LAW.share) * before for before, after in heldout.values()):
+        if fitted.fit.from_release:
+            each = _heldout_from_release(before, fitted)
+        else:
+            each = [_heldout(about, i) for i in range(len(names))]
+        total, left = np.sum(each, axis=0)
+        if left <= (1.0 - UNKNOWN_LAW.share) * total and all(after < before for before, after in each):
+            heldout = dict(zip(names, each, strict=True))
             return tuple(PartlyExplained(one.id, _jackknifed(about, fitted, one), heldout) for one in candidates)
     return ()
 
@@ -72,6 +80,20 @@ def _heldout(found: Search, i: int) -> tuple[float, float]:
     before = chi_squared(found.base.fit.linears[i], level, found.base.residuals[i])
     after = max(heldout_chi2(found, found.final.hypothesis, i), 0.0)
     return before / found.base.residuals[i].size, after / found.equations.linears[i].raw.size
+
+
+def _heldout_from_release(before: ContinuousFit, fitted: ContinuousFit) -> list[tuple[float, float]]:
+    """Return what `_heldout` does for flights of which their release tells the most, by fits of each alone.
+
+    What a fit moves stated numbers by is counted with what it leaves, both in the noise that the baseline leaves: in
+    that of the readings any release would serve the path.
+    """
+    level = {group: noise._replace(correlation=0.0) for group, noise in before.fit.noise.items()}
+    merits = []
+    for one in (before, fitted):
+        fit = refit(replace(one.fit, noise=level), iterations=_STEPS)
+        merits.append([alone.merit / alone.count for alone in heldout_fits(replace(one, fit=fit))])
+    return list(zip(*merits, strict=True))
 
 
 def _jackknifed(found: Search, fitted: ContinuousFit, candidate: CandidateEffect) -> dict[str, ParameterValue]:

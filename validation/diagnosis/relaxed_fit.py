@@ -21,6 +21,7 @@ from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.followed import true_noise
 from discsim.validation.diagnosis.consistency.spin_agreement import Comparison, compared, written_ratios
 from discsim.validation.diagnosis.settings import CONSISTENCY, RELAXED_FIT
+from discsim.validation.identification.from_afar import fitted_from_afar
 from discsim.validation.identification.gauss_newton import Fit, linearised, merit_of, refit
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.noise import channel_of, estimate_noise, robust_noise, stated_noise, whitened
@@ -64,8 +65,9 @@ def first_trajectory(recording: Recording, ratio: float = 1.0, nodes: FloatArray
     Starts stand in the time that the magnetometer writes. ``nodes`` (k + 1,) are the boundaries of the segments, s,
     where they are not those that `nodes_of` a recording takes.
     """
-    nodes = nodes_of(recording) if nodes is None else nodes
-    return trajectory_of(recording, nodes, plant_of(recording).initial.states(recording, nodes[:-1], ratio))
+    nodes, plant = nodes_of(recording) if nodes is None else nodes, plant_of(recording)
+    found = trajectory_of(recording, nodes, plant.initial.states(recording, nodes[:-1], ratio))
+    return replace(found, trust_radius=plant.sizes.of_path) if plant.from_release(recording) else found
 
 
 def ordinary(sensors: set[str], plant: str, *, small: bool = False) -> tuple[Parameter, ...]:
@@ -129,6 +131,8 @@ def relaxed(
     seen = true_noise([readings for trajectory in trajectories for readings in trajectory.readings])
     fit = replace(fit, noise=stated_noise(bare, {group: level.sd for group, level in seen.items()}))
     few = 1e-4 * sum(linear.raw.size for linear in bare)
+    if fit.from_release:
+        return fitted_from_afar(fit)
     fit = _reweighted(fit, iterations, few) if supposed else refit(fit, iterations=iterations, tolerance=few)
     fit = from_other_initial_states(fit)
     if not plant.airborne:

@@ -79,6 +79,11 @@ class Fit:
         return self.plant.continuous_defects([one.recording for one in self.trajectories])
 
     @property
+    def from_release(self) -> bool:
+        """Whether nothing but what is stated of their release tells how its motions begin."""
+        return all(self.plant.from_release(trajectory.recording) for trajectory in self.trajectories)
+
+    @property
     def count(self) -> int:
         """Number of scalar readings that take part."""
         return sum(linear.residual.size for linear in self.linears)

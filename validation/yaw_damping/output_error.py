@@ -56,8 +56,8 @@ _CONVERGED = 0.01
 _STARTED = 10.0
 #: a start is good enough, and the next is not tried, where it ends at residuals of so many stated deviations (rms)
 _NEAR = 3.0
-#: a turn of the release about z_B, with p and q turned back, changes nothing that is observed: it is held, rad
-_TURN, _HELD = 8, 1e-6
+#: a turn of the release about z_B, with p and q turned back, changes nothing that is observed, and is held
+_TURN = 8
 
 
 @dataclass(frozen=True)
@@ -196,9 +196,8 @@ def _segment(throw: Throw, state: FloatArray) -> Trajectory:
         sheets={item.sensor: SensorSheet(1.0) for item in readings},
         samples={},
     )
-    trust_radius = FLIGHT.sizes.unknown.copy()
-    trust_radius[_TURN] = _HELD
-    return Trajectory(recording, readings, np.array([0.0, throw.end + 1e-6]), state[None], trust_radius=trust_radius)
+    nodes = np.array([0.0, throw.end + 1e-6])
+    return Trajectory(recording, readings, nodes, state[None], trust_radius=FLIGHT.sizes.of_path)
 
 
 def _readings(sensor: str, t: FloatArray, value: FloatArray, sd: FloatArray) -> Readings:

@@ -15,6 +15,7 @@ from discsim.sensors import Instruments, Noise, Sampling, Tracker, record
 from discsim.validation.diagnosis.answer.named import ParameterValue
 from discsim.validation.diagnosis.answer.partly import PartlyExplained
 from discsim.validation.diagnosis.partly import partly_explained
+from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.selection.stepwise import screened
 
 CAMERA = effect("track.camera", height_m=30.0, north_m=10.0, east_m=-8.0)
@@ -43,6 +44,15 @@ def test_a_camera_over_plans_of_throws_is_asked_and_takes_most_away_on_each():
     assert set(part.parameters) == {"height_m", "north_m", "east_m"}
     assert all(after < 0.5 * before for before, after in part.heldout.values())
     assert partly_explained(replace(found, hints=()), ["throw-0", "throw-1"]) == ()
+
+
+def test_it_is_named_where_it_explains_all_that_the_paths_show():
+    found = diagnose([plans()], ["plans"]).diagnosis
+    assert found.verdict == "explained"
+    assert [one.id for one in found.effects] == ["track.camera"]
+    for name, size in CAMERA.sizes.items():
+        told = found.effects[0].parameters[name]
+        assert abs(told.value - size) < 4.0 * told.sd
 
 
 def test_it_is_told_with_what_it_leaves_and_is_plain_json():

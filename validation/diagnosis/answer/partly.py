@@ -16,7 +16,7 @@ __all__ = ["PartlyExplained"]
 
 @dataclass(frozen=True)
 class PartlyExplained:
-    """An effect that takes most of a mismatch away on every recording set aside.
+    """An effect that takes most of a mismatch away on recordings set aside.
 
     ``parameters`` have the standard deviations of the jackknife (Tukey, 1958), which hold whatever is left;
     ``heldout`` has chi-squared per reading of each recording before and with it, its numbers those of the others.

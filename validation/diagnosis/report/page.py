@@ -140,6 +140,9 @@ def verdict_sentence(diagnosis: Diagnosis) -> str:
         return f"The baseline's physics explains these recordings once {text}.".replace("-", "−")
     if diagnosis.verdict == "unexplained":
         text = "Something is missing that no effect of the catalogue accounts for"
+        if diagnosis.partly:
+            lead = _joined([name_of(item.id) for item in diagnosis.partly])
+            return f"{text}. The nearest is {lead}: it takes most of the mismatch away, and leaves more than noise."
         return f"{text}; a law for it is below." if diagnosis.law is not None else f"{text}."
     names = _joined([_named(item) for item in diagnosis.effects])
     return f"The baseline leaves out {names}."

@@ -17,6 +17,7 @@ from discsim.effects.sensors import ClockRate
 from discsim.validation.diagnosis.relaxed_fit import beginning
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
+from discsim.validation.identification.from_afar import fitted_from_afar
 from discsim.validation.identification.gauss_newton import Fit, penalty_of, refit
 from discsim.validation.identification.noise import NoiseModel, estimate_noise, likeliest_noise, log_likelihood
 from discsim.validation.identification.parameters import Parameter, values_of
@@ -62,6 +63,8 @@ def continuous_fit(
     if not plant.airborne and any(q.group in CLOCKS for q in parameters):
         fit = replace(fit, at=_longer_and_longer(fit))
     begun = fit
+    if fit.from_release:
+        return scored(hypothesis, fitted_from_afar(fit, bounds=BOUNDS))
     fit = refit(fit, iterations=iterations, bounds=BOUNDS, bar=bar)
     if not np.isfinite(fit.merit):
         # algebra from far away may offer numbers under which no motion lasts

@@ -18,6 +18,7 @@ from discsim.effects import Effect
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import DroppedSamples, Lag
 from discsim.recording import Recording
+from discsim.validation.diagnosis.consistency.followed import true_noise
 from discsim.validation.diagnosis.detectors.all import searched
 from discsim.validation.diagnosis.detectors.dropped_samples import PhaseLosses, Shifted
 from discsim.validation.diagnosis.relaxed_fit import relaxed, unknowns, without_outliers
@@ -115,14 +116,15 @@ def screened(
     relaxed_fit = replace(
         relaxed_fit, trajectories=tuple(replace(trajectory, effects=effects) for trajectory in relaxed_fit.trajectories)
     )
-    noise = estimate_noise(relaxed_fit.linears, [linear.residual for linear in relaxed_fit.linears])
+    noise = _noise_of(relaxed_fit)
     given = {q.group for q in free}
     if relaxed_fit.plant.held and _HELD not in {hint.id for hint in hints}:
         # of means over turns a lag changes nothing but how what it holds dies away, which was asked before any fit
         given.add(_HELD)
     candidates = tuple(candidate for candidate in candidates_for(recordings, effects) if candidate.id not in given)
     report("asking every effect", 1, 4)
-    equations = normal_equations_of(relaxed_fit, candidates, noise, relaxed_fit.continuous_defects)
+    asked_in = relaxed_fit.noise if relaxed_fit.from_release else noise
+    equations = normal_equations_of(relaxed_fit, candidates, asked_in, relaxed_fit.continuous_defects)
     report("fitting the baseline", 2, 4)
     base = _baseline(relaxed_fit, equations, own, noise)
     asked = tuple(hinted(hint) for hint in hints if any(candidate.id == hint.id for candidate in candidates))
@@ -142,6 +144,13 @@ def screened(
         outliers=tuple(left_out),
         hints=asked,
     )
+
+
+def _noise_of(relaxed_fit: Fit) -> NoiseModel:
+    """Return the noise of readings: what a fit leaves that follows them, else what they show themselves."""
+    if relaxed_fit.from_release:
+        return true_noise([readings for trajectory in relaxed_fit.trajectories for readings in trajectory.readings])
+    return estimate_noise(relaxed_fit.linears, [linear.residual for linear in relaxed_fit.linears])
 
 
 def _baseline(

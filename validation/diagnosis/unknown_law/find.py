@@ -136,8 +136,9 @@ def find_law(
     the parameters that the recordings leave open without any effect, ``noise`` that of the relaxed fit.
     """
     plant = relaxed_fit.plant
-    if plant.weakly_identified:
-        return None  # what a free spin does not model takes up any further moment
+    if plant.weakly_identified or relaxed_fit.from_release:
+        # what a free spin does not model takes up any further moment; a path alone leaves no motion beside the data
+        return None
     if len(recordings) == 1 and BOARD.isdisjoint(recordings[0].samples):
         return None  # one path takes any law, and no other recording could bear it out
     base = (

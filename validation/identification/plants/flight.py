@@ -41,6 +41,7 @@ from discsim.validation.identification.plants.plant import (
     MotionLaws,
     Plant,
     Sizes,
+    even_nodes,
     propagated_by,
 )
 
@@ -132,6 +133,19 @@ def _other_attitudes(recording: Recording) -> tuple[FloatArray, ...]:
 def _other_states(recording: Recording, t: FloatArray, ratio: float) -> tuple[FloatArray, ...]:
     starts = flight_starts(recording, np.minimum(t * ratio, recording.end))
     return tuple(_rows(one, ratio) for one in islice(starts, 1, None))
+
+
+def _from_release(recording: Recording) -> bool:
+    release = recording.release
+    if release is None or not BOARD.isdisjoint(recording.samples):
+        return False
+    return all(one is not None for one in (release.position, release.velocity, release.roll, release.pitch))
+
+
+def _nodes(recording: Recording, segment: float) -> FloatArray:
+    """Return the nodes (k + 1,) of segments, s: a path tells no turning, and so not how segments go on."""
+    nodes = even_nodes(recording, segment)
+    return nodes[[0, -1]] if _from_release(recording) else nodes
 
 
 def _lacks(recording: Recording) -> str | None:
@@ -294,6 +308,7 @@ FLIGHT = Plant(
         unknown=np.repeat([1e4, 300.0, 30.0, 1e3], 3),
         continuous=AllowedDefects(np.zeros(12)),
         relaxed=AllowedDefects(np.repeat([0.1, 0.5, 0.05, 0.3], 3)),
+        of_path=np.array([*[1e4] * 3, *[300.0] * 3, 30.0, 30.0, 1e-6, *[1e3] * 3]),
     ),
     # twice the longest throw; a first look of two segments
     durations=Durations(segment=0.5, first_look=1.0, window=0.5, longest=20.0, setup=60.0, event_near=0.09),
@@ -302,4 +317,6 @@ FLIGHT = Plant(
     grows_with=_grows_with,
     laws=MotionLaws(_terms(), _symbols, moment_step=2e-4),
     design=Design(_about, _read),
+    nodes=_nodes,
+    from_release=_from_release,
 )

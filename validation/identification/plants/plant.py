@@ -35,6 +35,7 @@ __all__ = [
     "MotionLaws",
     "Plant",
     "Sizes",
+    "even_nodes",
     "propagated_by",
 ]
 
@@ -216,7 +217,8 @@ class Sizes:
     ``differences`` are half the differences by which slopes are taken; ``unknown`` is what is known of a state without
     any reading, one sigma. ``continuous`` are the defects of continuity that a fit allows whose segments are
     continuous, ``counted`` the same of recordings whose rows were counted one by one, where they are others;
-    ``relaxed`` are those that it allows to stay beside the data whatever physics is missing.
+    ``relaxed`` are those that it allows to stay beside the data whatever physics is missing. ``of_path`` is ``unknown``
+    where readings tell a path alone, of which a turn of the body about its own axis changes nothing.
     """
 
     differences: FloatArray
@@ -224,6 +226,7 @@ class Sizes:
     continuous: AllowedDefects
     relaxed: AllowedDefects
     counted: AllowedDefects | None = None
+    of_path: FloatArray | None = None
 
 
 class Durations(NamedTuple):
@@ -318,6 +321,11 @@ def _nothing_lacks(recording: Recording) -> str | None:
     return None
 
 
+def _readings_tell(recording: Recording) -> bool:
+    del recording
+    return False
+
+
 def _as_read(recording: Recording, readings: Readings) -> Sequence[Readings]:
     del recording
     return (readings,)
@@ -342,6 +350,8 @@ class Plant:
         See these types.
     nodes : function
         The nodes (k + 1,) of a recording's segments, s, of about a given length.
+    from_release : function
+        Whether what a recording states of its release tells how it begins to turn, and no reading does.
     own : tuple of Parameter
         Parameters of its motion that neither the catalogue nor a recording's hardware has, with what is known of them
         before any reading; their group is its name. Each recording has its own, unless a fit says otherwise.
@@ -382,6 +392,7 @@ class Plant:
     sizes: Sizes
     durations: Durations
     nodes: Callable[[Recording, float], FloatArray] = even_nodes
+    from_release: Callable[[Recording], bool] = _readings_tell
     own: tuple[Parameter, ...] = ()
     held: tuple[Parameter, ...] = ()
     zeros: tuple[Parameter, ...] = ()
