@@ -55,14 +55,14 @@ Goal: at least 0.9 of the cores for 1000 flights.
 
 ## Start
 
-`python benchmarks/start_up.py`: the least of several processes. A flight loads numpy, numba and MuJoCo, whose own
-start stands beside it, and the compiled code from its cache; scipy is loaded by what needs it.
+`python benchmarks/start_up.py`: the least of several processes, with bytecode and compiled code in their caches. A
+flight loads numpy, numba and MuJoCo, whose own start stands beside it; scipy is loaded by what needs it.
 
 {start}
 
 Goals: `import discsim` and `discsim --help` 0.3 s, `discsim fly` of a 3 s throw 1.5 s from the second time on.
-A flight misses it where the CPU time above is more: of it the three imports take half, and the rest is numba's own
-start, a quarter of a second, and the loading of cached code.
+The three imports take half of a flight's start; the rest is numba's own registries, a seventh, the command line and our
+modules, a fifth, and the flight with its files.
 
 ## The standalone model
 

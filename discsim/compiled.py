@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import hashlib
 import os
+import sys
 from collections.abc import Callable
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -29,6 +31,29 @@ __all__ = [
 ]
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _load_without_blas() -> None:
+    """Load numba's functions of arrays without scipy's linear algebra, which is a sixth of a flight's start.
+
+    While they load, numba sees whether there is a BLAS by loading one. There is: scipy comes with this package. What
+    calls it loads it when it is compiled, or, from the cache, when it runs.
+    """
+    if "numba.np.arraymath" in sys.modules:
+        return
+    try:
+        linalg: Any = import_module("numba.np.linalg")
+        ensure, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+    except (ImportError, AttributeError):  # another numba, which may do as it likes
+        return
+    try:
+        arrays: Any = import_module("numba.np.arraymath")
+        arrays.ensure_blas = ensure
+    finally:
+        linalg.ensure_blas = ensure
+
+
+_load_without_blas()
 
 
 @cache

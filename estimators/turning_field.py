@@ -19,6 +19,10 @@ __all__ = ["SOFT", "add_normal_equations", "integrate"]
 
 #: rows and columns of the six parameters of soft iron
 SOFT = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+#: readings whose derivatives are multiplied with each other at once: so the sums run along memory
+TOGETHER = 32
+#: most parameters that act at one time: four of the spin's spline and of each of two others
+ACTING = 12
 
 
 @compiled_nogil
@@ -96,33 +100,80 @@ def integrate(
 
 
 @compiled_sums
-def _weighed(
+def _weigh(
     scale: float,
     C: FloatArray,
     iron: FloatArray,
     skew: FloatArray,
     turned: FloatArray,
     residual: FloatArray,
-    B: FloatArray,
-    D: FloatArray,
+    rows: FloatArray,
+    at: int,
+    q: int,
+    dense: int,
 ) -> None:
-    """Write a reading's derivatives, weighed: ``B`` by rotations in N and, fourth, about the axis; ``D`` by the rest.
+    """Write a reading's derivatives, weighed, into ``rows`` (p, 3 n) from its column ``at`` on.
 
-    Columns of ``D`` (3, 13 + r): field, hard iron, soft iron, r left to the caller, and last the residual.
-    """  # fmt: skip
+    First those by rotations in N and, where ``q`` is 4, about the axis; then ``dense`` by field, hard iron and soft
+    iron, some left to the caller, and last the residual.
+    """
     for a in range(3):
         for b in range(3):
-            D[a, b] = scale * (iron[a, 0] * C[0, b] + iron[a, 1] * C[1, b] + iron[a, 2] * C[2, b])
-            D[a, 3 + b] = scale if a == b else 0.0
+            rows[q + b, at + a] = scale * (iron[a, 0] * C[0, b] + iron[a, 1] * C[1, b] + iron[a, 2] * C[2, b])
+            rows[q + 3 + b, at + a] = scale if a == b else 0.0
+        x, y, z = rows[q, at + a], rows[q + 1, at + a], rows[q + 2, at + a]
         for b in range(3):
-            B[a, b] = D[a, 0] * skew[b, 0] + D[a, 1] * skew[b, 1] + D[a, 2] * skew[b, 2]
-        if B.shape[1] == 4:
-            B[a, 3] = B[a, 0] * C[2, 0] + B[a, 1] * C[2, 1] + B[a, 2] * C[2, 2]
-        D[a, D.shape[1] - 1] = scale * residual[a]
+            rows[b, at + a] = x * skew[b, 0] + y * skew[b, 1] + z * skew[b, 2]
+        if q == 4:
+            rows[3, at + a] = rows[0, at + a] * C[2, 0] + rows[1, at + a] * C[2, 1] + rows[2, at + a] * C[2, 2]
+        rows[q + dense - 1, at + a] = scale * residual[a]
     for column in range(6):
         a, b = SOFT[column]
-        D[a, 6 + column] = scale * turned[b]
-        D[b, 6 + column] = scale * turned[a]
+        rows[q + 6 + column, at + a] = scale * turned[b]
+        rows[q + 6 + column, at + b] = scale * turned[a]
+
+
+@compiled_sums
+def _product(rows: FloatArray, a: int, b: int, count: int) -> float:
+    total = 0.0
+    for k in range(count):
+        total += rows[a, k] * rows[b, k]
+    return total
+
+
+@compiled_sums
+def _add_products(
+    rows: FloatArray,
+    filled: int,
+    active: IndexArray,
+    count: int,
+    sum_g: FloatArray,
+    sum_l: FloatArray,
+    sum_d: FloatArray,
+    run: FloatArray,
+    pairs: FloatArray,
+    cross: FloatArray,
+) -> None:
+    """Add the products of the derivatives of some readings, ``filled`` columns of ``rows``, to all sums."""
+    q, dense = sum_l.shape
+    for a in range(q):
+        for b in range(q):
+            sum_g[a, b] += _product(rows, a, b, filled)
+        for b in range(dense):
+            sum_l[a, b] += _product(rows, a, q + b, filled)
+    for a in range(dense):
+        for b in range(a + 1):
+            value = sum_d[a, b] + _product(rows, q + a, q + b, filled)
+            sum_d[a, b], sum_d[b, a] = value, value
+    for m in range(count):
+        j, own = active[m], q + dense + m
+        for a in range(q):
+            run[j, a] += _product(rows, own, a, filled)
+        for b in range(dense):
+            cross[j, b] += _product(rows, own, q + b, filled)
+        for other in range(m + 1):
+            k = active[other]
+            pairs[max(j, k), min(j, k)] += _product(rows, own, q + dense + other, filled)
 
 
 @compiled
@@ -209,9 +260,9 @@ def add_normal_equations(
     rest_g, rest_l = np.zeros((total_size, q, q)), np.zeros((total_size, q, dense))
     order, ended = np.empty(total_size, dtype=np.int64), 0
     skew = np.array([[0.0, m0[2], -m0[1]], [-m0[2], 0.0, m0[0]], [m0[1], -m0[0], 0.0]])
-    B, D, G, L = np.empty((3, q)), np.zeros((3, dense)), np.empty((q, q)), np.empty((q, dense))
+    #: derivatives of some readings at once: by rotations, by the rest, and by the parameters that act
+    rows, filled = np.zeros((q + dense + ACTING, 3 * TOGETHER)), 0
     active, count = np.empty(total_size + 16, dtype=np.int64), 0
-    pulled = np.empty(q)
     low, slow_low = int(first[0]), int(slow_first[0]) if slow_size else 0
     for i in range(n):
         if i > 0:
@@ -240,6 +291,8 @@ def add_normal_equations(
             now = first[i * substeps - 1]
             slow_now = slow_first[i * substeps - 1] if slow_size else 0
             if i == 1 or now > low or slow_now > slow_low:
+                _add_products(rows, filled, active, count, sum_g, sum_l, sum_d, run, pairs, cross)
+                filled = 0
                 count = _acting(low, now, slow_low, slow_now, size, slow_size, active)
                 m = 0
                 while m < count:
@@ -259,36 +312,22 @@ def add_normal_equations(
                     ended, count = ended + 1, count - 1
                     active[m] = active[count]
                 low, slow_low = now, slow_now
-        _weighed(scale[i], attitude[i], iron, skew, turned[i], residual[i], B, D)
-        for a in range(3):
+        _weigh(scale[i], attitude[i], iron, skew, turned[i], residual[i], rows, filled, q, dense)
+        for a in range(filled, filled + 3):
+            x, y, z = rows[0, a], rows[1, a], rows[2, a]
             for j in range(read):
-                D[a, 12 + j] = B[a, 0] * moments[j, 0] + B[a, 1] * moments[j, 1] + B[a, 2] * moments[j, 2]
-        for a in range(q):
-            for b in range(q):
-                G[a, b] = B[0, a] * B[0, b] + B[1, a] * B[1, b] + B[2, a] * B[2, b]
-                sum_g[a, b] += G[a, b]
-            for b in range(dense):
-                L[a, b] = B[0, a] * D[0, b] + B[1, a] * D[1, b] + B[2, a] * D[2, b]
-                sum_l[a, b] += L[a, b]
-        for a in range(dense):
-            for b in range(dense):
-                sum_d[a, b] += D[0, a] * D[0, b] + D[1, a] * D[1, b] + D[2, a] * D[2, b]
-        for m in range(count):
-            j = active[m]
-            for a in range(q):
-                value = 0.0
-                for b in range(q):
-                    value += G[a, b] * theta[j, b]
-                pulled[a] = value
-                run[j, a] += value
-                for b in range(dense):
-                    cross[j, b] += theta[j, a] * L[a, b]
-            for other in range(m + 1):
-                k = active[other]
-                value = 0.0
-                for a in range(q):
-                    value += pulled[a] * theta[k, a]
-                pairs[max(j, k), min(j, k)] += value
+                rows[q + 12 + j, a] = x * moments[j, 0] + y * moments[j, 1] + z * moments[j, 2]
+            for m in range(count):
+                j = active[m]
+                value = x * theta[j, 0] + y * theta[j, 1] + z * theta[j, 2]
+                if despun:
+                    value += rows[3, a] * theta[j, 3]
+                rows[q + dense + m, a] = value
+        filled += 3
+        if filled == 3 * TOGETHER:
+            _add_products(rows, filled, active, count, sum_g, sum_l, sum_d, run, pairs, cross)
+            filled = 0
+    _add_products(rows, filled, active, count, sum_g, sum_l, sum_d, run, pairs, cross)
     settled = ended
     for m in range(count):
         _note(rest_g, sum_g, active[m])

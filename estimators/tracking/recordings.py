@@ -135,7 +135,7 @@ def _window_fits(recording: Recording, window: float, *, turning: bool) -> tuple
     """
     t, m = usable_field(recording.need("magnetometer"), recording.sheets.get("magnetometer"))
     gyroscope = transverse_gyroscope(recording)
-    windows = LikelihoodSettings(window=window, step=window / 8, degree=1)
+    windows = LikelihoodSettings(window=window, step=window / 4, degree=1)
     centres = window_centres(t, windows)
     fits = fit_windows(t, m, centres, windows)
     axial = axial_field(fits.amplitude, fits.axial, recording.environment.field_strength)

@@ -89,7 +89,7 @@ def _fitted(problem: Problem, x: FloatArray, floor: float, near: Track | None = 
         # Huber's weight for single bad readings
         point = point.weighed(np.sqrt(np.minimum(1.0, 4.0 * sigma / np.maximum(length, 1e-12))))
         linear = linearise(point, sigma, *problem.prior(precession))
-        mixture = adapt(problem, linear, point.x, target)
+        mixture = adapt(problem, linear, point.x, target, None if outer == 0 and near is None else roughness)
         previous, roughness = roughness, mean_roughness(mixture)
         if problem.slow is not None and problem.despun:
             # the part of the precession that the field shows tells the size of the part that it does not

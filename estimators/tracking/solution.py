@@ -12,7 +12,7 @@ from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 from discsim.arrays import FloatArray
 from discsim.estimators.tracking.problem import Linear, Problem, Turned
 
-__all__ = ["Mixture", "Point", "adapt", "linearise", "mean_roughness", "solve", "with_roughness"]
+__all__ = ["Mixture", "Point", "adapt", "linearise", "may_reach", "mean_roughness", "solve", "with_roughness"]
 
 
 #: Spectral densities of r'' tried, (rad/s^3)^2 s. Their prior falls slowly: where the data cannot tell, a
@@ -21,6 +21,9 @@ _GRID = np.logspace(-10, 7, 35)
 
 #: The grid is left where the evidence is this far below the best twice in a row: exp(-25) of it.
 FAR = 25.0
+
+#: Most rounds of expectation-maximisation.
+_ROUNDS = 12
 
 
 class Point:
@@ -52,19 +55,34 @@ class Point:
         return self.problem.evaluate_rows(self.x)
 
 
+def _huber(error: FloatArray) -> FloatArray:
+    """Return Huber's weight at four sigma: a reading far outside its calibration's reach must not bend the track."""
+    return np.minimum(1.0, 4.0 / np.maximum(np.abs(error), 1e-12))
+
+
+def _cost(point: Point, noise: float, precision: FloatArray, mean: FloatArray) -> float:
+    """Return twice the negative log posterior of readings of a noise, uT, but for constants and the roughness."""
+    problem, x = point.problem, point.x
+    error = (point.at.residual * (point.weights[:, None] / noise)).ravel()
+    cost = float(error @ error + (x - mean) @ precision @ (x - mean))
+    for row_error, _ in point.rows:
+        weight = _huber(row_error)
+        cost += float(np.sum(np.where(weight < 1, 8 * np.abs(row_error) - 16, row_error**2)))
+    if problem.strength is not None:
+        length = float(np.linalg.norm(x[problem.parts[2]]))
+        cost += ((problem.strength - length) / (problem.settings.strength * problem.strength)) ** 2
+    return cost
+
+
 def linearise(point: Point, noise: float, precision: FloatArray, mean: FloatArray) -> Linear:
     """Linearise readings of a noise, uT, about a point, with the unknowns' priors."""
     problem, x = point.problem, point.x
-    error = (point.at.residual * (point.weights[:, None] / noise)).ravel()
     information = point.field[0] / noise**2 + precision
     right = point.field[1] / noise**2 - precision @ (x - mean)
-    cost = float(error @ error + (x - mean) @ precision @ (x - mean))
     for row_error, row_J in point.rows:
-        # a reading far outside its calibration's reach must not bend the track: Huber's weight at four sigma
-        weight = np.minimum(1.0, 4.0 / np.maximum(np.abs(row_error), 1e-12))
+        weight = _huber(row_error)
         information += row_J.T @ (row_J * weight[:, None])
         right += row_J.T @ (row_error * weight)
-        cost += float(np.sum(np.where(weight < 1, 8 * np.abs(row_error) - 16, row_error**2)))
     if problem.strength is not None:
         vector = problem.parts[2]
         m0 = x[vector]
@@ -72,33 +90,38 @@ def linearise(point: Point, noise: float, precision: FloatArray, mean: FloatArra
         sd = problem.settings.strength * problem.strength
         gradient = np.zeros(problem.size)
         gradient[vector] = m0 / length / sd
-        gap = (problem.strength - length) / sd
         information += np.outer(gradient, gradient)
-        right += gradient * gap
-        cost += gap**2
+        right += gradient * ((problem.strength - length) / sd)
+    cost = _cost(point, noise, precision, mean)
     if not (np.isfinite(cost) and np.all(np.isfinite(information))):
         raise np.linalg.LinAlgError("the fit has left the numbers")
     return Linear(information, right, cost)
+
+
+def _gap(problem: Problem, x: FloatArray, target: FloatArray) -> FloatArray:
+    """Return by how much second differences miss their means, (spline size - 2,), for a roughness of one."""
+    return np.asarray(np.sqrt(problem.local) * (target - problem.spline.bend(x[problem.parts[0]])))
 
 
 def with_roughness(
     problem: Problem, linear: Linear, x: FloatArray, target: FloatArray, roughness: float
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return the information (n, n), right-hand side (n,) and cost of a linearisation with a roughness's rows added."""
-    scale = np.sqrt(problem.local)
-    spin = problem.parts[0]
+    spin, gap = problem.parts[0], _gap(problem, x, target)
     information = linear.information.copy()
     information[spin, spin] += problem.penalty() / roughness
-    gap = scale * (target - problem.spline.bend(x[spin]))
     right = linear.right.copy()
-    right[spin] += problem.spline.pulled(scale * gap) / roughness
+    right[spin] += problem.spline.pulled(np.sqrt(problem.local) * gap) / roughness
     return information, right, linear.cost + float(gap @ gap) / roughness
 
 
 def solve(
     problem: Problem, point: Point, noise: float, roughness: float, precession: float, most: int
 ) -> tuple[Point, Linear, FloatArray]:
-    """Gauss-Newton with damping until a step is worth less than a hundredth of a standard deviation."""
+    """Gauss-Newton with damping until a step is worth less than a hundredth of a standard deviation.
+
+    The linearisation returned is the one from which the last step was taken.
+    """
     precision, mean = problem.prior(precession)
     target = problem.bend_expected(point.x)
     linear = linearise(point, noise, precision, mean)
@@ -108,14 +131,14 @@ def solve(
         information[np.diag_indices_from(information)] *= 1.0 + damping
         step = cho_solve(cho_factor(information), right)
         trial = Point(problem, point.x + step, point.weights)
-        moved = linearise(trial, noise, precision, mean)
-        _, _, trial_cost = with_roughness(problem, moved, trial.x, target, roughness)
-        if trial_cost <= cost + 1e-9:
-            point, linear = trial, moved
+        gap = _gap(problem, trial.x, target)
+        if _cost(trial, noise, precision, mean) + float(gap @ gap) / roughness <= cost + 1e-9:
+            point = trial
             target = problem.bend_expected(point.x)
             damping = 0.0 if damping < 1e-4 else damping * 0.1
             if float(step @ right) < 1e-4:
                 break
+            linear = linearise(point, noise, precision, mean)
         else:
             damping = max(1e-4, 10 * damping)
             if damping > 1e6:
@@ -205,31 +228,43 @@ class _Reduced:
         return Mixture(weight, self.coefficients + mean, covariance, best + own)
 
 
-def adapt(problem: Problem, linear: Linear, x: FloatArray, target: FloatArray) -> Mixture:
+def adapt(problem: Problem, linear: Linear, x: FloatArray, target: FloatArray, about: float | None = None) -> Mixture:
     """Find the roughness, and where it is larger than elsewhere: Student's t with one degree of freedom for r''.
 
     A flight is alike smooth throughout; a rate table is quiet between the corners of its ramps. Which of both it is,
     the evidence says. Expectation-maximisation with the posterior variance of r'', so that intervals without data
-    keep the common roughness.
+    keep the common roughness. ``about`` is the roughness where it is roughly known: the grid is looked at from there.
     """
     reduced = _Reduced(problem, linear, x, target)
     problem.local = np.ones(problem.spline.size - 2)
-    best = mixture = reduced.evidence()
+    near = None if about is None else int(np.argmin(np.abs(np.log(_GRID / about))))
+    best = mixture = reduced.evidence(near)
     kept, needed = problem.local, best.log + 10.0  # corners must be plain
-    for _ in range(12):
+    for left in range(_ROUNDS - 1, -1, -1):
         roughness = mean_roughness(mixture)
         bend = problem.spline.bend(mixture.mean) - target
         square = bend**2 + problem.spline.bend_variance(mixture.covariance)
         # corners fall between knots: neighbours share them
         smooth = np.maximum(square, 0.5 * np.maximum(np.roll(square, 1), np.roll(square, -1)))
         problem.local = 2.0 / (1.0 + smooth / roughness)
+        before = mixture.log
         mixture = reduced.evidence(near=int(np.argmax(mixture.weight)))
         if mixture.log < max(best.log, needed - 10.0):
             break  # without end it would gather all roughness in ever fewer intervals
         if mixture.log > max(best.log, needed):
             best, kept = mixture, problem.local
+        elif not may_reach(needed, mixture.log, mixture.log - before, left):
+            break
     problem.local = kept
     return best
+
+
+def may_reach(height: float, log: float, gain: float, left: int) -> bool:
+    """Tell whether a log evidence may rise to a height in ``left`` rounds of expectation-maximisation.
+
+    Rounds gain less and less: they will not where as much as the last one gained, in each, would not do.
+    """
+    return log + left * abs(gain) >= height
 
 
 def mean_roughness(mixture: Mixture) -> float:

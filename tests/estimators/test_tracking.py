@@ -184,8 +184,8 @@ def test_a_long_recording_is_cut_and_joined_without_a_seam():
     assert np.sqrt(np.nanmean(error**2)) < 0.3
 
 
-def test_a_step_of_the_spin_is_followed():
-    """A ramp of 500 deg/s in half a second: the corners are blurred over a knot and the standard deviation says so."""
+def ramp():
+    """Return times, s, and rates, rad/s, of a table that speeds up by 500 deg/s in half a second, and its recording."""
     spin = without(Spin(duration=4.0, rate=2000.0), precession=False, spin_down=False)
     t = np.arange(0.0, 4.0, 0.01)
     rate = np.radians(2000.0 + 1000.0 * (np.clip(t, 1.5, 2.0) - 1.5))
@@ -193,11 +193,16 @@ def test_a_step_of_the_spin_is_followed():
     field = np.stack([28 * np.cos(phase), -28 * np.sin(phase), np.full(t.size, 41.0)], -1)
     rng = np.random.default_rng(11)
     recording, _ = record(spin, rng, sensors=("magnetometer",), plant="rate_table")
-    ramp = Recording(
+    return t, rate, Recording(
         "rate_table", "ramp", recording.environment, sheets=recording.sheets,
         samples={"magnetometer": Samples(t, field + rng.normal(0, 0.6, field.shape))},
     )  # fmt: skip
-    found = tracking(ramp)
+
+
+def test_a_step_of_the_spin_is_followed():
+    """A ramp of 500 deg/s in half a second: the corners are blurred over a knot and the standard deviation says so."""
+    t, rate, recording = ramp()
+    found = tracking(recording)
     error = np.degrees(found.rate - np.interp(found.t, t, rate))
     # at a recording's ends a smoother knows the rate several times worse
     plateau = ((found.t > 0.4) & (found.t < 1.2)) | ((found.t > 2.3) & (found.t < 3.6))
@@ -228,6 +233,19 @@ def test_the_evidence_near_its_peak_is_all_that_matters(thrown, monkeypatch):
     whole = tracking(Recording(**vars(recording)))
     np.testing.assert_allclose(near.rate, whole.rate, rtol=1e-12)
     np.testing.assert_allclose(near.sd, whole.sd, rtol=1e-9)
+
+
+def test_rounds_that_cannot_find_a_corner_are_left_out(thrown, monkeypatch):
+    """Of a flight and of a ramp all twelve rounds give the same: the first has no corner, the second keeps its own."""
+    spin, truth = thrown
+    flown, _ = record(spin, np.random.default_rng(23), IRON, truth=truth, sensors=PHASE)
+    for recording in (flown, ramp()[2]):
+        few = tracking(recording)
+        with monkeypatch.context() as patched:
+            patched.setattr("discsim.estimators.tracking.solution.may_reach", lambda *_: True)
+            all_rounds = tracking(Recording(**vars(recording)))
+        np.testing.assert_allclose(few.rate, all_rounds.rate, rtol=1e-12)
+        np.testing.assert_allclose(few.sd, all_rounds.sd, rtol=1e-9)
 
 
 def test_segments_side_by_side_are_those_one_after_the_other(thrown, monkeypatch):

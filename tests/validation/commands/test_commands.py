@@ -51,8 +51,12 @@ def test_the_help_says_of_each_command_what_the_command_itself_says():
         assert len(line) <= 63, f"{line}: cut off on a terminal of 80 columns"
 
 
-def test_a_command_loads_neither_the_others_nor_what_it_does_not_need():
-    """`discsim --help` and `import discsim` need no numpy, and a flight no scipy, which takes a third of a second."""
+def test_a_command_loads_neither_the_others_nor_what_it_does_not_need(tmp_path):
+    """`discsim --help` and `import discsim` need no numpy, and a flight no scipy, which takes a third of a second.
+
+    Numba loads scipy's linear algebra with the first compiled function unless it is kept from it, and that in turn
+    numpy.f2py and all of numpy's tests (`discsim.compiled`): a sixth of a flight's start.
+    """
 
     def loaded(code: str) -> set[str]:
         line = f"import sys\n{code}\nprint(*sys.modules)"
@@ -65,9 +69,15 @@ def test_a_command_loads_neither_the_others_nor_what_it_does_not_need():
     )
     assert "discsim.validation.commands" in shown
     assert not shown & {"numpy", "discsim.validation.commands.fly"}
-    flown = loaded("import discsim.validation.commands.fly, discsim.engine, discsim.sensors, discsim.many_flights")
-    assert "mujoco" in flown
-    assert not flown & {"scipy.interpolate", "scipy.optimize", "scipy.special", "matplotlib"}
+    arguments = ["discsim", "fly", "--duration", "0.5", "--out", str(tmp_path / "flight")]
+    flown = loaded(
+        f"sys.argv = {arguments}\nimport discsim.many_flights\n"
+        "try:\n import discsim.validation.cli as c; c.main()\nexcept SystemExit: pass"
+    )
+    assert {"mujoco", "discsim.engine", "discsim.validation.commands.fly"} <= flown
+    assert (tmp_path / "flight" / "recording.toml").exists()
+    heavy = {"scipy.linalg", "scipy.interpolate", "scipy.optimize", "scipy.special", "matplotlib", "rich", "jinja2"}
+    assert not flown & (heavy | {"numpy.f2py", "numpy.testing", "pandas", "xarray", "mujoco.viewer"})
 
 
 def test_an_interrupt_while_python_still_loads_is_one_line(tmp_path):
