@@ -50,6 +50,7 @@ from discsim.validation.diagnosis.selection.stepwise import tried_without
 from discsim.validation.diagnosis.settings import settings_told
 from discsim.validation.diagnosis.setup_effects import SetupAnswer, answer_of_setup, on_board_axes
 from discsim.validation.diagnosis.stages import Judged, Question
+from discsim.validation.diagnosis.uninflated_noise import capped, spoilt_groups, uninflated_noise
 from discsim.validation.diagnosis.unknown_law.find import FoundLaw
 from discsim.validation.diagnosis.verdict import RECALIBRATED_NAMES, recalibrations, standard_errors
 from discsim.validation.identification.gauss_newton import Fit
@@ -151,15 +152,15 @@ def _noise_beside(found: Search) -> list[NoiseNote]:
 
     The relaxed fit follows the data; a sensor that it leaves more than noise on says nothing of its noise.
     """
-    linears = found.relaxed_fit.linears
-    left = unmodelled_residuals(linears, [linear.residual for linear in linears], found.relaxed_noise)
-    spoilt = {item.group for item in left}
-    return _noise_notes(linears, {group: noise for group, noise in found.relaxed_noise.items() if group not in spoilt})
+    spoilt = spoilt_groups(found)
+    told = {group: noise for group, noise in found.relaxed_noise.items() if group not in spoilt}
+    return _noise_notes(found.relaxed_fit.linears, told)
 
 
 def _with_law(found: Search, law: FoundLaw) -> tuple[FitFigures, FitFigures, tuple[HeldOut, ...]]:
     """Return the figures of the baseline and of the fit with a law, and what recordings gain that were set aside."""
-    reference = {group: noise._replace(correlation=0.0) for group, noise in law.fitted.fit.noise.items()}
+    left = {group: noise._replace(correlation=0.0) for group, noise in law.fitted.fit.noise.items()}
+    reference = capped(left, uninflated_noise(found))
     rows = [linear.raw.size for linear in law.fitted.fit.linears]
     before, after = chi2_in(found.base, reference), chi2_in(law.fitted, reference)
     held = tuple(
@@ -194,8 +195,8 @@ def _reference(found: Search, unexplained: bool, counted: Agreement | None) -> N
 
     What a misfit has inflated would make a good fit of a bad one.
     """
-    noise = found.relaxed_noise if unexplained else found.final.fit.noise
-    white = {group: level._replace(correlation=0.0) for group, level in noise.items()}
+    final = {group: level._replace(correlation=0.0) for group, level in found.final.fit.noise.items()}
+    white = uninflated_noise(found) if unexplained else final
     return white if counted is None else pure_noise(counted, white)
 
 
@@ -242,7 +243,7 @@ def _figures(
 def _residuals(found: Search, names: Sequence[str], unexplained: bool) -> list[Residuals]:
     shown = []
     after_fit = found.final
-    noise = found.relaxed_noise if unexplained else after_fit.fit.noise
+    noise = uninflated_noise(found) if unexplained else after_fit.fit.noise
     for i, name in enumerate(names):
         before_linear, after_linear = found.base.fit.linears[i], after_fit.fit.linears[i]
         for channel in after_linear.channels:

@@ -11,6 +11,7 @@ from discsim.validation.diagnosis.result import Located
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.diagnosis.selection.hypothesis import fitted_parameters
 from discsim.validation.diagnosis.selection.search_state import Search
+from discsim.validation.diagnosis.uninflated_noise import uninflated_noise
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.normal_equations import nuisance_step
 
@@ -105,7 +106,7 @@ def _instant(found: Search, candidate: CandidateEffect) -> float:
 
 def located_unmodelled(found: Search, names: Sequence[str]) -> list[Located]:
     """Return where the baseline fails when nothing explains it: sensors and axes, and what the excess grows with."""
-    noise = {group: found.relaxed_noise[group].sd for group in found.relaxed_noise}
+    noise = {group: level.sd for group, level in uninflated_noise(found).items()}
     linears = found.base.fit.linears
     zero = [np.zeros_like(residual) for residual in found.base.residuals]
     excess = {key: value - 1.0 for key, value in excess_of(found.base.residuals, zero, linears, noise).items()}

@@ -152,7 +152,10 @@ class Selection:
     no_nearer : float
         An effect that leaves more than this share leads no nearer: of two that are hidden the larger leaves half.
     most_effects : int
-        How many effects are ever added: a fifth has yet to be found in recordings that leave nothing else.
+        How many effects are added: a fifth on the motion has yet to be found in recordings that leave nothing else.
+    most_with_sensors : int
+        The same where all but one of them are errors of sensors: those of a module within its sheet are five of three
+        sensors, beside what is hidden.
     refitted, refitted_at_most : int
         Candidates that are refitted at a step, near the data and while none comes near: algebra from far away ranks
         many a wrong one before the right one, which was the seventh at worst.
@@ -200,6 +203,7 @@ class Selection:
     followed: float = 2.0
     no_nearer: float = 0.7
     most_effects: int = 4
+    most_with_sensors: int = 8
     refitted: int = 4
     refitted_at_most: int = 9
     pairs_refitted: int = 5

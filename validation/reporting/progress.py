@@ -8,17 +8,20 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeAlias
 
-__all__ = ["Pace", "Progress", "shown"]
+from discsim.validation.reporting.time_left import TimeLeft
+
+__all__ = ["Pace", "Progress", "in_words", "shown"]
 
 #: called with what is being done, how much of it is done, and how much there is: ("screening", 3, 44)
 Progress: TypeAlias = Callable[[str, int, int], None]
 
 
 @contextmanager
-def shown() -> Iterator[Progress]:
-    """Show progress on stderr while the block runs."""
+def shown(*, rig: bool = False) -> Iterator[Progress]:
+    """Show progress on stderr while the block runs, which diagnoses recordings of a ``rig`` or of what flies."""
+    whole = TimeLeft(rig=rig)
     if not sys.stderr.isatty():
-        yield _Lines()
+        yield _Lines(whole)
         return
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
@@ -29,10 +32,17 @@ def shown() -> Iterator[Progress]:
         task, pace = bars.add_task("", total=None), Pace()
 
         def report(stage: str, done: int, total: int) -> None:
-            left = pace(stage, done, total)
+            left = ", ".join(filter(None, (pace(stage, done, total), in_words(whole(stage, done, total)))))
             bars.update(task, description=f"{stage}{f' ({left})' if left else ''}", completed=done, total=total)
 
         yield report
+
+
+def in_words(seconds: float | None) -> str:
+    """Return the time that is left of a whole diagnosis in words, to one figure or two: empty where nobody knows."""
+    if seconds is None or seconds < 1.0:
+        return ""
+    return f"about {seconds:.0f} s left in all" if seconds < 90.0 else f"about {seconds / 60.0:.0f} min left in all"
 
 
 class Pace:
@@ -63,8 +73,9 @@ class Pace:
 class _Lines:
     """Writes a line when a stage begins: what is done, which step of how many it is, and the time so far."""
 
-    def __init__(self) -> None:
+    def __init__(self, whole: TimeLeft) -> None:
         self._stage = ""
+        self._whole = whole
         self._started = time.monotonic()
         self._pace = Pace()
 
@@ -75,5 +86,9 @@ class _Lines:
             step = f" ({kind}{min(done + 1, total)} of {total})" if total > 1 else ""
             spent = time.monotonic() - self._started
             so_far = f", {spent:.0f} s so far" if spent >= 1 else ""
-            left = self._pace(stage, done, total)
-            print(f"{stage}{step}{so_far}{f', {left}' if left else ''}", file=sys.stderr, flush=True)
+            left = "".join(
+                f", {words}"
+                for words in (self._pace(stage, done, total), in_words(self._whole(stage, done, total)))
+                if words
+            )
+            print(f"{stage}{step}{so_far}{left}", file=sys.stderr, flush=True)

@@ -56,11 +56,12 @@ from discsim.validation.diagnosis.selection.search_state import (
     possible,
     values_of_fit,
 )
-from discsim.validation.diagnosis.settings import SELECTION
+from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
 from discsim.validation.identification.competing_effects import CATALOGUED, Competing
 from discsim.validation.identification.gauss_newton import Fit, merit_of
-from discsim.validation.identification.noise import NoiseModel, estimate_noise, robust_noise
+from discsim.validation.identification.noise import NoiseModel, estimate_noise, robust_noise, stated_noise
 from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.residual_tests import unmodelled_residuals
 from discsim.validation.identification.stated_parameters import stated_parameters
 
 __all__ = ["screened", "search", "tried_without"]
@@ -186,15 +187,19 @@ def _selected_forward(found: Search) -> Search:
         if far(found, found.final):
             return found
         most += len(found.final.hypothesis.candidates)
-    for step in range(len(found.final.hypothesis.candidates), most):
+    for step in range(len(found.final.hypothesis.candidates), max(most, SELECTION.most_with_sensors)):
         current = found.final
+        if step >= _most(current, most):
+            break
         found, better = next_effect(found, current, step)
+        if better is None and (told := _without_swallowed(current)) is not None and not far(found, current):
+            found, better = next_effect(found, told, step)
         if step == 0 and far(found, current) and (better is None or far(found, better)) and not _told(better):
             found, together = _together(found)
             if together is not None:
                 found = _with_final(found, eliminated_backward(found, together))
                 continue
-        if better is None or len(better.hypothesis.candidates) > most:
+        if better is None or len(better.hypothesis.candidates) > _most(better, most):
             break
         if step == 0 and far(found, better) and not _told(better) and no_nearer(found, current, better):
             # neither one effect nor two come near the data, nor does any lead there
@@ -208,6 +213,26 @@ def _selected_forward(found: Search) -> Search:
             return replace(found, final=better)
         found = _with_final(found, eliminated_backward(found, better, kept=better.hypothesis.candidates[-1]))
     return found
+
+
+def _without_swallowed(fitted: ContinuousFit) -> ContinuousFit | None:
+    """Return a fit with the stated noise where what was estimated is so loud and slow that it has swallowed an effect.
+
+    A bias is nothing but such noise: in it no bias is worth its price. None where nothing is swallowed.
+    """
+    left = unmodelled_residuals(fitted.fit.linears, fitted.residuals, fitted.fit.noise)
+    groups = {item.group for item in left if item.kind == "swallowed"}
+    if not groups:
+        return None
+    stated = stated_noise(fitted.fit.linears)
+    noise = {group: stated[group] if group in groups else level for group, level in fitted.fit.noise.items()}
+    return replace(fitted, fit=replace(fitted.fit, noise=noise))
+
+
+def _most(fitted: ContinuousFit, most: int) -> int:
+    """Return how many effects a search for at most so many may come to from a fit: more of them errors of sensors."""
+    on_motion = sum(candidate.row.acts_on == "motion" for candidate in fitted.hypothesis.candidates)
+    return max(most, SELECTION.most_with_sensors) if on_motion < UNKNOWN_LAW.stack else most
 
 
 def _with_final(found: Search, fitted: ContinuousFit) -> Search:
