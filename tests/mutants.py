@@ -1,14 +1,15 @@
-"""Mutation testing: change one operator, comparison or number of a file, run its tests, and list what nobody noticed.
+"""Mutation testing: change one operator, comparison or number of some files, run tests, and list what nobody noticed.
 
 ``python -m tests.mutants discsim/frames.py --tests tests/discsim/test_frames.py --count 40 --seed 1``. Each mutant is
-made in a copy of the checkout and killed where a test fails or hangs. Functions run as plain Python, a hundred times as
-fast as compiling them anew; tests that fly need ``--compiled``.
+made in a copy of the checkout and killed where a test fails or hangs. Functions that are compiled run as plain Python,
+a hundred times as fast as compiling them anew; tests that fly are left out then, unless ``--compiled`` is given.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import math
 import os
 import random
 import shutil
@@ -19,6 +20,16 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
+#: compiled code reads a record's fields as attributes, plain Python those of this type of numpy's alone
+_RECORD = """
+PARAMETERS = np.dtype((np.record, PARAMETERS))
+"""
+#: nothing compiled is changed: what is compiled once serves all mutants
+_KEPT = """
+
+def _cache_folder() -> Path:
+    return Path({folder!r})
+"""
 _OPERATORS: dict[type[ast.AST], type[ast.AST]] = {
     ast.Add: ast.Sub,
     ast.Sub: ast.Add,
@@ -73,52 +84,90 @@ def _mutant(source: str, number: int) -> tuple[str, str]:
     return ast.unparse(tree), f"line {node.lineno}: {before}  ->  {ast.unparse(node)}"  # type: ignore[attr-defined]
 
 
+class _Copy:
+    """A copy of the checkout in which mutants are made and tested."""
+
+    def __init__(self, root: Path, compiled: bool, kept: bool) -> None:
+        self.root, self._words = root, [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider"]
+        shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(".git", "__pycache__", ".*_cache"))
+        self._environment = {
+            **os.environ,
+            "PYTHONPATH": str(root),
+            "NUMBA_DISABLE_JIT": str(int(not compiled)),
+            "CI": "1",
+        }
+        if not compiled:
+            self._append("discsim/parameters.py", _RECORD)
+        elif kept:
+            self._append("discsim/compiled.py", _KEPT.format(folder=str(root / "kept")))
+
+    def _append(self, name: str, text: str) -> None:
+        with (self.root / name).open("a", encoding="utf-8") as file:
+            file.write(text)
+
+    def failing(self, tests: list[str]) -> list[str]:
+        """Return the tests that fail without any change."""
+        said = self._run(["-rfE", *tests], 1800.0)
+        return [line.split()[1] for line in said.splitlines() if line.startswith(("FAILED ", "ERROR "))]
+
+    def notices(self, tests: list[str], longest: float) -> bool:
+        """Return whether a test fails, or hangs."""
+        try:
+            self._run(["-x", *tests], longest)
+        except (subprocess.TimeoutExpired, subprocess.CalledProcessError):
+            return True
+        return False
+
+    def _run(self, words: list[str], longest: float) -> str:
+        done = subprocess.run(
+            [*self._words, *words], cwd=self.root, env=self._environment, capture_output=True, text=True,
+            timeout=longest, check="-x" in words,
+        )  # fmt: skip
+        return done.stdout
+
+
 def main() -> int:
     """Run mutants and print the survivors and the score."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=__doc__)
-    parser.add_argument("file", type=Path)
+    parser.add_argument("files", type=Path, nargs="+")
     parser.add_argument("--tests", nargs="+", required=True)
     parser.add_argument("--count", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--compiled", action="store_true", help="compile each mutant, about a minute")
     given = parser.parse_args()
+    sources = {file: (ROOT / file).read_text(encoding="utf-8") for file in given.files}
+    places = [(file, *place) for file, text in sources.items() for place in _places(ast.parse(text))]
+    chosen = sorted(random.Random(given.seed).sample(places, min(given.count, len(places))))
+    plain = not any(word in text for text in sources.values() for word in ("@compiled", "@inlined"))
     with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder) / "copy"
-        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".git", "__pycache__", ".*_cache"))
-        target = copy / given.file
-        source = target.read_text(encoding="utf-8")
-        places = _places(ast.parse(source))
-        chosen = sorted(random.Random(given.seed).sample(places, min(given.count, len(places))))
-        words = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider", *given.tests]
-        environment = {
-            **os.environ,
-            "PYTHONPATH": str(copy),
-            "NUMBA_DISABLE_JIT": str(int(not given.compiled)),
-            "CI": "1",
-        }
-
-        def passes(longest: float) -> bool:
-            try:
-                done = subprocess.run(
-                    words, cwd=copy, env=environment, capture_output=True, timeout=longest, check=False
-                )
-            except subprocess.TimeoutExpired:
-                return False
-            return done.returncode == 0
-
+        copy = _Copy(Path(folder) / "copy", given.compiled or plain, plain)
+        left_out = copy.failing(given.tests)
+        if left_out:
+            print(f"left out, for they fail without any change or without compiling: {', '.join(left_out)}", flush=True)
+        tests = [*given.tests, *(word for one in left_out for word in ("--deselect", one))]
         started = time.monotonic()
-        if not passes(1800.0):
-            raise SystemExit("the tests fail without any change, or without compiling; expected them to pass")
+        if copy.notices(tests, 1800.0):
+            raise SystemExit("the tests fail without any change; expected them to pass")
         longest, killed = 10 * (time.monotonic() - started) + 60.0, 0
-        for number, _ in chosen:
-            changed, what = _mutant(source, number)
-            target.write_text(changed, encoding="utf-8")
-            if passes(longest):
-                print(f"survived, {what}", flush=True)
-            else:
+        for file, number, _ in chosen:
+            changed, what = _mutant(sources[file], number)
+            (copy.root / file).write_text(changed, encoding="utf-8")
+            if copy.notices(tests, longest):
                 killed += 1
-        print(f"{given.file}: {killed} of {len(chosen)} mutants killed ({len(places)} places), seed {given.seed}")
+            else:
+                print(f"survived, {file}, {what}", flush=True)
+            (copy.root / file).write_text(sources[file], encoding="utf-8")
+        low, high = _interval(killed, len(chosen))
+        share = f"{100 * killed / len(chosen):.0f} %, 95 % of such samples: {100 * low:.0f} to {100 * high:.0f} %"
+        print(f"{killed} of {len(chosen)} mutants killed ({share}), {len(places)} places, seed {given.seed}")
     return 0
+
+
+def _interval(killed: int, count: int) -> tuple[float, float]:
+    """Return Wilson's interval of a share, at 95 %."""
+    z, share = 1.96, killed / count
+    middle, half = share + z**2 / (2 * count), z * math.sqrt(share * (1 - share) / count + z**2 / (4 * count**2))
+    return (middle - half) / (1 + z**2 / count), (middle + half) / (1 + z**2 / count)
 
 
 if __name__ == "__main__":

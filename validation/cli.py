@@ -16,6 +16,7 @@ import typer
 from discsim.errors import InputError
 from discsim.validation.commands import register
 from discsim.validation.reporting.spoken import speaking
+from discsim.validation.start import loading
 
 __all__ = ["app", "main"]
 
@@ -77,7 +78,8 @@ def _status(debug: bool) -> int:
         # the options that stand before a command take no value, so the first other word is its name
         app.registered_commands.clear()
         words = _completed() or sys.argv[1:]
-        register(app, next((argument for argument in words if not argument.startswith("-")), None))
+        with loading():
+            register(app, next((argument for argument in words if not argument.startswith("-")), None))
         status = app(standalone_mode=False, prog_name="discsim")
         sys.stdout.flush()  # a full disk below it is an error like any other
     except (InputError, typer.TyperException, OSError, MemoryError) as error:
@@ -88,13 +90,22 @@ def _status(debug: bool) -> int:
     except (KeyboardInterrupt, typer.Abort):
         status = 130
     except Exception as error:
-        if debug:
-            raise
-        typer.echo(f"discsim: internal error, {type(error).__name__}: {error} (--debug shows where)", err=True)
-        return 3
+        if not _of_an_interrupt(error):
+            if debug:
+                raise
+            typer.echo(f"discsim: internal error, {type(error).__name__}: {error} (--debug shows where)", err=True)
+            return 3
+        status = 130
     if status == 130:  # typer turns an interrupt into this status and says nothing
         typer.echo("discsim: interrupted", err=True)
     return status if isinstance(status, int) else 0
+
+
+def _of_an_interrupt(error: BaseException | None) -> bool:
+    """Return whether an interrupt caused an error: a library that was just loading says that it could not."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _in_one_line(error: BaseException) -> str:

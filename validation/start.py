@@ -5,16 +5,45 @@ Takes nothing; ends the process with the command's exit status, 130 for an inter
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
-__all__ = ["main"]
+__all__ = ["loading", "main"]
 
 
 def main() -> None:
     """Load the command line and run it."""
     try:
-        from discsim.validation.cli import main as run
+        with loading():
+            from discsim.validation.cli import main as run
+        run()
     except KeyboardInterrupt:
-        print("discsim: interrupted", file=sys.stderr)
-        sys.exit(130)
-    run()
+        _end()
+
+
+@contextmanager
+def loading() -> Iterator[None]:
+    """Let an interrupt end the process at once: modules that load make other errors of a `KeyboardInterrupt`, or none.
+
+    Nothing is written while they load. An interrupt that somebody else deals with, or nobody, is left to them.
+    """
+    try:
+        heard = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        if heard:
+            signal.signal(signal.SIGINT, _end)
+    except ValueError:  # not the main thread, which alone hears signals
+        heard = False
+    try:
+        yield
+    finally:
+        if heard:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _end(*_: object) -> None:
+    sys.stderr.flush()
+    os.write(2, b"discsim: interrupted\n")
+    os._exit(130)

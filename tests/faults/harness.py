@@ -17,6 +17,7 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from fuzz.analyses import SETS, SWEEPS
 from fuzz.seeds import RAW
@@ -89,9 +90,11 @@ def run(words: Sequence[str], heard: Path) -> int:
 def content(out: Path) -> dict[str, bytes]:
     """Return the files of a folder by their names, without what is between runs and what stands apart.
 
-    Pages say by which command they were made: where it wrote to, and how many workers it had, is no result.
+    Pages say by which command they were made: where it wrote to, and how many workers it had, is no result. How long
+    its diagnoses took a challenge tells as a result, which no two runs share: challenge.json is compared without, and
+    its page, which shows the same numbers, without any.
     """
-    found = {}
+    found, timed = {}, (out / "challenge.json").exists()
     for file in sorted(out.rglob("*")):
         name = file.relative_to(out).as_posix()
         if not file.is_file() or name.split("/")[0] in _BETWEEN:
@@ -99,11 +102,24 @@ def content(out: Path) -> dict[str, bytes]:
         found[name] = file.read_bytes()
         if file.suffix in (".html", ".json"):
             found[name] = re.sub(rb"--workers \d+", b"--workers N", found[name].replace(str(out).encode(), b"OUT"))
+        if timed and file.suffix == ".html":
+            found[name] = re.sub(rb"[\d.]+", b"N", found[name])
+        if name == "challenge.json":
+            found[name] = json.dumps(_without_times(json.loads(found[name]))).encode()
         if name == "run.json":
             told = json.loads(found[name])
-            told["files"] = {key: value for key, value in told["files"].items() if not key.endswith(".html")}
+            compared = (key for key in told["files"] if not key.endswith(".html") and key != "challenge.json")
+            told["files"] = {key: told["files"][key] for key in compared}
             found[name] = json.dumps({key: told[key] for key in told if key not in _APART}).encode()
     return found
+
+
+def _without_times(told: Any) -> Any:
+    if isinstance(told, list):
+        return [_without_times(one) for one in told]
+    if isinstance(told, dict):
+        return {key: _without_times(one) for key, one in told.items() if key != "seconds"}
+    return told
 
 
 def disturbed(

@@ -72,7 +72,8 @@ def main() -> int:
         prepare(place / "given")
         for name in given.command or COMMANDS:
             words = COMMANDS[name](place / "given")
-            first = run_again(words, place / name / "first", place / name)
+            # every folder is called the same: a recording bears the name of its own
+            first = run_again(words, place / name / "out", place / name)
             for number, (what, other, environment) in enumerate(_variations(name, words, place / name, given.cold)):
                 desk = place / name / f"desk-{number}"
                 found = differing(first, run_again(other, desk / "out", desk, **environment))

@@ -135,7 +135,7 @@ SWEEPS: Mapping[str, Callable[[], Files]] = MappingProxyType({"small": lambda: {
 
 
 def swept(folder: Path) -> None:
-    """Work through a plan of few mounts in this process; a share is between nothing and all."""
+    """Work through a plan of few mounts in this process and report it; a share is between nothing and all."""
     plan = read_plan(folder / "plan.toml")
     if plan.mounts.count * len(plan.cases) > 300:  # a large sweep is no fault, and takes its time
         return
@@ -144,6 +144,8 @@ def swept(folder: Path) -> None:
     possible(bool(np.all(np.isnan(known) | ((known >= 0.0) & (known <= 1.0)))), "a share beyond 1")
     for name in ("bias_deg_s", "rms_deg_s", "worst_deg_s"):
         possible(not np.any(np.isinf(found.scores[name].values)), f"{name} is infinite")
+    found.report(folder / "out")
+    _sound_files(folder / "out")
 
 
 RATES: Mapping[str, Callable[[], Files]] = MappingProxyType(

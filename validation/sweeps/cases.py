@@ -102,17 +102,18 @@ def carried_on(error: FloatArray, rate: FloatArray, landing: Landing) -> Carried
     By (26) C_Nr is the slope of ln r over time. A rate that is read as (1 + e) r makes it
     1 + d ln(1 + e)/d ln r times as large: an error in proportion to the rate leaves it as it is, one that fades with
     the rate does not. The slope is fitted to all rates at which a mount is read; the spin at release has the error of
-    the fastest of them. NaN where fewer than two are.
+    the fastest of them. NaN where fewer than two are; a disc at rest counts for none, as it has no relative error.
     """
     slope, fastest = np.full(error.shape[0], np.nan), np.full(error.shape[0], np.nan)
-    logarithm = np.log(rate)
+    turning = rate != 0.0
+    logarithm = np.log(np.abs(rate), where=turning, out=np.zeros(rate.shape))
     for mount, row in enumerate(error):
-        known = np.isfinite(row) & (row > -1.0)
+        known = np.isfinite(row) & (row > -1.0) & turning
         if known.sum() < 2:
             continue
         away = logarithm[known] - logarithm[known].mean()
         slope[mount] = np.sum(away * np.log1p(row[known])) / np.sum(away**2)
-        fastest[mount] = row[np.flatnonzero(known)[np.argmax(rate[known])]]
+        fastest[mount] = row[np.flatnonzero(known)[np.argmax(np.abs(rate[known]))]]
     moved = slope[:, None] * landing.by_CNr + fastest[:, None] * landing.by_spin
     return Carried(slope, np.hypot(moved[:, 0], moved[:, 1]))
 
@@ -145,7 +146,7 @@ def rows_of(scores: xr.Dataset, landing: Landing | None) -> list[Row]:
             scored = np.isfinite(one.known.values).any(axis=one.known.get_axis_num("segment"))
             share = one.known.transpose("mount", "segment").values[scored]
             rate = one.rate_deg_s.values
-            error = one.bias_deg_s.transpose("mount", "segment").values[scored] / rate
+            error = one.bias_deg_s.transpose("mount", "segment").values[scored] / np.where(rate == 0.0, np.nan, rate)
             error = np.where(share >= READ, error, np.nan)
             for k, each in enumerate(rate):
                 if np.isfinite(each):

@@ -174,7 +174,8 @@ def _along(axes: Axes, result: xr.Dataset, name: str) -> None:
         values = result.rms_deg_s.sel(estimator=estimator).transpose(name, ...).values.reshape(len(x), -1)
         known = np.isfinite(values).any(axis=1)
         low, middle, high = np.full((3, len(x)), np.nan)
-        low[known], middle[known], high[known] = np.nanquantile(values[known], (0.05, 0.5, 0.95), axis=1)
+        if known.any():
+            low[known], middle[known], high[known] = np.nanquantile(values[known], (0.05, 0.5, 0.95), axis=1)
         shade = colour(estimator, methods)
         axes.fill_between(x, low, high, color=shade, alpha=0.2, lw=0)
         axes.plot(x, middle, "o-", ms=4, color=shade, label=estimator + ("" if known.any() else " (unknown)"))

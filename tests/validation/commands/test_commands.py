@@ -80,10 +80,17 @@ def test_a_command_loads_neither_the_others_nor_what_it_does_not_need(tmp_path):
     assert not flown & (heavy | {"numpy.f2py", "numpy.testing", "pandas", "xarray", "mujoco.viewer"})
 
 
-def test_an_interrupt_while_python_still_loads_is_one_line(tmp_path):
-    """Half a second of a command's start is loading: an interrupt then showed a traceback of the import."""
-    (tmp_path / "typer.py").write_text("raise KeyboardInterrupt\n")
-    code = "import sys; sys.path.insert(0, sys.argv[1]); from discsim.validation.start import main; main()"
+@pytest.mark.parametrize("module", ["typer", "mujoco"])
+def test_an_interrupt_while_python_still_loads_is_one_line(tmp_path, module):
+    """Half a second of a command's start is loading: an interrupt then showed a traceback, an ImportError, or nothing.
+
+    What loads may make another error of it: MuJoCo says that its initialization failed.
+    """
+    interrupt = "import signal\ntry:\n    signal.raise_signal(signal.SIGINT)\nexcept BaseException as error:\n    "
+    then = {"typer": "pass", "mujoco": "raise ImportError('initialization failed') from error"}[module]
+    (tmp_path / f"{module}.py").write_text(f"{interrupt}{then}\n")
+    code = "import sys; sys.path.insert(0, sys.argv[1]); from discsim.validation.start import main; "
+    code += "sys.argv[:] = ['discsim', 'fly', '--out', sys.argv[1]]; main()"
     done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True)
     assert (done.returncode, done.stderr, done.stdout) == (130, "discsim: interrupted\n", "")
     script = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]["discsim"]

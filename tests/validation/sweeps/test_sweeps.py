@@ -35,6 +35,7 @@ from discsim.validation.sweeps.mounts import (
 )
 from discsim.validation.sweeps.plan import Plan, plan_file, read_plan
 from discsim.validation.sweeps.result import labelled, write_netcdf
+from discsim.validation.sweeps.swept import sweep
 
 SMALL = """
 name = "small"
@@ -204,6 +205,25 @@ def test_errors_grow_with_offset_over_radius_and_end_where_the_sensor_leaves_its
     faster = plan_of(tmp_path, SMALL.replace("2600", "3200").replace("[0.01, 0.02]", "[0.016, 0.064]"))
     known = swept(faster)[1].known.isel(segment=1).sel(estimator="accelerometer").mean("mount")  # 16 g at 50 mm
     assert known.values.tolist() == [1.0, 0.0]
+
+
+def test_a_table_at_rest_and_a_method_that_knows_nothing_are_reported(tmp_path):
+    """At rest there is no relative error, and a field across no window's line leaves a method without any value."""
+    plan = plan_of(
+        tmp_path,
+        'name = "rest"\nseed = 3\nfft_step = 64\n[truth]\nplant = "rate_table"\nrates_deg_s = [0.0, 1500.0]\n'
+        'hold_s = 2.0\nramp_s = 0.5\n[axes]\ndip_deg = [0.0, 60.0]\n[mounts]\ndesign = "random"\ncount = 4\n'
+        'x_m = [-0.001, 0.001]\n[estimators]\naccelerometer = "all"\nfft = 1\n',
+    )
+    found = sweep(plan, workers=1)
+    assert float(found.scores.known.sel(estimator="fft").sum()) == 0.0
+    found.report(tmp_path / "out")
+    lines = (tmp_path / "out" / "cases.csv").read_text().splitlines()
+    at_rest = [line.split(",") for line in lines[1:] if line.split(",")[2] == "0"]
+    assert [cells[4:] for cells in at_rest] == [["0", "", "", "", "", ""]] * 4
+    ran = [line.split(",") for line in lines[1:] if line.split(",")[1:3] == ["accelerometer", "1500"]]
+    assert all(float(cells[4]) == 1.0 and 0.0 < float(cells[6]) < 10.0 for cells in ran)
+    assert len(ran) == 2
 
 
 def test_a_field_that_points_steeply_down_is_worth_less_to_the_fft(tmp_path):
