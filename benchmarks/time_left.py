@@ -22,16 +22,16 @@ from discsim.validation.diagnosis.pipeline import diagnose  # noqa: E402
 from discsim.validation.reporting.time_left import TimeLeft  # noqa: E402
 
 CASES = (
-    "spin_down/401",
-    "free_spin/402",
+    "spin_down/405/rig.coulomb_friction",
+    "rate_table/408",
+    "flight/410/gps.latency",
+    "spin_down/412",
+    "flight/409",
     "flight/403",
     "rate_table/404",
-    "spin_down/405/rig.coulomb_friction",
-    "free_spin/406",
     "flight/407/air.wind/mag.lag",
-    "rate_table/408",
-    "flight/409",
-    "flight/410/gps.latency",
+    "flight/300/air.wind",
+    "flight/305/gps.latency",
 )
 PARTS = (0.25, 0.5, 0.75)
 
@@ -41,7 +41,7 @@ def told(plant: str, events: list[tuple[float, str, int, int]], whole: float) ->
     found: list[float | None] = []
     for part in PARTS:
         clock = iter([0.0, *(at for at, *_ in events)])
-        left, last = TimeLeft(rig=plant in ("rate_table", "spin_down"), now=lambda clock=clock: next(clock)), None
+        left, last = TimeLeft(table=plant == "rate_table", now=lambda clock=clock: next(clock)), None
         for at, stage, done, total in events:
             if at > part * whole:
                 break

@@ -64,7 +64,7 @@ def command(
     plans = None if candidates is None else read_plans(candidates, recordings[0][0].plant)
     named = dict(zip(names, recordings, strict=True))
     with start_run(out, seed, [*datasets, *files, *([candidates] if candidates else [])]) as run:
-        with shown(rig=recordings[0][0].plant in ("rate_table", "spin_down")) as progress:
+        with shown(table=recordings[0][0].plant == "rate_table") as progress:
             found = diagnose_named(named, progress=progress, seed=seed, user_effects=effects, plans=plans)
         found.report(out, command=f"discsim {' '.join(run.command)}")
     typer.echo(found.summary())

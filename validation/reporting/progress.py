@@ -17,9 +17,9 @@ Progress: TypeAlias = Callable[[str, int, int], None]
 
 
 @contextmanager
-def shown(*, rig: bool = False) -> Iterator[Progress]:
-    """Show progress on stderr while the block runs, which diagnoses recordings of a ``rig`` or of what flies."""
-    whole = TimeLeft(rig=rig)
+def shown(*, table: bool = False) -> Iterator[Progress]:
+    """Show on stderr how far a diagnosis is while the block runs, of a rate ``table`` or of anything else."""
+    whole = TimeLeft(table=table)
     if not sys.stderr.isatty():
         yield _Lines(whole)
         return

@@ -22,16 +22,16 @@ class Span(NamedTuple):
     ends: float
 
 
-#: of flights and free spins, whose motions are costly; measured on twelve diagnoses of `benchmarks/plan.py`
-_IN_AIR = {
+#: of all but rate tables; measured on twelve diagnoses of `benchmarks/plan.py`
+_USUAL = {
     "following the data": Span(0.10, 0.36),
     "asking every effect": Span(0.36, 0.45),
     "fitting the baseline": Span(0.45, 0.50),
     "refitting candidates": Span(0.50, 0.66),
     "effect 1": Span(0.57, 0.80),
 }
-#: of rigs, whose sensors are compared at length; measured on tables that ripple
-_ON_RIG = {
+#: of rate tables, whose sensors are compared at length; measured on such as ripple
+_ON_TABLE = {
     "following the data": Span(0.25, 0.43),
     "asking every effect": Span(0.43, 0.49),
     "fitting the baseline": Span(0.49, 0.52),
@@ -48,19 +48,19 @@ _LATER = {
     "looking for a law": Span(0.90, 0.97),
     "asking what to record next": Span(0.90, 0.97),
 }
-_SPANS: Mapping[bool, Mapping[str, Span]] = MappingProxyType({False: _IN_AIR | _LATER, True: _ON_RIG | _LATER})
+_SPANS: Mapping[bool, Mapping[str, Span]] = MappingProxyType({False: _USUAL | _LATER, True: _ON_TABLE | _LATER})
 #: stages of the search that take up a longer name's place
 _MANY = re.compile(r"effect ([4-9]|\d\d)")
 
 
 class TimeLeft:
-    """Tells the seconds that are left of a diagnosis of recordings of a rig, or of what flies; ``now`` gives seconds.
+    """Tells the seconds that are left of a diagnosis, of a rate ``table`` or of anything else; ``now`` gives seconds.
 
     A stage that lasts longer than it usually does makes the whole longer.
     """
 
-    def __init__(self, *, rig: bool, now: Callable[[], float] = time.monotonic) -> None:
-        self._now, self._spans = now, _SPANS[rig]
+    def __init__(self, *, table: bool, now: Callable[[], float] = time.monotonic) -> None:
+        self._now, self._spans = now, _SPANS[table]
         self._start = now()
         self._stage, self._entered = "", 0.0
 

@@ -112,18 +112,21 @@ class TestRecorded:
             margin(1)
 
 
+@pytest.mark.parametrize("run", ["quick", "full"])
 class TestShipped:
-    """The quick run's limits, recorded from 20 seeds: `discsim validate --quick` is judged by them."""
+    """The limits of both runs, recorded from 20 seeds each: `discsim validate` is judged by them."""
 
-    TEXT = model_file("limits/quick.toml").read_text(encoding="utf-8")
     REMARK = re.compile(r'^(".+") = (\S+)  # seen .+, mean (\S+), sd (\S+), expected (\S+)$', re.MULTILINE)
 
-    def test_the_file_says_by_which_command_and_when_it_was_recorded(self):
-        assert "`discsim validate --quick --record-limits models/limits/quick.toml --repeat 20 --margin 3" in self.TEXT
-        assert re.search(r"20 seeds.+on \d{4}-\d\d-\d\d", self.TEXT)
+    def test_the_file_says_by_which_command_and_when_it_was_recorded(self, run):
+        text = model_file(f"limits/{run}.toml").read_text(encoding="utf-8")
+        options = "--quick " if run == "quick" else ""
+        made_by = f"discsim validate {options}--record-limits models/limits/{run}.toml --repeat 20 --margin 3"
+        assert f"`{made_by}" in text
+        assert re.search(r"20 seeds.+on \d{4}-\d\d-\d\d", text)
 
-    def test_every_score_that_scatters_has_three_of_its_standard_deviations_and_its_bias(self):
-        rows = self.REMARK.findall(self.TEXT)
+    def test_every_score_that_scatters_has_three_of_its_standard_deviations_and_its_bias(self, run):
+        rows = self.REMARK.findall(model_file(f"limits/{run}.toml").read_text(encoding="utf-8"))
         assert len(rows) >= 10
         for name, tolerance, mean, sd, expected in rows:
             wanted = abs(float(mean) - float(expected)) + 3 * float(sd)
@@ -131,9 +134,9 @@ class TestShipped:
             loose = 1e-3 * abs(float(mean)) + 0.02 * float(sd)
             assert float(tolerance) == pytest.approx(wanted, abs=loose), name
 
-    def test_all_of_it_is_read(self):
-        limits = shipped_limits(True)
-        assert len(limits) == self.TEXT.count('\n"')
+    def test_all_of_it_is_read(self, run):
+        limits = shipped_limits(run == "quick")
+        assert len(limits) == model_file(f"limits/{run}.toml").read_text(encoding="utf-8").count('\n"')
         assert all(limit.expected is None for limit in limits.values())
 
 

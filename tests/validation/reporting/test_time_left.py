@@ -20,7 +20,7 @@ class Clock:
 
 def test_nothing_is_told_before_the_motion_is_followed():
     clock = Clock()
-    left = TimeLeft(rig=False, now=clock)
+    left = TimeLeft(table=False, now=clock)
     clock.at += 1.0
     assert left("checking the setup", 0, 5) is None
     assert left("asking whether sensors contradict one another", 0, 5) is None
@@ -28,17 +28,17 @@ def test_nothing_is_told_before_the_motion_is_followed():
     assert left("following the data", 1, 5) == pytest.approx(18.0)
 
 
-@pytest.mark.parametrize(("rig", "expected"), [(False, 10.0), (True, 9.23)])
-def test_half_the_time_is_spent_when_candidates_are_refitted(rig, expected):
+@pytest.mark.parametrize(("table", "expected"), [(False, 10.0), (True, 9.23)])
+def test_half_the_time_is_spent_when_candidates_are_refitted(table, expected):
     clock = Clock()
-    left = TimeLeft(rig=rig, now=clock)
+    left = TimeLeft(table=table, now=clock)
     clock.at += 10.0
     assert left("refitting candidates", 3, 4) == pytest.approx(expected, abs=0.01)
 
 
 def test_a_stage_that_lasts_makes_the_whole_longer():
     clock = Clock()
-    left = TimeLeft(rig=False, now=clock)
+    left = TimeLeft(table=False, now=clock)
     clock.at += 5.7
     at_first = left("effect 1, refitting with: air.wind", 0, 4)
     assert at_first == pytest.approx(4.3)
@@ -52,7 +52,7 @@ def test_a_stage_that_lasts_makes_the_whole_longer():
 
 def test_a_third_effect_says_that_more_come():
     clock = Clock()
-    left = TimeLeft(rig=False, now=clock)
+    left = TimeLeft(table=False, now=clock)
     clock.at += 62.0
     second = left("effect 2, refitting with: air.wind", 0, 4)
     third = left("effect 3, refitting with: air.wind", 0, 4)
