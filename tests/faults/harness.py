@@ -22,7 +22,7 @@ from typing import Any
 from fuzz.analyses import SETS, SWEEPS
 from fuzz.seeds import RAW
 
-from discsim.validation.cli import main
+from discsim.validation.start import main
 
 __all__ = ["COMMANDS", "content", "disturbed", "doubled", "prepare", "run"]
 
