@@ -190,10 +190,15 @@ def refit(
     """
     linears = linearised(fit) if relinearise else fit.linears
     fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
-    fit, settled = _iterated(fit, iterations, tolerance, bounds or {}, _FREE, bar)
-    if not settled and iterations >= _LONG and discontinuous(fit) and fit.plant.weakly_identified:
+    settled, held = False, _HELD * iterations
+    if iterations < _LONG and discontinuous(fit) and fit.plant.weakly_identified:
+        # a few steps more of a fit that held ones have brought where it is
+        held = iterations
+    else:
+        fit, settled = _iterated(fit, iterations, tolerance, bounds or {}, _FREE, bar)
+    if not settled and discontinuous(fit) and fit.plant.weakly_identified:
         # free steps hop about where the readings say little: short ones, and what held them back is not known
-        fit, _ = _iterated(fit, _HELD * iterations, tolerance, bounds or {}, _FIRST_DAMPING, bar)
+        fit, _ = _iterated(fit, held, tolerance, bounds or {}, _FIRST_DAMPING, bar)
         _, (_, covariance, _) = _solved(fit, np.full(len(fit.trajectories), _FREE))
         fit = replace(fit, covariance=covariance)
     return fit
