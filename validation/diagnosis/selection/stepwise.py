@@ -231,8 +231,10 @@ def _without_swallowed(fitted: ContinuousFit) -> ContinuousFit | None:
 
 def _most(fitted: ContinuousFit, most: int) -> int:
     """Return how many effects a search for at most so many may come to from a fit: more of them errors of sensors."""
-    on_motion = sum(candidate.row.acts_on == "motion" for candidate in fitted.hypothesis.candidates)
-    return max(most, SELECTION.most_with_sensors) if on_motion < UNKNOWN_LAW.stack else most
+    acting = [candidate.row.acts_on for candidate in fitted.hypothesis.candidates]
+    # a stack of one sensor's errors stands for what is none of them
+    stacked = acting.count("motion") >= UNKNOWN_LAW.stack or any(acting.count(one) >= most for one in acting)
+    return most if stacked else max(most, SELECTION.most_with_sensors)
 
 
 def _with_final(found: Search, fitted: ContinuousFit) -> Search:
