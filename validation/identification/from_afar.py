@@ -14,7 +14,7 @@ import numpy as np
 
 from discsim.validation.identification.gauss_newton import Fit, linearised, merit_of, refit
 from discsim.validation.identification.linear import Linear
-from discsim.validation.identification.noise import GroupNoise, NoiseModel
+from discsim.validation.identification.noise import GroupNoise, NoiseModel, estimate_noise
 
 __all__ = ["fitted_from_afar"]
 
@@ -42,13 +42,5 @@ def fitted_from_afar(fit: Fit, *, bounds: Mapping[tuple[str, str], tuple[float, 
 
 def _left(linears: tuple[Linear, ...], least: NoiseModel) -> dict[str, GroupNoise]:
     """Return the root mean square of residuals by group, at least the level in ``least``."""
-    squares: dict[str, float] = {}
-    counts: dict[str, int] = {}
-    for linear in linears:
-        for channel in linear.channels:
-            e = linear.residual[channel.rows]
-            squares[channel.group] = squares.get(channel.group, 0.0) + float(e @ e)
-            counts[channel.group] = counts.get(channel.group, 0) + e.size
-    return {
-        group: GroupNoise(max(float(np.sqrt(squares[group] / n)), least[group].sd)) for group, n in counts.items() if n
-    }
+    left = estimate_noise(linears, [linear.residual for linear in linears], coloured=False)
+    return {group: level._replace(sd=max(level.sd, least[group].sd)) for group, level in left.items()}

@@ -24,9 +24,9 @@ from discsim.validation.diagnosis.unknown_law.formula import as_laws, as_sensor_
 from discsim.validation.diagnosis.unknown_law.motion_law import candidate_laws, fitted_law, reference_of, state_of
 from discsim.validation.diagnosis.unknown_law.sensor_law import asked_of_sensors, fitted_sensor_law, sensor_library
 from discsim.validation.diagnosis.unknown_law.terms import SensorTerm
-from discsim.validation.identification.gauss_newton import Fit, mapped, refit
+from discsim.validation.identification.gauss_newton import Fit, reduced_each, refit
 from discsim.validation.identification.noise import GroupNoise, NoiseModel, chi_squared, log_likelihood
-from discsim.validation.identification.normal_equations import common_step, nuisance_step, reduce
+from discsim.validation.identification.normal_equations import common_step, nuisance_step
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.plants.law_terms import Term
 from discsim.validation.identification.residual_tests import unmodelled_residuals
@@ -71,9 +71,7 @@ def _held_out(before: Fit, after: Fit) -> tuple[dict[int, float], dict[int, tupl
     sides, squares = [], []
     for fit in (before, after):
         linears = fit.linears
-        reduced = mapped(
-            lambda linear, trajectory, f=fit: reduce(linear, trajectory, f.noise, f.defects), linears, fit.trajectories
-        )
+        reduced = reduced_each(fit)
         levels, squared = [], []
         for i in range(count):
             others = np.sum([r.gram for j, r in enumerate(reduced) if j != i], axis=0)
