@@ -96,7 +96,7 @@ def diagnose_blind(request: tuple[Any, ...], command: Sequence[str] | None) -> d
 
     The process gets the folder's name (which tells nothing), an empty folder to write to, and a bare environment; its
     working folder is empty too. No file with an answer is in reach by these. Returns ``diagnosis`` (None where there
-    is none), ``error``, ``seconds`` and the digest of the recordings.
+    is none), ``error``, ``seconds`` by the clock and of the processors, and the digest of the recordings.
     """
     case = Request(*request).draw()
     with tempfile.TemporaryDirectory(prefix="recordings-") as place:
@@ -104,7 +104,7 @@ def diagnose_blind(request: tuple[Any, ...], command: Sequence[str] | None) -> d
         desk.mkdir()
         write_recordings(case, dataset)
         fingerprint = digest(dataset)
-        started = time.monotonic()
+        started, before = time.monotonic(), os.times()
         error = None
         try:
             done = subprocess.run(
@@ -121,11 +121,18 @@ def diagnose_blind(request: tuple[Any, ...], command: Sequence[str] | None) -> d
                 error = f"exit status {done.returncode}: {done.stderr.strip()[-600:]}"
         except subprocess.TimeoutExpired:
             error = f"no answer within {PATIENCE_S:g} s"
-        seconds = round(time.monotonic() - started, 2)
+        seconds, after = round(time.monotonic() - started, 2), os.times()
+        cpu = after.children_user + after.children_system - before.children_user - before.children_system
         diagnosis = None
         if error is None:
             try:
                 diagnosis = json.loads((out / "diagnosis.json").read_text("utf-8"))
             except (OSError, ValueError) as fault:
                 error = f"no diagnosis.json that can be read ({fault})"
-    return {"diagnosis": diagnosis, "error": error, "seconds": seconds, "recordings_sha256": fingerprint}
+    return {
+        "diagnosis": diagnosis,
+        "error": error,
+        "seconds": seconds,
+        "cpu_seconds": round(cpu, 2),
+        "recordings_sha256": fingerprint,
+    }

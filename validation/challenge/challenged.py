@@ -20,7 +20,7 @@ from discsim.validation.challenge.report.figures import draw_detection
 from discsim.validation.challenge.report.page import MANY, goals_met
 from discsim.validation.challenge.run import challenge, write_challenge
 from discsim.validation.challenge.scores.detection import Curve, detections, fit_curve
-from discsim.validation.challenge.scores.result import Scored, rates_of, times
+from discsim.validation.challenge.scores.result import Scored, both_times, rates_of
 from discsim.validation.challenge.scores.scoring import Rate
 from discsim.validation.reporting.run import Run
 
@@ -74,7 +74,7 @@ class Challenged(Result):
             lines.append(f"{label.replace('_', ' ')}: {share}")
         if self.curve is not None:
             lines.append(f"half-detection size, in detection limits: {self.curve.text}")
-        return "\n".join([*lines, self._right, f"a diagnosis took {times(self.cases).text}"])
+        return "\n".join([*lines, self._right, f"a diagnosis took {both_times(self.cases)}"])
 
     def table(self) -> dict[str, list[Any]]:
         """Return a row for each case: seed, plant, what was concealed, what was answered, and whether it is right."""

@@ -15,7 +15,7 @@ from discsim.validation.challenge.blind import DIAGNOSE, Request, diagnose_blind
 from discsim.validation.challenge.cases.detection_limit import sizes
 from discsim.validation.challenge.report.page import write_page
 from discsim.validation.challenge.scores.detection import detections, fit_curve
-from discsim.validation.challenge.scores.result import RESULT, Scored, rates_of, times
+from discsim.validation.challenge.scores.result import RESULT, Scored, processor_times, rates_of, times
 from discsim.validation.reporting.run import Run, json_text, package_version, source_digest
 from discsim.validation.running.tasks import Task, claim, discard, run_tasks
 
@@ -98,6 +98,7 @@ def write_challenge(
         "summary": {name: value.to_json() for name, value in rates_of(scored).items()},
         "half_detection": curve._asdict() if curve is not None else None,
         "seconds": times(scored)._asdict(),
+        "cpu_seconds": processor_times(scored)._asdict(),
     }
     write_text(out / RESULT, json_text(content))
     write_page(out, scored)

@@ -164,6 +164,8 @@ class Selection:
     hopeless, hopeless_near : float
         A refit that will leave this many times the best chi-squared so far is given up, and where that is near the
         data: time alone.
+    hopeless_held : float
+        The same after steps that are held: what these expect of the end is within a tenth of it.
     out_of_reach : float
         The same of a refit that expects to stay so much worse than the fit beside it: no price nor tie comes near.
     right_sign : float
@@ -209,6 +211,7 @@ class Selection:
     pairs_refitted: int = 5
     hopeless: float = 10.0
     hopeless_near: float = 4.0
+    hopeless_held: float = 2.0
     out_of_reach: float = 500.0
     right_sign: float = 4.0
     worse: float = 10.0

@@ -181,12 +181,14 @@ def refit(
     bounds: Mapping[tuple[str, str], tuple[float, float]] | None = None,
     relinearise: bool = True,
     bar: float = np.inf,
+    held_bar: float = np.inf,
 ) -> Fit:
     """Go on from where a fit stands by Gauss-Newton steps, halved where they do not improve.
 
     Stops when the gain, expected or found, is below ``tolerance`` of chi-squared. ``relinearise`` is false where only
     the noise has changed since the last linearisation. A fit that after its first steps expects to stay above ``bar``
-    is of no use to the caller, and is left where it stands.
+    is of no use to the caller, and is left where it stands; so is one that held steps expect to stay above ``held_bar``
+    (they move little, and what they expect of the end is within a tenth of it).
     """
     linears = linearised(fit) if relinearise else fit.linears
     fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
@@ -198,7 +200,7 @@ def refit(
         fit, settled = _iterated(fit, iterations, tolerance, bounds or {}, _FREE, bar)
     if not settled and discontinuous(fit) and fit.plant.weakly_identified:
         # free steps hop about where the readings say little: short ones, and what held them back is not known
-        fit, _ = _iterated(fit, held, tolerance, bounds or {}, _FIRST_DAMPING, bar)
+        fit, _ = _iterated(fit, held, tolerance, bounds or {}, _FIRST_DAMPING, min(bar, held_bar))
         _, (_, covariance, _) = _solved(fit, np.full(len(fit.trajectories), _FREE))
         fit = replace(fit, covariance=covariance)
     return fit

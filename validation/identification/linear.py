@@ -98,6 +98,31 @@ class Linear:
             full[self.segment < 0] = self.whole
         return full
 
+    @property
+    def acting(self) -> IntArray:
+        """The shared columns (a,) that say anything of this recording."""
+        d, u = self.sensitivities.shape[1], self.unknowns
+        parts = [self.own[:, d:], self.transitions[..., d:], *([self.whole[:, u:]] if self.whole.size else [])]
+        return np.flatnonzero(np.any([np.any(part != 0.0, axis=tuple(range(part.ndim - 1))) for part in parts], axis=0))
+
+    def only(self, shared: IntArray) -> Linear:
+        """Return the linearisation with these of its shared columns (a,) alone."""
+        d, u = self.sensitivities.shape[1], self.unknowns
+        if shared.size == self.own.shape[1] - d:
+            return self
+
+        def chosen(columns: FloatArray, kept: int) -> FloatArray:
+            """Return the first columns (..., kept) of some (..., kept + p), and those of the shared ones."""
+            return columns[..., np.concatenate([np.arange(kept), kept + shared])]
+
+        return replace(
+            self,
+            own=chosen(self.own, d),
+            sensitivities=chosen(self.sensitivities, u),
+            transitions=chosen(self.transitions, d),
+            whole=chosen(self.whole, u) if self.whole.size else np.empty((0, u + shared.size)),
+        )
+
     def spread(self, places: Sequence[int], width: int) -> Linear:
         """Return the linearisation with its shared columns at ``places`` of ``width``, the others zero."""
         d, u = self.own.shape[1] - len(places), self.unknowns

@@ -129,8 +129,11 @@ def reduce(
     linear: Linear, current: Trajectory, noise: NoiseModel, defects: AllowedDefects, damping: float = 0.0
 ) -> Reduced:
     """Eliminate the local unknowns of a recording; ``damping`` keeps its attitude from turning far in one step."""
-    u = linear.unknowns
-    G = normal_matrix(linear, noise)
+    u, d = linear.unknowns, linear.sensitivities.shape[1]
+    p = linear.own.shape[1] - d
+    # most of what is shared may be other recordings' own, which says nothing here
+    acting = linear.acting
+    G = normal_matrix(linear.only(acting), noise)
     H, right, chi2 = unknown_prior(linear, current, defects)
     attitude = current.plant.layout.attitude
     if damping and attitude is not None:
@@ -144,9 +147,12 @@ def reduce(
     H = G[:u, :u] * scale[:, None] * scale[None, :]
     H[np.arange(u), np.arange(u)] += 1e-12
     L = lower_root(H)
-    cross = G[:u, u:] * scale[:, None]
-    half = solve_triangular(L, cross, lower=True, check_finite=False)
-    gram = G[u:, u:] - half.T @ half
+    told = G[:u, u:] * scale[:, None]
+    half = solve_triangular(L, told, lower=True, check_finite=False)
+    places = np.append(acting, p)
+    cross, gram = np.zeros((u, p + 1)), np.zeros((p + 1, p + 1))
+    cross[:, places] = told
+    gram[np.ix_(places, places)] = G[u:, u:] - half.T @ half
     return Reduced(gram, (L, scale), cross, linear.residual.size)
 
 

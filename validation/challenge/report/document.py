@@ -18,7 +18,7 @@ from discsim.validation.challenge.cases.draw import KINDS, PLANT_SHARES
 from discsim.validation.challenge.masks import MASK_HEADER, mask_row, masked_results
 from discsim.validation.challenge.report.page import deviates_of, fault_of, found_of, goal_rows, hidden_of, percent
 from discsim.validation.challenge.scores.detection import Sized, detections, fit_curve
-from discsim.validation.challenge.scores.result import Result, Scored, rates_of, times
+from discsim.validation.challenge.scores.result import Result, Scored, both_times, rates_of, times
 from discsim.validation.challenge.scores.scoring import confusion, has_power_law
 from discsim.validation.reporting.markdown import table
 
@@ -75,7 +75,7 @@ def result_text(
     right = sum(item.score.right for item in scored)
     parts = [
         f"{made_by(result)} {right} are answered rightly in verdict, effects and place. A diagnosis takes "
-        f"{times(scored).text}, wall clock on the machine it ran on.",
+        f"{both_times(scored)}, on the machine it ran on.",
         _goals(scored, pooled(result, near), [item for other in blank for item in other.scored]),
     ]
     if blank:

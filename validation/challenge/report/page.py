@@ -19,7 +19,7 @@ from discsim.validation.challenge.report.figures import (
     draw_exponents,
 )
 from discsim.validation.challenge.scores.detection import HALF_GOAL, Curve, Sized, detections, fit_curve, has_curve
-from discsim.validation.challenge.scores.result import Scored, rates_of, times
+from discsim.validation.challenge.scores.result import Scored, both_times, rates_of
 from discsim.validation.challenge.scores.scoring import NOTHING, Rate, confusion, has_power_law, median, rate
 from discsim.validation.reporting.html import Section, write_report
 
@@ -116,7 +116,7 @@ def write_page(out: Path, scored: Sequence[Scored]) -> None:
         out / "report.html",
         "Blind test of the diagnosis",
         f"{len(scored)} concealed cases, {right} answered rightly in verdict, effects and place. "
-        f"A diagnosis takes {times(scored).text}.",
+        f"A diagnosis takes {both_times(scored)}.",
         sections,
     )
 

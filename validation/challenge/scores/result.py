@@ -14,7 +14,7 @@ from discsim.errors import InputError
 from discsim.validation.challenge.cases.conceal import Answer
 from discsim.validation.challenge.scores.scoring import CaseScore, Rate, score_case, summary
 
-__all__ = ["RESULT", "Result", "Scored", "Times", "rates_of", "read_result", "times"]
+__all__ = ["RESULT", "Result", "Scored", "Times", "both_times", "processor_times", "rates_of", "read_result", "times"]
 
 #: the file of a challenge's result
 RESULT = "challenge.json"
@@ -25,7 +25,7 @@ class Scored:
     """One case, opened: its answer, the diagnosis (None where there is none), its score, time and detection limit.
 
     ``sizes`` holds each concealed effect of the catalogue in units of the smallest that can be seen, by id;
-    ``reproduce`` is the command that does this case alone.
+    ``reproduce`` is the command that does this case alone. ``cpu_seconds`` are None in files of older versions.
     """
 
     answer: Answer
@@ -36,6 +36,7 @@ class Scored:
     recordings_sha256: str
     sizes: Mapping[str, float] = field(default_factory=dict)
     reproduce: str = ""
+    cpu_seconds: float | None = None
 
     @property
     def strength(self) -> float | None:
@@ -67,6 +68,7 @@ class Scored:
             "sizes_over_limit": dict(self.sizes),
             "error": self.error,
             "seconds": self.seconds,
+            "cpu_seconds": self.cpu_seconds,
             "recordings_sha256": self.recordings_sha256,
         }
 
@@ -87,6 +89,7 @@ class Scored:
             entry["diagnosis"],
             error=entry["error"],
             seconds=entry["seconds"],
+            cpu_seconds=entry.get("cpu_seconds"),
             recordings_sha256=entry["recordings_sha256"],
             sizes=entry["sizes_over_limit"],
             reproduce=entry["reproduce"],
@@ -105,7 +108,7 @@ class Scored:
 
 
 class Times(NamedTuple):
-    """Seconds of wall clock that diagnoses took: the median, what nine in ten do not exceed, the longest."""
+    """Seconds that diagnoses took: the median, what nine in ten do not exceed, the longest."""
 
     median_s: float
     nine_in_ten_s: float
@@ -118,12 +121,27 @@ class Times(NamedTuple):
         return f"{self.median_s:.0f} s (median), {most}"
 
 
-def times(scored: Sequence[Scored]) -> Times:
-    """Return how long the diagnoses took, with an answer or without; NaN of none."""
-    seconds = [item.seconds for item in scored]
+def _times(seconds: Sequence[float]) -> Times:
     if not seconds:
         return Times(float("nan"), float("nan"), float("nan"))
     return Times(*(float(np.quantile(seconds, share)) for share in (0.5, 0.9, 1.0)))
+
+
+def times(scored: Sequence[Scored]) -> Times:
+    """Return how long the diagnoses took by the clock, with an answer or without; NaN of none."""
+    return _times([item.seconds for item in scored])
+
+
+def processor_times(scored: Sequence[Scored]) -> Times:
+    """Return how long they kept processors busy; NaN where that is not known."""
+    return _times([item.cpu_seconds for item in scored if item.cpu_seconds is not None])
+
+
+def both_times(scored: Sequence[Scored]) -> str:
+    """Return in words how long the diagnoses took by the clock and, where it is known, of the processors."""
+    busy = processor_times(scored)
+    by_clock = f"{times(scored).text} by the clock"
+    return by_clock if np.isnan(busy.median_s) else f"{by_clock}; of processor time {busy.text}"
 
 
 def rates_of(scored: Sequence[Scored]) -> dict[str, Rate]:

@@ -347,7 +347,8 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
             found.own,
             noise if distant else current.fit.noise,
             {**values_of_fit(current), **screened.start, **_wobbles(fit)},
-            bar=(SELECTION.hopeless_near if near_data else SELECTION.hopeless) * best_chi2 if distant else beside,
+            bar=_hopeless(best_chi2, current.fit.count) if distant else beside,
+            held_bar=SELECTION.hopeless_held * best_chi2 if distant else np.inf,
         )
         if not distant and not cost and refitted.score > current.score + SELECTION.worse:
             refitted = _begun_again(found, current, screened, beside)
@@ -367,6 +368,11 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
     if cost > 0:
         found = replace(found, relaxed_fit=replace(found.relaxed_fit, trajectories=fit.trajectories))
     return replace(found, cost=found.cost + cost), best
+
+
+def _hopeless(best: float, count: int) -> float:
+    """Return the chi-squared above which a refit is of no use beside the best so far, of so many readings."""
+    return (SELECTION.hopeless_near if best < SELECTION.far * count else SELECTION.hopeless) * best
 
 
 def _begun_again(found: Search, current: ContinuousFit, screened: ScreenedCandidate, bar: float) -> ContinuousFit:
