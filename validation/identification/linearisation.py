@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -37,12 +38,11 @@ from discsim.validation.identification.propagation import (
 )
 from discsim.validation.identification.readings import group_of
 from discsim.validation.identification.segments import Trajectory, stepped
-from discsim.validation.identification.sensor_model import CLOCKS, is_motion, predicted
+from discsim.validation.identification.sensitivities import followed, readings_and_slopes
+from discsim.validation.identification.sensor_model import CLOCKS, is_motion, predicted, sensed
 
 __all__ = ["linearise", "moved", "reread"]
 
-#: neighbours simulated at a time, to bound memory
-_BATCH = 16
 #: instants of several segments that are read together
 _INSTANTS = 256
 #: fewest segments that are worth a thread of their own
@@ -283,37 +283,44 @@ class _Read:
         if not segments:
             return
         around = self._around
-        row_of_neighbour = {int(neighbour): row for row, neighbour in enumerate(acting)}
+        half = acting[(acting > 0) & (acting <= around.half)]
+        columns, spans = around.places[half - 1], around.widths[half - 1] * (2.0 if around.central else 1.0)
+        rows = segments[0][2] if len(segments) == 1 else np.concatenate([one[2] for one in segments], axis=1)
+        firsts = np.cumsum([0, *(one[2].shape[1] for one in segments)])
         bounds = [np.cumsum([0, *(o.size for o in own)]) for own, *_ in segments]
         for which, s in enumerate(self._samples):
             o = np.concatenate([own[which] for own, *_ in segments])
             if o.size == 0:
                 continue
             mine = np.concatenate(
-                [rows[:, place[b[which] : b[which + 1]]] for b, (_, place, rows) in zip(bounds, segments, strict=True)],
-                axis=1,
+                [
+                    first + place[b[which] : b[which + 1]]
+                    for first, b, (_, place, _) in zip(firsts, bounds, segments, strict=False)
+                ]
             )
-            t = s.instants[o]
-            self.rows[which][o] = mine[0]
-            shown = np.empty((mine.shape[0], o.size, s.width))
-            for first in range(0, mine.shape[0], _BATCH):
-                part = slice(first, first + _BATCH)
-                shown[part] = around.read(s.sensor, around.values, t, mine[part])
-            for neighbour, j in enumerate(around.motion, 1 + around.d):
-                if around.columns[j].key in _ALSO_READ:  # it moves the readings of a given motion, too
-                    for other, sign in ((neighbour, 1.0), (neighbour + around.half, -1.0))[: 1 + bool(around.central)]:
-                        row = row_of_neighbour[other]
-                        shown[row] = self._also_moved(s.sensor, t, mine[row], around.columns[j], sign)
-            self.ideal[which][o] = shown[0] + s.held[o]
-            slopes, ahead = around.slopes(shown, acting), acting[(acting > 0) & (acting <= around.half)]
-            self.slopes[which][o[:, None], :, around.places[ahead - 1]] = np.moveaxis(slopes, 0, 1)
+            t, motion = s.instants[o], rows[0, mine]
+            self.rows[which][o] = motion
+            senses = sensed(s.sensor, around.recording, around.values, around.effects) if half.size else ()
+            ideal, slopes = readings_and_slopes(partial(around.read, s.sensor, around.values, t), senses, motion)
+            self.ideal[which][o] = ideal + s.held[o]
+            if not half.size:
+                continue
+            follows = followed(slopes, senses, rows, mine, spans, bool(around.central))
+            for j, place in enumerate(half - 1 - around.d):
+                if place >= 0 and around.columns[around.motion[place]].key in _ALSO_READ:
+                    # it moves the readings of a given motion, too
+                    follows[:, :, j] += self._also_moved(s.sensor, t, motion, around.columns[around.motion[place]])
+            self.slopes[which][o[:, None], :, columns] = np.moveaxis(follows, 2, 1)
 
-    def _also_moved(self, sensor: str, t: FloatArray, rows: FloatArray, column: Column, sign: float) -> FloatArray:
-        """Return what a sensor reads where a parameter moves its readings beside the motion."""
+    def _also_moved(self, sensor: str, t: FloatArray, rows: FloatArray, column: Column) -> FloatArray:
+        """Return how what a sensor reads of a given motion follows a parameter, (m, width)."""
         around = self._around
         now = around.current(*column.key)
-        moved_values = {**around.values, column.key: now + sign * column.step}
-        return around.read(sensor, moved_values, t, rows)
+        up, down = (
+            around.read(sensor, {**around.values, column.key: now + sign * column.step}, t, rows)
+            for sign in (1.0, -1.0)
+        )
+        return np.asarray((up - down) / (2.0 * column.step))
 
 
 @dataclass(frozen=True)

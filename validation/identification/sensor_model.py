@@ -20,13 +20,16 @@ from discsim.effects.sensors import AccelerometerSaturation, ClockRate, Lag, Lat
 from discsim.effects.setup import BoardRotation, TimeOffset
 from discsim.motion import State, Surroundings
 from discsim.recording import Recording
-from discsim.sensors import Gyroscope
+from discsim.sensors import Accelerometer, Gps, Gyroscope, Magnetometer
 from discsim.sensors.instruments import FIELDS, KINDS, Sensor
+from discsim.sensors.position import Tracker
+from discsim.sensors.rate_reference import RateReference
 from discsim.validation.identification.competing_effects import CATALOGUED, Competing
 from discsim.validation.identification.parameters import Values
 from discsim.validation.identification.plants import plant_of
+from discsim.validation.identification.sensitivities import MOTION
 
-__all__ = ["CLOCKS", "Values", "delay", "is_motion", "predicted", "sized", "value"]
+__all__ = ["CLOCKS", "Values", "delay", "is_motion", "predicted", "sensed", "sized", "value"]
 
 _Kind = TypeVar("_Kind")
 
@@ -105,6 +108,30 @@ def predicted(
             changed = effect.applied.on_readings(sizes, readings.reshape(-1, readings.shape[-1]), times, flat)
             readings = changed.reshape(readings.shape)
     return readings
+
+
+def sensed(sensor: str, recording: Recording, values: Values, effects: Competing = CATALOGUED) -> tuple[str, ...]:
+    """Return what of a motion a sensor's readings follow, of `discsim.validation.identification.sensitivities.MOTION`.
+
+    Where the path is unknown its acceleration is no part of the motion, and no direction is told from another.
+    """
+    if effects.called_on(sensor):
+        return MOTION
+    model, path = _model(sensor, recording, values), plant_of(recording).path_known
+    force = (("acceleration", "attitude") if path else ()) + ("rate", "angular_acceleration")
+    match model:
+        case Magnetometer():
+            return ("position", "attitude") if any(model.stray_field[:3]) else ("attitude",)
+        case Accelerometer():
+            return force
+        case Gyroscope():
+            return force if any(model.g_sensitivity) else ("rate",)
+        case Gps():
+            return ("position", "velocity")
+        case Tracker():
+            return ("position",)
+        case RateReference():
+            return ("rate",)
 
 
 def _state(t: FloatArray, rows: FloatArray) -> State:

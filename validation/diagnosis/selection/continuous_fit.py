@@ -55,8 +55,8 @@ def continuous_fit(
     """Fit a hypothesis with segments that are continuous, from the trajectories of a relaxed fit.
 
     ``start`` gives first values of parameters by (key, recordings). The noise is estimated anew from the residuals. A
-    fit whose chi-squared in ``noise`` will stay above ``bar`` is given up after a few steps, and above ``held_bar`` after a
-    few held ones.
+    fit whose chi-squared in ``noise`` will stay above ``bar`` is given up after a few steps, and above ``held_bar``
+    after a few held ones.
     """
     parameters = fitted_parameters(hypothesis, own)
     at = np.array([start.get((q.key, q.recordings), q.stated) for q in parameters])

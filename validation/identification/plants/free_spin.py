@@ -16,23 +16,19 @@ numbers     meaning
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, copysign, cos, degrees, hypot, radians, sin, sqrt
-from typing import Any
+from math import atan2, degrees, hypot, radians
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray
-from discsim.compiled import compiled, compiled_nogil
-from discsim.effects.body import transverse_inertia
-from discsim.effects.events import spin_step
 from discsim.frames import body_to_ned, multiply, quaternion_from_euler, turn
-from discsim.parameters import PARAMETERS
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
-from discsim.validation.identification.dynamics import FASTEST, SIZE
+from discsim.validation.identification.dynamics import FASTEST
 from discsim.validation.identification.initial.flight import spin_initial_states
 from discsim.validation.identification.parameters import AllowedDefects, Parameter
+from discsim.validation.identification.plants.free_spin_motion import free_spin_segments
 from discsim.validation.identification.plants.plan import Plan, turns
 from discsim.validation.identification.plants.plant import (
     Design,
@@ -64,164 +60,6 @@ _STEP, _NUTATION = 0.005, 0.22
 def _longest_step(given: Given, state: FloatArray, start: float, stop: float) -> float:
     del given, start, stop
     return min(_STEP, _NUTATION / max(min(abs(float(state[_SPIN])), FASTEST) * 2.0, 1.0))
-
-
-@compiled
-def _turned(q: FloatArray, wx: float, wy: float, wz: float, h: float, new: FloatArray) -> None:
-    """Write q turned for h s at a constant body rate into new (4,)."""
-    angle = sqrt(wx * wx + wy * wy + wz * wz) * h
-    c = cos(0.5 * angle)
-    s = 0.5 * h if angle < 1e-9 else sin(0.5 * angle) * h / angle
-    x, y, z = s * wx, s * wy, s * wz
-    new[0] = q[0] * c - q[1] * x - q[2] * y - q[3] * z
-    new[1] = q[0] * x + q[1] * c + q[2] * z - q[3] * y
-    new[2] = q[0] * y - q[1] * z + q[2] * c + q[3] * x
-    new[3] = q[0] * z + q[1] * y - q[2] * x + q[3] * c
-
-
-#: what tells axes apart by less than the root of this, 1/s^2, says little about where they are
-_NO_AXIS = 0.1
-
-
-@compiled
-def _spinning(
-    p: Any,
-    state: FloatArray,
-    wobble: FloatArray,
-    t: float,
-    t0: float,
-    psi: float,
-    heading: float,
-    w: FloatArray,
-    dw: FloatArray,
-) -> None:
-    """Write the derivative of body rates w (3,) in a free spin into dw (3,): Euler's equations and the nuisances.
-
-    wobble (10,) is how fast the wobble dies, 1/s, how much faster it turns for the stiffness of the air, rad/s, and how
-    both differ along the wind and across it (cosine and sine of twice the wind's direction), each with its change over
-    the first seconds. heading is that of x_B in N where psi is zero. Air is as stiff as the slope of its moment over
-    the angle of attack, which need not be smooth: state[13] is what that adds in this segment, rad/s. A moment about
-    one axis turns the wobble as much as it tells that axis from the other.
-
-    How that moment bends with the angle of attack drives the wobble at twice its own frequency, by the square of the
-    rates: m = (w_x + i w_y)^2 (state[14] + i state[15]), 1/rad, where psi is zero, and its mirror image at that axis.
-    """
-    Ixx, Izz = p.disc.Ixx, p.disc.Izz
-    Iyy = transverse_inertia(p.body_inertia_asymmetry, Ixx)
-    since = t - t0
-    mx, my = state[0] + since * state[2], state[1] + since * state[3]
-    c, s = cos(psi), sin(psi)
-    later = t / (1.0 + t)  # bounded, or a wobble that is long gone would grow again
-    decay = wobble[0] + later * (wobble[1] + later * wobble[8])
-    faster = wobble[2] + later * (wobble[3] + later * wobble[9])
-    stiffer = 1.0 + state[13] * faster / (1.0 + faster * faster)
-    faster += state[13]
-    along, across = wobble[4] + later * wobble[5], wobble[6] + later * wobble[7]
-    c2, s2 = cos(2.0 * (psi + heading)), sin(2.0 * (psi + heading))
-    a, b = along * c2 + across * s2, across * c2 - along * s2
-    # the axis: a moment about one at the angle chi tells axes apart by -i k exp(2 i chi), and turns the wobble by k,
-    # which has the sign opposite to the spin where the moment grows with the angle of attack
-    mirror = copysign(1.0 / sqrt(along * along + across * across + _NO_AXIS), -w[2])
-    ux, uy = -b * mirror, a * mirror
-    a, b = stiffer * a, stiffer * b
-    bx, by = c * state[14] - s * state[15], s * state[14] + c * state[15]
-    wx, wy = w[0] * w[0] - w[1] * w[1], 2.0 * w[0] * w[1]
-    px, py = bx * wx - by * wy, bx * wy + by * wx
-    dw[0] = (Iyy - Izz) / Ixx * w[1] * w[2] + c * mx + s * my - decay * w[0] - faster * w[1]
-    dw[0] += a * w[0] + b * w[1]
-    dw[1] = (Izz - Ixx) / Iyy * w[2] * w[0] + c * my - s * mx - decay * w[1] + faster * w[0]
-    dw[1] += b * w[0] - a * w[1]
-    dw[0] += px + ux * px + uy * py
-    dw[1] += py + uy * px - ux * py
-    dw[2] = (Ixx - Iyy) / Izz * w[0] * w[1] + (state[4] + since * state[5]) * w[2]
-    dw[2] += spin_step(p.event_spin_step, t, w[2])
-
-
-@compiled_nogil
-def free_spin_segments(
-    flats: FloatArray,
-    wobbles: FloatArray,
-    states: FloatArray,
-    times: FloatArray,
-    last: int,
-    out: FloatArray,
-    rows: FloatArray,
-    ends: FloatArray,
-) -> None:
-    """Spin freely from states (c, 16); wobbles (c, 10) as for `_spinning`. Else as `flight_segments`.
-
-    Rates by the classical fourth-order steps, attitude by the fourth-order Magnus step through them.
-    """
-    n = times.size
-    rate, slope, attitude, psis = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 4)), np.empty(n)
-    k1, k2, k3, k4, w = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    for c in range(states.shape[0]):
-        flat = flats[c, :SIZE].copy()
-        p = flat.view(PARAMETERS)[0]
-        state = states[c]
-        attitude[0], rate[0], psis[0] = state[6:10], state[10:13], 0.0
-        heading = atan2(
-            2.0 * (state[6] * state[9] + state[7] * state[8]), 1.0 - 2.0 * (state[8] * state[8] + state[9] * state[9])
-        )
-        for k in range(n - 1):
-            t, h, psi = times[k], times[k + 1] - times[k], psis[k]
-            w0 = rate[k]
-            _spinning(p, state, wobbles[c], t, times[0], psi, heading, w0, k1)
-            for i in range(3):
-                w[i] = w0[i] + 0.5 * h * k1[i]
-            middle = psi + 0.5 * h * w0[2] + 0.125 * h * h * k1[2]
-            _spinning(p, state, wobbles[c], t + 0.5 * h, times[0], middle, heading, w, k2)
-            for i in range(3):
-                w[i] = w0[i] + 0.5 * h * k2[i]
-            _spinning(p, state, wobbles[c], t + 0.5 * h, times[0], middle, heading, w, k3)
-            for i in range(3):
-                w[i] = w0[i] + h * k3[i]
-            _spinning(p, state, wobbles[c], t + h, times[0], psi + h * w0[2] + 0.5 * h * h * k2[2], heading, w, k4)
-            slope[k] = k1
-            for i in range(3):
-                rate[k + 1, i] = w0[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
-            psis[k + 1] = psi + 0.5 * h * (w0[2] + rate[k + 1, 2]) + h * h / 12.0 * (k1[2] - k4[2])
-            _magnus(attitude[k], w0, rate[k + 1], k1, k4, h, attitude[k + 1])
-        _spinning(p, state, wobbles[c], times[n - 1], times[0], psis[n - 1], heading, rate[n - 1], slope[n - 1])
-        for j in range(out.size):
-            k = min(max(np.searchsorted(times, out[j], side="right") - 1, 0), n - 2)
-            h, x = times[k + 1] - times[k], out[j] - times[k]
-            row = rows[c, j]
-            row[:9] = 0.0
-            s = x / h
-            for i in range(3):
-                a, b = rate[k, i], rate[k + 1, i]
-                da, db = h * slope[k, i], h * slope[k + 1, i]
-                w[i] = a + s * (da + s * (3.0 * (b - a) - 2.0 * da - db + s * (2.0 * (a - b) + da + db)))
-                row[13 + i] = w[i]
-                row[16 + i] = (
-                    da + s * (2.0 * (3.0 * (b - a) - 2.0 * da - db) + 3.0 * s * (2.0 * (a - b) + da + db))
-                ) / h
-            _magnus(attitude[k], rate[k], w, slope[k], row[16:19], x, row[9:13])
-        end = ends[c]
-        psi, span = psis[last], times[last] - times[0]
-        cosine, sine = cos(psi), sin(psi)
-        mx, my = state[0] + span * state[2], state[1] + span * state[3]
-        end[0], end[1] = cosine * mx + sine * my, cosine * my - sine * mx
-        end[2], end[3] = cosine * state[2] + sine * state[3], cosine * state[3] - sine * state[2]
-        end[4], end[5] = state[4] + span * state[5], state[5]
-        end[6:10], end[10:13], end[13] = attitude[last], rate[last], state[13]
-        end[14], end[15] = cosine * state[14] - sine * state[15], sine * state[14] + cosine * state[15]
-
-
-@compiled
-def _magnus(
-    q: FloatArray, a: FloatArray, b: FloatArray, da: FloatArray, db: FloatArray, h: float, new: FloatArray
-) -> None:
-    """Turn q for h s by rates that run from a to b (3,) with slopes da and db there; fourth order."""
-    x = 0.5 * (a[0] + b[0]) + h / 12.0 * (da[0] - db[0])
-    y = 0.5 * (a[1] + b[1]) + h / 12.0 * (da[1] - db[1])
-    z = 0.5 * (a[2] + b[2]) + h / 12.0 * (da[2] - db[2])
-    # body rates: the commutator enters with this sign
-    x += h / 12.0 * (a[1] * b[2] - a[2] * b[1])
-    y += h / 12.0 * (a[2] * b[0] - a[0] * b[2])
-    z += h / 12.0 * (a[0] * b[1] - a[1] * b[0])
-    _turned(q, x, y, z, h, new)
 
 
 #: how the wobble dies (1/s) and turns (rad/s), how that differs along and across the wind, and their slopes in time:

@@ -53,7 +53,7 @@ def step(
     assert fit.count == COUNT
     refitted, bars = [], []
 
-    def told(fit: Fit, hypothesis: Hypothesis, *others: object, bar: float) -> ContinuousFit:
+    def told(fit: Fit, hypothesis: Hypothesis, *others: object, bar: float, held_bar: float = np.inf) -> ContinuousFit:
         refitted.append(hypothesis.candidates[-1].id)
         bars.append((merit_of(fit, fit.linears) - bar) / fit.count)
         return ContinuousFit(hypothesis, fit, 0.0 if hypothesis.candidates[-1] == right else 5e5)
@@ -112,7 +112,9 @@ def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present
     tilt = free_candidate("rig.axis_tilt")
     size = (("rig.axis_tilt", "tilt_north_rad"), None)
 
-    def told(fit: Fit, hypothesis: Hypothesis, own: object, noise: object, start: dict, *, bar: float) -> ContinuousFit:
+    def told(
+        fit: Fit, hypothesis: Hypothesis, own: object, noise: object, start: dict, *, bar: float, held_bar: float = 0.0
+    ) -> ContinuousFit:
         return ContinuousFit(hypothesis, fit, 2e4 if size in start else 0.0)
 
     monkeypatch.setattr(searching, "continuous_fit", told)
