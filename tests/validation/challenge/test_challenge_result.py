@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from discsim.validation.challenge.report.document import masks_text, plain_comma
 from discsim.validation.challenge.report.page import fault_of, goals_met
 from discsim.validation.challenge.run import challenge
 from discsim.validation.challenge.scores.detection import Sized, allowed, detections, fit_curve, has_curve
-from discsim.validation.challenge.scores.result import Scored, rates_of, read_result, times
+from discsim.validation.challenge.scores.result import Scored, both_times, processor_times, rates_of, read_result, times
 from discsim.validation.challenge.scores.scoring import score_case
 from discsim.validation.reporting.run import start_run
 from discsim.validation.studies.catalogue import run_study
@@ -190,6 +191,15 @@ def test_times_are_those_of_all_diagnoses_also_of_one_that_was_given_up():
     assert times(found) == (6.0, 10.0, 11.0)
     assert times([*found, scored(POWER, None, seconds=1800.0)]).longest_s == 1800.0
     assert np.isnan(times([]).median_s)
+
+
+def test_processor_time_is_told_beside_the_clock_where_it_is_known():
+    one = scored(POWER, diagnosis("unexplained"), seconds=20.0)
+    assert both_times([one]) == "20 s (median), nine in ten within 20 s, longest 20 s by the clock"
+    known = [replace(one, cpu_seconds=busy) for busy in (8.0, 10.0, 30.0)]
+    assert processor_times([one, *known]).median_s == 10.0
+    assert both_times(known).endswith("; of processor time 10 s (median), nine in ten within 26 s, longest 30 s")
+    assert [Scored.from_json(item.to_json()).cpu_seconds for item in (one, *known)] == [None, 8.0, 10.0, 30.0]
 
 
 def test_of_two_effects_each_counts_by_its_own_size():
