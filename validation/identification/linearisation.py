@@ -38,7 +38,7 @@ from discsim.validation.identification.propagation import (
 )
 from discsim.validation.identification.readings import group_of
 from discsim.validation.identification.segments import Trajectory, stepped
-from discsim.validation.identification.sensitivities import followed, readings_and_slopes
+from discsim.validation.identification.sensitivities import readings_of_neighbours
 from discsim.validation.identification.sensor_model import CLOCKS, is_motion, predicted, sensed
 
 __all__ = ["linearise", "moved", "reread"]
@@ -300,12 +300,10 @@ class _Read:
             )
             t, motion = s.instants[o], rows[0, mine]
             self.rows[which][o] = motion
-            senses = sensed(s.sensor, around.recording, around.values, around.effects) if half.size else ()
-            ideal, slopes = readings_and_slopes(partial(around.read, s.sensor, around.values, t), senses, motion)
+            senses = sensed(s.sensor, around.recording, around.values, around.effects)
+            read = partial(around.read, s.sensor, around.values, t)
+            ideal, follows = readings_of_neighbours(read, senses, rows, mine, spans, bool(around.central))
             self.ideal[which][o] = ideal + s.held[o]
-            if not half.size:
-                continue
-            follows = followed(slopes, senses, rows, mine, spans, bool(around.central))
             for j, place in enumerate(half - 1 - around.d):
                 if place >= 0 and around.columns[around.motion[place]].key in _ALSO_READ:
                     # it moves the readings of a given motion, too

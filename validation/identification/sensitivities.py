@@ -1,8 +1,8 @@
 """How what a sensor reads follows the motion, and with it the neighbours of a motion.
 
 Takes a way to read a sensor and rows of motion, those of neighbours beside them; gives ideal readings and their slopes.
-A reading is asked once for each of the few numbers of the motion that its sensor senses, and all neighbours follow by
-the chain rule: they are many more.
+Where neighbours are many, as those of a throw, a reading is asked once for each of the few numbers of the motion that
+its sensor senses, and all neighbours follow by the chain rule; where they are few, as those of a rig, each is read.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from discsim.arrays import FloatArray, IntArray
 from discsim.compiled import compiled_nogil
 from discsim.frames import multiply
 
-__all__ = ["MOTION", "followed", "readings_and_slopes"]
+__all__ = ["MOTION", "followed", "readings_and_slopes", "readings_of_neighbours"]
 
 #: the numbers of a row of motion by what they are: three each, of the attitude its small turns in B
 MOTION = ("position", "velocity", "acceleration", "attitude", "rate", "angular_acceleration")
@@ -52,6 +52,27 @@ def readings_and_slopes(
                 row[:, _PLACES[name] + axis] += _STEPS[name]
     shown = read(asked)
     return shown[0], np.moveaxis((shown[1:] - shown[0]) / steps[:, None, None], 0, 2)
+
+
+def readings_of_neighbours(
+    read: Callable[[FloatArray], FloatArray],
+    senses: Sequence[str],
+    rows: FloatArray,
+    place: IntArray,
+    spans: FloatArray,
+    central: bool,
+) -> tuple[FloatArray, FloatArray]:
+    """Return readings (m, w) of a motion and how they follow its n neighbours, (m, w, n) per unit of what tells these.
+
+    ``read`` and ``senses`` are as for `readings_and_slopes`, the others as for `followed`.
+    """
+    if rows.shape[0] > 1 + 3 * len(senses):
+        ideal, slopes = readings_and_slopes(read, senses, rows[0, place])
+        return ideal, followed(slopes, senses, rows, place, spans, central)
+    shown = read(rows[:, place])
+    n = spans.size
+    behind = shown[1 + n :] if central else shown[:1]
+    return shown[0], np.moveaxis((shown[1 : 1 + n] - behind) / spans[:, None, None], 0, 2)
 
 
 def followed(

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from discsim.effects.catalogue import CATALOGUE
-from discsim.validation.identification.sensitivities import MOTION, followed, readings_and_slopes
+from discsim.validation.identification.sensitivities import (
+    MOTION,
+    followed,
+    readings_and_slopes,
+    readings_of_neighbours,
+)
 from discsim.validation.identification.sensor_model import predicted, sensed
 from tests.support.made import throws
 
@@ -82,4 +87,9 @@ def test_readings_follow_neighbours_as_they_are_read(central):
             if central
             else ((shown[1:] - shown[0]) / spans[:, None, None])
         )
-        np.testing.assert_allclose(follows, np.moveaxis(wanted, 0, 2), rtol=1e-3, atol=1e-3 * np.abs(wanted).max())
+        wanted = np.moveaxis(wanted, 0, 2)
+        np.testing.assert_allclose(follows, wanted, rtol=1e-3, atol=1e-3 * np.abs(wanted).max())
+        # neighbours that are fewer than what is sensed are read, each of them
+        told = 2.0 * spans if central else spans
+        read_each = readings_of_neighbours(read, MOTION, rows, place, told, central)
+        np.testing.assert_allclose(read_each[1], wanted, rtol=1e-12, atol=1e-12 * np.abs(wanted).max())
