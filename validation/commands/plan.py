@@ -85,6 +85,6 @@ def command(
             instead=[other.split(",") for other in instead or ()],
             say=run.step,
         )
-        found.report(out, command=f"discsim {' '.join(run.command)}")
+        found.report(out)
     typer.echo(found.summary())
     typer.echo(f"read {out / 'report.html'}")

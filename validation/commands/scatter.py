@@ -70,7 +70,7 @@ def command(
             checkpoints=out / "checkpoints" if workers or scheduler else None,
             progress=run.progress,
         )
-        found.report(out, command=f"discsim {' '.join(run.command)}")
+        found.report(out)
     for note in notes:
         typer.echo(note)
     typer.echo(found.summary())

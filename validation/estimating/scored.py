@@ -13,7 +13,7 @@ from discsim.errors import InputError
 from discsim.estimators.rate import YawRate
 from discsim.files import write_text
 from discsim.validation.reporting.figures import draw_differences, draw_rates, new_figure, save_figure
-from discsim.validation.reporting.html import Section, write_report
+from discsim.validation.reporting.html import Section, Tone, write_report
 from discsim.validation.reporting.run import json_text
 from discsim.validation.reporting.scores import Score, at_most, score
 
@@ -50,6 +50,8 @@ FIGURES: Mapping[str, str] = {
     "within": "share of errors within two stated sds, at least",
 }
 _AT_LEAST = ("known", "within")
+#: exceeded limits that the banner of the page names
+_NAMED = 4
 
 
 @dataclass(frozen=True, repr=False)
@@ -95,26 +97,12 @@ class ScoredRates:
         write_text(out / "score.json", json_text(self.to_json()))
         figure, axes = new_figure(2, 1, height=6.0, sharex=True)
         draw_rates(axes[0], [*self.rates, self.truth])
+        axes[0].set_xlabel("")  # the lower one has it
         draw_differences(axes[1], self.rates, self.truth)
         save_figure(figure, out / "score.png")
-        header = ("rate", "values", "known", "bias", "rms", "95 % below", "worst", "delay, ms", "within 2 sd")
-        rows = [
-            (one.method, str(one.values), f"{100 * one.known:.1f} %", *(f"{v:.4g}" for v in (one.bias, one.rms)),
-             *(f"{v:.4g}" for v in (one.p95, one.worst)), _or_dash(1000 * one.delay), _or_dash(100 * one.within))
-            for one in self.errors
-        ]  # fmt: skip
-        limits = [(item.name, f"{item.value:.4g} {item.unit}", item.goal, "ok" if item.ok else "FAIL")
-                  for item in self.scores]  # fmt: skip
-        lead = (
-            f"{sum(item.ok for item in self.scores)} of {len(self.scores)} limits are kept."
-            if self.scores
-            else "No limit was asked for."
-        )
-        figures = [("Rates, and what they differ from the truth by", out / "score.png")]
-        sections = [Section("Errors in deg/s", (), header, rows, figures)]
-        if limits:
-            sections.insert(0, Section("Limits", (), ("figure", "value", "goal", ""), limits))
-        write_report(out / "report.html", "Rates against the truth", lead, sections)
+        lead, tone = _answer(self)
+        sections = [*_limits(self), _errors_told(self, out / "score.png")]
+        write_report(out / "report.html", "Rates against the truth", lead, sections, tone)
         return out / "report.html"
 
 
@@ -122,8 +110,57 @@ def _line(item: Score) -> str:
     return f"{'ok  ' if item.ok else 'FAIL'} {item.name}: {item.value:.4g} {item.unit}".rstrip() + f" ({item.goal})"
 
 
-def _or_dash(value: float) -> str:
-    return f"{value:.3g}" if np.isfinite(value) else "–"
+def _answer(found: ScoredRates) -> tuple[str, Tone]:
+    """Return the banner of the page and its look: what exceeds its limit, or the rate that errs least."""
+    known = [one for one in found.errors if np.isfinite(one.rms)]
+    if not known:
+        return "No rate is known anywhere.", "bad"
+    best = min(known, key=lambda one: one.rms)
+    errs = f"{best.rms:.3g} deg/s rms, {best.worst:.3g} deg/s at worst, {100 * best.known:.0f} % known."
+    errs = f"{best.method} errs {'by' if len(found.errors) == 1 else 'least:'} {errs}"
+    exceeded = [item.name for item in found.scores if not item.ok]
+    if not found.scores:
+        return f"{errs} No limit was asked for.", "plain"
+    if not exceeded:
+        return f"All limits are kept. {errs}", "good"
+    named = ", ".join(exceeded[:_NAMED]) + (f" and {len(exceeded) - _NAMED} more" if len(exceeded) > _NAMED else "")
+    return f"{len(exceeded)} of {len(found.scores)} limits are exceeded: {named}. {errs}", "bad"
+
+
+def _limits(found: ScoredRates) -> list[Section]:
+    if not found.scores:
+        return []
+    rows = [
+        (item.name, f"{item.value:.4g}" if np.isfinite(item.value) else "–", item.goal, "ok" if item.ok else "FAIL")
+        for item in found.scores
+    ]
+    return [Section("Limits", (), ("figure", "value", "limit", ""), rows)]
+
+
+def _errors_told(found: ScoredRates, figure: Path) -> Section:
+    text = (
+        "An error is the rate less the truth, in deg/s where no unit is named. Known: the share of values that are "
+        "numbers. Delay: how late the rate follows changes of the truth. Within 2 sd: the share of errors within two "
+        "of the rate's own standard deviations; honest ones give about 95 %."
+    )
+    header = ("rate", "values", "known", "bias", "rms", "95 % below", "worst", "delay, ms", "within 2 sd")
+    rows = [
+        (
+            one.method,
+            str(one.values),
+            f"{100 * one.known:.1f} %",
+            *(_or_dash(value, 3) for value in (one.bias, one.rms, one.p95, one.worst)),
+            _or_dash(1000 * one.delay, 1),
+            _or_dash(100 * one.within, 1, " %"),
+        )
+        for one in found.errors
+    ]
+    figures = [("Rates, and what they differ from the truth by", figure)]
+    return Section("Errors", (text,), header, rows, figures)
+
+
+def _or_dash(value: float, decimals: int, unit: str = "") -> str:
+    return f"{round(value, decimals) + 0.0:.{decimals}f}{unit}" if np.isfinite(value) else "–"
 
 
 def score_rates(rates: Sequence[YawRate], truth: YawRate, limits: Mapping[str, float] | None = None) -> ScoredRates:

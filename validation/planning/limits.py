@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple
@@ -46,13 +46,15 @@ class EffectLimit(NamedTuple):
 class Pair(NamedTuple):
     """Two effects of which the second takes a share of the first one's trace, by the parameter that it takes most of.
 
-    They are told apart where the first has ``apart`` times the size that is named; infinite where never.
+    They are told apart where the first has ``apart`` times the size that is named; infinite where never. ``visible`` is
+    the same over the catalogue's small but visible size: below one, they are told apart before anybody cares.
     """
 
     id: str
     rival: str
     taken: float
     apart: float
+    visible: float
 
 
 class Coefficient(NamedTuple):
@@ -137,11 +139,7 @@ def _limit(one: _Asked, others: Sequence[_Asked], H: FloatArray) -> tuple[Effect
         taken_by[id] = np.maximum(taken_by.get(id, np.zeros(power.size)), taken)
     with np.errstate(divide="ignore", invalid="ignore"):
         seen, named = (np.where(power > 0.0, np.sqrt(x / power), np.inf) for x in (np.full(power.size, least), need))
-    pairs = []
-    for id, distance in apart.items():
-        worst = float(np.max(np.sqrt(distance / need))) if np.all(np.isfinite(need)) else np.inf
-        if worst > 1.0:
-            pairs.append(Pair(one.candidate.id, id, float(np.max(taken_by[id])), worst))
+    pairs = _pairs(one.candidate, power, need, apart, taken_by)
     rival = max(taken_by, key=lambda id: float(np.max(taken_by[id])), default="")
     names = tuple(column.name for column in one.candidate.columns)
     limit = EffectLimit(
@@ -156,6 +154,34 @@ def _limit(one: _Asked, others: Sequence[_Asked], H: FloatArray) -> tuple[Effect
         tuple(need.tolist()),
     )
     return limit, pairs
+
+
+def _pairs(
+    candidate: CandidateEffect,
+    power: FloatArray,
+    need: FloatArray,
+    apart: Mapping[str, FloatArray],
+    taken: Mapping[str, FloatArray],
+) -> list[Pair]:
+    """Return the rivals that an effect is not told from at the size that is named.
+
+    All are by its parameters: what is known of each, what naming it needs, and what telling it from each rival needs. A
+    parameter that nothing shows has no rival. One that no size names, for a simpler rival takes all of its trace, has
+    only those that take all of it.
+    """
+    scales = np.array([candidate.row.fitted_scale[column.name] for column in candidate.columns])
+    shown = power > 0.0
+    pairs = []
+    for id, distance in apart.items():
+        with np.errstate(divide="ignore", invalid="ignore"):
+            times = np.where(np.isinf(distance), np.inf, np.sqrt(distance / need))
+            visible = np.sqrt(distance / power) / scales
+        later = shown & (times > 1.0)
+        if np.any(later):
+            worst = int(np.argmax(np.where(later, times, 0.0)))
+            sizes = (float(taken[id][worst]), float(times[worst]), float(np.max(visible[later])))
+            pairs.append(Pair(candidate.id, id, *sizes))
+    return pairs
 
 
 def coefficients_of(information: Information) -> list[Coefficient]:

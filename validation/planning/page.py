@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,15 +14,16 @@ from discsim.validation.reporting.html import Section, write_report
 
 __all__ = ["write_plan_page"]
 
-#: pairs that are listed
-_PAIRS = 40
+#: a stand-in that takes less of the trace than this stands behind nearer ones: the effect is told from it about where
+#: it is named
+_SHARE = 0.5
 
 
-def write_plan_page(found: Planned, out: Path, command: str = "") -> Path:
+def write_plan_page(found: Planned, out: Path) -> Path:
     """Write report.html and its figure into ``out``; return the path of the page."""
     draw_limits(found.limits, out / "plan.png")
     sections = [_effects(found, out), _pairs(found), _coefficients(found), _next(found), _hardware(found)]
-    sections.append(_made(found, command))
+    sections.append(_made(found))
     write_report(out / "report.html", "Before going out", f"{found.headline}.", sections)
     return out / "report.html"
 
@@ -36,9 +38,13 @@ def _factor(value: float) -> str:
 
 def _effects(found: Planned, out: Path) -> Section:
     rows = []
+    unseen: dict[str, list[str]] = {}
     for one in found.limits.effects:
         row = CATALOGUE[one.id]
         for name, seen, named in zip(one.parameters, one.seen, one.named, strict=True):
+            if not np.isfinite(seen):
+                unseen.setdefault(one.id, []).append(name)
+                continue
             scale = row.fitted_scale[name]
             rows.append(
                 (one.id, name, _number(seen), _number(named), f"{scale:g}", one.rival, f"{100 * one.taken:.1f} %")
@@ -57,23 +63,49 @@ def _effects(found: Planned, out: Path) -> Section:
         text.append(f"Asked about: {said}. What comes at an instant comes in the first recording.")
     if found.information.questions.silent:
         text.append(f"Not foretold, for no linear question shows it: {', '.join(found.information.questions.silent)}.")
+    if unseen:
+        text.append(_unseen(found, unseen))
     header = ("effect", "parameter", "seen", "named", "small but visible", "nearest", "share")
     return Section("What can be seen and named", text, header, rows, [("Sizes of effects", out / "plan.png")])
 
 
+def _unseen(found: Planned, unseen: Mapping[str, Sequence[str]]) -> str:
+    """Say which parameters no size shows, and which axes have no reading that could."""
+    names = "; ".join(f"{id} {', '.join(parameters)}" for id, parameters in unseen.items())
+    blind = [name for name, share in _shares_clipped(found).items() if share == 1.0]
+    why = f" Readings that stand at the range throughout show nothing: {', '.join(blind)}." if blind else ""
+    return f"No size of these is seen, so they have no row: {names}.{why}"
+
+
 def _pairs(found: Planned) -> Section:
-    shown = found.limits.pairs[:_PAIRS]
-    rows = [
-        (pair.id, pair.rival, f"{100 * pair.taken:.2f} %", "never" if np.isinf(pair.apart) else f"{pair.apart:.1f}")
-        for pair in shown
-    ]
-    more = len(found.limits.pairs) - len(shown)
+    """Return the pairs that matter by effect, and the number of those that come apart before anybody would see them."""
+    matters = [pair for pair in found.limits.pairs if pair.visible >= 1.0 and pair.taken >= _SHARE]
+    rows = []
+    for id in dict.fromkeys(pair.id for pair in matters):
+        mine = [pair for pair in matters if pair.id == id]
+        never = ", ".join(pair.rival for pair in mine if np.isinf(pair.apart))
+        later = ", ".join(f"{pair.rival} ({pair.visible:.1f})" for pair in mine if np.isfinite(pair.apart))
+        rows.append((id, never, later))
     text = [
-        "The second effect can stand in for the first until that is so many times larger than the size that is named; "
-        "a diagnosis then lists it under what it may be confused with."
+        "A stand-in does to these readings almost what the effect does: a diagnosis lists it under what the effect may "
+        "be confused with. Never: whatever the size. Later: up to so many times the small but visible size.",
     ]
-    text += [f"{more} more pairs are in plan.json."] if more > 0 else []
-    return Section("What could not be told apart", text, ("effect", "stand-in", "share", "times the size"), rows)
+    folded = len(found.limits.pairs) - len(matters)
+    if folded:
+        text.append(
+            f"{folded} further pairs are in plan.json alone: they come apart below the small but visible size, or the "
+            "stand-in takes less than half of the trace."
+        )
+    helpful = max((one for one in found.next_throws if one.pairs > 1.0), key=lambda one: one.pairs, default=None)
+    if rows and helpful is not None:
+        text.append(
+            f"Of the next recordings below this one helps most, and divides such sizes by {helpful.pairs:.2f}: "
+            f"{helpful.text}."
+        )
+    if not rows:
+        return Section("What could not be told apart", [*text[1:], "No pair of effects that could be seen."])
+    header = ("effect", "never told from", "later, up to so many times a visible size")
+    return Section("What could not be told apart", text, header, rows)
 
 
 def _coefficients(found: Planned) -> Section:
@@ -117,21 +149,25 @@ def _hardware(found: Planned) -> Section:
 
 def _clipped(found: Planned) -> list[str]:
     """Return which axes would stand at their range: a wider one would show what they hide."""
-    shares: dict[str, float] = {}
-    for one in found.information.trajectories:
-        for readings in one.readings:
-            for axis, name in enumerate(readings.axes):
-                share = float(np.mean(readings.clipped[:, axis]))
-                shares[f"{name} of the {readings.sensor}"] = max(
-                    shares.get(f"{name} of the {readings.sensor}", 0), share
-                )
-    beyond = [f"{name} ({100 * share:.0f} %)" for name, share in shares.items() if share > 0.0]
+    beyond = [f"{name} ({100 * share:.0f} %)" for name, share in _shares_clipped(found).items() if share > 0.0]
     if not beyond:
         return ["No axis reaches its range: a wider one would buy nothing."]
     return [f"At its range, where a wider one would help: {', '.join(beyond)}."]
 
 
-def _made(found: Planned, command: str) -> Section:
+def _shares_clipped(found: Planned) -> dict[str, float]:
+    """Return for each axis the largest share of a recording's readings that would stand at the range."""
+    shares: dict[str, float] = {}
+    for one in found.information.trajectories:
+        for readings in one.readings:
+            for axis, name in enumerate(readings.axes):
+                called = f"{name.split('_')[0]} of the {readings.sensor}"
+                share = float(np.mean(readings.clipped[:, axis]))
+                shares[called] = max(shares.get(called, 0.0), share)
+    return shares
+
+
+def _made(found: Planned) -> Section:
     rows = [(str(number), item.text) for number, item in enumerate(found.plans, start=1)]
     text = [f"Each is made {found.times} times."] if found.times > 1 else []
     text += [
@@ -140,5 +176,4 @@ def _made(found: Planned, command: str) -> Section:
         + (f", range {sheet.range:g}" if sheet.range is not None else "")
         for name, sheet in found.bench.sheets.items()
     ]
-    text += [f"Command: {command}"] if command else []
     return Section("The plan", text, ("", "recording"), rows)

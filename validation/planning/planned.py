@@ -125,13 +125,13 @@ class Planned:
             "hardware": [one._asdict() for one in self.bought],
         }  # fmt: skip
 
-    def report(self, folder: Path | str, command: str = "") -> Path:
+    def report(self, folder: Path | str) -> Path:
         """Write plan.json, plan.png and report.html into ``folder``; return the path of the page."""
         from discsim.validation.planning.page import write_plan_page
 
         out = Path(folder)
         write_text(out / "plan.json", json_text(self.to_json()))
-        return write_plan_page(self, out, command)
+        return write_plan_page(self, out)
 
 
 def throws_about(throw: Release, count: int) -> list[Plan]:

@@ -54,12 +54,23 @@ def write_page(path: Path, template: str, **content: Any) -> None:
     environment = Environment(
         loader=PackageLoader("discsim.validation"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    environment.tests["number_cell"] = lambda cell: bool(_NUMBER.match(str(cell)))
+    environment.tests["number_cell"] = _is_number
+    environment.tests["number_column"] = _is_number_column
     loader = environment.loader
     assert loader is not None
     script = Markup(loader.get_source(environment, "page.js")[0].rstrip())
     page = environment.get_template(template).render(footer=made_by(), script=script, **{"tone": "plain", **content})
     write_text(path, with_terms(page))
+
+
+def _is_number(cell: object) -> bool:
+    return bool(_NUMBER.match(str(cell)))
+
+
+def _is_number_column(rows: Sequence[Sequence[str]], column: int) -> bool:
+    """Return whether a column's cells stand at the right, so that its head does, too; blank ones do not count."""
+    cells = [row[column] for row in rows if column < len(row) and str(row[column])]
+    return bool(cells) and all(map(_is_number, cells))
 
 
 def made_by() -> str:

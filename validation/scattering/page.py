@@ -11,7 +11,7 @@ from discsim.validation.scattering.scattered import PERCENTILES, Scattered
 __all__ = ["write_scatter_page"]
 
 
-def write_scatter_page(found: Scattered, out: Path, command: str = "") -> Path:
+def write_scatter_page(found: Scattered, out: Path) -> Path:
     """Write report.html and its figures into ``out``; return the path of the page."""
     draw_landings(found, out / "scatter.png")
     draw_shares(found, out / "sensitivities.png")
@@ -19,7 +19,7 @@ def write_scatter_page(found: Scattered, out: Path, command: str = "") -> Path:
         out / "report.html",
         "Where it lands",
         f"{found.headline}.",
-        [_landings(found, out), _sensitivities(found, out), _inputs(found, command)],
+        [_landings(found, out), _sensitivities(found, out), _inputs(found)],
     )
     return out / "report.html"
 
@@ -37,7 +37,8 @@ def _landings(found: Scattered, out: Path) -> Section:
     ]
     widest = max((high - low) / 2 for item in found.percentiles[:3] for low, high in item.intervals)
     text = [
-        "An ellipse has the shape of the landings' covariance and the size that holds its share of them.",
+        "Columns of per cent are percentiles: 5 % of the landings stay below the first. An ellipse has the shape of "
+        "the landings' covariance and the size that holds its share of them.",
         f"With these {found.landed} landings a percentile of a distance is known to {widest:.2f} m or better "
         "(95 %, by order statistics).",
         *(f"Note: {note}." for note in found.notes),
@@ -52,7 +53,8 @@ def _sensitivities(found: Scattered, out: Path) -> Section:
         "and with others. Inputs that a fit gives together vary together, and count as one.",
         "The slope is how far the result moves per unit of the input, about the middle of the scatter.",
         *(
-            f"{shares.result}: {100 * shares.unexplained:.0f} % of the variance is none of these terms."
+            f"{shares.result.capitalize()}: {100 * shares.unexplained:.0f} % of the variance is of higher order, and "
+            "in no row below."
             for shares in found.shares
             if shares.unexplained >= 0.05
         ),
@@ -78,8 +80,7 @@ def _sensitivities(found: Scattered, out: Path) -> Section:
     return Section("What scatters them", text, header, rows, [("Shares of the variance", out / "sensitivities.png")])
 
 
-def _inputs(found: Scattered, command: str) -> Section:
+def _inputs(found: Scattered) -> Section:
     rows = [(item.name, f"{item.mean:.5g}", f"{item.sd:.3g}", item.unit, item.source) for item in found.inputs.items]
     text = [f"Seed {found.seed}; {len(found.flown.ends)} flights by the standalone model of 12 states."]
-    text += [f"Command: {command}"] if command else []
     return Section("What was uncertain", text, ("input", "mean", "sd", "unit", "from"), rows)

@@ -178,7 +178,7 @@ class Scattered:
         columns = dict(zip(self.inputs.names, self.flown.inputs.T, strict=True))
         return xr.Dataset({name: ("flight", column) for name, column in {**ends, **columns}.items()})
 
-    def report(self, folder: Path | str, command: str = "") -> Path:
+    def report(self, folder: Path | str) -> Path:
         """Write scatter.json, landings.csv, scatter.png and report.html; return the path of the page."""
         from discsim.validation.scattering.page import write_scatter_page
 
@@ -187,7 +187,7 @@ class Scattered:
         table = np.column_stack([self.flown.ends, self.flown.inputs])
         names = [_column(item.name, item.unit) for item in self.inputs.items]
         write_csv(out / "landings.csv", ",".join([*_ENDS, *names]), table)
-        return write_scatter_page(self, out, command)
+        return write_scatter_page(self, out)
 
 
 _ENDS = ("north_m", "east_m", "time_s", "speed_m_s")

@@ -1,10 +1,13 @@
 "use strict";
 // Tables are put in order by a click on their head; figures tell their values and are enlarged by a click.
 (() => {
+  // "1,200", "0.4 deg/s", "<= 1.5 m" and "24.0 to 8.0" are put in order by their first number
   const number = cell => {
-    const text = cell.textContent.trim().replace(/[,%\s]/g, "").replace("\u2212", "-");
-    return text !== "" && isFinite(text) ? Number(text) : null;
+    const text = cell.textContent.trim().replace(/\u2212/g, "-").replace(/^[<>=\u2264\u2265\u00b1~\s]+/, "");
+    const found = text.match(/^[-+]?\d[\d,]*(\.\d+)?(e[-+]?\d+)?/);
+    return found ? Number(found[0].replace(/,/g, "")) : null;
   };
+  const blank = cell => ["", "\u2013"].includes(cell.textContent.trim());
   for (const table of document.querySelectorAll("table")) {
     const head = table.rows[0];
     if (!head || table.rows.length < 3) continue;
@@ -18,10 +21,11 @@
         cell.dataset.order = down ? "down" : "up";
         const rows = [...table.rows].slice(1);
         rows.sort((a, b) => {
-          const x = number(a.cells[column]), y = number(b.cells[column]);
-          const order = x !== null && y !== null ? x - y
-            : x !== null ? -1 : y !== null ? 1
-            : a.cells[column].textContent.localeCompare(b.cells[column].textContent);
+          const one = a.cells[column], other = b.cells[column];
+          if (blank(one) || blank(other)) return blank(one) - blank(other); // at the end, whichever way
+          const x = number(one), y = number(other);
+          const order = (x !== null && y !== null ? x - y : x !== null ? -1 : y !== null ? 1 : 0)
+            || one.textContent.localeCompare(other.textContent, undefined, { numeric: true });
           return down ? -order : order;
         });
         for (const row of rows) row.parentNode.appendChild(row);

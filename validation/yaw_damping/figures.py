@@ -25,28 +25,39 @@ def draw_fit(throws: Sequence[Throw], fit: Fit, paper: PaperTable, path: Path | 
 
     Where a path is given the figure is written there.
     """
-    figure, axes = new_figure(1, 3, width=13.0, height=4.4)
+    figure, panels = new_figure(2, 2, width=9.0, height=7.0)
+    figure.delaxes(panels[1, 1])
+    panels[1, 0].set_subplotspec(panels[1, 0].get_gridspec()[1, :])
+    rates, left, path_left = panels[0, 0], panels[0, 1], panels[1, 0]
     for number, (throw, fitted, line) in enumerate(zip(throws, fit.throws, paper.slopes, strict=True)):
-        shade, first = _SHADES[number % len(_SHADES)], number == 0
+        shade = _SHADES[number % len(_SHADES)]
         t, r = throw.spin_t, np.degrees(np.abs(throw.spin))
-        axes[0].plot(t, r, ".", color=shade, ms=2.5, alpha=0.5, label="estimated" if first else None)
-        model = r - np.degrees(np.sign(throw.spin) * fitted.spin_residual)
-        axes[0].plot(t, model, color=shade, lw=1.2, label="model flight" if first else None)
-        ends = np.degrees(line.at(line.t))
-        axes[0].plot(line.t, ends, color=shade, lw=0.9, ls="--", label="straight line (paper)" if first else None)
-        axes[1].plot(t, r - np.degrees(line.at(t)), color=shade, lw=0.8, ls="--")
-        axes[1].plot(t, np.degrees(np.sign(throw.spin) * fitted.spin_residual), color=shade, lw=1.0)
+        residual = np.degrees(np.sign(throw.spin) * fitted.spin_residual)
+        rates.plot(t, r, ".", color=shade, ms=2.5, alpha=0.5)
+        rates.plot(t, r - residual, color=shade, lw=1.2)
+        rates.plot(line.t, np.degrees(line.at(line.t)), color=shade, lw=0.9, ls="--")
+        left.plot(t, r - np.degrees(line.at(t)), color=shade, lw=0.8, ls="--")
+        left.plot(t, residual, color=shade, lw=1.0)
         speed_residual = np.linalg.norm(fitted.path_residual[:, 3:], axis=1)
-        axes[2].plot(throw.path_t, speed_residual, color=shade, lw=0.7, alpha=0.8, label=throw.recording.name)
-    axes[0].set(title="Magnitude of the spin rate", xlabel="time (s)", ylabel="rate (deg/s)")
-    axes[0].legend(fontsize=7)
-    axes[1].set(title="Estimate less model (solid), less line (dashed)", xlabel="time (s)", ylabel="difference (deg/s)")
-    axes[1].axhline(0, color=COLOURS["truth"], lw=0.6)
-    axes[2].set(title="GPS velocity less the model's, size", xlabel="time (s)", ylabel="difference (m/s)")
-    axes[2].set_ylim(bottom=0)
+        path_left.plot(throw.path_t, speed_residual, color=shade, lw=0.7, alpha=0.8, label=throw.recording.name)
+    _explain(rates)
+    rates.set(title="Magnitude of the spin rate", xlabel="time (s)", ylabel="rate (deg/s)")
+    left.set(title="Estimate less model (solid), less line (dashed)", xlabel="time (s)", ylabel="difference (deg/s)")
+    left.axhline(0, color=COLOURS["truth"], lw=0.6)
+    path_left.set(title="GPS velocity less the model's, size", xlabel="time (s)", ylabel="difference (m/s)")
+    path_left.set_ylim(bottom=0)
     if any(throw.path_t.size for throw in throws):
-        axes[2].legend(fontsize=6, ncols=2)
+        path_left.legend(fontsize=8, ncols=min(len(throws), 6), loc="upper right")
     return save_figure(figure, path)
+
+
+def _explain(axes: Axes) -> None:
+    """Say what dots and lines are, in no throw's colour: throws lie upon one another."""
+    grey = "#555555"
+    axes.plot([], [], "o", color=grey, ms=4, label="estimated")
+    axes.plot([], [], color=grey, label="model flight")
+    axes.plot([], [], color=grey, ls="--", label="straight line (paper)")
+    axes.legend(fontsize=8)
 
 
 def draw_surface(paper: PaperTable, fit: Fit | None, path: Path) -> None:
@@ -77,8 +88,8 @@ def draw_surface_on(axes: Axes, paper: PaperTable, fit: Fit | None) -> None:
 
 def draw_sources(found: Sequence[Compared], path: Path) -> None:
     """Draw C_Nr by each source, with two standard deviations, and beside it what (26) gives from the same spin."""
-    figure, axes = new_figure(width=8.0, height=3.6)
     known = [item for item in found if item.fit is not None]
+    figure, axes = new_figure(width=8.0, height=1.6 + 0.4 * len(known))
     for number, item in enumerate(known):
         assert item.fit is not None
         value, sd = 1000 * item.fit.CNr, 1000 * item.fit.sd

@@ -118,7 +118,7 @@ class FittedYawDamping(Result):
         draw_fit(self.throws, self.fit, self.paper, out / "fit.png")
         draw_surface(self.paper, self.fit, out / "surface.png")
         draw_sources(self.sources, out / "sources.png")
-        write_fit_page(out, self.fit, self.sources, self.notes)
+        write_fit_page(out, self.fit, self.paper, self.sources, self.notes)
         return out / "cnr.json"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from scipy.stats import ncx2
 
 from discsim.disc import Release
+from discsim.effects.catalogue import CATALOGUE
 from discsim.errors import InputError
 from discsim.shipped import load_disc, load_throw
 from discsim.trajectory import release_state
@@ -20,10 +22,10 @@ from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.cli import main
 from discsim.validation.diagnosis.design.plans import read_plans
 from discsim.validation.identification.plants.plan import Plan
-from discsim.validation.planning.advice import bought, next_throws
+from discsim.validation.planning.advice import NextThrow, bought, next_throws
 from discsim.validation.planning.information import Information, information_of, questions_of
 from discsim.validation.planning.limits import coefficients_of, limits_of, needed
-from discsim.validation.planning.planned import throws_about
+from discsim.validation.planning.planned import Planned, throws_about
 from discsim.validation.planning.recordings import Bench, planned_trajectory
 
 DISC, FIELD = load_disc("driver")
@@ -96,6 +98,44 @@ def test_a_lag_and_an_offset_of_time_are_never_told_apart(flights):
     pairs = {(pair.id, pair.rival): pair for pair in limits_of(flights).pairs}
     assert pairs["mag.lag", "mag.time_offset"].apart == np.inf
     assert ("air.wind", "mag.hard_iron") not in pairs
+
+
+def test_only_what_takes_all_of_a_trace_is_never_told_from_it(flights):
+    """A parameter that a simpler effect takes whole, as a turn of the axis of spin, says nothing of other rivals."""
+    found = limits_of(flights)
+    never = [pair for pair in found.pairs if np.isinf(pair.apart)]
+    assert ("gyro.cross_axis", "gyro.mount") in {(pair.id, pair.rival) for pair in never}
+    assert min(pair.taken for pair in never) > 0.999
+    assert not [pair for pair in found.pairs if pair.id == "gyro.cross_axis" and np.isfinite(pair.apart)]
+
+
+def test_a_pair_comes_apart_at_so_many_times_the_size_that_is_named(flights):
+    found = limits_of(flights)
+    sizes = {one.id: one for one in found.effects if len(one.parameters) == 1}
+    some = [pair for pair in found.pairs if pair.id in sizes and np.isfinite(pair.apart)]
+    assert len(some) > 10
+    for pair in some:
+        one = sizes[pair.id]
+        scale = CATALOGUE[one.id].fitted_scale[one.parameters[0]]
+        assert pair.visible == pytest.approx(pair.apart * one.named[0] / scale, rel=1e-9)
+
+
+def test_the_page_lists_pairs_by_effect_and_only_such_as_somebody_could_see(flights, tmp_path):
+    limits = limits_of(flights)
+    bench = Bench.like(flights.trajectories[0].recording)
+    plans = tuple(throws_about(load_throw("driver"), 2))
+    helpful = NextThrow("a slow throw", 1.1, 1.1, 1.1, 1.6)
+    made = Planned(plans, 1, bench, flights, limits, tuple(coefficients_of(flights)), (helpful,), ())
+    page = made.report(tmp_path).read_text()
+    section = re.sub("<[^>]+>", " ", page[page.index("What could not be told apart") :].split("</section>")[0])
+    listed = re.findall(r"^ *(\w+\.\w+) ", section, re.M)
+    assert len(set(listed)) == len(listed) < 25 < len(limits.pairs)
+    assert "body.mass_imbalance" not in listed  # told apart at half of a visible size
+    assert re.search(r"mag.lag\s+mag.time_offset\s+mag.mount \(", section)
+    assert re.search(r"\d+ further pairs are in plan.json", section)
+    assert "divides such sizes by 1.60: a slow throw." in section
+    assert "gyro.scale sz" in page  # nothing shows it, for the axis clips
+    assert "at the range throughout show nothing: z of the gyroscope." in page
 
 
 @pytest.mark.parametrize("id", ["air.wind", "aero.yaw_reynolds"])

@@ -12,8 +12,10 @@ from support.browser import browse, needs_browser
 import discsim
 from discsim.estimators.rate import YawRate
 from discsim.validation.estimating.page import write_estimate_page
+from discsim.validation.estimating.scored import score_rates
 from discsim.validation.estimating.spin_estimates import draw_estimates
 from discsim.validation.reporting.figures import new_figure, save_figure
+from discsim.validation.reporting.html import Section, write_report
 from discsim.validation.reporting.scores import at_most, score
 from discsim.validation.scenarios.rate_table import Plateau
 from discsim.validation.scenarios.table_page import write_table_page
@@ -103,6 +105,52 @@ def test_a_sweep_names_the_estimator_that_errs_least_and_lists_cases(tmp_path):
     page = (tmp_path / "report.html").read_text()
     assert "100 more are in cases.csv." in page
     assert ">16.1 mm, mpu9250<" in page
+
+
+@pytest.mark.parametrize(
+    ("limits", "said"),
+    [
+        ({}, "plain: late errs least: 1 deg/s rms, 1 deg/s at worst, 100 % known. No limit was asked for."),
+        ({"rms": 30.0}, "good: All limits are kept. late errs least: 1 deg/s rms"),
+        ({"rms": 2.0, "known": 0.9}, "bad: 1 of 4 limits are exceeded: early: rms. late errs least: 1 deg/s rms"),
+    ],
+)
+def test_a_score_says_first_which_limits_are_exceeded(tmp_path, limits, said):
+    rates = [rate("early", 3580.0, 0.25), rate("late", 3601.0, 0.25)]
+    score_rates(rates, rate("truth", 3600.0, 0.0), limits).report(tmp_path)
+    assert lead_of(tmp_path / "report.html").startswith(said)
+
+
+def test_a_score_of_a_rate_that_is_known_nowhere_is_no_good_one(tmp_path):
+    score_rates([rate("fft", NAN, NAN)], rate("truth", 3600.0, 0.0)).report(tmp_path)
+    assert lead_of(tmp_path / "report.html") == "bad: No rate is known anywhere."
+
+
+def test_the_head_of_a_column_of_numbers_stands_where_they_do(tmp_path):
+    rows = [("a", "2", "0.1 m", ""), ("b", "–", "3", "7 %")]
+    write_report(tmp_path / "report.html", "A page", "All.", [Section("", (), ("name", "n", "size", "share"), rows)])
+    heads = re.findall(r"<th( class=\"number\")?>(\w+)</th>", (tmp_path / "report.html").read_text())
+    assert [name for right, name in heads if right] == ["n", "share"]
+
+
+@needs_browser
+def test_a_click_on_a_head_puts_values_with_units_in_order_and_blanks_last(tmp_path):
+    page = tmp_path / "report.html"
+    rows = [(text,) for text in ("31.27 deg/s", "–", "4.7 to 9.1", "<= 1.5 m", "1,200", "throw 10", "throw 9")]
+    write_report(page, "A page", "All.", [Section("Numbers", (), ("value",), rows)])
+    probe = """
+<script>
+const values = () => [...document.querySelectorAll("td")].map(cell => cell.textContent).join("|");
+document.querySelector("th").click();
+document.body.dataset.up = values();
+document.querySelector("th").click();
+document.body.dataset.down = values();
+</script></body>"""
+    page.write_text(page.read_text().replace("</body>", probe))
+    done = browse(page, "--dump-dom")
+    up = ["&lt;= 1.5 m", "4.7 to 9.1", "31.27 deg/s", "1,200", "throw 9", "throw 10"]
+    assert f'data-up="{"|".join([*up, "–"])}"' in done.stdout
+    assert f'data-down="{"|".join([*reversed(up), "–"])}"' in done.stdout
 
 
 @needs_browser

@@ -159,7 +159,9 @@ def test_the_command_writes_every_flight_the_ellipses_and_a_page(tmp_path, monke
     rows = list(csv.DictReader((out / "landings.csv").read_text().splitlines()))
     assert len(rows) == 150
     assert {"north_m", "east_m", "speed_m_s", "hyzer_deg"} <= set(rows[0])
-    assert "Where it lands" in (out / "report.html").read_text()
+    page = (out / "report.html").read_text()
+    assert "Where it lands" in page
+    assert page.count("--flights 150") == 1  # the command stands in the footer alone
 
 
 def test_a_file_that_is_no_fit_is_refused_by_name(tmp_path):

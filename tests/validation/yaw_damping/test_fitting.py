@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -287,6 +288,8 @@ class TestCommand:
         page = (tmp_path / "out" / "report.html").read_text()
         assert f"{answer['CNr']['value']:.6f} ± {answer['CNr']['sd']:.6f}" in page
         assert ">throw-1<" in page
+        assert "left out because" not in page  # no source was
+        assert re.search(r"These flights are inside the table for \d\d? % of their time", page)
         assert read_recording(tmp_path / "set" / "throw-0").disc.aero.CNr == DISC.aero.CNr
 
     def test_an_unknown_method_is_refused_by_name(self, tmp_path):
