@@ -18,7 +18,13 @@ import numpy as np
 from discsim.arrays import ComplexArray, FloatArray, IntArray
 from discsim.compiled import compiled
 from discsim.recording import Recording
-from discsim.validation.diagnosis.consistency.phase_regression import rate_of, retimed, signal_of, slow_columns
+from discsim.validation.diagnosis.consistency.phase_regression import (
+    circle_centre,
+    rate_of,
+    retimed,
+    signal_of,
+    slow_columns,
+)
 from discsim.validation.diagnosis.consistency.time_stamp_recovery import Rows
 
 __all__ = ["OwnClock", "SamplesShown", "own_clock_of"]
@@ -352,19 +358,6 @@ def _field_of(recording: Recording) -> _Field | None:
     return _Field(signal.value, np.interp(signal.t, known[1], known[2]), wobble)
 
 
-def _centre(value: ComplexArray) -> complex:
-    """Return the centre of the circle (n,) that a field runs, robustly, by its algebraic equation."""
-    x, y = value.real, value.imag
-    A, b = np.column_stack([2.0 * x, 2.0 * y, np.ones(x.size)]), x * x + y * y
-    weight = np.ones(x.size)
-    solution: FloatArray = np.zeros(3)
-    for _ in range(_REWEIGHTED):
-        solution = np.asarray(np.linalg.lstsq(A * weight[:, None], b * weight, rcond=None)[0])
-        left = np.abs(b - A @ solution)
-        weight = 1.0 / np.sqrt(1.0 + (left / (1.5 * max(float(np.median(left)), 1e-12))) ** 2)
-    return complex(solution[0], solution[1])
-
-
 def own_clock_of(recordings: Sequence[Recording], names: Sequence[str], rows: Rows) -> OwnClock | None:
     """Return the magnetometer's own clock, None where rows that are counted in whole ticks do as well.
 
@@ -390,7 +383,7 @@ def own_clock_of(recordings: Sequence[Recording], names: Sequence[str], rows: Ro
         others = [period for other, period in periods.items() if other != name] or [periods[name]]
         found = _followed(field, means[name].newest, means[name].apart, float(np.mean(others)), means=True)
         turned = found.period * float(np.median(np.abs(field.rate)))
-        if turned < _PHASE_STEP * found.scale / float(np.median(np.abs(field.value - _centre(field.value)))):
+        if turned < _PHASE_STEP * found.scale / float(np.median(np.abs(field.value - circle_centre(field.value)))):
             return None
         left = (_rms(single[name].left), _rms(found.left))
         shown.append(SamplesShown(name, float(np.mean(others)), found.newest, found.apart, left))
@@ -401,7 +394,7 @@ def own_clock_of(recordings: Sequence[Recording], names: Sequence[str], rows: Ro
 
 def _counted(field: _Field, period: float, *, means: bool) -> _Found:
     """Return the samples that rows show at a period, which is made better where it is only nearly right."""
-    centre = _centre(field.value)
+    centre = circle_centre(field.value)
     found = _followed(field, *_first_samples(field, centre, period, means=means), period, means=means)
     for _ in range(_REFINED):
         if abs(found.period / period - 1.0) > _NEARLY:

@@ -75,7 +75,10 @@ class RowTimes:
         """Return what was counted as effects of an answer; figures of each recording are by the period of others."""
         rows, clock = self._gains
         lost = np.array([shown.lost for shown in self.clock.shown])
-        error = float(np.std(lost, ddof=1) / np.sqrt(lost.size)) if lost.size > 1 else None
+        steps = sum((shown.newest.size - 1) / (1.0 - shown.lost) for shown in self.clock.shown)
+        share = float(np.mean(lost))
+        # steps lose their rows by chance: a few recordings may agree better than so many steps can
+        error = max(float(np.std(lost) / np.sqrt(max(lost.size - 1, 1))), float(np.sqrt(share * (1.0 - share) / steps)))
         held = len(self.clock.shown) > 1
 
         imu = self.imu if self.imu is not None and not self.imu.loops else None
@@ -87,7 +90,7 @@ class RowTimes:
             return NamedEffect(row.id, {row.parameters[0]: ParameterValue(value, sd)}, evidence, None, ())
 
         return (
-            named(LostRows, "clock", float(np.mean(lost)), error, rows),
+            named(LostRows, "clock", share, error, rows),
             named(OwnClock, "magnetometer", self.clock.period_s, self.clock.sd_s, clock),
             named(Average, "magnetometer", 0.5, None, clock),
             *(() if imu is None else (named(ImuClock, "board", imu.period_s, imu.sd_s, imu.gain),)),
