@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from discsim.disc import Release
 from discsim.effects.catalogue import CATALOGUE
+from discsim.engine import fly
 from discsim.errors import InputError
 from discsim.motion import Motion
 from discsim.recording import Recording
 from discsim.sensors import Noise
 from discsim.validation.challenge.blind import Request
 from discsim.validation.challenge.cases.case import Case
-from discsim.validation.challenge.cases.conceal import Answer, _motion, read_answer, recordings
+from discsim.validation.challenge.cases.conceal import Answer, read_answer, recordings
 from discsim.validation.challenge.cases.detection_limit import sizes
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.challenge.report.page import fault_of
@@ -60,7 +62,10 @@ def made(seed: int, *kept: str) -> tuple[Recording, Motion]:
     """Return that run as it is recorded, and its motion."""
     case = quiet(seed, *kept)
     (recording,) = recordings(case)
-    return recording, _motion(case, case.runs[0], [], 0)
+    (run,) = case.runs
+    assert case.disc is not None
+    assert isinstance(run, Release)
+    return recording, fly(case.disc, case.environment, run, duration=case.longest)
 
 
 def phase_times(recording: Recording, sensor: str, motion: Motion) -> np.ndarray:
