@@ -24,6 +24,7 @@ from discsim.sensors import Instruments, record
 from discsim.toml_table import read_toml
 from discsim.toml_text import toml_lines
 from discsim.validation.challenge.cases.case import Case, Coast, Kind, Run, Turning
+from discsim.validation.challenge.cases.like_real import cut_in_flight
 from discsim.validation.challenge.cases.off_catalogue import HiddenDisc, coast, haunted
 from discsim.validation.challenge.cases.setups import equivalents
 
@@ -168,6 +169,8 @@ def recordings(case: Case) -> list[Recording]:
             rig=case.stated_rig,
             command=run.profile if isinstance(run, Turning) else None,
         )
+        if case.kind == "like_real":
+            taken = cut_in_flight(taken)
         sheets = {name: case.sheets_of.sensors[name].sheet for name in taken.samples}
         release = case.stated_releases[number] if case.stated_releases else None
         made.append(replace(taken, sheets=sheets, release=release))

@@ -18,14 +18,14 @@ from discsim.disc import Disc, Release
 from discsim.effects.catalogue import Effect, effect, row
 from discsim.environment import Environment
 from discsim.errors import InputError
-from discsim.recording import Plant
+from discsim.recording import Plant, Recording, Samples
 from discsim.sensors import Accelerometer, Gyroscope, Instruments, Magnetometer, Noise, Sampling
 from discsim.shipped import load_disc
 from discsim.validation.challenge.cases.case import Case, Concealed, Mask
 from discsim.validation.challenge.cases.off_catalogue import log_uniform
 from discsim.validation.scenarios.throws import Throw
 
-__all__ = ["check_asked", "like_real"]
+__all__ = ["check_asked", "cut_in_flight", "like_real"]
 
 #: rows a second of the logger's loop, and the shipped disc that carried it
 _LOOP_HZ, _DISC = 100.0, "ultrastar"
@@ -34,6 +34,8 @@ _LOOP_HZ, _DISC = 100.0, "ultrastar"
 _LESS_DAMPED = 13.0
 #: throws of a case, m/s, deg/s, rad/s of wobble at release, and s recorded: those of the four measured throws
 _THROWS, _SPEED, _SPIN, _WOBBLE, _RECORDED = 4, (13.0, 20.0), (3000.0, 3900.0), (2.5, 14.0), (2.6, 3.2)
+#: rows that are cut off after the release
+_CUT = 3
 #: what a low-pass holds of the hand beyond what acts on the disc at release, m/s^2, across the axis and along it
 _HAND, _HAND_ALONG = (20.0, 110.0), 4.0
 #: share of steps that wrote no row; tick and share of rows that came late: measured are 18 to 24 % lost
@@ -128,6 +130,15 @@ def _hand(rng: np.random.Generator) -> FloatArray:
     towards = rng.uniform(-np.pi, np.pi)
     pull = rng.uniform(*_HAND)
     return readonly([pull * np.cos(towards), pull * np.sin(towards), rng.normal(0.0, _HAND_ALONG)])
+
+
+def cut_in_flight(recording: Recording) -> Recording:
+    """Return a recording as it is cut out of a log: without its first rows, its written time beginning anew.
+
+    They show samples from before the release, which a motion that begins there does not have.
+    """
+    samples = {name: Samples(own.t[:-_CUT], own.value[_CUT:]) for name, own in recording.samples.items()}
+    return replace(recording, samples=samples)
 
 
 # ---------------------------------------------------------------------------------------------- what is concealed

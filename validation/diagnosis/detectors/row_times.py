@@ -69,7 +69,8 @@ class RowTimes:
                 counted = proof.left[2] if proof.left[2] < proof.left[1] else shown.left[1]
                 rows += 4.0 * shown.newest.size * float(np.log(proof.left[1] / counted)) - price
             clock += 4.0 * shown.newest.size * float(np.log(shown.left[0] / shown.left[1]))
-        return rows, clock
+        # single samples leave what counted rows do: there the pattern of those that were skipped tells the clock
+        return rows, clock if self.clock.weight else self.clock.gain
 
     def effects(self) -> tuple[NamedEffect, ...]:
         """Return what was counted as effects of an answer; figures of each recording are by the period of others."""
@@ -92,7 +93,7 @@ class RowTimes:
         return (
             named(LostRows, "clock", share, error, rows),
             named(OwnClock, "magnetometer", self.clock.period_s, self.clock.sd_s, clock),
-            named(Average, "magnetometer", 0.5, None, clock),
+            *((named(Average, "magnetometer", self.clock.weight, None, clock),) if self.clock.weight else ()),
             *(() if imu is None else (named(ImuClock, "board", imu.period_s, imu.sd_s, imu.gain),)),
         )
 

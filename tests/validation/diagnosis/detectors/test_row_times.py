@@ -79,6 +79,19 @@ def test_the_baseline_is_charged_for_the_field_as_it_is_written():
     assert loud > 10.0
 
 
+def test_single_samples_of_a_part_with_its_own_clock_are_named_without_means():
+    single = [loop.logged(one, 1 + k, own_clock=True, weight=0.0)[0] for k, one in enumerate(loop.motions())]
+    found = row_times(single, NAMES, agreement_of(single, NAMES))
+    assert found is not None
+    assert [one.id for one in found.effects()] == ["clock.lost_rows", "mag.own_clock"]
+    for one in found.effects():
+        assert one.evidence.delta_bic > 20.0
+    for after in found.applied(single):
+        field = next(one for one in readings_of(after) if one.sensor == "magnetometer")
+        assert field.taken is not None
+        assert field.taken[0] == pytest.approx(field.taken[1])
+
+
 def test_counts_that_no_other_sensor_bears_out_are_not_believed():
     agreement = agreement_of(logged(), NAMES)
     assert row_times(loop.without_wobble(logged(), 1), NAMES, agreement) is None
