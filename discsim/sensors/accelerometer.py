@@ -69,6 +69,8 @@ class Accelerometer(BoardSensor):
     bias: AccelerometerBias = field(default_factory=AccelerometerBias)
     drift: BiasDrift = field(default_factory=BiasDrift)
     lag: Lag = field(default_factory=Lag)
+    #: what a lag still holds of the hand that threw, (3,) beyond the reading at the motion's start; None: nothing
+    held: FloatArray | None = None
     saturation: AccelerometerSaturation = field(default_factory=AccelerometerSaturation)
     noise: Noise = field(default_factory=Noise)
     resolution: float = 0.0

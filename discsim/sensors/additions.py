@@ -50,6 +50,8 @@ class BoardSensor(MotionSensor):
     lag: Lag
     #: how far its rows show means of two samples
     average: Average = Average()
+    #: what a lag still holds at the motion's start beyond the reading there, in the sensor's unit; None: nothing
+    held: FloatArray | None = None
     noise: Noise
     resolution: float
     range: float
@@ -64,9 +66,9 @@ class BoardSensor(MotionSensor):
     def measure(self, motion: Motion, rng: np.random.Generator) -> Samples:
         """Return the samples of a motion, value (n, 3) in the sensor's unit."""
         written, taken, before = self.sampling.acquired(motion.start, motion.end, rng)
-        value = filtered(self.lag, motion, lambda t: self.ideal(motion, t), taken)
+        value = filtered(self.lag, motion, lambda t: self.ideal(motion, t), taken, self.held)
         if self.average.weight > 0.0:
-            earlier = filtered(self.lag, motion, lambda t: self.ideal(motion, t), np.minimum(before, taken))
+            earlier = filtered(self.lag, motion, lambda t: self.ideal(motion, t), np.minimum(before, taken), self.held)
             value = (1.0 - self.average.weight) * value + self.average.weight * earlier
         step, axes = self.resolution, np.array(self.axes)
         return Samples(written, digitise(value, written, self.noise, rng, resolution=step, limit=self.limit, axes=axes))

@@ -168,16 +168,19 @@ def check_lag(effect: Lag) -> None:
         raise InputError(f"lag is {effect.tau_s:g} s, expected zero or more")
 
 
-def filtered(effect: Lag, motion: Motion, signal: Signal, taken: FloatArray) -> FloatArray:
+def filtered(
+    effect: Lag, motion: Motion, signal: Signal, taken: FloatArray, held: FloatArray | None = None
+) -> FloatArray:
     """Return ``signal`` at the instants ``taken`` (n,), through a first-order lag where there is one.
 
-    A lag settles on the signal at the motion's start.
+    A lag has settled on the signal at the motion's start, or holds ``held`` (k,) beyond it.
     """
     if effect.tau_s <= 0:
         return signal(taken)
     fine = np.linspace(motion.start, motion.end, int(np.ceil((motion.end - motion.start) / FINE_STEP)) + 1)
     grid = np.union1d(fine, taken)
-    return lag(effect, grid, signal(grid))[np.searchsorted(grid, taken)]
+    x = signal(grid)
+    return lag(effect, grid, x, None if held is None else x[0] + held)[np.searchsorted(grid, taken)]
 
 
 def stated(

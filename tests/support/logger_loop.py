@@ -63,6 +63,14 @@ def logged(
     return replace(recording, samples=samples), np.rint((sampled(kept) - phase) / PERIOD).astype(int)
 
 
+def ages(seed: int) -> np.ndarray:
+    """Return how old the newest sample of the field is in each row that `logged` writes in step with the loop, s."""
+    rng = np.random.default_rng(seed)
+    steps = np.arange(2, int(1.9 / LOOP))
+    kept = steps[rng.random(steps.size) > 0.2]
+    return np.asarray((kept * LOOP - rng.uniform(0.0, PERIOD)) % PERIOD)
+
+
 def without_wobble(recordings: Sequence[Recording], seed: int) -> list[Recording]:
     """Return recordings whose gyroscope reads nothing but noise across the axis."""
     rng = np.random.default_rng(seed)

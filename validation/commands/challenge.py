@@ -38,6 +38,7 @@ class KindName(enum.StrEnum):
     two = "two"
     off_catalogue = "off_catalogue"
     setup = "setup"
+    like_real = "like_real"
 
 
 class MaskName(enum.StrEnum):

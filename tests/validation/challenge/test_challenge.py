@@ -265,6 +265,8 @@ def test_the_summary_counts_what_a_person_would_count():
         "exponent_within_2sd_rate": (0, 0),
         "heldout_improved_rate": (1, 1),
         "right_setup_rate": (0, 0),
+        "right_like_real_rate": (0, 0),
+        "found_like_real_rate": (0, 0),
         "crash_rate": (1, 7),
     }
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
+from discsim.arrays import FloatArray
 from discsim.disc import Disc, Release, Rig
 from discsim.effects.catalogue import Effect
 from discsim.environment import Environment
@@ -41,7 +42,7 @@ ORDINARY_FLIGHT_S = 3.5
 #: no throw of the challenge stays up this long, s
 LONGEST_FLIGHT_S = 20.0
 
-Kind = Literal["nothing", "noise", "within_sigma", "beyond_sigma", "one", "two", "off_catalogue", "setup"]
+Kind = Literal["nothing", "noise", "within_sigma", "beyond_sigma", "one", "two", "off_catalogue", "setup", "like_real"]
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,8 @@ class Case:
     """Everything about one case; only what is ``stated`` and what the instruments read reaches a recording.
 
     ``disc`` and ``rig`` are the true ones, ``sheets_of`` the instruments as their data sheets describe them. A flight
-    is recorded until it ends or for ``longest`` (s).
+    is recorded until it ends or for ``longest`` (s). ``hands`` (3,) m/s^2, one for each run where there are any, are
+    what a lagging accelerometer still holds of the hand that threw.
     """
 
     seed: int
@@ -97,6 +99,7 @@ class Case:
     stated_releases: tuple[Release | None, ...] = ()
     moved: Mapping[str, float] = field(default_factory=dict)
     longest: float = LONGEST_FLIGHT_S
+    hands: tuple[FloatArray, ...] = ()
 
     @property
     def recorded(self) -> float:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,10 +20,11 @@ from discsim.files import digest, write_text
 from discsim.motion import Motion
 from discsim.recording import Plant, Recording, write_recording
 from discsim.rig import turn_table
-from discsim.sensors import record
+from discsim.sensors import Instruments, record
 from discsim.toml_table import read_toml
 from discsim.toml_text import toml_lines
 from discsim.validation.challenge.cases.case import Case, Coast, Kind, Run, Turning
+from discsim.validation.challenge.cases.like_real import cut_in_flight
 from discsim.validation.challenge.cases.off_catalogue import HiddenDisc, coast, haunted
 from discsim.validation.challenge.cases.setups import equivalents
 
@@ -34,8 +36,9 @@ class Answer:
     """What was concealed.
 
     ``verdict`` is one of the contract's, ``effects`` the ids; ``recordings`` (folder names) those an event is in, None
-    where no event is hidden. ``parameters`` holds the sizes by name, ``moved`` the true values of stated coefficients
-    that have a sigma, ``law`` the physics of no catalogue in words. ``setting`` is that of the fault of a setup, by
+    where no event is hidden. ``parameters`` holds the sizes by name, with the id before it (``mag.own_clock.period_s``)
+    where two of the effects have a parameter of that name; ``moved`` the true values of stated coefficients that have a
+    sigma, ``law`` the physics of no catalogue in words. ``setting`` is that of the fault of a setup, by
     name; ``equivalents`` are the faults (id, axes) that no recording of the case can tell from it.
     """
 
@@ -54,10 +57,7 @@ class Answer:
     @classmethod
     def of(cls, case: Case) -> Answer:
         """Return the answer of a case."""
-        parameters: dict[str, float] = {}
-        for item in case.concealed:
-            none = item.effect.row.sizes
-            parameters.update({name: size for name, size in item.effect.sizes.items() if size != none[name]})
+        parameters = _sizes_of([item.effect for item in case.concealed])
         if case.secret is not None:
             numbers = {name: value for name, value in vars(case.secret).items() if isinstance(value, float)}
             parameters.update(numbers)
@@ -78,6 +78,10 @@ class Answer:
             alike,
         )
 
+    def size(self, id: str, name: str) -> float | None:
+        """Return the size of a concealed effect's parameter; None where it stands at its baseline."""
+        return self.parameters.get(f"{id}.{name}", self.parameters.get(name))
+
     @property
     def text(self) -> str:
         """The answer as TOML."""
@@ -90,10 +94,26 @@ class Answer:
         lines.append(f"seed = {self.seed}")
         for name, given in (("parameters", self.parameters), ("moved", self.moved), ("setting", self.setting)):
             if given:
-                lines += ["", f"[{name}]", *toml_lines(given)]
+                lines += ["", f"[{name}]", *toml_lines({_key(key): value for key, value in given.items()})]
         for id, axes in self.equivalents:
             lines += ["", "[[equivalents]]", *toml_lines({"id": id, "axes": axes})]
         return "\n".join([*lines, ""])
+
+
+def _sizes_of(effects: Sequence[Effect]) -> dict[str, float]:
+    """Return the sizes that are not at their baseline; a name that two effects share has the id before it."""
+    times = Counter(name for item in effects for name in item.sizes)
+    return {
+        f"{item.id}.{name}" if times[name] > 1 else name: size
+        for item in effects
+        for name, size in item.sizes.items()
+        if size != item.row.sizes[name]
+    }
+
+
+def _key(name: str) -> str:
+    """Return a name as a key of TOML, in which a dot would open a table."""
+    return f'"{name}"' if "." in name else name
 
 
 def read_answer(path: Path) -> Answer:
@@ -138,7 +158,7 @@ def recordings(case: Case) -> list[Recording]:
         motion = _motion(case, run, effects, number)
         stated = replace(case.environment, air_density=case.environment.air_density if case.plant == "flight" else None)
         motion = replace(motion, environment=stated)
-        instruments = haunted(case.instruments, case.secret).with_effects(effects)
+        instruments = haunted(_thrown_by(case, number), case.secret).with_effects(effects)
         taken = record(
             motion,
             instruments,
@@ -149,10 +169,17 @@ def recordings(case: Case) -> list[Recording]:
             rig=case.stated_rig,
             command=run.profile if isinstance(run, Turning) else None,
         )
+        if case.kind == "like_real":
+            taken = cut_in_flight(taken)
         sheets = {name: case.sheets_of.sensors[name].sheet for name in taken.samples}
         release = case.stated_releases[number] if case.stated_releases else None
         made.append(replace(taken, sheets=sheets, release=release))
     return made
+
+
+def _thrown_by(case: Case, number: int) -> Instruments:
+    """Return the instruments of a run, with what a lag of the accelerometer still holds of the hand."""
+    return case.instruments.fitted("accelerometer", held=case.hands[number]) if case.hands else case.instruments
 
 
 def _stated_disc(case: Case) -> Any:

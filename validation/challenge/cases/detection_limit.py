@@ -19,7 +19,8 @@ from scipy.interpolate import BSpline
 
 from discsim.arrays import BoolArray, FloatArray
 from discsim.disc import Disc, Release, Rig
-from discsim.effects.catalogue import Effect, effect
+from discsim.effects.catalogue import Effect, catalogued, effect
+from discsim.effects.timing_rows import LostRows
 from discsim.frames import body_to_ned
 from discsim.motion import Motion, State
 from discsim.rig import spin_down, turn_table
@@ -36,6 +37,8 @@ THRESHOLD = 40.0
 _POSITION, _VELOCITY, _ANGLE, _RATE = 1e-3, 1e-4, 1e-5, 1e-4
 #: knots of what is unknown but smooth in a free spin, s
 _KNOTS_S = 0.3
+#: who finds what is counted row by row
+_COUNTED = catalogued(LostRows, "clock").detector
 #: readings by sensor: times (n,), values (n, k)
 Readings: TypeAlias = Mapping[str, tuple[FloatArray, FloatArray]]
 
@@ -46,11 +49,15 @@ def strength(case: Case) -> float | None:
 
 
 def sizes(case: Case) -> dict[str, float]:
-    """Return each concealed effect's size in units of its detection limit, by id; faults of the setup have none."""
+    """Return each concealed effect's size in units of its detection limit, by id.
+
+    Faults of the setup have none. Nor has, in a case like a real logger's, what is counted row by row: readings are not
+    linear in a pattern of rows, and one of these effects shows by what another does to it. It counts as above it.
+    """
     return {
         item.effect.id: sqrt(max(noncentrality(case, item), 0.0) / THRESHOLD)
         for item in case.concealed
-        if not item.effect.row.setup
+        if not (item.effect.row.setup or (case.kind == "like_real" and item.effect.row.detector == _COUNTED))
     }
 
 
@@ -61,14 +68,15 @@ def noncentrality(case: Case, item: Concealed) -> float:
     gain = 0.0
     for number, run in enumerate(case.runs):
         if item.recording in (None, number):
-            sheet = _Sheet.of(case, readings(case, run, []))
-            signature = sheet.column(readings(case, run, [small]), share)
+            here = replace(case, hands=case.hands[number : number + 1])
+            sheet = _Sheet.of(here, readings(here, run, []))
+            signature = sheet.column(readings(here, run, [small]), share)
         else:
             continue
-        basis = _orthonormal(_unknowns(case, run, sheet))
+        basis = _orthonormal(_unknowns(here, run, sheet))
         signature -= basis @ (basis.T @ signature)
         gain += float(signature @ signature)
-        uncertain = _uncertain(case, run)
+        uncertain = _uncertain(here, run)
         if uncertain:
             columns = np.column_stack([sheet.column(made, step) for made, step in uncertain])
             shared.add(columns - basis @ (basis.T @ columns), signature)
@@ -111,6 +119,8 @@ def _small(item: Effect, case: Case) -> tuple[Effect, float]:
         return effect(clock, ratio=1.0 - 1e-5), 1e-5 / values["fraction"]
     if item.id == "accel.saturation":
         return item, 1.0  # a clipped reading is not linear in the limit
+    if item.id == "accel.lag" and case.hands:
+        return item, 1.0  # nor what dies away in its time constant
     size = float(np.linalg.norm([values[name] - hiding.about for name in hiding.sized]))
     share = min(1.0, 0.1 * hiding.limits(case.plant)[0] / size)
     small = {name: hiding.about + share * (values[name] - hiding.about) for name in hiding.sized}
@@ -123,7 +133,7 @@ def _small(item: Effect, case: Case) -> tuple[Effect, float]:
 def readings(
     case: Case, run: Run, effects: Sequence[Effect], disc: Disc | None = None, rig: Rig | None = None
 ) -> Readings:
-    """Return the noise-free readings of one run."""
+    """Return the noise-free readings of one run, which any ``hands`` of the case threw first."""
     return _measured(case, _motion(case, run, effects, disc or case.stated_disc, rig or case.stated_rig), effects)
 
 
@@ -139,6 +149,8 @@ def _motion(case: Case, run: Run, effects: Sequence[Effect], disc: Disc | None, 
 
 def _measured(case: Case, motion: Motion, effects: Sequence[Effect]) -> Readings:
     quiet: Instruments = case.sheets_of
+    if case.hands:
+        quiet = quiet.fitted("accelerometer", held=case.hands[0])
     for name, sensor in quiet.sensors.items():
         names = {item.name for item in fields(sensor)}
         still = {item: Noise() for item in ("noise", "position_noise", "velocity_noise") if item in names}

@@ -16,6 +16,7 @@ from discsim.sensors import Instruments
 from discsim.shipped import load_disc
 from discsim.validation.challenge.cases.case import Case, Coast, Kind, Mask, Run, Turning
 from discsim.validation.challenge.cases.hiding import hide
+from discsim.validation.challenge.cases.like_real import check_asked, like_real
 from discsim.validation.challenge.cases.masking import masked
 from discsim.validation.challenge.cases.off_catalogue import OFF_CATALOGUE
 from discsim.validation.challenge.cases.sensor_kits import sensors_wanted, with_sensors
@@ -26,7 +27,7 @@ __all__ = ["KINDS", "PLANT_SHARES", "draw_case"]
 
 #: shares of the kinds of case: nothing hidden in a third (plain, other noise than stated, coefficients within their
 #: stated sigma, or beyond it), one effect in a third, two in a sixth, physics of no catalogue in a sixth; a fault of
-#: the setup only where it is asked for
+#: the setup, and what a real logger did, only where it is asked for
 KINDS: Mapping[Kind, float] = {
     "nothing": 1 / 9,
     "noise": 1 / 9,
@@ -36,6 +37,7 @@ KINDS: Mapping[Kind, float] = {
     "two": 1 / 6,
     "off_catalogue": 1 / 6,
     "setup": 0.0,
+    "like_real": 0.0,
 }
 PLANT_SHARES: Mapping[Plant, float] = {"flight": 0.49, "rate_table": 0.17, "spin_down": 0.17, "free_spin": 0.17}
 
@@ -51,6 +53,10 @@ def draw_case(
 
     A ``mask`` is put over it (`MASKS`). Raises `InputError` where what is asked for does not go together.
     """
+    if kind == "like_real":
+        check_asked(plant, effects, mask)
+        own = np.random.default_rng([seed, 2])
+        return like_real(seed, _place(own), own)
     rng = np.random.default_rng(seed)
     drawn_plant: Plant = rng.choice(list(PLANT_SHARES), p=list(PLANT_SHARES.values()))
     drawn_kind: Kind = rng.choice(list(KINDS), p=list(KINDS.values()))

@@ -11,6 +11,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import CATALOGUE
+from discsim.validation.challenge.cases.draw import KINDS
 from discsim.validation.challenge.report.figures import (
     draw_confusion,
     draw_detection,
@@ -179,6 +180,8 @@ NAMES: Mapping[str, str] = {
     "exponent_within_2sd_rate": "power laws: exponent within 2 standard deviations",
     "heldout_improved_rate": "held-out recordings fit better (effects named rightly)",
     "right_setup_rate": "faults of the setup: verdict, effects, setting and place are right",
+    "right_like_real_rate": "throws like real ones: verdict, effects and place are right",
+    "found_like_real_rate": "effects in throws like real ones, each by itself: named",
     "crash_rate": "no answer at all",
 }
 
@@ -224,7 +227,7 @@ def _goals(rates: Mapping[str, Rate], curve: Curve | None, few: bool) -> Section
 def _kinds(scored: Sequence[Scored]) -> Section:
     rows = []
     for plant in ("flight", "rate_table", "spin_down", "free_spin"):
-        for kind in ("nothing", "noise", "within_sigma", "beyond_sigma", "one", "two", "off_catalogue", "setup"):
+        for kind in KINDS:
             mine = [item for item in scored if (item.answer.plant, item.answer.kind) == (plant, kind)]
             if mine:
                 right = rate(item.score.right for item in mine)
@@ -234,7 +237,8 @@ def _kinds(scored: Sequence[Scored]) -> Section:
                 )
     text = (
         "noise: louder, quieter or slower than stated, which is no physics. within and beyond sigma: coefficients that "
-        "differ from the stated ones by less, or one of them by more, than their stated uncertainty allows."
+        "differ from the stated ones by less, or one of them by more, than their stated uncertainty allows. like real: "
+        "what a measured logger did to throws, five to eight effects at once."
     )
     return Section("By kind of case", (text,), ("plant", "concealed", "cases", "right", "seconds (median)"), rows)
 
@@ -364,7 +368,7 @@ def fault_of(item: Scored) -> str:
     if not named:
         return "noticed, called unexplained"
     if named < hidden:
-        return "one of two effects not named"
+        return "one of two effects not named" if len(hidden) == 2 else "some of the effects not named"
     return "effects named beside the right ones" if hidden < named else "another effect named"
 
 

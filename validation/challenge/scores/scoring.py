@@ -215,7 +215,8 @@ def _deviations(
         none = row(id).sizes
         found = {name: (item["value"], item["sd"]) for name, item in effect["parameters"].items()}
         for name, (value, sd) in _one_way_to_say_it(id, found).items():
-            true = answer.parameters.get(name, none[name])
+            size = answer.size(id, name)
+            true = none[name] if size is None else size
             if isfinite(true):
                 yield Deviation(id, name, true, _near(name, value, true), sd)
     for name, true in answer.moved.items():
@@ -328,6 +329,7 @@ def summary(
         s for (a, _, s), size in zip(scored, strengths, strict=True) if a.effects and size is not None and size >= 2.0
     ]
     unknown = [(d, s) for a, d, s in scored if a.kind == "off_catalogue"]
+    real = [(a, s) for a, _, s in scored if a.kind == "like_real"]
     errors = [[(d.effect, abs(z)) for d in s.deviations if (z := d.in_sd) is not None] for _, _, s in scored]
     stated = [[z for effect, z in group if effect == RECALIBRATED] for group in errors]
     of_effects = [[z for effect, z in group if effect != RECALIBRATED] for group in errors]
@@ -356,6 +358,8 @@ def summary(
         "exponent_within_2sd_rate": rate(abs(z) <= 2.0 for z in exponents),
         "heldout_improved_rate": rate(gained),
         "right_setup_rate": rate(s.right for a, _, s in scored if a.kind == "setup"),
+        "right_like_real_rate": rate(s.right for _, s in real),
+        "found_like_real_rate": clustered_rate([id in s.named for id in a.effects] for a, s in real),
         "crash_rate": rate(s.crashed for _, _, s in scored),
     }
 

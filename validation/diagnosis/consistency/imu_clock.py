@@ -41,6 +41,8 @@ _STARTS, _PHASES = (0.2, 0.4, 0.6, 0.8), 4
 _PRICE, _ANOTHER = 24.0, 0.02
 #: what chooses one of two teeth costs, in twice the log likelihood
 _CHOICE = 2.0 * float(np.log(2.0))
+#: between which shares of its rows the ages of the field's samples are taken: a few rows are miscounted
+_AGES = (0.02, 0.98)
 #: a comb this near to the logger's loop is the loop itself: the chip is read as it is sampled
 _SAME = 0.02
 
@@ -318,9 +320,17 @@ def imu_clock_of(recordings: Sequence[Recording], names: Sequence[str], clock: O
     own = np.array([one.period_s for one in found])
     loops = [one.loop_s for one in clock.shown if one.loop_s is not None]
     period = float(np.mean(own))
-    return ImuClock(
-        period,
-        float(np.std(own, ddof=1) / np.sqrt(own.size)),
-        tuple(found),
-        bool(loops) and abs(period / float(np.median(loops)) - 1.0) < _SAME,
-    )
+    same = bool(loops) and abs(period / float(np.median(loops)) - 1.0) < _SAME
+    if same:
+        found = [_asked_between(one, wobbles[one.recording]) for one in found]
+    return ImuClock(period, float(np.std(own, ddof=1) / np.sqrt(own.size)), tuple(found), same)
+
+
+def _asked_between(rows: ImuRows, wobble: _Wobble) -> ImuRows:
+    """Return rows of the loop's own instants where these lie between a row's newest sample of the field and the next.
+
+    A wobble's phase tells instants but for one time that all are off by. Beside a part that free-runs they are of every
+    age from none to a period of it, which tells that time.
+    """
+    youngest, oldest = np.quantile(rows.times - wobble.asked, _AGES)
+    return replace(rows, times=rows.times + 0.5 * (wobble.within - float(youngest + oldest)))

@@ -9,7 +9,7 @@ motion is linear in its unknowns, so that nothing but whole numbers is chosen, a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,7 +18,14 @@ import numpy as np
 from discsim.arrays import ComplexArray, FloatArray, IntArray
 from discsim.compiled import compiled
 from discsim.recording import Recording
-from discsim.validation.diagnosis.consistency.phase_regression import rate_of, retimed, signal_of, slow_columns
+from discsim.validation.diagnosis.consistency.phase_regression import (
+    circle_centre,
+    rate_of,
+    retimed,
+    signal_of,
+    slow_columns,
+)
+from discsim.validation.diagnosis.consistency.skipped_samples import Loop, loop_beside
 from discsim.validation.diagnosis.consistency.time_stamp_recovery import Rows
 
 __all__ = ["OwnClock", "SamplesShown", "own_clock_of"]
@@ -52,7 +59,8 @@ _PHASE_STEP = 8.0
 class SamplesShown:
     """What the rows of one recording show: newest sample (n,), and how much older the other one of a mean is (n,).
 
-    ``period_of_others_s`` is the period by which they were counted, ``left`` what is left of the field, uT rms, along
+    ``period_of_others_s`` is the period by which they were counted, ``loop_by_skips_s`` the loop's step where rows show
+    single samples (``apart`` is zero then), ``left`` what is left of the field, uT rms, along
     a flexible motion: with rows that last whole ticks, and of these samples.
     """
 
@@ -61,6 +69,7 @@ class SamplesShown:
     newest: IntArray
     apart: IntArray
     left: tuple[float, float]
+    loop_by_skips_s: float | None = None
 
     @property
     def lost(self) -> float:
@@ -71,6 +80,9 @@ class SamplesShown:
     @property
     def _skips(self) -> int:
         """Samples that the logger's loop has skipped, those within lost rows by their mean spacing."""
+        if self.loop_by_skips_s is not None:
+            span = float(self.newest[-1] - self.newest[0])
+            return round(span * (1.0 - self.period_of_others_s / self.loop_by_skips_s))
         at = self.newest[self.apart == 2]
         if at.size < 2:
             return int(at.size)
@@ -81,8 +93,8 @@ class SamplesShown:
     def loop_s(self) -> float | None:
         """Duration of a step of the logger's loop, from the samples that it skips; None where it skips too few."""
         at = self.newest[self.apart == 2]
-        if at.size < 3:
-            return None
+        if self.loop_by_skips_s is not None or at.size < 3:
+            return self.loop_by_skips_s
         spacing = float(np.median(np.diff(at)))
         return self.period_of_others_s * spacing / (spacing - 1.0)
 
@@ -118,6 +130,8 @@ class OwnClock:
     sd_s: float
     gain: float
     shown: tuple[SamplesShown, ...]
+    #: how far rows are means of two samples: 0.5, or not at all
+    weight: float = 0.5
 
     def counted(self, recording: Recording, name: str) -> Recording | None:
         """Return a recording with its samples at the times that its rows' samples give, None where there is none."""
@@ -135,12 +149,16 @@ class OwnClock:
     @property
     def sentences(self) -> list[str]:
         """What there is to say, in words."""
+        how = (
+            "and every row shows the mean of its last two samples (mag.average, weight 0.5). Where the logger's loop "
+            "skips a sample the two are further apart: that mean turns by half a period less, and is smaller, so that "
+            "the tick looks half as long."
+            if self.weight
+            else "and the logger's slower loop skips samples at even distances, which no row ever shows."
+        )
         said = [
             f"The magnetometer has a clock of its own (mag.own_clock): a period of {1e3 * self.period_s:.3f} ± "
-            f"{1e3 * self.sd_s:.3f} ms, and every row shows the mean of its last two samples (mag.average, weight "
-            "0.5). Where the logger's loop skips a sample the two are further apart: that mean turns by half a period "
-            "less, and is smaller, so that the tick looks half as long. Twice the log likelihood gains "
-            f"{self.gain:.0f}."
+            f"{1e3 * self.sd_s:.3f} ms, {how} Twice the log likelihood gains {self.gain:.0f}."
         ]
         for item in self.shown:
             counted, here = item.left
@@ -157,7 +175,7 @@ class OwnClock:
         return {
             "period_s": self.period_s,
             "period_sd_s": self.sd_s,
-            "weight": 0.5,
+            "weight": self.weight,
             "gain": self.gain,
             "heldout": [item.to_json() for item in self.shown],
         }
@@ -171,6 +189,8 @@ class _Field:
     rate: FloatArray
     #: turns of the wobble in the body per turn of the disc, less one; None where no disc is stated
     wobble: float | None
+    #: a row as it is written, s
+    row_s: float
 
     def turned(self, t: FloatArray) -> Any:
         """Return the angle turned as a polynomial of time, the rows being at ``t`` (n,): a disc's spin is smooth."""
@@ -349,20 +369,8 @@ def _field_of(recording: Recording) -> _Field | None:
         return None
     disc = recording.disc
     wobble = None if disc is None or disc.Ixx <= 0.0 else disc.Izz / disc.Ixx - 1.0
-    return _Field(signal.value, np.interp(signal.t, known[1], known[2]), wobble)
-
-
-def _centre(value: ComplexArray) -> complex:
-    """Return the centre of the circle (n,) that a field runs, robustly, by its algebraic equation."""
-    x, y = value.real, value.imag
-    A, b = np.column_stack([2.0 * x, 2.0 * y, np.ones(x.size)]), x * x + y * y
-    weight = np.ones(x.size)
-    solution: FloatArray = np.zeros(3)
-    for _ in range(_REWEIGHTED):
-        solution = np.asarray(np.linalg.lstsq(A * weight[:, None], b * weight, rcond=None)[0])
-        left = np.abs(b - A @ solution)
-        weight = 1.0 / np.sqrt(1.0 + (left / (1.5 * max(float(np.median(left)), 1e-12))) ** 2)
-    return complex(solution[0], solution[1])
+    rate = np.interp(signal.t, known[1], known[2])
+    return _Field(signal.value, rate, wobble, float(np.median(np.diff(signal.t))))
 
 
 def own_clock_of(recordings: Sequence[Recording], names: Sequence[str], rows: Rows) -> OwnClock | None:
@@ -382,26 +390,50 @@ def own_clock_of(recordings: Sequence[Recording], names: Sequence[str], rows: Ro
     ]
     means = min(tried, key=lambda found: sum(one.total for one in found.values()))
     gain = sum(single[name].total - means[name].total for name in fields)
-    if gain < _PRICE * len(fields):
+    rest = {name: _rms(one.left) for name, one in single.items()}
+    if gain >= _PRICE * len(fields):
+        return _clock(fields, means, rest, rows, gain)
+    loops = {name: loop_beside(one.newest, one.period, fields[name].row_s) for name, one in single.items()}
+    told = {name: loop for name, loop in loops.items() if loop is not None}
+    if len(told) < len(fields) or sum(loop.gain for loop in told.values()) < _PRICE:
         return None
-    periods = {name: one.period for name, one in means.items()}
+    return _clock(fields, single, rest, rows, sum(loop.gain for loop in told.values()), told)
+
+
+def _clock(
+    fields: Mapping[str, _Field],
+    counted: Mapping[str, _Found],
+    rest: Mapping[str, float],
+    rows: Rows,
+    gain: float,
+    loops: Mapping[str, Loop] | None = None,
+) -> OwnClock | None:
+    """Return the clock that counted samples tell, None where they are too close to be told apart.
+
+    Takes what is left of each field, ``rest``, where rows last whole ticks. Rows show means of two samples unless
+    ``loops`` tell the clock by what they skip.
+    """
+    means = loops is None
+    periods = {name: one.period for name, one in counted.items()}
     shown = []
     for name, field in fields.items():
         others = [period for other, period in periods.items() if other != name] or [periods[name]]
-        found = _followed(field, means[name].newest, means[name].apart, float(np.mean(others)), means=True)
+        before, period = counted[name], float(np.mean(others))
+        found = _followed(field, before.newest, before.apart, period, means=means)
         turned = found.period * float(np.median(np.abs(field.rate)))
-        if turned < _PHASE_STEP * found.scale / float(np.median(np.abs(field.value - _centre(field.value)))):
+        if turned < _PHASE_STEP * found.scale / float(np.median(np.abs(field.value - circle_centre(field.value)))):
             return None
-        left = (_rms(single[name].left), _rms(found.left))
-        shown.append(SamplesShown(name, float(np.mean(others)), found.newest, found.apart, left))
-    period = float(np.mean(list(periods.values())))
+        apart, step = (found.apart, None) if loops is None else (np.zeros_like(found.apart), loops[name].step_s)
+        left = (rest[name], _rms(found.left))
+        shown.append(SamplesShown(name, period, found.newest, apart, left, step))
+    mean = float(np.mean(list(periods.values())))
     scatter = float(np.std(list(periods.values()), ddof=1)) if len(periods) > 1 else rows.sd_s
-    return OwnClock(period, scatter / np.sqrt(len(periods)), gain, tuple(shown))
+    return OwnClock(mean, scatter / np.sqrt(len(periods)), gain, tuple(shown), 0.5 if means else 0.0)
 
 
 def _counted(field: _Field, period: float, *, means: bool) -> _Found:
     """Return the samples that rows show at a period, which is made better where it is only nearly right."""
-    centre = _centre(field.value)
+    centre = circle_centre(field.value)
     found = _followed(field, *_first_samples(field, centre, period, means=means), period, means=means)
     for _ in range(_REFINED):
         if abs(found.period / period - 1.0) > _NEARLY:

@@ -25,6 +25,7 @@ __all__ = [
     "angle_turned",
     "centripetal",
     "centripetal_of",
+    "circle_centre",
     "explained",
     "left_of",
     "rate_of",
@@ -46,6 +47,8 @@ _STILL = 1
 _CHANGES = {"field": 0, "wobble": 2}
 #: how far a ratio of turns is looked for, in its logarithm, and in which steps
 REACH, STEP = 0.4, 0.01
+#: reweighted steps of the circle that a field runs (bisquare's cousin: Cauchy weights)
+_REWEIGHTED = 12
 #: blocks by which the error of a ratio is judged
 _BLOCKS = 10
 #: of the angle between two readings: how far backwards noise may turn it, rad
@@ -183,6 +186,14 @@ def left_of(signal: Signal, psi: FloatArray, ratio: float = 1.0) -> float:
     return float(np.sqrt(left / max(count, 1)))
 
 
+def _still_part(signal: Signal, psi: FloatArray) -> ComplexArray:
+    """Return what stands still (n,) while the rest turns so many times the angle psi (n,) as leaves least."""
+    guess = min(
+        np.exp(np.arange(-REACH, REACH + 0.5 * STEP, STEP)), key=lambda ratio: rest_of(signal, psi, float(ratio))[0]
+    )
+    return still_part(signal, psi, float(guess))
+
+
 def still_part(signal: Signal, psi: FloatArray, ratio: float) -> ComplexArray:
     """Return what of a signal (n,) stands still in B while the rest turns with the angle psi (n,)."""
     still = np.full(signal.t.size, np.mean(signal.value))
@@ -205,15 +216,26 @@ def explained(signal: Signal, psi: FloatArray, ratio: float = 1.0) -> float:
     return 1.0 - left / max(total, 1e-300)
 
 
-def steps(signal: Signal, psi: FloatArray) -> tuple[FloatArray, FloatArray]:
+def circle_centre(value: ComplexArray) -> complex:
+    """Return the centre of the circle that a field (n,) runs, robustly, by its algebraic equation; no time enters."""
+    x, y = value.real, value.imag
+    A, b = np.column_stack([2.0 * x, 2.0 * y, np.ones(x.size)]), x * x + y * y
+    weight = np.ones(x.size)
+    solution: FloatArray = np.zeros(3)
+    for _ in range(_REWEIGHTED):
+        solution = np.asarray(np.linalg.lstsq(A * weight[:, None], b * weight, rcond=None)[0])
+        left = np.abs(b - A @ solution)
+        weight = 1.0 / np.sqrt(1.0 + (left / (1.5 * max(float(np.median(left)), 1e-12))) ** 2)
+    return complex(solution[0], solution[1])
+
+
+def steps(signal: Signal, psi: FloatArray, centre: complex | None = None) -> tuple[FloatArray, FloatArray]:
     """Return how far a signal turns from reading to reading over what the angle psi (n,) makes of it, and weights.
 
-    Both are (n - 1,). A step may be several times the expected one, where rows were lost, or a little backwards.
+    Both are (n - 1,). A step may be several times the expected one, where rows were lost, or a little backwards. What
+    stands still in B is a ``centre`` where that is known, else what does not turn with the angle.
     """
-    guess = min(
-        np.exp(np.arange(-REACH, REACH + 0.5 * STEP, STEP)), key=lambda ratio: rest_of(signal, psi, float(ratio))[0]
-    )
-    turning = signal.value - still_part(signal, psi, float(guess))
+    turning = signal.value - (_still_part(signal, psi) if centre is None else centre)
     expected = signal.order * np.diff(psi)
     angle = np.angle(turning[1:] * np.conj(turning[:-1])) * np.sign(expected)
     angle = np.where(angle < -BACKWARDS, angle + 2.0 * np.pi, angle)

@@ -69,13 +69,17 @@ class RowTimes:
                 counted = proof.left[2] if proof.left[2] < proof.left[1] else shown.left[1]
                 rows += 4.0 * shown.newest.size * float(np.log(proof.left[1] / counted)) - price
             clock += 4.0 * shown.newest.size * float(np.log(shown.left[0] / shown.left[1]))
-        return rows, clock
+        # single samples leave what counted rows do: there the pattern of those that were skipped tells the clock
+        return rows, clock if self.clock.weight else self.clock.gain
 
     def effects(self) -> tuple[NamedEffect, ...]:
         """Return what was counted as effects of an answer; figures of each recording are by the period of others."""
         rows, clock = self._gains
         lost = np.array([shown.lost for shown in self.clock.shown])
-        error = float(np.std(lost, ddof=1) / np.sqrt(lost.size)) if lost.size > 1 else None
+        steps = sum((shown.newest.size - 1) / (1.0 - shown.lost) for shown in self.clock.shown)
+        share = float(np.mean(lost))
+        # steps lose their rows by chance: a few recordings may agree better than so many steps can
+        error = max(float(np.std(lost) / np.sqrt(max(lost.size - 1, 1))), float(np.sqrt(share * (1.0 - share) / steps)))
         held = len(self.clock.shown) > 1
 
         imu = self.imu if self.imu is not None and not self.imu.loops else None
@@ -87,9 +91,9 @@ class RowTimes:
             return NamedEffect(row.id, {row.parameters[0]: ParameterValue(value, sd)}, evidence, None, ())
 
         return (
-            named(LostRows, "clock", float(np.mean(lost)), error, rows),
+            named(LostRows, "clock", share, error, rows),
             named(OwnClock, "magnetometer", self.clock.period_s, self.clock.sd_s, clock),
-            named(Average, "magnetometer", 0.5, None, clock),
+            *((named(Average, "magnetometer", self.clock.weight, None, clock),) if self.clock.weight else ()),
             *(() if imu is None else (named(ImuClock, "board", imu.period_s, imu.sd_s, imu.gain),)),
         )
 

@@ -49,6 +49,25 @@ def test_a_chip_that_is_read_in_step_has_no_clock_of_its_own(seed):
     assert "imu.own_clock" not in named
 
 
+@pytest.mark.parametrize("seed", [1, 11])
+def test_rows_that_are_read_in_step_stand_behind_the_samples_that_they_show_by_their_true_ages(seed):
+    made, clock = counted(seed, None)
+    found = imu_clock_of(made, NAMES, clock)
+    assert found is not None
+    assert found.loops
+    for k, (one, name) in enumerate(zip(made, NAMES, strict=True)):
+        shown = next(item for item in clock.shown if item.recording == name)
+        timed = clock.counted(one, name)
+        assert timed is not None
+        put = found.counted(one, timed, name, shown)
+        newest = put.samples["magnetometer"].t + 0.5 * shown.apart * shown.period_of_others_s
+        age = put.samples["gyroscope"].t - newest
+        true = loop.ages(seed + k)
+        # as the field's samples slip by 0.6 ms in a step, ages that are none or a whole period are seen to that
+        assert np.median(age - true) == pytest.approx(0.0, abs=6e-4)
+        assert true.mean() > 3e-3
+
+
 def test_a_disc_that_does_not_wobble_tells_nothing_of_its_chip():
     made, clock = counted(1, 0.0091)
     assert imu_clock_of(loop.without_wobble(made, 3), NAMES, clock) is None

@@ -33,9 +33,21 @@ def test_means_of_two_samples_of_a_part_with_its_own_clock_are_told_apart_row_by
 
 
 @pytest.mark.parametrize("seed", range(1, 41, 8))
-@pytest.mark.parametrize("own_clock", [False, True])
-def test_lost_rows_alone_ask_for_no_means(seed, own_clock):
-    assert found(seed, own_clock=own_clock, weight=0.0)[0] is None
+def test_lost_rows_alone_ask_for_no_clock_and_no_means(seed):
+    assert found(seed, own_clock=False, weight=0.0)[0] is None
+
+
+@pytest.mark.parametrize("seed", range(1, 41, 8))
+def test_single_samples_of_a_part_with_its_own_clock_are_told_by_those_that_are_skipped(seed):
+    clock, newest = found(seed, own_clock=True, weight=0.0)
+    assert clock is not None
+    assert clock.weight == 0.0
+    assert abs(clock.period_s - PERIOD) < 3.0 * clock.sd_s + 2e-3 * PERIOD
+    assert "mag.average" not in " ".join(clock.sentences)
+    for item, true in zip(clock.shown, newest, strict=True):
+        assert np.mean(np.diff(item.newest) == np.diff(true)) > 0.98
+        assert item.loop_s == pytest.approx(LOOP, rel=0.01)
+        assert item.lost == pytest.approx(0.2, abs=0.06)
 
 
 def test_rows_are_put_where_their_samples_were_taken():

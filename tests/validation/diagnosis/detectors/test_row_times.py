@@ -48,6 +48,18 @@ def test_what_was_counted_is_named_with_its_sizes():
         assert one.evidence.heldout_delta_log_likelihood > 50.0
 
 
+def test_the_share_of_lost_rows_is_no_surer_than_so_many_steps_by_chance():
+    found = counted()
+    told, lost = found.effects()[0].parameters["fraction"], [shown.lost for shown in found.clock.shown]
+    steps = [(shown.newest.size - 1) / (1.0 - shown.lost) for shown in found.clock.shown]
+    assert told.sd is not None
+    assert told.sd >= np.sqrt(told.value * (1.0 - told.value) / sum(steps))
+    assert told.sd >= np.std(lost, ddof=1) / np.sqrt(len(lost))
+    same = replace(found, clock=replace(found.clock, shown=(found.clock.shown[0],) * 2))
+    alike = same.effects()[0].parameters["fraction"].sd
+    assert alike == pytest.approx(np.sqrt(lost[0] * (1.0 - lost[0]) / (2.0 * steps[0])))
+
+
 def test_a_fit_sees_the_field_as_means_of_two_samples_at_their_times():
     for before, after in zip(logged(), counted().applied(logged()), strict=True):
         field = next(one for one in readings_of(after) if one.sensor == "magnetometer")
@@ -65,6 +77,19 @@ def test_the_baseline_is_charged_for_the_field_as_it_is_written():
     loud, still = (found.excess({"magnetometer": GroupNoise(sd)}, 1000) for sd in (0.2, 0.1))
     assert still == pytest.approx(4.0 * loud)
     assert loud > 10.0
+
+
+def test_single_samples_of_a_part_with_its_own_clock_are_named_without_means():
+    single = [loop.logged(one, 1 + k, own_clock=True, weight=0.0)[0] for k, one in enumerate(loop.motions())]
+    found = row_times(single, NAMES, agreement_of(single, NAMES))
+    assert found is not None
+    assert [one.id for one in found.effects()] == ["clock.lost_rows", "mag.own_clock"]
+    for one in found.effects():
+        assert one.evidence.delta_bic > 20.0
+    for after in found.applied(single):
+        field = next(one for one in readings_of(after) if one.sensor == "magnetometer")
+        assert field.taken is not None
+        assert field.taken[0] == pytest.approx(field.taken[1])
 
 
 def test_counts_that_no_other_sensor_bears_out_are_not_believed():
