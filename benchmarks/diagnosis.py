@@ -1,17 +1,19 @@
 """What a diagnosis costs: CPU seconds of `diagnose` on data sets made as the blind test makes them.
 
-    python benchmarks/diagnosis.py [sets] [growth] [--each 3] [--only WORD] [--seed 500]
+    python benchmarks/diagnosis.py [sets] [growth] [many] [--each 3] [--only WORD] [--seed 500]
 
 ``sets`` diagnoses sets of each kind that has a goal and prints the median and the longest of each kind beside it;
-``growth`` prints how the cost of one set grows with recordings, with their length and with the sensors on board. Time
-is CPU time of the process with all its threads, after one diagnosis that compiles what is not in the cache yet; so
-other work on the machine counts little. Each line tells whether the answer was right, too.
+``growth`` prints how the cost of one set grows with recordings, with their length and with the sensors on board;
+``many`` how cost and memory grow to 200 recordings. Time is CPU time of the process with all its threads, after one
+diagnosis that compiles what is not in the cache yet; so other work on the machine counts little. Each line tells
+whether the answer was right, too.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import resource
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -144,18 +146,46 @@ def growth(seed: int) -> None:
         show(four, cost_of(four, part))
 
 
+#: how often eight throws are thrown again, each with noise of its own
+MANY = (1, 5, 25)
+
+
+def many(seed: int) -> None:
+    """Print what sets of many throws cost and hold in memory."""
+    case = next(drawn(Wanted("", "flight", "one", 8, 0.0), seed))
+    print("one effect: many throws")
+    for times in MANY:
+        some = replace(case, runs=case.runs * times, stated_releases=case.stated_releases * times)
+        given = simulated(some)
+        held = sum(own.t.nbytes + own.value.nbytes for recording in given for own in recording.samples.values())
+        cost = cost_of(some, given)
+        highest = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+        print(
+            f"  {len(given):4d} throws, {held / 1e6:.1f} MB of readings: {cost.seconds:6.1f} s, "
+            f"{cost.seconds / len(given):.2f} s each, at most {highest / 1e6:.0f} MB; {cost.hidden} -> {cost.said}",
+            flush=True,
+        )
+
+
 def main() -> None:
     """Run what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
-    parser.add_argument("parts", nargs="*", metavar="sets|growth", default=["sets"])
+    parser.add_argument("parts", nargs="*", metavar="sets|growth|many", default=["sets"])
     parser.add_argument("--each", type=int, default=3, help="sets of each kind")
     parser.add_argument("--only", default="", help="only kinds whose name has this in it")
     parser.add_argument("--seed", type=int, default=500)
     options = parser.parse_args()
     warm = next(drawn(Wanted("", "flight", "one", 3, 0.0), 0))
     diagnose([simulated(shorter(warm, 1.0))], ["warm-up"])
+    parts = {
+        "sets": lambda: sets(options.each, options.seed, options.only),
+        "growth": lambda: growth(options.seed),
+        "many": lambda: many(options.seed),
+    }
+    if unknown := [part for part in options.parts if part not in parts]:
+        parser.error(f"no part '{unknown[0]}'; expected some of {', '.join(parts)}")
     for part in options.parts:
-        sets(options.each, options.seed, options.only) if part == "sets" else growth(options.seed)
+        parts[part]()
 
 
 if __name__ == "__main__":
