@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,10 +35,23 @@ from discsim.validation.identification.propagation import Column
 from discsim.validation.identification.release_prior import release_rows
 from discsim.validation.identification.segments import Trajectory, stepped
 
-__all__ = ["Fit", "linearised_columns", "refit"]
+__all__ = ["NO_BARS", "Bars", "Fit", "linearised_columns", "refit"]
 
 #: recordings that are worked on at once, on as many threads as there are cores
 THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Bars(NamedTuple):
+    """Chi-squared above which a fit is of no use to its caller, as it is expected after the first steps.
+
+    ``held`` is asked of held steps alone: they move little, and what they expect of the end is within a tenth of it.
+    """
+
+    free: float = np.inf
+    held: float = np.inf
+
+
+NO_BARS = Bars()
 
 
 @dataclass(frozen=True)
@@ -180,15 +193,13 @@ def refit(
     tolerance: float = 0.05,
     bounds: Mapping[tuple[str, str], tuple[float, float]] | None = None,
     relinearise: bool = True,
-    bar: float = np.inf,
-    held_bar: float = np.inf,
+    bars: Bars = NO_BARS,
 ) -> Fit:
     """Go on from where a fit stands by Gauss-Newton steps, halved where they do not improve.
 
     Stops when the gain, expected or found, is below ``tolerance`` of chi-squared. ``relinearise`` is false where only
-    the noise has changed since the last linearisation. A fit that after its first steps expects to stay above ``bar``
-    is of no use to the caller, and is left where it stands; so is one that held steps expect to stay above ``held_bar``
-    (they move little, and what they expect of the end is within a tenth of it).
+    the noise has changed since the last linearisation. A fit that expects to stay above its ``bars`` is left where it
+    stands.
     """
     linears = linearised(fit) if relinearise else fit.linears
     fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
@@ -197,10 +208,10 @@ def refit(
         # a few steps more of a fit that held ones have brought where it is
         held = iterations
     else:
-        fit, settled = _iterated(fit, iterations, tolerance, bounds or {}, _FREE, bar)
+        fit, settled = _iterated(fit, iterations, tolerance, bounds or {}, _FREE, bars.free)
     if not settled and discontinuous(fit) and fit.plant.weakly_identified:
         # free steps hop about where the readings say little: short ones, and what held them back is not known
-        fit, _ = _iterated(fit, held, tolerance, bounds or {}, _FIRST_DAMPING, min(bar, held_bar))
+        fit, _ = _iterated(fit, held, tolerance, bounds or {}, _FIRST_DAMPING, min(bars))
         _, (_, covariance, _) = _solved(fit, np.full(len(fit.trajectories), _FREE))
         fit = replace(fit, covariance=covariance)
     return fit

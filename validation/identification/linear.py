@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -86,8 +85,12 @@ class Linear:
         """Measured minus predicted (n,) once the defects that are not allowed are closed."""
         return self.raw - self.shifts
 
-    @cached_property
-    def _full(self) -> FloatArray:
+    @property
+    def full(self) -> FloatArray:
+        """Derivatives of the prediction (n, l + p) by all unknowns.
+
+        They are worked out each time: kept for every recording they would be most of what a fit holds in memory.
+        """
         d, width = self.sensitivities.shape[1:]
         full = np.empty((self.raw.size, width))
         for i in range(self.sensitivities.shape[0]):
@@ -155,9 +158,9 @@ class Linear:
     @property
     def nuisance(self) -> FloatArray:
         """Derivatives of the prediction (n, l) by the local unknowns."""
-        return self._full[:, : self.unknowns]
+        return self.full[:, : self.unknowns]
 
     @property
     def common(self) -> FloatArray:
         """Derivatives of the prediction (n, p) by the shared parameters."""
-        return self._full[:, self.unknowns :]
+        return self.full[:, self.unknowns :]

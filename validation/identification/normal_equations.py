@@ -71,7 +71,7 @@ def normal_matrix(linear: Linear, noise: NoiseModel) -> FloatArray:
     """Return the normal matrix (l + p + 1, l + p + 1) over [local | shared | residual] of whitened rows."""
     u, d = linear.unknowns, linear.sensitivities.shape[1]
     if u == d:
-        A = whitened(linear, noise, np.hstack([linear.nuisance, linear.common, linear.residual[:, None]]))
+        A = whitened(linear, noise, np.hstack([linear.full, linear.residual[:, None]]))
         return np.asarray(A.T @ A)
     # with defects the full rows are long and mostly empty: what later segments say of a state is summed backwards, and
     # a jump meets the unknowns before it through the state that it moves

@@ -24,8 +24,8 @@ from discsim.parameters import flight_parameters, parameter_index, tables
 from discsim.recording import SENSORS, Recording, SensorSheet
 from discsim.sensitivity import sensitivities
 from discsim.trajectory import Flight, integrate
+from discsim.validation.identification.gauss_newton import Bars, polished, refit
 from discsim.validation.identification.gauss_newton import Fit as Solution
-from discsim.validation.identification.gauss_newton import polished, refit
 from discsim.validation.identification.noise import GroupNoise, NoiseModel
 from discsim.validation.identification.normal_equations import Reduced, local_covariance
 from discsim.validation.identification.parameters import Parameter
@@ -220,7 +220,7 @@ def _first_state(throw: Throw, CNr: float) -> FloatArray:
     for candidate in release_candidates(throw):
         segment = _segment(throw, candidate)
         alone = Solution((segment,), (), np.empty(0), FLIGHT.sizes.continuous, _noise(), {("aero", "CNr"): CNr})
-        fit = refit(alone, iterations=_MOST_STEPS, tolerance=_STARTED, bar=least)
+        fit = refit(alone, iterations=_MOST_STEPS, tolerance=_STARTED, bars=Bars(least))
         if fit.merit < least:
             best, least = fit.trajectories[0].states[0], fit.merit
         if least < _NEAR**2 * fit.count:

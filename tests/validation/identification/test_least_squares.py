@@ -15,6 +15,7 @@ from discsim.effects import effect
 from discsim.validation.diagnosis.relaxed_fit import first_trajectory
 from discsim.validation.identification import gauss_newton, normal_equations
 from discsim.validation.identification.gauss_newton import (
+    Bars,
     Fit,
     GaussNewtonStep,
     discontinuous,
@@ -276,8 +277,8 @@ def test_a_fit_that_will_stay_above_a_bar_is_left_where_it_stands():
     fit = replace(white(relaxed_fit()), defects=SPIN_DOWN.sizes.continuous)
     fit = replace(fit, at=np.array([5.0 * RIG.viscous, 1e-3, 0.3]))
     whole = refit(fit)
-    assert refit(fit, bar=2.0 * whole.merit).merit == whole.merit
-    given_up = refit(fit, bar=0.5 * whole.merit)
+    assert refit(fit, bars=Bars(2.0 * whole.merit)).merit == whole.merit
+    given_up = refit(fit, bars=Bars(0.5 * whole.merit))
     assert given_up.iterations < whole.iterations
     assert given_up.merit > whole.merit
 

@@ -42,10 +42,11 @@ def _gust(id: str, problem: LocalProblem, recording: int, wide: Sequence[int]) -
     """Return the gust in a recording that would gain most; ``wide`` are the places of a steady wind's columns."""
     linear, segment, nodes = problem.linear, problem.segment, problem.trajectory.nodes
     d, own, k = problem.trajectory.plant.layout.directions, linear.unknowns, len(problem.trajectory.states)
-    first = linear.nuisance[:, :d]
+    full = linear.full
+    first = full[:, :d]
     # u: the change of the first state that a wind up to each boundary amounts to
     u = np.stack([undone(m[:, :d], m[:, [own + w for w in wide]]) for m in linear.sensitivities])
-    within = linear.common[:, list(wide)] - np.einsum("nd,ndw->nw", first, u[segment])
+    within = full[:, [own + w for w in wide]] - np.einsum("nd,ndw->nw", first, u[segment])
     push = np.diff(u, axis=0)
     middle = 0.5 * (nodes[:-1] + nodes[1:])
     best: ScreenedCandidate | None = None

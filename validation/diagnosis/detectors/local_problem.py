@@ -141,9 +141,9 @@ def _by_recording(fit: Fit, f: int) -> dict[int, LocalProblem]:
     off = prior * (np.array([q.stated for q in parameters]) - at[:f])
     found = {}
     for i, (linear, trajectory) in enumerate(zip(linears, fit.trajectories, strict=True)):
-        residual = linear.residual + linear.common @ away
-        own = linear.unknowns
-        columns = np.hstack([linear.nuisance, linear.common[:, :f], residual[:, None]])
+        own, full = linear.unknowns, linear.full
+        residual = linear.residual + full[:, own:] @ away
+        columns = np.hstack([full[:, : own + f], residual[:, None]])
         white = whitened(linear, noise, columns)
         A, e = white[:, :-1], white[:, -1]
         H, right = A.T @ A, A.T @ e

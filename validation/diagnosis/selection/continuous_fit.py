@@ -18,7 +18,7 @@ from discsim.validation.diagnosis.relaxed_fit import beginning
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
 from discsim.validation.identification.from_afar import fitted_from_afar
-from discsim.validation.identification.gauss_newton import Fit, penalty_of, refit
+from discsim.validation.identification.gauss_newton import NO_BARS, Bars, Fit, penalty_of, refit
 from discsim.validation.identification.noise import NoiseModel, estimate_noise, likeliest_noise, log_likelihood
 from discsim.validation.identification.parameters import Parameter, values_of
 from discsim.validation.identification.segments import Trajectory
@@ -49,14 +49,12 @@ def continuous_fit(
     *,
     iterations: int = 8,
     polish: int = 2,
-    bar: float = np.inf,
-    held_bar: float = np.inf,
+    bars: Bars = NO_BARS,
 ) -> ContinuousFit:
     """Fit a hypothesis with segments that are continuous, from the trajectories of a relaxed fit.
 
     ``start`` gives first values of parameters by (key, recordings). The noise is estimated anew from the residuals. A
-    fit whose chi-squared in ``noise`` will stay above ``bar`` is given up after a few steps, and above ``held_bar``
-    after a few held ones.
+    fit whose chi-squared in ``noise`` will stay above its ``bars`` is given up after a few steps.
     """
     parameters = fitted_parameters(hypothesis, own)
     at = np.array([start.get((q.key, q.recordings), q.stated) for q in parameters])
@@ -67,13 +65,13 @@ def continuous_fit(
     begun = fit
     if fit.from_release:
         return scored(hypothesis, fitted_from_afar(fit, bounds=BOUNDS))
-    fit = refit(fit, iterations=iterations, bounds=BOUNDS, bar=bar, held_bar=held_bar)
+    fit = refit(fit, iterations=iterations, bounds=BOUNDS, bars=bars)
     if not np.isfinite(fit.merit):
         # algebra from far away may offer numbers under which no motion lasts
         effects = {candidate.id for candidate in hypothesis.candidates}
         plain = np.array([v if q.group in effects else q.stated for q, v in zip(parameters, at, strict=True)])
-        fit = refit(replace(begun, at=plain), iterations=iterations, bounds=BOUNDS, bar=bar, held_bar=held_bar)
-    for _ in range(polish if fit.merit < min(bar, held_bar) else 0):
+        fit = refit(replace(begun, at=plain), iterations=iterations, bounds=BOUNDS, bars=bars)
+    for _ in range(polish if fit.merit < min(bars) else 0):
         # a sensor of which a lag or an offset has left no reading keeps the noise that it had: it may come back
         fit = replace(fit, noise={**noise, **noise_of(fit)})
         before, fit = fit, refit(fit, iterations=2, bounds=BOUNDS, relinearise=False)

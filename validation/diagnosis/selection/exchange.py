@@ -17,7 +17,7 @@ from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.selection.screening import free_columns
 from discsim.validation.diagnosis.selection.search_state import Rival, Search, from_here, lost, possible, values_of_fit
 from discsim.validation.diagnosis.settings import SELECTION
-from discsim.validation.identification.gauss_newton import merit_of
+from discsim.validation.identification.gauss_newton import Bars, merit_of
 
 __all__ = ["eliminated_backward", "exchanged", "rivals_of", "takes_its_place", "widened"]
 
@@ -42,7 +42,7 @@ def widened(found: Search, final: ContinuousFit) -> ContinuousFit:
             found.own,
             final.fit.noise,
             start,
-            bar=merit_of(final.fit, final.fit.linears) + SELECTION.out_of_reach,
+            bars=Bars(merit_of(final.fit, final.fit.linears) + SELECTION.out_of_reach),
         )
         wide = replace(wide, score=wide.score + found.cost)
         if wide.score - final.score < scope_price(len(found.recordings)) and possible(wide):
@@ -66,7 +66,7 @@ def eliminated_backward(found: Search, current: ContinuousFit, kept: CandidateEf
                 found.own,
                 current.fit.noise,
                 values_of_fit(current),
-                bar=merit_of(current.fit, current.fit.linears) + SELECTION.out_of_reach,
+                bars=Bars(merit_of(current.fit, current.fit.linears) + SELECTION.out_of_reach),
             )
             less = replace(less, score=less.score + found.cost)
             if less.score - current.score < price(candidate) and (weakest is None or less.score < weakest.score):
@@ -121,7 +121,7 @@ def rivals_of(found: Search) -> dict[str, list[Rival]]:
                 found.own,
                 final.fit.noise,
                 from_here(screened, final).start,
-                bar=merit_of(final.fit, final.fit.linears) + SELECTION.out_of_reach,
+                bars=Bars(merit_of(final.fit, final.fit.linears) + SELECTION.out_of_reach),
             )
             other_fit = replace(other_fit, score=other_fit.score + found.cost)
             rivals[candidate.name].append(Rival(scoped, other_fit.score - final.score, other_fit))

@@ -58,7 +58,7 @@ from discsim.validation.diagnosis.selection.search_state import (
 )
 from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
 from discsim.validation.identification.competing_effects import CATALOGUED, Competing
-from discsim.validation.identification.gauss_newton import Fit, merit_of
+from discsim.validation.identification.gauss_newton import Bars, Fit, merit_of
 from discsim.validation.identification.noise import NoiseModel, estimate_noise, robust_noise, stated_noise
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.residual_tests import unmodelled_residuals
@@ -170,7 +170,7 @@ def _baseline(
             base.fit.noise,
             values_of_fit(base),
             iterations=plant.base_steps,
-            bar=merit_of(base.fit, base.fit.linears),
+            bars=Bars(merit_of(base.fit, base.fit.linears)),
         )
         base = min(base, again, key=lambda one: one.score)
     return base
@@ -347,8 +347,7 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
             found.own,
             noise if distant else current.fit.noise,
             {**values_of_fit(current), **screened.start, **_wobbles(fit)},
-            bar=_hopeless(best_chi2, current.fit.count) if distant else beside,
-            held_bar=SELECTION.hopeless_held * best_chi2 if distant else np.inf,
+            bars=_hopeless(best_chi2, current.fit.count) if distant else Bars(beside),
         )
         if not distant and not cost and refitted.score > current.score + SELECTION.worse:
             refitted = _begun_again(found, current, screened, beside)
@@ -370,9 +369,10 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
     return replace(found, cost=found.cost + cost), best
 
 
-def _hopeless(best: float, count: int) -> float:
+def _hopeless(best: float, count: int) -> Bars:
     """Return the chi-squared above which a refit is of no use beside the best so far, of so many readings."""
-    return (SELECTION.hopeless_near if best < SELECTION.far * count else SELECTION.hopeless) * best
+    times = SELECTION.hopeless_near if best < SELECTION.far * count else SELECTION.hopeless
+    return Bars(times * best, SELECTION.hopeless_held * best)
 
 
 def _begun_again(found: Search, current: ContinuousFit, screened: ScreenedCandidate, bar: float) -> ContinuousFit:
@@ -383,7 +383,7 @@ def _begun_again(found: Search, current: ContinuousFit, screened: ScreenedCandid
     shape_grid = {key: number for key, number in screened.start.items() if key[0][1] in screened.candidate.shape_grid}
     start = {**values_of_fit(current), **shape_grid}
     return continuous_fit(
-        current.fit, current.hypothesis.plus(screened.candidate), found.own, current.fit.noise, start, bar=bar
+        current.fit, current.hypothesis.plus(screened.candidate), found.own, current.fit.noise, start, bars=Bars(bar)
     )
 
 
@@ -435,7 +435,7 @@ def _together(found: Search) -> tuple[Search, ContinuousFit | None]:
             found.own,
             noise,
             start,
-            bar=SELECTION.hopeless * SELECTION.far * found.base.fit.count,
+            bars=Bars(SELECTION.hopeless * SELECTION.far * found.base.fit.count),
         )
         both = replace(both, score=both.score + found.cost)
         for candidate in pair.hypothesis.candidates:

@@ -22,7 +22,7 @@ from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate, hinted
 from discsim.validation.diagnosis.selection.search_state import on_the_disc
-from discsim.validation.identification.gauss_newton import Fit, linearised, merit_of
+from discsim.validation.identification.gauss_newton import Bars, Fit, linearised, merit_of
 from discsim.validation.identification.noise import stated_noise
 from discsim.validation.identification.plants.flight import FLIGHT
 from discsim.validation.identification.plants.spin_down import SPIN_DOWN
@@ -51,11 +51,11 @@ def step(
     fit = Fit(fit.trajectories, (), np.empty(0), fit.defects, stated_noise(linears), linears=linears)
     base = ContinuousFit(Hypothesis(), fit, 1e6)
     assert fit.count == COUNT
-    refitted, bars = [], []
+    refitted, asked_for = [], []
 
-    def told(fit: Fit, hypothesis: Hypothesis, *others: object, bar: float, held_bar: float = np.inf) -> ContinuousFit:
+    def told(fit: Fit, hypothesis: Hypothesis, *others: object, bars: Bars) -> ContinuousFit:
         refitted.append(hypothesis.candidates[-1].id)
-        bars.append((merit_of(fit, fit.linears) - bar) / fit.count)
+        asked_for.append((merit_of(fit, fit.linears) - bars.free) / fit.count)
         return ContinuousFit(hypothesis, fit, 0.0 if hypothesis.candidates[-1] == right else 5e5)
 
     def chi2(fitted: ContinuousFit, noise: object) -> float:
@@ -77,7 +77,7 @@ def step(
     )
     _, best = searching.next_effect(found, base, 0)
     assert best is not None
-    return best.hypothesis.candidates[-1].id, refitted, bars
+    return best.hypothesis.candidates[-1].id, refitted, asked_for
 
 
 def test_far_from_the_data_more_is_refitted_until_something_comes_near(monkeypatch):
@@ -112,9 +112,7 @@ def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present
     tilt = free_candidate("rig.axis_tilt")
     size = (("rig.axis_tilt", "tilt_north_rad"), None)
 
-    def told(
-        fit: Fit, hypothesis: Hypothesis, own: object, noise: object, start: dict, *, bar: float, held_bar: float = 0.0
-    ) -> ContinuousFit:
+    def told(fit: Fit, hypothesis: Hypothesis, own: object, noise: object, start: dict, *, bars: Bars) -> ContinuousFit:
         return ContinuousFit(hypothesis, fit, 2e4 if size in start else 0.0)
 
     monkeypatch.setattr(searching, "continuous_fit", told)
@@ -149,7 +147,7 @@ def exchanged(monkeypatch: pytest.MonkeyPatch, without_scale: float) -> set[str]
         free_candidate, ("accel.time_offset", "accel.scale", "board.rotation", "accel.position_offset")
     )
 
-    def told(fit: Fit, hypothesis: Hypothesis, *others: object, bar: float) -> ContinuousFit:
+    def told(fit: Fit, hypothesis: Hypothesis, *others: object, bars: Bars) -> ContinuousFit:
         return ContinuousFit(hypothesis, fit, without_scale if set(hypothesis.candidates) == {offset, place} else 1e4)
 
     monkeypatch.setattr(exchange, "continuous_fit", told)
@@ -183,7 +181,7 @@ def scope(monkeypatch: pytest.MonkeyPatch, everywhere: float) -> frozenset[int] 
     fit = Fit(fit.trajectories, (), np.empty(0), fit.defects, stated_noise(linears), linears=linears)
     stall = replace(free_candidate("aero.stall"), recordings=frozenset([1]))
     monkeypatch.setattr(
-        exchange, "continuous_fit", lambda fit, hypothesis, *_, bar: ContinuousFit(hypothesis, fit, everywhere)
+        exchange, "continuous_fit", lambda fit, hypothesis, *_, bars: ContinuousFit(hypothesis, fit, everywhere)
     )
     monkeypatch.setattr(exchange, "possible", lambda _: True)
     monkeypatch.setattr(exchange, "lost", lambda *_: False)
