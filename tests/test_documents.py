@@ -32,6 +32,14 @@ def test_the_index_lists_every_page():
     assert set(re.findall(r"\]\(([\w-]+\.md)\)", index)) == pages
 
 
+def test_the_sites_navigation_lists_every_page():
+    """Else `mkdocs build --strict` ends with a warning, which no other test runs."""
+    navigation = (ROOT / "mkdocs.yml").read_text(encoding="utf-8").split("\nnav:\n")[1]
+    docs = ROOT / "docs"
+    pages = {str(page.relative_to(docs)) for kind in ("*.md", "*.ipynb") for page in docs.rglob(kind)}
+    assert set(re.findall(r": ([\w/.-]+\.(?:md|ipynb))$", navigation, re.M)) == pages
+
+
 def test_the_format_page_has_every_file_and_header():
     table = dict(re.findall(r"^\| `(\w+)\.csv` \| `([^`]+)` \|$", FORMAT_PAGE, re.M))
     assert table == {sensor: kind.header for sensor, kind in SENSORS.items()} | {"command": COMMAND_HEADER}

@@ -39,7 +39,8 @@ def _hindered(recording: Recording, name: str) -> str:
         return f"{len(recording.samples['magnetometer'])} readings, a window needs {WINDOW}"
     position = recording.sheets["accelerometer"].position if "accelerometer" in recording.sheets else None
     if name.startswith("accelerometer") and (position is None or not np.any(position[:2])):
-        return "position_m is not stated, or on the axis"
+        what = "is not stated" if position is None else "lies on the axis"
+        return f"position_m {what}; state it below [sensors.accelerometer] of the import map, or of recording.toml"
     return ""
 
 

@@ -15,7 +15,7 @@ from discsim.result import Result
 from discsim.threads import one_thread
 from discsim.validation.checking.check import Check, check_recording
 from discsim.validation.checking.table import print_checks
-from discsim.validation.diagnosis.setup import find_setup_faults
+from discsim.validation.diagnosis.setup import find_setup_faults, suspected_fault
 from discsim.validation.reporting.figures import COLOURS, new_figure
 from discsim.validation.reporting.run import json_text
 from discsim.validation.running.given import Given, given_recordings
@@ -90,5 +90,6 @@ def check(recordings: Given) -> Checked:
     200
     """
     found = given_recordings(recordings)
-    faults = find_setup_faults(found).faults
+    setup = find_setup_faults(found)
+    faults = [*setup.faults, *filter(None, [suspected_fault(setup)])]
     return Checked(tuple(check_recording(recording, faults) for recording in found))

@@ -43,11 +43,12 @@ def print_checks(checks: Sequence[Check], console: Console | None = None) -> Non
             for line in check.not_told:
                 console.print(f"  {escape(line)}", highlight=False)
     errors, warnings = (sum(len(check.of(severity)) for check in checks) for severity in ("error", "warning"))
-    console.print(f"{errors} errors, {warnings} warnings in {_count(len(checks))}", highlight=False)
+    counts = f"{_count(errors, 'error')}, {_count(warnings, 'warning')} in {_count(len(checks), 'recording')}"
+    console.print(counts, highlight=False)
 
 
-def _count(number: int) -> str:
-    return "1 recording" if number == 1 else f"{number} recordings"
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" + "s" * (number != 1)
 
 
 def _table(check: Check) -> Table:

@@ -48,6 +48,7 @@ from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.search_state import Considered, Search, chi2_in
 from discsim.validation.diagnosis.selection.stepwise import tried_without
 from discsim.validation.diagnosis.settings import settings_told
+from discsim.validation.diagnosis.setup import suspected_fault
 from discsim.validation.diagnosis.setup_effects import SetupAnswer, answer_of_setup, on_board_axes
 from discsim.validation.diagnosis.stages import Judged, Question
 from discsim.validation.diagnosis.uninflated_noise import capped, spoilt_groups, uninflated_noise
@@ -350,7 +351,9 @@ def outcome_of(judged: Judged, question: Question) -> Outcome:
     rows, agreement = ready.rows, ready.agreement
     unsaid = () if rows is None or judged.verdict != "unexplained" else rows.sentences
     searched_for = _speed_searched_for(ready.meant) if judged.verdict == "unexplained" else ()
-    warnings = (*setup.warnings, *unsaid, *searched_for, *ready.notes)
+    perhaps = suspected_fault(ready.setup) if judged.verdict == "unexplained" else None
+    suspicion = () if perhaps is None else (f"P{perhaps.sentence[1:]}.",)
+    warnings = (*suspicion, *setup.warnings, *unsaid, *searched_for, *ready.notes)
     turning = None
     # where rows had to be counted, what sensors say of one another at the times as written is not so
     if judged.verdict == "unexplained" and rows is None and not plant_of(ready.meant[0]).path_known:

@@ -53,7 +53,7 @@ def prepared(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[lis
         usable.append(replace(recording, samples=kept, sheets=sheets))
         _enough(usable[-1], name)
     said = [note if len(where) == len(names) else f"{', '.join(where)}: {note}" for note, where in notes.items()]
-    return usable, [*_absent(usable, names), *said]
+    return usable, [*_absent(usable, names), *_unplaced(usable), *said]
 
 
 def _in_flight(recording: Recording) -> tuple[Recording, str]:
@@ -151,6 +151,16 @@ def _absent(recordings: Sequence[Recording], names: Sequence[str]) -> Iterator[s
         without = [name for one, name in zip(recordings, names, strict=True) if sensor not in one]
         if 0 < len(without) < len(names):
             yield f"{', '.join(without)}: no {sensor}; what only it shows cannot be said of them."
+
+
+def _unplaced(recordings: Sequence[Recording]) -> Iterator[str]:
+    """Yield what is taken for the accelerometer's place where nobody states it."""
+    sheets = [one.sheets["accelerometer"] for one in recordings if "accelerometer" in one.samples]
+    if any(sheet.position is None for sheet in sheets):
+        yield (
+            "where the accelerometer sits (position_m) is not stated: the centre is taken, and where it does sit shows "
+            "as accel.position_offset."
+        )
 
 
 def _notes(recording: Recording, sensor: str, samples: Samples, left: Samples | None, step: int) -> Iterator[str]:

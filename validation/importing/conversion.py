@@ -304,7 +304,10 @@ def _stretches(table: RawTable, clock: RowClock, rows: slice | None) -> list[str
     if not clock.starts:
         return []
     lines = ", ".join(str(line) for line, _ in clock.starts[:5]) + ", ..." * (len(clock.starts) > 5)
-    kept = "the longest is kept; --rows A:B takes another" if rows is None else "of --rows the longest is kept"
+    every = [np.flatnonzero(clock.known & (clock.stretch == one)) for one in np.unique(clock.stretch[clock.known])]
+    spans = [f"{table.number[some[0]]}:{table.number[some[-1]] + 1}" for some in every[:6]]
+    another = f"--rows takes another: {', '.join(spans)}" + ", ..." * (len(every) > len(spans))
+    kept = f"the longest is kept; {another}" if rows is None else "of --rows the longest is kept"
     return [
         f"WARNING: {table.path.name}: the clock starts anew in line {lines}: {len(clock.starts) + 1} stretches; {kept}"
     ]

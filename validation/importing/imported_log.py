@@ -17,7 +17,7 @@ from discsim.recording import Recording, write_recording
 from discsim.result import Result
 from discsim.threads import one_thread
 from discsim.validation.checking import check_recording
-from discsim.validation.diagnosis.setup import find_setup_faults
+from discsim.validation.diagnosis.setup import find_setup_faults, suspected_fault
 from discsim.validation.importing.conversion import Imported, RawReadings, read_readings, repairs_csv
 from discsim.validation.importing.import_map import ImportMap, find_map, read_map
 from discsim.validation.importing.raw_table import Repair
@@ -105,7 +105,8 @@ class ImportedLog(Result):
         lines.append(self.imported[0].summary)
         lines += dict.fromkeys(advice for one in self.recordings for advice in check_recording(one).advice)
         axes = {sensor: own.axes for sensor, own in self.import_map.sensors.items()}
-        faults = find_setup_faults(self.recordings).faults
+        setup = find_setup_faults(self.recordings)
+        faults = [*setup.faults, *filter(None, [suspected_fault(setup)])]
         return lines + [f"warning: {fault.id}: {fault.advice(axes)}" for fault in faults]
 
     @property

@@ -341,7 +341,8 @@ def test_the_longest_stretch_is_imported_or_the_one_that_rows_pick(tmp_path):
     whole = imported(tmp_path, stamps, mag, turning(500))
     assert len(whole.recording.samples["gyroscope"]) == 300
     assert_allclose(whole.recording.samples["magnetometer"].value[0], mag[200], rtol=1e-6)
-    assert any("the clock starts anew in line 202: 2 stretches; the longest is kept" in note for note in whole.notes)
+    said = "the clock starts anew in line 202: 2 stretches; the longest is kept; --rows takes another: 0:200, 200:500"
+    assert any(said in note for note in whole.notes)
     assert [(r.line, r.action) for r in whole.repairs] == [(202, "a new stretch begins here")]
     first = imported(tmp_path, stamps, mag, turning(500), rows=":200")
     assert len(first.recording.samples["gyroscope"]) == 200

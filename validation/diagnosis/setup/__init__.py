@@ -5,7 +5,8 @@ from discsim.validation.diagnosis.setup.find import (
     SetupFindings,
     find_setup_faults,
     said,
+    suspected_fault,
     with_likeliest_fault,
 )
 
-__all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said", "with_likeliest_fault"]
+__all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said", "suspected_fault", "with_likeliest_fault"]

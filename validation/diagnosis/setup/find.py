@@ -25,13 +25,15 @@ from discsim.validation.diagnosis.setup.units import clock_unit, sensor_units
 from discsim.validation.identification.plants import Plant, plant_of
 from discsim.written import corrected
 
-__all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said", "with_likeliest_fault"]
+__all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said", "suspected_fault", "with_likeliest_fault"]
 
 #: what a fault must gain, in twice the log likelihood of the relations between sensors; on 40 concealed sets of all
 #: kinds the largest gain of a fault that is not there is 15 (lost samples of a magnetometer), the next 0.3
 PRICE = 30.0
 #: what it must gain in a flight where a short fit bears it out
 _PRICE_IN_AIR = 15.0
+#: what makes a suspicion of it, as one short throw may: above all but one of those 40
+_SUSPECT = 15.0
 #: sensors agree where the cost per independent statement is below this; sound sets have 0.02 to 0.25
 AGREE, SOUND = 0.6, 0.25
 #: no relation may be left to hold worse than this, cost per statement: 7 ordinary errors. A turned board that empties a
@@ -76,6 +78,14 @@ class SetupFault:
         return f"{text}; {remedy(self.effect, axes)}"
 
 
+class SuspectedFault(SetupFault):
+    """A fault that would make the sensors agree and gains too little to be named."""
+
+    def advice(self, axes: Mapping[str, MapAxes] | None = None) -> str:
+        """Return the sentence as a supposition."""
+        return f"perhaps {super().advice(axes)}; too little turned here to be sure: a second throw or spin would tell"
+
+
 @dataclass(frozen=True)
 class SetupFindings:
     """The faults of a setup, and the recordings as they were meant, in the order in which they were given."""
@@ -116,6 +126,24 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
         faults += found
         current = tuple(corrected(one, [fault.effect for fault in found]) for one in current)
     return SetupFindings(tuple(faults), current, hints)
+
+
+def suspected_fault(findings: SetupFindings) -> SuspectedFault | None:
+    """Return the fault that makes sensors agree and gains too little to be named, as of one short throw; None if none.
+
+    Where some fault was found already, nothing more is suspected.
+    """
+    recordings = [_judgeable(one) for one in findings.recordings]
+    if findings.faults or findings.hints or not all(one.samples for one in recordings):
+        return None
+    ranking = hypotheses(recordings, _SUSPECT)
+    found = ranking.found
+    if not found or found[0].kind == "rival" or not _agrees(found[0]):
+        return None
+    if not _gains(ranking.as_written, found[0], _SUSPECT / PRICE):
+        return None
+    likeliest = _fault(ranking.as_written, tuple(item for item in found if item.kind != "rival"), recordings)
+    return SuspectedFault(likeliest.effect, likeliest.gain, likeliest.heldout_gain, likeliest.twins)
 
 
 def with_likeliest_fault(findings: SetupFindings) -> SetupFindings | None:

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 from support.made import tables, throws
 
 from discsim.effects import CATALOGUE, Effect, effect
+from discsim.recording import Recording
+from discsim.sensors import Instruments, record
+from discsim.shipped import load_disc, load_site
+from discsim.trajectory import predict
+from discsim.validation.checking.checked import check
 from discsim.validation.diagnosis.selection.candidates import available, candidates_for, parameters_of
 from discsim.validation.diagnosis.selection.stepwise import search
-from discsim.validation.diagnosis.setup import SetupFindings
+from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, suspected_fault
 from discsim.validation.diagnosis.setup_effects import with_reversed_axes
+from discsim.validation.scenarios.throws import Throw
 from discsim.written import as_written
 
 
@@ -90,3 +97,35 @@ def test_an_axis_that_the_fit_finds_scaled_by_minus_one_is_a_reversed_column():
 def test_a_small_scale_is_no_reversed_column():
     made = tuple(tables(errors=[effect("gyro.scale", sx=0.0, sy=0.0, sz=0.03)]))
     assert with_reversed_axes(SetupFindings((), made), search(made).final.fit) is None
+
+
+@cache
+def short_throw(heading: float) -> Recording:
+    """Return what a board records of two seconds in the air, with its place and the disc unknown."""
+    disc, air = load_disc("driver")
+    place = replace(air, magnetic_field=load_site("seoul").environment.magnetic_field)
+    motion = predict(disc, place, Throw(24.0, heading, 1500.0).release, duration=2.3).motion()
+    flight = record(motion, Instruments.from_parts("mpu9250"), np.random.default_rng(3), plant="flight", name="one")
+    sheets = {name: replace(sheet, position=None) for name, sheet in flight.sheets.items()}
+    return replace(flight, plant="free_spin", sheets=sheets, environment=place)
+
+
+@pytest.mark.parametrize("fault", [effect("mag.axes", axes="x y -z"), effect("gyro.axes", axes="x -y z")])
+def test_a_flipped_axis_of_one_short_throw_is_suspected_and_of_two_named(fault: Effect):
+    one, other = (as_written(short_throw(heading), [fault]) for heading in (0.0, 180.0))
+    alone = find_setup_faults([one])
+    assert alone.faults == ()
+    suspected = suspected_fault(alone)
+    assert suspected is not None
+    assert suspected.effect == fault
+    assert suspected.sentence.startswith("perhaps the ")
+    assert suspected.sentence.endswith("a second throw or spin would tell")
+    told = [finding for finding in check(one).checks[0].findings if finding.id == fault.id]
+    assert [finding.severity for finding in told] == ["warning"]
+    both = find_setup_faults([one, other])
+    assert fault.id in [found.id for found in both.faults]
+    assert suspected_fault(both) is None
+
+
+def test_nothing_is_suspected_of_a_sound_short_throw():
+    assert suspected_fault(find_setup_faults([short_throw(0.0)])) is None
