@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import linprog
 
 from discsim.arrays import ComplexArray, FloatArray
 from discsim.recording import Recording, Samples
@@ -41,8 +42,6 @@ _STARTS, _PHASES = (0.2, 0.4, 0.6, 0.8), 4
 _PRICE, _ANOTHER = 24.0, 0.02
 #: what chooses one of two teeth costs, in twice the log likelihood
 _CHOICE = 2.0 * float(np.log(2.0))
-#: between which shares of its rows the ages of the field's samples are taken: a few rows are miscounted
-_AGES = (0.02, 0.98)
 #: a comb this near to the logger's loop is the loop itself: the chip is read as it is sampled
 _SAME = 0.02
 
@@ -329,8 +328,18 @@ def imu_clock_of(recordings: Sequence[Recording], names: Sequence[str], clock: O
 def _asked_between(rows: ImuRows, wobble: _Wobble) -> ImuRows:
     """Return rows of the loop's own instants where these lie between a row's newest sample of the field and the next.
 
-    A wobble's phase tells instants but for one time that all are off by. Beside a part that free-runs they are of every
-    age from none to a period of it, which tells that time.
+    A wobble's phase tells instants roughly, and but for one time that all are off by. Beside a part that free-runs they
+    are of every age from none to a period of it: the evenly spaced instants that stay farthest within these bounds are
+    found by linear programming, a row that was miscounted paying for how far it is outside.
     """
-    youngest, oldest = np.quantile(rows.times - wobble.asked, _AGES)
-    return replace(rows, times=rows.times + 0.5 * (wobble.within - float(youngest + oldest)))
+    step = np.rint((rows.times - rows.times[0]) / rows.period_s)
+    count, one = step.size, np.ones((step.size, 1))
+    own = -np.eye(count)
+    # unknowns: first instant, spacing, least distance from a bound, how far each row is outside
+    late = np.hstack([-one, -step[:, None], one, own])
+    early = np.hstack([one, step[:, None], one, own])
+    cost = np.concatenate([[0.0, 0.0, -1.0], np.ones(count)])
+    limits = np.concatenate([-wobble.asked, wobble.asked + wobble.within])
+    bounds = [(None, None)] * 3 + [(0.0, None)] * count
+    best = linprog(cost, np.vstack([late, early]), limits, bounds=bounds)
+    return rows if best.x is None else replace(rows, times=best.x[0] + best.x[1] * step)

@@ -63,8 +63,8 @@ def test_rows_that_are_read_in_step_stand_behind_the_samples_that_they_show_by_t
         newest = put.samples["magnetometer"].t + 0.5 * shown.apart * shown.period_of_others_s
         age = put.samples["gyroscope"].t - newest
         true = loop.ages(seed + k)
-        # as the field's samples slip by 0.6 ms in a step, ages that are none or a whole period are seen to that
-        assert np.median(age - true) == pytest.approx(0.0, abs=6e-4)
+        # as the field's samples slip by 0.6 ms in a step, ages that are none or a whole period are seen to better
+        assert np.quantile(np.abs(age - true), 0.95) < 3e-4
         assert true.mean() > 3e-3
 
 
