@@ -53,6 +53,7 @@ def command(
     from discsim.validation.reporting.options import at_place
     from discsim.validation.reporting.progress import shown
     from discsim.validation.reporting.run import start_run
+    from discsim.validation.reporting.time_left import TimeLeft
 
     files = user_effects or []
     effects = load_user_effects(files)
@@ -64,7 +65,7 @@ def command(
     plans = None if candidates is None else read_plans(candidates, recordings[0][0].plant)
     named = dict(zip(names, recordings, strict=True))
     with start_run(out, seed, [*datasets, *files, *([candidates] if candidates else [])]) as run:
-        with shown(table=recordings[0][0].plant == "rate_table") as progress:
+        with shown(TimeLeft(table=recordings[0][0].plant == "rate_table")) as progress:
             found = diagnose_named(named, progress=progress, seed=seed, user_effects=effects, plans=plans)
         found.report(out, command=f"discsim {' '.join(run.command)}")
     typer.echo(found.summary())

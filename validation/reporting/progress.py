@@ -1,4 +1,4 @@
-"""How far a diagnosis has come: a bar on a terminal, one line per stage elsewhere."""
+"""How far long work has come: a bar on a terminal, one line per stage elsewhere."""
 
 from __future__ import annotations
 
@@ -8,18 +8,24 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeAlias
 
-from discsim.validation.reporting.time_left import TimeLeft
-
-__all__ = ["Pace", "Progress", "in_words", "shown"]
+__all__ = ["Left", "Pace", "Progress", "in_words", "nobody_knows", "shown"]
 
 #: called with what is being done, how much of it is done, and how much there is: ("screening", 3, 44)
 Progress: TypeAlias = Callable[[str, int, int], None]
 
+#: called as `Progress`, it gives the seconds that are left of all, or None where nobody knows (`TimeLeft`)
+Left: TypeAlias = Callable[[str, int, int], float | None]
+
+
+def nobody_knows(stage: str, done: int, total: int) -> float | None:
+    """Return None: of work whose stages nobody has timed."""
+    del stage, done, total
+    return None
+
 
 @contextmanager
-def shown(*, table: bool = False) -> Iterator[Progress]:
-    """Show on stderr how far a diagnosis is while the block runs, of a rate ``table`` or of anything else."""
-    whole = TimeLeft(table=table)
+def shown(whole: Left = nobody_knows) -> Iterator[Progress]:
+    """Show on stderr how far work is while the block runs; ``whole`` tells how long all of it still takes."""
     if not sys.stderr.isatty():
         yield _Lines(whole)
         return
@@ -39,7 +45,7 @@ def shown(*, table: bool = False) -> Iterator[Progress]:
 
 
 def in_words(seconds: float | None) -> str:
-    """Return the time that is left of a whole diagnosis in words, to one figure or two: empty where nobody knows."""
+    """Return the time that is left of the whole in words, to one figure or two: empty where nobody knows."""
     if seconds is None or seconds < 1.0:
         return ""
     return f"about {seconds:.0f} s left in all" if seconds < 90.0 else f"about {seconds / 60.0:.0f} min left in all"
@@ -73,7 +79,7 @@ class Pace:
 class _Lines:
     """Writes a line when a stage begins: what is done, which step of how many it is, and the time so far."""
 
-    def __init__(self, whole: TimeLeft) -> None:
+    def __init__(self, whole: Left) -> None:
         self._stage = ""
         self._whole = whole
         self._started = time.monotonic()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import resource
 import shutil
 import subprocess
@@ -213,7 +214,7 @@ def _checked(one: Answers) -> str:
     said = one.said.get("check")
     if said is None or said.status != 0:
         return _failed(said)
-    return next((line.split(" in ")[0] for line in said.text.splitlines() if " errors, " in line), "")
+    return next((line.split(" in ")[0] for line in said.text.splitlines() if re.match(r"\d+ errors?, ", line)), "")
 
 
 def _estimated(one: Answers) -> str:
