@@ -59,7 +59,7 @@ def diagnose(
 def tried_under(setup: SetupFindings, question: Question) -> Tried:
     """Follow recordings as a setup says that they were meant and search effects, unless their sensors contradict."""
     progress, ready = question.progress, prepared_under(setup, question)
-    free = (*free_parameters(setup), *(() if ready.rows is None else ready.rows.free))
+    free = free_parameters(setup)
     known = (*stated_parameters(ready.fitted), *free)
     progress("asking whether sensors contradict one another", 0, 5)
     contradiction = contradiction_in(ready.fitted, known)

@@ -15,7 +15,6 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
-from discsim.effects.sensors import ClockRate
 from discsim.effects.timing_rows import Average, ImuClock, LostRows, OwnClock
 from discsim.recording import Recording
 from discsim.validation.diagnosis.answer.measured import Located
@@ -24,20 +23,14 @@ from discsim.validation.diagnosis.consistency.imu_clock import ImuClock as Found
 from discsim.validation.diagnosis.consistency.own_clock import OwnClock as FoundClock
 from discsim.validation.diagnosis.consistency.phase_regression import angle_turned, signal_of, slow_columns
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, RowProof
-from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.noise import NoiseModel
-from discsim.validation.identification.parameters import Parameter
 
 __all__ = ["RowTimes", "row_times"]
 
 #: what a second sensor must gain in twice the log likelihood by times that it took no part in: an effect's entry
 _SECOND = 24.0
-#: the scale of all times
-_SCALE = (catalogued(ClockRate, "clock").id, "ratio")
 #: recordings of one logger have one period: their own ones may differ by this share
 _ALIKE = 5e-3
-#: by how much the precession of ordinary throws bends the phase of a field, as a share of their spin: 4 deg/s of 3500
-_BENT = 1e-3
 #: knots of the wobble's amplitude, s, as in the count itself by half: it halves in 0.3 s or more
 _KNOTS_S = 0.15
 
@@ -78,27 +71,6 @@ class RowTimes:
             clock += 4.0 * shown.newest.size * float(np.log(shown.left[0] / shown.left[1]))
         # single samples leave what counted rows do: there the pattern of those that were skipped tells the clock
         return rows, clock if self.clock.weight else self.clock.gain
-
-    @property
-    def free(self) -> tuple[Parameter, ...]:
-        """The scale of all times, for a fit to refine: a period is counted as if nothing but the spin turned the field.
-
-        Precession turns it, too, which only a fit of the motion knows.
-        """
-        sigma = float(np.hypot(_BENT, self.clock.sd_s / self.clock.period_s))
-        return (Parameter(*_SCALE, 1.0, 1e-6, sigma),)
-
-    def refined(self, fit: Fit) -> RowTimes:
-        """Return what was counted with the scale of times that a fit has found, and its error."""
-        place = next((j for j, q in enumerate(fit.parameters) if q.key == _SCALE and q.recordings is None), None)
-        if place is None or fit.covariance.shape[0] != len(fit.parameters):
-            return self
-        ratio, sd = float(fit.at[place]), float(np.sqrt(fit.covariance[place, place]))
-        clock = replace(self.clock, period_s=self.clock.period_s / ratio, sd_s=self.clock.period_s * sd)
-        imu = self.imu
-        if imu is not None:
-            imu = replace(imu, period_s=imu.period_s / ratio, sd_s=float(np.hypot(imu.sd_s, imu.period_s * sd)))
-        return replace(self, clock=clock, imu=imu)
 
     def effects(self) -> tuple[NamedEffect, ...]:
         """Return what was counted as effects of an answer; figures of each recording are by the period of others."""

@@ -11,22 +11,19 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from discsim.effects.catalogue import CATALOGUE
-from discsim.effects.sensors import CrossAxis, Lag, SoftIron
+from discsim.effects.sensors import Lag
 from discsim.validation.diagnosis.held_out import heldout_chi2
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate, parameters_of
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.evidence import TURNED, price
-from discsim.validation.diagnosis.selection.exchange import takes_its_place
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
 from discsim.validation.diagnosis.selection.screening import NormalEquations
-from discsim.validation.diagnosis.selection.search_state import Search, far, on_the_disc, possible, values_of_fit
+from discsim.validation.diagnosis.selection.search_state import Search, far, on_the_disc, possible
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.parameters import Parameter
 
 __all__ = ["all_at_once", "worth_of_each"]
 
-#: errors of a sensor whose numbers are a matrix, as those of a small turn are
-_MATRICES = (CrossAxis, SoftIron)
 #: most effects at once: those of the consistency stage and the ordinary errors of three sensors that it goes with
 _MOST = 8
 #: most steps of their fit: it begins where the relaxed fit has them, and closes segments that this let part
@@ -55,8 +52,6 @@ def all_at_once(found: Search) -> ContinuousFit | None:
         fitted = _fitted(found, fewer)
     if fitted is None:
         return None
-    fitted = _turned_instead(found, fitted)
-    fewer = fitted.hypothesis.candidates
     worth = found.base.score - fitted.score > sum(map(price, fewer))
     return fitted if worth and possible(fitted) else None
 
@@ -74,52 +69,6 @@ def _fitted(found: Search, candidates: tuple[CandidateEffect, ...]) -> Continuou
     return continuous_fit(
         relaxed_fit, Hypothesis(candidates), found.own, found.relaxed_noise, start, iterations=_STEPS, polish=2
     )
-
-
-def _turned_instead(found: Search, fitted: ContinuousFit) -> ContinuousFit:
-    """Return a fit with a chip that is turned in place of six numbers of its sensor where it explains as much.
-
-    Beside each other neither is worth its price, and the one with more numbers is the last to go. What stood in for the
-    squares of a turn, as a scale, is left out with it.
-    """
-    competing = {candidate.id for candidate in found.candidates}
-    for candidate in fitted.hypothesis.candidates:
-        if candidate.row.type not in _MATRICES:
-            continue
-        for id in sorted(TURNED & competing):
-            rival = free_candidate(id)
-            if rival.row.acts_on != candidate.row.acts_on or any(one.id == id for one in fitted.hypothesis.candidates):
-                continue
-            values = values_of_fit(fitted)
-            start = {**values, **_turn_of(values, candidate, rival)}
-            other = _again(found, fitted, fitted.hypothesis.without(candidate).plus(rival), start)
-            about = found.about(other.fit)
-            fewer = _held_out(about, _pruned(about.equations, other.hypothesis.candidates, found.own))
-            if len(fewer) < len(other.hypothesis.candidates) and any(one.id == id for one in fewer):
-                other = _again(found, other, Hypothesis(fewer), values_of_fit(other))
-            left_out = fitted.hypothesis.size - len(parameters_of(candidate))
-            left_out -= other.hypothesis.size - len(parameters_of(rival))
-            worse = other.score - fitted.score - SELECTION.rival * left_out
-            if possible(other) and takes_its_place(worse, rival, candidate):
-                fitted = other
-    return fitted
-
-
-def _again(found: Search, fitted: ContinuousFit, hypothesis: Hypothesis, start: Start) -> ContinuousFit:
-    """Return the fit of other effects that begins where a fit stands."""
-    return continuous_fit(fitted.fit, hypothesis, found.own, found.relaxed_noise, start, iterations=_STEPS, polish=2)
-
-
-def _turn_of(values: Start, candidate: CandidateEffect, rival: CandidateEffect) -> Start:
-    """Return the rotation vector that does about what a matrix does: v - r x v is (I + S) v.
-
-    Of a symmetric one that is what it adds to z, which shows the turning part of the other two.
-    """
-    S = {name: values.get(((candidate.id, name), None), 0.0) for name in candidate.row.parameters}
-    turn = (-S["syz"], S["sxz"], 0.0)
-    if candidate.row.type is CrossAxis:
-        turn = (0.5 * (S["syz"] - S["szy"]), 0.5 * (S["szx"] - S["sxz"]), 0.5 * (S["sxy"] - S["syx"]))
-    return {((rival.id, name), None): r for name, r in zip(rival.row.parameters, turn, strict=True)}
 
 
 def _held_out(

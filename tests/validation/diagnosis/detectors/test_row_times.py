@@ -13,10 +13,8 @@ from discsim.effects import effect
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of
 from discsim.validation.diagnosis.detectors.row_times import RowTimes, row_times
-from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.noise import GroupNoise
 from discsim.validation.identification.observations import readings_of
-from discsim.validation.identification.plants.free_spin import FREE_SPIN
 
 NAMES = tuple(loop.NAMES)
 HIDDEN = (
@@ -72,22 +70,6 @@ def test_a_fit_sees_the_field_as_means_of_two_samples_at_their_times():
         # a fifth of the rows is missing, so that it lasted longer than it is written
         assert after.end / before.end == pytest.approx(1.25, abs=0.1)
         assert {len(own) for own in after.samples.values()} == {len(own) for own in before.samples.values()}
-
-
-def test_a_fit_may_scale_all_times_and_what_was_counted_follows_it():
-    found = counted()
-    (scale,) = found.free
-    assert scale.key == ("clock.rate", "ratio")
-    # precession bends the phase of a field by up to 15 deg/s, of a spin of 4000
-    assert 0.0005 < scale.sigma < 0.004
-    bare = Fit((), (scale,), np.array([1.001]), FREE_SPIN.sizes.continuous, {}, covariance=np.array([[4e-10]]))
-    here, refined = ({one.id: one.parameters for one in some.effects()} for some in (found, found.refined(bare)))
-    period, better = (some["mag.own_clock"]["period_s"] for some in (here, refined))
-    # written times are the true ones times the ratio
-    assert better.value == pytest.approx(period.value / 1.001)
-    assert better.sd == pytest.approx(2e-5 * period.value)
-    assert refined["clock.lost_rows"] == here["clock.lost_rows"]
-    assert found.refined(replace(bare, parameters=(), at=np.array([]))) is found
 
 
 def test_the_baseline_is_charged_for_the_field_as_it_is_written():
