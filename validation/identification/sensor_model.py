@@ -132,6 +132,8 @@ def sensed(sensor: str, recording: Recording, values: Values, effects: Competing
             return ("position",)
         case RateReference():
             return ("rate",)
+        case _:
+            return MOTION
 
 
 def _state(t: FloatArray, rows: FloatArray) -> State:

@@ -153,7 +153,8 @@ def test_the_throws_of_an_ultimate_disc_agree_once_their_rows_are_counted():
     assert all(own == pytest.approx(found.rows.tick_s, rel=3e-3) for own, _ in found.rows.own.values())
     for proof in found.row_proofs:
         written, even, counted, _ = proof.left
-        assert counted < 0.5 * even < 0.5 * written
+        # a magnetometer that free-runs beside the loop leaves more than noise: its own clock is found next
+        assert counted < 0.6 * even < 0.3 * written
         assert proof.wobble is not None
         assert proof.wobble > 0.5
     assert found.settling is not None
