@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from discsim.validation.diagnosis.diagnosed import diagnose_recordings as diagnose
     from discsim.validation.estimating.spin_estimates import estimate_spin as estimate
     from discsim.validation.importing.imported_log import import_log
+    from discsim.validation.planning.planned import plan
     from discsim.validation.sweeps.swept import sweep
     from discsim.validation.yaw_damping.fitted import fit_recordings as fit
 
@@ -75,6 +76,7 @@ __all__ = [
     "load_part",
     "load_site",
     "load_throw",
+    "plan",
     "predict",
     "read_dataset",
     "read_model",
@@ -113,6 +115,7 @@ _HOMES = {
     "load_part": "discsim.sensors.instruments:read_part",
     "load_site": "discsim.shipped",
     "load_throw": "discsim.shipped",
+    "plan": "discsim.validation.planning.planned",
     "predict": "discsim.trajectory",
     "read_dataset": "discsim.recording",
     "read_model": "discsim.model_file",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,11 +11,19 @@ from discsim.effects.catalogue import CATALOGUE
 from discsim.validation.planning.limits import Limits
 from discsim.validation.reporting.figures import new_figure, save_figure
 
-__all__ = ["draw_limits"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_limits", "limits_figure"]
 
 
 def draw_limits(limits: Limits, path: Path) -> None:
-    """Draw for each effect its sizes, seen and named, over the small but visible size that the catalogue states."""
+    """Write the figure of `limits_figure` to a file."""
+    save_figure(limits_figure(limits), path)
+
+
+def limits_figure(limits: Limits) -> Figure:
+    """Return for each effect its sizes, seen and named, over the small but visible size that the catalogue states."""
     rows = []
     for one in limits.effects:
         row = CATALOGUE[one.id]
@@ -39,4 +48,4 @@ def draw_limits(limits: Limits, path: Path) -> None:
     axes.set_title("What these recordings can show, a dot for each parameter")
     # below the axes: dots may lie in each corner
     figure.legend(loc="outside lower center", ncols=2, fontsize=8)
-    save_figure(figure, path)
+    return figure

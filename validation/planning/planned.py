@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from discsim.files import write_text
 from discsim.frames import quaternion_from_matrix
 from discsim.launch import launch_of, released
 from discsim.recording import Plant, Recording
+from discsim.result import Result
 from discsim.shipped import load_disc, load_throw
 from discsim.validation.diagnosis.design.plans import plans_about
 from discsim.validation.identification.plants.plan import Plan, towards
@@ -26,6 +27,9 @@ from discsim.validation.planning.limits import Coefficient, Limits, coefficients
 from discsim.validation.planning.recordings import Bench, planned_trajectory, plans_like
 from discsim.validation.reporting.run import json_text
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 __all__ = ["Planned", "plan", "throws_about"]
 
 #: a throw ends on the ground, at the latest after this long, s
@@ -33,7 +37,7 @@ _LONGEST_THROW = 15.0
 
 
 @dataclass(frozen=True, repr=False)
-class Planned:
+class Planned(Result):
     """What planned recordings could show.
 
     Attributes
@@ -98,6 +102,22 @@ class Planned:
                     f"best hardware: {most.text}, which divides the sizes that are named by {most.effects:.2f}"
                 )
         return "\n".join(lines)
+
+    def table(self) -> dict[str, list[Any]]:
+        """Return a row for each parameter of each effect: the sizes that are seen and named, and what is nearest."""
+        rows = [
+            (one.id, name, seen, named, one.rival, one.taken)
+            for one in self.limits.effects
+            for name, seen, named in zip(one.parameters, one.seen, one.named, strict=True)
+        ]
+        names = ("effect", "parameter", "seen", "named", "nearest", "share")
+        return {name: [row[k] for row in rows] for k, name in enumerate(names)}
+
+    def plot(self) -> Figure:
+        """Return the figure of the sizes that are seen and named."""
+        from discsim.validation.planning.figures import limits_figure
+
+        return limits_figure(self.limits)
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of plan.json."""
