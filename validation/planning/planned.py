@@ -182,6 +182,8 @@ def plan(
 ) -> Planned:
     """Tell what recordings that are planned could show: effects, pairs of them, coefficients, and what to do better.
 
+    Raises `InputError` where no recording can be made, or parts or plant are unknown.
+
     Parameters
     ----------
     plans
@@ -199,8 +201,6 @@ def plan(
         Recordings that could be added; by default such as are made easily about the first.
     instead : sequence of parts
         Other sets of parts, to be compared with these.
-
-    Raises `InputError` where no recording can be made, or parts or plant are unknown.
     """
     in_hand = [] if isinstance(plans, int) else [one for one in plans if isinstance(one, Recording)]
     if in_hand:
