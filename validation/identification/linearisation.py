@@ -225,6 +225,7 @@ class _Read:
         self.rows = [np.empty((s.instants.size, ROW)) for s in samples]
         self.ideal = [np.empty((s.instants.size, s.width)) for s in samples]
         self.slopes = [np.zeros((s.instants.size, s.width, columns)) for s in samples]
+        self._senses = [sensed(s.sensor, around.recording, around.values, around.effects) for s in samples]
 
     def run_all(self, segment_of: Sequence[IntArray], threads: int) -> FloatArray:
         """Run all segments and read the sensors; return the states (k, c, s) at the ends of the segments.
@@ -300,9 +301,8 @@ class _Read:
             )
             t, motion = s.instants[o], rows[0, mine]
             self.rows[which][o] = motion
-            senses = sensed(s.sensor, around.recording, around.values, around.effects)
             read = partial(around.read, s.sensor, around.values, t)
-            ideal, follows = readings_of_neighbours(read, senses, rows, mine, spans, bool(around.central))
+            ideal, follows = readings_of_neighbours(read, self._senses[which], rows, mine, spans, bool(around.central))
             self.ideal[which][o] = ideal + s.held[o]
             for j, place in enumerate(half - 1 - around.d):
                 if place >= 0 and around.columns[around.motion[place]].key in _ALSO_READ:

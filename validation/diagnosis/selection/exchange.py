@@ -22,6 +22,11 @@ from discsim.validation.identification.gauss_newton import Bars, merit_of
 __all__ = ["eliminated_backward", "exchanged", "rivals_of", "takes_its_place", "widened"]
 
 
+def _in_reach(fitted: ContinuousFit) -> Bars:
+    """Return what a refit beside a fit may stay above it and still come near by a price or a tie."""
+    return Bars(merit_of(fitted.fit, fitted.fit.linears) + SELECTION.out_of_reach)
+
+
 def widened(found: Search, final: ContinuousFit) -> ContinuousFit:
     """Return a fit with effects that were proposed for one recording in all, where nothing speaks against that.
 
@@ -42,7 +47,7 @@ def widened(found: Search, final: ContinuousFit) -> ContinuousFit:
             found.own,
             final.fit.noise,
             start,
-            bars=Bars(merit_of(final.fit, final.fit.linears) + SELECTION.out_of_reach),
+            bars=_in_reach(final),
         )
         wide = replace(wide, score=wide.score + found.cost)
         if wide.score - final.score < scope_price(len(found.recordings)) and possible(wide):
@@ -66,7 +71,7 @@ def eliminated_backward(found: Search, current: ContinuousFit, kept: CandidateEf
                 found.own,
                 current.fit.noise,
                 values_of_fit(current),
-                bars=Bars(merit_of(current.fit, current.fit.linears) + SELECTION.out_of_reach),
+                bars=_in_reach(current),
             )
             less = replace(less, score=less.score + found.cost)
             if less.score - current.score < price(candidate) and (weakest is None or less.score < weakest.score):
@@ -121,7 +126,7 @@ def rivals_of(found: Search) -> dict[str, list[Rival]]:
                 found.own,
                 final.fit.noise,
                 from_here(screened, final).start,
-                bars=Bars(merit_of(final.fit, final.fit.linears) + SELECTION.out_of_reach),
+                bars=_in_reach(final),
             )
             other_fit = replace(other_fit, score=other_fit.score + found.cost)
             rivals[candidate.name].append(Rival(scoped, other_fit.score - final.score, other_fit))
