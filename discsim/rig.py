@@ -158,6 +158,11 @@ class _Hinge:
         check_state(data)
         self.log.extend((data.time, float(data.qpos[0]), float(data.qvel[0]), float(data.qacc[0])))
 
+    def note_again(self) -> None:
+        """Note the present state in place of the last one, from which it has jumped at the same instant."""
+        del self.log[-4:]
+        self.note()
+
     def run(self, until: float, timestep: float) -> None:
         """Step to ``until`` in equal steps of at most ``timestep``, noting each state."""
         span = until - self.data.time
@@ -224,18 +229,22 @@ def turn_table(
         if stepped_data is data:
             drive_force(flat, segment, data.time, *views)
 
-    data.qvel[0] = profile.value[0]
-    if profile.value[0] != 0.0:  # it turns already, ripple and all
-        data.qvel[0] += speed_ripple(SpeedRipple(*flat.view(PARAMETERS)[0]["rig_speed_ripple"]), 0.0, 0.0)[0]
     slopes = np.diff(profile.value) / np.diff(profile.t)
+    ripple = SpeedRipple(*flat.view(PARAMETERS)[0]["rig_speed_ripple"])
+    turning = False
+    data.qvel[0] = profile.value[0]
     with own_warnings(), passive_force(model, drive):
         for k in chain.from_iterable(progress(_parts(slopes.size))):
-            if k and profile.value[k] == 0.0 and slopes[k] != 0.0:  # it starts to turn, ripple and all
-                turned = float(data.qpos[0]) - yaw
-                data.qvel[0] += speed_ripple(SpeedRipple(*flat.view(PARAMETERS)[0]["rig_speed_ripple"]), turned, 0.0)[0]
+            turning, before = bool(profile.value[k] or slopes[k]), turning
+            if turning != before:
+                # the ripple is there while the table turns: it sets in and ends with it
+                at_once = speed_ripple(ripple, float(data.qpos[0]) - yaw, 0.0)[0]
+                data.qvel[0] += at_once if turning else -at_once
             segment[:] = profile.t[k], profile.value[k], slopes[k], yaw, inertia
             if k == 0:
                 hinge.note()
+            elif turning != before:
+                hinge.note_again()
             hinge.run(float(profile.t[k + 1]), timestep)
     return hinge.motion()
 
