@@ -228,7 +228,7 @@ def _figures(
     held = []
     before = after = 0.0
     for i in range(equations.recordings):
-        rows = equations.linears[i].raw.size
+        rows = final.fit.linears[i].raw.size
         if set_aside:
             alone = set_aside[i].linears[0]
             new = chi_squared(alone, reference, alone.residual)

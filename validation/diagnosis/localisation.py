@@ -13,7 +13,7 @@ from discsim.validation.diagnosis.selection.hypothesis import fitted_parameters
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.uninflated_noise import uninflated_noise
 from discsim.validation.identification.linear import Linear
-from discsim.validation.identification.normal_equations import nuisance_step
+from discsim.validation.identification.normal_equations import nuisance_step, reduce
 
 __all__ = ["located_effect", "located_unmodelled"]
 
@@ -38,29 +38,24 @@ def without(found: Search, candidate: CandidateEffect) -> list[FloatArray]:
 
     What the recordings' own unknowns and the other effects can take over, they do, to first order.
     """
-    board = found.equations
-    final = found.final
-    kept = board.columns_of(fitted_parameters(final.hypothesis.without(candidate), found.own))
-    whole = board.columns_of(final.fit.parameters)
-    stood = {(q.key, q.recordings): at - q.stated for q, at in zip(final.fit.parameters, final.fit.at, strict=True)}
+    board, fit = found.equations, found.final.fit
+    kept = board.columns_of(fitted_parameters(found.final.hypothesis.without(candidate), found.own))
     value = board.solve(kept).value
+    elsewhere = {(q.key, q.recordings): float(v) for (_, q), v in zip(kept, value, strict=True)}
+    stood = fit.at - np.array([q.stated for q in fit.parameters])
+    went = np.array([elsewhere.get((q.key, q.recordings), 0.0) for q in fit.parameters]) - stood
     residuals = []
-    for i, linear in enumerate(board.linears):
-        step = np.zeros(len(board.columns))
-        for column, q in whole:
-            if q.acts_in(i):
-                step[board.place[column]] -= stood[q.key, q.recordings]
-        for (column, q), v in zip(kept, value, strict=True):
-            if q.acts_in(i):
-                step[board.place[column]] += v
-        residuals.append(linear.after(nuisance_step(board.reduced[i], step), step))
+    for i, (linear, trajectory) in enumerate(zip(fit.linears, fit.trajectories, strict=True)):
+        step = np.where([q.acts_in(i) for q in fit.parameters], went, 0.0)
+        reduced = reduce(linear, trajectory, fit.noise, fit.defects)
+        residuals.append(linear.after(nuisance_step(reduced, step), step))
     return residuals
 
 
 def located_effect(found: Search, candidate: CandidateEffect, names: Sequence[str]) -> list[Located]:
     """Return where an effect shows: for an event its instant, for a sensor's fault the sensor and axis."""
     sd = {group: noise.sd for group, noise in found.final.fit.noise.items()}
-    excess = excess_of(without(found, candidate), found.final.residuals, found.equations.linears, sd)
+    excess = excess_of(without(found, candidate), found.final.residuals, found.final.fit.linears, sd)
     row, own = candidate.row, candidate.user
     grows, text = (row.grows_with, row.trace) if own is None else (None, own.text)
     mine = {
@@ -82,7 +77,7 @@ def located_effect(found: Search, candidate: CandidateEffect, names: Sequence[st
             continue
         start, stop = 0.0, max(recording.end for recording in found.recordings)
         if traced:
-            start, stop = _span({k: v for k, v in mine.items() if k[1:] == (sensor, axis)}, found.equations.linears)
+            start, stop = _span({k: v for k, v in mine.items() if k[1:] == (sensor, axis)}, found.final.fit.linears)
         if event:
             instant = _instant(found, candidate)
             width = 2.0 * abs(_value(found, candidate, row.lasts)) if isinstance(row.lasts, str) else 3.0 * row.lasts

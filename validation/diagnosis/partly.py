@@ -79,7 +79,7 @@ def _heldout(found: Search, i: int) -> tuple[float, float]:
     level = {group: noise._replace(correlation=0.0) for group, noise in found.final.fit.noise.items()}
     before = chi_squared(found.base.fit.linears[i], level, found.base.residuals[i])
     after = max(heldout_chi2(found, found.final.hypothesis, i), 0.0)
-    return before / found.base.residuals[i].size, after / found.equations.linears[i].raw.size
+    return before / found.base.residuals[i].size, after / found.final.fit.linears[i].raw.size
 
 
 def _heldout_from_release(before: ContinuousFit, fitted: ContinuousFit) -> list[tuple[float, float]]:

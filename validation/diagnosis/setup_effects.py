@@ -41,6 +41,8 @@ __all__ = ["SetupAnswer", "answer_of_setup", "free_parameters", "on_board_axes",
 _SIGMA: Mapping[type[Any], float] = {TimeOffset: 0.01, BoardRotation: 0.2, SiteField: 0.2}
 #: a number whose error is this share of that was not determined by the recordings
 _UNDETERMINED = 0.3
+#: scale error beyond which an axis reads rather -1 times what it should than nothing
+_REVERSED = -1.5
 
 
 def free_parameters(findings: SetupFindings) -> tuple[Parameter, ...]:
@@ -63,7 +65,9 @@ def with_reversed_axes(findings: SetupFindings, fit: Fit) -> SetupFindings | Non
     for sensor in ("accelerometer", "gyroscope"):
         id = catalogued(Scale, sensor).id
         scales = {q.name: (v, e) for q, v, e in zip(fit.parameters, fit.at, sd, strict=True) if q.group == id}
-        signs = ["-" if v + 3.0 * e < -1.0 else "" for v, e in (scales.get(name, (0.0, 0.0)) for name in Scale._fields)]
+        signs = [
+            "-" if v + 3.0 * e < _REVERSED else "" for v, e in (scales.get(name, (0.0, 0.0)) for name in Scale._fields)
+        ]
         if any(signs):
             axes = effect_of(Axes(" ".join(map("".join, zip(signs, "xyz", strict=True)))), sensor)
             meant = tuple(corrected(one, [axes]) for one in findings.recordings)

@@ -35,7 +35,7 @@ from discsim.validation.identification.propagation import Column
 from discsim.validation.identification.release_prior import release_rows
 from discsim.validation.identification.segments import Trajectory, stepped
 
-__all__ = ["NO_BARS", "Bars", "Fit", "linearised_columns", "refit"]
+__all__ = ["NO_BARS", "Bars", "Fit", "linearised_columns", "linearised_in", "refit"]
 
 #: recordings that are worked on at once, on as many threads as there are cores
 THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -155,15 +155,16 @@ def repredicted(fit: Fit) -> tuple[Linear, ...] | None:
 
 def linearised_columns(fit: Fit, columns: Sequence[Column]) -> tuple[Linear, ...]:
     """Linearise all trajectories where they stand, with any columns; one that is another recording's own is zero."""
+    return tuple(mapped(lambda index: linearised_in(fit, index, columns), range(len(fit.trajectories))))
 
-    def one(index: int) -> Linear:
-        active = [j for j, c in enumerate(columns) if dict(c.given).get("recording", index) == index]
-        own = [columns[j] for j in active]
-        threads = _spare(len(fit.trajectories))
-        linear = linearise(fit.trajectories[index], fit.values(index), own, fit.defects.allowed, threads=threads)
-        return linear.spread(active, len(columns)) if len(active) < len(columns) else linear
 
-    return tuple(mapped(one, range(len(fit.trajectories))))
+def linearised_in(fit: Fit, recording: int, columns: Sequence[Column]) -> Linear:
+    """Linearise one trajectory where it stands, with any columns; one that is another recording's own is zero."""
+    active = [j for j, c in enumerate(columns) if dict(c.given).get("recording", recording) == recording]
+    own = [columns[j] for j in active]
+    threads = _spare(len(fit.trajectories))
+    linear = linearise(fit.trajectories[recording], fit.values(recording), own, fit.defects.allowed, threads=threads)
+    return linear.spread(active, len(columns)) if len(active) < len(columns) else linear
 
 
 def merit_of(fit: Fit, linears: Sequence[Linear]) -> float:

@@ -197,13 +197,14 @@ def common_step(
 ) -> tuple[FloatArray, FloatArray, float]:
     """Solve for the shared parameters from a summed gram (p + 1, p + 1), each held back to its ``trust_radius`` (p,).
 
-    Returns the step (p,), its covariance (p, p) and what chi-squared is expected to become, priors included; all NaN
-    where the fit has gone where its predictions are not finite.
+    Returns the step (p,), the covariance (p, p) of where it leads and what chi-squared is expected to become, priors
+    included; all NaN where the fit has gone where its predictions are not finite.
     """
     p = len(parameters)
     prior = np.array([q.precision for q in parameters])
     off = np.array([q.stated for q in parameters]) - at
-    H = gram[:p, :p] + np.diag(prior if trust_radius is None else prior + trust_radius**-2.0)
+    held = prior if trust_radius is None else prior + trust_radius**-2.0
+    H = gram[:p, :p] + np.diag(held)
     right = gram[:p, -1] + prior * off
     if p == 0:
         return np.empty(0), np.empty((0, 0)), float(gram[-1, -1])
@@ -212,10 +213,23 @@ def common_step(
         scaled = H * scale[:, None] * scale[None, :]
     if not (np.all(np.isfinite(gram)) and np.all(np.isfinite(scaled))):
         return np.full(p, np.nan), np.full((p, p), np.nan), np.nan
-    covariance = inverse_of(scaled) * scale[:, None] * scale[None, :]
+    units = scale[:, None] * scale[None, :]
+    covariance = inverse_of(scaled) * units
     step = covariance @ right
     expected = float(gram[-1, -1] + prior @ off**2 - step @ right)
-    return step, covariance, expected
+    return step, covariance + _unread(scaled, held * scale**2) * units, expected
+
+
+def _unread(H: FloatArray, prior: FloatArray) -> FloatArray:
+    """Return the covariance (p, p) of combinations of which a normal matrix (p, p) says nothing: no step moves these.
+
+    All that is known of them was known beforehand: ``prior`` (p,) are precisions in the units of the matrix.
+    """
+    w, V = np.linalg.eigh(H)
+    unread = V[:, w <= CUT_OFF * max(float(w[-1]), 1e-300)]
+    if not unread.size:
+        return np.zeros_like(H)
+    return np.asarray(unread @ inverse_of(unread.T @ (prior[:, None] * unread)) @ unread.T)
 
 
 #: how far one step goes where the readings say little, beyond which motion is far from linear: shares of the sigma of

@@ -18,8 +18,8 @@ from discsim.errors import InputError
 from discsim.recording import Recording
 from discsim.validation.diagnosis.relaxed_fit import unknowns
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, available, candidates_for, free_candidate
-from discsim.validation.diagnosis.selection.screening import normal_equations_of
-from discsim.validation.identification.gauss_newton import Fit, linearised
+from discsim.validation.diagnosis.selection.screening import columns_about
+from discsim.validation.identification.gauss_newton import Fit, linearised, linearised_columns
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.noise import GroupNoise, NoiseModel, stated_noise
 from discsim.validation.identification.normal_equations import reduce
@@ -177,10 +177,10 @@ def information_of(
         fit = Fit((one,), parameters, np.array([q.stated for q in parameters]), one.plant.sizes.continuous, {})
         if noise is None:
             noise = stated_noise(linearised(fit, ()))
-        equations = normal_equations_of(replace(fit, noise=noise), _asked(questions), noise, one.plant.sizes.continuous)
-        # the board's columns start with the recording's own unknowns; the rest stands in the order of the questions
-        linears.append(equations.linears[0])
-        grams.append(_gram(equations.linears[0], one, noise, questions))
+        # the columns start with the recording's own unknowns; the rest stands in the order of the questions
+        (linear,) = linearised_columns(fit, columns_about(fit, _asked(questions)))
+        linears.append(linear)
+        grams.append(_gram(linear, one, noise, questions))
     assert noise is not None
     if not np.all(np.isfinite(grams)):
         raise InputError("a planned recording leaves what is finite; expected throws that a disc can fly")

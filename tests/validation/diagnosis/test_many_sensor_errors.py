@@ -47,6 +47,25 @@ def test_a_strong_ripple_and_four_errors_of_sensors_are_named_together():
     assert found.final.chi2_per_sample == pytest.approx(1.0, abs=0.1)
 
 
+def test_a_scale_that_clipping_and_slow_noise_hide_is_found():
+    """A plateau at the gyroscope's very range: its noise swallows the scale, until that is asked in stated noise."""
+    faults = (
+        effect("gyro.scale", sz=0.017),
+        effect("gyro.bias", bx_rad_s=0.004, by_rad_s=-0.075, bz_rad_s=-0.056),
+        effect("accel.scale", sx=-0.001, sy=0.003, sz=-0.06),
+    )
+    ripple = effect("rig.speed_ripple", order=2.0, amplitude_rad_s=0.3, phase_rad=0.6)
+    profile = default_profile((0, 1000, 2000, 3000, 4000), hold=2.0)
+    motion = turn_table(profile, Environment(), (ripple,), yaw=0.3)
+    module = Instruments.from_parts("mpu9250", "ac1120s").with_effects(faults)
+    clipped = record(motion, module, np.random.default_rng(3), plant="rate_table", name="run", command=profile)
+    found = diagnose([[clipped]], ["bench"]).diagnosis
+    assert found.verdict == "explained"
+    named = {one.id: one.parameters for one in found.effects}
+    assert named.keys() == {ripple.id, *(fault.id for fault in faults)}
+    assert named["gyro.scale"]["sz"].value == pytest.approx(0.017, abs=5e-4)
+
+
 def test_a_mismatch_is_told_in_noise_that_it_has_not_inflated():
     """The relaxed fit does not follow a strong ripple: what it leaves of the rate reference is no noise of it."""
     found = screened([run()])

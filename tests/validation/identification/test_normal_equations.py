@@ -11,7 +11,13 @@ import pytest
 from discsim import validation
 from discsim.validation.identification.linear import Channel, Linear
 from discsim.validation.identification.noise import GroupNoise, whitened
-from discsim.validation.identification.normal_equations import CUT_OFF, Reduced, inverse_of, local_covariance
+from discsim.validation.identification.normal_equations import (
+    CUT_OFF,
+    Reduced,
+    common_step,
+    inverse_of,
+    local_covariance,
+)
 from discsim.validation.identification.parameters import Parameter, values_of
 
 
@@ -33,6 +39,18 @@ def test_a_combination_of_which_nothing_is_known_stays_where_it_is(share, kept):
     expected = 1.0 / share if kept else 0.0
     assert directions[:, 2] @ inverse @ directions[:, 2] == pytest.approx(expected, rel=1e-4, abs=1e-3)
     assert directions[:, 0] @ inverse @ directions[:, 0] == pytest.approx(1.0, rel=1e-4)
+
+
+def test_what_readings_say_nothing_of_is_as_uncertain_as_it_was_beforehand():
+    """Two numbers of which only the sum shows: it is known by the readings, the difference by the priors alone."""
+    q = [Parameter("effect", name, 0.0, 1.0, 20.0) for name in "ab"]
+    gram = 1e12 * np.array([[1.0, 1.0, 3.0], [1.0, 1.0, 3.0], [3.0, 3.0, 10.0]])
+    step, covariance, _ = common_step(gram, q, np.zeros(2))
+    apart, both = np.array([1.0, -1.0]), np.ones(2)
+    assert step @ both == pytest.approx(3.0)
+    assert step @ apart == pytest.approx(0.0, abs=1e-6)
+    assert apart @ covariance @ apart == pytest.approx(2.0 * 20.0**2)
+    assert both @ covariance @ both == pytest.approx(1e-12, rel=1e-6, abs=1e-11)
 
 
 def test_the_covariance_of_a_recording_s_own_unknowns_is_that_of_all_together():

@@ -16,15 +16,14 @@ from discsim.arrays import FloatArray
 from discsim.errors import InputError
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from discsim.validation.diagnosis.selection.to_stated import to_baseline
-from discsim.validation.identification.gauss_newton import Fit, linearised_columns, mapped
-from discsim.validation.identification.linear import Linear
+from discsim.validation.identification.gauss_newton import Fit, linearised_in, mapped
 from discsim.validation.identification.noise import NoiseModel
-from discsim.validation.identification.normal_equations import Reduced, inverse_of, reduce
+from discsim.validation.identification.normal_equations import inverse_of, reduce
 from discsim.validation.identification.parameters import AllowedDefects, Parameter
 from discsim.validation.identification.plants import PLANTS
 from discsim.validation.identification.propagation import Column
 
-__all__ = ["NormalEquations", "ScoreTest", "normal_equations_of"]
+__all__ = ["NormalEquations", "ScoreTest", "columns_about", "normal_equations_of"]
 
 
 @dataclass(frozen=True)
@@ -43,8 +42,6 @@ class NormalEquations:
     columns: tuple[Column, ...]
     grams: FloatArray
     place: Mapping[Column, int]
-    linears: tuple[Linear, ...]
-    reduced: tuple[Reduced, ...]
 
     @property
     def recordings(self) -> int:
@@ -92,15 +89,15 @@ def normal_equations_of(
     fit: Fit, candidates: Sequence[CandidateEffect], noise: NoiseModel, defects: AllowedDefects
 ) -> NormalEquations:
     """Take the columns of candidates and of a fit's own parameters where the fit stands, to the baseline of each."""
-    columns = tuple(
-        dict.fromkeys(
-            (*map(column_of, fit.parameters), *(column for candidate in candidates for column in candidate.columns))
-        )
-    )
+    columns = columns_about(fit, candidates)
     place = {column: k for k, column in enumerate(columns)}
-    linears = linearised_columns(replace(fit, defects=defects), columns)
-    reduced = mapped(lambda linear, trajectory: reduce(linear, trajectory, noise, defects), linears, fit.trajectories)
-    grams = np.stack([r.gram for r in reduced])
+    allowing = replace(fit, defects=defects)
+
+    def gram(index: int) -> FloatArray:
+        # the slopes by all columns of all recordings would be most of what a diagnosis holds in memory
+        return reduce(linearised_in(allowing, index, columns), fit.trajectories[index], noise, defects).gram
+
+    grams = np.stack(mapped(gram, range(len(fit.trajectories))))
     if not np.all(np.isfinite(grams)):
         raise InputError(
             "diagnose: no motion of this plant follows the readings, its fit leaves the numbers "
@@ -108,7 +105,13 @@ def normal_equations_of(
             "discsim import RAW --throw N or --rows A:B takes it out"
         )
     to_baseline(grams, fit, [place[column_of(q)] for q in fit.parameters])
-    return NormalEquations(columns, grams, place, linears, tuple(reduced))
+    return NormalEquations(columns, grams, place)
+
+
+def columns_about(fit: Fit, candidates: Sequence[CandidateEffect]) -> tuple[Column, ...]:
+    """Return the columns of a fit's own parameters, and those of candidates behind them."""
+    of_candidates = (column for candidate in candidates for column in candidate.columns)
+    return tuple(dict.fromkeys((*map(column_of, fit.parameters), *of_candidates)))
 
 
 def free_columns(candidate: CandidateEffect) -> list[tuple[Column, Parameter]]:

@@ -61,7 +61,7 @@ from discsim.validation.identification.competing_effects import CATALOGUED, Comp
 from discsim.validation.identification.gauss_newton import Bars, Fit, merit_of
 from discsim.validation.identification.noise import NoiseModel, estimate_noise, robust_noise, stated_noise
 from discsim.validation.identification.parameters import Parameter
-from discsim.validation.identification.residual_tests import unmodelled_residuals
+from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, unmodelled_residuals
 from discsim.validation.identification.stated_parameters import stated_parameters
 
 __all__ = ["screened", "search", "tried_without"]
@@ -216,15 +216,20 @@ def _selected_forward(found: Search) -> Search:
 
 
 def _without_swallowed(fitted: ContinuousFit) -> ContinuousFit | None:
-    """Return a fit with the stated noise where what was estimated is so loud and slow that it has swallowed an effect.
+    """Return a fit with the stated noise where what was estimated is so loud that it has swallowed an effect.
 
-    A bias is nothing but such noise: in it no bias is worth its price. None where nothing is swallowed.
+    A bias is nothing but loud and slow noise: in it no bias is worth its price. Nor is noise that is so loud and leaves
+    more than itself. None where nothing is swallowed.
     """
     left = unmodelled_residuals(fitted.fit.linears, fitted.residuals, fitted.fit.noise)
-    groups = {item.group for item in left if item.kind == "swallowed"}
+    stated, loud = stated_noise(fitted.fit.linears), RESIDUAL_TESTS.loud
+    groups = {
+        item.group
+        for item in left
+        if item.kind == "swallowed" or fitted.fit.noise[item.group].sd > loud * stated[item.group].sd
+    }
     if not groups:
         return None
-    stated = stated_noise(fitted.fit.linears)
     noise = {group: stated[group] if group in groups else level for group, level in fitted.fit.noise.items()}
     return replace(fitted, fit=replace(fitted.fit, noise=noise))
 

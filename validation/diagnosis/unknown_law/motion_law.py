@@ -99,9 +99,7 @@ def normal_equations_of_terms(
     )
     columns = (*own, *(Column("law", f"{j}.candidate", 1.0) for j in range(len(terms))))
     grams = to_baseline(np.stack([r.gram for r in reduced]), fit)
-    return NormalEquations(
-        columns, grams, {column: j for j, column in enumerate(columns)}, tuple(linears), tuple(reduced)
-    )
+    return NormalEquations(columns, grams, {column: j for j, column in enumerate(columns)})
 
 
 def _asked(equations: NormalEquations, own: Sequence[Parameter], terms: int) -> Iterator[tuple[float, float]]:

@@ -180,8 +180,6 @@ def asked_of_sensors(fit: Fit, own: Sequence[Parameter], terms: Sequence[SensorT
         columns,
         to_baseline(np.stack([r.gram for r in reduced]), fit),
         {column: j for j, column in enumerate(columns)},
-        tuple(wide),
-        tuple(reduced),
     )
     taken = [(column_of(q), q) for q in own]
     base = equations.solve(taken).chi2

@@ -20,7 +20,7 @@ from discsim.validation.diagnosis.selection.screening import (
     free_columns,
     normal_equations_of,
 )
-from discsim.validation.identification.gauss_newton import Fit, linearised, refit
+from discsim.validation.identification.gauss_newton import Fit, linearised, linearised_columns, refit
 from discsim.validation.identification.noise import stated_noise, whitened
 from discsim.validation.identification.normal_equations import unknown_prior
 from discsim.validation.identification.parameters import Parameter
@@ -53,11 +53,12 @@ def chosen(*ids: str) -> list[tuple[Column, Parameter]]:
 def direct(parameters: Sequence[tuple[Column, Parameter]], only: Sequence[int]) -> tuple[float, FloatArray, FloatArray]:
     """Chi-squared, values and covariance of least squares over all rows: unknowns of each recording, then columns."""
     fit, board = fitted()
-    d, f = board.linears[0].sensitivities.shape[1], len(parameters)
+    linears = linearised_columns(fit, board.columns)
+    d, f = linears[0].sensitivities.shape[1], len(parameters)
     width = len(only) * d + f
     A, b = [], []
     for k, i in enumerate(only):
-        linear = board.linears[i]
+        linear = linears[i]
         columns = np.stack([linear.common[:, board.place[c]] * float(q.acts_in(i)) for c, q in parameters], axis=1)
         # the fit's own parameter stands off its stated value; the board counts from there
         away = linear.common[:, board.place[column_of(VISCOUS)]] * (fit.at[0] - VISCOUS.stated)

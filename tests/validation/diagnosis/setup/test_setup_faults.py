@@ -19,6 +19,8 @@ from discsim.validation.diagnosis.selection.candidates import available, candida
 from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, suspected_fault
 from discsim.validation.diagnosis.setup_effects import with_reversed_axes
+from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.parameters import AllowedDefects, Parameter
 from discsim.validation.scenarios.throws import Throw
 from discsim.written import as_written
 
@@ -129,3 +131,10 @@ def test_a_flipped_axis_of_one_short_throw_is_suspected_and_of_two_named(fault: 
 
 def test_nothing_is_suspected_of_a_sound_short_throw():
     assert suspected_fault(find_setup_faults([short_throw(0.0)])) is None
+
+
+@pytest.mark.parametrize(("scale", "reversed"), [(-1.97, True), (-1.39, False), (-1.0, False)])
+def test_a_scale_that_is_nearer_to_no_reading_than_to_a_reversed_one_is_none(scale: float, reversed: bool):
+    parameter = Parameter("gyro.scale", "sx", 0.0, 1e-3, 20.0)
+    fit = Fit((), (parameter,), np.array([scale]), AllowedDefects(np.zeros(2)), {}, covariance=np.array([[4e-4]]))
+    assert (with_reversed_axes(SetupFindings((), tuple(tables())), fit) is not None) == reversed
