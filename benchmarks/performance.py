@@ -32,8 +32,8 @@ run. `--section NAME` measures one anew.
 """
 
 #: under each heading
-MEASURED = """Measured on {day} on {machine} with {cores} cores at a load of {load:.0f} at the end; MuJoCo {mujoco}, numba
-{numba}, numpy {numpy}, Python {python}."""
+MEASURED = """Measured on {day} on {machine} with {cores} cores at a load of {load:.0f} at the end; MuJoCo {mujoco},
+numba {numba}, numpy {numpy}, Python {python}."""
 
 #: section -> its heading and what is said of the measurement, before and after what the benchmark printed
 SECTIONS: dict[str, tuple[str, str]] = {
@@ -82,7 +82,8 @@ fraction of its turn, beyond which it is unstable whatever error is allowed.""",
     ),
     "diagnosis": (
         "A diagnosis",
-        """`{command}`: CPU seconds of a whole diagnosis, all threads, of sets that are drawn and simulated as the blind test's, and whether the answer was right.
+        """`{command}`: CPU seconds of a whole diagnosis, all threads, of sets that
+are drawn and simulated as the blind test's, and whether the answer was right.
 
 {printed}
 
@@ -93,14 +94,15 @@ equations, tests of residuals.""",
     ),
     "log": (
         "A long log",
-        """`{command}`: commands on a log of three sensors at 1 kHz, and on data sets of throws, start included; what a minute, or a throw, more costs is the same at every size where
+        """`{command}`: commands on a log of three sensors at
+1 kHz, and on data sets of throws, start included; what a minute, or a throw, more costs is the same at every size where
 time is linear.
 
 {printed}
 
 Goal: an hour in 60 s and 1 GB. The work is shared by all cores: on two, half the CPU seconds pass by the clock where
-nothing else runs. [What each method costs](estimators.md) says which methods take it. Of a free spin a diagnosis looks at
-the first 20 s. Of many recordings it holds the readings, and what each fit says of each.""",
+nothing else runs. [What each method costs](estimators.md) says which methods take it. Of a free spin a diagnosis looks
+at the first 20 s. Of many recordings it holds the readings, and what each fit says of each.""",
     ),
 }
 
