@@ -13,6 +13,7 @@ from discsim.disc import Aero, aero_key
 from discsim.effects.catalogue import effect as catalogued
 from discsim.model_file import Model, ModelEffect
 from discsim.recording import Recording
+from discsim.validation.diagnosis.command_followed import not_as_commanded
 from discsim.validation.diagnosis.consistency.driven import turning_of
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
 from discsim.validation.diagnosis.contradicted import contradicted_outcome
@@ -360,6 +361,7 @@ def outcome_of(judged: Judged, question: Question) -> Outcome:
         turning = turning_of(question.recordings, question.names)
     if found is not None:
         told = () if turning is None else turning.sentences
+        told += not_as_commanded(found, question.names) if judged.verdict == "unexplained" else ()
         return _outcome_of_search(judged, question, found, setup, (*told, *warnings), agreement)
     assert tried.contradiction is not None
     datasets, names, seed = question.datasets, question.names, question.seed
