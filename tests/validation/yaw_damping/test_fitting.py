@@ -209,7 +209,7 @@ class TestObservations:
         gps = recordings[0].samples["gps"]
         late = {**recordings[0].samples, "gps": Samples(1000.0 * gps.t, gps.value)}
         with pytest.raises(InputError, match=r"ends at \d+ s; expected a throw of at most 20 s .* in seconds"):
-            observe(replace(recordings[0], samples=late), "gyroscope")
+            observe(replace(recordings[0], samples=late), "accelerometer")
 
     def test_a_misplaced_accelerometer_scales_the_rate_by_a_square_root(self, recordings):
         """Eq. (9): stated 1 mm farther out than it is, at 16.1 mm."""
