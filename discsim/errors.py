@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["InputError"]
+__all__ = ["InputError", "printable"]
 
 #: characters of a message that are shown: a file may have names of thousands, and what was expected stands at the end
 _HEAD, _TAIL = 800, 300
+
+
+def printable(text: str) -> str:
+    """Return a text in which what does not print (ends of lines, what a terminal would obey) is escaped."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 class InputError(ValueError):
@@ -20,6 +25,7 @@ class InputError(ValueError):
         Of a very long message the middle is left out.
         """
         where = f"{path}:{line}" if line else f"{path}"
+        message = printable(message)
         if len(message) > _HEAD + _TAIL:
             message = f"{message[:_HEAD]} ... {message[-_TAIL:]}"
-        return cls("".join(c if c.isprintable() else ascii(c)[1:-1] for c in f"{where}: {message}"))
+        return cls(f"{printable(where)}: {message}")

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from discsim.arrays import FloatArray, readonly
 from discsim.compiled import compiled
-from discsim.errors import InputError
+from discsim.errors import InputError, printable
 from discsim.frames import heading_angles, norm3
 from discsim.recording import SENSORS
 
@@ -116,7 +116,7 @@ class _Parser:
     """Reads a sum of products into rows: coefficient, powers of the magnitudes, whether the sign is kept."""
 
     def __init__(self, text: str, coefficients: Mapping[str, float]) -> None:
-        self._text, self._coefficients = text if len(text) <= 200 else f"{text[:197]}...", coefficients
+        self._text, self._coefficients = printable(text if len(text) <= 200 else f"{text[:197]}..."), coefficients
         self._tokens: list[str] = []
         if len(text) > _LONGEST:
             raise self._error(f"{len(text)} characters, at most {_LONGEST} are read")
@@ -124,7 +124,7 @@ class _Parser:
         while text[place:].strip():
             token = _TOKEN.match(text, place)
             if token is None:
-                raise self._error(f"cannot read '{text[place:].strip()[:20]}'")
+                raise self._error(f"cannot read '{printable(text[place:].strip()[:20])}'")
             self._tokens.append(token[0].strip())
             place = token.end()
         self._next = 0
@@ -233,12 +233,12 @@ class _Parser:
             return 1.0, place, 0.0, 1.0
         if token in SYMBOLS:
             power = self._exponent()
-            if power != round(power):
+            if not power.is_integer():
                 raise self._error(f"{token} to a power that is no integer; write |{token}|^{power:g}")
             return 1.0, SYMBOLS.index(token), power, abs(power) % 2.0
         value = self._number(token)
         power = self._exponent()
-        if (value == 0.0 and power < 0.0) or (value < 0.0 and power != round(power)):
+        if (value == 0.0 and power < 0.0) or (value < 0.0 and not power.is_integer()):
             raise self._error(f"{value:g} to the power {power:g}")
         return value, -1, power, 0.0
 

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from fuzz.campaign import campaign, run_case, warm_up
+from fuzz.campaign import campaign, run_case, warm_up, warm_up_one
 from fuzz.corpus import CORPUS, read_case, write_case
 from fuzz.judge import FaultFound, judge
 from fuzz.mutate import mutated
@@ -52,7 +52,7 @@ def test_no_mutation_of_a_log_of_messages_crashes_its_reader():
 @pytest.mark.parametrize("path", sorted(CORPUS.glob("*.toml")), ids=lambda path: path.stem)
 def test_what_once_failed_is_right_or_refused(path):
     case = read_case(path)
-    warm_up(case.target)
+    warm_up_one(case.target, case.seed)
     outcome = run_case(case).outcome
     assert outcome.sound, outcome
 
@@ -67,6 +67,13 @@ def test_the_same_seed_gives_the_same_mutations():
     first, second = (mutated(files, random.Random(7)) for _ in range(2))
     assert first == second
     assert first != files
+
+
+def test_rows_of_uneven_length_are_mutated_like_others():
+    """An earlier mutation may have taken a cell from any row."""
+    uneven = {"log.csv": "a,b,c\n" + "1,2,3\n" * 3 + "1\n" + "1,2,3\n"}
+    for seed in range(300):
+        mutated(uneven, random.Random(seed))
 
 
 def test_a_case_written_into_the_corpus_is_the_same_case_again(tmp_path):

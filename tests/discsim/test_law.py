@@ -10,9 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.flights import DRIVER, FIELD, throw
 
+from discsim.aerodynamics import air_wrench, total_wrench
 from discsim.engine import fly
 from discsim.errors import InputError
 from discsim.law import SYMBOLS, WRENCH_TARGETS, Law, law_wrench
+from discsim.parameters import PARAMETERS, parameters, tables
 from discsim.trajectory import predict
 
 STATE = {"t": 1.5, "h": 2.0, "V": 17.0, "alpha": -0.1, "p_H": 2.0, "q_H": -3.0, "r": -60.0}
@@ -124,11 +126,29 @@ def test_both_engines_fly_a_law():
         ("|r|^99", "a power above 30"),
         ("b * " * 3000 + "r", "12001 characters, at most 5000 are read"),
         ("|" * 4000, "belongs"),
+        ("r^1e400", "to a power that is no integer"),
+        ("2^1e400", "not finite"),
+        ("|r|^1e400", "not finite"),
+        ("r \x1b[31m", r"cannot read '\\x1b\[31m'"),
+        ("r \u202e", r"cannot read '\\u202e'"),
     ],
 )
 def test_a_text_that_is_no_law_is_refused_with_the_place(text, expected):
-    with pytest.raises(InputError, match=expected):
+    with pytest.raises(InputError, match=expected) as refused:
         Law(text, "moment_z_N_m", COEFFICIENTS)
+    assert str(refused.value).isprintable()
+
+
+@pytest.mark.parametrize("target", WRENCH_TARGETS)
+def test_a_law_is_added_to_what_the_air_does(target):
+    """Straight ahead the heading frame is that of the arguments; the sum differs by rounding."""
+    p = parameters(FIELD, DRIVER).view(PARAMETERS)[0]
+    given = (30.0, 20.0, 0.0, 1.0, 0.5, -0.7, 70.0)
+    air = np.array(air_wrench(p, tables(DRIVER), *given))
+    for coefficient in (0.25, -0.125):
+        law = Law("c", target, {"c": coefficient})
+        total = np.array(total_wrench(p, tables(DRIVER, law), 0.0, *given))
+        np.testing.assert_allclose(total - air, coefficient * (np.array(WRENCH_TARGETS) == target), atol=1e-14)
 
 
 @pytest.mark.parametrize("name", ["r", "sign", "exp", "psi", "a b", "2"])

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
-from support.flights import BARE, DRIVER, FIELD, throw
+from support.flights import BARE, DRIVER, FIELD, in_wind, throw
 from support.readings import FAST, FLIGHT, IMU, MAG, RATE, SPECIFIC, WOBBLING, WRITTEN, in_body, measured, rng
 from support.turning import field_at, turning
 
@@ -39,9 +39,11 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import model_file
 from discsim.frames import body_to_ned
+from discsim.law import Law
 from discsim.recording import Samples
 from discsim.rig import turn_table
 from discsim.sensors import Accelerometer, Gps, Gyroscope, Magnetometer, Noise, RateReference, Sampling, Tracker
+from discsim.sensors.additions import by_law
 
 FLU = np.array([1.0, -1.0, -1.0])
 G = FIELD.gravity
@@ -348,6 +350,10 @@ class TestErrorsOfTheAccelerometer:
         rounded = np.round((SPECIFIC + np.array([5.0, 0.0, 0.0])) / step) * step
         self.held(np.clip(rounded, -30.1, 30.1), bias=AccelerometerBias(5.0), resolution=step, range=30.1)
 
+    def test_it_may_saturate_below_one(self):
+        small = Accelerometer(FAST, saturation=AccelerometerSaturation(0.5))
+        assert np.abs(measured(small, FLIGHT).value).max() == 0.5
+
     @pytest.mark.parametrize("limit", [0.0, -3.0, float("nan")])
     def test_a_limit_that_cannot_be_is_refused(self, limit):
         with pytest.raises(InputError, match=r"saturates at .* expected above zero"):
@@ -514,3 +520,48 @@ class TestTrackerAndReference:
     def test_it_tells_the_direction_and_rounds(self):
         samples = measured(RateReference(resolution=0.25), turning(-20.1))
         np.testing.assert_array_equal(samples.value, -20.0)
+
+    def test_noise_in_proportion_to_the_rate_grows_with_it(self):
+        """4 sigma of the rms of 4001 values at each rate; a table that stands still has none."""
+        encoder = RateReference(Sampling(4000.0), noise_share=0.2, largest_rate=100.0)
+        for rate in (10.0, -80.0):
+            error = measured(encoder, turning(rate, 1.0)).value - rate
+            assert np.std(error) == pytest.approx(0.2 * abs(rate), rel=4 / np.sqrt(2 * 4001))
+        np.testing.assert_array_equal(measured(encoder, turning(0.0)).value, 0.0)
+        assert encoder.sheet.noise_rms == pytest.approx(20.0, rel=1e-12)
+
+
+class TestLawsAboutSensors:
+    """A law adds to one column what its text says of the state; the symbols are worked out in another way here."""
+
+    motion = fly(DRIVER, in_wind(2.0, -1.0, 0.0), WOBBLING, duration=0.3)
+    t = np.linspace(0.05, 0.25, 11)
+
+    def symbols(self, readings: np.ndarray) -> dict[str, np.ndarray]:
+        state = self.motion.at(self.t)
+        turned = Rotation.from_quat(state.attitude[:, [1, 2, 3, 0]]).inv()
+        u, v, w = turned.apply(state.velocity - np.array([2.0, -1.0, 0.0])).T
+        across, (P, Q, r) = np.hypot(u, v), state.rate.T
+        fine = np.linspace(self.motion.start, self.t, 20001)
+        spin = self.motion.at(fine.ravel()).rate[:, 2].reshape(fine.shape)
+        return {
+            "t": self.t - self.motion.start,
+            "h": -state.position[:, 2],
+            "V": np.linalg.norm(np.stack([u, v, w]), axis=0),
+            "alpha": np.arcsin(w / np.sqrt(across**2 + w**2)),
+            "p_H": (u * P + v * Q) / across,
+            "q_H": (u * Q - v * P) / across,
+            "r": r,
+            "cos(psi)": np.cos(np.trapezoid(spin, fine, axis=0)),
+            **dict(zip("xyz", readings.T, strict=True)),
+        }
+
+    @pytest.mark.parametrize("name", ["t", "h", "V", "alpha", "p_H", "q_H", "r", "cos(psi)", "x", "y", "z"])
+    def test_each_symbol_is_that_of_the_motion(self, name):
+        """An angle of twenty radians is told to 1e-6 by steps of a hundredth of a millisecond."""
+        readings = Magnetometer().ideal(self.motion, self.t)
+        state = self.motion.at(self.t)._replace(t=self.t - self.motion.start)
+        changed = by_law(Law(f"0.5 {name}", "magnetometer.y_uT", {}))(readings, state, self.motion)
+        expected = readings.copy()
+        expected[:, 1] += 0.5 * self.symbols(readings)[name]
+        np.testing.assert_allclose(changed, expected, rtol=1e-9, atol=1e-6)

@@ -7,12 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.flights import DRIVER, FIELD
 from support.places import ROOT
 
+from discsim.aerodynamics import air_wrench, total_wrench
 from discsim.effects.applied import compiled_wrench
 from discsim.effects.own import load_user_effect, load_user_effects
 from discsim.errors import InputError
 from discsim.motion import State
+from discsim.parameters import PARAMETERS, parameters, tables
 
 PAGE = (ROOT / "docs" / "diagnosing.md").read_text(encoding="utf-8")
 SENSOR, MOTION = (block for block in re.findall(r"```python\n(.*?)```", PAGE, re.S) if "NamedTuple" in block)
@@ -53,6 +56,16 @@ def test_the_documents_motion_example_drags_against_the_air(tmp_path):
     assert effect.row.plants == ("flight",)
     wrench = compiled_wrench(effect)
     assert wrench(np.array([0.5]), 0.0, 1.0, 3.0, -2.0, 1.0, 0.1, 0.2, 60.0) == (-1.5, 1.0, -0.5, 0.0, 0.0, 0.0)
+
+
+def test_a_motion_of_ones_own_is_added_to_what_the_air_does(tmp_path):
+    """Each of the six numbers has a size of its own; the sum differs by rounding."""
+    text = MOTION.replace("-k * u, -k * v, -k * w, 0.0, 0.0, 0.0", "k, 2 * k, 3 * k, 4 * k, 5 * k, 6 * k")
+    acting = load_user_effect(written(tmp_path, text)).sized({"k_N_per_m_s": 0.125})
+    p, given = parameters(FIELD, DRIVER).view(PARAMETERS)[0], (30.0, 20.0, 0.0, 1.0, 0.5, -0.7, 70.0)
+    air = np.array(air_wrench(p, tables(DRIVER), *given))
+    total = np.array(total_wrench(p, tables(DRIVER, None, [acting]), 0.0, *given))
+    np.testing.assert_allclose(total - air, 0.125 * np.arange(1, 7), atol=1e-14)
 
 
 def test_a_parameters_default_need_not_be_zero(tmp_path):

@@ -164,6 +164,10 @@ RATES: Mapping[str, Callable[[], Files]] = MappingProxyType(
 
 
 def score(folder: Path) -> None:
-    """Score rates against a truth, and write the answer."""
-    found = score_rates(read_rates(folder / "rates.csv"), read_truth(folder / "truth.csv"))
+    """Score rates against a truth, and write the answer; nothing is later than all of the truth is long."""
+    truth = read_truth(folder / "truth.csv")
+    found = score_rates(read_rates(folder / "rates.csv"), truth)
     json_text(found.to_json())
+    span = float(truth.t[-1] - truth.t[0])
+    for one in found.errors:
+        possible(bool(np.isnan(one.delay)) or abs(one.delay) <= span, f"a delay of {one.delay:g} s within {span:g} s")

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from .judge import LONGEST_S, Outcome, judge
 from .targets import TARGETS
 
-__all__ = ["Case", "Found", "campaign", "run_case", "warm_up"]
+__all__ = ["Case", "Found", "campaign", "run_case", "warm_up", "warm_up_one"]
 
 
 class Case(NamedTuple):
@@ -48,14 +48,18 @@ def campaign(targets: Sequence[str], mutations: int, rng: random.Random) -> Iter
         yield run_case(case)
 
 
-@cache
 def warm_up(name: str) -> None:
-    """Run a target on its sound files, which must be right; what it needs is compiled then, and no case pays for it."""
-    target = TARGETS[name]
-    for seed, files in target.seeds.items():
-        found = run_case(Case(name, seed, files()), longest=600.0)
-        if found.outcome.kind != "right":
-            raise AssertionError(f"{name}: the sound {seed} is not right: {found.outcome}")
+    """Warm up all seeds of a target."""
+    for seed in TARGETS[name].seeds:
+        warm_up_one(name, seed)
+
+
+@cache
+def warm_up_one(name: str, seed: str) -> None:
+    """Run a target on sound files, which must be right; what it needs is compiled then, and no case pays for it."""
+    found = run_case(Case(name, seed, TARGETS[name].seeds[seed]()), longest=600.0)
+    if found.outcome.kind != "right":
+        raise AssertionError(f"{name}: the sound {seed} is not right: {found.outcome}")
 
 
 def run_case(case: Case, longest: float = LONGEST_S) -> Found:

@@ -192,7 +192,8 @@ def _column(rows: list[list[str]], rng: random.Random) -> None:
         10.0 ** rng.choice((rng.randint(-3, 3), rng.randint(-12, 12), rng.randint(-320, 308))),
         10.0 ** rng.randint(-9, 9),
     )
-    kind, held = rng.choice(("blank", "hold", "scale", "offset", "swap", "turn", "odd")), rows[start][k]
+    kind = rng.choice(("blank", "hold", "scale", "offset", "swap", "turn", "odd"))
+    held = rows[start][k] if k < len(rows[start]) else ""  # an earlier mutation may have shortened that row
     odd = _odd_number(rng)
     for row in rows[start:]:
         if max(k, other) >= len(row):

@@ -138,7 +138,9 @@ def _noise_notes(linears: Sequence[Linear], found: NoiseModel) -> list[NoiseNote
     """Return the sensors whose noise is not as stated: that of the fit which leaves the least beside noise."""
     notes = []
     for group, noise in found.items():
-        channel = next((linear, c) for linear in linears for c in linear.channels if c.group == group)
+        channel = next(((linear, c) for linear in linears for c in linear.channels if c.group == group), None)
+        if channel is None:  # what explains the mismatch leaves no reading of it
+            continue
         stated = float(channel[0].sd[channel[1].rows][0])
         interval = float(np.median(np.diff(channel[0].t[channel[1].rows]))) if channel[1].index.size > 1 else 0.0
         n = sum(c.index.size for linear in linears for c in linear.channels if c.group == group)

@@ -37,7 +37,6 @@ from discsim.validation.reporting.run import json_text
 from discsim.validation.running.given import Given, given_recordings
 from discsim.validation.running.progress import Progress, silent
 from discsim.validation.scenarios.method_disagreement import Disagreement, disagreements
-from discsim.written import require_seconds
 
 __all__ = [
     "SpinEstimates",
@@ -138,7 +137,6 @@ def estimate_spin(
         raise InputError(f"{len(given)} recordings; expected one (take them one after the other)")
     setup = find_setup_faults(given)
     data = setup.recordings[0]
-    require_seconds(data)
     rates, left_out = estimate_all(data, method, options or Options(), progress)
     notes = [f"{fault.sentence}; the estimates are of the readings so corrected" for fault in setup.faults]
     if (perhaps := suspected_fault(setup)) is not None:

@@ -154,7 +154,9 @@ def shiftable(
 ) -> Shiftable:
     """Return readings beside what a trajectory's motion shows on a grid of ``step`` s."""
     sensor = readings.sensor
-    sd = np.array([noise[group_of(sensor, axis)].sd for axis in range(readings.value.shape[1])])
+    groups = [group_of(sensor, axis) for axis in range(readings.value.shape[1])]
+    # of a sensor that has no reading which counts, nothing is known
+    sd = np.array([noise[group].sd if group in noise else np.nan for group in groups])
     grid = np.arange(float(current.nodes[0]), float(current.nodes[-1]), step)
     value = np.where(readings.good, readings.value, np.nan) / sd
     at = readings.t - delay(values, sensor, readings.t)

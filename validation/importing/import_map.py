@@ -212,8 +212,9 @@ def _layout(table: TomlTable | None) -> Layout:
 def _encoding(table: TomlTable) -> str:
     encoding = table.text("encoding", required=False) or "utf-8"
     try:
-        "".encode(encoding)  # a codec such as "hex", which knows no text, fails here too
-    except LookupError:
+        # a codec such as "hex", which knows no text, fails here, and one such as "idna", which knows no damaged text
+        b"1".decode(encoding, errors="replace")
+    except (LookupError, ValueError):
         raise table.error("encoding", f"'encoding' is '{encoding}', expected one such as utf-8 or latin-1") from None
     return encoding
 

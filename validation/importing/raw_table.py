@@ -161,7 +161,7 @@ def _spread(cell: str) -> list[str]:
         return [cell]
     try:
         items = json.loads(text)
-    except json.JSONDecodeError:
+    except (ValueError, RecursionError):  # no JSON, an integer of thousands of digits, a list within lists without end
         return [cell]
     return [str(item) for item in items]
 

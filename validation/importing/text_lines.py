@@ -51,6 +51,8 @@ class TextLines:
                     *whole, left = (left + piece).split("\n")
                     if whole:
                         yield whole
+        except UnicodeError as error:  # of a whole text, such as one in UTF-16 that does not say in which order
+            raise InputError.at(self.path, None, f"{error}; expected text in {self.encoding}, as was said") from None
         except OSError as error:
             raise self._unread(error) from None
         yield [left]

@@ -13,6 +13,7 @@ from discsim.errors import InputError
 from discsim.estimators.methods import estimate
 from discsim.estimators.rate import YawRate
 from discsim.recording import Recording
+from discsim.validation.identification.plants.flight import FLIGHT
 
 __all__ = ["SHARED_S", "Throw", "misplaced", "observe"]
 
@@ -71,8 +72,8 @@ class Throw:
 def observe(recording: Recording, method: str = "best", rate: YawRate | None = None) -> Throw:
     """Return what a recording shows of a throw, with the spin rate by a method of `estimate`, or a given one.
 
-    Raises `InputError` where the recording is no flight, the method fails or knows too little, or nothing tells the
-    direction of a spin whose method gives magnitudes only.
+    Raises `InputError` where the recording is no flight or longer than one, the method fails or knows too little, or
+    nothing tells the direction of a spin whose method gives magnitudes only.
     """
     where = recording.path or recording.name
     if recording.plant != "flight":
@@ -84,6 +85,12 @@ def observe(recording: Recording, method: str = "best", rate: YawRate | None = N
             f"{where}: {method} knows the spin at {np.count_nonzero(known)} instants; expected at least {FEWEST}"
         )
     t, path, path_sd = _path(recording)
+    end = max(float(rate.t[known][-1]), float(t[-1]) if t.size else 0.0)
+    if end > (longest := FLIGHT.durations.longest):
+        raise InputError(
+            f"{where}: its spin or its path ends at {end:.6g} s; expected a throw of at most {longest:g} s from the "
+            "release, in seconds (import the rows of one throw)"
+        )
     sign = 1.0 if rate.signed else _direction(recording, rate)
     spin, sd = readonly(sign * rate.rate[known]), readonly(rate.sd[known])
     return Throw(recording, rate.method, readonly(rate.t[known]), spin, sd, t, path, path_sd)

@@ -55,6 +55,21 @@ def test_a_rate_that_is_late_is_told_by_how_much():
     assert np.isnan(steady.delay)
 
 
+def test_of_a_rate_that_falls_along_a_line_no_delay_is_told():
+    """A rate that is late by a second and one that is too large by the slope are the same then."""
+    line = 70.0 - T
+    (found,) = score_rates([rate(T, line + 0.1)], rate(T, line)).errors
+    assert found.bias == pytest.approx(np.degrees(0.1))
+    assert np.isnan(found.delay)
+
+
+def test_a_delay_that_noise_hides_is_not_told():
+    """Slopes of 0.2 rad/s^2 rms beside errors of 1 rad/s at 500 instants: an sd of 0.2 s."""
+    noise = np.random.default_rng(1).normal(0.0, 1.0, T.size)
+    (found,) = score_rates([rate(T, 50.0 + 0.3 * np.sin(T) + noise)], rate(T, 50.0 + 0.3 * np.sin(T))).errors
+    assert np.isnan(found.delay)
+
+
 def test_a_rate_without_a_sign_is_compared_by_its_magnitude():
     backwards = rate(T, -SPIN)
     (found,) = score_rates([rate(T, SPIN, signed=False)], backwards).errors

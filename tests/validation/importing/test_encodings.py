@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fuzz.seeds import RAW
 from numpy.testing import assert_allclose
 from support.made_logs import made_log, three, write_table
 
@@ -77,3 +78,24 @@ def test_where_the_encoding_cannot_be_told_the_sentence_says_so(tmp_path):
         InputError, match=r"the text is no UTF-8 and its encoding could not be told \(save it as UTF-8\)"
     ):
         sniff(raw)
+
+
+@pytest.mark.parametrize(
+    ("named", "sentence"),
+    [
+        ("undefined", "'encoding' is 'undefined', expected one such as utf-8"),
+        ("idna", "'encoding' is 'idna', expected one such as utf-8"),
+        ("hex", "'encoding' is 'hex', expected one such as utf-8"),
+        ("utf-16", r"log\.csv: .*BOM; expected text in utf-16, as was said"),
+        ("cp500", r"log\.csv: no usable row; expected"),
+    ],
+)
+def test_a_map_s_encoding_that_is_not_the_log_s_is_refused_in_one_line(tmp_path, named, sentence):
+    given = RAW()
+    text = given["map.toml"] + f'\n[layout]\nencoding = "{named}"\n'
+    (tmp_path / "map.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "log.csv").write_text(given["log.csv"], encoding="utf-8")
+    with pytest.raises(InputError, match=sentence) as refused:
+        import_recording(tmp_path / "log.csv", read_map(tmp_path / "map.toml"))
+    assert str(refused.value).isprintable()
+    assert len(str(refused.value)) < 2000

@@ -354,6 +354,16 @@ def test_lists_in_quoted_cells_are_spread_over_columns(tmp_path):
     assert [(r.file, r.line) for r in result.repairs] == [("a_gyro_b.csv", 1), ("a_mag_b.csv", 2)]
 
 
+@pytest.mark.parametrize("cell", ["[" * 5000 + "]" * 5000, "[" + "9" * 5000 + ", 1, 2]"], ids=["deep", "long"])
+def test_a_list_that_no_logger_writes_leaves_its_row_out(tmp_path, cell):
+    (tmp_path / "a_gyro_b.csv").write_text(f'7,100.5,"[10, 20, -90.0]"\n8,100.6,"{cell}"\n')
+    (tmp_path / "a_mag_b.csv").write_text('7,100.5,"[6842, 0, -6842]"\n')
+    (tmp_path / "a_acc_b.csv").write_text('7,100.55,"[0, 0, 8192]"\n')
+    result = shipped(tmp_path, "srp")
+    assert len(result.recording.samples["gyroscope"]) == 1
+    assert [(r.file, r.line) for r in result.repairs] == [("a_gyro_b.csv", 2)]
+
+
 # -------------------------------------------------------------------------------- release of a tracked throw
 
 TRACK = "\ufeffmass_A\nt\tx\ty\tv\n1.000\t0       0       0\n1.033\t0.851\t0.0456\t24.46\n1.067\t1.595\t0.213\t22.4\n\n"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import sys
 import zipfile
 from pathlib import Path
@@ -277,6 +278,28 @@ def test_a_path_out_of_the_archive_is_refused(tmp_path, member, sentence):
     with pytest.raises(InputError, match=sentence), opened(tmp_path / "bad.zip"):
         pass
     assert not (tmp_path.parent / "out.csv").exists()
+
+
+@pytest.mark.parametrize("packed", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_a_damaged_archive_is_read_or_refused_in_one_sentence(tmp_path, packed):
+    """Whatever library unpacks it, and wherever the damage lies: in what is packed, or in what is said of it."""
+    raw, rng = tmp_path / "log.zip", random.Random(packed)
+    with zipfile.ZipFile(raw, "w", packed) as archive:
+        for name in ("run/gyro.csv", "run/mag.csv"):
+            archive.writestr(name, "t,x,y,z\n" + "".join(f"{k / 50},{k % 7},{k % 5},0\n" for k in range(200)))
+    sound, said = raw.read_bytes(), []
+    for _ in range(200):
+        damaged = bytearray(sound)
+        for _ in range(rng.choice((1, 4))):
+            damaged[rng.randrange(len(sound))] = rng.randrange(256)
+        raw.write_bytes(damaged)
+        try:
+            with opened(raw):
+                pass
+        except InputError as error:
+            said.append(str(error))
+    assert len(said) > 50
+    assert all(text.isprintable() and "expected" in text for text in said)
 
 
 def test_a_link_in_an_archive_is_refused(tmp_path):

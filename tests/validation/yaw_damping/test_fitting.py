@@ -12,7 +12,7 @@ import pytest
 from discsim.disc import Release, RollingTable
 from discsim.errors import InputError
 from discsim.model_file import read_model
-from discsim.recording import Recording, read_recording, write_recording
+from discsim.recording import Recording, Samples, read_recording, write_recording
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
 from discsim.trajectory import predict
@@ -203,6 +203,13 @@ class TestObservations:
     def test_a_spin_without_an_airspeed_is_refused(self, recordings):
         with pytest.raises(InputError, match="expected a flight"):
             observe(replace(recordings[0], plant="free_spin"), "likelihood")
+
+    def test_a_throw_that_ends_later_than_any_is_refused(self, recordings):
+        """Times in milliseconds, or fixes of the walk back: a model flight of minutes would be fitted to them."""
+        gps = recordings[0].samples["gps"]
+        late = {**recordings[0].samples, "gps": Samples(1000.0 * gps.t, gps.value)}
+        with pytest.raises(InputError, match=r"ends at \d+ s; expected a throw of at most 20 s .* in seconds"):
+            observe(replace(recordings[0], samples=late), "accelerometer")
 
     def test_a_misplaced_accelerometer_scales_the_rate_by_a_square_root(self, recordings):
         """Eq. (9): stated 1 mm farther out than it is, at 16.1 mm."""

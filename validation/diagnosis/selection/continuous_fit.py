@@ -122,7 +122,8 @@ def noise_of(fit: Fit) -> NoiseModel:
 def scored(hypothesis: Hypothesis, fit: Fit) -> ContinuousFit:
     """Return a fit with its score."""
     residuals = tuple(linear.residual for linear in fit.linears)
-    fit = replace(fit, noise=likeliest_noise(fit.linears, residuals, noise_of(fit)))
+    # of a sensor that has no reading left the noise stays: it has some again under a rival of this hypothesis
+    fit = replace(fit, noise={**fit.noise, **likeliest_noise(fit.linears, residuals, noise_of(fit))})
     score = sum(log_likelihood(linear, fit.noise, e) for linear, e in zip(fit.linears, residuals, strict=True))
     return ContinuousFit(hypothesis, fit, score + penalty_of(fit, fit.linears) + _of_starts(fit), residuals)
 

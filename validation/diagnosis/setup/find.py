@@ -23,7 +23,7 @@ from discsim.validation.diagnosis.setup.proof import left_by_short_fit
 from discsim.validation.diagnosis.setup.remedy import MapAxes, remedy
 from discsim.validation.diagnosis.setup.units import clock_unit, sensor_units
 from discsim.validation.identification.plants import Plant, plant_of
-from discsim.written import corrected
+from discsim.written import corrected, require_seconds
 
 __all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said", "suspected_fault", "with_likeliest_fault"]
 
@@ -105,7 +105,7 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
     """Find what is wrong in how recordings of one hardware were set up and written.
 
     Takes a second or so. Recordings without a spin, or with one sensor only, tell little: nothing is found then but
-    units of time and magnitude.
+    units of time and magnitude. Raises `InputError` where times are none, and their unit does not explain it.
     """
     current = tuple(recordings)
     faults: list[SetupFault] = []
@@ -113,6 +113,8 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
     for unit in [] if clock is None else [clock]:
         faults.append(SetupFault(unit, float("inf"), None))
         current = tuple(corrected(one, [unit]) for one in current)
+    for one in current:
+        require_seconds(one)
     if not all(_judgeable(one).samples for one in current):
         return SetupFindings(tuple(faults), current)
     for unit in sensor_units([_judgeable(one) for one in current]):
@@ -192,11 +194,15 @@ def _alive(samples: Samples) -> bool:
 def _busiest(samples: Mapping[str, Samples], length: float) -> tuple[float, float] | None:
     """Return from when to when, s, sensors turn on end in a recording longer than ``length`` s, at most that long.
 
-    The longest stretch that turns at a quarter of the fastest rate or more; None of a shorter recording.
+    The longest stretch that turns at a quarter of the fastest rate or more; None of a shorter recording. Where that
+    sensor is shorter and another is not, whose clock may have jumped, from its first reading on.
     """
     turning = next((samples[name] for name in ("gyroscope", "magnetometer", "accelerometer") if name in samples), None)
-    if turning is None or len(turning) < 2 or turning.t[-1] - turning.t[0] <= length:
+    if turning is None or len(turning) < 2:
         return None
+    if turning.t[-1] - turning.t[0] <= length:
+        longer = any(len(one) and one.t[-1] - one.t[0] > length for one in samples.values())
+        return (float(turning.t[0]), float(turning.t[0]) + length) if longer else None
     slot = ((turning.t - turning.t[0]) / _SLOT).astype(int)
     count = np.maximum(np.bincount(slot), 1)
     value = np.nan_to_num(turning.value)

@@ -38,7 +38,7 @@ class Readings(NamedTuple):
 def readings_for(recording: Recording, sensor: str, columns: slice | int = slice(None)) -> Readings | None:
     """Return the readings of which every asked column is there and not clipped, or None for too few."""
     samples = recording.get(sensor)
-    if samples is None:
+    if samples is None or not len(samples):  # of no row there is no number of columns
         return None
     value = np.where(recording.sheets[sensor].clipped(samples.value), np.nan, samples.value)
     value = value.reshape(len(samples), -1)[:, columns]

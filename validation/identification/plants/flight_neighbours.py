@@ -24,7 +24,7 @@ from discsim.effects.events import EVENT_WIDTH_S
 from discsim.flight_equations import body_row, derivative
 from discsim.frames import rotate_by_quaternion
 from discsim.parameters import PARAMETERS, Tables
-from discsim.validation.identification.dynamics import ROW, SIZE, acting_tables
+from discsim.validation.identification.dynamics import FASTEST, ROW, SIZE, acting_tables
 
 __all__ = ["SLOWEST", "add_neighbours"]
 
@@ -55,7 +55,9 @@ def add_neighbours(
     ``end`` is where the segment ends and ``stop`` (s) where its motion may; else as `flight_segments`.
     """
     p = flats[0, :SIZE].copy().view(PARAMETERS)[0]
-    nutation = abs(states[0, 12]) * p.disc.Izz / p.disc.Ixx
+    # a step of a fit may lead to any spin and inertia; no body has Izz above 2 Ixx, and none that is looked for spins
+    # faster
+    nutation = min(abs(states[0, 12]) * p.disc.Izz / p.disc.Ixx, 2.0 * FASTEST)
     longest = _NUTATION if given.static.columns.shape[1] == 0 else _CORNERED
     longest = min(_STEP, longest / nutation)
     for c in range(flats.shape[0]):

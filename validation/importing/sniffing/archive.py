@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import lzma
 import re
 import shutil
 import stat
+import struct
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
@@ -23,6 +26,12 @@ MAX_BYTES = 4 << 30
 #: ... and this many bytes for each packed one: numbers shrink by 3 to 20, a constant column by some hundreds.
 MAX_RATIO = 1000
 _CHUNK = 1 << 20
+#: What damage makes of a zip: errors of the system, of zipfile, and of the libraries that unpack it. zipfile takes
+#: numbers and texts of the archive for sound and fails on them as any code does.
+_DAMAGED = (
+    *(OSError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error, lzma.LZMAError),
+    *(LookupError, UnicodeError, struct.error, OverflowError),
+)
 #: What lies beside the folder of a log: words to read and pictures.
 _BESIDE = re.compile(r"^(readme|license|licence|notes?)\b|\.(md|pdf|png|jpe?g|html?)$", re.IGNORECASE)
 
@@ -67,8 +76,9 @@ def _unpack(raw: Path, folder: Path) -> None:
                 target = folder / _checked(raw, member)
                 target.parent.mkdir(parents=True, exist_ok=True)
                 left -= _copy(raw, archive, member, target, left)
-    except (zipfile.BadZipFile, NotImplementedError, EOFError, OSError) as error:
-        raise InputError.at(raw, None, f"cannot be unpacked ({error}); expected a whole zip archive") from None
+    except _DAMAGED as error:
+        what = str(error) or type(error).__name__
+        raise InputError.at(raw, None, f"cannot be unpacked ({what}); expected a whole zip archive") from None
     except RuntimeError as error:  # zipfile's word for a password
         raise InputError.at(raw, None, f"cannot be unpacked ({error}); expected a zip without a password") from None
 
