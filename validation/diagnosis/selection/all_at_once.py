@@ -125,7 +125,7 @@ def _cost(candidate: CandidateEffect) -> float:
 
 
 def _few(found: Search, every: Sequence[CandidateEffect], told: Collection[str]) -> list[ContinuousFit]:
-    """Return the fit in which chips that are turned take the place of matrices and scales; none where it runs away.
+    """Return fits in which chips that are turned take the place of matrices and scales; none where they run away.
 
     A turn is nested in a matrix: its numbers are opposite in pairs, to first order. Beside each other neither is worth
     its price, the one with more numbers is the last to go, and scales make up for the squares of the turn. So the fit
@@ -137,16 +137,21 @@ def _few(found: Search, every: Sequence[CandidateEffect], told: Collection[str])
     if any(q.group == _BOARD for q in found.own):
         turns = ()
     few = tuple(one for one in every if one.id in told or one.row.type is HardIron)
+    fits: list[ContinuousFit] = []
     fitted = _fitted(found, (*few, *turns))
     for _ in range(_ROUNDS):
         if fitted is None or not possible(fitted):
-            return []
+            break
+        fits.append(fitted)
+        if len(fits) == _ROUNDS:
+            break
         about, present = _about(found, fitted.fit), fitted.hypothesis.candidates
         chosen = _held_out(about, _chosen(about.equations, present, every, found.own, told), told)
-        if set(chosen) == set(present):
+        if any(set(chosen) == set(one.hypothesis.candidates) for one in fits):
+            # what algebra offers about one fit it takes back about another: the better of both counts
             break
         fitted = _fitted(found, chosen, values_of_fit(fitted))
-    return [] if fitted is None else [fitted]
+    return fits
 
 
 def _about(found: Search, fit: Fit) -> Search:
