@@ -29,22 +29,32 @@ def motions() -> tuple[Recording, ...]:
 
 
 def logged(
-    recording: Recording, seed: int, *, own_clock: bool, weight: float, chip: float | None = None
+    recording: Recording,
+    seed: int,
+    *,
+    own_clock: bool,
+    weight: float,
+    chip: float | None = None,
+    late: tuple[float, float] | None = None,
 ) -> tuple[Recording, np.ndarray]:
     """Return what a loop writes of a motion that loses a fifth of its rows, and the newest sample of each row.
 
-    Gyroscope and accelerometer are read in step with the loop, or free-run with the period of a ``chip``, s.
+    Gyroscope and accelerometer are read in step with the loop, or free-run with the period of a ``chip``, s. Where rows
+    come ``late`` by a tick, s, a share of them, none is lost.
     """
     rng = np.random.default_rng(seed)
     steps = np.arange(2, int(1.9 / LOOP))
-    kept = steps[rng.random(steps.size) > 0.2]
+    kept = steps[rng.random(steps.size) > 0.2] if late is None else steps
     phase = rng.uniform(0.0, PERIOD)
+    asked = LOOP * np.arange(steps[-1] + 1.0)
+    if late is not None:
+        asked += late[0] * (rng.random(asked.size) < late[1])
 
     def sampled(step: np.ndarray) -> np.ndarray:
-        t = step * LOOP
+        t = asked[step]
         return phase + PERIOD * np.floor((t - phase) / PERIOD) if own_clock else t
 
-    read = kept * LOOP
+    read = asked[kept]
     if chip is not None:
         began = rng.uniform(0.0, chip)
         read = began + chip * np.floor((read - began) / chip)

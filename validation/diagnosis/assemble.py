@@ -409,7 +409,7 @@ def _outcome_of_search(
     named = on_board_axes(named, judged.tried.prepared.setup, found.final.fit)
     partly = partly_explained(found, names) if unexplained and law is None else ()
     rows = None if unexplained else judged.tried.prepared.rows
-    counted = () if rows is None else rows.effects()
+    counted = () if rows is None else rows.refined(found.final.fit).effects()
     places = () if rows is None else rows.located(max(float(one.nodes[-1]) for one in found.final.fit.trajectories))
     reference = _reference(found, unexplained, None if judged.tried.prepared.rows is None else agreement)
     missed = 0.0 if rows is None else rows.excess(reference, found.final.fit.count)

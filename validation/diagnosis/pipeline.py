@@ -17,7 +17,7 @@ from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.result import Outcome
 from discsim.validation.diagnosis.selection.refits import told_to
 from discsim.validation.diagnosis.selection.stepwise import search
-from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault
+from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault, with_turned_board
 from discsim.validation.diagnosis.setup_effects import free_parameters, with_reversed_axes
 from discsim.validation.diagnosis.stages import Prepared, Progress, Question, Tried, silent
 from discsim.validation.diagnosis.verdict import judged
@@ -48,7 +48,7 @@ def diagnose(
     question = Question(recordings, called, tuple(names), Competing(tuple(user_effects)), plans, seed, progress)
     with told_to(progress):
         progress("checking the setup", 0, 5)
-        tried = tried_under(find_setup_faults(recordings), question)
+        tried = tried_with(_prepared_first(question), question)
         for suppose in (likeliest_fault, reversed_axes):
             supposed = suppose(tried)
             again = tried if supposed is None else tried_under(supposed, question)
@@ -58,8 +58,27 @@ def diagnose(
 
 def tried_under(setup: SetupFindings, question: Question) -> Tried:
     """Follow recordings as a setup says that they were meant and search effects, unless their sensors contradict."""
-    progress, ready = question.progress, prepared_under(setup, question)
+    return tried_with(prepared_under(setup, question), question)
+
+
+def _prepared_first(question: Question) -> Prepared:
+    """Return recordings as they were meant by the faults of their setup.
+
+    Where rows must be counted no relation tells that a board is turned: it is where its spin is seen aslant and rows
+    are counted along its axes.
+    """
+    setup = find_setup_faults(question.recordings)
+    turned = with_turned_board(setup)
+    ready = None if turned is None else prepared_under(turned, question)
+    return prepared_under(setup, question) if ready is None or ready.rows is None else ready
+
+
+def tried_with(ready: Prepared, question: Question) -> Tried:
+    """Follow recordings that are ready for a fit and search effects, unless their sensors contradict."""
+    progress, setup = question.progress, ready.setup
     free = free_parameters(setup)
+    if ready.rows is not None:
+        free += tuple(q for q in ready.rows.free if q.key not in {known.key for known in free})
     known = (*stated_parameters(ready.fitted), *free)
     progress("asking whether sensors contradict one another", 0, 5)
     contradiction = contradiction_in(ready.fitted, known)

@@ -16,6 +16,7 @@ import numpy as np
 from discsim.arrays import FloatArray, sd_by_median
 from discsim.effects.catalogue import CATALOGUE, Effect, catalogued
 from discsim.effects.sensors import ClockRate
+from discsim.effects.setup import TimeOffset
 from discsim.frames import conjugate, multiply
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.followed import true_noise
@@ -43,6 +44,8 @@ __all__ = [
 
 #: the clock of all sensors
 _CLOCK = (catalogued(ClockRate, "clock").id, "ratio")
+#: times of one sensor that are off by as much all along
+_OFFSETS = frozenset(row.id for row in CATALOGUE.values() if row.type is TimeOffset)
 
 
 def nodes_of(recording: Recording) -> FloatArray:
@@ -124,7 +127,11 @@ def relaxed(
     )
     sensors = {readings.sensor for one in trajectories for readings in one.readings}
     clock = () if ratio == 1.0 else (Parameter(*_CLOCK, 1.0, 1e-6, RELAXED_FIT.time_sigma),)
-    parameters = (*known, *relaxed_parameters(recordings, sensors, small=bool(supposed)), *clock, *_supposed(supposed))
+    ordinary_ones = relaxed_parameters(recordings, sensors, small=bool(supposed))
+    if any(q.group in _OFFSETS for q in known):
+        # two sensors' times beside a third's: one of them is known to be open
+        ordinary_ones = tuple(q for q in ordinary_ones if q.group not in _OFFSETS)
+    parameters = (*known, *ordinary_ones, *clock, *_supposed(supposed))
     at = np.array([ratio if q.key == _CLOCK else q.stated for q in parameters])
     fit = Fit(trajectories, parameters, at, plant.sizes.relaxed, {})
     bare = linearised(fit, ())

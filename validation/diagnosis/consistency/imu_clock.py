@@ -11,15 +11,24 @@ range; nothing but whole numbers is chosen row by row, and each choice is paid f
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog
 
-from discsim.arrays import ComplexArray, FloatArray
+from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.recording import Recording, Samples
+from discsim.validation.diagnosis.consistency.late_rows import (
+    MISCOUNTED,
+    LateRows,
+    Windows,
+    asked_within,
+    late_all_along,
+    late_rows_of,
+    rows_decided,
+)
 from discsim.validation.diagnosis.consistency.own_clock import OwnClock, SamplesShown
 from discsim.validation.diagnosis.consistency.phase_regression import retimed, signal_of, slow_columns
 
@@ -77,27 +86,32 @@ class ImuClock:
     """The own period of the chip of gyroscope and accelerometer, s, with its error, and the rows of each recording.
 
     ``loops`` tells that the chip is read in step with the logger's loop: its comb is the loop's, no clock of its own.
+    ``late`` is by how much rows of the loop came late where none is lost.
     """
 
     period_s: float
     sd_s: float
     shown: tuple[ImuRows, ...]
     loops: bool
+    late: LateRows | None = None
 
     @property
     def gain(self) -> float:
         """Twice the log likelihood that all recordings gain."""
         return sum(one.gain for one in self.shown)
 
-    def counted(self, recording: Recording, timed: Recording, name: str, field: SamplesShown) -> Recording:
+    def counted(
+        self, recording: Recording, timed: Recording, name: str, field: SamplesShown, period: float
+    ) -> Recording:
         """Return a recording whose rows are counted with gyroscope and accelerometer at the chip's own times.
 
-        ``timed`` is the recording at the mean times of the magnetometer's samples, ``field``, that its rows show.
+        ``timed`` is the recording at the mean times of the magnetometer's samples, ``field``, that its rows show, a
+        ``period`` apart, s.
         """
         mine = next((one for one in self.shown if one.recording == name), None)
         if mine is None:
             return timed
-        first = float(timed.samples["magnetometer"].t[0]) + 0.5 * float(field.apart[0]) * field.period_of_others_s
+        first = float(timed.samples["magnetometer"].t[0]) + 0.5 * float(field.apart[0]) * period
         # what the chip made before the field's first sample must not be before the recording began
         early = max(0.0, -(first + float(mine.times[0])))
         # one sample in two rows: what is written must run on
@@ -120,11 +134,22 @@ class ImuClock:
             f"field's samples, {one.left[1]:.3f} at the chip's own."
             for one in self.shown
         ]
+        if self.late is not None:
+            said.append(
+                f"{100.0 * self.late.fraction:.0f} % of the loop's rows came {1e3 * self.late.tick_s:.2f} ms late "
+                f"(clock.late_rows); the magnetometer and the chip tell the same ones, by {self.late.agreed:.0f} in "
+                "twice the log likelihood."
+            )
         return said
 
     def to_json(self) -> dict[str, Any]:
         """Return the JSON object."""
-        return {"period_s": self.period_s, "period_sd_s": self.sd_s, "rows": [one.to_json() for one in self.shown]}
+        return {
+            "period_s": self.period_s,
+            "period_sd_s": self.sd_s,
+            "late_rows": None if self.late is None else self.late.to_json(),
+            "rows": [one.to_json() for one in self.shown],
+        }
 
 
 @dataclass(frozen=True)
@@ -149,8 +174,11 @@ class _Wobble:
         return np.hstack([fast, slow, np.exp(-1j * psi)[:, None] * slow]), fast.shape[1]
 
 
-def _wobble_of(recording: Recording, shown: SamplesShown) -> _Wobble | None:
-    """Return the wobble of a recording at the samples of the field that its rows show, None where none is told."""
+def _wobble_of(recording: Recording, shown: SamplesShown, period: float) -> _Wobble | None:
+    """Return the wobble of a recording at the samples of the field that its rows show, None where none is told.
+
+    These samples are a ``period`` apart, s.
+    """
     field, wobble = signal_of(recording, "field"), signal_of(recording, "wobble")
     if field is None or wobble is None or field.t.size != shown.newest.size:
         return None
@@ -160,13 +188,11 @@ def _wobble_of(recording: Recording, shown: SamplesShown) -> _Wobble | None:
     spin = np.interp(
         wobble.t[here], rate.t[np.isfinite(rate.value[:, 2])], rate.value[np.isfinite(rate.value[:, 2]), 2]
     )
-    asked = (shown.newest[both] - shown.newest[0]) * shown.period_of_others_s
+    asked = (shown.newest[both] - shown.newest[0]) * period
     if asked.size < 8 * int(4 + asked[-1] / _KNOTS_S):
         return None
     smooth = np.polynomial.Polynomial.fit(asked, spin, 4)
-    return _Wobble(
-        wobble.value[here], wobble.t[here], asked, smooth.integ(), smooth, wobble.order, shown.period_of_others_s
-    )
+    return _Wobble(wobble.value[here], wobble.t[here], asked, smooth.integ(), smooth, wobble.order, period)
 
 
 @dataclass(frozen=True)
@@ -285,11 +311,17 @@ def imu_clock_of(recordings: Sequence[Recording], names: Sequence[str], clock: O
     wobbles = {}
     for recording, name in zip(recordings, names, strict=True):
         shown = next((one for one in clock.shown if one.recording == name), None)
-        wobble = None if shown is None else _wobble_of(recording, shown)
+        wobble = None if shown is None else _wobble_of(recording, shown, clock.period_s)
         if wobble is not None:
             wobbles[name] = wobble
     if len(wobbles) < 2:
         return None
+    found = _own_comb(wobbles, clock)
+    return found if not clock.none_lost else _with_late_rows(wobbles, clock, found)
+
+
+def _own_comb(wobbles: Mapping[str, _Wobble], clock: OwnClock) -> ImuClock | None:
+    """Return the clock whose samples the wobbles show, None where the times of the field's samples do as well."""
     row = float(np.median([np.median(np.diff(wobble.written)) for wobble in wobbles.values()]))
     longest = max(float(wobble.asked[-1]) for wobble in wobbles.values())
     periods = np.arange(_SHORTEST * row, _LONGEST * row, 0.1 * row**2 / longest)
@@ -343,3 +375,82 @@ def _asked_between(rows: ImuRows, wobble: _Wobble) -> ImuRows:
     bounds = [(None, None)] * 3 + [(0.0, None)] * count
     best = linprog(cost, np.vstack([late, early]), limits, bounds=bounds)
     return rows if best.x is None else replace(rows, times=best.x[0] + best.x[1] * step)
+
+
+def _with_late_rows(wobbles: Mapping[str, _Wobble], clock: OwnClock, comb: ImuClock | None) -> ImuClock | None:
+    """Return the chip's clock beside a loop some of whose rows are late, or that loop itself where it tells more.
+
+    None where neither does as well as the times of the field's samples.
+    """
+    looped = _looped(wobbles, clock)
+    if comb is not None and not comb.loops and (looped is None or comb.gain > looped.gain):
+        return _beside_a_late_loop(wobbles, comb)
+    return looped if looped is not None and looped.gain >= _PRICE else None
+
+
+def _windows(wobble: _Wobble) -> Windows:
+    step = np.rint((wobble.written - wobble.written[0]) / float(np.median(np.diff(wobble.written))))
+    return Windows(step, wobble.asked, wobble.within)
+
+
+def _looped(wobbles: Mapping[str, _Wobble], clock: OwnClock) -> ImuClock | None:
+    """Return the rows of a chip that is read when the loop asks for them, on time or late; None without such a loop."""
+    windows = {name: _windows(wobble) for name, wobble in wobbles.items()}
+    begun = asked_within(windows)
+    if begun is None or not begun[0]:
+        return None
+    tick, loops = begun
+    rows, ticks, told = [], [], {}
+    for name, wobble in wobbles.items():
+        first, due = _fit(wobble, wobble.asked), loops[name].instants(windows[name].step)
+        late, own = _late_by_phase(wobble, due, tick)
+        times = due + own * late
+        fitted = _fit(wobble, times)
+        gain = 4.0 * times.size * float(np.log(first.rms / fitted.rms)) - _CHOICE * times.size
+        again = asked_within({name: replace(windows[name], made=wobble.asked - own * late)})
+        if again is not None:
+            due = again[1][name].instants(windows[name].step)
+        rows.append(ImuRows(name, loops[name].step_s, wobble.written, due + own * late, (first.rms, fitted.rms), gain))
+        ticks.append(own)
+        told[name] = (rows_decided(due, own, wobble.asked, wobble.within), (late, ~late))
+    periods = np.array([one.period_s for one in rows])
+    sd = float(np.std(periods, ddof=1) / np.sqrt(periods.size))
+    return ImuClock(float(np.mean(periods)), sd, tuple(rows), True, late_rows_of(np.array(ticks), told))
+
+
+def _late_by_phase(wobble: _Wobble, due: FloatArray, tick: float) -> tuple[BoolArray, float]:
+    """Return which rows (n,) the wobble reads as late, and their tick, s, begun with when they were due (n,)."""
+    late = wobble.asked > due
+    for _ in range(_ROUNDS):
+        fitted = _fit(wobble, due + tick * late)
+        reads = [wobble.columns(due + tick * one)[0] @ fitted.x for one in (0.0, 1.0)]
+        now = np.abs(wobble.value - reads[1]) < np.abs(wobble.value - reads[0])
+        off, weight = fitted.told - due - tick * late, fitted.weight
+        if 0 < np.count_nonzero(now) < now.size:
+            tick += float(np.average(off[now], weights=weight[now]) - np.average(off[~now], weights=weight[~now]))
+        if np.array_equal(now, late):
+            break
+        late = now
+    return late, tick
+
+
+def _beside_a_late_loop(wobbles: Mapping[str, _Wobble], comb: ImuClock) -> ImuClock:
+    """Return the clock of a chip's own with what the windows of the field's samples say of the loop's late rows."""
+    field = {name: _windows(wobble) for name, wobble in wobbles.items()}
+    chip = {one.recording: Windows(field[one.recording].step, one.times, one.period_s) for one in comb.shown}
+    begun = asked_within(field)
+    if begun is None or not begun[0]:
+        return comb
+    tick, loops = begun
+    due = {name: loops[name].instants(own.step) for name, own in field.items()}
+    more = late_all_along(due, tick, chip)
+    told, ticks = {}, []
+    for name, own in field.items():
+        by_chip = rows_decided(due[name], tick, chip[name].made + more, chip[name].period_s)
+        told[name] = (rows_decided(due[name], tick, own.made, own.period_s), by_chip)
+        alone = asked_within({name: own})
+        ticks.append(tick if alone is None else alone[0])
+    found = late_rows_of(np.array(ticks), told)
+    # so few rows that were late are near the end of their windows
+    near = MISCOUNTED * comb.period_s / max(found.fraction, MISCOUNTED)
+    return replace(comb, late=replace(found, tick_s=tick, tick_sd_s=float(np.hypot(found.tick_sd_s, near))))

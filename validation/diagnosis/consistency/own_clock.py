@@ -15,42 +15,36 @@ from typing import Any
 
 import numpy as np
 
-from discsim.arrays import ComplexArray, FloatArray, IntArray
-from discsim.compiled import compiled
-from discsim.recording import Recording
+from discsim.arrays import FloatArray, IntArray
+from discsim.recording import Recording, Samples
+from discsim.validation.diagnosis.consistency.counted_samples import (
+    PRICE,
+    Counted,
+    Field,
+    count_samples,
+    field_of,
+    followed,
+    rms,
+    unslipped,
+)
 from discsim.validation.diagnosis.consistency.phase_regression import (
     circle_centre,
-    rate_of,
     retimed,
     signal_of,
-    slow_columns,
 )
-from discsim.validation.diagnosis.consistency.skipped_samples import Loop, loop_beside
+from discsim.validation.diagnosis.consistency.skipped_samples import OFF, Loop, loop_beside
 from discsim.validation.diagnosis.consistency.time_stamp_recovery import Rows
 
 __all__ = ["OwnClock", "SamplesShown", "own_clock_of"]
 
-#: knots of the field's slow turn and of the wobble's amplitude: one per so many seconds (a
-#: wobble halves in 0.3 s or more)
-_KNOTS_S = 0.3
-#: what a spline's second differences are held to, as a share of the field's size: loosely, so that rows which do not
-#: fit yet cannot bend it
-_STIFF = 0.2
-#: rounds of motion and samples, and reweighted steps of the motion in each (bisquare's cousin: Cauchy weights)
-_ROUNDS, _REWEIGHTED = 12, 12
-#: beyond so many standard deviations a row counts by its logarithm (Cauchy): one that is off for another reason must
-#: not decide, and of two numbers that are both off the nearer one is still the likelier
-_ROBUST = 3.0
-#: how often a period is made better by the field's drift against the angle turned, and how far that may take it
-_REFINED, _NEARLY = 3, 0.03
-#: least noise of a reading, uT: below it the flexible motion would explain noise
-_FLOOR = 0.05
-#: how likely it is beforehand that a row shows the 1st, 2nd, ... sample after the one before
-_AHEAD = np.array([0.0, 0.6, 0.28, 0.08, 0.02, 0.01, 0.005, 0.003, 0.002])
-#: and that the two samples of a mean are not neighbours: the loop has skipped one of them
-_SKIPPED = 0.07
-#: twice the log likelihood that means of two samples, or a finer tick, must gain beyond their pattern's price
-_PRICE = 24.0
+#: a recording that is left with so many times what the best one is may be miscounted somewhere
+_SLIPPED = 1.3
+#: by how much the times of rows that show the same sample run on, s
+_RUNS_ON = 1e-9
+#: a row this many robust scales off the motion is no reading of any sample: normal noise makes none in 1e9 rows
+_DOUBTFUL = 6.0
+#: how long before the first row a motion begins, in periods: half a mean, and a part that is late by as much
+_ROOM = 1.5
 #: the field must turn by this many standard deviations of a reading's phase from sample to sample
 _PHASE_STEP = 8.0
 
@@ -60,8 +54,9 @@ class SamplesShown:
     """What the rows of one recording show: newest sample (n,), and how much older the other one of a mean is (n,).
 
     ``period_of_others_s`` is the period by which they were counted, ``loop_by_skips_s`` the loop's step where rows show
-    single samples (``apart`` is zero then), ``left`` what is left of the field, uT rms, along
-    a flexible motion: with rows that last whole ticks, and of these samples.
+    single samples (``apart`` is zero then), ``none_lost`` that each step wrote a row, ``left`` what is left of the
+    field, uT rms, along a flexible motion: with rows that last whole ticks, and of these samples. ``doubtful`` are rows
+    that no sample makes read as they do.
     """
 
     recording: str
@@ -70,10 +65,14 @@ class SamplesShown:
     apart: IntArray
     left: tuple[float, float]
     loop_by_skips_s: float | None = None
+    none_lost: bool = False
+    doubtful: tuple[int, ...] = ()
 
     @property
     def lost(self) -> float:
         """Share of the logger's own steps that wrote no row, a step being the mean one between skipped samples."""
+        if self.none_lost:
+            return 0.0
         steps = np.diff(self.newest).sum() - self._skips
         return float(1.0 - (self.newest.size - 1) / max(steps, 1))
 
@@ -92,21 +91,29 @@ class SamplesShown:
     @property
     def loop_s(self) -> float | None:
         """Duration of a step of the logger's loop, from the samples that it skips; None where it skips too few."""
+        if self.none_lost:
+            return float(self.newest[-1] - self.newest[0]) / (self.newest.size - 1) * self.period_of_others_s
         at = self.newest[self.apart == 2]
         if self.loop_by_skips_s is not None or at.size < 3:
             return self.loop_by_skips_s
         spacing = float(np.median(np.diff(at)))
         return self.period_of_others_s * spacing / (spacing - 1.0)
 
-    def times(self) -> FloatArray:
-        """Return the mean time (n,) s that each row's field is of, from the first row's on."""
-        at = (self.newest - 0.5 * self.apart) * self.period_of_others_s
+    def times(self, period: float) -> FloatArray:
+        """Return the mean time (n,) s that each row's field is of, from the first row's on, by a ``period``, s."""
+        at = (self.newest - 0.5 * self.apart) * period
+        if self.none_lost:
+            # one sample in two rows: what is written must run on
+            at = at + _RUNS_ON * np.arange(at.size)
         return np.asarray(at - at[0])
 
-    def averaged(self, first: float) -> tuple[FloatArray, FloatArray]:
-        """Return the times (2, n) s and weights (2, n) of the samples of each row, whose first is of time ``first``."""
-        middle = first + self.times()
-        half = 0.5 * self.apart * self.period_of_others_s
+    def averaged(self, first: float, period: float) -> tuple[FloatArray, FloatArray]:
+        """Return the times (2, n) s and weights (2, n) of the samples of each row, whose first is of time ``first``.
+
+        The samples are a ``period`` apart, s.
+        """
+        middle = first + self.times(period)
+        half = 0.5 * self.apart * period
         return np.stack([middle + half, middle - half]), np.full((2, self.newest.size), 0.5)
 
     def to_json(self) -> dict[str, Any]:
@@ -133,18 +140,33 @@ class OwnClock:
     #: how far rows are means of two samples: 0.5, or not at all
     weight: float = 0.5
 
+    @property
+    def none_lost(self) -> bool:
+        """Whether the logger wrote a row in each of its steps, some of them late."""
+        return all(one.none_lost for one in self.shown)
+
     def counted(self, recording: Recording, name: str) -> Recording | None:
-        """Return a recording with its samples at the times that its rows' samples give, None where there is none."""
+        """Return a recording with its samples at the times that its rows' samples give, None where there is none.
+
+        All recordings are of one part, and so of one period: precession bends the phase of the field of each by its
+        own, which makes periods differ that do not.
+        """
         mine = next((item for item in self.shown if item.recording == name), None)
         field = signal_of(recording, "field")
         if mine is None or field is None:
             return None
         if not np.array_equal(field.t, recording.samples["magnetometer"].t):
-            return retimed(
-                recording, field.t, field.t[0] + mine.times()
-            )  # a row without a field: its sample is unknown
-        timed = retimed(recording, field.t, field.t[0] + mine.times())
-        return replace(timed, averaged={"magnetometer": mine.averaged(float(field.t[0]))})
+            # a row without a field: its sample is unknown
+            return retimed(recording, field.t, field.t[0] + mine.times(self.period_s))
+        # neither the older sample of a mean nor what a fit finds to be late may come before the motion begins
+        first = float(field.t[0]) + _ROOM * self.period_s
+        timed = retimed(recording, field.t, first + mine.times(self.period_s))
+        if mine.doubtful:
+            own = timed.samples["magnetometer"]
+            value = own.value.copy()
+            value[list(mine.doubtful)] = np.nan
+            timed = replace(timed, samples={**timed.samples, "magnetometer": Samples(own.t, value)})
+        return replace(timed, averaged={"magnetometer": mine.averaged(first, self.period_s)})
 
     @property
     def sentences(self) -> list[str]:
@@ -156,6 +178,11 @@ class OwnClock:
             if self.weight
             else "and the logger's slower loop skips samples at even distances, which no row ever shows."
         )
+        if self.none_lost:
+            how += (
+                " No row is lost: some come late (clock.late_rows), show a newer sample than they should, and the row "
+                "after them the same one once more."
+            )
         said = [
             f"The magnetometer has a clock of its own (mag.own_clock): a period of {1e3 * self.period_s:.3f} ± "
             f"{1e3 * self.sd_s:.3f} ms, {how} Twice the log likelihood gains {self.gain:.0f}."
@@ -166,7 +193,8 @@ class OwnClock:
             said.append(
                 f"{item.recording}, with the period of the others: along a smooth motion the field leaves "
                 f"{counted:.1f} µT with counted rows, {here:.2f} with the samples that they show{loop}; "
-                f"{100.0 * item.lost:.0f} % of the loop's steps wrote no row (clock.lost_rows)."
+                + ("none" if item.none_lost else f"{100.0 * item.lost:.0f} %")
+                + " of the loop's steps wrote no row (clock.lost_rows)."
             )
         return said
 
@@ -181,266 +209,95 @@ class OwnClock:
         }
 
 
-@dataclass(frozen=True)
-class _Field:
-    """A magnetometer in its disc's plane: x + i y (n,), uT, the rate at each row (n,) rad/s, and how a wobble turns."""
-
-    value: ComplexArray
-    rate: FloatArray
-    #: turns of the wobble in the body per turn of the disc, less one; None where no disc is stated
-    wobble: float | None
-    #: a row as it is written, s
-    row_s: float
-
-    def turned(self, t: FloatArray) -> Any:
-        """Return the angle turned as a polynomial of time, the rows being at ``t`` (n,): a disc's spin is smooth."""
-        return np.polynomial.Polynomial.fit(t, self.rate, 3).integ()
-
-
-@dataclass(frozen=True)
-class _Flexible:
-    """The field along a flexible motion: hard iron, a slow turn, a wobble; all but the angle turned is linear."""
-
-    angle: Any
-    end: float
-    wobble: float | None
-
-    def columns(self, t: FloatArray) -> ComplexArray:
-        """Return the columns (n, p) at times (n,)."""
-        slow = slow_columns(t, self.end, _KNOTS_S)
-        psi = self.angle(t) - self.angle(0.0)
-        parts = [np.ones((t.size, 1), dtype=np.complex128), np.exp(-1j * psi)[:, None] * slow]
-        if self.wobble is not None:
-            parts.append(np.exp(1j * self.wobble * psi)[:, None] * slow)
-        return np.hstack(parts)
-
-    def drift(self, x: ComplexArray) -> float:
-        """Return how fast, rad/s, the slow turn of coefficients (p,) runs away from the angle turned."""
-        t = np.linspace(0.2 * self.end, 0.8 * self.end, 50)
-        psi = self.angle(t) - self.angle(0.0)
-        slow = np.exp(1j * psi) * (self.columns(t)[:, 1 : 1 + self._count] @ x[1 : 1 + self._count])
-        turned = np.unwrap(np.angle(slow))
-        return float(np.polynomial.Polynomial.fit(t, turned, 1).convert().coef[1])
-
-    @property
-    def _count(self) -> int:
-        return 4 + int(self.end / _KNOTS_S)
-
-    def held(self, size: float) -> FloatArray:
-        """Return the rows (c, p) that hold second differences of the splines' coefficients to a share of ``size``."""
-        count = self._count
-        second = np.diff(np.eye(count), 2, axis=0) / (_STIFF * size)
-        splines = 1 if self.wobble is None else 2
-        rows = np.zeros((splines * len(second), 1 + splines * count))
-        for i in range(splines):
-            rows[i * len(second) : (i + 1) * len(second), 1 + i * count : 1 + (i + 1) * count] = second
-        return rows
-
-
-def _fitted(columns: ComplexArray, held: FloatArray, value: ComplexArray) -> tuple[ComplexArray, ComplexArray, float]:
-    """Return robust coefficients (p,), residuals (n,) and their scale, uT."""
-    left, scale = value, np.inf
-    x = np.zeros(columns.shape[1], dtype=np.complex128)
-    for _ in range(_REWEIGHTED):
-        weight = np.ones(value.size) if np.isinf(scale) else 1.0 / (1.0 + (np.abs(left) / (2.0 * scale)) ** 2)
-        sd = 1.0 if np.isinf(scale) else scale
-        A = np.vstack([columns * np.sqrt(weight)[:, None] / sd, held])
-        b = np.concatenate([value * np.sqrt(weight) / sd, np.zeros(len(held))])
-        x = np.linalg.lstsq(A, b, rcond=None)[0]
-        left = value - columns @ x
-        scale = max(float(np.median(np.abs(left))), _FLOOR)
-    return x, left, scale
-
-
-@compiled
-def _likeliest(cost: FloatArray, ahead: FloatArray, skipped: FloatArray) -> tuple[float, IntArray, IntArray]:
-    """Return twice the negative log likelihood and the likeliest newest sample and distance of each row.
-
-    ``cost`` (d, n, m) is what row n costs that shows sample m and, where d is 1, one that is two older; ``ahead`` (k,)
-    and ``skipped`` (d,) are the prices of their numbers.
-    """
-    kinds, rows, samples = cost.shape
-    best = np.full((rows, samples, kinds), np.inf)
-    step = np.zeros((rows, samples, kinds), np.int64)
-    before = np.zeros((rows, samples, kinds), np.int64)
-    for m in range(min(samples, 2 * ahead.size)):
-        for d in range(kinds):
-            best[0, m, d] = cost[d, 0, m] + skipped[d]
-    for k in range(1, rows):
-        for m in range(k, samples):
-            for d in range(kinds):
-                mine = cost[d, k, m] + skipped[d]
-                for n in range(1 + d, min(ahead.size, m + 1)):
-                    for p in range(kinds):
-                        total = best[k - 1, m - n, p] + mine + ahead[n]
-                        if total < best[k, m, d]:
-                            best[k, m, d] = total
-                            step[k, m, d] = n
-                            before[k, m, d] = p
-    newest = np.zeros(rows, np.int64)
-    kind = np.zeros(rows, np.int64)
-    m, d = 0, 0
-    for i in range(samples):
-        for j in range(kinds):
-            if best[rows - 1, i, j] < best[rows - 1, m, d]:
-                m, d = i, j
-    total = best[rows - 1, m, d]
-    for k in range(rows - 1, -1, -1):
-        newest[k] = m
-        kind[k] = d
-        n, p = step[k, m, d], before[k, m, d]
-        m, d = m - n, p
-    return total, newest, kind
-
-
-@dataclass(frozen=True)
-class _Found:
-    """The samples that rows show, twice the negative log likelihood, residuals and their scale, and a better period."""
-
-    newest: IntArray
-    apart: IntArray
-    total: float
-    left: ComplexArray
-    scale: float
-    period: float
-
-
-def _first_samples(field: _Field, centre: complex, period: float, *, means: bool) -> tuple[IntArray, IntArray]:
-    """Return first guesses of newest samples (n,) and distances (n,) from how far the field turns row by row."""
-    z = field.value - centre
-    rate = 0.5 * (field.rate[1:] + field.rate[:-1])
-    turned = -np.angle(z[1:] * np.conj(z[:-1])) * np.sign(rate)
-    turned = np.where(turned < -0.5, turned + 2.0 * np.pi, turned) / np.abs(rate) / period
-    ahead = np.rint(turned).astype(np.int64)
-    apart = np.ones(z.size, dtype=np.int64)
-    if means:
-        halves = np.rint(2.0 * turned) / 2.0
-        odd = np.abs(halves - np.rint(halves)) > 0.25
-        k = 0
-        while k < odd.size - 1:
-            # half a sample more or less on both sides: the mean of two that are not neighbours stands between
-            if odd[k] and odd[k + 1]:
-                apart[k + 1] = 2
-                ahead[k], ahead[k + 1] = round(halves[k] + 0.5), round(halves[k + 1] - 0.5)
-                k += 1
-            k += 1
-    newest = 2 + np.concatenate([[0], np.cumsum(np.maximum(ahead, 1))])
-    return newest.astype(np.int64), apart
-
-
-def _followed(field: _Field, newest: IntArray, apart: IntArray, period: float, *, means: bool) -> _Found:
-    """Return the likeliest samples of a recording's rows, found with the motion in turn from first guesses."""
-    ahead = np.full(_AHEAD.size, np.inf)
-    ahead[1:] = -2.0 * np.log(_AHEAD[1:])
-    skipped = -2.0 * np.log(np.array([1.0 - _SKIPPED, _SKIPPED] if means else [1.0]))
-    middle = np.median(field.value.real) + 1j * np.median(field.value.imag)
-    size = float(np.median(np.abs(field.value - middle)))
-    found: _Found | None = None
-    for _ in range(_ROUNDS):
-        t = np.asarray((newest - (0.5 * apart if means else 0.0)) * period, dtype=np.float64)
-        motion = _Flexible(field.turned(t), float(t[-1]) + 0.2, field.wobble)
-        columns = motion.columns(np.asarray(newest * period))
-        if means:
-            columns = np.asarray(0.5 * (columns + motion.columns(np.asarray((newest - apart) * period))))
-        x, left, scale = _fitted(columns, motion.held(size), field.value)
-        every = motion.columns(np.arange(-2.0, newest[-1] + 12.0) * period) @ x
-        shown = [0.5 * (every[2:] + every[1:-1]), 0.5 * (every[2:] + every[:-2])] if means else [every[2:]]
-        off = [_ROBUST**2 * np.log1p((np.abs(field.value[:, None] - one) / (_ROBUST * scale)) ** 2) for one in shown]
-        total, now, kind = _likeliest(np.stack(off), ahead, skipped)
-        same = np.array_equal(now, newest) and np.array_equal(kind + 1, apart)
-        better = period * (1.0 - motion.drift(x) / float(np.median(field.rate)))
-        found = _Found(now, kind + 1, float(total) + 4.0 * newest.size * np.log(scale), left, scale, better)
-        newest, apart = now, kind + 1
-        if same:
-            break
-    assert found is not None
-    return found
-
-
-def _rms(left: ComplexArray) -> float:
-    return float(np.sqrt(np.mean(np.abs(left) ** 2)))
-
-
-def _field_of(recording: Recording) -> _Field | None:
-    """Return the field in a recording's plane, None where it or the rate is not told."""
-    signal = signal_of(recording, "field")
-    known = rate_of(recording)
-    if signal is None or known is None:
-        return None
-    disc = recording.disc
-    wobble = None if disc is None or disc.Ixx <= 0.0 else disc.Izz / disc.Ixx - 1.0
-    rate = np.interp(signal.t, known[1], known[2])
-    return _Field(signal.value, rate, wobble, float(np.median(np.diff(signal.t))))
-
-
 def own_clock_of(recordings: Sequence[Recording], names: Sequence[str], rows: Rows) -> OwnClock | None:
     """Return the magnetometer's own clock, None where rows that are counted in whole ticks do as well.
 
     Takes recordings, what to call them and the ticks that they come in. Where many rows are means of samples that are
     no neighbours the tick is half a period, else it is a period.
     """
-    every = {name: _field_of(recording) for recording, name in zip(recordings, names, strict=True)}
+    every = {name: field_of(recording) for recording, name in zip(recordings, names, strict=True)}
     fields = {name: field for name, field in every.items() if field is not None and name in rows.own}
     if not fields:
         return None
-    single = {name: _counted(field, rows.tick_s, means=False) for name, field in fields.items()}
-    tried = [
-        {name: _counted(field, ticks * rows.tick_s, means=True) for name, field in fields.items()}
-        for ticks in (1.0, 2.0)
-    ]
-    means = min(tried, key=lambda found: sum(one.total for one in found.values()))
-    gain = sum(single[name].total - means[name].total for name in fields)
-    rest = {name: _rms(one.left) for name, one in single.items()}
-    if gain >= _PRICE * len(fields):
-        return _clock(fields, means, rest, rows, gain)
+    single = {name: count_samples(field, rows.tick_s, means=False) for name, field in fields.items()}
+    rest = {name: rms(one.left) for name, one in single.items()}
+    means = min(
+        ({n: count_samples(f, ticks * rows.tick_s, means=True) for n, f in fields.items()} for ticks in (1.0, 2.0)),
+        key=_total,
+    )
+    gain = _total(single) - _total(means)
+    kept = _kept_rows(fields, rows)
+    if kept is not None and (gains := min(_total(single), _total(means)) - _total(kept[1])) >= PRICE * len(fields):
+        return _clock(fields, kept[1], rest, rows, gains, means=kept[0], kept=True)
     loops = {name: loop_beside(one.newest, one.period, fields[name].row_s) for name, one in single.items()}
     told = {name: loop for name, loop in loops.items() if loop is not None}
-    if len(told) < len(fields) or sum(loop.gain for loop in told.values()) < _PRICE:
-        return None
-    return _clock(fields, single, rest, rows, sum(loop.gain for loop in told.values()), told)
+    skips = sum(loop.gain for loop in told.values()) if len(told) == len(fields) else 0.0
+    if gain >= max(PRICE * len(fields), skips):
+        return _clock(fields, means, rest, rows, gain, means=True)
+    return _clock(fields, single, rest, rows, skips, means=False, loops=told) if skips >= PRICE else None
+
+
+def _total(found: Mapping[str, Counted]) -> float:
+    """Return twice the negative log likelihood of counted samples over all recordings."""
+    return sum(one.total for one in found.values())
+
+
+def _kept_rows(fields: Mapping[str, Field], rows: Rows) -> tuple[bool, dict[str, Counted]] | None:
+    """Return the samples of rows of which none is lost, and whether they are means; None where more would be skipped.
+
+    The loop's step is as it is written to within its oscillator's error: it may skip a sample, and a row that came late
+    is followed by a short one.
+    """
+    tried = []
+    for means, ticks in ((False, 1.0), (True, 1.0), (True, 2.0)):
+        period = ticks * rows.tick_s
+        found = {n: count_samples(field, period, means=means, kept=True) for n, field in fields.items()}
+        steps = [(one.newest[-1] - one.newest[0]) * one.period / (one.newest.size - 1) for one in found.values()]
+        off = [abs(step / field.row_s - 1.0) for step, field in zip(steps, fields.values(), strict=True)]
+        if max(off) < OFF:
+            tried.append((means, found))
+    return min(tried, key=lambda one: _total(one[1]), default=None)
 
 
 def _clock(
-    fields: Mapping[str, _Field],
-    counted: Mapping[str, _Found],
+    fields: Mapping[str, Field],
+    counted: Mapping[str, Counted],
     rest: Mapping[str, float],
     rows: Rows,
     gain: float,
+    *,
+    means: bool,
     loops: Mapping[str, Loop] | None = None,
+    kept: bool = False,
 ) -> OwnClock | None:
     """Return the clock that counted samples tell, None where they are too close to be told apart.
 
-    Takes what is left of each field, ``rest``, where rows last whole ticks. Rows show means of two samples unless
-    ``loops`` tell the clock by what they skip.
+    Takes what is left of each field, ``rest``, where rows last whole ticks. Rows show ``means`` of two samples, or
+    ``loops`` may tell the clock by what they skip; ``kept`` tells that none is lost.
     """
-    means = loops is None
+    least = min(rms(one.left) for one in counted.values())
+    middle = float(np.median([one.period for one in counted.values()]))
+    counted = {
+        name: unslipped(fields[name], one, middle, means=means, kept=kept) if rms(one.left) > _SLIPPED * least else one
+        for name, one in counted.items()
+    }
     periods = {name: one.period for name, one in counted.items()}
     shown = []
     for name, field in fields.items():
         others = [period for other, period in periods.items() if other != name] or [periods[name]]
         before, period = counted[name], float(np.mean(others))
-        found = _followed(field, before.newest, before.apart, period, means=means)
+        found = followed(field, before.newest, before.apart, period, means=means, kept=kept)
         turned = found.period * float(np.median(np.abs(field.rate)))
         if turned < _PHASE_STEP * found.scale / float(np.median(np.abs(field.value - circle_centre(field.value)))):
             return None
-        apart, step = (found.apart, None) if loops is None else (np.zeros_like(found.apart), loops[name].step_s)
-        left = (rest[name], _rms(found.left))
-        shown.append(SamplesShown(name, period, found.newest, apart, left, step))
+        apart, step = (
+            found.apart if means else np.zeros_like(found.apart),
+            None if loops is None else loops[name].step_s,
+        )
+        off = np.abs(found.left) > _DOUBTFUL * found.scale
+        left = (rest[name], rms(found.left[~off]))
+        doubtful = tuple(np.flatnonzero(off).tolist())
+        shown.append(SamplesShown(name, period, found.newest, apart, left, step, kept, doubtful))
     mean = float(np.mean(list(periods.values())))
     scatter = float(np.std(list(periods.values()), ddof=1)) if len(periods) > 1 else rows.sd_s
     return OwnClock(mean, scatter / np.sqrt(len(periods)), gain, tuple(shown), 0.5 if means else 0.0)
-
-
-def _counted(field: _Field, period: float, *, means: bool) -> _Found:
-    """Return the samples that rows show at a period, which is made better where it is only nearly right."""
-    centre = circle_centre(field.value)
-    found = _followed(field, *_first_samples(field, centre, period, means=means), period, means=means)
-    for _ in range(_REFINED):
-        if abs(found.period / period - 1.0) > _NEARLY:
-            break
-        period = found.period
-        better = _followed(field, *_first_samples(field, centre, period, means=means), period, means=means)
-        if better.total >= found.total:
-            break
-        found = better
-    return found

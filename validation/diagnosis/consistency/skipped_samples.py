@@ -17,12 +17,12 @@ from scipy.special import xlogy
 
 from discsim.arrays import FloatArray, IntArray
 
-__all__ = ["Loop", "loop_beside"]
+__all__ = ["OFF", "Loop", "loop_beside"]
 
 #: share of rows whose sample was miscounted
 _MISCOUNTED = 0.005
 #: how far a loop may be from its stated rate, and by how much slower than the part it must be to be told from it
-_OFF, _SLOWER = 0.02, 0.01
+OFF, _SLOWER = 0.02, 0.01
 #: loops and phases that are tried: a loop of the next may shift by so many samples at the recording's end
 _APART, _PHASES = 0.04, 150
 
@@ -40,7 +40,7 @@ def loop_beside(newest: IntArray, period: float, stated: float) -> Loop | None:
     The loop's step is ``stated`` to within its oscillator's error, s. None where none would be slower than the part.
     """
     shown = np.asarray(newest - newest[0], dtype=np.float64)
-    least, most = max((1.0 - _OFF) * stated / period, 1.0 + _SLOWER), (1.0 + _OFF) * stated / period
+    least, most = max((1.0 - OFF) * stated / period, 1.0 + _SLOWER), (1.0 + OFF) * stated / period
     if least >= most or shown[-1] <= 0.0:
         return None
     ratios = np.linspace(least, most, 2 + int((most - least) * shown[-1] / _APART))

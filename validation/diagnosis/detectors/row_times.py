@@ -15,22 +15,34 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
-from discsim.effects.timing_rows import Average, ImuClock, LostRows, OwnClock
+from discsim.effects.sensors import ClockRate
+from discsim.effects.setup import TimeOffset
+from discsim.effects.timing_rows import Average, ImuClock, LateRows, LostRows, OwnClock
 from discsim.recording import Recording
 from discsim.validation.diagnosis.answer.measured import Located
 from discsim.validation.diagnosis.answer.named import SMALLEST_P_VALUE, Evidence, NamedEffect, ParameterValue
 from discsim.validation.diagnosis.consistency.imu_clock import ImuClock as FoundImuClock
+from discsim.validation.diagnosis.consistency.late_rows import LateRows as FoundLateRows
 from discsim.validation.diagnosis.consistency.own_clock import OwnClock as FoundClock
 from discsim.validation.diagnosis.consistency.phase_regression import angle_turned, signal_of, slow_columns
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, RowProof
+from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.noise import NoiseModel
+from discsim.validation.identification.parameters import Parameter
 
 __all__ = ["RowTimes", "row_times"]
 
 #: what a second sensor must gain in twice the log likelihood by times that it took no part in: an effect's entry
 _SECOND = 24.0
+#: the scale of all times
+_SCALE = (catalogued(ClockRate, "clock").id, "ratio")
+#: how late the field's times are against those of gyroscope and accelerometer
+_OFFSET = (catalogued(TimeOffset, "magnetometer").id, "offset_s")
 #: recordings of one logger have one period: their own ones may differ by this share
 _ALIKE = 5e-3
+#: by how much less of a spin a chip shows that is tilted by 0.1 rad, as one soldered by eye may be; precession bends
+#: the phase of a field by a fifth of that, 4 deg/s of 3500
+_TILTED = 5e-3
 #: knots of the wobble's amplitude, s, as in the count itself by half: it halves in 0.3 s or more
 _KNOTS_S = 0.15
 
@@ -53,7 +65,12 @@ class RowTimes:
         if counted is None or self.imu is None:
             return counted or recording
         shown = next(one for one in self.clock.shown if one.recording == name)
-        return self.imu.counted(recording, counted, name, shown)
+        return self.imu.counted(recording, counted, name, shown, self.clock.period_s)
+
+    @property
+    def late(self) -> FoundLateRows | None:
+        """By how much rows came late where the logger lost none."""
+        return self.imu.late if self.clock.none_lost and self.imu is not None else None
 
     @property
     def _gains(self) -> tuple[float, float]:
@@ -72,6 +89,33 @@ class RowTimes:
         # single samples leave what counted rows do: there the pattern of those that were skipped tells the clock
         return rows, clock if self.clock.weight else self.clock.gain
 
+    @property
+    def free(self) -> tuple[Parameter, ...]:
+        """What counting leaves open, for a fit to refine: the scale of all times, and the field's beside the others'.
+
+        A period is counted as if nothing but the spin that a gyroscope shows turned the field: precession turns it,
+        too, and a chip that is tilted shows less of the spin, which only a fit of the motion knows. Which of its
+        samples each row shows is counted for each part by itself, so that the times of one may be off by as much all
+        along.
+        """
+        off = 0.5 * self.clock.period_s
+        return (
+            Parameter(*_SCALE, 1.0, 1e-6, float(np.hypot(_TILTED, self.clock.sd_s / self.clock.period_s))),
+            Parameter(*_OFFSET, 0.0, 1e-5, off),
+        )
+
+    def refined(self, fit: Fit) -> RowTimes:
+        """Return what was counted with the scale of times that a fit has found, and its error."""
+        place = next((j for j, q in enumerate(fit.parameters) if q.key == _SCALE and q.recordings is None), None)
+        if place is None or fit.covariance.shape[0] != len(fit.parameters):
+            return self
+        ratio, sd = float(fit.at[place]), float(np.sqrt(fit.covariance[place, place]))
+        clock = replace(self.clock, period_s=self.clock.period_s / ratio, sd_s=self.clock.period_s * sd)
+        imu = self.imu
+        if imu is not None:
+            imu = replace(imu, period_s=imu.period_s / ratio, sd_s=float(np.hypot(imu.sd_s, imu.period_s * sd)))
+        return replace(self, clock=clock, imu=imu)
+
     def effects(self) -> tuple[NamedEffect, ...]:
         """Return what was counted as effects of an answer; figures of each recording are by the period of others."""
         rows, clock = self._gains
@@ -84,24 +128,33 @@ class RowTimes:
 
         imu = self.imu if self.imu is not None and not self.imu.loops else None
 
-        def named(kind: type, acts_on: str, value: float, sd: float | None, gain: float) -> NamedEffect:
+        def named(kind: type, acts_on: str, gain: float, *sizes: tuple[float, float | None]) -> NamedEffect:
             row = catalogued(kind, acts_on)
             bic = gain - float(np.log(max(sum(shown.newest.size for shown in self.clock.shown), 2)))
             evidence = Evidence(bic, 0.5 * gain if held else None, SMALLEST_P_VALUE)
-            return NamedEffect(row.id, {row.parameters[0]: ParameterValue(value, sd)}, evidence, None, ())
+            parameters = {name: ParameterValue(*size) for name, size in zip(row.parameters, sizes, strict=True)}
+            return NamedEffect(row.id, parameters, evidence, None, ())
 
+        late = self.late
         return (
-            named(LostRows, "clock", share, error, rows),
-            named(OwnClock, "magnetometer", self.clock.period_s, self.clock.sd_s, clock),
-            *((named(Average, "magnetometer", self.clock.weight, None, clock),) if self.clock.weight else ()),
-            *(() if imu is None else (named(ImuClock, "board", imu.period_s, imu.sd_s, imu.gain),)),
+            named(LostRows, "clock", rows, (share, error))
+            if late is None
+            else named(
+                LateRows, "clock", late.agreed, (late.tick_s, late.tick_sd_s), (late.fraction, late.fraction_sd)
+            ),
+            named(OwnClock, "magnetometer", clock, (self.clock.period_s, self.clock.sd_s)),
+            *((named(Average, "magnetometer", clock, (self.clock.weight, None)),) if self.clock.weight else ()),
+            *(() if imu is None else (named(ImuClock, "board", imu.gain, (imu.period_s, imu.sd_s)),)),
         )
 
     def located(self, end: float) -> tuple[Located, ...]:
         """Return where recordings that end by ``end`` s part from a baseline for it: in the field, all along."""
         rows, clock = self._gains
         share = float(np.clip(rows / max(rows + clock, 1e-300), 0.0, 1.0))
-        row, own = catalogued(LostRows, "clock"), catalogued(OwnClock, "magnetometer")
+        row, own = (
+            catalogued(LostRows if self.late is None else LateRows, "clock"),
+            catalogued(OwnClock, "magnetometer"),
+        )
         return (
             Located("all", "all", "all", 0.0, end, share, row.trace, row.grows_with),
             Located("all", "magnetometer", "all", 0.0, end, 1.0 - share, own.trace, own.grows_with),
@@ -138,6 +191,10 @@ def row_times(recordings: Sequence[Recording], names: Sequence[str], agreement: 
     if len(clock.shown) < len(recordings) or np.ptp(periods) > _ALIKE * float(np.mean(periods)):
         return None
     found = RowTimes(tuple(names), clock, agreement.row_proofs)
+    if clock.none_lost:
+        # the wobble goes by the rows themselves, not by the samples that they show: it must tell the same ones late
+        found = replace(found, imu=agreement.imu_clock)
+        return found if found.late is not None and min(found._gains[1], found.late.agreed) > _SECOND else None
     if min(found._gains) < _SECOND or _gained(recordings, found.applied(recordings)) < _SECOND:
         return None
     # the chip's own samples were chosen by the wobble: they cannot bear out what it is asked for

@@ -9,25 +9,41 @@ no step by step selection comes nearer; beside the data algebra knows what each 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 
-from discsim.effects.catalogue import CATALOGUE
-from discsim.effects.sensors import Lag
+from discsim.effects.catalogue import CATALOGUE, catalogued
+from discsim.effects.mount_rows import Mount
+from discsim.effects.sensors import CrossAxis, HardIron, Lag
+from discsim.effects.setup import BoardRotation
 from discsim.validation.diagnosis.held_out import heldout_chi2
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from discsim.validation.diagnosis.selection.evidence import TURNED, price
-from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
-from discsim.validation.diagnosis.selection.screening import NormalEquations
-from discsim.validation.diagnosis.selection.search_state import Search, far, on_the_disc, possible
+from discsim.validation.diagnosis.selection.evidence import NESTED, TURNED, price
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
+from discsim.validation.diagnosis.selection.screening import NormalEquations, normal_equations_of
+from discsim.validation.diagnosis.selection.search_state import (
+    Search,
+    chi2_in,
+    far,
+    on_the_disc,
+    possible,
+    values_of_fit,
+)
 from discsim.validation.diagnosis.settings import SELECTION
+from discsim.validation.identification.gauss_newton import Fit, penalty_of
 from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = ["all_at_once", "worth_of_each"]
 
+#: the whole board turned
+_BOARD = catalogued(BoardRotation).id
 #: most effects at once: those of the consistency stage and the ordinary errors of three sensors that it goes with
 _MOST = 8
 #: most steps of their fit: it begins where the relaxed fit has them, and closes segments that this let part
 _STEPS = 20
+#: rounds in which effects are added and left out by algebra about a fit, each refitted: one mostly does
+_ROUNDS = 3
 
 
 def all_at_once(found: Search) -> ContinuousFit | None:
@@ -41,34 +57,133 @@ def all_at_once(found: Search) -> ContinuousFit | None:
     every = [free_candidate(id) for id in free if id in CATALOGUE and id in competing and not CATALOGUE[id].grid]
     # what sensors told before any fit stays until a fit has it: about the relaxed fit algebra weighs it against itself
     told = {hint.candidate.id for hint in lags}
+    fits = _few(found, every, told)
+    if not any(_leaves_noise(one) for one in fits):
+        fits += _many(found, every, told)
+    fits = [one for one in fits if possible(one)]
+    if not fits:
+        return None
+    fitted = min(fits, key=lambda one: _charged(found, one))
+    return fitted if found.base.score - fitted.score > sum(map(price, fitted.hypothesis.candidates)) else None
+
+
+def _leaves_noise(fitted: ContinuousFit) -> bool:
+    """Tell whether nothing but noise is left."""
+    return not unmodelled_residuals(fitted.fit.linears, fitted.residuals, fitted.fit.noise)
+
+
+def _many(found: Search, every: Sequence[CandidateEffect], told: Collection[str]) -> list[ContinuousFit]:
+    """Return the fit of all effects that the relaxed fit cannot do without, less those that it then can."""
     asked = _held_out(found, _pruned(found.loose_board, every, found.own, told), told)
     fitted = _fitted(found, asked)
     if fitted is None:
-        return None
+        return []
     about = found.about(fitted.fit)
     fewer = _held_out(about, _pruned(about.equations, asked, found.own))
     if len(fewer) < len(asked):
         # what two effects shared that are one in these recordings, one of them cannot have: again from the relaxed fit
         fitted = _fitted(found, fewer)
-    if fitted is None:
-        return None
-    worth = found.base.score - fitted.score > sum(map(price, fewer))
-    return fitted if worth and possible(fitted) else None
+    return [] if fitted is None else [fitted]
 
 
-def _fitted(found: Search, candidates: tuple[CandidateEffect, ...]) -> ContinuousFit | None:
-    """Return the fit of some effects from where the relaxed fit has them, None where it has them off the disc."""
+def _fitted(found: Search, candidates: tuple[CandidateEffect, ...], known: Start | None = None) -> ContinuousFit | None:
+    """Return the fit of some effects from where the relaxed fit has them, None where it has them off the disc.
+
+    What is ``known`` better begins there.
+    """
     relaxed_fit, ids = found.relaxed_fit, {one.id for one in candidates}
     start = {
         (q.key, q.recordings): float(v)
         for q, v in zip(relaxed_fit.parameters, relaxed_fit.at, strict=True)
-        if q.group in ids or q.key in relaxed_fit.plant.own_keys
+        if q.group in ids or q.key in relaxed_fit.plant.own_keys or q in found.own
     }
+    for turned, matrix in NESTED.items():
+        if turned in ids and matrix not in ids:
+            pairs = zip(relaxed_fit.parameters, relaxed_fit.at.tolist(), strict=True)
+            everything = {(q.key, q.recordings): v for q, v in pairs}
+            start |= _turn_of(everything, matrix, turned)
+    start |= {key: value for key, value in (known or {}).items() if key in start}
     if not candidates or not on_the_disc(found, start):
         return None
     return continuous_fit(
         relaxed_fit, Hypothesis(candidates), found.own, found.relaxed_noise, start, iterations=_STEPS, polish=2
     )
+
+
+def _charged(found: Search, fitted: ContinuousFit) -> float:
+    """Return chi-squared of a fit with its priors and what its effects cost, in the noise of the relaxed fit.
+
+    In the noise that it has left itself a sensor that it misses would be a noisy one.
+    """
+    left = chi2_in(fitted, found.relaxed_noise) + penalty_of(fitted.fit, fitted.fit.linears)
+    return left + sum(map(_cost, fitted.hypothesis.candidates))
+
+
+def _cost(candidate: CandidateEffect) -> float:
+    """Return what an effect must gain beside others."""
+    return price(candidate) + SELECTION.turned * (candidate.id in TURNED)
+
+
+def _few(found: Search, every: Sequence[CandidateEffect], told: Collection[str]) -> list[ContinuousFit]:
+    """Return fits in which chips that are turned take the place of matrices and scales; none where they run away.
+
+    A turn is nested in a matrix: its numbers are opposite in pairs, to first order. Beside each other neither is worth
+    its price, the one with more numbers is the last to go, and scales make up for the squares of the turn. So the fit
+    begins anew with the few: what was ``told``, hard iron, and each chip turned unless the whole board is. Of ``every``
+    other effect that counts which is worth its price beside them.
+    """
+    competing = {candidate.id for candidate in found.candidates}
+    turns = tuple(free_candidate(id) for id in sorted(TURNED & competing) if CATALOGUE[id].type is Mount)
+    if any(q.group == _BOARD for q in found.own):
+        turns = ()
+    few = tuple(one for one in every if one.id in told or one.row.type is HardIron)
+    fits: list[ContinuousFit] = []
+    fitted = _fitted(found, (*few, *turns))
+    for _ in range(_ROUNDS):
+        if fitted is None or not possible(fitted):
+            break
+        fits.append(fitted)
+        if len(fits) == _ROUNDS:
+            break
+        about, present = _about(found, fitted.fit), fitted.hypothesis.candidates
+        chosen = _held_out(about, _chosen(about.equations, present, every, found.own, told), told)
+        if any(set(chosen) == set(one.hypothesis.candidates) for one in fits):
+            # what algebra offers about one fit it takes back about another: the better of both counts
+            break
+        fitted = _fitted(found, chosen, values_of_fit(fitted))
+    return fits
+
+
+def _about(found: Search, fit: Fit) -> Search:
+    """Return the search with its normal equations about a fit, in the noise of the relaxed fit."""
+    equations = normal_equations_of(fit, found.candidates, found.relaxed_noise, fit.continuous_defects)
+    return replace(found, equations=equations, asked=fit)
+
+
+def _chosen(
+    equations: NormalEquations,
+    present: Sequence[CandidateEffect],
+    every: Sequence[CandidateEffect],
+    own: Sequence[Parameter],
+    told: Collection[str],
+) -> tuple[CandidateEffect, ...]:
+    """Return the effects that are worth their price as algebra has it, added and left out one by one from a fit's."""
+    chosen = _pruned(equations, present, own, told)
+    while len(chosen) < _MOST:
+        more = [one for one in every if one.id not in {item.id for item in chosen}]
+        gains = {one: worth_of_each(equations, (*chosen, one), own)[one.name] - _cost(one) for one in more}
+        best = max(gains, key=lambda one: gains[one], default=None)
+        if best is None or gains[best] <= 0.0:
+            break
+        chosen = (*chosen, best)
+    return _pruned(equations, chosen, own, told)
+
+
+def _turn_of(values: Start, matrix: str, turned: str) -> Start:
+    """Return the rotation vector that does about what a cross-axis matrix does: v - r x v is (I + S) v."""
+    S = {name: values.get(((matrix, name), None), 0.0) for name in CrossAxis._fields}
+    turn = (0.5 * (S["syz"] - S["szy"]), 0.5 * (S["szx"] - S["sxz"]), 0.5 * (S["sxy"] - S["syx"]))
+    return {((turned, name), None): r for name, r in zip(CATALOGUE[turned].parameters, turn, strict=True)}
 
 
 def _held_out(
@@ -120,7 +235,7 @@ def _pruned(
 
     def spare(left: Sequence[CandidateEffect]) -> dict[str, float]:
         worth = worth_of_each(equations, left, own)
-        return {one.name: worth[one.name] - price(one) - SELECTION.turned * (one.id in TURNED) for one in left}
+        return {one.name: worth[one.name] - _cost(one) for one in left}
 
     return _eliminated(candidates, kept, spare)
 

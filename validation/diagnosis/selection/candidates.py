@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from discsim.effects.catalogue import CATALOGUE, Row
+from discsim.effects.mount_rows import Mount
 from discsim.effects.own import UserEffect
 from discsim.recording import Recording
 from discsim.validation.identification.competing_effects import CATALOGUED, Competing
@@ -53,7 +54,8 @@ class CandidateEffect:
 #: a parameter is held this many steps wide, so that one without a trace in the readings stays where it is
 _PRIOR_SIGMA = 1e5
 #: and an angle of the motion, rad: a rig's axis is plumb to within a few degrees. Of its two tilts the one square to
-#: the field hardly shows, and would wander off
+#: the field hardly shows, and would wander off. So would two chips turned alike about the axis of a round disc,
+#: each soldered by eye
 _ANGLE = 0.1
 #: share of an effect's scale that a difference is taken over
 _STEP = 0.1
@@ -67,7 +69,7 @@ def _step(row: Row, name: str) -> float:
 
 def _prior_sigma(row: Row, column: Column) -> float:
     """Return how loosely a parameter is held at its baseline, one sigma."""
-    held = row.acts_on == "motion" and column.name.endswith("_rad")
+    held = (row.acts_on == "motion" or row.type is Mount) and column.name.endswith("_rad")
     return min(_PRIOR_SIGMA * column.step, _ANGLE if held else float("inf"))
 
 

@@ -12,11 +12,12 @@ import numpy as np
 
 from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.mount_rows import ROWS as MOUNTS
+from discsim.effects.sensors import CrossAxis
 from discsim.effects.setup import TimeOffset
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from discsim.validation.diagnosis.settings import SELECTION
 
-__all__ = ["charge", "price"]
+__all__ = ["charge", "lead", "price"]
 
 #: within which parameters make sense, the effects' and a rig's own
 BOUNDS: Mapping[tuple[str, str], tuple[float, float]] = {
@@ -45,6 +46,26 @@ def charge(candidate: CandidateEffect) -> float:
     unusual = SELECTION.mistimed if candidate.id in MISTIMED | TURNED else 0.0
     unusual += SELECTION.turned if candidate.id in TURNED else 0.0
     return SELECTION.rival * len(parameters_of(candidate)) + unusual
+
+
+#: a turned sensor -> the cross-axis error that holds it: a small turn is one whose numbers are opposite in pairs
+NESTED: Mapping[str, str] = {
+    turned.id: cross.id
+    for turned in MOUNTS
+    for cross in CATALOGUE.values()
+    if turned.id in TURNED and cross.type is CrossAxis and cross.acts_on == turned.acts_on
+}
+
+
+def lead(rival: CandidateEffect, candidate: CandidateEffect) -> float:
+    """Return by how much more a rival is charged than an effect.
+
+    Of nested effects the simpler one is named: six numbers that are opposite in pairs are no chance, however unusual a
+    turn is.
+    """
+    if NESTED.get(rival.id) == candidate.id:
+        return SELECTION.rival * (len(parameters_of(rival)) - len(parameters_of(candidate)))
+    return charge(rival) - charge(candidate)
 
 
 def price(candidate: CandidateEffect) -> float:

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from discsim.validation.diagnosis.selection.evidence import charge, price
+from discsim.validation.diagnosis.selection.evidence import lead, price
 from discsim.validation.diagnosis.selection.hypothesis import fitted_parameters
 from discsim.validation.diagnosis.selection.refits import refitting
 from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate, scope_price, start_of
@@ -135,7 +135,7 @@ def rivals_of(found: Search) -> dict[str, list[Rival]]:
 
 def _merit(worse: float, rival: CandidateEffect, candidate: CandidateEffect) -> float:
     """Return by how much a rival's score is worse than that of an effect, each charged for its parameters."""
-    return worse + charge(rival) - charge(candidate)
+    return worse + lead(rival, candidate)
 
 
 def takes_its_place(worse: float, rival: CandidateEffect, candidate: CandidateEffect) -> bool:

@@ -7,6 +7,15 @@ from discsim.validation.diagnosis.setup.find import (
     said,
     suspected_fault,
     with_likeliest_fault,
+    with_turned_board,
 )
 
-__all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said", "suspected_fault", "with_likeliest_fault"]
+__all__ = [
+    "SetupFault",
+    "SetupFindings",
+    "find_setup_faults",
+    "said",
+    "suspected_fault",
+    "with_likeliest_fault",
+    "with_turned_board",
+]

@@ -21,11 +21,20 @@ from discsim.recording import Recording, Samples
 from discsim.validation.diagnosis.setup.hypotheses import Hypothesis, Ranking, board_effect, chosen, hypotheses, pairs
 from discsim.validation.diagnosis.setup.proof import left_by_short_fit
 from discsim.validation.diagnosis.setup.remedy import MapAxes, remedy
+from discsim.validation.diagnosis.setup.rotation import board_turns, spin_axis
 from discsim.validation.diagnosis.setup.units import clock_unit, sensor_units
 from discsim.validation.identification.plants import Plant, plant_of
 from discsim.written import corrected, require_seconds
 
-__all__ = ["SetupFault", "SetupFindings", "find_setup_faults", "said", "suspected_fault", "with_likeliest_fault"]
+__all__ = [
+    "SetupFault",
+    "SetupFindings",
+    "find_setup_faults",
+    "said",
+    "suspected_fault",
+    "with_likeliest_fault",
+    "with_turned_board",
+]
 
 #: what a fault must gain, in twice the log likelihood of the relations between sensors; on 40 concealed sets of all
 #: kinds the largest gain of a fault that is not there is 15 (lost samples of a magnetometer), the next 0.3
@@ -41,6 +50,9 @@ AGREE, SOUND = 0.6, 0.25
 WORST = 2.1
 #: a hypothesis that costs no more than this above the best cannot be told from it
 TWIN = 8.0
+#: a board is turned whose gyroscope and magnetometer see the spin this far off the board's z, rad, and apart by less
+#: than this share of it: a wobble that dies moves an axis by 0.003, a soft iron of some per cent the field's by 0.02
+_TILTED, _ALIKE = 0.02, 0.5
 #: what is judged of a long recording turns at this share of the fastest rate or more, asked every so many s (half a
 #: turn at 6 rad/s)
 _QUARTER, _SLOT = 0.25, 0.5
@@ -164,6 +176,35 @@ def with_likeliest_fault(findings: SetupFindings) -> SetupFindings | None:
     fault = _fault(ranking.as_written, tuple(item for item in found if item.kind != "rival"), recordings)
     current = tuple(corrected(one, [fault.effect]) for one in findings.recordings)
     return SetupFindings((*findings.faults, fault), current)
+
+
+def with_turned_board(findings: SetupFindings) -> SetupFindings | None:
+    """Return findings of free spins with the board turned as gyroscope and magnetometer alike say, None where not so.
+
+    Both show the axis of the spin, and no time enters that: it tells a turned board where rows that were lost or late
+    spoil every relation. Two chips that are each turned in the board show two axes.
+    """
+    recordings = [_judgeable(one) for one in findings.recordings]
+    plant = plant_of(recordings[0])
+    if findings.faults or not plant.airborne or plant.air_modelled or not all(one.samples for one in recordings):
+        return None
+    axes = [spin_axis(recordings, sensor) for sensor in ("gyroscope", "magnetometer")]
+    turns = board_turns(recordings)
+    if not turns or any(axis is None for axis in axes):
+        return None
+    tilted = min(_angle(axis, np.array([0.0, 0.0, 1.0])) for axis in axes if axis is not None)
+    if tilted < _TILTED or _angle(*axes) > _ALIKE * tilted:
+        return None
+    effect, *others = (board_effect(turn) for turn in turns)
+    current = tuple(corrected(one, [effect]) for one in findings.recordings)
+    return SetupFindings((SetupFault(effect, float("inf"), None, tuple(others)),), current)
+
+
+def _angle(one: FloatArray | None, other: FloatArray | None) -> float:
+    """Return the angle between two axes (3,), rad, whichever way they point."""
+    assert one is not None
+    assert other is not None
+    return float(np.arccos(np.clip(abs(float(one @ other)), 0.0, 1.0)))
 
 
 def _judgeable(recording: Recording) -> Recording:

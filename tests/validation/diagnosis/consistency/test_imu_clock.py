@@ -59,8 +59,8 @@ def test_rows_that_are_read_in_step_stand_behind_the_samples_that_they_show_by_t
         shown = next(item for item in clock.shown if item.recording == name)
         timed = clock.counted(one, name)
         assert timed is not None
-        put = found.counted(one, timed, name, shown)
-        newest = put.samples["magnetometer"].t + 0.5 * shown.apart * shown.period_of_others_s
+        put = found.counted(one, timed, name, shown, clock.period_s)
+        newest = put.samples["magnetometer"].t + 0.5 * shown.apart * clock.period_s
         age = put.samples["gyroscope"].t - newest
         true = loop.ages(seed + k)
         # as the field's samples slip by 0.6 ms in a step, ages that are none or a whole period are seen to better
@@ -81,7 +81,7 @@ def test_rows_stand_where_the_chip_made_them():
         shown = next(item for item in clock.shown if item.recording == name)
         timed = clock.counted(one, name)
         assert timed is not None
-        put = found.counted(one, timed, name, shown)
+        put = found.counted(one, timed, name, shown, clock.period_s)
         t = put.samples["gyroscope"].t
         assert t[0] >= 0.0
         steps = np.diff(t) / found.period_s

@@ -13,8 +13,10 @@ from discsim.effects import effect
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of
 from discsim.validation.diagnosis.detectors.row_times import RowTimes, row_times
+from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.noise import GroupNoise
 from discsim.validation.identification.observations import readings_of
+from discsim.validation.identification.plants.free_spin import FREE_SPIN
 
 NAMES = tuple(loop.NAMES)
 HIDDEN = (
@@ -72,6 +74,24 @@ def test_a_fit_sees_the_field_as_means_of_two_samples_at_their_times():
         assert {len(own) for own in after.samples.values()} == {len(own) for own in before.samples.values()}
 
 
+def test_a_fit_may_scale_all_times_and_what_was_counted_follows_it():
+    found = counted()
+    scale, offset = found.free
+    assert scale.key == ("clock.rate", "ratio")
+    # a chip that is tilted by 0.1 rad shows less of the spin by its cosine
+    assert 1.0 - np.cos(0.1) <= scale.sigma < 0.01
+    assert offset.key == ("mag.time_offset", "offset_s")
+    assert offset.sigma == pytest.approx(0.5 * found.clock.period_s)
+    bare = Fit((), (scale,), np.array([1.001]), FREE_SPIN.sizes.continuous, {}, covariance=np.array([[4e-10]]))
+    here, refined = ({one.id: one.parameters for one in some.effects()} for some in (found, found.refined(bare)))
+    period, better = (some["mag.own_clock"]["period_s"] for some in (here, refined))
+    # written times are the true ones times the ratio
+    assert better.value == pytest.approx(period.value / 1.001)
+    assert better.sd == pytest.approx(2e-5 * period.value)
+    assert refined["clock.lost_rows"] == here["clock.lost_rows"]
+    assert found.refined(replace(bare, parameters=(), at=np.array([]))) is found
+
+
 def test_the_baseline_is_charged_for_the_field_as_it_is_written():
     found = counted()
     loud, still = (found.excess({"magnetometer": GroupNoise(sd)}, 1000) for sd in (0.2, 0.1))
@@ -107,3 +127,38 @@ def test_rows_are_believed_where_their_tick_came_out_as_a_whole_period():
     found = row_times(logged(), NAMES, replace(agreement, row_proofs=wrong))
     assert found is not None
     assert {one.id for one in found.effects()} == {one.id for one in counted().effects()}
+
+
+@cache
+def with_late_rows(weight: float, chip: float | None) -> RowTimes | None:
+    """Return what is counted of a logger that loses no row: three in ten come 4 ms late."""
+    late = tuple(
+        loop.logged(one, 31 + k, own_clock=True, weight=weight, chip=chip, late=(0.004, 0.3))[0]
+        for k, one in enumerate(loop.motions())
+    )
+    return row_times(late, NAMES, agreement_of(late, NAMES))
+
+
+@pytest.mark.parametrize(("weight", "chip"), [(0.5, None), (0.0, None), (0.5, 0.0091)])
+def test_rows_that_came_late_are_told_from_rows_that_were_lost(weight, chip):
+    found = with_late_rows(weight, chip)
+    assert found is not None
+    named = {one.id: one for one in found.effects()}
+    means, own = ["mag.average"] if weight else [], [] if chip is None else ["imu.own_clock"]
+    assert list(named) == ["clock.late_rows", "mag.own_clock", *means, *own]
+    late = named["clock.late_rows"].parameters
+    # the windows of two free-running parts tell the tick to some tenths of a millisecond, phases better
+    assert late["tick_s"].value == pytest.approx(0.004, abs=3e-4 if chip is None else 8e-4)
+    assert late["fraction"].value == pytest.approx(0.3, abs=0.1)
+    assert named["clock.late_rows"].evidence.delta_bic > 24.0
+    assert found.located(2.0)[0].text != ""
+
+
+def test_samples_that_late_rows_show_are_counted_where_one_is_shown_twice():
+    found = with_late_rows(0.5, None)
+    assert found is not None
+    for k, shown in enumerate(found.clock.shown):
+        newest = loop.logged(loop.motions()[k], 31 + k, own_clock=True, weight=0.5, late=(0.004, 0.3))[1]
+        assert np.any(np.diff(newest) == 0)
+        assert shown.lost == 0.0
+        assert np.mean(np.diff(shown.newest) == np.diff(newest)) > 0.98

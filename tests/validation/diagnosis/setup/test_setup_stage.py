@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
+from support import logger_loop as loop
 from support.places import ROOT
 
 from discsim.disc import Release
@@ -16,7 +18,7 @@ from discsim.validation.challenge.cases.case import Case, Coast, Concealed
 from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.commands.import_ import command as import_
-from discsim.validation.diagnosis.setup import SetupFault, find_setup_faults
+from discsim.validation.diagnosis.setup import SetupFault, find_setup_faults, with_turned_board
 from discsim.written import as_written
 
 MAP = ROOT / "models" / "imports" / "csv.toml"
@@ -241,3 +243,31 @@ def test_a_dead_sensor_is_no_fault_of_axes(sound: dict[str, list[Recording]], ax
     value[:, axes] = np.nan if len(axes) == 1 else 0.2
     dead = {**recording.samples, "gyroscope": Samples(samples.t, value)}
     assert find_setup_faults([replace(recording, samples=dead)]).faults == ()
+
+
+def rows_lost() -> list[Recording]:
+    """Return free spins as a logger wrote them that lost a fifth of its rows: no relation between sensors holds."""
+    return [loop.logged(one, 1 + k, own_clock=True, weight=0.5)[0] for k, one in enumerate(loop.motions())]
+
+
+@pytest.mark.parametrize("turn", [(0.3, -0.2, 0.5), (0.05, 0.03, 0.0)])
+def test_a_turned_board_is_told_by_the_spins_axis_where_rows_are_lost(turn):
+    fault = effect("board.rotation", **dict(zip(("rx_rad", "ry_rad", "rz_rad"), turn, strict=True)))
+    findings = with_turned_board(find_setup_faults([as_written(one, [fault]) for one in rows_lost()]))
+    assert findings is not None
+    (found,) = findings.faults
+    # the wobble and iron move both axes by some hundredths
+    assert np.array(list(found.effect.sizes.values())) == pytest.approx(np.array(turn), abs=0.03)
+    for made, meant in zip(rows_lost(), findings.recordings, strict=True):
+        spin = meant.samples["gyroscope"].value[:, 2]
+        assert np.mean(spin) == pytest.approx(np.mean(made.samples["gyroscope"].value[:, 2]), rel=2e-3)
+
+
+def test_a_chip_that_is_turned_alone_is_no_turned_board():
+    def tilted(one: Recording) -> Recording:
+        rates = one.samples["gyroscope"]
+        turned = rates.value @ Rotation.from_rotvec([0.08, -0.05, 0.0]).as_matrix()
+        return replace(one, samples={**one.samples, "gyroscope": Samples(rates.t, turned)})
+
+    assert with_turned_board(find_setup_faults(rows_lost())) is None
+    assert with_turned_board(find_setup_faults([tilted(one) for one in rows_lost()])) is None
