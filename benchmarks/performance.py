@@ -94,15 +94,21 @@ equations, tests of residuals.""",
     ),
     "log": (
         "A long log",
-        """`{command}`: commands on a log of three sensors at
-1 kHz, and on data sets of throws, start included; what a minute, or a throw, more costs is the same at every size where
-time is linear.
+        """`{command}`: commands on a log of three sensors at 1 kHz, start included; what a minute more costs is the same
+at every length where time is linear.
 
 {printed}
 
 Goal: an hour in 60 s and 1 GB. The work is shared by all cores: on two, half the CPU seconds pass by the clock where
 nothing else runs. [What each method costs](estimators.md) says which methods take it. Of a free spin a diagnosis looks
-at the first 20 s. Of many recordings it holds the readings, and what each fit says of each.""",
+at the first 20 s, of a rig at the first ten minutes.""",
+    ),
+    "throws": (
+        "Many throws",
+        """`{command}`: commands on data sets of throws of three seconds, start included; what a throw more costs is the
+same at every size where time is linear. A diagnosis holds the readings of all, and what its fits say of each.
+
+{printed}""",
     ),
 }
 
@@ -129,7 +135,9 @@ def benchmark(section: str, given: argparse.Namespace) -> list[str]:
     """Return the benchmark of a section with its arguments, as told on the page but for an interpreter's place."""
     quick = given.quick
     rounds, flights = ("3", ["10", "30", "100"]) if quick else ("15", ["10", "100", "1000"])
-    minutes, throws = (["0.5", "1", "2"], ["5", "10", "20"]) if quick else (["1", "10", "60"], ["10", "50", "200"])
+    minutes = ["0.5", "1", "2"] if quick else ["1", "10", "60"]
+    throws = ["5", "10", "20"] if quick else ["10", "50", "200"]
+    long_log = ["benchmarks/long_log.py", "--minutes"]
     return {
         "step": ["benchmarks/step_cost.py", "step", "--rounds", rounds],
         "batch": ["benchmarks/step_cost.py", "batch", "--flights", *flights],
@@ -139,7 +147,8 @@ def benchmark(section: str, given: argparse.Namespace) -> list[str]:
             *(("frispy", "--frispy", given.frispy) if given.frispy else ()),
         ],
         "diagnosis": ["benchmarks/diagnosis.py", "sets", "growth", "--each", "2" if quick else "9"],
-        "log": ["benchmarks/long_log.py", "--minutes", *minutes, "--throws", *throws],
+        "log": [*long_log, *minutes, "--throws", "--commands", "import", "check", "estimate"],
+        "throws": [*long_log, "--throws", *throws, "--commands", "check", "diagnose"],
     }[section]
 
 
