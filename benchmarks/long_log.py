@@ -236,15 +236,16 @@ def main() -> None:
                 write_log(log, 60 * minutes)
             if "import" in options.commands and not log.with_suffix(".csv").exists():
                 write_raw(log.with_suffix(".csv"), 60 * minutes)
-        for name in options.commands:
+        for name in options.commands if options.minutes else ():
             used(COMMANDS[name](logs[1 / 6], place / "first"))  # it compiles
             measure(name, [(minutes, logs[minutes]) for minutes in options.minutes], "minute", errors=options.errors)
         sets = {count: place / f"{count}-throws" for count in options.throws}
         for count, folder in sets.items():
             if not folder.exists():
                 write_throws(folder, count)
-        for name in ("estimate", "check", "diagnose"):
+        for name in ("estimate", "check", "diagnose") if sets else ():
             if name in options.commands:
+                used(COMMANDS[name](sets[min(sets)], place / "first"))  # it compiles
                 measure(name, list(sets.items()), "throw")
 
 

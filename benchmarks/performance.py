@@ -94,8 +94,8 @@ equations, tests of residuals.""",
     ),
     "log": (
         "A long log",
-        """`{command}`: commands on a log of three sensors at 1 kHz, start included; what a minute more costs is the same
-at every length where time is linear.
+        """`{command}`: commands on a log of three sensors at 1 kHz, start included; what a minute more costs is the
+same at every length where time is linear.
 
 {printed}
 
