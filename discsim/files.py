@@ -6,6 +6,7 @@ import codecs
 import hashlib
 import os
 import secrets
+import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -20,6 +21,7 @@ __all__ = [
     "Guard",
     "beside",
     "digest",
+    "endless",
     "guarding",
     "model_file",
     "model_names",
@@ -72,10 +74,22 @@ def read_text(path: Path) -> str:
     return "".join(read_pieces(path))
 
 
+def endless(path: Path) -> bool:
+    """Tell whether a path leads to a device or a pipe, which may never end, and not to a pipe that the shell opened.
+
+    A folder of a stranger may hold a link to one. Raises OSError where the path leads nowhere.
+    """
+    mode = path.stat().st_mode
+    piped = stat.S_ISFIFO(mode) and not path.is_relative_to("/dev") and not path.is_relative_to("/proc")
+    return piped or stat.S_ISCHR(mode) or stat.S_ISBLK(mode) or stat.S_ISSOCK(mode)
+
+
 def read_pieces(path: Path, size: int = BLOCK) -> Iterator[str]:
     """Yield the text of `read_text` in pieces of whole lines, of about ``size`` bytes each; raises as it does."""
     line = 1
     try:
+        if endless(path):
+            raise InputError.at(path, None, "is a device or a pipe; expected a readable UTF-8 file")
         with path.open("rb") as stream:
             while content := stream.read(size):
                 content += stream.readline() if not content.endswith(b"\n") else b""

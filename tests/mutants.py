@@ -89,7 +89,8 @@ class _Copy:
 
     def __init__(self, root: Path, compiled: bool, kept: bool) -> None:
         self.root, self._words = root, [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider"]
-        shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(".git", "__pycache__", ".*_cache"))
+        # links stay links: discsim/validation leads to validation, where the mutants of its files are made
+        shutil.copytree(ROOT, root, symlinks=True, ignore=shutil.ignore_patterns(".git", "__pycache__", ".*_cache"))
         self._environment = {
             **os.environ,
             "PYTHONPATH": str(root),

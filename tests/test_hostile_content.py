@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -11,9 +12,11 @@ from faults.harness import run
 from fuzz.seeds import RAW, recording_files
 from support import outcomes
 
+from discsim.errors import InputError
 from discsim.recording import read_recording, write_recording
 from discsim.validation.diagnosis.report.files import write_outcome
 from discsim.validation.diagnosis.result import NamedEffect, ParameterValue
+from discsim.validation.importing.sniffing import opened
 from discsim.validation.reporting.figures import new_figure, save_figure
 from discsim.validation.reporting.html import Section, write_report
 
@@ -115,6 +118,27 @@ def test_a_link_in_the_output_folder_is_replaced_and_not_followed(tmp_path):
     words = ["import", f"{tmp_path}/raw/log.csv", "--map", f"{tmp_path}/raw/map.toml", "--out", f"{tmp_path}/out"]
     assert run(words, tmp_path / "heard") in (0, 2)
     assert (tmp_path / "mine.txt").read_text() == "mine"
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="a system without devices")
+@pytest.mark.parametrize("name", ["recording.toml", "gyroscope.csv"])
+@pytest.mark.parametrize("kind", ["device", "pipe"])
+def test_a_link_of_a_recording_to_what_never_ends_is_refused(tmp_path, name, kind):
+    for file, text in recording_files("rate_table", 2.0).items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    (tmp_path / name).unlink()
+    if kind == "pipe":
+        os.mkfifo(tmp_path / "pipe")
+    (tmp_path / name).symlink_to("/dev/zero" if kind == "device" else "pipe")
+    with pytest.raises(InputError, match=rf"{name}: is a device or a pipe; expected"):
+        read_recording(tmp_path)
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="a system without devices")
+def test_a_log_that_is_a_device_is_refused(tmp_path):
+    (tmp_path / "log.csv").symlink_to("/dev/zero")
+    with pytest.raises(InputError, match=r"log\.csv: is a device or a pipe; expected"), opened(tmp_path / "log.csv"):
+        pass
 
 
 def test_a_power_of_ten_on_an_axis_is_still_a_formula(tmp_path):

@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 import discsim
 from discsim import validation
+from discsim.errors import InputError
 from discsim.estimators import estimate, fft
 from discsim.recording import Recording, SensorSheet
 from discsim.threads import limited, one_thread
@@ -303,3 +304,9 @@ def test_a_study_that_is_unknown_or_not_installed_is_refused_in_a_sentence(monke
     monkeypatch.setattr("discsim.validation.studies.catalogue.find_spec", lambda name: None)
     with pytest.raises(discsim.InputError, match=r"not part of an installed discsim; expected a checkout"):
         run_study("golf-throws", [])
+
+
+@pytest.mark.parametrize("cases", [0, -3])
+def test_a_blind_test_without_a_case_is_refused(cases):
+    with pytest.raises(InputError, match=f"{cases} cases; expected at least one"):
+        discsim.challenge(cases=cases)

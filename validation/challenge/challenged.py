@@ -12,6 +12,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from discsim.errors import InputError
 from discsim.recording import Plant
 from discsim.result import Result
 from discsim.validation.challenge.blind import Request
@@ -125,8 +126,10 @@ def blind_test(
     Raises
     ------
     InputError
-        For what does not go together, such as an effect that a plant does not have.
+        For what does not go together, such as an effect that a plant does not have, and for no case at all.
     """
+    if cases < 1:
+        raise InputError(f"{cases} cases; expected at least one")
     requests = [Request(number, plant, tuple(effects), kind, mask) for number in range(seed, seed + cases)]
     requests[0].draw()  # what does not go together is refused before hours are spent
     with ExitStack() as stack:

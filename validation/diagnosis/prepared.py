@@ -117,7 +117,7 @@ def _rows(samples: Samples) -> int:
 
 
 def _table(samples: Samples) -> FloatArray:
-    return samples.value.reshape(len(samples), -1)
+    return samples.value if samples.value.ndim == 2 else samples.value[:, None]
 
 
 def _shortened(samples: Samples, sheet: SensorSheet, longest: float) -> tuple[Samples | None, int]:

@@ -21,6 +21,7 @@ from discsim.validation.identification.residual_tests import whiteness
 from discsim.validation.scenarios.throws import FULL_SET
 from discsim.validation.yaw_damping import fit_yaw_damping, observe, paper_table
 from discsim.validation.yaw_damping.bias import paper_biases
+from discsim.validation.yaw_damping.compared import SOURCES
 from discsim.validation.yaw_damping.fitted import notes
 from discsim.validation.yaw_damping.observations import SHARED_S, Throw, misplaced
 from discsim.validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S, damping_by_26, table_csv
@@ -200,6 +201,28 @@ class TestObservations:
         with pytest.raises(InputError, match="direction"):
             observe(replace(recordings[0], samples=only), "fft")
 
+    def test_a_stated_release_tells_the_direction_where_no_gyroscope_does(self, recordings):
+        only = {name: recordings[1].samples[name] for name in ("magnetometer", "gps")}
+        for spin, sign in ((-80.0, -1.0), (80.0, 1.0)):
+            release = Release(body_rate=np.array([0.0, 0.0, spin]))
+            assert np.all(sign * observe(replace(recordings[1], samples=only, release=release), "fft").spin > 0)
+
+    def test_a_noise_that_no_sheet_states_is_read_off_the_fixes(self, recordings):
+        """Third differences of a path are its noise: 100 fixes of three columns tell it to a tenth or so."""
+        stated = recordings[0].sheets["gps"]
+        silent = {**recordings[0].sheets, "gps": replace(stated, noise_rms=None, velocity_noise_rms=None)}
+        t = np.arange(100) / 10.0
+        path = np.column_stack([20.0 * t, 2.0 * t, 0.5 * t**2, np.full((100, 3), 20.0)])
+        rng = np.random.default_rng(3)
+        fixes = Samples(t, path + np.repeat([0.4, 0.05], 3) * rng.standard_normal(path.shape))
+        seen = observe(replace(recordings[0], sheets=silent, samples={**recordings[0].samples, "gps": fixes}), "fft")
+        np.testing.assert_allclose(seen.path_sd, np.broadcast_to(np.repeat([0.4, 0.05], 3), (100, 6)), rtol=0.3)
+
+    def test_values_far_apart_are_independent(self):
+        throw = straight(-2.0, 90.0)
+        apart = replace(throw, spin_t=np.linspace(0.0, 60.0, 31), spin=throw.spin[:31], spin_sd=throw.spin_sd[:31])
+        np.testing.assert_array_equal(apart.spin_weight_sd, apart.spin_sd)
+
     def test_a_spin_without_an_airspeed_is_refused(self, recordings):
         with pytest.raises(InputError, match="expected a flight"):
             observe(replace(recordings[0], plant="free_spin"), "likelihood")
@@ -226,6 +249,19 @@ class TestObservations:
 
 
 class TestPaperTable:
+    def test_equation_26_gives_the_CNr_whose_moment_slows_the_spin(self):
+        """(24), (25) the other way round: N = Q A d gamma C_Nr and Izz rdot = N."""
+        V, r, CNr = 17.0, 85.0, -0.0041
+        moment = 0.5 * AIR.air_density * V**2 * DISC.area * DISC.diameter * (DISC.diameter * r / (2.0 * V)) * CNr
+        assert damping_by_26(DISC, AIR.air_density, moment / DISC.Izz, r, V) == pytest.approx(CNr, rel=1e-12)
+
+    def test_the_line_of_each_throw_is_that_of_its_spin(self):
+        (line,) = paper_table([straight(-2.0, 90.0)]).slopes
+        np.testing.assert_allclose(line.at(np.array([0.0, 1.5, 6.0])), [90.0, 87.0, 78.0], rtol=1e-9)
+
+    def test_the_paper_s_accelerometers_are_misplaced_by_one_and_five_millimetres(self):
+        assert [source.mount for source in SOURCES if source.method == "accelerometer"] == [0.0, 0.001, 0.005]
+
     def test_a_straight_spin_gives_equation_27_at_every_node(self):
         paper = paper_table([straight(-2.0, 90.0)])
         expected = damping_by_26(DISC, AIR.air_density, -2.0, np.radians(RATES_DEG_S)[:, None], SPEEDS_M_S[None, :])

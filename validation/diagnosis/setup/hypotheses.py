@@ -102,7 +102,8 @@ def chosen(recordings: Sequence[Recording]) -> list[Recording]:
     def direction(recording: Recording) -> float:
         for sensor, column in (("rate_reference", 0), ("gyroscope", 2)):
             if sensor in recording:
-                value = recording.samples[sensor].value.reshape(len(recording.samples[sensor]), -1)[:, column]
+                value = recording.samples[sensor].value
+                value = value if value.ndim == 1 else value[:, column]
                 if np.any(np.isfinite(value)):
                     return float(np.sign(np.nanmedian(value)))
         return 0.0

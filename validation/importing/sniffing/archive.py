@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
 from discsim.errors import InputError
+from discsim.files import endless
 from discsim.validation.importing.logs import kind_of, write_tables
 
 __all__ = ["MAX_BYTES", "MAX_FILES", "opened"]
@@ -45,6 +46,8 @@ def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterato
     """
     if not raw.exists():
         raise InputError.at(raw, None, "no such file or folder; expected what a logger wrote")
+    if endless(raw):
+        raise InputError.at(raw, None, "is a device or a pipe; expected a file or folder that a logger wrote")
     with tempfile.TemporaryDirectory(prefix="discsim-") as place:
         logged = raw
         if raw.is_file() and raw.suffix.lower() == ".zip":

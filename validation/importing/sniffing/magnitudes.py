@@ -148,7 +148,7 @@ def field_size(value: FloatArray) -> tuple[float, str]:
     radius = float(np.sqrt(max(0.0, solution[3] + solution[:3] @ solution[:3]))) * scale
     left = np.linalg.norm(centred / scale - solution[:3], axis=1) * scale
     # a sphere is known where the readings spread over 0.3 of its radius in every direction and lie on it within 15 %
-    narrowest = float(np.sqrt(np.linalg.eigvalsh(np.cov(centred.T))[0]))
+    narrowest = float(np.sqrt(max(0.0, np.linalg.eigvalsh(np.cov((centred / scale).T))[0]))) * scale
     if radius > 0 and narrowest > 0.3 * radius and float(np.std(left)) < 0.15 * radius:
         return radius, "radius of the sphere through the readings"
     return median, "median norm"
