@@ -36,7 +36,8 @@ def main() -> int:
             words = COMMANDS[name](place / "given")
             for number in range(2):  # the first one compiles, and its time says nothing
                 started = time.monotonic()
-                out = place / f"{name}-whole-{number}"
+                # of the name that the disturbed ones write to: a recording bears that of its folder
+                out = place / f"{name}-whole-{number}" / "out"
                 if (status := run([*words, "--out", str(out)], place / "heard")) not in (0, 1):
                     raise SystemExit(f"{name}: exit status {status}: {(place / 'heard').read_text()[-500:]}")
             seconds, whole = time.monotonic() - started, content(out)

@@ -210,6 +210,8 @@ def plan(
         bench = Bench.of(plant, environment or place, parts, body if rig is None else None, rig)
         like = throw or load_throw("driver")
         asked = throws_about(like, plans) if isinstance(plans, int) else [p for p in plans if isinstance(p, Plan)]
+    if not asked:
+        raise InputError("no recording is planned; expected at least one")
     say(f"simulating {len(asked)} recordings")
     trajectories = _trajectories(asked, bench)
     questions = _questions(trajectories)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import pytest
+
 import discsim as ds
+from discsim.errors import InputError
 from discsim.validation.planning.planned import Planned
 
 
@@ -19,3 +22,9 @@ def test_a_plan_is_a_result_like_the_others():
     assert len(frame) == len(table["effect"])
     assert "named" in arrays
     assert "2 recordings" in found._repr_html_()
+
+
+@pytest.mark.parametrize("plans", [0, []], ids=["no throw", "no plan"])
+def test_a_plan_of_no_recording_is_refused(plans):
+    with pytest.raises(InputError, match="no recording is planned; expected at least one"):
+        ds.plan(plans)

@@ -187,6 +187,20 @@ def square(argument, shared):
     return {"square": argument**2, "known": float("nan")}
 
 
+def addresses(argument, shared):
+    from distributed import get_worker
+
+    worker = get_worker()
+    return [worker.address, worker.scheduler.address]
+
+
+def test_local_processes_listen_on_this_machine_alone(tmp_path):
+    """Whoever reaches a scheduler or a worker runs what he likes."""
+    told = run_tasks([Task("one", 1), Task("two", 2)], addresses, tmp_path, workers=2)
+    assert len(told) == 2
+    assert all(address.startswith("tcp://127.0.0.1:") for pair in told for address in pair)
+
+
 def spectrum(argument, shared):
     return {"squares": np.arange(argument) ** 2 / shared}
 
