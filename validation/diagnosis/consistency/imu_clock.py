@@ -338,11 +338,12 @@ def _own_comb(wobbles: Mapping[str, _Wobble], clock: OwnClock) -> ImuClock | Non
         return None
     about = np.abs(periods / middles[int(np.argmax(total))] - 1.0) <= 2.0 * _ALIKE
     rough = {name: _from_all_phases(wobble, first[name], periods[about]) for name, wobble in wobbles.items()}
+    combs = _at_one_period(wobbles, first, rough)
     found = []
     for name, wobble in wobbles.items():
-        others = [one for other, one in rough.items() if other != name]
+        others = [one for other, one in combs.items() if other != name]
         told = np.average([one.period for one in others], weights=[max(one.gain, 1.0) for one in others])
-        best = rough[name]
+        best = combs[name]
         if abs(best.period / told - 1.0) > _ALIKE:
             best = _from_all_phases(wobble, first[name], periods[np.abs(periods / told - 1.0) <= _ALIKE])
         if best.gain < _PRICE:
@@ -375,6 +376,20 @@ def _asked_between(rows: ImuRows, wobble: _Wobble) -> ImuRows:
     bounds = [(None, None)] * 3 + [(0.0, None)] * count
     best = linprog(cost, np.vstack([late, early]), limits, bounds=bounds)
     return rows if best.x is None else replace(rows, times=best.x[0] + best.x[1] * step)
+
+
+def _at_one_period(
+    wobbles: Mapping[str, _Wobble], first: Mapping[str, _Fitted], own: Mapping[str, _Comb]
+) -> Mapping[str, _Comb]:
+    """Return the combs of all recordings at one period, where that tells more than each its ``own``.
+
+    They are of one chip. A recording that was miscounted has another period; tried are those that they found.
+    """
+    best = own
+    for period in {one.period for one in own.values()} | {float(np.median([one.period for one in own.values()]))}:
+        tried = {name: _from_all_phases(one, first[name], np.array([period])) for name, one in wobbles.items()}
+        best = max(best, tried, key=lambda combs: sum(one.gain for one in combs.values()))
+    return best
 
 
 def _with_late_rows(wobbles: Mapping[str, _Wobble], clock: OwnClock, comb: ImuClock | None) -> ImuClock | None:
