@@ -94,8 +94,9 @@ equations, tests of residuals.""",
     ),
     "log": (
         "A long log",
-        """`{command}`: commands on a log of three sensors at 1 kHz, start included; what a minute more costs is the
-same at every length where time is linear.
+        """`{command}`:
+commands on a log of three sensors at 1 kHz, start included; what a minute more costs is the same at every length where
+time is linear.
 
 {printed}
 
@@ -105,8 +106,9 @@ at the first 20 s, of a rig at the first ten minutes.""",
     ),
     "throws": (
         "Many throws",
-        """`{command}`: commands on data sets of throws of three seconds, start included; what a throw more costs is the
-same at every size where time is linear. A diagnosis holds the readings of all, and what its fits say of each.
+        """`{command}`:
+commands on data sets of throws of three seconds, start included; what a throw more costs is the same at every size
+where time is linear. A diagnosis holds the readings of all, and what its fits say of each.
 
 {printed}""",
     ),
