@@ -34,7 +34,7 @@ from discsim.validation.identification.gauss_newton import Fit, penalty_of
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.residual_tests import unmodelled_residuals
 
-__all__ = ["all_at_once", "worth_of_each"]
+__all__ = ["all_at_once", "turn_of", "worth_of_each"]
 
 #: the whole board turned
 _BOARD = catalogued(BoardRotation).id
@@ -101,7 +101,7 @@ def _fitted(found: Search, candidates: tuple[CandidateEffect, ...], known: Start
         if turned in ids and matrix not in ids:
             pairs = zip(relaxed_fit.parameters, relaxed_fit.at.tolist(), strict=True)
             everything = {(q.key, q.recordings): v for q, v in pairs}
-            start |= _turn_of(everything, matrix, turned)
+            start |= turn_of(everything, matrix, turned)
     start |= {key: value for key, value in (known or {}).items() if key in start}
     if not candidates or not on_the_disc(found, start):
         return None
@@ -179,7 +179,7 @@ def _chosen(
     return _pruned(equations, chosen, own, told)
 
 
-def _turn_of(values: Start, matrix: str, turned: str) -> Start:
+def turn_of(values: Start, matrix: str, turned: str) -> Start:
     """Return the rotation vector that does about what a cross-axis matrix does: v - r x v is (I + S) v."""
     S = {name: values.get(((matrix, name), None), 0.0) for name in CrossAxis._fields}
     turn = (0.5 * (S["syz"] - S["szy"]), 0.5 * (S["szx"] - S["sxz"]), 0.5 * (S["sxy"] - S["syx"]))

@@ -10,7 +10,7 @@ from discsim.effects.sensors import CrossAxis
 from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.diagnosis.pipeline import diagnose
-from discsim.validation.diagnosis.selection.all_at_once import _turn_of
+from discsim.validation.diagnosis.selection.all_at_once import turn_of
 from discsim.validation.diagnosis.selection.candidates import free_candidate, parameters_of
 
 
@@ -19,7 +19,7 @@ def test_a_matrix_whose_numbers_are_opposite_in_pairs_is_the_turn_that_it_begins
     seen = Rotation.from_rotvec(turn).as_matrix().T - np.eye(3)
     places = {"x": 0, "y": 1, "z": 2}
     matrix = {name: float(seen[places[name[1]], places[name[2]]]) for name in CrossAxis._fields}
-    start = _turn_of(
+    start = turn_of(
         {(("gyro.cross_axis", name), None): v for name, v in matrix.items()}, "gyro.cross_axis", "gyro.mount"
     )
     # the squares of the turn are left out
