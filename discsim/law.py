@@ -4,7 +4,8 @@ The text is a sum of products of powers. A factor is a number, a coefficient, a 
 ``|r|`` or its direction ``sign(r)``; an exponent is a number or a coefficient. ``c * |r|^n * sign(r) + b * V^2`` with
 the coefficients c, n and b is a law, and so is ``-c r V``: a blank or a dot multiplies, too. What dies away in time has
 the factor ``exp(-t/tau)``; what repeats as a disc turns, ``cos(k psi + phase)`` or ``sin(k psi)``, psi being the angle
-turned since the recording began: it stands only in a law about a sensor.
+turned since the recording began: it stands only in a law about a sensor. So does ``play(x, w)``, what a reading x
+shows behind a play of +-w: Prandtl's operator, the simplest hysteresis.
 """
 
 from __future__ import annotations
@@ -25,23 +26,24 @@ from discsim.errors import InputError, printable
 from discsim.frames import heading_angles, norm3
 from discsim.recording import SENSORS
 
-__all__ = ["LAW_WIDTH", "SYMBOLS", "WRENCH_TARGETS", "Law", "law_wrench"]
+__all__ = ["LAW_WIDTH", "SYMBOLS", "WRENCH_TARGETS", "Law", "behind_play", "law_wrench"]
 
 #: symbols that a law may hold: time s, height m, airspeed m/s, angle of attack rad, rates in the H frame and spin
 #: rad/s; x, y, z are a sensor's own reading before noise, in its unit, and stand only in a law about that sensor
 SYMBOLS = ("t", "h", "V", "alpha", "p_H", "q_H", "r", "x", "y", "z")
 #: what a law about motion may give: force and moment of the H frame, whose z axis is that of the body
 WRENCH_TARGETS = ("force_x_N", "force_y_N", "force_z_N", "moment_x_N_m", "moment_y_N_m", "moment_z_N_m")
-_FUNCTIONS = ("sign", "exp", "cos", "sin")
+_FUNCTIONS = ("sign", "exp", "cos", "sin", "play")
+_READINGS = ("x", "y", "z")
 _COUNT = len(SYMBOLS)
 #: characters of a law's text: the longest law that a diagnosis writes has some two hundred
 _LONGEST = 5000
 #: size of an exponent: r^30 is 1e111 at the fastest spin, and no force grows so
 _STEEPEST = 30.0
 #: a row of a law's numbers: place of its target, coefficient, of each symbol the power of its magnitude and its sign
-#: to a power, decay in 1/s, order and phase of the angle turned
-_DECAY, _ORDER, _PHASE, LAW_WIDTH = (2 + 2 * _COUNT + k for k in range(4))
-_TOKEN = re.compile(r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*·/^|()]))")
+#: to a power, decay in 1/s, order and phase of the angle turned, play of its sensor's reading
+_DECAY, _ORDER, _PHASE, _PLAY, LAW_WIDTH = (2 + 2 * _COUNT + k for k in range(5))
+_TOKEN = re.compile(r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*·/^|(),]))")
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,7 @@ class Law:
         return readonly([[place, *term] for term in parser.terms()])
 
     def evaluate(self, state: Mapping[str, ArrayLike]) -> FloatArray:
-        """Return the law at states given by symbol (psi, too), each a number or (n,).
+        """Return the law at states given by symbol (psi, too), each a number or (n,), in the order of time.
 
         Raises KeyError where one is missing.
         """
@@ -103,6 +105,8 @@ class Law:
                 power, odd = row[2 + k], row[2 + _COUNT + k]
                 if power or odd:
                     x = np.asarray(state[symbol], dtype=np.float64)
+                    if row[_PLAY] and symbol in _READINGS:
+                        x = behind_play(np.atleast_1d(x), row[_PLAY]).reshape(x.shape)
                     term = term * np.abs(x) ** power * (np.sign(x) if odd else 1.0)
             if row[_DECAY]:
                 term = term * np.exp(-row[_DECAY] * np.asarray(state["t"], dtype=np.float64))
@@ -161,7 +165,7 @@ class _Parser:
 
     def _product(self, sign: float) -> list[float]:
         coefficient, powers, odd = sign, [0.0] * _COUNT, [0.0] * _COUNT
-        decay, order, phase = 0.0, 0.0, 0.0
+        decay, order, phase, width = 0.0, 0.0, 0.0, 0.0
         inverse = 1.0
         while True:
             if self._peek() == "exp":
@@ -172,6 +176,12 @@ class _Parser:
                 order, phase = self._turn()
                 if not order:
                     coefficient *= np.cos(phase)
+            elif self._peek() == "play":
+                if width or inverse < 0.0:
+                    raise self._error("a second play in one product, or one below a stroke")
+                place, width = self._play()
+                powers[place] += 1.0
+                odd[place] = (odd[place] + 1.0) % 2.0
             else:
                 value, place, power, is_odd = self._factor()
                 if place < 0:
@@ -180,7 +190,9 @@ class _Parser:
                     powers[place] += inverse * power
                     odd[place] = (odd[place] + is_odd) % 2.0
             if self._peek() in ("", "+", "-"):
-                row = [float(coefficient), *powers, *odd, decay, order, phase]
+                row = [float(coefficient), *powers, *odd, decay, order, phase, width]
+                if width and sum(map(abs, powers[-len(_READINGS) :])) != 1.0:
+                    raise self._error("a play times a reading")
                 if not all(map(isfinite, row)) or max(map(abs, powers)) > _STEEPEST:
                     raise self._error(f"a number that is not finite, or a power above {_STEEPEST:g} in all")
                 return row
@@ -218,6 +230,18 @@ class _Parser:
             phase += sign * self._number(self._take())
         self._take(")")
         return order, phase
+
+    def _play(self) -> tuple[int, float]:
+        """Read ``play(x, w)``; return the place of the reading and w."""
+        self._take("play")
+        self._take("(")
+        place = SYMBOLS.index(self._take(*_READINGS))
+        self._take(",")
+        width = self._number(self._take())
+        self._take(")")
+        if not width > 0.0:
+            raise self._error(f"a play of {width:g}, which must be positive")
+        return place, width
 
     def _factor(self) -> tuple[float, int, float, float]:
         """Return value of a number, place of a symbol (-1: a number), its power, and whether its sign is kept."""
@@ -263,6 +287,16 @@ class _Parser:
         except ValueError:
             known = ", ".join((*self._coefficients, *SYMBOLS))
             raise self._error(f"unknown '{token}' (known are {known})") from None
+
+
+@compiled
+def behind_play(x: FloatArray, width: float) -> FloatArray:
+    """Return what a part with play +-width shows, (n,), that x (n,) pushes to and fro: Prandtl's operator."""
+    y = np.empty_like(x)
+    y[0] = x[0]
+    for k in range(1, x.size):
+        y[k] = min(max(y[k - 1], x[k] - width), x[k] + width)
+    return y
 
 
 @compiled

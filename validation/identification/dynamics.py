@@ -31,6 +31,7 @@ LAW_PLACES = (
     "decay",
     "order",
     "phase",
+    "play",
     *(f"at_{symbol}" for symbol in SYMBOLS),
 )
 _PLACES, _COUNT = len(LAW_PLACES), len(SYMBOLS)

@@ -12,6 +12,7 @@ from discsim.effects.catalogue import CATALOGUE, effect
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.files import digest
+from discsim.law import behind_play
 from discsim.recording import PLANTS, SENSORS, Samples, read_dataset
 from discsim.rig import spin_down
 from discsim.sensors import Noise
@@ -19,8 +20,9 @@ from discsim.validation.challenge.cases.case import MASKS, Case, Coast, Turning
 from discsim.validation.challenge.cases.conceal import Answer, conceal, read_answer, recordings
 from discsim.validation.challenge.cases.detection_limit import sizes
 from discsim.validation.challenge.cases.draw import draw_case
+from discsim.validation.challenge.cases.hidden_physics import coast
 from discsim.validation.challenge.cases.hiding import possible
-from discsim.validation.challenge.cases.off_catalogue import OFF_CATALOGUE, coast, play
+from discsim.validation.challenge.cases.off_catalogue import OFF_CATALOGUE
 from discsim.validation.challenge.cases.sizes import HIDING, conceivable, draw_effect, scaled
 from discsim.validation.experiments.concealed import FULL_CASES, QUICK_CASES
 
@@ -314,7 +316,7 @@ def test_a_wind_seen_by_one_who_moves_is_a_wind():
 
 def test_a_play_follows_late_both_ways():
     x = np.concatenate([np.linspace(0, 5, 50), np.linspace(5, 0, 50)])
-    y = play(x, 1.0)
+    y = behind_play(x, 1.0)
     assert y[49] == pytest.approx(4.0)
     assert y[-1] == pytest.approx(1.0)
     assert np.all(np.abs(x - y) <= 1.0 + 1e-12)

@@ -24,8 +24,8 @@ from discsim.sensors import Instruments, record
 from discsim.toml_table import read_toml
 from discsim.toml_text import toml_lines
 from discsim.validation.challenge.cases.case import Case, Coast, Kind, Run, Turning
+from discsim.validation.challenge.cases.hidden_physics import HiddenDisc, coast, haunted
 from discsim.validation.challenge.cases.like_real import cut_in_flight
-from discsim.validation.challenge.cases.off_catalogue import HiddenDisc, coast, haunted
 from discsim.validation.challenge.cases.setups import equivalents
 
 __all__ = ["Answer", "conceal", "read_answer", "recordings", "write_recordings"]

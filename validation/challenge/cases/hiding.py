@@ -116,7 +116,11 @@ def possible(case: Case) -> list[str]:
 
 
 def _present(name: str, sensors: tuple[str, ...]) -> bool:
-    needed = {"rotating_magnet": ("magnetometer",), "sensor_hysteresis": ("accelerometer",)}
+    needed = {
+        "rotating_magnet": ("magnetometer",),
+        "mains_field": ("magnetometer",),
+        "sensor_hysteresis": ("accelerometer",),
+    }
     if name == "warming":
         return "accelerometer" in sensors or "gyroscope" in sensors
     return all(sensor in sensors for sensor in needed.get(name, ()))

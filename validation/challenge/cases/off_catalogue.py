@@ -1,14 +1,13 @@
-"""Physics that the catalogue lacks: it lives here only, so that a diagnosis has nothing to look it up in.
+"""Physics that the catalogue lacks: it lives in the blind test only, so that a diagnosis has nothing to look it up in.
 
 Each kind is one frozen type: its fields are its numbers, ``drawn`` a specimen of a size that nobody could take for
-noise, ``law`` what a person would write down who knew. Kinds that act on the motion work inside MuJoCo, on the disc
-(`HiddenDisc`) or on the rig (`coast`); kinds that act on a sensor replace it by one that is haunted.
+noise, ``law`` what a person would write down who knew. `hidden_physics` lets them act.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, ClassVar, TypeAlias
 
@@ -17,34 +16,25 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray
-from discsim.callbacks import compile_model, own_warnings, passive_force
-from discsim.compiled import compiled
-from discsim.disc import Disc, Rig
-from discsim.effects.catalogue import Effect, by_id
-from discsim.effects.events import spin_step
-from discsim.effects.rig import axis
-from discsim.engine import FlyingDisc, check_model, check_state
-from discsim.environment import Environment
-from discsim.frames import flip_yz, multiply, turn
 from discsim.motion import Motion
-from discsim.parameters import parameter_index
 from discsim.recording import Plant
-from discsim.sensors import Accelerometer, Gyroscope, Instruments, Magnetometer
 
 __all__ = [
     "OFF_CATALOGUE",
     "BearingWarmth",
-    "HiddenDisc",
+    "Cogging",
+    "DryingDisc",
     "LiftHysteresis",
     "LoosePart",
+    "MainsField",
     "OffCatalogue",
     "PowerLawTorque",
     "RotatingMagnet",
     "SensorHysteresis",
+    "Thermal",
     "Turbulence",
     "Warming",
-    "coast",
-    "haunted",
+    "log_uniform",
 ]
 
 
@@ -269,6 +259,118 @@ class SensorHysteresis:
         return f"accelerometer x with a play of +-{self.width:g} m/s^2 (hysteresis)"
 
 
+@dataclass(frozen=True)
+class Cogging:
+    """A bearing that holds in ``order`` places of a turn, as motors do: torque ``amplitude cos(order yaw)`` in N m."""
+
+    amplitude: float
+    order: int
+    plants: ClassVar[tuple[Plant, ...]] = ("spin_down",)
+
+    @classmethod
+    def drawn(cls, plant: Plant, rng: np.random.Generator) -> Cogging:
+        """Draw a torque that makes the rate pulse by 0.05 to 0.5 rad/s at 60 rad/s, two to four times a turn."""
+        order = int(rng.integers(2, 5))
+        return cls(float(f"{log_uniform(rng, 0.05, 0.5) * 1.1e-3 * order * 60.0:.6g}"), order)
+
+    @property
+    def law(self) -> str:
+        """What it is, as text."""
+        return f"torque about z_B {self.amplitude:g} cos({self.order} yaw) N m, yaw the rig's own"
+
+    def torque(self, yaw: float) -> float:
+        """Torque, N m, at yaw in rad."""
+        return self.amplitude * float(np.cos(self.order * yaw))
+
+
+@dataclass(frozen=True)
+class MainsField:
+    """The field of a mains cable: ``field_uT`` along ``direction`` in N at ``frequency`` (Hz), in any phase."""
+
+    field_uT: float
+    frequency: float
+    direction: tuple[float, float, float]
+    plants: ClassVar[tuple[Plant, ...]] = ("rate_table", "spin_down", "free_spin")
+
+    @classmethod
+    def drawn(cls, plant: Plant, rng: np.random.Generator) -> MainsField:
+        """Draw a field of 2 to 15 uT of a mains of 50 or 60 Hz, which is never quite that."""
+        field_uT = log_uniform(rng, 2.0, 15.0)
+        frequency = round(float(rng.choice([50.0, 60.0]) + rng.uniform(-0.2, 0.2)), 3)
+        direction = rng.standard_normal(3)
+        n, e, d = (float(f"{x:.6g}") for x in direction / np.linalg.norm(direction))
+        return cls(field_uT, frequency, (n, e, d))
+
+    @property
+    def law(self) -> str:
+        """What it is, as text."""
+        n, e, d = self.direction
+        return f"field in N ({n:g}, {e:g}, {d:g}) {self.field_uT:g} uT cos(2 pi {self.frequency:g} t + any phase)"
+
+    def field_b(self, motion: Motion, t: FloatArray) -> FloatArray:
+        """Return the field in B (n, 3) uT at instants t (n,).
+
+        Its phase is that of a number without meaning, so that it is another one in each recording.
+        """
+        phase = 1e4 * float(np.sum(motion.attitude[0]))
+        swing = np.cos(2.0 * np.pi * self.frequency * t + phase)
+        return np.asarray(motion.at(t).in_body(np.outer(swing, self.field_uT * np.array(self.direction))))
+
+
+@dataclass(frozen=True)
+class DryingDisc:
+    """A wet disc that dries: mass and inertia fall by ``share`` of what is stated with time constant ``tau`` (s)."""
+
+    share: float
+    tau: float
+    plants: ClassVar[tuple[Plant, ...]] = ("flight",)
+
+    @classmethod
+    def drawn(cls, plant: Plant, rng: np.random.Generator) -> DryingDisc:
+        """Draw 3 to 15 % of its mass, thrown off within a second or so."""
+        return cls(log_uniform(rng, 0.03, 0.15), log_uniform(rng, 0.4, 1.5))
+
+    @property
+    def law(self) -> str:
+        """What it is, as text."""
+        return f"mass and inertia {1.0 + self.share:g} to 1 of what is stated, by exp(-t/{self.tau:g} s)"
+
+    def lighter(self, t: float) -> float:
+        """Return what the air's force and moment are worth at t s, beside a disc of the stated mass."""
+        return 1.0 / (1.0 + self.share * float(np.exp(-t / self.tau)))
+
+
+@dataclass(frozen=True)
+class Thermal:
+    """Air that rises with ``speed`` (m/s) about a place in the field, over ``size`` (m)."""
+
+    speed: float
+    north: float
+    east: float
+    size: float
+    plants: ClassVar[tuple[Plant, ...]] = ("flight",)
+
+    @classmethod
+    def drawn(cls, plant: Plant, rng: np.random.Generator) -> Thermal:
+        """Draw air that rises by 1 to 3 m/s over 15 to 40 m, so near that each throw feels it, none alike."""
+        size, way = rng.uniform(15.0, 40.0), rng.uniform(0.0, 2.0 * np.pi)
+        off = 0.7 * size
+        return cls(
+            log_uniform(rng, 1.0, 3.0), round(off * np.cos(way), 2), round(off * np.sin(way), 2), round(float(size), 2)
+        )
+
+    @property
+    def law(self) -> str:
+        """What it is, as text."""
+        where = f"exp(-((north - {self.north:g})^2 + (east - {self.east:g})^2) / (2 ({self.size:g} m)^2))"
+        return f"wind up {self.speed:g} m/s {where}"
+
+    def wind_up(self, north: float, east: float) -> float:
+        """Return the wind, m/s upwards, at a place in m."""
+        away = ((north - self.north) ** 2 + (east - self.east) ** 2) / self.size**2
+        return self.speed * float(np.exp(-0.5 * away))
+
+
 OffCatalogue: TypeAlias = (
     PowerLawTorque
     | BearingWarmth
@@ -278,6 +380,10 @@ OffCatalogue: TypeAlias = (
     | RotatingMagnet
     | Warming
     | SensorHysteresis
+    | Cogging
+    | MainsField
+    | DryingDisc
+    | Thermal
 )
 
 #: kinds by the name used on the command line and in an answer
@@ -291,235 +397,9 @@ OFF_CATALOGUE: Mapping[str, type[OffCatalogue]] = MappingProxyType(
         "rotating_magnet": RotatingMagnet,
         "warming": Warming,
         "sensor_hysteresis": SensorHysteresis,
+        "cogging": Cogging,
+        "mains_field": MainsField,
+        "drying_disc": DryingDisc,
+        "thermal": Thermal,
     }
 )
-
-
-# ---------------------------------------------------------------------------------------------- in the air
-
-
-class HiddenDisc(FlyingDisc):
-    """A disc in MuJoCo with physics upon it that the catalogue lacks."""
-
-    def __init__(
-        self,
-        disc: Disc,
-        environment: Environment,
-        effects: Sequence[Effect],
-        secret: OffCatalogue | None,
-        recording: int,
-    ) -> None:
-        self.secret = secret
-        super().__init__(disc, environment, effects)
-        self._gusts = secret.series(recording) if isinstance(secret, Turbulence) else None
-        self._wind = [parameter_index("environment", f"wind_{way}") for way in ("north", "east", "down")]
-        self._late: tuple[float, float] | None = None
-
-    def specification(self, timestep: float, contacts: bool) -> Any:
-        """Return the disc's specification, with the loose part on it where there is one."""
-        spec = super().specification(timestep, contacts)
-        if isinstance(self.secret, LoosePart):
-            body = spec.body("disc")
-            body.mass -= self.secret.mass
-            self.secret.attach(body)
-        return spec
-
-    def apply(self, model: Any, data: Any) -> None:
-        """Add the air, the events and what is hidden to ``data.qfrc_passive``."""
-        if model is not self.model:
-            return
-        if self._gusts is not None:
-            place = data.time / Turbulence.STEP
-            k = min(int(place), len(self._gusts) - 2)
-            gust = self._gusts[k] + (place - k) * (self._gusts[k + 1] - self._gusts[k])
-            self.parameters[self._wind] = self.environment.wind + gust
-        super().apply(model, data)
-        if isinstance(self.secret, PowerLawTorque):
-            data.qfrc_passive[5] -= self.secret.torque(-data.qvel[5])  # z of MuJoCo's body axes is up
-        elif isinstance(self.secret, LiftHysteresis):
-            data.qfrc_passive[:3] += self._late_lift(self.secret, data)
-
-    def _late_lift(self, secret: LiftHysteresis, data: Any) -> FloatArray:
-        """Return the force (3,) in MuJoCo's world axes, across the wind, that a late angle of attack adds."""
-        flat = np.empty(9)
-        mujoco.mju_quat2Mat(flat, data.qpos[3:7])
-        C = flat.reshape(3, 3)
-        through_air = data.qvel[:3] - flip_yz(self.environment.wind)
-        u, v, up = C.T @ through_air
-        alpha = float(np.arctan2(-up, np.hypot(u, v)))
-        time, late = self._late or (data.time, alpha)
-        if data.time > time:  # once per step: the stages of one step share what was before
-            late += (alpha - late) * (1.0 - np.exp(-(data.time - time) / secret.tau))
-        self._late = (data.time, late)
-        V = float(np.linalg.norm(through_air))
-        assert self.disc.aero is not None
-        assert self.environment.air_density is not None
-        pressure = 0.5 * self.environment.air_density * V * V * self.disc.area
-        lift = secret.share * pressure * self.disc.aero.CLa * (late - alpha)
-        along = through_air / V
-        across = C[:, 2] - (C[:, 2] @ along) * along
-        return np.asarray(lift * across / np.linalg.norm(across))
-
-
-# ---------------------------------------------------------------------------------------------- on the bench
-
-_SPINNER = """
-<mujoco>
-  <option timestep="0.001" integrator="RK4"/>
-  <worldbody>
-    <body name="axis">
-      <body name="rotor">
-        <joint name="spin" type="hinge" axis="0 0 -1"/>
-        <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
-      </body>
-    </body>
-  </worldbody>
-</mujoco>
-"""
-
-
-def coast(
-    rig: Rig,
-    environment: Environment,
-    rate: float,
-    duration: float,
-    effects: Sequence[Effect] = (),
-    secret: OffCatalogue | None = None,
-    *,
-    yaw: float = 0.0,
-) -> Motion:
-    """Let a rig run down in MuJoCo's own joint and return its true motion.
-
-    Viscous and quadratic drag are the joint's polynomial damping, dry friction is its friction loss (a constraint of
-    the solver), a tilt turns the body that carries the hinge: none of it is the catalogue's formula. Only a kick is.
-    """
-    given = by_id(effects)
-    model, tilt = _spinner(rig, environment, given, secret)
-    data = mujoco.MjData(model)
-    check_model(model)
-    data.qpos[0], data.qvel[0] = yaw, rate
-    kick = given.get("event.spin_step")
-
-    def hidden(stepped_model: Any, stepped_data: Any) -> None:
-        if stepped_data is not data:
-            return
-        r = float(data.qvel[0])
-        torque = rig.Izz * spin_step(kick, data.time, r) if kick is not None else 0.0
-        if isinstance(secret, PowerLawTorque):
-            torque += secret.torque(r)
-        elif isinstance(secret, BearingWarmth):
-            torque += secret.share * rig.viscous * r * (1.0 - np.exp(-data.time / secret.tau))
-        data.qfrc_passive[0] += torque
-
-    steps = round(duration / model.opt.timestep)
-    log = np.empty((steps + 1, 4))
-    with own_warnings(), passive_force(model, hidden):
-        for k in range(steps + 1):
-            if k:
-                mujoco.mj_step(model, data)
-            mujoco.mj_forward(model, data)
-            check_state(data)
-            log[k] = data.time, data.qpos[0], data.qvel[0], data.qacc[0]
-    down = np.array([0.0, 0.0, 1.0])
-    still = np.zeros((steps + 1, 3))
-    return Motion(
-        t=log[:, 0],
-        position=still,
-        velocity=still,
-        acceleration=still,
-        attitude=multiply(np.broadcast_to(tilt, (steps + 1, 4)), turn(log[:, 1:2] * down)),
-        rate=log[:, 2:3] * down,
-        angular_acceleration=log[:, 3:4] * down,
-        environment=environment,
-    )
-
-
-def _spinner(
-    rig: Rig, environment: Environment, given: Mapping[str, Any], secret: OffCatalogue | None
-) -> tuple[mujoco.MjModel, FloatArray]:
-    """Return the rig's model, its bearing's friction in the joint, and the quaternion (4,) by which its axis tilts."""
-    spec = mujoco.MjSpec.from_string(_SPINNER)
-    spec.option.gravity = [0.0, 0.0, -environment.gravity]
-    joint, rotor = spec.joint("spin"), spec.body("rotor")
-    quadratic = given["rig.quadratic_drag"].coefficient_N_m_s2 if "rig.quadratic_drag" in given else 0.0
-    joint.damping = [rig.viscous, quadratic, 0.0]
-    joint.frictionloss = given["rig.coulomb_friction"].torque_N_m if "rig.coulomb_friction" in given else 0.0
-    rotor.inertia = [rig.Izz, rig.Izz, rig.Izz]
-    if isinstance(secret, LoosePart):
-        secret.attach(rotor)
-    tilt = np.array([1.0, 0.0, 0.0, 0.0])
-    if "rig.axis_tilt" in given:
-        n, e, d = axis(given["rig.axis_tilt"])
-        across = np.hypot(n, e)
-        tilt = turn(np.array([-e, n, 0.0]) * np.arctan2(across, d) / across)
-        spec.body("axis").quat = [tilt[0], *flip_yz(tilt[1:])]
-    return compile_model(spec), tilt
-
-
-# ---------------------------------------------------------------------------------------------- haunted sensors
-
-
-@dataclass(frozen=True)
-class MagnetisedMagnetometer(Magnetometer):
-    """A magnetometer with a magnet that turns beside it."""
-
-    magnet: RotatingMagnet = field(default_factory=lambda: RotatingMagnet(0.0, 0.5))
-
-    def ideal(self, motion: Motion, t: FloatArray) -> FloatArray:
-        """Return the reading (n, 3) uT before lag and noise."""
-        return np.asarray(super().ideal(motion, t) + self.magnet.field_b(motion, t))
-
-
-@dataclass(frozen=True)
-class HauntedAccelerometer(Accelerometer):
-    """An accelerometer that warms up, or whose spring has play along x."""
-
-    warming: Warming = field(default_factory=lambda: Warming("accelerometer", (0.0, 0.0, 0.0), 1.0))
-    play: float = 0.0
-
-    def ideal(self, motion: Motion, t: FloatArray) -> FloatArray:
-        """Return the reading (n, 3) m/s^2 before lag and noise."""
-        reading = super().ideal(motion, t) + self.warming.at(t - motion.start)
-        if self.play > 0.0:
-            reading[:, 0] = play(reading[:, 0], self.play)
-        return np.asarray(reading)
-
-
-@dataclass(frozen=True)
-class WarmingGyroscope(Gyroscope):
-    """A gyroscope that warms up."""
-
-    warming: Warming = field(default_factory=lambda: Warming("gyroscope", (0.0, 0.0, 0.0), 1.0))
-
-    def ideal(self, motion: Motion, t: FloatArray) -> FloatArray:
-        """Return the reading (n, 3) rad/s before lag and noise."""
-        return np.asarray(super().ideal(motion, t) + self.warming.at(t - motion.start))
-
-
-@compiled
-def play(x: FloatArray, width: float) -> FloatArray:
-    """Return what a part with play +-width shows that x (n,) pushes to and fro, Prandtl's operator."""
-    y = np.empty_like(x)
-    y[0] = x[0]
-    for k in range(1, x.size):
-        y[k] = min(max(y[k - 1], x[k] - width), x[k] + width)
-    return y
-
-
-def haunted(instruments: Instruments, secret: OffCatalogue | None) -> Instruments:
-    """Return the instruments with the sensor replaced that a secret acts on."""
-
-    def replaced(name: str, kind: type[Any], **added: Any) -> Instruments:
-        sensor = instruments.sensors[name]
-        own = {item.name: getattr(sensor, item.name) for item in fields(sensor)}
-        return Instruments({**instruments.sensors, name: kind(**own, **added)}, instruments.clock)
-
-    if isinstance(secret, RotatingMagnet):
-        return replaced("magnetometer", MagnetisedMagnetometer, magnet=secret)
-    if isinstance(secret, SensorHysteresis):
-        return replaced("accelerometer", HauntedAccelerometer, play=secret.width)
-    if isinstance(secret, Warming) and secret.sensor == "accelerometer":
-        return replaced("accelerometer", HauntedAccelerometer, warming=secret)
-    if isinstance(secret, Warming):
-        return replaced("gyroscope", WarmingGyroscope, warming=secret)
-    return instruments

@@ -22,7 +22,13 @@ from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
 from discsim.validation.diagnosis.unknown_law.formula import as_laws, as_sensor_laws
 from discsim.validation.diagnosis.unknown_law.motion_law import candidate_laws, fitted_law, reference_of, state_of
-from discsim.validation.diagnosis.unknown_law.sensor_law import asked_of_sensors, fitted_sensor_law, sensor_library
+from discsim.validation.diagnosis.unknown_law.sensor_law import (
+    asked_of_sensors,
+    fitted_sensor_law,
+    further_sensor_terms,
+    sensor_library,
+    settled_terms,
+)
 from discsim.validation.diagnosis.unknown_law.terms import SensorTerm
 from discsim.validation.identification.gauss_newton import Fit, reduced_each, refit
 from discsim.validation.identification.noise import GroupNoise, NoiseModel, chi_squared, log_likelihood
@@ -126,17 +132,23 @@ def _quick(e: FloatArray) -> float:
 
 
 def find_law(
-    relaxed_fit: Fit, best: ContinuousFit, own: Sequence[Parameter], noise: NoiseModel, recordings: Sequence[Recording]
+    relaxed_fit: Fit,
+    best: ContinuousFit,
+    own: Sequence[Parameter],
+    noise: NoiseModel,
+    recordings: Sequence[Recording],
+    *,
+    instead: bool = True,
 ) -> FoundLaw | None:
     """Return the law that explains what the catalogue does not, or None where none holds on held-out recordings.
 
     ``relaxed_fit`` is the relaxed fit, ``best`` the best fit with effects of the catalogue (or without any), ``own``
-    the parameters that the recordings leave open without any effect, ``noise`` that of the relaxed fit.
+    the parameters that the recordings leave open without any effect, ``noise`` that of the relaxed fit. ``instead``
+    asks for a law that does better than the effects of the best fit, which then would explain the recordings.
     """
     plant = relaxed_fit.plant
-    if plant.weakly_identified or relaxed_fit.from_release:
-        # what a free spin does not model takes up any further moment; a path alone leaves no motion beside the data
-        return None
+    if relaxed_fit.from_release:
+        return None  # a path alone leaves no motion beside the data
     if len(recordings) == 1 and BOARD.isdisjoint(recordings[0].samples):
         return None  # one path takes any law, and no other recording could bear it out
     base = (
@@ -148,7 +160,8 @@ def find_law(
     start = _beside(relaxed_fit, own, own_at, noise)
     states = [state_of(trajectory, start.values(i)) for i, trajectory in enumerate(start.trajectories)]
     at = reference_of(states)
-    motion = plant.laws.terms
+    # what a free spin does not model takes up any further moment
+    motion = () if plant.weakly_identified else plant.laws.terms
     about = sensor_library(start)
     ranked: list[tuple[float, float, Term | SensorTerm]] = []
     if motion:
@@ -159,7 +172,7 @@ def find_law(
     for _, coefficient, term in _spread(ranked):
         fitted: ContinuousFit | None
         if isinstance(term, SensorTerm):
-            fitted = fitted_sensor_law(start, own, own_at, term)
+            fitted = fitted_sensor_law(start, own, own_at, [term])
         else:
             fitted = fitted_law(start, own, own_at, [term], [coefficient], at)
         if fitted is None:
@@ -172,8 +185,12 @@ def find_law(
         return None
     fitted, term = found
     if isinstance(term, SensorTerm):
-        return _believed(fitted, term, base, best, at, start.noise)
-    return _believed(*_more_terms(start, own, own_at, fitted, term, at), base, best, at, start.noise)
+        law = _believed(*_more_sensor_terms(start, own, own_at, fitted, term), base, at, start.noise)
+    else:
+        law = _believed(*_more_terms(start, own, own_at, fitted, term, at), base, at, start.noise)
+    if law is None or (instead and _priced(law.fitted) + SELECTION.entry > best.score):
+        return None
+    return law
 
 
 def _more_terms(
@@ -214,6 +231,33 @@ def _more_terms(
     return best, chosen
 
 
+def _more_sensor_terms(
+    start: Fit, own: Sequence[Parameter], own_at: FloatArray, fitted: ContinuousFit, first: SensorTerm
+) -> tuple[ContinuousFit, tuple[SensorTerm, ...]]:
+    """Return the fit of a law about a sensor with one more term where the first leaves more than noise, and its terms.
+
+    As for motion, the further term must gain its price and held-out likelihood over the law without it.
+    """
+    terms: tuple[SensorTerm, ...] = (first,)
+    if len(start.trajectories) < 2 or not unmodelled_residuals(fitted.fit.linears, fitted.residuals, fitted.fit.noise):
+        return fitted, terms
+    settled = settled_terms(fitted, terms)
+    others = further_sensor_terms(start, own, settled)
+    gains = asked_of_sensors(start, own, others, settled)
+    ranked = sorted(((gain, 0.0, term) for gain, term in zip(gains, others, strict=True)), key=lambda item: -item[0])
+    best = fitted
+    for _, _, term in _spread(ranked):
+        assert isinstance(term, SensorTerm)
+        two = (settled[0].term, term)
+        both = fitted_sensor_law(start, own, own_at, two)
+        if both is None or _priced(both) + SELECTION.entry > _priced(best):
+            continue
+        gained, _ = _held_out(fitted.fit, both.fit)
+        if _holds(gained):
+            best, terms = both, two
+    return best, terms
+
+
 def _holds(heldout: Mapping[int, float]) -> bool:
     """Tell whether recordings held out gain enough, half of them anything; where none could be held out it may."""
     gains = np.array([*heldout.values()])
@@ -236,8 +280,12 @@ def _spread(ranked: Sequence[tuple[float, float, Term | SensorTerm]]) -> list[tu
 
 
 def _share(base: Fit, fit: Fit, noise: NoiseModel) -> float:
-    """Return the part of the excess of chi2 over the number of readings that a fit takes away."""
-    before, after = (sum(chi_squared(linear, noise, linear.residual) for linear in one.linears) for one in (base, fit))
+    """Return the part of the excess of chi2 over the number of readings that a fit takes away, in white noise.
+
+    Noise with a memory weighs the differences of neighbours most, which hold none of what a law explains.
+    """
+    white = {group: item._replace(correlation=0.0) for group, item in noise.items()}
+    before, after = (sum(chi_squared(linear, white, linear.residual) for linear in one.linears) for one in (base, fit))
     return (before - after) / max(before - base.count, 1.0)
 
 
@@ -248,22 +296,22 @@ def _priced(fitted: ContinuousFit) -> float:
 
 def _believed(
     fitted: ContinuousFit,
-    terms: tuple[Term, ...] | SensorTerm,
+    terms: tuple[Term, ...] | tuple[SensorTerm, ...],
     base: ContinuousFit,
-    best: ContinuousFit,
     at: Mapping[str, float],
     noise: NoiseModel,
 ) -> FoundLaw | None:
     """Return the law if it gains what it costs, explains most of the excess, and recordings that took no part."""
-    if _priced(fitted) + SELECTION.entry > min(base.score, best.score):
+    if _priced(fitted) + SELECTION.entry > base.score:
         return None
     share = _share(base.fit, fitted.fit, noise)
     heldout, chi2 = _held_out(base.fit, fitted.fit)
     if not _holds(heldout) or share < UNKNOWN_LAW.share:
         return None
     total = sum(heldout.values()) if heldout else None
-    if isinstance(terms, SensorTerm):
-        laws, reference = as_sensor_laws(terms, fitted.fit, total)
+    about = tuple(term for term in terms if isinstance(term, SensorTerm))
+    if about:
+        laws, reference = as_sensor_laws(about, fitted.fit, total)
     else:
-        laws, reference = as_laws(terms, fitted.fit, at, total)
+        laws, reference = as_laws(tuple(t for t in terms if isinstance(t, Term)), fitted.fit, at, total)
     return FoundLaw(laws[0], base.score - fitted.score, heldout, share, reference, fitted, laws[1:], chi2)

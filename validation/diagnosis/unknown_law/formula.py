@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from math import exp, log
 
 import numpy as np
@@ -17,48 +18,85 @@ from discsim.validation.identification.plants.law_terms import Term
 __all__ = ["as_laws", "as_sensor_laws"]
 
 
-def as_sensor_laws(term: SensorTerm, fit: Fit, heldout: float | None) -> tuple[tuple[Law, ...], str]:
-    """Return a sensor term as laws, that of the strongest axis first, and its shape in words."""
-    C, place = fit.covariance, {q.name: j for j, q in enumerate(fit.parameters) if q.group == "term"}
-    s = place["shape"]
-    shape, shape_sd = float(fit.at[s]), float(np.sqrt(C[s, s]))
-    axes = list(dict.fromkeys(name.partition(".")[0] for name in place if name != "shape"))
-    ranked = []
-    for axis in axes:
-        js = [place[f"{axis}.{j}"] for j in range(term.size)]
-        values, block = fit.at[js], C[np.ix_(js, js)]
-        if not np.any(np.diag(block) > 0):
+def as_sensor_laws(terms: Sequence[SensorTerm], fit: Fit, heldout: float | None) -> tuple[tuple[Law, ...], str]:
+    """Return sensor terms as laws, that of the strongest axis first, and their shapes in words."""
+    place = {q.name: j for j, q in enumerate(fit.parameters) if q.group == "term"}
+    parts: dict[str, list[_Part]] = {}
+    notes = []
+    for i, term in enumerate(terms):
+        s = place[f"{i}.shape"]
+        notes.append(f"{term.kind} of the {term.sensor}, {fit.at[s]:.4g} ± {float(np.sqrt(fit.covariance[s, s])):.2g}")
+        prefix = f"{i}."
+        axes = dict.fromkeys(name[len(prefix) :].partition(".")[0] for name in place if name.startswith(prefix))
+        for axis in axes:
+            if axis != "shape" and (part := _part(term, i, axis, place, fit)) is not None:
+                parts.setdefault(f"{term.sensor}.{axis}", []).append(part)
+    significant = 4.0 * SELECTION.per_parameter
+    strongest = max(max(part.chi2 for part in mine) for mine in parts.values())
+    laws = []
+    for target, mine in sorted(parts.items(), key=lambda item: -max(part.chi2 for part in item[1])):
+        kept = [part for part in mine if part.chi2 > min(significant, strongest)] or [
+            part for part in mine if part.chi2 == strongest
+        ]
+        if not kept:
             continue
-        z2 = float(values @ inverse_of(block) @ values)
-        sds = np.sqrt(np.diag(block))
-        if term.kind == "turning":
-            text = "a * cos(k * psi) + b * sin(k * psi)"
-            coefficients = {
-                "a": ParameterValue(float(values[0]), float(sds[0])),
-                "b": ParameterValue(float(values[1]), float(sds[1])),
-                "k": ParameterValue(shape, shape_sd),
-            }
-        elif term.kind == "warming":
-            text = "c - c * exp(-t/tau)"
-            coefficients = {
-                "c": ParameterValue(float(values[0]), float(sds[0])),
-                "tau": ParameterValue(shape, shape_sd),
-            }
-        else:
-            symbol = {"drift": "t", "rate": "r", "reading": axis.partition("_")[0]}[term.kind]
-            scale = term.unit**-shape
-            c = float(values[0])
-            row = np.array([scale, -c * scale * log(term.unit)])
-            pair = C[np.ix_([js[0], s], [js[0], s])]
-            text = f"c * |{symbol}|^n" + (f" * sign({symbol})" if symbol != "t" else "")
-            coefficients = {
-                "c": ParameterValue(c * scale, float(np.sqrt(row @ pair @ row))),
-                "n": ParameterValue(shape, shape_sd),
-            }
-        ranked.append((z2, Law(text, f"{term.sensor}.{axis}", coefficients, heldout)))
-    ranked.sort(key=lambda item: -item[0])
-    laws = tuple(law for z2, law in ranked if z2 > 4.0 * SELECTION.per_parameter or law is ranked[0][1])
-    return laws, f"{term.kind} of the {term.sensor}, {shape:.4g} ± {shape_sd:.2g}"
+        coefficients: dict[str, ParameterValue] = {}
+        text = ""
+        for k, part in enumerate(kept):
+            mark = str(k + 1) if len(kept) > 1 else ""
+            coefficients |= {name + mark: value for name, value in part.coefficients.items()}
+            text += (" + " if text else "") + part.text.format(**{name: name + mark for name in part.coefficients})
+        laws.append(Law(text, target, coefficients, heldout))
+    return tuple(laws), "; ".join(notes)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What one term does to one axis: its text with names of coefficients in braces, and how far it is from nothing."""
+
+    text: str
+    coefficients: Mapping[str, ParameterValue]
+    chi2: float
+
+
+def _part(term: SensorTerm, i: int, axis: str, place: Mapping[str, int], fit: Fit) -> _Part | None:
+    """Return what the i-th term does to an axis, or None where no reading tells it."""
+    C, s = fit.covariance, place[f"{i}.shape"]
+    shape, shape_sd = float(fit.at[s]), float(np.sqrt(C[s, s]))
+    js = [place[f"{i}.{axis}.{j}"] for j in range(term.size)]
+    values, block = fit.at[js], C[np.ix_(js, js)]
+    if not np.any(np.diag(block) > 0):
+        return None
+    chi2 = float(values @ inverse_of(block) @ values)
+    sds = [float(sd) for sd in np.sqrt(np.diag(block))]
+    c = float(values[0])
+    if term.kind == "turning":
+        coefficients = {
+            "a": ParameterValue(c, sds[0]),
+            "b": ParameterValue(float(values[1]), sds[1]),
+            "k": ParameterValue(shape, shape_sd),
+        }
+        return _Part("{a} * cos({k} * psi) + {b} * sin({k} * psi)", coefficients, chi2)
+    if term.kind in ("warming", "settling", "play"):
+        symbol = axis.partition("_")[0]
+        scale = term.unit**-2 if term.kind == "settling" else 1.0
+        name, text = {
+            "warming": ("tau", "{c} - {c} * exp(-t/{tau})"),
+            "settling": ("tau", "{c} * r^2 - {c} * r^2 * exp(-t/{tau})"),
+            "play": ("w", f"{{c}} * play({symbol}, {{w}}) - {{c}} * {symbol}"),
+        }[term.kind]
+        coefficients = {"c": ParameterValue(c * scale, sds[0] * scale), name: ParameterValue(shape, shape_sd)}
+        return _Part(text, coefficients, chi2)
+    symbol = {"drift": "t", "rate": "r", "reading": axis.partition("_")[0]}[term.kind]
+    scale = term.unit**-shape
+    row = np.array([scale, -c * scale * log(term.unit)])
+    pair = C[np.ix_([js[0], s], [js[0], s])]
+    text = f"{{c}} * |{symbol}|^{{n}}" + (f" * sign({symbol})" if symbol != "t" else "")
+    coefficients = {
+        "c": ParameterValue(c * scale, float(np.sqrt(row @ pair @ row))),
+        "n": ParameterValue(shape, shape_sd),
+    }
+    return _Part(text, coefficients, chi2)
 
 
 def _factor(symbol: str, power: str) -> str:

@@ -59,22 +59,26 @@ def _constant(target: str, plant: Plant, term: int = 0) -> Column:
     )
 
 
-def _weighed(linear: Linear, first: int, targets: Sequence[int], weights: FloatArray) -> Linear:
+def _weighed(linear: Linear, nodes: FloatArray, first: int, targets: Sequence[int], weights: FloatArray) -> Linear:
     """Return a linearisation with terms for its last columns, made of those of constants.
 
-    ``first`` is the place of the first constant among the shared columns, ``targets`` (m,) which of them a term
-    weighs, ``weights`` (m, k) its value in each segment.
+    ``nodes`` (k + 1,) bound the segments, ``first`` is the place of the first constant among the shared columns,
+    ``targets`` (m,) which of them a term weighs, ``weights`` (m, k) its value in each segment. A reading that hangs on
+    several segments takes that of its own time.
     """
     local, (k, d) = linear.unknowns, linear.sensitivities.shape[:2]
     places = [d + first + j for j in targets]
     own = linear.own[:, places] * weights[:, linear.segment].T
     passes = linear.transitions[:, :, places] * weights.T[: k - 1, None, :]
+    several = np.clip(np.searchsorted(nodes, linear.t[linear.segment < 0], side="right") - 1, 0, k - 1)
+    whole = linear.whole[:, [local + first + j for j in targets]] * weights[:, several].T if linear.whole.size else None
     moves = np.zeros((k, d, len(targets)))
     for i in range(k - 1):
         moves[i + 1] = linear.transitions[i, :, :d] @ moves[i] + passes[i]
     return replace(
         linear,
         own=np.hstack([linear.own[:, : d + first], own]),
+        whole=linear.whole if whole is None else np.hstack([linear.whole[:, : local + first], whole]),
         sensitivities=np.concatenate([linear.sensitivities[:, :, : local + first], moves], axis=2),
         transitions=np.concatenate([linear.transitions[:, :, : d + first], passes], axis=2),
     )
@@ -91,8 +95,8 @@ def normal_equations_of_terms(
     own = [column_of(q) for q in fit.parameters]
     bare = linearised_columns(fit, [*own, *(_constant(target, plant, taken) for target in targets)])
     linears = [
-        _weighed(linear, len(own), place_of, np.array([term.weight(state, at) for term in terms]))
-        for linear, state in zip(bare, states, strict=True)
+        _weighed(linear, trajectory.nodes, len(own), place_of, np.array([term.weight(state, at) for term in terms]))
+        for linear, trajectory, state in zip(bare, fit.trajectories, states, strict=True)
     ]
     reduced = mapped(
         lambda linear, trajectory: reduce(linear, trajectory, fit.noise, defects), linears, fit.trajectories

@@ -23,7 +23,14 @@ from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.propagation import Column
 from discsim.validation.identification.segments import Trajectory
 
-__all__ = ["asked_of_sensors", "fitted_sensor_law"]
+__all__ = [
+    "SettledTerm",
+    "asked_of_sensors",
+    "fitted_sensor_law",
+    "further_sensor_terms",
+    "sensor_library",
+    "settled_terms",
+]
 
 #: half the difference by which the slope in a shape is taken, as a share of it
 _SHAPE_STEP = 1e-4
@@ -31,6 +38,15 @@ _SHAPE_STEP = 1e-4
 
 #: orders of the spin that are looked at, peaks of the spectrum that are tried
 _ORDERS, _PEAKS = (0.15, 4.0), 3
+
+
+#: orders of the spin nearer than this are one
+_SAME_ORDER = 0.02
+
+
+#: a play is told by a coefficient of 1 to within this, where it is these standard deviations from 0; readings at even
+#: instants see its turns late, which costs some per cent
+_PLAY_OFF, _TOLD = 0.2, 4.0
 
 
 @dataclass(frozen=True)
@@ -103,6 +119,7 @@ def _widened(linear: Linear, columns: FloatArray) -> Linear:
     return replace(
         linear,
         own=np.hstack([linear.own, columns]),
+        whole=np.hstack([linear.whole, columns[linear.segment < 0]]) if linear.whole.size else linear.whole,
         sensitivities=np.concatenate([linear.sensitivities, np.zeros((*linear.sensitivities.shape[:2], more))], axis=2),
         transitions=np.concatenate([linear.transitions, np.zeros((*linear.transitions.shape[:2], more))], axis=2),
     )
@@ -148,95 +165,162 @@ def sensor_library(fit: Fit) -> list[SensorTerm]:
         values = [r.value[r.good] for trajectory in fit.trajectories for r in trajectory.readings if r.sensor == sensor]
         if not values or not any(v.size for v in values):
             continue
-        units = {"drift": length, "rate": spin, "reading": float(np.std(np.concatenate(values)))}
+        spread = float(np.std(np.concatenate(values)))
+        units = {"drift": length, "rate": spin, "settling": spin, "reading": spread}
         for kind in SENSORS[sensor]:
             shape_grid = orders(fit, sensor) if kind == "turning" else SHAPES[kind]
+            if kind == "play":
+                shape_grid = [spread * share for share in shape_grid if spread > 0.0]
             unit = float(f"{max(units.get(kind, 1.0), 1e-6):.1g}")
             terms += [SensorTerm(sensor, kind, shape, unit) for shape in shape_grid]
     return terms
 
 
-def asked_of_sensors(fit: Fit, own: Sequence[Parameter], terms: Sequence[SensorTerm]) -> list[float]:
-    """Return what each sensor term would gain in chi2, segments jumping as they may."""
+@dataclass(frozen=True)
+class SettledTerm:
+    """A term with its shape and its coefficients (axes size,)."""
+
+    term: SensorTerm
+    shape: float
+    coefficients: FloatArray
+
+
+def _width(trajectories: Sequence[Trajectory], term: SensorTerm) -> int:
+    """Return the number of a term's coefficients."""
+    return max(len(_axes(trajectory, term.sensor)) for trajectory in trajectories) * term.size
+
+
+def _beside_terms(
+    linear: Linear, trajectory: Trajectory, settled: Sequence[SettledTerm], widths: Sequence[int]
+) -> Linear:
+    """Return a linearisation less what terms do, with columns for their coefficients, and last for their shapes."""
+    less, columns, slopes = np.zeros(linear.raw.size), [], []
+    for one, width in zip(settled, widths, strict=True):
+        if not _axes(trajectory, one.term.sensor):
+            columns.append(np.zeros((linear.raw.size, width)))
+            slopes.append(np.zeros(linear.raw.size))
+            continue
+        here, h = _columns_of(linear, trajectory, one.term, one.shape), _SHAPE_STEP * one.shape
+        above, below = (_columns_of(linear, trajectory, one.term, shape) for shape in (one.shape + h, one.shape - h))
+        columns.append(here)
+        slopes.append(((above - below) @ one.coefficients) / (2.0 * h))
+        less += here @ one.coefficients
+    return _widened(replace(linear, raw=linear.raw - less), np.column_stack([*columns, *slopes]))
+
+
+def asked_of_sensors(
+    fit: Fit, own: Sequence[Parameter], terms: Sequence[SensorTerm], settled: Sequence[SettledTerm] = ()
+) -> list[float]:
+    """Return what each sensor term would gain in chi2 beside ``settled`` ones, segments jumping as they may."""
     if not terms:
         return []
-    bare, defects = linearised(fit), fit.defects
-    wide, places, at = [], [], len(fit.parameters)
+    defects, p = fit.defects, len(fit.parameters)
+    known = [_width(fit.trajectories, one.term) for one in settled]
+    wide, places, at = [], [], p + sum(known) + len(settled)
+    first = at
     for term in terms:
-        width = max(len(_axes(trajectory, term.sensor)) for trajectory in fit.trajectories) * term.size
+        width = _width(fit.trajectories, term)
         places.append(range(at, at + width))
         at += width
-    for linear, trajectory in zip(bare, fit.trajectories, strict=True):
+    for bare, trajectory in zip(linearised(fit), fit.trajectories, strict=True):
+        linear = _beside_terms(bare, trajectory, settled, known) if settled else bare
         parts = [
-            _columns_of(linear, trajectory, term, term.shape)
+            _columns_of(bare, trajectory, term, term.shape)
             if _axes(trajectory, term.sensor)
             else np.zeros((linear.raw.size, len(place)))
             for term, place in zip(terms, places, strict=True)
         ]
         wide.append(_widened(linear, np.hstack(parts)))
     reduced = mapped(lambda linear, trajectory: reduce(linear, trajectory, fit.noise, defects), wide, fit.trajectories)
-    columns = (*map(column_of, fit.parameters), *(Column("term", str(j), 1.0) for j in range(at - len(fit.parameters))))
+    columns = (*map(column_of, fit.parameters), *(Column("term", str(j), 1.0) for j in range(at - p)))
     equations = NormalEquations(
         columns,
         to_baseline(np.stack([r.gram for r in reduced]), fit),
         {column: j for j, column in enumerate(columns)},
     )
-    taken = [(column_of(q), q) for q in own]
+
+    def free(place: Sequence[int]) -> list[tuple[Column, Parameter]]:
+        return [(columns[j], Parameter("term", columns[j].name, 0.0, 1.0)) for j in place]
+
+    taken = [*((column_of(q), q) for q in own), *free(range(p, first))]
     base = equations.solve(taken).chi2
-    gains = []
-    for place in places:
-        chosen = [(columns[j], Parameter("term", columns[j].name, 0.0, 1.0)) for j in place]
-        gains.append(base - equations.solve([*taken, *chosen]).chi2)
-    return gains
+    return [base - equations.solve([*taken, *free(place)]).chi2 for place in places]
+
+
+def further_sensor_terms(start: Fit, own: Sequence[Parameter], settled: Sequence[SettledTerm]) -> list[SensorTerm]:
+    """Return the terms that may stand beside settled ones: of another sensor or another kind, or of another order."""
+    there = {(one.term.sensor, one.term.kind) for one in settled}
+    terms = [t for t in sensor_library(start) if t.kind == "turning" or (t.sensor, t.kind) not in there]
+    return [
+        term
+        for term in terms
+        if not any(
+            one.term.kind == term.kind == "turning"
+            and one.term.sensor == term.sensor
+            and abs(one.shape - term.shape) < _SAME_ORDER
+            for one in settled
+        )
+    ]
+
+
+def settled_terms(fitted: ContinuousFit, terms: Sequence[SensorTerm]) -> tuple[SettledTerm, ...]:
+    """Return terms where a fit has them."""
+    values = {q.name: float(v) for q, v in zip(fitted.fit.parameters, fitted.fit.at, strict=True) if q.group == "term"}
+    return tuple(
+        SettledTerm(
+            replace(term, shape=values[f"{i}.shape"]),
+            values[f"{i}.shape"],
+            np.array([v for name, v in values.items() if name.startswith(f"{i}.") and name != f"{i}.shape"]),
+        )
+        for i, term in enumerate(terms)
+    )
 
 
 def fitted_sensor_law(
-    start: Fit, own: Sequence[Parameter], own_at: FloatArray, term: SensorTerm
+    start: Fit, own: Sequence[Parameter], own_at: FloatArray, terms: Sequence[SensorTerm]
 ) -> ContinuousFit | None:
-    """Fit a sensor term and own parameters by output error, segments hanging together.
+    """Fit sensor terms and own parameters by output error, segments hanging together.
 
-    The trajectories keep their readings; what the term takes off them is part of the residual.
+    The trajectories keep their readings; what the terms take off them is part of the residual.
     """
-    axes = max((_axes(trajectory, term.sensor) for trajectory in start.trajectories), key=len)
-    names = [(axis, j) for axis in axes for j in range(term.size)]
-    noise, trajectories, shape = start.noise, start.trajectories, term.shape
-    at = np.concatenate([own_at, np.zeros(len(names)), [shape]])
+    names, widths = [], []
+    for i, term in enumerate(terms):
+        axes = max((_axes(trajectory, term.sensor) for trajectory in start.trajectories), key=len)
+        names += [f"{i}.{axis}.{j}" for axis in axes for j in range(term.size)]
+        widths.append(len(axes) * term.size)
+    p, count = len(own), len(names)
     parameters = (
         *own,
-        *(Parameter("term", f"{axis}.{j}", 0.0, 1.0) for axis, j in names),
-        Parameter("term", "shape", shape, _SHAPE_STEP * shape, 0.3 * shape if term.kind != "turning" else 0.01),
+        *(Parameter("term", name, 0.0, 1.0) for name in names),
+        *(
+            Parameter(
+                "term", f"{i}.shape", t.shape, _SHAPE_STEP * t.shape, 0.3 * t.shape if t.kind != "turning" else 0.01
+            )
+            for i, t in enumerate(terms)
+        ),
     )
-    p = len(own)
-    fit = Fit(trajectories, parameters, at, start.plant.sizes.continuous, noise)
+    shapes = np.array([term.shape for term in terms])
+    at = np.concatenate([own_at, np.zeros(count), shapes])
+    fit = Fit(start.trajectories, parameters, at, start.plant.sizes.continuous, start.noise)
     for round in range(12):
         bare = linearised(replace(fit, parameters=tuple(own), at=fit.at[:p]))
-        linears = []
-        shape, c = float(fit.at[-1]), fit.at[p:-1]
-        for linear, trajectory in zip(bare, fit.trajectories, strict=True):
-            if not _axes(trajectory, term.sensor):
-                linears.append(_widened(linear, np.zeros((linear.raw.size, len(names) + 1))))
-                continue
-            here = _columns_of(linear, trajectory, term, shape)
-            h = _SHAPE_STEP * shape
-            slope = (
-                _columns_of(linear, trajectory, term, shape + h) - _columns_of(linear, trajectory, term, shape - h)
-            ) @ c
-            less = replace(linear, raw=linear.raw - here @ c)
-            linears.append(_widened(less, np.hstack([here, slope[:, None] / (2.0 * h)])))
+        shapes, parts = fit.at[p + count :], np.split(fit.at[p : p + count], np.cumsum(widths)[:-1])
+        settled = [SettledTerm(*one) for one in zip(terms, shapes.tolist(), parts, strict=True)]
+        linears = [_beside_terms(a, b, settled, widths) for a, b in zip(bare, fit.trajectories, strict=True)]
         fit = replace(fit, linears=tuple(linears))
         merit = sum(chi_squared(linear, fit.noise, linear.residual) for linear in linears)
         reduced = mapped(
             lambda linear, trajectory, f=fit: reduce(linear, trajectory, f.noise, f.defects), linears, fit.trajectories
         )
         gram = np.sum([r.gram for r in reduced], axis=0)
-        free = [*range(p + len(names))] if not np.any(c) else [*range(len(parameters))]
+        free = [*range(p + count)] if not np.any(fit.at[p : p + count]) else [*range(len(parameters))]
         some = [*free, len(parameters)]
         step, covariance, expected = common_step(gram[np.ix_(some, some)], [parameters[j] for j in free], fit.at[free])
         full = np.zeros(len(parameters))
         full[free] = step
         if len(free) == len(parameters):
             # a shape moves by a third of itself at most, an order of the spin by less than its line is wide
-            full[-1] = float(np.clip(full[-1], -0.3 * shape, 0.3 * shape))
+            full[p + count :] = np.clip(full[p + count :], -0.3 * shapes, 0.3 * shapes)
             fit = replace(fit, covariance=covariance)
         if round > 2 and fit.merit - merit < 1e-3 * abs(fit.merit - expected) + 0.05 and merit - expected < 0.5:
             break
@@ -244,4 +328,20 @@ def fitted_sensor_law(
             break
         fit = replace(fit, merit=merit, noise=noise_of(fit) if round > 3 else fit.noise)
         fit = whole_step(fit, reduced, full)
-    return scored(Hypothesis(), fit) if np.all(np.isfinite(fit.at)) and fit.covariance.size else None
+    if not np.all(np.isfinite(fit.at)) or not fit.covariance.size or not _are_plays(fit, terms):
+        return None
+    return scored(Hypothesis(), fit)
+
+
+def _are_plays(fit: Fit, terms: Sequence[SensorTerm]) -> bool:
+    """Tell whether every play is one: its coefficient is 1, or no reading tells it from 0."""
+    place = {q.name: j for j, q in enumerate(fit.parameters) if q.group == "term"}
+    for i, term in enumerate(terms):
+        if term.kind != "play":
+            continue
+        for name, j in place.items():
+            if name.startswith(f"{i}.") and name != f"{i}.shape":
+                c, sd = float(fit.at[j]), float(np.sqrt(fit.covariance[j, j]))
+                if abs(c) > _TOLD * sd and not abs(c - 1.0) < max(_PLAY_OFF, _TOLD * sd):
+                    return False
+    return True

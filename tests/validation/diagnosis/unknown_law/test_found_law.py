@@ -16,13 +16,12 @@ from discsim.recording import Recording, Samples
 from discsim.rig import turn_table
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
+from discsim.validation.challenge.cases.hidden_physics import coast, haunted
 from discsim.validation.challenge.cases.off_catalogue import (
     OffCatalogue,
     PowerLawTorque,
     RotatingMagnet,
     Warming,
-    coast,
-    haunted,
 )
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
