@@ -90,6 +90,19 @@ def test_a_law_about_a_sensor_may_repeat_as_the_disc_turns(text, expected):
     assert float(law.evaluate({**STATE, "psi": 7.0})) == pytest.approx(expected, rel=1e-12)
 
 
+def test_what_a_reading_shows_behind_a_play():
+    """It stands still until it has turned by twice the play; up and down again it comes back by that much late."""
+    x = np.concatenate([np.linspace(0.0, 5.0, 51), np.linspace(5.0, -5.0, 101)])
+    law = Law("2 play(x, w) - x", "accelerometer.x_m_s2", {"w": 1.0})
+    shown = 0.5 * (law.evaluate({"x": x}) + x)
+    assert shown[50] == pytest.approx(4.0)
+    # at rest from 5 down to 3, then as far above as it was below before
+    np.testing.assert_allclose(shown[50:71], 4.0, atol=1e-12)
+    np.testing.assert_allclose(shown[71:], x[71:] + 1.0, atol=1e-12)
+    # the same of one number: a play that has not turned yet shows what there is
+    assert float(law.evaluate({"x": 3.0})) == 3.0
+
+
 def test_both_engines_fly_a_law():
     """One second, in which the law takes two metres; RK4 at 1 ms keeps to 1e-5 m."""
     law = Law("c |V|^1.5 |r|^0.5 sign(r)", "force_y_N", {"c": 2e-3})
@@ -131,6 +144,14 @@ def test_both_engines_fly_a_law():
         ("|r|^1e400", "not finite"),
         ("r \x1b[31m", r"cannot read '\\x1b\[31m'"),
         ("r \u202e", r"cannot read '\\u202e'"),
+        ("play(x, 1)", "only in a law about a sensor"),
+        ("play(r, 1)", "found 'r' where x or y or z belongs"),
+        ("play(x, 0)", "a play of 0"),
+        ("play(x, -1)", "unknown '-'"),
+        ("play(x)", r"found '\)' where , belongs"),
+        ("play(x, 1) play(y, 1)", "a second play"),
+        ("r / play(x, 1)", "below a stroke"),
+        ("x play(x, 1)", "a play times a reading"),
     ],
 )
 def test_a_text_that_is_no_law_is_refused_with_the_place(text, expected):

@@ -36,6 +36,14 @@ __all__ = [
 _SHAPE_STEP = 1e-4
 
 
+#: that of a play: where it turns lies between two samples, so that its slope jumps; 3 % is some samples of a turn
+_PLAY_STEP = 0.03
+
+
+#: rounds after which the noise is that which a term leaves; a fit ends in that noise
+_SETTLED = 3
+
+
 #: orders of the spin that are looked at, peaks of the spectrum that are tried
 _ORDERS, _PEAKS = (0.15, 4.0), 3
 
@@ -185,6 +193,10 @@ class SettledTerm:
     coefficients: FloatArray
 
 
+def _shape_step(term: SensorTerm) -> float:
+    return _PLAY_STEP if term.kind == "play" else _SHAPE_STEP
+
+
 def _width(trajectories: Sequence[Trajectory], term: SensorTerm) -> int:
     """Return the number of a term's coefficients."""
     return max(len(_axes(trajectory, term.sensor)) for trajectory in trajectories) * term.size
@@ -200,7 +212,7 @@ def _beside_terms(
             columns.append(np.zeros((linear.raw.size, width)))
             slopes.append(np.zeros(linear.raw.size))
             continue
-        here, h = _columns_of(linear, trajectory, one.term, one.shape), _SHAPE_STEP * one.shape
+        here, h = _columns_of(linear, trajectory, one.term, one.shape), _shape_step(one.term) * one.shape
         above, below = (_columns_of(linear, trajectory, one.term, shape) for shape in (one.shape + h, one.shape - h))
         columns.append(here)
         slopes.append(((above - below) @ one.coefficients) / (2.0 * h))
@@ -294,7 +306,7 @@ def fitted_sensor_law(
         *(Parameter("term", name, 0.0, 1.0) for name in names),
         *(
             Parameter(
-                "term", f"{i}.shape", t.shape, _SHAPE_STEP * t.shape, 0.3 * t.shape if t.kind != "turning" else 0.01
+                "term", f"{i}.shape", t.shape, _shape_step(t) * t.shape, 0.3 * t.shape if t.kind != "turning" else 0.01
             )
             for i, t in enumerate(terms)
         ),
@@ -322,11 +334,11 @@ def fitted_sensor_law(
             # a shape moves by a third of itself at most, an order of the spin by less than its line is wide
             full[p + count :] = np.clip(full[p + count :], -0.3 * shapes, 0.3 * shapes)
             fit = replace(fit, covariance=covariance)
-        if round > 2 and fit.merit - merit < 1e-3 * abs(fit.merit - expected) + 0.05 and merit - expected < 0.5:
+        if round > _SETTLED and fit.merit - merit < 1e-3 * abs(fit.merit - expected) + 0.05 and merit - expected < 0.5:
             break
         if round == 11 or not np.all(np.isfinite(full)):
             break
-        fit = replace(fit, merit=merit, noise=noise_of(fit) if round > 3 else fit.noise)
+        fit = replace(fit, merit=merit, noise=noise_of(fit) if round >= _SETTLED else fit.noise)
         fit = whole_step(fit, reduced, full)
     if not np.all(np.isfinite(fit.at)) or not fit.covariance.size or not _are_plays(fit, terms):
         return None
