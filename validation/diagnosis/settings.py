@@ -156,6 +156,9 @@ class Selection:
     most_with_sensors : int
         The same where all but one of them are errors of sensors: those of a module within its sheet are five of three
         sensors, beside what is hidden.
+    steps_alike : float
+        What is left may be this many times what all further effects would take if each took as much as the last: the
+        largest comes first, and two that are asked for one by one take less than together.
     refitted, refitted_at_most : int
         Candidates that are refitted at a step, near the data and while none comes near: algebra from far away ranks
         many a wrong one before the right one, which was the seventh at worst.
@@ -206,6 +209,7 @@ class Selection:
     no_nearer: float = 0.7
     most_effects: int = 4
     most_with_sensors: int = 8
+    steps_alike: float = 3.0
     refitted: int = 4
     refitted_at_most: int = 9
     pairs_refitted: int = 5

@@ -57,6 +57,7 @@ from discsim.validation.diagnosis.selection.search_state import (
     values_of_fit,
 )
 from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
+from discsim.validation.diagnosis.uninflated_noise import uninflated_noise
 from discsim.validation.identification.competing_effects import CATALOGUED, Competing
 from discsim.validation.identification.gauss_newton import Bars, Fit, merit_of
 from discsim.validation.identification.noise import NoiseModel, estimate_noise, robust_noise, stated_noise
@@ -64,7 +65,7 @@ from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, unmodelled_residuals
 from discsim.validation.identification.stated_parameters import stated_parameters
 
-__all__ = ["screened", "search", "tried_without"]
+__all__ = ["past_hope", "screened", "search", "tried_without"]
 
 Report: TypeAlias = Callable[[str, int, int], None]
 #: what is proposed, the fit whose motion a fit of it starts from, and what choosing lost samples costs
@@ -211,8 +212,22 @@ def _selected_forward(found: Search) -> Search:
         if step >= 1 and far(found, better):
             # two effects and still far from the data: none of these
             return replace(found, final=better)
+        if step >= 1 and past_hope(found, current, better, max(most, SELECTION.most_with_sensors) - step - 1):
+            return replace(found, final=better)
         found = _with_final(found, eliminated_backward(found, better, kept=better.hypothesis.candidates[-1]))
     return found
+
+
+def past_hope(found: Search, before: ContinuousFit, after: ContinuousFit, further: int) -> bool:
+    """Tell whether so many ``further`` effects could not take away what an effect leaves.
+
+    The largest comes first, so each takes about as much as the last at best, in noise that no misfit has inflated.
+    """
+    noise = uninflated_noise(found)
+    was, left = (chi2_in(fitted, noise) - fitted.fit.count for fitted in (before, after))
+    if before.fit.count != after.fit.count or left < (SELECTION.near - 1.0) * after.fit.count:
+        return False
+    return left > SELECTION.steps_alike * further * max(was - left, 0.0)
 
 
 def _without_swallowed(fitted: ContinuousFit) -> ContinuousFit | None:

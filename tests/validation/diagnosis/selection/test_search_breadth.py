@@ -214,3 +214,32 @@ def test_a_centre_of_mass_off_the_disc_is_not_refitted_and_a_sensor_s_unknown_pl
     assert not tried("body.mass_imbalance", "ex_m", -1.1 * radius)
     assert tried("accel.position_offset", "dz_m", 3.0 * radius)
     assert tried("air.wind", "w_north_m_s", 30.0)
+
+
+@pytest.mark.parametrize(
+    ("was", "left", "further", "stops"),
+    [
+        # of a bearing that holds in places of a turn a kick explains next to nothing
+        (2910.7, 2910.2, 6, True),
+        # six equal effects, of which the second is found: each took as much as is left for one
+        (5.0, 4.0, 4, False),
+        # three times as much as six such steps take is left
+        (20.1, 19.1, 6, True),
+        (18.9, 17.9, 6, False),
+        # beside the data the search goes on until nothing is worth its price
+        (1.16, 1.15, 1, False),
+    ],
+)
+def test_the_search_ends_where_all_further_effects_cannot_take_what_is_left(monkeypatch, was, left, further, stops):
+    recordings = coasts(seconds=1.0)
+    fit = Fit(tuple(first_trajectory(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
+    linears = linearised(fit)
+    fit = Fit(fit.trajectories, (), np.empty(0), fit.defects, stated_noise(linears), linears=linears)
+    before, after = ContinuousFit(Hypothesis(), fit, 1e4), ContinuousFit(Hypothesis(), fit, 0.0)
+    found = finding.Search(tuple(recordings), (), fit, fit.noise, tuple(RANKED), before, before, *UNASKED)
+
+    def chi2(fitted: ContinuousFit, noise: object) -> float:
+        return (was if fitted is before else left) * fit.count
+
+    monkeypatch.setattr(searching, "chi2_in", chi2)
+    assert searching.past_hope(found, before, after, further) is stops
