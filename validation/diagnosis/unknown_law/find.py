@@ -286,7 +286,7 @@ def _share(base: Fit, fit: Fit, noise: NoiseModel) -> float:
     """
     white = {group: item._replace(correlation=0.0) for group, item in noise.items()}
     before, after = (sum(chi_squared(linear, white, linear.residual) for linear in one.linears) for one in (base, fit))
-    return (before - after) / max(before - base.count, 1.0)
+    return min((before - after) / max(before - base.count, 1.0), 1.0)
 
 
 def _priced(fitted: ContinuousFit) -> float:
