@@ -36,8 +36,9 @@ def read_limits(path: Path) -> dict[str, Limit]:
 
     A table has ``tolerance`` and, where it is to be another one, ``expected``. Raises `InputError` for anything else.
     """
+    text = read_text(path)
     try:
-        content = tomllib.loads(read_text(path))
+        content = tomllib.loads(text)
     except ValueError as error:
         raise InputError.at(
             path, None, f"no valid TOML: {error}; expected [limits] and lines of name = number"
