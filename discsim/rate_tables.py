@@ -77,8 +77,7 @@ def load_table(name_or_path: str | PathLike[str]) -> RateTable:
     """
     path = shipped_or_path("tables", name_or_path)
     top = read_toml(path)
-    name = top.text("name")
-    assert name is not None
+    name = top.text("name", required=False) or path.stem
     drive = read_drive(top.table("drive"))
     table = RateTable(
         name,

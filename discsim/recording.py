@@ -218,6 +218,8 @@ def read_recording(folder: Path | str) -> Recording:
 def _read_folder(folder: Path) -> Recording:
     if not folder.is_dir():
         raise InputError.at(folder, None, "no such folder; expected a recording (a folder with recording.toml)")
+    if not _there(folder / "recording.toml") and (members := sorted(folder.glob("*/recording.toml"))):
+        raise InputError.at(folder, None, f"is a data set; expected one of its recordings, such as {members[0].parent}")
     top = read_toml(folder / "recording.toml")
     top.text("format", choices=(FORMAT,))
     plant = cast(Plant, top.text("plant", choices=PLANTS))

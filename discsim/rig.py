@@ -42,6 +42,8 @@ PLATEAUS_DEG_S = (0, 300, 600, 1000, 1500, 2000, 2500, 3000, 3500, 4000, 4500, 5
 PARTS = 23
 #: stiffness of the table's speed loop, 1/s: an error of speed dies out within some 10 ms
 SPEED_LOOP = 100.0
+#: header of a profile in degrees, beside that of a recording's command
+_IN_DEGREES = "time_s,rate_deg_s"
 
 
 def default_profile(plateaus_deg_s: Sequence[float] = PLATEAUS_DEG_S, hold: float = 5.0, ramp: float = 1.0) -> Samples:
@@ -65,8 +67,11 @@ def read_profile(path: Path) -> Samples:
         return _within_limits(path, read_shape(path))
     if (path / "recording.toml").is_file():
         return _within_limits(path, measured_profile(read_recording(path)))
-    degrees = read_text(path).partition("\n")[0] == "time_s,rate_deg_s"
-    knots = read_csv(path, "time_s,rate_deg_s" if degrees else COMMAND_HEADER, gaps_allowed=False)
+    first = read_text(path).partition("\n")[0]
+    if first not in (COMMAND_HEADER, _IN_DEGREES):
+        raise InputError.at(path, 1, f"header is '{first[:120]}', expected '{_IN_DEGREES}' or '{COMMAND_HEADER}'")
+    degrees = first == _IN_DEGREES
+    knots = read_csv(path, first, gaps_allowed=False)
     knots = Samples(knots.t, np.radians(knots.value)) if degrees else knots
     if len(knots) < 2:
         raise InputError.at(path, 2, "one knot only; expected at least two")

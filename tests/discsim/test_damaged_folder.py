@@ -37,6 +37,11 @@ def test_a_folder_without_recording_toml_is_refused(flight):
     assert refusal(flight).startswith("recording.toml: no such file; expected")
 
 
+def test_a_data_set_in_the_place_of_a_recording_is_refused(flight, tmp_path):
+    said = refusal(tmp_path)
+    assert said == f": is a data set; expected one of its recordings, such as {flight}"
+
+
 def test_an_empty_recording_toml_is_refused(flight):
     (flight / "recording.toml").write_bytes(b"")
     assert refusal(flight).startswith("recording.toml: missing key 'format'")

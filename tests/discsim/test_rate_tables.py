@@ -273,6 +273,10 @@ class TestFiles:
     def test_a_shipped_table_can_be_read(self, name):
         assert load_table(name).encoder is not None
 
+    def test_a_table_without_a_name_has_that_of_its_file(self, tmp_path):
+        (tmp_path / "bench.toml").write_text("[drive]\nbandwidth_hz = 8\n")
+        assert load_table(tmp_path / "bench.toml").name == "bench"
+
     @pytest.mark.parametrize(
         ("text", "says"),
         [

@@ -312,7 +312,11 @@ class TestProfiles:
     @pytest.mark.parametrize(
         ("text", "line", "message"),
         [
-            ("time_s,rate_rpm\n0,1\n1,2\n", 1, "header is 'time_s,rate_rpm', expected 'time_s,rate_rad_s'"),
+            (
+                "time_s,rate_rpm\n0,1\n1,2\n",
+                1,
+                "header is 'time_s,rate_rpm', expected 'time_s,rate_deg_s' or 'time_s,rate_rad_s'",
+            ),
             ("time_s,rate_deg_s\n0,1\n1,two\n", 3, "rate_deg_s is 'two', expected a finite number"),
             ("time_s,rate_deg_s\n0,1\n1,\n", 3, "a cell is empty"),
             ("time_s,rate_deg_s\n0,1\n0,2\n", 3, "expected ascending time"),

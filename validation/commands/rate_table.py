@@ -80,9 +80,10 @@ def command(
     """Turn a rate table and score every method against the truth.
 
     Writes a recording folder (the module and the table's read-out), truth.csv, methods.csv (each method over the whole
-    run), bands.csv (by rate), plateaus.csv where the profile has some, scores.json, report.html, methods.png (as the
-    paper's Fig. 7) and waveform.png into --out; with the paper's module also the wide-range gyroscope's recording, in
-    adxrs649/. With --recording the emulation's files go into emulation/; comparison.md and comparison.png show both.
+    run), bands.csv (by rate), scores.json, report.html and methods.png (as the paper's Fig. 7) into --out, where the
+    profile has plateaus also plateaus.csv and waveform.png; with the paper's module also the wide-range gyroscope's
+    recording, in adxrs649/. With --recording the emulation's files go into emulation/; comparison.md and comparison.png
+    show both.
 
     Example: discsim rate-table --table workshop --parts mpu9250,adxl375 --radius 0.03 --out rate-table
     """

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -18,6 +18,13 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
+#: seeds that limits are recorded from, where --repeat does not say
+_SEEDS = 5
+
+RepeatOption = Annotated[
+    int | None,
+    typer.Option(min=2, help=f"--record-limits: number of seeds, from --seed on.  [default: {_SEEDS}]"),
+]
 MarginOption = Annotated[
     float | None,
     typer.Option(
@@ -47,7 +54,7 @@ def command(
     record_limits: Annotated[
         Path | None, typer.Option(help="Write such a file, from the spread of this run over --repeat seeds.")
     ] = None,
-    repeat: Annotated[int, typer.Option(min=2, help="--record-limits: number of seeds, from --seed on.")] = 5,
+    repeat: RepeatOption = None,
     margin: MarginOption = None,
     against: Annotated[
         Path | None, typer.Option(help="An earlier run's folder or scores.json: write against.html beside the report.")
@@ -78,7 +85,7 @@ def command(
     mine = [] if recordings is None else read_dataset(recordings)
     # with a disc, parts, throws or profile of one's own the scores scatter otherwise
     shipped = {} if any((disc, model, *names, profile)) else shipped_limits(quick)
-    judging = replace(Judging.read(shipped, limits, against), record=record_limits, seeds=repeat, margin=margin)
+    judging = replace(Judging.read(shipped, limits, against), **_recorded(record_limits, repeat, margin))
     if stated is not None and (stated.effects or stated.laws):
         typer.echo(f"{model}: its effects and laws are passed over; the scores are of its disc")
     inputs = given_files(model, profile, recordings, limits, disc, *names[0], *names[1])
@@ -96,6 +103,13 @@ def _told(done: Validated, out: Path) -> bool:
     within, count = sum(item.ok for item in done.scores), len(done.scores)
     typer.echo(f"{within} of {count} scores within tolerance; report: {out / 'report.html'}")
     return within == count
+
+
+def _recorded(record: Path | None, repeat: int | None, margin: float | None) -> dict[str, Any]:
+    """Return how limits are recorded, as `Judging` has it; raises `InputError` where that is said of none."""
+    if record is None and (repeat, margin) != (None, None):
+        raise InputError("--repeat and --margin say how limits are recorded; expected them with --record-limits FILE")
+    return {"record": record, "seeds": repeat or _SEEDS, "margin": margin}
 
 
 def _check_places(files: Mapping[str, Path | None]) -> None:

@@ -18,7 +18,7 @@ from discsim.validation.experiments.feedback.loop import Loop, close_loop
 from discsim.validation.experiments.recorded import recording_checks
 from discsim.validation.experiments.subject import Subject, shipped_subject
 from discsim.validation.experiments.validation_report import draw_throws, write_validation_report
-from discsim.validation.reporting.limits import Limit, limited, limits_text, read_limits
+from discsim.validation.reporting.limits import Limit, limited, limits_text, read_limits, unguarded
 from discsim.validation.reporting.regression import Change, compare_scores, read_scores, write_regression
 from discsim.validation.reporting.run import Run
 from discsim.validation.reporting.scores import Score, write_junit
@@ -111,6 +111,8 @@ def validate(
 
     if judging.record is not None:
         _record(run, judging, subject, scores)
+    for line in unguarded(scores, judging.limits):
+        run.step(line)
     scores = limited(scores, judging.limits)
     run.step("report")
     run.write_json("scores.json", [item.as_dict() for item in scores])

@@ -56,7 +56,7 @@ def markdown_summary(title: str, scores: Sequence[Score], changes: Sequence[Chan
 
 def _table(scores: Sequence[Score]) -> list[str]:
     rows = [
-        f"| {_cell(item.name)} | {item.value:.5g} {item.unit} | {item.expected:g} | {item.tolerance:g} | "
+        f"| {_cell(item.name)} | {item.shown} | {item.expected:g} | {item.tolerance:g} | "
         f"{'ok' if item.ok else '**FAIL**'} |"
         for item in scores
     ]

@@ -14,7 +14,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.text import Text
+from matplotlib.textpath import text_to_path
 from matplotlib.ticker import LogFormatter, NullLocator
 
 from discsim.arrays import FloatArray
@@ -23,7 +25,17 @@ from discsim.estimators.spin_spline import IndexArray
 from discsim.files import write_bytes
 from discsim.validation.reporting.drawn_values import KEY, drawn_values
 
-__all__ = ["COLOURS", "STYLE", "colour", "draw_differences", "draw_rates", "new_figure", "save_figure", "symmetric_log"]
+__all__ = [
+    "COLOURS",
+    "STYLE",
+    "colour",
+    "draw_differences",
+    "draw_rates",
+    "legend_columns",
+    "new_figure",
+    "save_figure",
+    "symmetric_log",
+]
 
 #: One colour per method wherever it is drawn: Okabe and Ito's, which colour-blind readers can tell apart.
 COLOURS: Mapping[str, str] = MappingProxyType(
@@ -87,6 +99,18 @@ def new_figure(
     _BEGUN.add(figure)
     FigureCanvasAgg(figure)
     return figure, figure.subplots(rows, columns, **options)
+
+
+def legend_columns(labels: Sequence[str], width: float, fontsize: float) -> int:
+    """Return how many columns of a legend fit into a width (inches), one at least; the font is in points.
+
+    A legend that is wider than its figure leaves the axes no room.
+    """
+    font = FontProperties(size=fontsize)
+    widest = max((text_to_path.get_text_width_height_descent(label, font, False)[0] for label in labels), default=0.0)
+    beside = mpl.rcParams["legend.handlelength"] + mpl.rcParams["legend.handletextpad"]
+    column = widest + fontsize * (beside + mpl.rcParams["legend.columnspacing"])
+    return max(1, min(len(labels), int(72.0 * width / column)))
 
 
 def save_figure(figure: Figure, path: Path | None) -> Figure:

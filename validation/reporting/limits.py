@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,7 +16,7 @@ from discsim.errors import InputError
 from discsim.files import model_file, model_names, read_text
 from discsim.validation.reporting.scores import Score, score
 
-__all__ = ["Limit", "limited", "limits_text", "margin", "read_limits", "shipped_limits"]
+__all__ = ["Limit", "limited", "limits_text", "margin", "read_limits", "shipped_limits", "unguarded"]
 
 #: a limit is to hold this share of all further runs, and that with this confidence: of 25 scores of a run that draw
 #: random numbers one in 400 runs then fails by chance
@@ -36,8 +37,9 @@ def read_limits(path: Path) -> dict[str, Limit]:
 
     A table has ``tolerance`` and, where it is to be another one, ``expected``. Raises `InputError` for anything else.
     """
+    text = read_text(path)
     try:
-        content = tomllib.loads(read_text(path))
+        content = tomllib.loads(text)
     except ValueError as error:
         raise InputError.at(
             path, None, f"no valid TOML: {error}; expected [limits] and lines of name = number"
@@ -80,8 +82,20 @@ def limited(scores: Sequence[Score], limits: Mapping[str, Limit]) -> list[Score]
         expected = item.expected if limit.expected is None else limit.expected
         judged.append(score(item.name, item.value, item.unit, expected, limit.tolerance))
     names = {item.name for item in scores}
-    unguarded = [(name, limit) for name, limit in limits.items() if name not in names]
-    return judged + [score(name, np.nan, "", limit.expected or 0.0, limit.tolerance) for name, limit in unguarded]
+    lost = [(name, limit) for name, limit in limits.items() if name not in names]
+    return judged + [score(name, np.nan, "", limit.expected or 0.0, limit.tolerance) for name, limit in lost]
+
+
+def unguarded(scores: Sequence[Score], limits: Mapping[str, Limit]) -> list[str]:
+    """Return a line for each limit that no score is held against, with the score that may be meant."""
+    names = [item.name for item in scores]
+    lines = []
+    for name in limits:
+        if name not in names:
+            near = get_close_matches(name, names, n=1)
+            hint = f"; did you mean '{near[0]}'?" if near else ""
+            lines.append(f"a limit of '{name}', which is no score of this run{hint}")
+    return lines
 
 
 def margin(count: int) -> float:

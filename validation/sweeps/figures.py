@@ -27,6 +27,12 @@ __all__ = ["draw_axes", "draw_installation", "draw_sweep"]
 SHOWN = 300
 #: a mount counts as read where this share of its estimates is known
 READ = 0.5
+#: below this share of known estimates a point says so: a method that is silent where it is hard errs no more
+TOLD = 0.75
+#: panels of axes in a row, at most
+BESIDE = 3
+#: values of an axis that span so many times the least are drawn on a logarithmic one
+WIDE = 10.0
 
 
 def draw_sweep(result: xr.Dataset, sweep: Sweep, path: Path | None = None) -> Figure:
@@ -158,10 +164,15 @@ def draw_axes(result: xr.Dataset, path: Path | None = None) -> Figure:
         if name not in ("estimator", "mount") and (name == "segment" or result.sizes[name] > 1)
     ]
     names = [name for name in names if name != "segment" or result.sizes["segment"] > 1 or len(names) == 1]
-    figure, panels = new_figure(1, len(names), width=max(6.0, 4.5 * len(names)), height=4.2, squeeze=False)
-    for axes, name in zip(panels[0], names, strict=True):
+    columns = min(len(names), BESIDE)
+    rows = -(-len(names) // columns)
+    figure, panels = new_figure(rows, columns, width=max(6.0, 4.5 * columns), height=4.2 * rows, squeeze=False)
+    for axes, name in zip(panels.flat, names, strict=False):
         _along(axes, result, name)
-    panels[0, 0].set_ylabel("rms error of the rate (deg/s)")
+    for axes in panels.flat[len(names) :]:
+        figure.delaxes(axes)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("rms error of the rate (deg/s)")
     panels[0, 0].legend(fontsize=8)
     panels[0, 0].set_title(f"{result.attrs['title']}: median, 5 to 95 % over all else")
     return save_figure(figure, path)
@@ -179,8 +190,18 @@ def _along(axes: Axes, result: xr.Dataset, name: str) -> None:
         shade = colour(estimator, methods)
         axes.fill_between(x, low, high, color=shade, alpha=0.2, lw=0)
         axes.plot(x, middle, "o-", ms=4, color=shade, label=estimator + ("" if known.any() else " (unknown)"))
+        share = result.known.sel(estimator=estimator).transpose(name, ...).values.reshape(len(x), -1)
+        for at, error, told in zip(x[known], middle[known], share[known], strict=True):
+            if (mean := float(np.nanmean(told))) < TOLD:
+                side = "left" if at == x.min() else "right" if at == x.max() else "center"
+                text, place = f"{100 * mean:.0f} % known", (0, 6)
+                axes.annotate(text, (at, error), place, textcoords="offset points", ha=side, fontsize=7)
     axes.set_yscale("log")
     _plain_decades(axes)
+    if labels is None and x.min() > 0.0 and x.max() >= WIDE * x.min():
+        axes.set_xscale("log")
+        axes.set_xticks(x, [f"{value:g}" for value in x])
+        axes.xaxis.set_minor_locator(NullLocator())
     if labels is not None:
         axes.set_xticks(x, labels, rotation=20, ha="right")
     axes.set_xlabel("mean true rate (deg/s)" if name == "segment" else name)

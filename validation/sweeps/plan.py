@@ -145,6 +145,9 @@ class Plan:
                 id, name = key.rsplit(".", 1)
                 if (row(id).acts_on == "motion") == moving:
                     sizes.setdefault(id, {})[name] = size
+        if "magnet_m" in settings and not moving:
+            iron = sizes.setdefault("mag.hard_iron", {})
+            iron["bx_uT"] = iron.get("bx_uT", 0.0) + dipole_field(settings["magnet_A_m2"], settings["magnet_m"])
         return tuple(effect(id, **parameters) for id, parameters in sizes.items())
 
     def scored(self, estimator: str) -> NDArray[np.int64]:
@@ -191,6 +194,11 @@ def _dipped(magnetic_field: FloatArray, dip_deg: float) -> FloatArray:
     return readonly([level * np.cos(declination), level * np.sin(declination), size * np.sin(dip)])
 
 
+def dipole_field(moment: float, distance: float) -> float:
+    """Return the field, uT, of a dipole (A m^2) on its axis at a distance (m): mu0/(4 pi) 2 m/d^3."""
+    return 0.2 * moment / distance**3
+
+
 # ------------------------------------------------------------------------------------------------------ reading
 
 
@@ -234,6 +242,8 @@ _KINDS: Mapping[str, _Kind] = MappingProxyType(
         "accelerometer_hz": _Kind(BOTH, False, lowest=1.0, highest=1e5),
         "magnetometer_hz": _Kind(BOTH, False, lowest=1.0, highest=1e5),
         "mount_hz": _Kind(BOTH, False, lowest=1.0, highest=1e5),
+        "magnet_m": _Kind(BOTH, False, lowest=1e-3, highest=10.0),
+        "magnet_A_m2": _Kind(BOTH, False, lowest=-100.0, highest=100.0),
         "noise_ratio": _Kind(BOTH, False, lowest=0.0, highest=1e6),
     }
 )
@@ -264,7 +274,10 @@ def read_plan(path: Path, *, count: int | None = None, seed: int | None = None) 
     plant, profile, duration = _read_truth(_need(top, "truth"))
     files: dict[str, str] = {}
     axes = _read_axes(top.table("axes"), plant, path.parent, files)
-    if any(axis.name == "profile" for axis in axes):
+    named = {axis.name for axis in axes}
+    if len(named & {"magnet_m", "magnet_A_m2"}) == 1:
+        raise top.error("axes", "a magnet needs both axes.magnet_m (its distance) and axes.magnet_A_m2 (its moment)")
+    if "profile" in named:
         if profile is not None:
             raise top.error("truth.rates_deg_s", "truth.rates_deg_s and the axis 'profile' both give a profile")
     elif plant == "rate_table" and profile is None:
@@ -296,12 +309,13 @@ def _check_case(plan: Plan, case: Case, path: Path) -> None:
     """Refuse a combination that cannot be measured before anything is flown."""
     try:
         module = plan.instruments(case)
-        for id in {key.rsplit(".", 1)[0] for key in case.settings if "." in key}:
-            kind = row(id)
+        upon_sensors = plan.effects(case.settings, moving=False)
+        for one in (*upon_sensors, *plan.effects(case.settings, moving=True)):
+            kind = row(one.id)
             if not kind.acts_with(module.sensors):
-                raise InputError(f"{id}: there is no {kind.acts_on} among the parts, only {', '.join(module.sensors)}")
-        module.with_effects(plan.effects(case.settings, moving=False))
-        plan.effects(case.settings, moving=True)
+                given = ", ".join(module.sensors)
+                raise InputError(f"{one.id}: there is no {kind.acts_on} among the parts, only {given}")
+        module.with_effects(upon_sensors)
         for name in plan.estimators:
             absent = () if name == "best" else tuple(s for s in METHODS[name].sensors if s not in module.sensors)
             if absent:

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from discsim.validation.reporting.figures import COLOURS, new_figure, save_figure
+from discsim.validation.reporting.figures import COLOURS, legend_columns, new_figure, save_figure
 from discsim.validation.yaw_damping.compared import Compared
 from discsim.validation.yaw_damping.observations import Throw
 from discsim.validation.yaw_damping.output_error import Fit
@@ -18,6 +18,8 @@ from discsim.validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S, 
 __all__ = ["draw_fit", "draw_sources", "draw_surface", "draw_surface_on"]
 
 _SHADES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#6a3d9a", "#8c6d31")
+#: throws that are named beside a figure, at most: beyond the shades twice over a colour tells none of them
+_NAMED = 2 * len(_SHADES)
 
 
 def draw_fit(throws: Sequence[Throw], fit: Fit, paper: PaperTable, path: Path | None = None) -> Figure:
@@ -46,8 +48,10 @@ def draw_fit(throws: Sequence[Throw], fit: Fit, paper: PaperTable, path: Path | 
     left.axhline(0, color=COLOURS["truth"], lw=0.6)
     path_left.set(title="GPS velocity less the model's, size", xlabel="time (s)", ylabel="difference (m/s)")
     path_left.set_ylim(bottom=0)
-    if any(throw.path_t.size for throw in throws):
-        path_left.legend(fontsize=8, ncols=min(len(throws), 6), loc="upper right")
+    if any(throw.path_t.size for throw in throws) and len(throws) <= _NAMED:
+        handles, labels = path_left.get_legend_handles_labels()
+        columns = legend_columns(labels, figure.get_figwidth(), 8.0)
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=8)
     return save_figure(figure, path)
 
 

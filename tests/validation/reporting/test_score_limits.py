@@ -12,7 +12,16 @@ import pytest
 from discsim.errors import InputError
 from discsim.files import model_file
 from discsim.validation.reporting.ci import github_commands, markdown_summary
-from discsim.validation.reporting.limits import SHARE, Limit, limited, limits_text, margin, read_limits, shipped_limits
+from discsim.validation.reporting.limits import (
+    SHARE,
+    Limit,
+    limited,
+    limits_text,
+    margin,
+    read_limits,
+    shipped_limits,
+    unguarded,
+)
 from discsim.validation.reporting.regression import compare_scores, read_scores, write_regression
 from discsim.validation.reporting.run import json_text
 from discsim.validation.reporting.scores import Score, at_most, score
@@ -39,9 +48,12 @@ class TestLimits:
         assert limited([NOISE, ERROR], {ERROR.name: Limit(1.0)})[0] == NOISE
 
     def test_a_limit_of_no_score_fails_by_its_name(self):
-        *same, lost = limited([NOISE, ERROR], {"throws: worst eror": Limit(1.0)})
-        assert same == [NOISE, ERROR]
+        misspelt = {ERROR.name: Limit(1.0), "throws: worst eror": Limit(1.0)}
+        *same, lost = limited([NOISE, ERROR], misspelt)
+        assert [item.name for item in same] == [NOISE.name, ERROR.name]
         assert (lost.name, lost.ok) == ("throws: worst eror", False)
+        (line,) = unguarded([NOISE, ERROR], misspelt)
+        assert line == f"a limit of 'throws: worst eror', which is no score of this run; did you mean '{ERROR.name}'?"
 
     @pytest.mark.parametrize(
         "text",

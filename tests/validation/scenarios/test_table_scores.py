@@ -23,7 +23,7 @@ from discsim.recording import Samples, read_recording, write_recording
 from discsim.rig import read_profile, turn_table
 from discsim.sensors import Instruments, record
 from discsim.validation.cli import main
-from discsim.validation.experiments.table_recording import compare, lines_through, read_run
+from discsim.validation.experiments.table_recording import compare, differences, lines_through, read_run
 from discsim.validation.scenarios.rate_table import Bench, plateaus, rate_table_checks, run_rate_table, with_all_methods
 from discsim.validation.scenarios.table_scores import delay_of, score_rates
 
@@ -182,6 +182,13 @@ class TestMeasuredRun:
         assert found.sentences(Path()) == [
             "The emulation errs as the measured run does: what is stated of the sensors explains it."
         ]
+
+    @pytest.mark.parametrize(("bias", "told_of"), [(1e-9, 0), (1e-3, 2)])
+    def test_what_prints_as_nothing_is_no_difference(self, bias, told_of):
+        """Sensors without noise: biases differ by rounding, which is many standard deviations. Two bands."""
+        rates = {"gyroscope": told(bias=bias)}
+        one, other = (score_rates({"gyroscope": rate}, truth, (0.0, 8.0)) for rate in (rates["gyroscope"], told()))
+        assert len(differences(one, other, rates)) == told_of
 
     def test_lines_through_a_log_leave_no_more_than_its_scatter(self, measured):
         log = read_run(measured).profile

@@ -392,3 +392,35 @@ class TestALooseMount:
     def test_a_mount_that_cannot_hold_the_module_is_refused(self):
         with pytest.raises(InputError, match="tears off"):
             stretched(np.array([100.0]), 15.0)
+
+
+class TestAMagnet:
+    PLAN = SMALL.replace("radius_m = [0.01, 0.02]", "magnet_m = [0.03, 0.1, 0.3]\nmagnet_A_m2 = 0.05")
+
+    def test_it_adds_its_field_to_that_of_the_iron_and_falls_with_the_cube_of_its_distance(self, tmp_path):
+        text = self.PLAN.replace("[mounts]", '[axes.effect]\n"mag.hard_iron.bx_uT" = [2.0]\n[mounts]')
+        plan = plan_of(tmp_path, text)
+        added = [plan.effects(case.settings, moving=False)[0].value.bx_uT - 2.0 for case in plan.cases]
+        # 1e-7 * 2 m/d^3 T; by Biot and Savart a loop of radius a and moment m has 2e-7 m/(d^2 + a^2)^1.5 on its axis
+        loop = [1e6 * 2e-7 * 0.05 / (d**2 + 1e-8) ** 1.5 for d in (0.03, 0.1, 0.3)]
+        np.testing.assert_allclose(added, loop, rtol=1e-4)
+        assert plan.effects(plan.cases[0].settings, moving=True) == ()
+
+    def test_the_nearest_silences_the_magnetometer_and_the_figure_says_so(self, tmp_path):
+        text = self.PLAN.replace("drawn = true", "").replace("rates_deg_s = [1200, 2600]", "rates_deg_s = [1000, 2600]")
+        done, result = swept(plan_of(tmp_path, text))
+        known = result.known.sel(estimator="fft").mean(("mount", "segment", "magnet_A_m2")).values
+        assert known[0] < 0.75 < known[1]
+        error = result.rms_deg_s.sel(estimator="fft").isel(segment=0).mean(("mount", "magnet_A_m2")).values
+        assert error[1] > error[2]
+        figure = draw_sweep(result, done)
+        said = [text.get_text() for axes in figure.axes for text in axes.texts]
+        assert any("% known" in text for text in said)
+        assert figure.axes[0].get_xscale() == "log"
+
+    def test_a_distance_without_a_moment_is_refused_and_so_is_a_magnet_by_no_magnetometer(self, tmp_path):
+        with pytest.raises(InputError, match="needs both"):
+            plan_of(tmp_path, self.PLAN.replace("magnet_A_m2 = 0.05", ""))
+        alone = self.PLAN.replace("magnet_A_m2 = 0.05", 'magnet_A_m2 = 0.05\nparts = ["adxl375"]')
+        with pytest.raises(InputError, match="no magnetometer among the parts"):
+            plan_of(tmp_path, alone.replace("fft = 2\n", ""))

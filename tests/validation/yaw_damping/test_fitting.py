@@ -22,6 +22,7 @@ from discsim.validation.scenarios.throws import FULL_SET
 from discsim.validation.yaw_damping import fit_yaw_damping, observe, paper_table
 from discsim.validation.yaw_damping.bias import paper_biases
 from discsim.validation.yaw_damping.compared import SOURCES
+from discsim.validation.yaw_damping.figures import draw_fit
 from discsim.validation.yaw_damping.fitted import notes
 from discsim.validation.yaw_damping.observations import SHARED_S, Throw, misplaced
 from discsim.validation.yaw_damping.paper_table import RATES_DEG_S, SPEEDS_M_S, damping_by_26, table_csv
@@ -296,6 +297,24 @@ class TestPaperTable:
         assert len(lines) == 1 + 51 * 35
         assert lines[1].startswith("4500,6,-")
         assert lines[-1].startswith("7000,23,-")
+
+
+def test_many_throws_with_long_names_leave_the_panels_their_room(throws, fit):
+    """A legend in one row that is wider than the figure would push them aside."""
+    named = [
+        replace(
+            throw, recording=replace(throw.recording, name=f"{throw.recording.name}, 24 m/s to 180 deg, 4200 deg/s")
+        )
+        for throw in throws * 4
+    ]
+    figure = draw_fit(named, replace(fit, throws=fit.throws * 4), paper_table(named))
+    figure.draw_without_rendering()
+    widths = [axes.get_position().width for axes in figure.axes]
+    assert widths == pytest.approx([0.4, 0.4, 0.9], abs=0.06)
+    (legend,) = figure.legends
+    assert len(legend.get_texts()) == 8
+    drawn = legend.get_window_extent()
+    assert 0.0 <= drawn.x0 < drawn.x1 <= figure.bbox.width
 
 
 class TestWhiteness:
