@@ -156,6 +156,16 @@ class TestOutputError:
         assert found.path_scale == pytest.approx(path_scale, rel=2e-3)
         assert found.spin_scale > 2 * found.path_scale > 5
 
+    def test_two_fixes_leave_four_numbers_to_tell_the_scale_of_the_path_by(self, throws, fit):
+        """Twelve readings less eight; a tenth of a reading more would be 1.2 %, the noise as stated makes 0.3 %."""
+        throw = throws[0]
+        first_and_last = {"path_t": throw.path_t[[0, -1]], "path": throw.path[[0, -1]]}
+        boasting = replace(throw, path_sd=throw.path_sd[[0, -1]] / 10, **first_and_last)
+        found = fit_yaw_damping([boasting], [fit.throws[0].state])
+        left = found.throws[0].path_z
+        assert left.size == 12
+        assert found.path_scale == pytest.approx(np.sqrt(np.sum(left**2) / 4), rel=6e-3)
+
     def test_the_stated_release_takes_the_place_of_a_missing_gps(self, recordings):
         sigma = {"velocity_ned_m_s": 0.3, "roll_rad": 0.03, "pitch_rad": 0.03}
         stated = FULL_SET[0].release
