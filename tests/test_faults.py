@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import resource
@@ -15,6 +16,7 @@ import sys
 import tempfile
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -22,6 +24,9 @@ from faults.harness import COMMANDS, content, disturbed, doubled, prepare, run
 
 from discsim.errors import InputError
 from discsim.files import write_text
+from discsim.validation.challenge.cases.conceal import Answer
+from discsim.validation.challenge.scores.result import Scored
+from discsim.validation.challenge.scores.scoring import score_case
 from discsim.validation.reporting.run import start_run
 from discsim.validation.reporting.written import alone_in
 
@@ -52,6 +57,19 @@ def test_a_run_that_is_killed_or_interrupted_anywhere_is_made_good_by_the_next(u
 def test_of_two_runs_into_one_folder_one_is_refused_or_follows_the_other(undisturbed, tmp_path):
     _, words, whole, _ = undisturbed
     assert not list(doubled(words, whole, tmp_path / "twice"))
+
+
+def test_two_results_of_a_challenge_that_differ_in_times_alone_count_as_the_same(tmp_path):
+    """How long a diagnosis took, by the clock and of the processor, no two runs share; what it said they do."""
+    answer = Answer(5, "spin_down", "off_catalogue", "unexplained", law="a torque")
+    case = Scored(answer, None, score_case(answer, None), None, 1.0, "0" * 64, cpu_seconds=0.5)
+    other = replace(case, seconds=2.0, cpu_seconds=1.5)
+    left = []
+    for number, one in enumerate((case, other, replace(other, error="killed"))):
+        (tmp_path / f"{number}").mkdir()
+        (tmp_path / f"{number}" / "challenge.json").write_text(json.dumps({"cases": [one.to_json()]}))
+        left.append(content(tmp_path / f"{number}"))
+    assert left[0] == left[1] != left[2]
 
 
 @pytest.mark.parametrize("largest", [1000, 3000, 9000])

@@ -54,6 +54,14 @@ def test_the_workflow_runs_ci_and_the_same_tests():
     assert '- run: bash -c "$(.ci/readme-line pytest)"\n' in workflow
 
 
+def test_the_lowest_versions_are_those_of_all_that_the_package_uses_and_of_no_tool():
+    done = subprocess.run([sys.executable, ROOT / ".ci" / "lowest"], capture_output=True, text=True, check=True)
+    used = [*PROJECT["project"]["dependencies"]]
+    for extra in set(PROJECT["project"]["optional-dependencies"]) - {"test", "docs", "dev"}:
+        used += PROJECT["project"]["optional-dependencies"][extra]
+    assert sorted(done.stdout.splitlines()) == sorted(re.sub(r">=([\d.]+).*", r"==\1", line) for line in used)
+
+
 def test_the_wheel_holds_every_package_and_the_models():
     wheel = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
     packages = sorted(path.parent.name for path in ROOT.glob("*/__init__.py") if path.parent.name != "tests")

@@ -228,7 +228,7 @@ def _symmetric(s: FloatArray) -> FloatArray:
     return np.array([[s[0], s[1], s[2]], [s[1], s[3], s[4]], [s[2], s[4], s[5]]])
 
 
-@dataclass
+@dataclass(frozen=True)
 class Linear:
     """The problem about its current point: data information, its right side, and the prior beside the roughness."""
 

@@ -118,7 +118,7 @@ def _without_times(told: Any) -> Any:
     if isinstance(told, list):
         return [_without_times(one) for one in told]
     if isinstance(told, dict):
-        return {key: _without_times(one) for key, one in told.items() if key != "seconds"}
+        return {key: _without_times(one) for key, one in told.items() if key not in ("seconds", "cpu_seconds")}
     return told
 
 

@@ -20,6 +20,7 @@ from discsim.sensors import Accelerometer, Gyroscope, Instruments, Magnetometer,
 from discsim.sensors.sampling import Noise, Sampling
 from discsim.validation.diagnosis.setup import find_setup_faults
 from discsim.validation.reporting.figures import colour, new_figure, save_figure, symmetric_log
+from discsim.validation.reporting.markdown import literal
 from discsim.validation.scenarios.rate_table import (
     Plateau,
     RateTableRun,
@@ -166,7 +167,7 @@ class Comparison:
             ]
             rows.append(f"| {one.method} | " + " | ".join(f"{a} | {b}" for a, b in zip(*pairs, strict=True)) + " |")
         return [
-            f"# {self.real.recording.name or 'The run'}, measured and emulated",
+            f"# {literal(self.real.recording.name) or 'The run'}, measured and emulated",
             "",
             "Errors of the spin rate in deg/s against the rate reference (measured) and truth (emulated), delay in ms.",
             "",
@@ -174,7 +175,7 @@ class Comparison:
             "|---|---|---|---|---|---|---|---|---|",
             *rows,
             "",
-            *self.sentences(out),
+            *map(literal, self.sentences(out)),
             "",
         ]
 

@@ -107,8 +107,11 @@ class Fit:
 
 def mapped(function: Callable[..., Any], *arguments: Sequence[Any]) -> list[Any]:
     """Map over recordings, on as many threads as there are cores, each with the call's `numpy.errstate`."""
+    asked = list(zip(*arguments, strict=True))
+    if len(asked) == 1:  # begun and ended a thousand times a diagnosis, a pool would cost more than it serves
+        return [copy_context().run(function, *asked[0])]
     with ThreadPoolExecutor(THREADS) as pool:
-        tasks = [pool.submit(copy_context().run, function, *each) for each in zip(*arguments, strict=True)]
+        tasks = [pool.submit(copy_context().run, function, *each) for each in asked]
         return [task.result() for task in tasks]
 
 

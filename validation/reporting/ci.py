@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from discsim.validation.reporting.markdown import literal
 from discsim.validation.reporting.regression import Change
 from discsim.validation.reporting.scores import Score
 
@@ -56,7 +57,7 @@ def markdown_summary(title: str, scores: Sequence[Score], changes: Sequence[Chan
 
 def _table(scores: Sequence[Score]) -> list[str]:
     rows = [
-        f"| {_cell(item.name)} | {item.shown} | {item.expected:g} | {item.tolerance:g} | "
+        f"| {literal(item.name)} | {literal(item.shown)} | {item.expected:g} | {item.tolerance:g} | "
         f"{'ok' if item.ok else '**FAIL**'} |"
         for item in scores
     ]
@@ -66,8 +67,4 @@ def _table(scores: Sequence[Score]) -> list[str]:
 def _changed(change: Change) -> str:
     values = ["–" if item is None else f"{item.value:.5g}" for item in (change.before, change.after)]
     moved = f"{change.in_tolerances:+.2f}" if np.isfinite(change.in_tolerances) else "–"
-    return f"| {_cell(change.name)} | {' | '.join(values)} | {moved} | {change.verdict} |"
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|")
+    return f"| {literal(change.name)} | {' | '.join(values)} | {moved} | {change.verdict} |"

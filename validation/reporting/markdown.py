@@ -11,11 +11,13 @@ from typing import Any
 
 from discsim.files import write_text
 
-__all__ = ["page_text", "span", "table", "wrapped", "write_page"]
+__all__ = ["literal", "page_text", "span", "table", "wrapped", "write_page"]
 
 _WIDTH = 118
 #: what begins a line that stays as it is: a heading, a table, a picture, a tag
 _AS_IT_IS = ("#", "|", "![", "<")
+#: what begins an element, a link, a code or a cell of a table
+_MARKS = re.compile(r"([\\`*<\[\]|])")
 
 
 def write_page(path: Path, template: Path, **content: Any) -> None:
@@ -54,6 +56,11 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return the lines of a table; a cell stays on its line, and in its column whatever stands in it."""
     cells = ([" ".join(cell.split()).replace("|", "\\|") for cell in row] for row in rows)
     return "\n".join(f"| {' | '.join(line)} |" for line in (header, ["---"] * len(header), *cells))
+
+
+def literal(text: str) -> str:
+    """Return a name of somebody else's for a page in Markdown: on one line, and every character as it is."""
+    return _MARKS.sub(r"\\\1", " ".join(text.split()).replace("&", "&amp;"))
 
 
 def wrapped(text: str) -> str:

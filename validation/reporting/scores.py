@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
+from discsim.errors import printable
 from discsim.files import write_bytes
 
 __all__ = ["Score", "at_most", "score", "write_junit"]
@@ -47,7 +48,7 @@ class Score:
         """One line for a log."""
         verdict = "ok  " if self.ok else "FAIL"
         value = f"{self.value:.6g}" + ("" if self.unit in ("", "1") else f" {self.unit}")
-        return f"{verdict} {self.name}: {value} (expected {self.goal})".replace("±", "+-")
+        return printable(f"{verdict} {self.name}: {value} (expected {self.goal})".replace("±", "+-"))
 
 
 def score(name: str, value: float, unit: str, expected: float, tolerance: float) -> Score:
@@ -73,7 +74,7 @@ def write_junit(path: Path, scores: Sequence[Score], duration_s: float, *, suite
         time=f"{duration_s:.3f}",
     )
     for item in scores:
-        group, _, name = item.name.partition(": ")
+        group, _, name = printable(item.name).partition(": ")
         case = ElementTree.SubElement(tests, "testcase", classname=f"discsim.{group}", name=name or group, time="0")
         if not item.ok:
             failure = ElementTree.SubElement(case, "failure", message=item.text, type="OutsideTolerance")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import csv
+import io
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -14,6 +16,7 @@ from discsim.arrays import FloatArray, readonly
 from discsim.files import write_text
 from discsim.shipped import load_disc, load_throw
 from discsim.trajectory import predict
+from discsim.validation.reporting.markdown import literal
 from discsim.validation.scenarios.throws import rms
 
 if TYPE_CHECKING:
@@ -26,8 +29,10 @@ __all__ = [
     "Row",
     "carried_on",
     "cases_of",
+    "csv_text",
     "described",
     "landing_of",
+    "named_table",
     "rows_of",
     "write_rows",
 ]
@@ -172,12 +177,24 @@ def write_rows(folder: Path, rows: list[Row]) -> None:
     names = list(rows[0].place)
     head = [*names, "estimator", "rate_deg_s", "mounts", "read", "mean_percent", "rms_percent", "95_percent_below"]
     head += ["CNr_rms_percent", "landing_rms_m"]
-    table = []
+    lines = []
     for row in rows:
         rate = "all" if np.isnan(row.rate_deg_s) else f"{row.rate_deg_s:.6g}"
         cells = [*map(str, row.place.values()), row.estimator, rate, str(row.mounts), f"{row.read:.3g}"]
         figures = (row.mean, row.rms, row.most, row.CNr_percent, row.landing_m)
-        table.append([*cells, *("" if np.isnan(x) else f"{x:.3g}" for x in figures)])
-    write_text(folder / "cases.csv", "\n".join([",".join(head), *(",".join(cells) for cells in table), ""]))
-    lines = [head, ["---"] * len(head), *table]
-    write_text(folder / "cases.md", "\n".join([*("| " + " | ".join(cells) + " |" for cells in lines), ""]))
+        lines.append([*cells, *("" if np.isnan(x) else f"{x:.3g}" for x in figures)])
+    write_text(folder / "cases.csv", csv_text([head, *lines]))
+    write_text(folder / "cases.md", named_table(head, lines) + "\n")
+
+
+def csv_text(lines: Iterable[Sequence[str]]) -> str:
+    """Return lines of cells as CSV; a cell with a comma, a quote or an end of line in it stands in quotes."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(lines)
+    return text.getvalue()
+
+
+def named_table(head: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
+    """Return a table in Markdown whose cells may hold names that somebody else gave."""
+    cells = [[literal(cell) for cell in line] for line in lines]
+    return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *cells))

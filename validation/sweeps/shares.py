@@ -12,7 +12,7 @@ from scipy.stats import sobol_indices
 from discsim.arrays import FloatArray
 from discsim.files import write_text
 from discsim.validation.reporting.figures import new_figure, save_figure
-from discsim.validation.sweeps.cases import cases_of, described
+from discsim.validation.sweeps.cases import cases_of, csv_text, described
 from discsim.validation.sweeps.chunks import Sweep
 from discsim.validation.sweeps.mounts import MOUNT_FIELDS
 
@@ -91,12 +91,12 @@ def _indices(blocks: FloatArray) -> FloatArray | None:
 def write_shares(path: Path, shares: list[Share]) -> None:
     """Write the shares as CSV: a row for each case, estimator, rate and source."""
     names = list(shares[0].place)
-    lines = [",".join([*names, "estimator,rate_deg_s,source,first_order,total_order,total_low,total_high"])]
+    lines = [[*names, "estimator", "rate_deg_s", "source", "first_order", "total_order", "total_low", "total_high"]]
     for share in shares:
         figures = (share.first, share.total, share.low, share.high)
         cells = [*map(str, share.place.values()), share.estimator, f"{share.rate_deg_s:.6g}", share.source]
-        lines.append(",".join([*cells, *(f"{x:.4f}" for x in figures)]))
-    write_text(path, "\n".join([*lines, ""]))
+        lines.append([*cells, *(f"{x:.4f}" for x in figures)])
+    write_text(path, csv_text(lines))
 
 
 def draw_shares(shares: list[Share], path: Path) -> None:

@@ -11,7 +11,7 @@ from scipy.stats import qmc
 from discsim.arrays import FloatArray
 from discsim.files import write_text
 from discsim.validation.reporting.figures import new_figure, save_figure
-from discsim.validation.sweeps.cases import READ, cases_of, described
+from discsim.validation.sweeps.cases import READ, cases_of, csv_text, described, named_table
 from discsim.validation.sweeps.chunks import Sweep
 
 if TYPE_CHECKING:
@@ -152,12 +152,9 @@ def write_tolerances(folder: Path, found: list[Tolerance], below: float) -> None
         rows.append(
             [*map(str, one.place.values()), one.estimator, f"{one.rate_deg_s:.6g}", f"{100 * one.perfect:.3g}", *cells]
         )
-    write_text(folder / "tolerances.csv", "\n".join([",".join(head), *(",".join(row) for row in rows), ""]))
-    lines = [head, ["---"] * len(head), *rows]
+    write_text(folder / "tolerances.csv", csv_text([head, *rows]))
     what = f"Half-widths within which {100 * SHARE:g} % of mounts err by less than {100 * below:g} % of the rate."
-    page = [what, ""]
-    page += ["| " + " | ".join(cells) + " |" for cells in lines]
-    write_text(folder / "tolerances.md", "\n".join([*page, ""]))
+    write_text(folder / "tolerances.md", f"{what}\n\n{named_table(head, rows)}\n")
 
 
 def sentences_of(found: list[Tolerance], below: float) -> list[str]:
