@@ -66,6 +66,28 @@ def test_a_scale_that_clipping_and_slow_noise_hide_is_found():
     assert named["gyro.scale"]["sz"].value == pytest.approx(0.017, abs=5e-4)
 
 
+def test_two_plateaus_tell_three_errors_of_a_module_of_which_two_lead_near_but_not_to_the_data():
+    faults = (
+        effect("gyro.scale", sz=-0.0296),
+        effect("gyro.bias", bx_rad_s=-0.0485, by_rad_s=0.065, bz_rad_s=0.045),
+        effect("accel.position_offset", dx_m=0.0012),
+    )
+    profile = default_profile((1000, 3000), hold=3.0)
+    motion = turn_table(profile, Environment(), yaw=0.3)
+    module = Instruments.from_parts("mpu9250", "ac1120s").with_effects(faults)
+    short = record(motion, module, np.random.default_rng(3), plant="rate_table", name="run", command=profile)
+    found = diagnose([[short]], ["bench"]).diagnosis
+    assert found.verdict == "explained"
+    named = {one.id: one for one in found.effects}
+    # a place nearer the axis and a smaller scale are one to an accelerometer that only ever feels the spin
+    (third,) = named.keys() - {"gyro.scale", "gyro.bias"}
+    assert third in {"accel.position_offset", "accel.scale"}
+    if third == "accel.scale":
+        assert "accel.position_offset" in {rival.id for rival in named[third].confused_with}
+    assert named["gyro.scale"].parameters["sz"].value == pytest.approx(-0.0296, abs=5e-4)
+    assert found.final.chi2_per_sample == pytest.approx(1.0, abs=0.1)
+
+
 def test_a_mismatch_is_told_in_noise_that_it_has_not_inflated():
     """The relaxed fit does not follow a strong ripple: what it leaves of the rate reference is no noise of it."""
     found = screened([run()])

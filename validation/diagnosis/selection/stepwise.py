@@ -209,7 +209,7 @@ def _selected_forward(found: Search) -> Search:
         if again is not None:
             # it was not the effect that gained, but where its fit had started
             return replace(found, final=again, base=again if step == 0 else found.base)
-        if step >= 1 and far(found, better):
+        if step >= 1 and far(found, better) and not _nearing(found, current, better):
             # two effects and still far from the data: none of these
             return replace(found, final=better)
         if step >= 1 and past_hope(found, current, better, max(most, SELECTION.most_with_sensors) - step - 1):
@@ -292,6 +292,15 @@ def _wobbles(fit: Fit) -> Start:
     """
     parameters = zip(fit.parameters, fit.at, strict=True)
     return {(q.key, q.recordings): float(v) for q, v in parameters if q.key in fit.plant.own_keys}
+
+
+def _nearing(found: Search, before: ContinuousFit, after: ContinuousFit) -> bool:
+    """Tell whether a further error of sensors, on none but such, leads much nearer to the data: a module has several.
+
+    What acts on the motion is another matter: a stack of effects upon it stands for what is none of them.
+    """
+    of_sensors = all(candidate.row.acts_on != "motion" for candidate in after.hypothesis.candidates)
+    return of_sensors and not no_nearer(found, before, after)
 
 
 def _told(fitted: ContinuousFit | None) -> bool:
