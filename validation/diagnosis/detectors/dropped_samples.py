@@ -162,6 +162,8 @@ def dropped_accelerometer(
     id = catalogued(DroppedSamples, sensor).id
     if sensor not in {r.sensor for trajectory in fit.trajectories for r in trajectory.readings}:
         return []
+    if sensor not in noise:  # all of its readings are beyond its range, and none takes part
+        return []
     if any(candidate.id == id for candidate in taken):
         return []
     sd = _stated_sd(fit, sensor, noise)
