@@ -11,10 +11,8 @@ and `accelerometer` is told how large it may be.
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import os
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,8 +21,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "benchmarks")]
 
+from estimator_throws import random_throw  # noqa: E402
 from support.spinning_sensor import move, record  # noqa: E402
 
 from discsim.estimators import AccelerometerErrors, Options, YawRate, estimate  # noqa: E402
@@ -62,17 +61,6 @@ ROWS: tuple[tuple[str, tuple[str, ...], str, float], ...] = (
 )
 
 
-def drawn_throw() -> Callable[..., tuple]:  # type: ignore[type-arg]
-    """Return the draw of benchmarks/estimators.py, a file that has the name of a package."""
-    spec = importlib.util.spec_from_file_location("estimator_benchmark", ROOT / "benchmarks" / "estimators.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module.random_throw  # type: ignore[no-any-return]
-
-
 def only(recording: Recording, sensors: tuple[str, ...]) -> Recording:
     """Return a recording with some of its sensors."""
     return Recording(
@@ -86,7 +74,7 @@ def only(recording: Recording, sensors: tuple[str, ...]) -> Recording:
 
 def table(throws: int) -> list[str]:
     """Return the lines of the table."""
-    rng, random_throw = np.random.default_rng(12), drawn_throw()
+    rng = np.random.default_rng(12)
     errors: list[list[np.ndarray]] = [[] for _ in ROWS]  # type: ignore[type-arg]
     scaled: list[list[np.ndarray]] = [[] for _ in ROWS]  # type: ignore[type-arg]
     shares: list[list[float]] = [[] for _ in ROWS]
