@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discsim.arrays import FloatArray, readonly
-from discsim.effects.catalogue import Effect, effect, row
-from discsim.effects.sensors import PositionOffset
+from discsim.effects.catalogue import Effect, catalogued, effect, row
+from discsim.effects.sensors import HardIron, PositionOffset
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.estimators.methods import METHODS
@@ -29,6 +29,9 @@ from discsim.toml_table import TomlTable, read_toml
 from discsim.validation.sweeps.mounts import MOUNT_FIELDS, MountDesign
 
 __all__ = ["Axis", "Case", "Plan", "plan_file", "read_plan"]
+
+#: what a magnet at the sensor is
+_IRON = catalogued(HardIron).id
 
 #: values of one result, beyond which a plan is refused: netCDF-3 holds 2 GiB in one array of 8-byte numbers
 LARGEST = 2**28 - 1
@@ -146,7 +149,7 @@ class Plan:
                 if (row(id).acts_on == "motion") == moving:
                     sizes.setdefault(id, {})[name] = size
         if "magnet_m" in settings and not moving:
-            iron = sizes.setdefault("mag.hard_iron", {})
+            iron = sizes.setdefault(_IRON, {})
             iron["bx_uT"] = iron.get("bx_uT", 0.0) + dipole_field(settings["magnet_A_m2"], settings["magnet_m"])
         return tuple(effect(id, **parameters) for id, parameters in sizes.items())
 

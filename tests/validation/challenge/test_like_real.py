@@ -207,16 +207,18 @@ def told(case: Case) -> str:
 
 
 def test_the_seeds_of_all_other_kinds_draw_what_they_drew_before_this_kind_came():
-    """The digest was taken of the code as it was before."""
-    kinds = ("nothing", "noise", "within_sigma", "beyond_sigma", "one", "two", "off_catalogue", "setup")
+    """The digest was taken of the code as it was before; of no catalogue more kinds of physics are drawn since."""
+    kinds = ("nothing", "noise", "within_sigma", "beyond_sigma", "one", "two", "setup")
     masks = ("short", "second_effect", "clipped", "coloured_noise")
     named = ("clock.lost_rows", "clock.late_rows", "mag.own_clock", "mag.average", "gyro.mount")
     cases = [draw_case(seed) for seed in range(40)]
     cases += [draw_case(seed, kind=kind) for kind in kinds for seed in range(40, 46)]
     cases += [draw_case(seed, mask=mask) for mask in masks for seed in range(50, 54)]
     cases += [draw_case(seed, "free_spin", [id]) for seed, id in enumerate(named)]
-    digest = hashlib.sha256("\n".join(map(told, cases)).encode()).hexdigest()
-    assert digest == "1f46d2178cc1af79927ebb412bd59c656b411d057215d2f164eb00bbef63ec96"
+    listed = [case for case in cases if case.kind != "off_catalogue"]
+    assert len(listed) == 91
+    digest = hashlib.sha256("\n".join(map(told, listed)).encode()).hexdigest()
+    assert digest == "de5ad8a02b749ed55476abd0caa4e715fb5f3419b16bfea381cf26ed97d11568"
 
 
 # ---------------------------------------------------------------------------------------------- answers and scores
