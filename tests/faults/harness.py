@@ -137,7 +137,7 @@ def disturbed(
     if status not in (0, 1, -kill, 130):
         yield f"{when}: exit status {status}: {heard.read_text()[-300:]}"
     if kill == signal.SIGINT and "Traceback" in heard.read_text():
-        yield f"{when}: a traceback"
+        yield f"{when}: a traceback: {heard.read_text()[-600:]}"
     for name, bytes_ in content(out).items() if out.exists() else ():
         hidden = any(part.startswith(".") for part in Path(name).parts)
         if not hidden and bytes_ != whole.get(name):
