@@ -185,7 +185,7 @@ def find_law(
         return None
     fitted, term = found
     if isinstance(term, SensorTerm):
-        law = _believed(*_more_sensor_terms(start, own, own_at, fitted, term), base, at, start.noise)
+        law = _believed(*_more_sensor_terms(start, own, own_at, fitted, term, about), base, at, start.noise)
     else:
         law = _believed(*_more_terms(start, own, own_at, fitted, term, at), base, at, start.noise)
     if law is None or (instead and _priced(law.fitted) + SELECTION.entry > best.score):
@@ -232,7 +232,12 @@ def _more_terms(
 
 
 def _more_sensor_terms(
-    start: Fit, own: Sequence[Parameter], own_at: FloatArray, fitted: ContinuousFit, first: SensorTerm
+    start: Fit,
+    own: Sequence[Parameter],
+    own_at: FloatArray,
+    fitted: ContinuousFit,
+    first: SensorTerm,
+    library: Sequence[SensorTerm],
 ) -> tuple[ContinuousFit, tuple[SensorTerm, ...]]:
     """Return the fit of a law about a sensor with one more term where the first leaves more than noise, and its terms.
 
@@ -242,7 +247,7 @@ def _more_sensor_terms(
     if len(start.trajectories) < 2 or not unmodelled_residuals(fitted.fit.linears, fitted.residuals, fitted.fit.noise):
         return fitted, terms
     settled = settled_terms(fitted, terms)
-    others = further_sensor_terms(start, own, settled)
+    others = further_sensor_terms(library, settled)
     gains = asked_of_sensors(start, own, others, settled)
     ranked = sorted(((gain, 0.0, term) for gain, term in zip(gains, others, strict=True)), key=lambda item: -item[0])
     best = fitted

@@ -35,9 +35,7 @@ def as_sensor_laws(terms: Sequence[SensorTerm], fit: Fit, heldout: float | None)
     strongest = max(max(part.chi2 for part in mine) for mine in parts.values())
     laws = []
     for target, mine in sorted(parts.items(), key=lambda item: -max(part.chi2 for part in item[1])):
-        kept = [part for part in mine if part.chi2 > min(significant, strongest)] or [
-            part for part in mine if part.chi2 == strongest
-        ]
+        kept = [part for part in mine if part.chi2 > significant or part.chi2 == strongest]
         if not kept:
             continue
         coefficients: dict[str, ParameterValue] = {}

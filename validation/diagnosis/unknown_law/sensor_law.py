@@ -186,10 +186,9 @@ def sensor_library(fit: Fit) -> list[SensorTerm]:
 
 @dataclass(frozen=True)
 class SettledTerm:
-    """A term with its shape and its coefficients (axes size,)."""
+    """A term of the shape that a fit gave it, with its coefficients (axes size,)."""
 
     term: SensorTerm
-    shape: float
     coefficients: FloatArray
 
 
@@ -212,8 +211,8 @@ def _beside_terms(
             columns.append(np.zeros((linear.raw.size, width)))
             slopes.append(np.zeros(linear.raw.size))
             continue
-        here, h = _columns_of(linear, trajectory, one.term, one.shape), _shape_step(one.term) * one.shape
-        above, below = (_columns_of(linear, trajectory, one.term, shape) for shape in (one.shape + h, one.shape - h))
+        shape, h = one.term.shape, _shape_step(one.term) * one.term.shape
+        here, above, below = (_columns_of(linear, trajectory, one.term, x) for x in (shape, shape + h, shape - h))
         columns.append(here)
         slopes.append(((above - below) @ one.coefficients) / (2.0 * h))
         less += here @ one.coefficients
@@ -259,20 +258,14 @@ def asked_of_sensors(
     return [base - equations.solve([*taken, *free(place)]).chi2 for place in places]
 
 
-def further_sensor_terms(start: Fit, own: Sequence[Parameter], settled: Sequence[SettledTerm]) -> list[SensorTerm]:
+def further_sensor_terms(library: Sequence[SensorTerm], settled: Sequence[SettledTerm]) -> list[SensorTerm]:
     """Return the terms that may stand beside settled ones: of another sensor or another kind, or of another order."""
-    there = {(one.term.sensor, one.term.kind) for one in settled}
-    terms = [t for t in sensor_library(start) if t.kind == "turning" or (t.sensor, t.kind) not in there]
-    return [
-        term
-        for term in terms
-        if not any(
-            one.term.kind == term.kind == "turning"
-            and one.term.sensor == term.sensor
-            and abs(one.shape - term.shape) < _SAME_ORDER
-            for one in settled
-        )
-    ]
+
+    def one_of(term: SensorTerm, known: SensorTerm) -> bool:
+        alike = (term.sensor, term.kind) == (known.sensor, known.kind)
+        return alike and (term.kind != "turning" or abs(term.shape - known.shape) < _SAME_ORDER)
+
+    return [term for term in library if not any(one_of(term, one.term) for one in settled)]
 
 
 def settled_terms(fitted: ContinuousFit, terms: Sequence[SensorTerm]) -> tuple[SettledTerm, ...]:
@@ -281,7 +274,6 @@ def settled_terms(fitted: ContinuousFit, terms: Sequence[SensorTerm]) -> tuple[S
     return tuple(
         SettledTerm(
             replace(term, shape=values[f"{i}.shape"]),
-            values[f"{i}.shape"],
             np.array([v for name, v in values.items() if name.startswith(f"{i}.") and name != f"{i}.shape"]),
         )
         for i, term in enumerate(terms)
@@ -317,7 +309,8 @@ def fitted_sensor_law(
     for round in range(12):
         bare = linearised(replace(fit, parameters=tuple(own), at=fit.at[:p]))
         shapes, parts = fit.at[p + count :], np.split(fit.at[p : p + count], np.cumsum(widths)[:-1])
-        settled = [SettledTerm(*one) for one in zip(terms, shapes.tolist(), parts, strict=True)]
+        here = zip(terms, shapes.tolist(), parts, strict=True)
+        settled = [SettledTerm(replace(term, shape=shape), c) for term, shape, c in here]
         linears = [_beside_terms(a, b, settled, widths) for a, b in zip(bare, fit.trajectories, strict=True)]
         fit = replace(fit, linears=tuple(linears))
         merit = sum(chi_squared(linear, fit.noise, linear.residual) for linear in linears)
