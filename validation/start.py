@@ -5,13 +5,17 @@ Takes nothing; ends the process with the command's exit status, 130 for an inter
 
 from __future__ import annotations
 
+import _thread
 import os
 import signal
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-__all__ = ["loading", "main"]
+__all__ = ["heard_anywhere", "loading", "main"]
+
+_AGAIN_S = 0.01  # after which a swallowed interrupt comes again: by then what swallowed it is over, and nobody waits
 
 
 def main() -> None:
@@ -19,7 +23,8 @@ def main() -> None:
     try:
         with loading():
             from discsim.validation.cli import main as run
-        run()
+        with heard_anywhere():
+            run()
     except KeyboardInterrupt:
         _end()
 
@@ -41,6 +46,27 @@ def loading() -> Iterator[None]:
     finally:
         if heard:
             signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@contextmanager
+def heard_anywhere() -> Iterator[None]:
+    """Raise an interrupt again that fell where Python drops errors, with a traceback and nothing more.
+
+    Such places are what it calls when an object ends. The collection of garbage after large figures is a long one.
+    """
+    before = sys.unraisablehook
+
+    def told(error: sys.UnraisableHookArgs) -> None:
+        if isinstance(error.exc_value, KeyboardInterrupt):
+            threading.Timer(_AGAIN_S, _thread.interrupt_main).start()  # raised here it would be dropped as well
+        else:
+            before(error)
+
+    sys.unraisablehook = told
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
 
 
 def _end(*_: object) -> None:

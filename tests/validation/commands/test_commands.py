@@ -97,6 +97,26 @@ def test_an_interrupt_while_python_still_loads_is_one_line(tmp_path, module):
     assert script == "discsim.validation.start:main"
 
 
+def test_an_interrupt_where_python_drops_errors_is_heard_all_the_same():
+    """One that fell into a collection of garbage was told by a traceback, and the command went on to its end."""
+    code = """
+import signal, time, weakref
+from discsim.validation.start import heard_anywhere
+class Figure: pass
+with heard_anywhere():
+    figure = Figure()
+    end = weakref.ref(figure, lambda _: signal.raise_signal(signal.SIGINT))
+    try:
+        del figure
+        time.sleep(20)
+        print("ran on")
+    except KeyboardInterrupt:
+        print("heard")
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr, done.stdout) == (0, "", "heard\n")
+
+
 def test_a_flight_leaves_a_recording_and_its_truth_which_ends_on_the_ground(monkeypatch, tmp_path, capsys):
     out = tmp_path / "flight"
     assert run(monkeypatch, "fly", "--out", str(out), "--seed", "3") == 0
