@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from discsim.effects.own import UserEffect
 from discsim.recording import Recording
 from discsim.validation.diagnosis.assemble import outcome_of
@@ -28,6 +30,8 @@ from discsim.validation.identification.stated_parameters import stated_parameter
 __all__ = ["diagnose"]
 
 
+# far from the data a motion may run beyond all numbers, in a search and in what is told of its answer
+@np.errstate(over="ignore", invalid="ignore")
 def diagnose(
     datasets: Sequence[Sequence[Recording]],
     names: Sequence[str],

@@ -74,6 +74,17 @@ def test_a_fit_sees_the_field_as_means_of_two_samples_at_their_times():
         assert {len(own) for own in after.samples.values()} == {len(own) for own in before.samples.values()}
 
 
+def test_rows_at_the_ends_take_no_part_in_a_fit():
+    """Nothing beyond them holds a flexible motion: it follows them wherever they are counted, and a fit was bent."""
+    for timed, used in zip(counted().timed(logged()), counted().applied(logged()), strict=True):
+        for sensor, own in used.samples.items():
+            before, left = timed.samples[sensor].value, np.isfinite(own.value).all(axis=1)
+            some = slice(5, -5) if sensor in ("magnetometer", "gyroscope") else slice(None)
+            assert np.array_equal(own.value[some], before[some], equal_nan=True)
+            assert np.count_nonzero(left) == np.count_nonzero(np.isfinite(before[some]).all(axis=1))
+            assert np.array_equal(own.t, timed.samples[sensor].t)
+
+
 def test_a_fit_may_scale_all_times_and_what_was_counted_follows_it():
     found = counted()
     scale, offset = found.free
