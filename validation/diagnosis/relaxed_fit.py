@@ -15,6 +15,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray, sd_by_median
 from discsim.effects.catalogue import CATALOGUE, Effect, catalogued
+from discsim.effects.catalogue import effect as made
 from discsim.effects.sensors import ClockRate
 from discsim.effects.setup import TimeOffset
 from discsim.frames import conjugate, multiply
@@ -36,6 +37,7 @@ from discsim.validation.identification.sensor_model import delay
 
 __all__ = [
     "beginning",
+    "clock_of_accelerometer",
     "first_trajectory",
     "from_other_initial_states",
     "relaxed",
@@ -279,6 +281,11 @@ _LED = {sensor: (catalogued(ClockRate, sensor).id, "ratio") for sensor in ("acce
 #: clocks that are tried on a motion that the other sensors tell
 _CLOCKS_STEP = 1e-4
 _CLOCKS_TRIED = 1.0 + _CLOCKS_STEP * np.arange(-300, 301)
+#: clocks that are tried by the corners of a rig's rate, within what a free clock may be: a second wide, they move by a
+#: hundredth of that in half a minute
+_CORNERS_TRIED = 1.0 + 5e-4 * np.arange(-60, 61)
+#: a clock that leaves less than this share is tried, and named only if its fit is the best: a bar low enough for 3 s
+_WORTH_TRYING = 0.5
 #: clocks this far apart at a recording's end, rad, lie in one valley, and no more than so many are passed over
 _ALIKE, _FEW_CLOCKS = 0.5, 20
 
@@ -335,6 +342,35 @@ def _with_own_clock(fit: Fit) -> Fit:
     timed = replace(fit, parameters=(*fit.parameters, free), at=np.append(fit.at, ratio))
     timed = refit(timed, iterations=8, tolerance=1e-4 * fit.count)
     return timed if _misfit(timed, sensor) < RELAXED_FIT.reconciled * before else fit
+
+
+def clock_of_accelerometer(fit: Fit) -> Effect | None:
+    """Return the clock by which the accelerometer on a rig follows the motion that others tell; None without need.
+
+    A rig's rate changes at corners, which a clock that is off by a per cent moves by a third of a second: from there no
+    slope leads to it.
+    """
+    sensor = "accelerometer"
+    clock = _LED[sensor]
+    if fit.plant.airborne or not _misfit(fit, sensor) > RELAXED_FIT.lost:
+        return None
+
+    def misfit(ratio: float) -> float:
+        return sum(
+            _misfit_at(one, told, {**_ideal(fit.values(i), sensor), clock: ratio}, sensor)
+            for i, one in enumerate(fit.trajectories)
+            for told in one.readings
+            if told.sensor == sensor
+        )
+
+    found = {ratio: misfit(ratio) for ratio in _CORNERS_TRIED.tolist()}
+    best = min(found, key=lambda ratio: found[ratio])
+    return made(clock[0], ratio=best) if found[best] < _WORTH_TRYING * found[1.0] else None
+
+
+def _ideal(values: Values, sensor: str) -> Values:
+    """Return a fit's values without a sensor's own errors: beside a wrong clock they stand for what it does."""
+    return {key: v for key, v in values.items() if key[0] not in CATALOGUE or CATALOGUE[key[0]].acts_on != sensor}
 
 
 def _misfit(fit: Fit, sensor: str) -> float:

@@ -1,4 +1,4 @@
-"""A gyroscope on a rig whose clock is so far off that its readings would pass for slow noise."""
+"""A gyroscope or an accelerometer on a rig whose clock is so far off that its readings would pass for slow noise."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from support.made import tables
 
 from discsim.effects import effect
 from discsim.recording import Recording
-from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.relaxed_fit import clock_of_accelerometer, relaxed
 from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.identification.stated_parameters import stated_parameters
 
@@ -38,3 +38,30 @@ def test_it_is_named_alone():
     assert [candidate.id for candidate in final.hypothesis.candidates] == ["gyro.clock_rate"]
     place = [q.key for q in final.fit.parameters].index(KEY)
     assert final.fit.at[place] == pytest.approx(1.017, abs=3e-4)
+
+
+def told(recordings: list[Recording]) -> float | None:
+    """Return the accelerometer's clock that the corners of a rig's rate tell, None where they tell none."""
+    found = clock_of_accelerometer(relaxed(recordings, stated_parameters(recordings)))
+    return None if found is None else float(found.value.ratio)
+
+
+def test_corners_tell_the_clock_of_an_accelerometer():
+    assert told(tables(errors=[effect("accel.clock_rate", ratio=1.017)])) == pytest.approx(1.017, abs=6e-4)
+
+
+@pytest.mark.parametrize(
+    "error", [[], [effect("accel.scale", sx=0.03, sy=0.0, sz=0.0)], [effect("accel.lag", tau_s=0.2)]]
+)
+def test_corners_tell_no_clock_where_there_is_none(error):
+    assert told(tables(errors=error)) is None
+
+
+def test_the_clock_of_an_accelerometer_is_named_beside_a_bias():
+    """Offsets in time, one recording's own clock and a bias came first, and nothing explained the rest."""
+    errors = [
+        effect("accel.clock_rate", ratio=1.0168),
+        effect("gyro.bias", bx_rad_s=0.0046, by_rad_s=0.0014, bz_rad_s=-0.0002),
+    ]
+    final = search(tables(errors=errors)).final
+    assert {candidate.id for candidate in final.hypothesis.candidates} == {"accel.clock_rate", "gyro.bias"}

@@ -21,7 +21,7 @@ from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.followed import true_noise
 from discsim.validation.diagnosis.detectors.all import searched
 from discsim.validation.diagnosis.detectors.dropped_samples import PhaseLosses, Shifted
-from discsim.validation.diagnosis.relaxed_fit import relaxed, unknowns, without_outliers
+from discsim.validation.diagnosis.relaxed_fit import clock_of_accelerometer, relaxed, unknowns, without_outliers
 from discsim.validation.diagnosis.selection.all_at_once import all_at_once
 from discsim.validation.diagnosis.selection.candidates import (
     CandidateEffect,
@@ -129,6 +129,8 @@ def screened(
     equations = normal_equations_of(relaxed_fit, candidates, asked_in, relaxed_fit.continuous_defects)
     report("fitting the baseline", 2, 4)
     base = _baseline(relaxed_fit, equations, own, noise)
+    told = clock_of_accelerometer(relaxed_fit)
+    hints = hints if told is None else (*hints, told)
     asked = tuple(hinted(hint) for hint in hints if any(candidate.id == hint.id for candidate in candidates))
     asked += pictured_from_above(recordings, candidates)
     stated = tuple(as_stated or recordings)
@@ -337,7 +339,7 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
     # far from the data the two are asked in different noise: what they gain does not compare
     there, here = ([offer for offer in some if on_the_disc(found, offer[0].start)] for some in (there, here))
     worth = in_turn(there, here) if distant and step > 0 else in_turn([*there, *here])
-    if distant:
+    if distant or not found.relaxed_fit.plant.airborne:
         present = {candidate.id for candidate in current.hypothesis.candidates}
         worth = [*((hint, found.relaxed_fit, 0.0) for hint in found.hints if hint.candidate.id not in present), *worth]
     return found, worth
