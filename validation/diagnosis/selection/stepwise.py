@@ -372,11 +372,14 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
         # beside the data it must gain half its price, as algebra said it would; where other readings take part that
         # cannot be seen
         beside = np.inf if cost else merit_now - 0.5 * price(screened.candidate)
+        told = not distant and any(screened is hint for hint in found.hints)
+        if told:
+            beside = np.inf
         refitted = continuous_fit(
             fit,
             current.hypothesis.plus(screened.candidate),
             found.own,
-            noise if distant else current.fit.noise,
+            noise if distant else _noise_asked_in(current, screened.candidate, told=told),
             {**values_of_fit(current), **screened.start, **_wobbles(fit)},
             bars=_hopeless(best_chi2, current.fit.count) if distant else Bars(beside),
         )
@@ -398,6 +401,15 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
     if cost > 0:
         found = replace(found, relaxed_fit=replace(found.relaxed_fit, trajectories=fit.trajectories))
     return replace(found, cost=found.cost + cost), best
+
+
+def _noise_asked_in(current: ContinuousFit, candidate: CandidateEffect, *, told: bool) -> NoiseModel:
+    """Return the noise in which an effect is fitted beside the data; stated noise of its sensor where it was told.
+
+    What was told before any fit is so large that the noise estimated without it has swallowed it.
+    """
+    own, stated = candidate.row.acts_on, stated_noise(current.fit.linears)
+    return {**current.fit.noise, own: stated[own]} if told and own in stated else current.fit.noise
 
 
 def _hopeless(best: float, count: int) -> Bars:
