@@ -339,9 +339,9 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
     # far from the data the two are asked in different noise: what they gain does not compare
     there, here = ([offer for offer in some if on_the_disc(found, offer[0].start)] for some in (there, here))
     worth = in_turn(there, here) if distant and step > 0 else in_turn([*there, *here])
-    if distant or not found.relaxed_fit.plant.airborne:
-        present = {candidate.id for candidate in current.hypothesis.candidates}
-        worth = [*((hint, found.relaxed_fit, 0.0) for hint in found.hints if hint.candidate.id not in present), *worth]
+    present = {candidate.id for candidate in current.hypothesis.candidates}
+    told = [hint for hint in found.hints if hint.candidate.id not in present and (distant or _swallowed(current, hint))]
+    worth = [*((hint, found.relaxed_fit, 0.0) for hint in told), *worth]
     return found, worth
 
 
@@ -401,6 +401,14 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
     if cost > 0:
         found = replace(found, relaxed_fit=replace(found.relaxed_fit, trajectories=fit.trajectories))
     return replace(found, cost=found.cost + cost), best
+
+
+def _swallowed(current: ContinuousFit, hint: ScreenedCandidate) -> bool:
+    """Tell whether a sensor's noise on a rig is so loud that it has swallowed what was told of it before any fit."""
+    own, stated = hint.candidate.row.acts_on, stated_noise(current.fit.linears)
+    if current.fit.plant.airborne or own not in stated:
+        return False
+    return current.fit.noise[own].sd > RESIDUAL_TESTS.loud * stated[own].sd
 
 
 def _noise_asked_in(current: ContinuousFit, candidate: CandidateEffect, *, told: bool) -> NoiseModel:
