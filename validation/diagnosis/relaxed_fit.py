@@ -8,7 +8,7 @@ that decide are nearly linear.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -355,14 +355,8 @@ def clock_of_accelerometer(fit: Fit) -> Effect | None:
     if fit.plant.airborne or not _misfit(fit, sensor) > RELAXED_FIT.lost:
         return None
 
-    def misfit(ratio: float) -> float:
-        return sum(
-            _misfit_at(one, told, {**_ideal(fit.values(i), sensor), clock: ratio}, sensor)
-            for i, one in enumerate(fit.trajectories)
-            for told in one.readings
-            if told.sensor == sensor
-        )
-
+    values = [_ideal(fit.values(i), sensor) for i in range(len(fit.trajectories))]
+    misfit = _misfit_by(fit.trajectories, [one.readings for one in fit.trajectories], values, sensor, clock)
     found = {ratio: misfit(ratio) for ratio in _CORNERS_TRIED.tolist()}
     best = min(found, key=lambda ratio: found[ratio])
     return made(clock[0], ratio=best) if found[best] < _WORTH_TRYING * found[1.0] else None
@@ -411,18 +405,25 @@ def _clock_read(led: Fit, readings: Sequence[Sequence[Readings]], sensor: str, c
     )
     apart = int(np.clip(_ALIKE / max(turned * _CLOCKS_STEP, 1e-9), 1, _FEW_CLOCKS))
 
-    def misfit(ratio: float) -> float:
-        return sum(
-            _misfit_at(one, told, {**led.values(i), clock: ratio}, sensor)
-            for i, (one, own) in enumerate(zip(led.trajectories, readings, strict=True))
-            for told in own
-            if told.sensor == sensor
-        )
-
+    values = [led.values(i) for i in range(len(led.trajectories))]
+    misfit = _misfit_by(led.trajectories, readings, values, sensor, clock)
     rough = _CLOCKS_TRIED[::apart]
     best = apart * int(np.argmin([misfit(float(ratio)) for ratio in rough]))
     near = _CLOCKS_TRIED[max(best - apart, 0) : best + apart + 1]
     return float(near[int(np.argmin([misfit(float(ratio)) for ratio in near]))])
+
+
+def _misfit_by(
+    motions: Sequence[Trajectory],
+    readings: Sequence[Sequence[Readings]],
+    values: Sequence[Values],
+    sensor: str,
+    clock: tuple[str, str],
+) -> Callable[[float], float]:
+    """Return how far a sensor's readings are from motions under their values, as a function of its clock."""
+    every = zip(motions, values, readings, strict=True)
+    own = [(one, at, told) for one, at, some in every for told in some if told.sensor == sensor]
+    return lambda ratio: sum(_misfit_at(one, told, {**at, clock: ratio}, sensor) for one, at, told in own)
 
 
 def _misfit_at(one: Trajectory, told: Readings, values: Values, sensor: str) -> float:

@@ -371,15 +371,14 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
             cost = -screened.gain
         # beside the data it must gain half its price, as algebra said it would; where other readings take part that
         # cannot be seen
-        beside = np.inf if cost else merit_now - 0.5 * price(screened.candidate)
         told = not distant and any(screened is hint for hint in found.hints)
-        if told:
-            beside = np.inf
+        beside = np.inf if cost or told else merit_now - 0.5 * price(screened.candidate)
+        beside_noise = _with_stated(current, screened) if told else current.fit.noise
         refitted = continuous_fit(
             fit,
             current.hypothesis.plus(screened.candidate),
             found.own,
-            noise if distant else _noise_asked_in(current, screened.candidate, told=told),
+            noise if distant else beside_noise,
             {**values_of_fit(current), **screened.start, **_wobbles(fit)},
             bars=_hopeless(best_chi2, current.fit.count) if distant else Bars(beside),
         )
@@ -411,13 +410,10 @@ def _swallowed(current: ContinuousFit, hint: ScreenedCandidate) -> bool:
     return current.fit.noise[own].sd > RESIDUAL_TESTS.loud * stated[own].sd
 
 
-def _noise_asked_in(current: ContinuousFit, candidate: CandidateEffect, *, told: bool) -> NoiseModel:
-    """Return the noise in which an effect is fitted beside the data; stated noise of its sensor where it was told.
-
-    What was told before any fit is so large that the noise estimated without it has swallowed it.
-    """
-    own, stated = candidate.row.acts_on, stated_noise(current.fit.linears)
-    return {**current.fit.noise, own: stated[own]} if told and own in stated else current.fit.noise
+def _with_stated(current: ContinuousFit, hint: ScreenedCandidate) -> NoiseModel:
+    """Return a fit's noise with the stated one of the sensor whose own has swallowed what was told of it."""
+    own = hint.candidate.row.acts_on
+    return {**current.fit.noise, own: stated_noise(current.fit.linears)[own]}
 
 
 def _hopeless(best: float, count: int) -> Bars:
