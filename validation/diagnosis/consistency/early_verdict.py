@@ -23,6 +23,7 @@ from discsim.effects.sensors import Lag
 from discsim.recording import SENSORS, Recording
 from discsim.validation.diagnosis.consistency.followed import left_of, left_when_shifted, left_when_turned, true_noise
 from discsim.validation.diagnosis.consistency.spin_rates import RatesApart, rates_apart
+from discsim.validation.diagnosis.detectors.dropped_samples import loses_samples
 from discsim.validation.diagnosis.detectors.speed_ripple import ripple
 from discsim.validation.diagnosis.relaxed_fit import (
     beginning,
@@ -188,7 +189,7 @@ def contradiction_in(recordings: Sequence[Recording], known: Sequence[Parameter]
             continue
         if _reconciled(recordings, look, sensor) or _follows_lagging(recordings, known, sensors, sensor):
             return None
-        if _turned(recordings, look, sensor):
+        if _turned(recordings, look, sensor) or _loses(recordings, look, sensor):
             return None
         if _pulses(recordings, whole, sensor):
             return None
@@ -241,6 +242,25 @@ def _turned(recordings: Sequence[Recording], look: Look, sensor: str) -> bool:
             before, after = left_when_turned(trajectory, look.fit.values(i), readings, true_noise([readings]))
             told.append(after <= max(CONSISTENCY.reconciled, CONSISTENCY.left_of_turn * before))
     return 2 * sum(told) > len(told)
+
+
+def _loses(recordings: Sequence[Recording], look: Look, sensor: str) -> bool:
+    """Tell whether a motion that others tell is that of an accelerometer, too, if it lost samples in each recording.
+
+    Air other than stated changes what it feels by many times its noise: no shift alone reconciles it then.
+    """
+    if sensor != "accelerometer":
+        return False
+    found = []
+    for i, trajectory in enumerate(look.fit.trajectories):
+        one = recordings[look.places[i]]
+        readings = next((r for r in readings_of(one) if r.sensor == sensor), None)
+        if readings is not None:
+            sd = np.array(
+                [true_noise([readings])[group_of(sensor, axis)].sd for axis in range(readings.value.shape[1])]
+            )
+            found.append(loses_samples(trajectory, look.fit.values(i), readings, one.sheets[sensor].rate_hz, sd))
+    return bool(found) and all(found)
 
 
 #: half the widths of a ripple's differences: of its order, amplitude (rad/s) and phase (rad)

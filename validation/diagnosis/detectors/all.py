@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from discsim.validation.diagnosis.detectors.dropped_samples import Shifted, dropped_accelerometer
+from discsim.validation.diagnosis.detectors.dropped_samples import Shifted
 from discsim.validation.diagnosis.detectors.events import events
 from discsim.validation.diagnosis.detectors.gusts import gusts
 from discsim.validation.diagnosis.detectors.local_problem import local_problems
@@ -38,7 +38,7 @@ def searched(
     """Return what all searches propose upon a hypothesis, best first.
 
     ``relaxed_fit`` is the relaxed fit with its ``noise``, ``fitted`` the fit under the hypothesis so far, ``own`` the
-    stated parameters and each recording's unknowns, ``lost`` the magnetometer's lost samples as its phase tells them.
+    stated parameters and each recording's unknowns, ``lost`` what sensors lost as the relaxed fit tells it.
     Without a hypothesis what is missing may have bent the continuous fit, and events are looked for from the relaxed
     one.
     """
@@ -50,9 +50,8 @@ def searched(
         found += events(problems, least)
         found += gusts(problems, least)
     found += ripple(fitted.fit, fitted.fit.noise, taken, least)
-    found += lost
+    present = {candidate.id for candidate in taken}
+    found += [item for item in lost if item.screened.candidate.id not in present]
     found += saturation(fitted.fit, fitted.fit.noise, taken)
     found += time_offsets(fitted.fit, fitted.fit.noise, taken)
-    if relaxed_fit.plant.path_known:  # else an accelerometer counts by its means over turns
-        found += dropped_accelerometer(relaxed_fit, noise, taken)
     return sorted(found, key=lambda p: p.screened.gain if isinstance(p, Shifted) else p.gain, reverse=True)

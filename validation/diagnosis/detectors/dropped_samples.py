@@ -5,7 +5,7 @@ Takes a relaxed fit; gives candidates with trajectories in the time that the cou
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,15 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import DroppedSamples
-from discsim.validation.diagnosis.detectors.sample_alignment import first_yaw, lost_along, phase_counts, repaired
+from discsim.validation.diagnosis.detectors.sample_alignment import (
+    Losses,
+    alignment_of,
+    first_yaw,
+    lost_along,
+    lost_in_own_noise,
+    phase_counts,
+    repaired,
+)
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
@@ -21,9 +29,11 @@ from discsim.validation.diagnosis.settings import DETECTORS
 from discsim.validation.identification.gauss_newton import Fit, mapped, refit
 from discsim.validation.identification.noise import NoiseModel
 from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.readings import Readings
 from discsim.validation.identification.segments import Trajectory, resegmented
+from discsim.validation.identification.sensor_model import Values
 
-__all__ = ["PhaseLosses", "Shifted", "dropped_accelerometer", "dropped_magnetometer"]
+__all__ = ["LostSamples", "Shifted", "dropped_accelerometer", "dropped_magnetometer", "loses_samples"]
 
 
 @dataclass(frozen=True)
@@ -58,15 +68,20 @@ def _losses(id: str, trajectories: Sequence[Trajectory], sensor: str) -> tuple[C
 
 
 @dataclass(frozen=True)
-class PhaseLosses:
-    """Lost samples of the magnetometer as its phase tells them about a relaxed fit; about none before it is asked."""
+class LostSamples:
+    """Lost samples of the sensors as a relaxed fit tells them; of none before it is asked."""
 
     fit: Fit | None = None
     found: tuple[Shifted, ...] = ()
 
-    def about(self, fit: Fit, known: Sequence[Parameter]) -> PhaseLosses:
-        """Return what is found about a fit, which is worked out once."""
-        return self if self.fit is fit else PhaseLosses(fit, tuple(dropped_magnetometer(fit, known)))
+    def about(self, fit: Fit, known: Sequence[Parameter], noise: Callable[[], NoiseModel]) -> LostSamples:
+        """Return what is found about a fit with its noise, which is worked out once: it takes fits of its own."""
+        if self.fit is fit:
+            return self
+        found = dropped_magnetometer(fit, known)
+        if fit.plant.path_known:  # else an accelerometer counts by its means over turns
+            found += dropped_accelerometer(fit, noise())
+        return LostSamples(fit, tuple(found))
 
 
 def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = DETECTORS.least_dropped) -> list[Shifted]:
@@ -104,7 +119,7 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = DE
         whole = tuple(
             _begun(replace(c, nodes=c.nodes[[0, -1]], states=c.states[:1]), anew, i) for i, c in enumerate(new)
         )
-        counted, _ = _counted(replace(found, trajectories=whole), sensor, _stated_sd(found, sensor, anew.noise))
+        counted = _counted(replace(found, trajectories=whole), sensor, _stated_sd(found, sensor, anew.noise))
         standing = tuple(
             resegmented(one, found.values(i), trajectory.nodes)
             for i, (one, trajectory) in enumerate(zip(whole, new, strict=True))
@@ -112,7 +127,7 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = DE
         found = _with_losses(replace(found, trajectories=standing), counted, sensor)
     for _ in range(2):
         fitted = refit(replace(found, defects=plant.sizes.continuous), iterations=4)
-        counted, _ = _counted(fitted, sensor, _stated_sd(found, sensor, anew.noise))
+        counted = _counted(fitted, sensor, _stated_sd(found, sensor, anew.noise))
         same = all(
             np.array_equal(a.lost.get(sensor, 0.0), b.lost.get(sensor, 0.0))
             for a, b in zip(found.trajectories, counted.trajectories, strict=True)
@@ -154,9 +169,13 @@ def _own_times(anew: Trajectory, old: Trajectory, lost: Mapping[str, FloatArray]
     return replace(anew, recording=old.recording, readings=readings, lost={**old.lost, **some}, effects=old.effects)
 
 
-def dropped_accelerometer(
-    fit: Fit, noise: NoiseModel, taken: Sequence[CandidateEffect] = (), least: float = DETECTORS.least_dropped
-) -> list[Shifted]:
+#: most rounds in which the motion says more of the counts and they of the motion; what share the noise has to fall by
+_ROUNDS, _FALLEN = 4, 0.9
+#: noises that a motion which others tell may leave of a sensor, and more
+_ANY = 100.0
+
+
+def dropped_accelerometer(fit: Fit, noise: NoiseModel, least: float = DETECTORS.least_dropped) -> list[Shifted]:
     """Return lost samples of the accelerometer as a screened candidate where the motion tells of them."""
     sensor = "accelerometer"
     id = catalogued(DroppedSamples, sensor).id
@@ -164,10 +183,7 @@ def dropped_accelerometer(
         return []
     if sensor not in noise:  # all of its readings are beyond its range, and none takes part
         return []
-    if any(candidate.id == id for candidate in taken):
-        return []
-    sd = _stated_sd(fit, sensor, noise)
-    if _counted(fit, sensor, sd)[1] < least:
+    if _counted_in_own_noise(fit, sensor, noise)[1] < least:
         return []
     # what is lost has bent the motion: once more without the sensor in question
     without = replace(
@@ -177,21 +193,57 @@ def dropped_accelerometer(
         ),
     )
     free = refit(without, iterations=4)
-    whole = replace(
+    again = replace(
         free,
         trajectories=tuple(
             replace(c, readings=old.readings) for c, old in zip(free.trajectories, fit.trajectories, strict=True)
         ),
     )
-    whole, gain = _counted(whole, sensor, sd)
-    if gain < least:
-        return []
-    again = refit(replace(whole, noise=noise), iterations=3)
-    again, _ = _counted(again, sensor, sd)
-    candidate, cost = _losses(id, again.trajectories, sensor)
+    level = np.inf
+    # with its samples counted the sensor tells more of the motion, and the motion more of the counts
+    for _ in range(_ROUNDS):
+        whole, gain, lower = _counted_in_own_noise(again, sensor, noise)
+        if gain < least:
+            return []
+        if lower > _FALLEN * level:
+            break
+        level = lower
+        again = refit(replace(whole, noise={**noise, sensor: noise[sensor]._replace(sd=level)}), iterations=3)
+    candidate, cost = _losses(id, whole.trajectories, sensor)
     if candidate.fixed_values[0][1] == 0.0:
         return []
-    return [Shifted(ScreenedCandidate(candidate, gain, {}), again.trajectories, cost)]
+    return [Shifted(ScreenedCandidate(candidate, gain, {}), whole.trajectories, cost)]
+
+
+def _counted_in_own_noise(fit: Fit, sensor: str, noise: NoiseModel) -> tuple[Fit, float, float]:
+    """Return a fit with the likeliest losses of a sensor, each recording's in the noise that they leave.
+
+    Beside it stand their gain, and the loudest axis of the median recording.
+    """
+    stated = _stated_sd(fit, sensor, noise)
+
+    def one(i: int) -> tuple[Trajectory, Losses | None]:
+        trajectory = fit.trajectories[i]
+        readings = next((r for r in trajectory.readings if r.sensor == sensor), None)
+        if readings is None:
+            return trajectory, None
+        own = alignment_of(trajectory, fit.values(i), readings, trajectory.recording.sheets[sensor].rate_hz)
+        losses = lost_in_own_noise(own, stated, np.full_like(stated, noise[sensor].sd))
+        return replace(trajectory, lost={**trajectory.lost, sensor: losses.counts}), losses
+
+    done = mapped(one, range(len(fit.trajectories)))
+    found = [losses for _, losses in done if losses is not None]
+    level = float(np.median([np.max(losses.noise) for losses in found]))
+    return replace(fit, trajectories=tuple(t for t, _ in done)), sum(losses.gain for losses in found), level
+
+
+def loses_samples(trajectory: Trajectory, values: Values, readings: Readings, rate_hz: float, sd: FloatArray) -> bool:
+    """Tell whether lost samples bring a sensor to a motion that others tell, and that ends before its readings do.
+
+    ``sd`` (k,) is the sensor's noise.
+    """
+    own = alignment_of(trajectory, values, readings, rate_hz, cut=True)
+    return lost_in_own_noise(own, sd, _ANY * sd).gain >= DETECTORS.least_dropped
 
 
 def _stated_sd(fit: Fit, sensor: str, noise: NoiseModel) -> FloatArray:
@@ -200,15 +252,14 @@ def _stated_sd(fit: Fit, sensor: str, noise: NoiseModel) -> FloatArray:
     return np.where(np.isfinite(readings.sd), readings.sd, noise[sensor].sd)
 
 
-def _counted(fit: Fit, sensor: str, sd: FloatArray) -> tuple[Fit, float]:
-    """Return a fit whose trajectories hold the likeliest losses of a sensor by its motion, and their gain."""
+def _counted(fit: Fit, sensor: str, sd: FloatArray) -> Fit:
+    """Return a fit whose trajectories hold the likeliest losses of a sensor by its motion in a noise ``sd`` (k,)."""
 
-    def one(i: int) -> tuple[Trajectory, float]:
+    def one(i: int) -> Trajectory:
         trajectory = fit.trajectories[i]
         if all(r.sensor != sensor for r in trajectory.readings):
-            return trajectory, 0.0
-        counts, gain = lost_along(trajectory, fit.values(i), sensor, 2.0 * sd)
-        return replace(trajectory, lost={**trajectory.lost, sensor: counts}), gain
+            return trajectory
+        counts = lost_along(trajectory, fit.values(i), sensor, sd).counts
+        return replace(trajectory, lost={**trajectory.lost, sensor: counts})
 
-    done = mapped(one, range(len(fit.trajectories)))
-    return replace(fit, trajectories=tuple(trajectory for trajectory, _ in done)), float(sum(gain for _, gain in done))
+    return replace(fit, trajectories=tuple(mapped(one, range(len(fit.trajectories)))))

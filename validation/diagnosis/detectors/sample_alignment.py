@@ -7,7 +7,7 @@ disc spins, a lost sample is a step in the phase; elsewhere only a motion known 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,10 +15,20 @@ from discsim.arrays import ComplexArray, FloatArray, IntArray, sd_by_median
 from discsim.compiled import compiled_nogil
 from discsim.recording import Recording, Samples
 from discsim.validation.identification.prediction import shown
+from discsim.validation.identification.readings import Readings
 from discsim.validation.identification.segments import Trajectory
 from discsim.validation.identification.sensor_model import Values, delay
 
-__all__ = ["circle_through", "first_yaw", "lost_along", "phase_counts", "repaired", "viterbi_counts"]
+__all__ = [
+    "alignment_of",
+    "circle_through",
+    "first_yaw",
+    "lost_along",
+    "lost_in_own_noise",
+    "phase_counts",
+    "repaired",
+    "viterbi_counts",
+]
 
 #: most samples lost in a row that are looked for
 _IN_A_ROW = 4
@@ -34,6 +44,16 @@ _NEIGHBOURS = 12
 _FIRST = 12
 #: smallest step of phase, in its own noise, that is told from none
 _SEEN = 4.5
+#: noises in which counts are found, in that of their sensor: a motion is not known exactly
+_MARGIN = 2.0
+#: times by which a noise to start from is quieter than the one before
+_QUIETER = 3.0
+#: most rounds in which counts and noise follow from one another, and the share to which a noise has settled
+_LEVELS, _SETTLED = 8, 0.95
+#: rounds in which samples far off a line lose their weight, and how far that is, in what half of them leave
+_TRIMMED, _FAR_OFF = 3, 4.0
+#: share of a motion's end at which samples do not count where it ends before they do: as many may be lost
+_ROOM = 0.1
 
 
 def viterbi_counts(cost: FloatArray, gaps: IntArray, each: float = _COST) -> tuple[IntArray, float]:
@@ -132,46 +152,143 @@ def _centre(z: ComplexArray) -> complex:
     return centre if abs(centre) < 2.0 * radius and turned < 0.5 else 0j
 
 
-def lost_along(
-    current: Trajectory, values: Values, sensor: str, sd: FloatArray, *, about: FloatArray | None = None
-) -> tuple[FloatArray, float]:
-    """Return the likeliest counts lost before each sample (n,) of a sensor by a trajectory's motion, and their gain.
+@dataclass(frozen=True)
+class Losses:
+    """Samples that a sensor lost in one recording: counts before each (n,), their gain, and the noise they leave (k,).
 
-    ``sd`` (k,) is the noise of its axes. The gain is that in chi-squared over losing none, or over the counts
-    ``about``, less the price of each loss.
+    The gain is in chi-squared in that noise over losing none, less the price of each loss.
     """
-    recording = current.recording
-    samples = recording.samples[sensor]
-    readings = next(r for r in current.readings if r.sensor == sensor)
-    rate_hz = recording.sheets[sensor].rate_hz
-    place = grid_of(samples, rate_hz)
-    end = float(current.nodes[-1])
-    most = max(int((end - samples.t[-1]) * rate_hz) + 1, 0)
+
+    counts: FloatArray
+    gain: float
+    noise: FloatArray
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """A sensor's samples (n, k) and what a motion shows on the grid of its clock (g, k), on which they may lie.
+
+    Sample j lies at ``place[j]`` plus as many as were lost before it, at most ``most``; ``missing`` are as many as the
+    grid goes on after the last.
+    """
+
+    measured: FloatArray
+    shown: FloatArray
+    place: IntArray
+    most: int
+    missing: int
+
+    def left(self, counts: IntArray, line: FloatArray) -> FloatArray:
+        """Return what samples leave (n, k) at their counts (n,), of the motion by a line (2, k): factor and offset."""
+        return np.asarray(self.measured - line[1] - line[0] * self.shown[self.place + counts])
+
+    def line(self, counts: IntArray) -> FloatArray:
+        """Return factor and offset (2, k) by which the motion is nearest to the samples, robust against a few."""
+        line = np.empty((2, self.measured.shape[1]))
+        for axis in range(line.shape[1]):
+            y, x = self.measured[:, axis], self.shown[self.place + counts, axis]
+            known = np.isfinite(y)
+            kept = known
+            for _ in range(_TRIMMED):
+                columns = np.stack([x[kept], np.ones(np.count_nonzero(kept))], axis=1)
+                line[:, axis] = np.linalg.lstsq(columns, y[kept], rcond=None)[0]
+                off = np.abs(y - line[1, axis] - line[0, axis] * x)
+                kept = known & (off <= _FAR_OFF * np.median(off[known]))
+        return line
+
+    def price(self, line: FloatArray, sd: FloatArray) -> FloatArray:
+        """Return what each sample (n,) says against each count (c,) in a noise (k,): a limited chi-squared."""
+        counts = np.arange(self.most + 1)
+        expected = line[1] + line[0] * self.shown
+        off = (self.measured[:, None, :] - expected[self.place[:, None] + counts]) / sd
+        return np.asarray(np.minimum(np.nansum(off**2, axis=2), _MOST))
+
+
+def alignment_of(
+    current: Trajectory, values: Values, readings: Readings, rate_hz: float, *, cut: bool = False
+) -> Alignment:
+    """Return readings (n, k) of a sensor beside what a trajectory's motion shows of it.
+
+    Of a trajectory that is ``cut``, which ends before the readings do, those count that lie before its last part: as
+    much of it as may be lost lies behind each.
+    """
+    sensor, end = readings.sensor, float(current.nodes[-1])
+    last = len(readings.t) if not cut else int(np.searchsorted(readings.t, (1.0 - _ROOM) * end))
+    t, good, value = readings.t[:last], readings.good[:last], readings.value[:last]
+    place = np.asarray(np.round((t - t[0]) * rate_hz), dtype=np.int64)
+    missing = max(int((end - t[-1]) * rate_hz + 1e-3), 0)
+    most = max(int((end - t[-1]) * rate_hz) + 1, 0) if not cut else missing
     most = min(most, int(0.25 * place[-1]) + 8)
-    if about is not None:
-        most = max(most, int(about[-1]))
-    grid = samples.t[0] + np.arange(place[-1] + most + 1) / rate_hz
+    grid = t[0] + np.arange(place[-1] + most + 1) / rate_hz
     expected = shown(current, values, sensor, grid - delay(values, sensor, grid))
-    if sensor == "accelerometer" and readings.limit is not None:
+    if readings.limit is not None:
         expected = np.clip(expected, -readings.limit, readings.limit)
-    counts = np.arange(most + 1)
-    measured = np.where(readings.good[:, None, :], samples.value[:, None, :], np.nan)
-    off = (measured - expected[place[:, None] + counts]) / sd
-    cost = np.minimum(np.nansum(off**2, axis=2), _MOST)
+    return Alignment(np.where(good, value, np.nan), expected, place, most, most + 1 if cut else missing)
+
+
+def _likeliest(own: Alignment, line: FloatArray, sd: FloatArray) -> tuple[IntArray, float]:
+    """Return the likeliest counts (n,) in a noise (k,), and their gain over none, as the readings alone tell it."""
+    cost = own.price(line, sd)
     # loggers mostly stop all their sensors together: then as many as are missing at the end were lost before, and
     # where the readings do not tell the place of one, there are so many places that it costs nothing
-    missing = max(int((end - samples.t[-1]) * rate_hz + 1e-3), 0)
     believed = cost.copy()
-    if missing <= most:
-        believed[-1] += _TOGETHER + _COST * missing
-        believed[-1, missing] = cost[-1, missing]
-    gaps = np.diff(place, prepend=place[0])
+    if own.missing <= own.most:
+        believed[-1] += _TOGETHER + _COST * own.missing
+        believed[-1, own.missing] = cost[-1, own.missing]
+    gaps = np.diff(own.place, prepend=own.place[0])
     path, _ = viterbi_counts(believed, gaps)
-    # the gain is what the readings say alone
     _, least = viterbi_counts(cost, gaps)
-    was = np.zeros(len(samples), dtype=np.int64) if about is None else about.astype(np.int64)
-    before = float(cost[np.arange(len(samples)), was].sum()) + _COST * float(was[-1])
-    return path.astype(float), before - least
+    return path, float(cost[:, 0].sum()) - least
+
+
+def lost_along(current: Trajectory, values: Values, sensor: str, sd: FloatArray) -> Losses:
+    """Return the likeliest losses of a sensor by a trajectory's motion in a noise of its axes, ``sd`` (k,)."""
+    readings = next(r for r in current.readings if r.sensor == sensor)
+    own = alignment_of(current, values, readings, current.recording.sheets[sensor].rate_hz)
+    plain = np.stack([np.ones_like(sd), np.zeros_like(sd)])
+    path, gain = _likeliest(own, plain, _MARGIN * sd)
+    return Losses(path.astype(float), gain, sd)
+
+
+def lost_in_own_noise(own: Alignment, stated: FloatArray, loudest: FloatArray) -> Losses:
+    """Return the likeliest losses of a sensor by a motion that is known to a line only, in the noise that they leave.
+
+    Air and place of a sensor are known to a few parts in a hundred: of what a motion shows of each axis a factor and an
+    offset are free. What it does not tell yet is noise, which lies between a ``stated`` and a ``loudest`` one (k,) and
+    follows from the counts as they do from it. Of the noises to start from, that whose counts leave least holds.
+    """
+    none = np.zeros(len(own.measured), dtype=np.int64)
+    # about none the factor of an axis that turns with the disc would vanish where samples slip
+    plain = np.stack([np.ones_like(stated), np.zeros_like(stated)])
+    plain[1] = [np.median(x[np.isfinite(x)]) if np.isfinite(x).any() else 0.0 for x in own.left(none, plain).T]
+    found: Losses | None = None
+    start = np.maximum(loudest, stated)
+    while True:
+        path, level, line = none, start, plain
+        for _ in range(_LEVELS):
+            path, _ = _likeliest(own, line, _MARGIN * level)
+            line = own.line(path)
+            lower = np.clip(_robust(own.left(path, line)), stated, np.maximum(loudest, stated))
+            settled = bool(np.all((lower > _SETTLED * level) & (level > _SETTLED * lower)))
+            level = lower
+            if settled:
+                break
+        line = own.line(path)
+        path, _ = _likeliest(own, line, _MARGIN * level)
+        without = np.minimum(np.nansum((own.left(none, own.line(none)) / (_MARGIN * level)) ** 2, axis=1), _MOST)
+        counted = np.minimum(np.nansum((own.left(path, line) / (_MARGIN * level)) ** 2, axis=1), _MOST)
+        losses = Losses(path.astype(float), float(without.sum() - counted.sum()) - _COST * float(path[-1]), level)
+        if found is None or np.sum(np.log(losses.noise)) < np.sum(np.log(found.noise)):
+            found = losses
+        if np.all(start <= stated):
+            return found
+        start = np.maximum(start / _QUIETER, stated)
+
+
+def _robust(left: FloatArray) -> FloatArray:
+    """Return a robust standard deviation of each axis (k,) of readings (n, k); without end where none is known."""
+    known = [axis[np.isfinite(axis)] for axis in left.T]
+    return np.array([sd_by_median(axis) if axis.size else np.inf for axis in known])
 
 
 def first_yaw(current: Trajectory, values: Values) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from discsim.effects.catalogue import CATALOGUE, catalogued
 from discsim.effects.events import SpinStep
 from discsim.recording import Recording
-from discsim.validation.diagnosis.detectors.dropped_samples import PhaseLosses
+from discsim.validation.diagnosis.detectors.dropped_samples import LostSamples
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
 from discsim.validation.diagnosis.selection.evidence import ONE_SIDED
@@ -107,7 +107,7 @@ class Search:
     outliers: tuple[tuple[int, str, str, float, float], ...] = ()
     hints: tuple[ScreenedCandidate, ...] = ()
     cost: float = 0.0
-    phase_losses: PhaseLosses = field(default_factory=PhaseLosses)
+    lost_samples: LostSamples = field(default_factory=LostSamples)
     at_once: bool = False
 
     def about(self, fit: Fit) -> Search:

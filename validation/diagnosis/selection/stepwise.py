@@ -16,11 +16,11 @@ import numpy as np
 
 from discsim.effects import Effect
 from discsim.effects.catalogue import catalogued
-from discsim.effects.sensors import DroppedSamples, Lag
+from discsim.effects.sensors import Lag
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.followed import true_noise
 from discsim.validation.diagnosis.detectors.all import searched
-from discsim.validation.diagnosis.detectors.dropped_samples import PhaseLosses, Shifted
+from discsim.validation.diagnosis.detectors.dropped_samples import Shifted
 from discsim.validation.diagnosis.relaxed_fit import clock_of_accelerometer, relaxed, unknowns, without_outliers
 from discsim.validation.diagnosis.selection.all_at_once import all_at_once
 from discsim.validation.diagnosis.selection.candidates import (
@@ -71,7 +71,6 @@ Report: TypeAlias = Callable[[str, int, int], None]
 #: what is proposed, the fit whose motion a fit of it starts from, and what choosing lost samples costs
 Offer: TypeAlias = tuple[ScreenedCandidate, Fit, float]
 
-_DROPPED = catalogued(DroppedSamples, "magnetometer").id
 #: the lag that holds what was there before a recording began
 _HELD = catalogued(Lag, "accelerometer").id
 
@@ -328,8 +327,8 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
                 screened_candidates(found.equations, found.candidates, current.hypothesis, found.own)
             )
         ]
-    found = _with_slips(found, current)
-    for item in searched(found.relaxed_fit, current, found.own, _steady_noise(found), found.phase_losses.found):
+    found = _with_lost_samples(found)
+    for item in searched(found.relaxed_fit, current, found.own, _steady_noise(found), found.lost_samples.found):
         if isinstance(item, Shifted):
             there.append((item.screened, replace(found.relaxed_fit, trajectories=item.trajectories), item.cost))
         elif current.hypothesis.candidates:
@@ -493,12 +492,11 @@ def _together(found: Search) -> tuple[Search, ContinuousFit | None]:
     return found, None
 
 
-def _with_slips(found: Search, current: ContinuousFit) -> Search:
-    """Return a search that knows the magnetometer's lost samples, unless they are among the present effects already."""
-    if any(candidate.id == _DROPPED for candidate in current.hypothesis.candidates):
-        return replace(found, phase_losses=PhaseLosses())
+def _with_lost_samples(found: Search) -> Search:
+    """Return a search that knows what samples were lost as its relaxed fit tells them."""
     known = [q for q in found.own if q.key not in found.relaxed_fit.plant.own_keys]
-    return replace(found, phase_losses=found.phase_losses.about(found.relaxed_fit, known))
+    lost = found.lost_samples.about(found.relaxed_fit, known, lambda: _steady_noise(found))
+    return replace(found, lost_samples=lost)
 
 
 def _steady_noise(found: Search) -> NoiseModel:

@@ -270,7 +270,10 @@ def _next(recordings: Sequence[Recording]) -> tuple[list[SetupFault], tuple[Effe
     before = None if as_written is None else as_written.costs
     if found and found[0].kind == "rival" and _gains(as_written, found[0], 0.5):
         return [], _hints(ranking)
+    rivals = [item for item in found if item.kind == "rival"]
     found = tuple(item for item in found if item.kind != "rival")
+    if found and _may_be_physics(found[0], rivals):
+        return [], _hints(ranking)
     if found and _agrees(found[0]) and _worth_naming(as_written, found[0], recordings):
         return [_fault(as_written, found, recordings)], ()
     if as_written is not None and _agrees(as_written):
@@ -282,10 +285,19 @@ def _next(recordings: Sequence[Recording]) -> tuple[list[SetupFault], tuple[Effe
     return [], _hints(ranking)
 
 
+def _may_be_physics(fault: Hypothesis, rivals: Sequence[Hypothesis]) -> bool:
+    """Tell whether a shift of a sensor's times cannot be told from a lag, a clock or lost samples: fits decide then."""
+    return fault.kind == "offset" and any(
+        item.sensor == fault.sensor and item.charged < fault.charged + TWIN for item in rivals
+    )
+
+
 def _hints(ranking: Ranking) -> tuple[Effect, ...]:
     """Return the lags, clocks and iron that are worth a fault's price, best first, as effects."""
     rivals = [item for item in ranking.found if item.kind == "rival" and _gains(ranking.as_written, item)]
-    return tuple(_physics(item) for item in rivals if item.charged < rivals[0].charged + PRICE)
+    # samples that were lost are counted beside a motion: there is no size to start from
+    likely = [item for item in rivals if item.charged < rivals[0].charged + PRICE]
+    return tuple(_physics(item) for item in likely if not any(name.endswith(".losses") for name in item.columns.rival))
 
 
 def _physics(item: Hypothesis) -> Effect:

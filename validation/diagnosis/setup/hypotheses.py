@@ -248,7 +248,10 @@ def _offsets(base: _Base) -> Iterator[Hypothesis]:
 
 
 def _rivals(base: _Base) -> Iterator[Hypothesis]:
-    """Return physics that is no fault of the setup, so that what it explains is not taken for one: lags and clocks."""
+    """Return physics that is no fault of the setup, so that what it explains is not taken for one.
+
+    Lags and clocks, and lost samples: a clock of its own in each recording, by which samples were taken ever later.
+    """
     if not plant_of(base.signals[0].recording).airborne:
         return
     fastest = max(float(np.nanmax(np.abs(one.rate))) for one in base.signals)
@@ -266,6 +269,27 @@ def _rivals(base: _Base) -> Iterator[Hypothesis]:
                 columns = Columns({}, {}, None, {f"{sensor}.{kind}": size})
                 found.append(Hypothesis("rival", sensor, columns, *misfit(base.signals, columns), 6.0))
             yield min(found, key=lambda item: item.cost)
+            if kind == "clock":
+                yield _losses(sensor, found)
+
+
+def _losses(sensor: str, clocks: Sequence[Hypothesis]) -> Hypothesis:
+    """Return what lost samples leave of clocks of one sensor: the best in each recording that runs ever later."""
+    name = f"{sensor}.clock"
+    later = [item for item in clocks if item.columns.rival[name] <= 0.0]
+    best = np.argmin([item.costs for item in later], axis=0)
+    costs = np.array([later[k].costs[i] for i, k in enumerate(best)])
+    size = float(np.median([later[k].columns.rival[name] for k in best]))
+    worst = max(later[k].worst for k in best)
+    return Hypothesis(
+        "rival",
+        sensor,
+        Columns({}, {}, None, {f"{sensor}.losses": size}),
+        costs,
+        later[0].weight,
+        worst,
+        6.0 * best.size,
+    )
 
 
 #: what f . m leaves on sound throws, times the field's size, m/s^2; how far a field may be from the stated one, as a

@@ -278,12 +278,13 @@ def test_no_offset_of_time_is_proposed_for_a_sound_table() -> None:
     assert offsets_found() == {}
 
 
-def test_what_the_phase_tells_of_losses_is_worked_out_once_for_a_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_fit_tells_of_lost_samples_is_worked_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
     monkeypatch.setattr(dropped_samples, "dropped_magnetometer", lambda fit, known: calls.append(fit) or [])
-    phase_losses, one, other = dropped_samples.PhaseLosses(), relaxed_fit(), replace(relaxed_fit())
+    monkeypatch.setattr(dropped_samples, "dropped_accelerometer", lambda fit, noise: [])
+    lost, one, other = dropped_samples.LostSamples(), relaxed_fit(), replace(relaxed_fit())
     assert calls == []
     for fit in (one, one, other):
-        phase_losses = phase_losses.about(fit, ())
-        assert phase_losses.fit is fit
+        lost = lost.about(fit, (), lambda: {})
+        assert lost.fit is fit
     assert calls == [one, other]
