@@ -27,7 +27,7 @@ _MISCOUNTED = 0.005
 OFF, _SLOWER = 0.02, 0.01
 #: loops and phases that are tried: the next one is shifted by so many samples at the recording's end, and as far by a
 #: phase; rows about a skipped sample hold a loop to a few hundredths
-_APART, _PHASES = 0.01, 150
+_APART, _PHASES = 0.01, 100
 
 
 class Loops(NamedTuple):
