@@ -94,6 +94,22 @@ def test_a_gyroscope_that_feels_force_feels_all_of_it_where_the_path_is_unknown(
     assert np.std(left[:, :2], axis=0) == pytest.approx(sd, rel=0.25)
 
 
+def test_a_clock_that_algebra_has_run_backwards_begins_where_the_relaxed_fit_has_it():
+    """From such a start a motion grew to 1e77 rad/s, and the score of the fit was 1e156."""
+    recording = record(
+        flight(seconds=0.4), BLIND, np.random.default_rng(7), plant="free_spin", name="clock", disc=DRIVER
+    )
+    scale = Parameter("clock.rate", "ratio", 1.0, 1e-6, 5e-3)
+    fit = relaxed([recording], [scale])
+    own = (scale, *unknowns([recording]))
+    noise = estimate_noise(fit.linears, [linear.residual for linear in fit.linears])
+    at = {(q.key, q.recordings): float(v) for q, v in zip(fit.parameters, fit.at, strict=True)}
+    wild = at | {(scale.key, None): -2.8e75}
+    sane, begun = (continuous_fit(fit, Hypothesis(), own, noise, start, polish=0) for start in (at, wild))
+    assert begun.score == sane.score
+    assert begun.fit.merit < 3.0 * begun.fit.count
+
+
 def test_a_wobble_of_one_recording_moves_no_other():
     recordings = [
         record(flight(seconds=0.4), BLIND, np.random.default_rng(k), plant="free_spin", name=f"{k}", disc=DRIVER)

@@ -32,7 +32,7 @@ from discsim.validation.diagnosis.consistency.phase_regression import (
     retimed,
     signal_of,
 )
-from discsim.validation.diagnosis.consistency.skipped_samples import OFF, Loop, loop_beside
+from discsim.validation.diagnosis.consistency.skipped_samples import OFF, Loops, loops_beside
 from discsim.validation.diagnosis.consistency.time_stamp_recovery import Rows
 
 __all__ = ["OwnClock", "SamplesShown", "own_clock_of"]
@@ -229,12 +229,12 @@ def own_clock_of(recordings: Sequence[Recording], names: Sequence[str], rows: Ro
     kept = _kept_rows(fields, rows)
     if kept is not None and (gains := min(_total(single), _total(means)) - _total(kept[1])) >= PRICE * len(fields):
         return _clock(fields, kept[1], rest, rows, gains, means=kept[0], kept=True)
-    loops = {name: loop_beside(one.newest, one.period, fields[name].row_s) for name, one in single.items()}
-    told = {name: loop for name, loop in loops.items() if loop is not None}
-    skips = sum(loop.gain for loop in told.values()) if len(told) == len(fields) else 0.0
+    newest, periods = ({n: one.newest for n, one in single.items()}, {n: one.period for n, one in single.items()})
+    loops = loops_beside(newest, periods, float(np.median([field.row_s for field in fields.values()])))
+    skips = 0.0 if loops is None else loops.gain
     if gain >= max(PRICE * len(fields), skips):
         return _clock(fields, means, rest, rows, gain, means=True)
-    return _clock(fields, single, rest, rows, skips, means=False, loops=told) if skips >= PRICE else None
+    return _clock(fields, single, rest, rows, skips, means=False, loops=loops) if skips >= PRICE else None
 
 
 def _total(found: Mapping[str, Counted]) -> float:
@@ -267,7 +267,7 @@ def _clock(
     gain: float,
     *,
     means: bool,
-    loops: Mapping[str, Loop] | None = None,
+    loops: Loops | None = None,
     kept: bool = False,
 ) -> OwnClock | None:
     """Return the clock that counted samples tell, None where they are too close to be told apart.
@@ -292,7 +292,7 @@ def _clock(
             return None
         apart, step = (
             found.apart if means else np.zeros_like(found.apart),
-            None if loops is None else loops[name].step_s,
+            None if loops is None else loops.step_s[name],
         )
         off = np.abs(found.left) > _DOUBTFUL * found.scale
         left = (rest[name], rms(found.left[~off]))

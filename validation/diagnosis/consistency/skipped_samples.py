@@ -1,14 +1,16 @@
 """Samples that a logger's loop must skip: the pattern by which a part that free-runs shows beside a slower loop.
 
-Takes which of a part's samples each row shows; gives the loop beside which no row shows a sample that it cannot. A loop
+Takes which of a part's samples each row of recordings shows; gives the loop beside which no row shows a sample that it
+cannot. A loop
 that is slower than the part skips a sample whenever it falls a whole period behind, at even distances, and no row ever
 shows one of those: what looks like a lost row there is none. Rows that are lost at random show every sample alike.
 The evidence is Bayes': the likelihood is averaged over all loops and phases that a sheet's rate allows, which charges
-for having looked at so many.
+for having looked at so many. Recordings of one logger share its loop, and so that charge.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -17,37 +19,56 @@ from scipy.special import xlogy
 
 from discsim.arrays import FloatArray, IntArray
 
-__all__ = ["OFF", "Loop", "loop_beside"]
+__all__ = ["OFF", "Loops", "loops_beside"]
 
 #: share of rows whose sample was miscounted
 _MISCOUNTED = 0.005
 #: how far a loop may be from its stated rate, and by how much slower than the part it must be to be told from it
 OFF, _SLOWER = 0.02, 0.01
-#: loops and phases that are tried: a loop of the next may shift by so many samples at the recording's end
-_APART, _PHASES = 0.04, 150
+#: loops and phases that are tried: the next one is shifted by so many samples at the recording's end, and as far by a
+#: phase; rows about a skipped sample hold a loop to a few hundredths
+_APART, _PHASES = 0.01, 100
 
 
-class Loop(NamedTuple):
-    """The likeliest step of a logger's loop, s, and twice the log of what loops are likelier than lost rows alone."""
+class Loops(NamedTuple):
+    """The likeliest step of the logger's loop by recording, s, and twice the log of what loops are likelier by.
 
-    step_s: float
+    They are likelier than rows that were lost alone.
+    """
+
+    step_s: Mapping[str, float]
     gain: float
 
 
-def loop_beside(newest: IntArray, period: float, stated: float) -> Loop | None:
-    """Return the loop beside a part of some ``period``, s, whose samples ``newest`` (n,) rows show.
+def loops_beside(newest: Mapping[str, IntArray], periods: Mapping[str, float], stated: float) -> Loops | None:
+    """Return the loop beside a part whose samples ``newest`` (n,) the rows of recordings show, by their names.
 
-    The loop's step is ``stated`` to within its oscillator's error, s. None where none would be slower than the part.
+    The part's samples are ``periods`` apart, s, as each recording has it; the loop's step is ``stated`` to within its
+    oscillator's error, s. All recordings are of one loop, unless loops of their own are likelier. None where none would
+    be slower than the part.
     """
-    shown = np.asarray(newest - newest[0], dtype=np.float64)
+    period = float(np.mean(list(periods.values())))
+    shown = {name: np.asarray(one - one[0], dtype=np.float64) for name, one in newest.items()}
     least, most = max((1.0 - OFF) * stated / period, 1.0 + _SLOWER), (1.0 + OFF) * stated / period
-    if least >= most or shown[-1] <= 0.0:
+    if least >= most or min(one[-1] for one in shown.values()) <= 0.0:
         return None
-    ratios = np.linspace(least, most, 2 + int((most - least) * shown[-1] / _APART))
-    log = np.stack([_log_likelihoods(shown, float(ratio)) for ratio in ratios])
+    longest = max(float(one[-1]) for one in shown.values())
+    ratios = np.linspace(least, most, 2 + int((most - least) * longest / _APART))
+    each = {
+        name: np.array([_log_mean(_log_likelihoods(one, float(ratio))) for ratio in ratios])
+        for name, one in shown.items()
+    }
+    together = np.sum(list(each.values()), axis=0)
+    apart = sum(_log_mean(one) for one in each.values())
+    gain = _log_mean(together)
+    best = {name: int(np.argmax(together if gain >= apart else one)) for name, one in each.items()}
+    return Loops({name: float(ratios[k]) * periods[name] for name, k in best.items()}, 2.0 * max(gain, apart))
+
+
+def _log_mean(log: FloatArray) -> float:
+    """Return the log of the mean of what has the logs (n,)."""
     best = float(np.max(log))
-    mean = best + float(np.log(np.mean(np.exp(log - best))))
-    return Loop(float(ratios[int(np.argmax(np.max(log, axis=1)))]) * period, 2.0 * mean)
+    return best + float(np.log(np.mean(np.exp(log - best))))
 
 
 def _log_likelihoods(shown: FloatArray, ratio: float) -> FloatArray:

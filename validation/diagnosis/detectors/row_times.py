@@ -36,6 +36,8 @@ __all__ = ["RowTimes", "row_times"]
 _SECOND = 24.0
 #: the scale of all times
 _SCALE = (catalogued(ClockRate, "clock").id, "ratio")
+#: the scale of the field's times beside those of gyroscope and accelerometer
+_BESIDE = (catalogued(ClockRate, "magnetometer").id, "ratio")
 #: how late the field's times are against those of gyroscope and accelerometer
 _OFFSET = (catalogued(TimeOffset, "magnetometer").id, "offset_s")
 #: recordings of one logger have one period: their own ones may differ by this share
@@ -43,6 +45,9 @@ _ALIKE = 5e-3
 #: by how much less of a spin a chip shows that is tilted by 0.1 rad, as one soldered by eye may be; precession bends
 #: the phase of a field by a fifth of that, 4 deg/s of 3500
 _TILTED = 5e-3
+#: by which share two combs beside each other may be off: whole numbers hold the one to a quarter of a period of the
+#: other from end to end, and 2.5 s are 250 rows
+_HELD = 1e-3
 #: rows at either end that take no part in a fit: of simulated throws up to three were miscounted there, which bent the
 #: motion for a tenth of a second before them
 _ENDS = 5
@@ -106,21 +111,25 @@ class RowTimes:
         A period is counted as if nothing but the spin that a gyroscope shows turned the field: precession turns it,
         too, and a chip that is tilted shows less of the spin, which only a fit of the motion knows. Which of its
         samples each row shows is counted for each part by itself, so that the times of one may be off by as much all
-        along.
+        along, and where the chip has a comb of its own its period beside the field's is as sure as whole numbers hold
+        it: a wobble that is free to follow tells no more, and one that obeys physics does.
         """
         off = 0.5 * self.clock.period_s
         return (
             Parameter(*_SCALE, 1.0, 1e-6, float(np.hypot(_TILTED, self.clock.sd_s / self.clock.period_s))),
+            *(() if self.imu is None else (Parameter(*_BESIDE, 1.0, 1e-6, _HELD),)),
             Parameter(*_OFFSET, 0.0, 1e-5, off),
         )
 
     def refined(self, fit: Fit) -> RowTimes:
-        """Return what was counted with the scale of times that a fit has found, and its error."""
-        place = next((j for j, q in enumerate(fit.parameters) if q.key == _SCALE and q.recordings is None), None)
-        if place is None or fit.covariance.shape[0] != len(fit.parameters):
+        """Return what was counted with the scales of times that a fit has found, and their errors."""
+        places = {q.key: j for j, q in enumerate(fit.parameters) if q.recordings is None}
+        if _SCALE not in places or fit.covariance.shape[0] != len(fit.parameters):
             return self
-        ratio, sd = float(fit.at[place]), float(np.sqrt(fit.covariance[place, place]))
-        clock = replace(self.clock, period_s=self.clock.period_s / ratio, sd_s=self.clock.period_s * sd)
+        ratio, sd = float(fit.at[places[_SCALE]]), float(np.sqrt(fit.covariance[places[_SCALE], places[_SCALE]]))
+        both = [places[key] for key in (_SCALE, _BESIDE) if key in places]
+        field, own = float(np.prod(fit.at[both])), float(np.sqrt(np.sum(fit.covariance[np.ix_(both, both)])))
+        clock = replace(self.clock, period_s=self.clock.period_s / field, sd_s=self.clock.period_s * own)
         imu = self.imu
         if imu is not None:
             imu = replace(imu, period_s=imu.period_s / ratio, sd_s=float(np.hypot(imu.sd_s, imu.period_s * sd)))

@@ -57,7 +57,7 @@ def continuous_fit(
     fit whose chi-squared in ``noise`` will stay above its ``bars`` is given up after a few steps.
     """
     parameters = fitted_parameters(hypothesis, own)
-    at = np.array([start.get((q.key, q.recordings), q.stated) for q in parameters])
+    at = _begun(relaxed_fit, parameters, own, start)
     plant = relaxed_fit.plant
     fit = Fit(_retimed(relaxed_fit, parameters, at), parameters, at, relaxed_fit.continuous_defects, noise)
     if not plant.airborne and any(q.group in CLOCKS for q in parameters):
@@ -79,6 +79,23 @@ def continuous_fit(
             # no step served: the same residuals show the same noise, in which none would serve again
             break
     return scored(hypothesis, fit)
+
+
+def _begun(relaxed_fit: Fit, parameters: Sequence[Parameter], own: Sequence[Parameter], start: Start) -> FloatArray:
+    """Return parameters (p,) at a start, the ``own`` ones where a relaxed fit has them if it is beyond all sense.
+
+    Far from the data algebra may offer any number, as a clock that runs backwards: the motion begun there never ends
+    anywhere, and what the same algebra offers of the others is no better.
+    """
+    offered = [start.get((q.key, q.recordings), q.stated) for q in parameters]
+    limits = [BOUNDS.get(q.key, (-np.inf, np.inf)) if q in own else (-np.inf, np.inf) for q in parameters]
+    pairs = list(zip(offered, limits, strict=True))
+    if all(low <= v <= high or np.isinf(high - low) for v, (low, high) in pairs):
+        # a number that is bounded on one side is held there by the first step
+        return np.array(offered)
+    known = zip(relaxed_fit.parameters, relaxed_fit.at.tolist(), strict=True)
+    relaxed = {(q.key, q.recordings): v for q, v in known if q in own}
+    return np.array([relaxed.get((q.key, q.recordings), v) for q, v in zip(parameters, offered, strict=True)])
 
 
 #: clocks by which the motion of a relaxed fit goes: it follows the magnetometer's phase

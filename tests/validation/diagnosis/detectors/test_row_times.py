@@ -11,6 +11,7 @@ from support import logger_loop as loop
 
 from discsim.effects import effect
 from discsim.recording import Recording
+from discsim.validation.diagnosis.consistency.imu_clock import ImuClock
 from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of
 from discsim.validation.diagnosis.detectors.row_times import RowTimes, row_times
 from discsim.validation.identification.gauss_newton import Fit
@@ -87,7 +88,7 @@ def test_rows_at_the_ends_take_no_part_in_a_fit():
 
 def test_a_fit_may_scale_all_times_and_what_was_counted_follows_it():
     found = counted()
-    scale, offset = found.free
+    scale, offset = replace(found, imu=None).free
     assert scale.key == ("clock.rate", "ratio")
     # a chip that is tilted by 0.1 rad shows less of the spin by its cosine
     assert 1.0 - np.cos(0.1) <= scale.sigma < 0.01
@@ -101,6 +102,27 @@ def test_a_fit_may_scale_all_times_and_what_was_counted_follows_it():
     assert better.sd == pytest.approx(2e-5 * period.value)
     assert refined["clock.lost_rows"] == here["clock.lost_rows"]
     assert found.refined(replace(bare, parameters=(), at=np.array([]))) is found
+
+
+def test_the_fields_clock_beside_a_chips_own_is_free_and_both_periods_follow_it():
+    """Whole numbers hold one comb to the other: 0.015 % of that bent a motion by more than all that was concealed."""
+    chip = ImuClock(0.0091, 1e-6, (), False)
+    found = replace(counted(), imu=chip)
+    scale, beside, offset = found.free
+    assert (scale.key, beside.key) == (("clock.rate", "ratio"), ("mag.clock_rate", "ratio"))
+    assert offset.key == ("mag.time_offset", "offset_s")
+    # a quarter of a sample at the end of the shorter of the recordings
+    assert beside.sigma == pytest.approx(0.25 / min(shown.newest[-1] for shown in found.clock.shown), rel=0.3)
+    covariance = np.array([[4e-10, -3e-10], [-3e-10, 4e-10]])
+    at, sizes = np.array([1.001, 0.9995]), FREE_SPIN.sizes.continuous
+    fit = Fit((), (scale, beside), at, sizes, {}, covariance=covariance)
+    told = found.refined(fit)
+    assert told.clock.period_s == pytest.approx(found.clock.period_s / (1.001 * 0.9995))
+    # what the two ratios share is told better than each of them
+    assert told.clock.sd_s == pytest.approx(found.clock.period_s * np.sqrt(2e-10))
+    assert told.imu is not None
+    assert told.imu.period_s == pytest.approx(chip.period_s / 1.001)
+    assert told.imu.sd_s == pytest.approx(np.hypot(1e-6, chip.period_s * 2e-5))
 
 
 def test_the_baseline_is_charged_for_the_field_as_it_is_written():
