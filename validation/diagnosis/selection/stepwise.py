@@ -269,6 +269,9 @@ def _settled(found: Search) -> Search:
     if found.at_once:
         return found.about(found.final.fit)
     for exchanges in range(SELECTION.exchanges + 1):
+        if found.relaxed_fit.plant.weakly_identified and not lost(found, found.final):
+            # what an effect gained upon a fit that stood beside its optimum, others gain without it
+            found = replace(found, final=eliminated_backward(found, found.final))
         if (wide := widened(found, found.final)) is not found.final:
             found = _with_final(found, wide)
         found = found.about(found.final.fit)
