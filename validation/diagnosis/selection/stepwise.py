@@ -377,14 +377,17 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
         told = not distant and any(screened is hint for hint in found.hints)
         beside = np.inf if cost or told else merit_now - 0.5 * price(screened.candidate)
         beside_noise = _with_stated(current, screened) if told else current.fit.noise
-        refitted = continuous_fit(
-            fit,
-            current.hypothesis.plus(screened.candidate),
-            found.own,
-            noise if distant else beside_noise,
-            {**values_of_fit(current), **screened.start, **_wobbles(fit)},
-            bars=_hopeless(best_chi2, current.fit.count) if distant else Bars(beside),
-        )
+        bars = _hopeless(best_chi2, current.fit.count) if distant else Bars(beside)
+        refitted = _joined(found, current, screened, bars) if distant and not cost else None
+        if refitted is None:
+            refitted = continuous_fit(
+                fit,
+                current.hypothesis.plus(screened.candidate),
+                found.own,
+                noise if distant else beside_noise,
+                {**values_of_fit(current), **screened.start, **_wobbles(fit)},
+                bars=bars,
+            )
         if not distant and not cost and refitted.score > current.score + SELECTION.worse:
             refitted = _begun_again(found, current, screened, beside)
         refitted = replace(refitted, score=refitted.score + found.cost + cost)
@@ -403,6 +406,18 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
     if cost > 0:
         found = replace(found, relaxed_fit=replace(found.relaxed_fit, trajectories=fit.trajectories))
     return replace(found, cost=found.cost + cost), best
+
+
+def _joined(found: Search, current: ContinuousFit, screened: ScreenedCandidate, bars: Bars) -> ContinuousFit | None:
+    """Return a refit of a weakly identified motion from the present fit, however far; None where it comes not near.
+
+    Its segments are joined already. To join those that follow the data takes short steps, which end beside the optimum.
+    """
+    if not found.relaxed_fit.plant.weakly_identified or screened.candidate.fixed_values:
+        return None
+    start, hypothesis = from_here(screened, current).start, current.hypothesis.plus(screened.candidate)
+    fitted = continuous_fit(current.fit, hypothesis, found.own, found.relaxed_noise, start, bars=bars)
+    return None if far(found, fitted) else fitted
 
 
 def _swallowed(current: ContinuousFit, hint: ScreenedCandidate) -> bool:
