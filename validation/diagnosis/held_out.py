@@ -44,8 +44,11 @@ def choices_without_each(found: Search, less: Mapping[str, ContinuousFit]) -> li
         rivals = [rival for rival in found.rivals.get(candidate.name, ()) if possible(rival.fitted)]
         worse = [_scores_without_each(rival.fitted) - here for rival in rivals]
         for i, choice in enumerate(choices):
-            better = [(w[i], rival.candidate) for w, rival in zip(worse, rivals, strict=True)]
-            better = [(w, other) for w, other in better if takes_its_place(w, other, candidate)]
+            better = [
+                (w[i], rival.candidate)
+                for w, rival in zip(worse, rivals, strict=True)
+                if takes_its_place(w[i], rival, candidate, final)
+            ]
             if gain[i] <= price(candidate):
                 choice[candidate.name] = None
             elif better:

@@ -207,13 +207,11 @@ def refit(
     """
     linears = linearised(fit) if relinearise else fit.linears
     fit = replace(fit, linears=linears, merit=merit_of(fit, linears))
-    settled, held = False, _HELD * iterations
-    if iterations < _LONG and discontinuous(fit) and fit.plant.weakly_identified:
-        # a few steps more of a fit that held ones have brought where it is
-        held = iterations
-    else:
-        fit, settled = _iterated(fit, iterations, tolerance, bounds or {}, _FREE, bars.free)
-    if not settled and discontinuous(fit) and fit.plant.weakly_identified:
+    shorter, held = True, iterations if iterations < _LONG else _HELD * iterations
+    if iterations >= _LONG or not discontinuous(fit) or not fit.plant.weakly_identified:
+        # else these are a few steps more of a fit that held ones have brought where it is
+        fit, shorter = _iterated(fit, iterations, tolerance, bounds or {}, _FREE, bars.free)
+    if shorter and fit.plant.weakly_identified:
         # free steps hop about where the readings say little: short ones, and what held them back is not known
         fit, _ = _iterated(fit, held, tolerance, bounds or {}, _FIRST_DAMPING, min(bars))
         _, (_, covariance, _) = _solved(fit, np.full(len(fit.trajectories), _FREE))
@@ -274,22 +272,23 @@ def _iterated(
     first: float,
     bar: float = np.inf,
 ) -> tuple[Fit, bool]:
-    """Return a fit after up to so many steps, and whether no more are wanted. ``first`` is how hard they are held.
+    """Return a fit after up to so many steps, and whether shorter ones are wanted. ``first`` is how hard they are held.
 
-    Where the steps end with segments that do not are continuous though they did on the way, the best such fit counts.
+    These are where the last segments still jump that may not, or no share of a step served that promised much. The best
+    fit on the way whose segments are continuous counts where the last is none, or worse; short steps go on from there.
     """
     damping = np.full(len(fit.trajectories), first)
     closed: Fit | None = None
-    settled, stuck, hops = False, 0, 0
+    settled, refused, stuck, hops = False, False, 0, 0
     for done in range(iterations):
         reduced, (step, covariance, expected) = _solved(fit, damping)
         fit = replace(fit, covariance=covariance)
         if done >= _LOOKED and expected > bar:
-            return fit, True
+            return fit, False
         closed = _better_continuous(closed, fit)
         least = max(tolerance, 1e-7 * fit.merit)
         if fit.merit - expected < least and not discontinuous(fit):
-            return fit, True
+            return fit, False
         going = GaussNewtonStep(fit, reduced, step, bounds, expected)
         if first > _FREE:
             better, rose = going.with_own_fractions()
@@ -299,11 +298,15 @@ def _iterated(
         else:
             better = going.with_one_fraction()
             hops = hops + 1 if better is not None and _hopped(fit, better) else 0
+        refused = better is None and fit.merit - expected > CHORD
         settled = better is None or (not discontinuous(fit) and fit.merit - better.merit < least)
         fit = better or fit
         if settled or stuck == _STUCK or hops == _HOPS:
             break
-    return (closed if closed is not None and discontinuous(fit) else fit), settled
+    apart = discontinuous(fit)
+    if closed is not None and (apart or closed.merit < fit.merit):
+        fit = closed
+    return fit, refused or (apart and not settled)
 
 
 def _hopped(fit: Fit, better: Fit) -> bool:

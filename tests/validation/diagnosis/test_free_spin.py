@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
-from support.made import DRIVER, FIELD, MODULE, flight, release_of, rows_of
+from support.made import DRIVER, FIELD, MODULE, flight, release_of, rows_of, throws
 
 from discsim.arrays import FloatArray
 from discsim.disc import Release
@@ -16,10 +17,13 @@ from discsim.recording import Recording
 from discsim.sensors import record
 from discsim.shipped import load_disc
 from discsim.validation.diagnosis.relaxed_fit import first_trajectory, relaxed, unknowns
+from discsim.validation.diagnosis.selection import stepwise
+from discsim.validation.diagnosis.selection.candidates import free_candidate
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
-from discsim.validation.diagnosis.selection.search_state import possible
-from discsim.validation.identification.gauss_newton import Fit, GaussNewtonStep, linearised, linearised_columns
+from discsim.validation.diagnosis.selection.score_tests import hinted
+from discsim.validation.diagnosis.selection.search_state import possible, values_of_fit
+from discsim.validation.identification.gauss_newton import NO_BARS, Fit, GaussNewtonStep, linearised, linearised_columns
 from discsim.validation.identification.noise import estimate_noise, stated_noise, whitened
 from discsim.validation.identification.normal_equations import reduce
 from discsim.validation.identification.parameters import AllowedDefects, Parameter
@@ -167,3 +171,41 @@ def going(fit: Fit, too_far: float) -> GaussNewtonStep:
     ]
     reduced[0] = replace(reduced[0], cross=too_far * reduced[0].cross)
     return GaussNewtonStep(fit, reduced, np.empty(0), {}, fit.merit)
+
+
+@cache
+def biased() -> stepwise.Search:
+    """Return where a search begins in two free spins whose gyroscope has a bias of twenty times its noise."""
+    bias = effect("gyro.bias", bx_rad_s=0.05, by_rad_s=-0.03, bz_rad_s=0.02)
+    return stepwise.screened(throws([], [bias], module=BLIND, plant="free_spin"))
+
+
+def fitted_with(*ids: str) -> ContinuousFit:
+    """Return the fit of effects from where the baseline of these has ended."""
+    base = biased().base
+    hypothesis = Hypothesis(tuple(free_candidate(id) for id in ids))
+    return continuous_fit(base.fit, hypothesis, biased().own, biased().relaxed_noise, values_of_fit(base))
+
+
+def test_a_fit_goes_on_from_segments_that_a_whole_step_would_part():
+    """A whole step parts them for good; the fit stayed where it was then, without the effect."""
+    with_bias = fitted_with("gyro.bias")
+    assert biased().base.score - with_bias.score > 1000.0
+    at = {q.name: v for q, v in zip(with_bias.fit.parameters, with_bias.fit.at, strict=True) if q.group == "gyro.bias"}
+    assert at["bx_rad_s"] == pytest.approx(0.05, abs=2e-3)
+    assert at["by_rad_s"] == pytest.approx(-0.03, abs=2e-3)
+    assert at["bz_rad_s"] == pytest.approx(0.02, abs=2e-3)
+
+
+def test_what_gained_only_by_where_the_fit_before_it_stood_is_named_no_more(monkeypatch):
+    monkeypatch.setattr(stepwise, "rivals_of", lambda _: {})
+    final = fitted_with("gyro.bias", "accel.bias")
+    (left,) = stepwise._settled(replace(biased(), final=final)).final.hypothesis.candidates
+    assert left.id == "gyro.bias"
+
+
+@pytest.mark.parametrize(("id", "near"), [("gyro.bias", True), ("mag.hard_iron", False)])
+def test_far_from_the_data_a_refit_begins_with_segments_that_are_joined_and_counts_where_it_comes_near(id, near):
+    far_away = hinted(effect(id))
+    fitted = stepwise._joined(biased(), biased().base, far_away, NO_BARS)
+    assert (fitted is not None) is near

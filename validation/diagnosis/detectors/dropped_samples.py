@@ -5,7 +5,7 @@ Takes a relaxed fit; gives candidates with trajectories in the time that the cou
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,7 +33,7 @@ from discsim.validation.identification.readings import Readings
 from discsim.validation.identification.segments import Trajectory, resegmented
 from discsim.validation.identification.sensor_model import Values
 
-__all__ = ["LostSamples", "Shifted", "dropped_accelerometer", "dropped_magnetometer", "loses_samples"]
+__all__ = ["LostSamples", "Shifted", "dropped_accelerometer", "dropped_magnetometer", "loses_samples", "recounted"]
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,10 @@ class Shifted:
     screened: ScreenedCandidate
     trajectories: tuple[Trajectory, ...]
     cost: float = 0.0
+
+
+def _id_of(sensor: str) -> str:
+    return catalogued(DroppedSamples, sensor).id
 
 
 def _losses(id: str, trajectories: Sequence[Trajectory], sensor: str) -> tuple[CandidateEffect, float]:
@@ -74,12 +78,18 @@ class LostSamples:
     fit: Fit | None = None
     found: tuple[Shifted, ...] = ()
 
-    def about(self, fit: Fit, known: Sequence[Parameter], noise: Callable[[], NoiseModel]) -> LostSamples:
-        """Return what is found about a fit with its noise, which is worked out once: it takes fits of its own."""
+    def about(
+        self, fit: Fit, known: Sequence[Parameter], noise: Callable[[], NoiseModel], taken: Collection[str] = ()
+    ) -> LostSamples:
+        """Return what is found about a fit with its noise, which is worked out once: it takes fits of its own.
+
+        ``taken`` are the ids of effects that the fit has counted already.
+        """
         if self.fit is fit:
             return self
-        found = dropped_magnetometer(fit, known)
-        if fit.plant.path_known:  # else an accelerometer counts by its means over turns
+        found = [] if _id_of("magnetometer") in taken else dropped_magnetometer(fit, known)
+        # of a path that is not known an accelerometer counts by its means over turns
+        if fit.plant.path_known and _id_of("accelerometer") not in taken:
             found += dropped_accelerometer(fit, noise())
         return LostSamples(fit, tuple(found))
 
@@ -92,7 +102,7 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = DE
     """
     trajectories = fit.trajectories
     sensor = "magnetometer"
-    id = catalogued(DroppedSamples, sensor).id
+    id = _id_of(sensor)
     counts = [
         phase_counts(trajectory.recording) if trajectory.recording.get(sensor) is not None else np.zeros(0)
         for trajectory in trajectories
@@ -178,7 +188,7 @@ _ANY = 100.0
 def dropped_accelerometer(fit: Fit, noise: NoiseModel, least: float = DETECTORS.least_dropped) -> list[Shifted]:
     """Return lost samples of the accelerometer as a screened candidate where the motion tells of them."""
     sensor = "accelerometer"
-    id = catalogued(DroppedSamples, sensor).id
+    id = _id_of(sensor)
     if sensor not in {r.sensor for trajectory in fit.trajectories for r in trajectory.readings}:
         return []
     if sensor not in noise:  # all of its readings are beyond its range, and none takes part
@@ -213,6 +223,23 @@ def dropped_accelerometer(fit: Fit, noise: NoiseModel, least: float = DETECTORS.
     if candidate.fixed_values[0][1] == 0.0:
         return []
     return [Shifted(ScreenedCandidate(candidate, gain, {}), whole.trajectories, cost)]
+
+
+def recounted(fit: Fit) -> tuple[Shifted, float] | None:
+    """Return the losses of an accelerometer by the motion of a fit that has some; None where they are as before.
+
+    Beside them stands by how much their price grows. What was missing when they were counted had bent the motion.
+    """
+    sensor = "accelerometer"
+    if all(sensor not in trajectory.lost for trajectory in fit.trajectories):
+        return None
+    whole, gain, _ = _counted_in_own_noise(fit, sensor, fit.noise)
+    counts = [[t.lost[sensor] for t in some.trajectories if sensor in t.lost] for some in (fit, whole)]
+    if all(np.array_equal(a, b) for a, b in zip(*counts, strict=True)):
+        return None
+    _, was = _losses(_id_of(sensor), fit.trajectories, sensor)
+    candidate, cost = _losses(_id_of(sensor), whole.trajectories, sensor)
+    return Shifted(ScreenedCandidate(candidate, gain, {}), whole.trajectories, cost), cost - was
 
 
 def _counted_in_own_noise(fit: Fit, sensor: str, noise: NoiseModel) -> tuple[Fit, float, float]:

@@ -15,7 +15,8 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import ClockRate
 from discsim.validation.diagnosis.relaxed_fit import beginning
-from discsim.validation.diagnosis.selection.evidence import BOUNDS
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
+from discsim.validation.diagnosis.selection.evidence import BOUNDS, charge
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
 from discsim.validation.identification.from_afar import fitted_from_afar
 from discsim.validation.identification.gauss_newton import NO_BARS, Bars, Fit, penalty_of, refit
@@ -38,6 +39,28 @@ class ContinuousFit:
     fit: Fit
     score: float
     residuals: tuple[FloatArray, ...] = field(default_factory=tuple)
+
+    def told(self, candidate: CandidateEffect) -> int:
+        """Return how many of a candidate's parameters the readings tell, at least one; all where that is not known.
+
+        A parameter is told where readings leave less than half of the variance that it had beforehand: else more than
+        half of it is the prior's (the number of well-determined parameters: D. MacKay, Neural Computation 4, 1992, p.
+        415). A gyroscope on a rig has rates about one axis, and three scales. What shapes an effect counts in any case.
+        """
+        sizes = {q.key for q in parameters_of(candidate, shaped=False)}
+        count = len(parameters_of(candidate))
+        if self.fit.covariance.shape[0] != len(self.fit.parameters):
+            return count
+        untold = sum(
+            q.key in sizes and q.recordings == candidate.recordings and bool(variance > 0.5 * q.sigma**2)
+            for q, variance in zip(self.fit.parameters, np.diag(self.fit.covariance), strict=True)
+        )
+        return max(count - untold, 1)
+
+    @property
+    def charged(self) -> float:
+        """What its effects are charged for the parameters that the readings tell, and for being unusual."""
+        return sum(charge(candidate, self.told(candidate)) for candidate in self.hypothesis.candidates)
 
 
 def continuous_fit(

@@ -40,12 +40,15 @@ TURNED = frozenset(row.id for row in MOUNTS if row.acts_on != "accelerometer")
 MISTIMED = frozenset(row.id for row in CATALOGUE.values() if row.type is TimeOffset)
 
 
-def charge(candidate: CandidateEffect) -> float:
-    """Return what an effect is charged where it stands against others: its parameters, and that it is unusual."""
+def charge(candidate: CandidateEffect, told: int | None = None) -> float:
+    """Return what an effect is charged where it stands against others: its parameters, and that it is unusual.
+
+    ``told`` is how many of its parameters the readings tell, all by default: one that no reading shows serves none.
+    """
     # a turn about the axis of spin stands in for an offset, too: it stays as far behind that as behind anything else
     unusual = SELECTION.mistimed if candidate.id in MISTIMED | TURNED else 0.0
     unusual += SELECTION.turned if candidate.id in TURNED else 0.0
-    return SELECTION.rival * len(parameters_of(candidate)) + unusual
+    return SELECTION.rival * (len(parameters_of(candidate)) if told is None else told) + unusual
 
 
 #: a turned sensor -> the cross-axis error that holds it: a small turn is one whose numbers are opposite in pairs
@@ -57,15 +60,17 @@ NESTED: Mapping[str, str] = {
 }
 
 
-def lead(rival: CandidateEffect, candidate: CandidateEffect) -> float:
-    """Return by how much more a rival is charged than an effect.
+def lead(
+    rival: CandidateEffect, candidate: CandidateEffect, rival_told: int | None = None, told: int | None = None
+) -> float:
+    """Return by how much more a rival is charged than an effect, each for what readings tell of it, as in `charge`.
 
     Of nested effects the simpler one is named: six numbers that are opposite in pairs are no chance, however unusual a
     turn is.
     """
     if NESTED.get(rival.id) == candidate.id:
         return SELECTION.rival * (len(parameters_of(rival)) - len(parameters_of(candidate)))
-    return charge(rival) - charge(candidate)
+    return charge(rival, rival_told) - charge(candidate, told)
 
 
 def price(candidate: CandidateEffect) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.evidence import lead, price
 from discsim.validation.diagnosis.selection.hypothesis import fitted_parameters
@@ -133,15 +133,18 @@ def rivals_of(found: Search) -> dict[str, list[Rival]]:
     return rivals
 
 
-def _merit(worse: float, rival: CandidateEffect, candidate: CandidateEffect) -> float:
-    """Return by how much a rival's score is worse than that of an effect, each charged for its parameters."""
-    return worse + lead(rival, candidate)
+def _merit(worse: float, rival: Rival, candidate: CandidateEffect, final: ContinuousFit) -> float:
+    """Return by how much a rival's score is worse than that of an effect, each charged for what readings tell of it."""
+    return worse + lead(rival.candidate, candidate, rival.fitted.told(rival.candidate), final.told(candidate))
 
 
-def takes_its_place(worse: float, rival: CandidateEffect, candidate: CandidateEffect) -> bool:
-    """Tell whether a rival explains more for its parameters than an effect, whose score it is ``worse`` than."""
-    simpler = len(parameters_of(rival)) < len(parameters_of(candidate))
-    return _merit(worse, rival, candidate) < -(SELECTION.simpler if simpler else SELECTION.better)
+def takes_its_place(worse: float, rival: Rival, candidate: CandidateEffect, final: ContinuousFit) -> bool:
+    """Tell whether a rival explains more for its parameters than an effect of a fit, whose score it is ``worse`` than.
+
+    What counts is the parameters that readings tell.
+    """
+    simpler = rival.fitted.told(rival.candidate) < final.told(candidate)
+    return _merit(worse, rival, candidate, final) < -(SELECTION.simpler if simpler else SELECTION.better)
 
 
 def exchanged(found: Search) -> ContinuousFit | None:
@@ -156,8 +159,8 @@ def exchanged(found: Search) -> ContinuousFit | None:
         for rival in found.rivals.get(candidate.name, []):
             if not possible(rival.fitted):
                 continue
-            if takes_its_place(rival.worse, rival.candidate, candidate):
-                better.append((_merit(rival.worse, rival.candidate, candidate), rival.fitted))
+            if takes_its_place(rival.worse, rival, candidate, found.final):
+                better.append((_merit(rival.worse, rival, candidate, found.final), rival.fitted))
             elif size > 1 and rival.worse < SELECTION.better:
                 fewer = eliminated_backward(found, rival.fitted, kept=rival.candidate)
                 merit = fewer.score - found.final.score + SELECTION.rival * (fewer.hypothesis.size - size)

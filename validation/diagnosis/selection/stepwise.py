@@ -16,11 +16,11 @@ import numpy as np
 
 from discsim.effects import Effect
 from discsim.effects.catalogue import catalogued
-from discsim.effects.sensors import Lag
+from discsim.effects.sensors import DroppedSamples, Lag
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.followed import true_noise
 from discsim.validation.diagnosis.detectors.all import searched
-from discsim.validation.diagnosis.detectors.dropped_samples import Shifted
+from discsim.validation.diagnosis.detectors.dropped_samples import Shifted, recounted
 from discsim.validation.diagnosis.relaxed_fit import clock_of_accelerometer, relaxed, unknowns, without_outliers
 from discsim.validation.diagnosis.selection.all_at_once import all_at_once
 from discsim.validation.diagnosis.selection.candidates import (
@@ -71,6 +71,7 @@ Report: TypeAlias = Callable[[str, int, int], None]
 #: what is proposed, the fit whose motion a fit of it starts from, and what choosing lost samples costs
 Offer: TypeAlias = tuple[ScreenedCandidate, Fit, float]
 
+_LOST = catalogued(DroppedSamples, "accelerometer").id
 #: the lag that holds what was there before a recording began
 _HELD = catalogued(Lag, "accelerometer").id
 
@@ -203,6 +204,7 @@ def _selected_forward(found: Search) -> Search:
                 continue
         if better is None or len(better.hypothesis.candidates) > _most(better, most):
             break
+        found, better = _recounted(found, better)
         if step == 0 and far(found, better) and not _told(better) and no_nearer(found, current, better):
             # neither one effect nor two come near the data, nor does any lead there
             return replace(found, final=better)
@@ -268,6 +270,9 @@ def _settled(found: Search) -> Search:
     if found.at_once:
         return found.about(found.final.fit)
     for exchanges in range(SELECTION.exchanges + 1):
+        if found.relaxed_fit.plant.weakly_identified and not lost(found, found.final):
+            # what an effect gained upon a fit that stood beside its optimum, others gain without it
+            found = replace(found, final=eliminated_backward(found, found.final))
         if (wide := widened(found, found.final)) is not found.final:
             found = _with_final(found, wide)
         found = found.about(found.final.fit)
@@ -327,7 +332,7 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
                 screened_candidates(found.equations, found.candidates, current.hypothesis, found.own)
             )
         ]
-    found = _with_lost_samples(found)
+    found = _with_lost_samples(found, current)
     for item in searched(found.relaxed_fit, current, found.own, _steady_noise(found), found.lost_samples.found):
         if isinstance(item, Shifted):
             there.append((item.screened, replace(found.relaxed_fit, trajectories=item.trajectories), item.cost))
@@ -373,14 +378,17 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
         told = not distant and any(screened is hint for hint in found.hints)
         beside = np.inf if cost or told else merit_now - 0.5 * price(screened.candidate)
         beside_noise = _with_stated(current, screened) if told else current.fit.noise
-        refitted = continuous_fit(
-            fit,
-            current.hypothesis.plus(screened.candidate),
-            found.own,
-            noise if distant else beside_noise,
-            {**values_of_fit(current), **screened.start, **_wobbles(fit)},
-            bars=_hopeless(best_chi2, current.fit.count) if distant else Bars(beside),
-        )
+        bars = _hopeless(best_chi2, current.fit.count) if distant else Bars(beside)
+        refitted = _joined(found, current, screened, bars) if distant and not cost else None
+        if refitted is None:
+            refitted = continuous_fit(
+                fit,
+                current.hypothesis.plus(screened.candidate),
+                found.own,
+                noise if distant else beside_noise,
+                {**values_of_fit(current), **screened.start, **_wobbles(fit)},
+                bars=bars,
+            )
         if not distant and not cost and refitted.score > current.score + SELECTION.worse:
             refitted = _begun_again(found, current, screened, beside)
         refitted = replace(refitted, score=refitted.score + found.cost + cost)
@@ -388,7 +396,7 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
         gain, chi2 = found.considered[-1].gain, chi2_in(refitted, noise)
         if gain > price(screened.candidate) and possible(refitted):
             # far from the data chi-squared says more than a likelihood that has swallowed the mismatch as noise
-            merit = (chi2 + cost if distant else refitted.score) + sum(map(charge, refitted.hypothesis.candidates))
+            merit = (chi2 + cost if distant else refitted.score) + refitted.charged
             merit -= SELECTION.right_sign * any(q.key in ONE_SIDED for q in parameters_of(screened.candidate))
             fits.append((merit, refitted, fit, cost))
             best_chi2 = min(best_chi2, chi2)
@@ -399,6 +407,18 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
     if cost > 0:
         found = replace(found, relaxed_fit=replace(found.relaxed_fit, trajectories=fit.trajectories))
     return replace(found, cost=found.cost + cost), best
+
+
+def _joined(found: Search, current: ContinuousFit, screened: ScreenedCandidate, bars: Bars) -> ContinuousFit | None:
+    """Return a refit of a weakly identified motion from the present fit, however far; None where it comes not near.
+
+    Its segments are joined already. To join those that follow the data takes short steps, which end beside the optimum.
+    """
+    if not found.relaxed_fit.plant.weakly_identified or screened.candidate.fixed_values:
+        return None
+    start, hypothesis = from_here(screened, current).start, current.hypothesis.plus(screened.candidate)
+    fitted = continuous_fit(current.fit, hypothesis, found.own, found.relaxed_noise, start, bars=bars)
+    return None if far(found, fitted) else fitted
 
 
 def _swallowed(current: ContinuousFit, hint: ScreenedCandidate) -> bool:
@@ -492,11 +512,41 @@ def _together(found: Search) -> tuple[Search, ContinuousFit | None]:
     return found, None
 
 
-def _with_lost_samples(found: Search) -> Search:
-    """Return a search that knows what samples were lost as its relaxed fit tells them."""
+def _with_lost_samples(found: Search, current: ContinuousFit) -> Search:
+    """Return a search that knows what samples were lost as its relaxed fit tells them, but for those that are taken."""
     known = [q for q in found.own if q.key not in found.relaxed_fit.plant.own_keys]
-    lost = found.lost_samples.about(found.relaxed_fit, known, lambda: _steady_noise(found))
+    taken = {candidate.id for candidate in current.hypothesis.candidates}
+    lost = found.lost_samples.about(found.relaxed_fit, known, lambda: _steady_noise(found), taken)
     return replace(found, lost_samples=lost)
+
+
+#: most rounds in which counts of lost samples and the motion better one another
+_RECOUNTS = 6
+
+
+def _recounted(found: Search, current: ContinuousFit) -> tuple[Search, ContinuousFit]:
+    """Return a search and its fit with an accelerometer's losses counted anew, where an effect since bettered them."""
+    if all(candidate.id != _LOST for candidate in current.hypothesis.candidates[:-1]):
+        return found, current
+    for _ in range(_RECOUNTS):
+        again = recounted(current.fit)
+        if again is None:
+            break
+        shifted, dearer = again
+        candidates = current.hypothesis.candidates
+        hypothesis = Hypothesis(tuple(shifted.screened.candidate if c.id == _LOST else c for c in candidates))
+        start = replace(current.fit, trajectories=shifted.trajectories)
+        fitted = continuous_fit(start, hypothesis, found.own, current.fit.noise, values_of_fit(current))
+        fitted = replace(fitted, score=fitted.score + found.cost + dearer)
+        if not fitted.score < current.score:
+            break
+        trajectories = tuple(
+            replace(one, lost={**one.lost, **other.lost})
+            for one, other in zip(found.relaxed_fit.trajectories, shifted.trajectories, strict=True)
+        )
+        relaxed_fit = replace(found.relaxed_fit, trajectories=trajectories)
+        found, current = replace(found, relaxed_fit=relaxed_fit, cost=found.cost + dearer), fitted
+    return found, current
 
 
 def _steady_noise(found: Search) -> NoiseModel:

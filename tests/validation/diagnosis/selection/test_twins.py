@@ -1,9 +1,18 @@
 """Effects that recordings hardly tell apart: which of them is named."""
 
-import pytest
+from functools import cache
 
+import numpy as np
+import pytest
+from support.made import FIELD, RIG
+
+from discsim.effects import effect
+from discsim.recording import Recording
+from discsim.rig import spin_down
+from discsim.sensors import Instruments, record
 from discsim.validation.diagnosis.selection.candidates import free_candidate
 from discsim.validation.diagnosis.selection.evidence import charge
+from discsim.validation.diagnosis.selection.stepwise import Search, search
 
 
 @pytest.mark.parametrize("sensor", ["mag", "accel", "gyro"])
@@ -15,3 +24,41 @@ def test_an_offset_of_time_is_named_before_a_lag_only_where_it_explains_clearly_
     """
     score = {"lag": 0.0, "time_offset": -better}
     assert min(score, key=lambda what: score[what] + charge(free_candidate(f"{sensor}.{what}"))) == named
+
+
+def coasts_with_gyroscope() -> list[Recording]:
+    """Return run-downs of a rig with viscous friction alone, whose gyroscope reads 0.3 % too little, unclipped."""
+    module = Instruments.from_parts("mpu9250").with_effects([effect("gyro.scale", sz=-0.003)])
+    return [
+        record(
+            spin_down(RIG, FIELD, rate, 4.0, yaw=0.5 + k),
+            module,
+            np.random.default_rng(50 + k),
+            plant="spin_down",
+            name=f"run-{k}",
+            rig=RIG,
+        )
+        for k, rate in enumerate((30.0, 15.0))
+    ]
+
+
+@cache
+def coasted() -> Search:
+    return search(coasts_with_gyroscope())
+
+
+def test_what_decays_in_proportion_to_itself_is_read_at_a_wrong_scale_rather_than_late():
+    """Late by 80 ms or too small by 0.3 %: no reading tells, and few loggers write wrong times."""
+    (named,) = coasted().final.hypothesis.candidates
+    assert named.id == "gyro.scale"
+    late = {rival.candidate.id: rival.worse for rival in coasted().rivals[named.name]}
+    assert abs(late["gyro.time_offset"]) < 1.0
+
+
+def test_a_parameter_that_no_reading_shows_is_not_charged():
+    """On a rig a gyroscope turns about one axis."""
+    final = coasted().final
+    (named,) = final.hypothesis.candidates
+    assert len(named.columns) == 3
+    assert final.told(named) == 1
+    assert final.charged == charge(named, 1) < charge(free_candidate("gyro.time_offset")) < charge(named)
