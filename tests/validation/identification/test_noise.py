@@ -177,6 +177,16 @@ def test_slow_noise_under_white_noise_is_told_by_its_likelihood(memory: float):
     assert np.mean([noise.sd for noise in found]) == pytest.approx(1.0, abs=0.05)
 
 
+def test_noise_that_seems_all_slow_may_have_a_white_part():
+    """A first look has all of it correlated, by the first lag alone: a likelihood with one number more tells."""
+    linear, residual = slow(3, 12.0)
+    model = {"gyroscope": GroupNoise(1.0, 0.6)}
+    found = likeliest_noise([linear], [residual], model)["gyroscope"]
+    assert found.share == pytest.approx(0.64, abs=0.05)
+    whole = coloured(np.random.default_rng(4), 9000, 1.0, 0.6)
+    assert likeliest_noise([rows(("gyroscope", 9000))], [whole], model)["gyroscope"].share == 1.0
+
+
 def test_a_constant_gains_no_more_than_chance_in_slow_noise():
     """Three numbers that are not there gain what chi-squared of three degrees of freedom does."""
     gains = []

@@ -36,6 +36,8 @@ MOST = 4
 LATEST, PHASE_STEP = 0.15, 0.25
 #: lags that are tried as rivals, as phases, rad; clocks are tried as far as a relaxed fit lets one go
 LAGS = np.array([0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.2, 3.3, 5.0, 8.0])
+#: largest share of samples lost that is tried as a rival: a fifth above the one in twenty that cases conceal at most
+MOST_LOST = 0.06
 #: a board nearer to a right angle than this (root sum of squares of the matrix) stands at it
 SNAP = 0.15
 #: what a statement costs that a hypothesis takes back (as readings that clip become gaps in a turned board): half of
@@ -256,40 +258,27 @@ def _rivals(base: _Base) -> Iterator[Hypothesis]:
         return
     fastest = max(float(np.nanmax(np.abs(one.rate))) for one in base.signals)
     longest = max(float(one.grid[-1]) for one in base.signals)
+    step = PHASE_STEP / (fastest * longest)
+
+    def tried(sensor: str, kind: str, sizes: Sequence[float]) -> list[Hypothesis]:
+        columns = [Columns({}, {}, None, {f"{sensor}.{kind}": size}) for size in sizes]
+        return [Hypothesis("rival", sensor, each, *misfit(base.signals, each), 6.0) for each in columns]
+
+    least = int(RELAXED_FIT.clock_sigma / step)
     for sensor in _shifting(base):
-        step = PHASE_STEP / (fastest * longest)
-        count = int(RELAXED_FIT.clock_sigma / step)
-        sizes = {
-            "lag": LAGS / fastest,
-            "clock": step * np.arange(-count, count + 1),
-        }
-        for kind, tried in sizes.items():
-            found = []
-            for size in tried.tolist():
-                columns = Columns({}, {}, None, {f"{sensor}.{kind}": size})
-                found.append(Hypothesis("rival", sensor, columns, *misfit(base.signals, columns), 6.0))
-            yield min(found, key=lambda item: item.cost)
-            if kind == "clock":
-                yield _losses(sensor, found)
+        yield min(tried(sensor, "lag", (LAGS / fastest).tolist()), key=lambda item: item.cost)
+        clocks = tried(sensor, "clock", (step * np.arange(-int(MOST_LOST / step), least + 1)).tolist())
+        yield min(clocks[-(2 * least + 1) :], key=lambda item: item.cost)
+        yield _losses(sensor, clocks[: len(clocks) - least])
 
 
 def _losses(sensor: str, clocks: Sequence[Hypothesis]) -> Hypothesis:
-    """Return what lost samples leave of clocks of one sensor: the best in each recording that runs ever later."""
-    name = f"{sensor}.clock"
-    later = [item for item in clocks if item.columns.rival[name] <= 0.0]
-    best = np.argmin([item.costs for item in later], axis=0)
-    costs = np.array([later[k].costs[i] for i, k in enumerate(best)])
-    size = float(np.median([later[k].columns.rival[name] for k in best]))
-    worst = max(later[k].worst for k in best)
-    return Hypothesis(
-        "rival",
-        sensor,
-        Columns({}, {}, None, {f"{sensor}.losses": size}),
-        costs,
-        later[0].weight,
-        worst,
-        6.0 * best.size,
-    )
+    """Return what lost samples leave of clocks of one sensor: the best in each recording, each with a price."""
+    best = [clocks[k] for k in np.argmin([item.costs for item in clocks], axis=0)]
+    costs = np.array([item.costs[i] for i, item in enumerate(best)])
+    size = float(np.median([item.columns.rival[f"{sensor}.clock"] for item in best]))
+    columns, worst = Columns({}, {}, None, {f"{sensor}.losses": size}), max(item.worst for item in best)
+    return Hypothesis("rival", sensor, columns, costs, best[0].weight, worst, len(best) * best[0].size)
 
 
 #: what f . m leaves on sound throws, times the field's size, m/s^2; how far a field may be from the stated one, as a

@@ -17,11 +17,16 @@ from discsim.rig import turn_table
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
 from discsim.validation.diagnosis.detectors import dropped_samples
-from discsim.validation.diagnosis.detectors.dropped_samples import dropped_accelerometer
+from discsim.validation.diagnosis.detectors.dropped_samples import dropped_accelerometer, recounted
 from discsim.validation.diagnosis.detectors.events import events
 from discsim.validation.diagnosis.detectors.gusts import gusts
 from discsim.validation.diagnosis.detectors.local_problem import LocalProblems, local_problems
-from discsim.validation.diagnosis.detectors.sample_alignment import phase_counts, viterbi_counts
+from discsim.validation.diagnosis.detectors.sample_alignment import (
+    Alignment,
+    lost_in_own_noise,
+    phase_counts,
+    viterbi_counts,
+)
 from discsim.validation.diagnosis.detectors.saturation import saturation
 from discsim.validation.diagnosis.detectors.speed_ripple import ripple
 from discsim.validation.diagnosis.detectors.time_offsets import time_offsets
@@ -165,6 +170,58 @@ def test_lost_samples_of_the_accelerometer_are_counted_by_the_motion_of_the_othe
     ((name, share, sd),) = found.screened.candidate.fixed_values
     assert name == "fraction"
     assert share == pytest.approx(0.02, abs=4.0 * sd)
+
+
+@cache
+def lost_in_other_air() -> tuple[Fit, list[dropped_samples.Shifted]]:
+    """Two throws in air that is thinner than stated, whose accelerometer lost samples, and what is found of them."""
+    air, lost = effect("air.density", ratio=0.93), effect("accel.dropped_samples", fraction=0.03)
+    motions = [flight(air, heading=heading) for heading in (0.5, -0.8)]
+    fit = relaxed([measured(motion, lost, seed=seed) for seed, motion in enumerate(motions, 1)])
+    return fit, dropped_accelerometer(fit, shown_noise(fit))
+
+
+def test_lost_samples_are_counted_where_the_air_is_thinner_than_stated() -> None:
+    """What the motion then tells of an accelerometer is off by many times its noise, and so is that noise."""
+    _, (found,) = lost_in_other_air()
+    for trajectory in found.trajectories:
+        own, gyroscope = (trajectory.recording.samples[sensor] for sensor in ("accelerometer", "gyroscope"))
+        rate_hz = trajectory.recording.sheets["accelerometer"].rate_hz
+        missing = round((gyroscope.t[-1] - own.t[-1]) * rate_hz)
+        assert missing > 3
+        assert trajectory.lost["accelerometer"][-1] == pytest.approx(missing, abs=1)
+
+
+def test_counts_that_are_right_stay_and_others_are_mended_by_the_motion() -> None:
+    fit, (found,) = lost_in_other_air()
+    right = replace(fit, trajectories=found.trajectories)
+    early = tuple(
+        replace(one, lost={"accelerometer": np.minimum(one.lost["accelerometer"] + 1.0, one.lost["accelerometer"][-1])})
+        for one in found.trajectories
+    )
+    anew = recounted(replace(right, trajectories=early))
+    assert anew is not None
+    for trajectory, own, wrong in zip(anew[0].trajectories, found.trajectories, early, strict=True):
+        counts, truth, bent = (one.lost["accelerometer"] for one in (trajectory, own, wrong))
+        assert np.mean(counts != truth) < 0.1 * np.mean(bent != truth)
+    assert recounted(relaxed_fit()) is None
+
+
+def test_a_motion_that_is_known_to_a_line_tells_what_was_lost_and_the_noise() -> None:
+    rng = np.random.default_rng(3)
+    turned = 2.0 * np.pi * np.arange(330.0)[:, None] / 17.0 + np.array([0.0, 1.6])
+    motion = np.column_stack([np.sin(turned), 0.01 * np.arange(330.0)])
+    lost = np.repeat([0, 1, 2, 4], [60, 90, 70, 80])
+    place = np.arange(lost.size)
+    measured = 0.9 * motion[place + lost] + np.array([3.0, -1.0, 0.5]) + 0.05 * rng.standard_normal((lost.size, 3))
+    own = Alignment(measured, motion, place, most=20, missing=21)
+    found = lost_in_own_noise(own, np.full(3, 0.02), np.full(3, 2.0))
+    assert np.count_nonzero(found.counts != lost) <= 3
+    assert found.noise == pytest.approx(np.full(3, 0.05), rel=0.2)
+    assert found.gain > 1000.0
+    sound = lost_in_own_noise(replace(own, measured=measured[:60], place=place[:60]), np.full(3, 0.02), np.full(3, 2.0))
+    assert sound.counts[-1] == 0.0
+    assert sound.gain == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("ratio", [1.015, 0.985])

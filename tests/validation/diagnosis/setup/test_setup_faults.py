@@ -18,6 +18,9 @@ from discsim.validation.checking.checked import check
 from discsim.validation.diagnosis.selection.candidates import available, candidates_for, parameters_of
 from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, suspected_fault
+from discsim.validation.diagnosis.setup.find import _may_be_physics
+from discsim.validation.diagnosis.setup.hypotheses import Hypothesis, hypotheses
+from discsim.validation.diagnosis.setup.relations import Columns
 from discsim.validation.diagnosis.setup_effects import with_reversed_axes
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.parameters import AllowedDefects, Parameter
@@ -138,3 +141,36 @@ def test_a_scale_that_is_nearer_to_no_reading_than_to_a_reversed_one_is_none(sca
     parameter = Parameter("gyro.scale", "sx", 0.0, 1e-3, 20.0)
     fit = Fit((), (parameter,), np.array([scale]), AllowedDefects(np.zeros(2)), {}, covariance=np.array([[4e-4]]))
     assert (with_reversed_axes(SetupFindings((), tuple(tables())), fit) is not None) == reversed
+
+
+@pytest.mark.parametrize("what", ["clock", "losses", "lag"])
+def test_a_shift_of_times_that_physics_explains_as_well_is_left_to_fits(what: str):
+    shift = Hypothesis(
+        "offset", "accelerometer", Columns({}, {"accelerometer": 0.02}), np.array([30.0, 34.5]), 290.0, 1.3, 6.0
+    )
+    rival = Hypothesis(
+        "rival",
+        "accelerometer",
+        Columns({}, {}, None, {f"accelerometer.{what}": 0.01}),
+        np.array([28.0, 31.9]),
+        290.0,
+        1.4,
+        18.0,
+    )
+    assert _may_be_physics(shift, [rival])
+    assert not _may_be_physics(shift, [replace(rival, sensor="gyroscope")])
+    assert not _may_be_physics(shift, [replace(rival, costs=rival.costs + 5.0)])
+    assert not _may_be_physics(replace(shift, kind="axes"), [rival])
+
+
+def test_lost_samples_in_each_throw_are_a_rival_of_a_shift_of_times():
+    """Each throw has lost another share: one clock for all leaves more than its own course in each."""
+    shares = (0.005, 0.035)
+    made = [throws(errors=[effect("accel.dropped_samples", fraction=share)], seconds=3.0) for share in shares]
+    rivals = [item for item in hypotheses([one[k] for k, one in enumerate(made)]).found if item.kind == "rival"]
+    cost = {next(iter(item.columns.rival)): item.cost for item in rivals}
+    sound = hypotheses(throws(seconds=3.0), 30.0)
+    assert sound.as_written is not None
+    assert sound.found == ()
+    beyond = {name: each - sound.as_written.cost for name, each in cost.items()}
+    assert beyond["accelerometer.losses"] < 0.5 * min(beyond["accelerometer.clock"], beyond["accelerometer.lag"])
