@@ -180,6 +180,10 @@ class Selection:
     doubtful : float
         A gain below this may be due to where the fits of a weakly identified motion started, and is asked for once more
         from there: time alone.
+    borne_out : float
+        Share of such a gain that the square of an effect's size, in its standard deviations, must reach beyond that:
+        of fits at their optimum the two are alike, or it is more where noise swallowed the effect. One of 14.5 sd that
+        gained 385 was none.
     short : float
         Where most readings lie within this many times the stated noise, what raises its level is short.
     exchanges : int
@@ -220,6 +224,7 @@ class Selection:
     right_sign: float = 4.0
     worse: float = 10.0
     doubtful: float = 200.0
+    borne_out: float = 0.8
     short: float = 2.0
     exchanges: int = 2
     simpler: float = 2.0

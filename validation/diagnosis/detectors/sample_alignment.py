@@ -168,15 +168,16 @@ class Losses:
 class Alignment:
     """A sensor's samples (n, k) and what a motion shows on the grid of its clock (g, k), on which they may lie.
 
-    Sample j lies at ``place[j]`` plus as many as were lost before it, at most ``most``; ``missing`` are as many as the
-    grid goes on after the last.
+    Sample j lies at ``place[j]`` plus as many as were lost before it, at most ``most``. ``missing`` are how many more
+    samples there were, at least and at most, if all sensors were stopped together: the others tell when to within one
+    of their intervals. None lies in that range where that is not known.
     """
 
     measured: FloatArray
     shown: FloatArray
     place: IntArray
     most: int
-    missing: int
+    missing: range
 
     def left(self, counts: IntArray, line: FloatArray) -> FloatArray:
         """Return what samples leave (n, k) at their counts (n,), of the motion by a line (2, k): factor and offset."""
@@ -216,14 +217,30 @@ def alignment_of(
     last = len(readings.t) if not cut else int(np.searchsorted(readings.t, (1.0 - _ROOM) * end))
     t, good, value = readings.t[:last], readings.good[:last], readings.value[:last]
     place = np.asarray(np.round((t - t[0]) * rate_hz), dtype=np.int64)
-    missing = max(int((end - t[-1]) * rate_hz + 1e-3), 0)
-    most = max(int((end - t[-1]) * rate_hz) + 1, 0) if not cut else missing
+    if cut:
+        most, missing = max(int((end - t[-1]) * rate_hz), 0), range(0)
+    else:
+        first = max(int((end - t[-1]) * rate_hz + 1e-3), 0)
+        missing = range(
+            first, max(int(np.ceil((_stopped(current.recording, sensor, end) - t[-1]) * rate_hz)), first + 1)
+        )
+        most = missing.stop
     most = min(most, int(0.25 * place[-1]) + 8)
     grid = t[0] + np.arange(place[-1] + most + 1) / rate_hz
     expected = shown(current, values, sensor, grid - delay(values, sensor, grid))
     if readings.limit is not None:
         expected = np.clip(expected, -readings.limit, readings.limit)
-    return Alignment(np.where(good, value, np.nan), expected, place, most, most + 1 if cut else missing)
+    return Alignment(np.where(good, value, np.nan), expected, place, most, missing)
+
+
+def _stopped(recording: Recording, sensor: str, end: float) -> float:
+    """Return when at the latest, s, the others stopped of which the last was read at ``end``: no other reading came."""
+    others = [
+        float(own.t[-1]) + 1.0 / recording.sheets[name].rate_hz
+        for name, own in recording.samples.items()
+        if name != sensor and len(own) and recording.sheets[name].rate_hz > 0.0
+    ]
+    return max(min(others, default=end), end)
 
 
 def _likeliest(own: Alignment, line: FloatArray, sd: FloatArray) -> tuple[IntArray, float]:
@@ -232,9 +249,11 @@ def _likeliest(own: Alignment, line: FloatArray, sd: FloatArray) -> tuple[IntArr
     # loggers mostly stop all their sensors together: then as many as are missing at the end were lost before, and
     # where the readings do not tell the place of one, there are so many places that it costs nothing
     believed = cost.copy()
-    if own.missing <= own.most:
-        believed[-1] += _TOGETHER + _COST * own.missing
-        believed[-1, own.missing] = cost[-1, own.missing]
+    if own.missing and own.missing[0] <= own.most:
+        # lost after the last sample: none of them shows where
+        after = np.maximum(own.missing[0] - np.arange(min(own.missing[-1], own.most) + 1), 0)
+        believed[-1] += _TOGETHER + _COST * own.missing[0]
+        believed[-1, : after.size] = cost[-1, : after.size] + _COST * after
     gaps = np.diff(own.place, prepend=own.place[0])
     path, _ = viterbi_counts(believed, gaps)
     _, least = viterbi_counts(cost, gaps)

@@ -40,6 +40,19 @@ class ContinuousFit:
     score: float
     residuals: tuple[FloatArray, ...] = field(default_factory=tuple)
 
+    def squared_sizes(self, candidate: CandidateEffect) -> float:
+        """Return how far a candidate's numbers are from where they act not, squared, in the fit's covariance (Wald).
+
+        About what it gains by, where a fit is at its optimum with it and without it; without end where that is not
+        known.
+        """
+        if self.fit.covariance.shape[0] != len(self.fit.parameters):
+            return np.inf
+        sizes = {q.key for q in parameters_of(candidate, shaped=False)}
+        own = [k for k, q in enumerate(self.fit.parameters) if q.key in sizes and q.recordings == candidate.recordings]
+        away = self.fit.at[own] - np.array([self.fit.parameters[k].stated for k in own])
+        return float(away @ np.linalg.pinv(self.fit.covariance[np.ix_(own, own)]) @ away)
+
     def told(self, candidate: CandidateEffect) -> int:
         """Return how many of a candidate's parameters the readings tell, at least one; all where that is not known.
 

@@ -210,8 +210,9 @@ def _selected_forward(found: Search) -> Search:
             return replace(found, final=better)
         again = _from_there(found, current, better)
         if again is not None:
-            # it was not the effect that gained, but where its fit had started
-            return replace(found, final=again, base=again if step == 0 else found.base)
+            # it was not the effect that gained, but where its fit had started: from there the search goes on
+            found = replace(found, final=again, base=again if step == 0 else found.base)
+            continue
         if step >= 1 and far(found, better) and not _nearing(found, current, better):
             # two effects and still far from the data: none of these
             return replace(found, final=better)
@@ -270,11 +271,11 @@ def _settled(found: Search) -> Search:
     if found.at_once:
         return found.about(found.final.fit)
     for exchanges in range(SELECTION.exchanges + 1):
+        if (wide := widened(found, found.final)) is not found.final:
+            found = _with_final(found, wide)
         if found.relaxed_fit.plant.weakly_identified and not lost(found, found.final):
             # what an effect gained upon a fit that stood beside its optimum, others gain without it
             found = replace(found, final=eliminated_backward(found, found.final))
-        if (wide := widened(found, found.final)) is not found.final:
-            found = _with_final(found, wide)
         found = found.about(found.final.fit)
         # where the fit is far from the data nothing is named, and nothing need be told apart
         found = replace(found, rivals={} if lost(found, found.final) else rivals_of(found))
@@ -525,8 +526,8 @@ _RECOUNTS = 6
 
 
 def _recounted(found: Search, current: ContinuousFit) -> tuple[Search, ContinuousFit]:
-    """Return a search and its fit with an accelerometer's losses counted anew, where an effect since bettered them."""
-    if all(candidate.id != _LOST for candidate in current.hypothesis.candidates[:-1]):
+    """Return a search and its fit with an accelerometer's losses counted anew by the motion that it tells."""
+    if all(candidate.id != _LOST for candidate in current.hypothesis.candidates):
         return found, current
     for _ in range(_RECOUNTS):
         again = recounted(current.fit)
@@ -577,10 +578,14 @@ def tried_without(found: Search, candidate: CandidateEffect) -> ContinuousFit:
 def _from_there(found: Search, current: ContinuousFit, better: ContinuousFit) -> ContinuousFit | None:
     """Return the fit without the last effect from where that with it stands, if then the effect is not worth its price.
 
-    None where it is, or where it gains so much that no start could.
+    None where it is, or where it gains so much that no start could: then its size in its own standard deviations,
+    squared, is of the order of what it gains.
     """
     candidate = better.hypothesis.candidates[-1]
-    if current.score - better.score > SELECTION.doubtful or not found.relaxed_fit.plant.weakly_identified:
+    if not found.relaxed_fit.plant.weakly_identified or candidate.fixed_values:
+        return None
+    gain = current.score - better.score
+    if gain > SELECTION.doubtful and better.squared_sizes(candidate) > SELECTION.borne_out * gain:
         return None
     start = values_of_fit(better)
     again = continuous_fit(better.fit, current.hypothesis, found.own, better.fit.noise, start)
