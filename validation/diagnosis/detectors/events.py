@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.events import Impulse, SpinStep
+from discsim.effects.catalogue import catalogued
+from discsim.effects.events import EVENT_WIDTH_S, Impulse, SpinStep
 from discsim.validation.diagnosis.detectors.local_problem import LocalProblem, LocalProblems, gain_of, peaks
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, detected
 from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
@@ -26,6 +27,8 @@ from discsim.validation.identification.segments import undone
 
 __all__ = ["events"]
 
+#: what pushes a disc, and by how much less than an event's gain a first look at it may promise
+_PUSH, _SHORT_OF = catalogued(Impulse).id, 10.0
 #: what of a state an event makes jump
 _MOVES: Mapping[type[Any], Callable[[Layout], slice | int | None]] = {
     Impulse: lambda layout: layout.velocity,
@@ -52,6 +55,21 @@ def _jumps(problem: LocalProblem, directions: Sequence[int]) -> FloatArray:
         cross = (back.T @ after[j]).T
         gain[j - 1], _ = problem.explained(own, cross[:-1], cross[-1])
     return gain
+
+
+def _needles(problem: LocalProblem) -> tuple[FloatArray, FloatArray]:
+    """Return instants (m,) s, and by how much chi-squared of two widths of a pulse about each exceeds chance.
+
+    What pushes a disc for some milliseconds an accelerometer feels in two or three readings, many times its noise, long
+    before the velocity that it leaves shows in anything else.
+    """
+    known = np.zeros(problem.left.size, dtype=np.bool_)
+    for channel in problem.linear.channels:
+        known[channel.rows] = True
+    step = EVENT_WIDTH_S
+    slot = np.floor(problem.linear.t[known] / step).astype(int)
+    beyond = np.bincount(np.maximum(slot, 0), problem.left[known] ** 2 - 1.0)
+    return step * np.arange(1.0, beyond.size), np.asarray(beyond[:-1] + beyond[1:], dtype=np.float64)
 
 
 def _events_at(
@@ -92,13 +110,14 @@ def events(problems: LocalProblems, least: float = DETECTORS.least) -> list[Scre
         i, (id, directions, _) = task
         return np.zeros(0) if problems.has(id, i) else _jumps(problems.by_recording[i], directions)
 
-    def one(task: tuple[int, tuple[str, Sequence[int], tuple[str, ...]]], gain: FloatArray) -> ScreenedCandidate | None:
+    def one(
+        task: tuple[int, tuple[str, Sequence[int], tuple[str, ...]]], instants: FloatArray
+    ) -> ScreenedCandidate | None:
         i, (id, _, names) = task
         problem = problems.by_recording[i]
         candidate = CandidateEffect(id, tuple(Column(id, name, 0.02) for name in names))
-        inner, end = problem.trajectory.nodes[1:-1], float(problem.trajectory.nodes[-1])
-        near = np.concatenate([inner[j] + times.event_near * np.linspace(-1.0, 1.0, 13) for j in peaks(gain, 2)])
-        near = np.unique(near.round(4))
+        end = float(problem.trajectory.nodes[-1])
+        near = np.unique(instants.round(4))
         near = near[(near > max(0.01, times.event_from)) & (near < end)]
         if near.size == 0:
             return None
@@ -110,9 +129,24 @@ def events(problems: LocalProblems, least: float = DETECTORS.least) -> list[Scre
         )
         return best if best.gain > least else None
 
+    def about_boundaries(task: tuple[int, tuple[str, Sequence[int], tuple[str, ...]]], gain: FloatArray) -> FloatArray:
+        inner = problems.by_recording[task[0]].trajectory.nodes[1:-1]
+        return np.concatenate([inner[j] + times.event_near * np.linspace(-1.0, 1.0, 13) for j in peaks(gain, 2)])
+
     tasks = [(i, kind) for i in problems.by_recording for kind in kinds]
     gains = mapped(scanned, tasks)
-    promising = [(t, g) for t, g in zip(tasks, gains, strict=True) if g.size and g.max() >= least - 10.0]
+    promising = [(t, g) for t, g in zip(tasks, gains, strict=True) if g.size and g.max() >= least - _SHORT_OF]
     promising = sorted(promising, key=lambda item: -float(item[1].max()))[: DETECTORS.followed]
-    found = mapped(one, [t for t, _ in promising], [g for _, g in promising])
-    return sorted((p for p in found if p is not None), key=gain_of, reverse=True)
+    asked = [(task, about_boundaries(task, gain)) for task, gain in promising]
+    pushed = [task for task in tasks if task[1][0] == _PUSH and not problems.has(_PUSH, task[0])]
+    needles = [(task, *_needles(problems.by_recording[task[0]])) for task in pushed]
+    felt = [(task, at, beyond) for task, at, beyond in needles if beyond.size and beyond.max() >= least - _SHORT_OF]
+    for task, at, beyond in sorted(felt, key=lambda item: -float(item[2].max()))[: DETECTORS.followed]:
+        sharp = at[peaks(beyond, 2)][:, None] + EVENT_WIDTH_S * np.linspace(-1.0, 1.0, 9)
+        asked.append((task, sharp.ravel()))
+    found: dict[tuple[str, int], ScreenedCandidate] = {}
+    for (task, _), event in zip(asked, mapped(one, *zip(*asked, strict=True)) if asked else [], strict=True):
+        place = task[1][0], task[0]
+        if event is not None and (place not in found or event.gain > found[place].gain):
+            found[place] = event
+    return sorted(found.values(), key=gain_of, reverse=True)

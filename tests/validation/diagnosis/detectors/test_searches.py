@@ -128,6 +128,16 @@ def test_an_event_is_found_in_its_recording_at_its_instant_with_its_size(
         assert sd < 0.2 * max(abs(v) for v in sizes.values())
 
 
+def test_a_touch_that_only_an_accelerometer_feels_is_found_at_its_instant() -> None:
+    """Two hundredths of a metre per second: nothing after it shows the velocity, which a look for steps asks for."""
+    hidden = effect("event.impulse", t_s=1.163, dv_north_m_s=-0.001, dv_east_m_s=-0.017, dv_down_m_s=-0.009)
+    best = events(questions((hidden,)))[0]
+    assert best.candidate.id == hidden.id
+    assert best.candidate.recordings == frozenset([1])
+    assert best.candidate.shape_grid["t_s"] == pytest.approx(1.163, abs=0.005)
+    assert best.start[("event.impulse", "dv_east_m_s"), best.candidate.recordings] == pytest.approx(-0.017, abs=0.003)
+
+
 def test_a_gust_is_found_in_its_recording_near_its_instant() -> None:
     hidden = effect("air.gust", t_s=1.1, width_s=0.3, w_north_m_s=0.9, w_east_m_s=-0.5)
     best = gusts(questions((hidden,)))[0]
