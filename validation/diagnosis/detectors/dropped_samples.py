@@ -183,6 +183,8 @@ def _own_times(anew: Trajectory, old: Trajectory, lost: Mapping[str, FloatArray]
 _ROUNDS, _FALLEN = 4, 0.9
 #: noises that a motion which others tell may leave of a sensor, and more
 _ANY = 100.0
+#: fewest readings of a motion's beginning that tell what was lost: some turns of a disc
+_FEWEST = 40
 
 
 def dropped_accelerometer(fit: Fit, noise: NoiseModel, least: float = DETECTORS.least_dropped) -> list[Shifted]:
@@ -267,8 +269,10 @@ def _counted_in_own_noise(fit: Fit, sensor: str, noise: NoiseModel) -> tuple[Fit
 def loses_samples(trajectory: Trajectory, values: Values, readings: Readings, rate_hz: float, sd: FloatArray) -> bool:
     """Tell whether lost samples bring a sensor to a motion that others tell, and that ends before its readings do.
 
-    ``sd`` (k,) is the sensor's noise.
+    ``sd`` (k,) is the sensor's noise. Few readings tell nothing.
     """
+    if np.count_nonzero(readings.t < float(trajectory.nodes[-1])) < _FEWEST:
+        return False
     own = alignment_of(trajectory, values, readings, rate_hz, cut=True)
     return lost_in_own_noise(own, sd, _ANY * sd).gain >= DETECTORS.least_dropped
 

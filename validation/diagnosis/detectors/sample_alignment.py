@@ -48,6 +48,8 @@ _SEEN = 4.5
 _MARGIN = 2.0
 #: times by which a noise to start from is quieter than the one before
 _QUIETER = 3.0
+#: share of the loudest noise below which none is tried: a motion with a misfit of a thousand noises is none
+_QUIETEST = 1e-3
 #: most rounds in which counts and noise follow from one another, and the share to which a noise has settled
 _LEVELS, _SETTLED = 8, 0.95
 #: rounds in which samples far off a line lose their weight, and how far that is, in what half of them leave
@@ -188,9 +190,9 @@ class Alignment:
         line = np.empty((2, self.measured.shape[1]))
         for axis in range(line.shape[1]):
             y, x = self.measured[:, axis], self.shown[self.place + counts, axis]
-            known = np.isfinite(y)
-            kept = known
-            for _ in range(_TRIMMED):
+            kept = known = np.isfinite(y)
+            line[:, axis] = 1.0, 0.0
+            for _ in range(_TRIMMED if known.any() else 0):
                 columns = np.stack([x[kept], np.ones(np.count_nonzero(kept))], axis=1)
                 line[:, axis] = np.linalg.lstsq(columns, y[kept], rcond=None)[0]
                 off = np.abs(y - line[1, axis] - line[0, axis] * x)
@@ -277,6 +279,7 @@ def lost_in_own_noise(own: Alignment, stated: FloatArray, loudest: FloatArray) -
     follows from the counts as they do from it. Of the noises to start from, that whose counts leave least holds.
     """
     none = np.zeros(len(own.measured), dtype=np.int64)
+    stated = np.maximum(stated, _QUIETEST * loudest)
     # about none the factor of an axis that turns with the disc would vanish where samples slip
     plain = np.stack([np.ones_like(stated), np.zeros_like(stated)])
     plain[1] = [np.median(x[np.isfinite(x)]) if np.isfinite(x).any() else 0.0 for x in own.left(none, plain).T]
