@@ -200,12 +200,12 @@ def test_a_fit_goes_on_from_segments_that_a_whole_step_would_part():
 def test_what_gained_only_by_where_the_fit_before_it_stood_is_named_no_more(monkeypatch):
     monkeypatch.setattr(stepwise, "rivals_of", lambda _: {})
     final = fitted_with("gyro.bias", "accel.bias")
-    (left,) = stepwise._settled(replace(biased(), final=final)).final.hypothesis.candidates
+    (left,) = stepwise.settled(replace(biased(), final=final)).final.hypothesis.candidates
     assert left.id == "gyro.bias"
 
 
 @pytest.mark.parametrize(("id", "near"), [("gyro.bias", True), ("mag.hard_iron", False)])
 def test_far_from_the_data_a_refit_begins_with_segments_that_are_joined_and_counts_where_it_comes_near(id, near):
     far_away = hinted(effect(id))
-    fitted = stepwise._joined(biased(), biased().base, far_away, NO_BARS)
+    fitted = stepwise.joined(biased(), biased().base, far_away, NO_BARS)
     assert (fitted is not None) is near

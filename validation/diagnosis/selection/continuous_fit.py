@@ -51,7 +51,7 @@ class ContinuousFit:
         sizes = {q.key for q in parameters_of(candidate, shaped=False)}
         own = [k for k, q in enumerate(self.fit.parameters) if q.key in sizes and q.recordings == candidate.recordings]
         away = self.fit.at[own] - np.array([self.fit.parameters[k].stated for k in own])
-        return float(away @ np.linalg.pinv(self.fit.covariance[np.ix_(own, own)]) @ away)
+        return float(away @ np.linalg.lstsq(self.fit.covariance[np.ix_(own, own)], away, rcond=None)[0])
 
     def told(self, candidate: CandidateEffect) -> int:
         """Return how many of a candidate's parameters the readings tell, at least one; all where that is not known.

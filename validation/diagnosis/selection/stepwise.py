@@ -65,7 +65,7 @@ from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, unmodelled_residuals
 from discsim.validation.identification.stated_parameters import stated_parameters
 
-__all__ = ["past_hope", "screened", "search", "tried_without"]
+__all__ = ["joined", "past_hope", "screened", "search", "settled", "tried_without"]
 
 Report: TypeAlias = Callable[[str, int, int], None]
 #: what is proposed, the fit whose motion a fit of it starts from, and what choosing lost samples costs
@@ -90,7 +90,7 @@ def search(
     """Find the effects that explain recordings of one plant; what is given is that of `screened`."""
     found = screened(recordings, report, as_stated, followed, free, hints, effects)
     report("refitting candidates", 3, 4)
-    found = _settled(_selected_forward(found))
+    found = settled(_selected_forward(found))
     report("done", 4, 4)
     return found
 
@@ -216,10 +216,19 @@ def _selected_forward(found: Search) -> Search:
         if step >= 1 and far(found, better) and not _nearing(found, current, better):
             # two effects and still far from the data: none of these
             return replace(found, final=better)
-        if step >= 1 and past_hope(found, current, better, max(most, SELECTION.most_with_sensors) - step - 1):
-            return replace(found, final=better)
+        further = max(most, SELECTION.most_with_sensors) - step - 1
+        if step >= 1 and past_hope(found, current, better, further):
+            found, next_one = _in_stated_noise(found, better, step + 1)
+            if next_one is None or past_hope(found, better, next_one, further - 1):
+                return replace(found, final=better)
         found = _with_final(found, eliminated_backward(found, better, kept=better.hypothesis.candidates[-1]))
     return found
+
+
+def _in_stated_noise(found: Search, current: ContinuousFit, step: int) -> tuple[Search, ContinuousFit | None]:
+    """Return the best further effect of a fit whose estimated noise has swallowed some; None where it has not."""
+    told = None if far(found, current) else _without_swallowed(current)
+    return (found, None) if told is None else next_effect(found, told, step)
 
 
 def past_hope(found: Search, before: ContinuousFit, after: ContinuousFit, further: int) -> bool:
@@ -266,7 +275,7 @@ def _with_final(found: Search, fitted: ContinuousFit) -> Search:
     return replace(found.with_step(fitted), final=fitted)
 
 
-def _settled(found: Search) -> Search:
+def settled(found: Search) -> Search:
     """Return a search whose effects are exchanged for rivals that explain more for their parameters."""
     if found.at_once:
         return found.about(found.final.fit)
@@ -380,7 +389,7 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
         beside = np.inf if cost or told else merit_now - 0.5 * price(screened.candidate)
         beside_noise = _with_stated(current, screened) if told else current.fit.noise
         bars = _hopeless(best_chi2, current.fit.count) if distant else Bars(beside)
-        refitted = _joined(found, current, screened, bars) if distant and not cost else None
+        refitted = joined(found, current, screened, bars) if distant and not cost else None
         if refitted is None:
             refitted = continuous_fit(
                 fit,
@@ -410,7 +419,7 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
     return replace(found, cost=found.cost + cost), best
 
 
-def _joined(found: Search, current: ContinuousFit, screened: ScreenedCandidate, bars: Bars) -> ContinuousFit | None:
+def joined(found: Search, current: ContinuousFit, screened: ScreenedCandidate, bars: Bars) -> ContinuousFit | None:
     """Return a refit of a weakly identified motion from the present fit, however far; None where it comes not near.
 
     Its segments are joined already. To join those that follow the data takes short steps, which end beside the optimum.

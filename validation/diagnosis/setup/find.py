@@ -30,6 +30,7 @@ __all__ = [
     "SetupFault",
     "SetupFindings",
     "find_setup_faults",
+    "may_be_physics",
     "said",
     "suspected_fault",
     "with_likeliest_fault",
@@ -272,7 +273,7 @@ def _next(recordings: Sequence[Recording]) -> tuple[list[SetupFault], tuple[Effe
         return [], _hints(ranking)
     rivals = [item for item in found if item.kind == "rival"]
     found = tuple(item for item in found if item.kind != "rival")
-    if found and _may_be_physics(found[0], rivals):
+    if found and may_be_physics(found[0], rivals):
         return [], _hints(ranking)
     if found and _agrees(found[0]) and _worth_naming(as_written, found[0], recordings):
         return [_fault(as_written, found, recordings)], ()
@@ -285,7 +286,7 @@ def _next(recordings: Sequence[Recording]) -> tuple[list[SetupFault], tuple[Effe
     return [], _hints(ranking)
 
 
-def _may_be_physics(fault: Hypothesis, rivals: Sequence[Hypothesis]) -> bool:
+def may_be_physics(fault: Hypothesis, rivals: Sequence[Hypothesis]) -> bool:
     """Tell whether a shift of a sensor's times cannot be told from a lag, a clock or lost samples: fits decide then."""
     return fault.kind == "offset" and any(
         item.sensor == fault.sensor and item.charged < fault.charged + TWIN for item in rivals

@@ -18,7 +18,7 @@ from discsim.validation.checking.checked import check
 from discsim.validation.diagnosis.selection.candidates import available, candidates_for, parameters_of
 from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, suspected_fault
-from discsim.validation.diagnosis.setup.find import _may_be_physics
+from discsim.validation.diagnosis.setup.find import may_be_physics
 from discsim.validation.diagnosis.setup.hypotheses import Hypothesis, hypotheses
 from discsim.validation.diagnosis.setup.relations import Columns
 from discsim.validation.diagnosis.setup_effects import with_reversed_axes
@@ -157,10 +157,10 @@ def test_a_shift_of_times_that_physics_explains_as_well_is_left_to_fits(what: st
         1.4,
         18.0,
     )
-    assert _may_be_physics(shift, [rival])
-    assert not _may_be_physics(shift, [replace(rival, sensor="gyroscope")])
-    assert not _may_be_physics(shift, [replace(rival, costs=rival.costs + 5.0)])
-    assert not _may_be_physics(replace(shift, kind="axes"), [rival])
+    assert may_be_physics(shift, [rival])
+    assert not may_be_physics(shift, [replace(rival, sensor="gyroscope")])
+    assert not may_be_physics(shift, [replace(rival, costs=rival.costs + 5.0)])
+    assert not may_be_physics(replace(shift, kind="axes"), [rival])
 
 
 def test_lost_samples_in_each_throw_are_a_rival_of_a_shift_of_times():
