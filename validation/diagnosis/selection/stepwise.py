@@ -16,11 +16,11 @@ import numpy as np
 
 from discsim.effects import Effect
 from discsim.effects.catalogue import catalogued
-from discsim.effects.sensors import DroppedSamples, Lag
+from discsim.effects.sensors import Lag
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.followed import true_noise
 from discsim.validation.diagnosis.detectors.all import searched
-from discsim.validation.diagnosis.detectors.dropped_samples import Shifted, recounted
+from discsim.validation.diagnosis.detectors.dropped_samples import Shifted
 from discsim.validation.diagnosis.relaxed_fit import clock_of_accelerometer, relaxed, unknowns, without_outliers
 from discsim.validation.diagnosis.selection.all_at_once import all_at_once
 from discsim.validation.diagnosis.selection.candidates import (
@@ -33,6 +33,7 @@ from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit,
 from discsim.validation.diagnosis.selection.evidence import ONE_SIDED, TURNED, charge, price
 from discsim.validation.diagnosis.selection.exchange import eliminated_backward, exchanged, rivals_of, widened
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
+from discsim.validation.diagnosis.selection.recounting import with_losses_recounted
 from discsim.validation.diagnosis.selection.refits import refitting
 from discsim.validation.diagnosis.selection.score_tests import (
     ScreenedCandidate,
@@ -71,7 +72,6 @@ Report: TypeAlias = Callable[[str, int, int], None]
 #: what is proposed, the fit whose motion a fit of it starts from, and what choosing lost samples costs
 Offer: TypeAlias = tuple[ScreenedCandidate, Fit, float]
 
-_LOST = catalogued(DroppedSamples, "accelerometer").id
 #: the lag that holds what was there before a recording began
 _HELD = catalogued(Lag, "accelerometer").id
 
@@ -204,7 +204,7 @@ def _selected_forward(found: Search) -> Search:
                 continue
         if better is None or len(better.hypothesis.candidates) > _most(better, most):
             break
-        found, better = _recounted(found, better)
+        found, better = with_losses_recounted(found, better)
         if step == 0 and far(found, better) and not _told(better) and no_nearer(found, current, better):
             # neither one effect nor two come near the data, nor does any lead there
             return replace(found, final=better)
@@ -528,35 +528,6 @@ def _with_lost_samples(found: Search, current: ContinuousFit) -> Search:
     taken = {candidate.id for candidate in current.hypothesis.candidates}
     lost = found.lost_samples.about(found.relaxed_fit, known, lambda: _steady_noise(found), taken)
     return replace(found, lost_samples=lost)
-
-
-#: most rounds in which counts of lost samples and the motion better one another
-_RECOUNTS = 6
-
-
-def _recounted(found: Search, current: ContinuousFit) -> tuple[Search, ContinuousFit]:
-    """Return a search and its fit with an accelerometer's losses counted anew by the motion that it tells."""
-    if all(candidate.id != _LOST for candidate in current.hypothesis.candidates):
-        return found, current
-    for _ in range(_RECOUNTS):
-        again = recounted(current.fit)
-        if again is None:
-            break
-        shifted, dearer = again
-        candidates = current.hypothesis.candidates
-        hypothesis = Hypothesis(tuple(shifted.screened.candidate if c.id == _LOST else c for c in candidates))
-        start = replace(current.fit, trajectories=shifted.trajectories)
-        fitted = continuous_fit(start, hypothesis, found.own, current.fit.noise, values_of_fit(current))
-        fitted = replace(fitted, score=fitted.score + found.cost + dearer)
-        if not fitted.score < current.score:
-            break
-        trajectories = tuple(
-            replace(one, lost={**one.lost, **other.lost})
-            for one, other in zip(found.relaxed_fit.trajectories, shifted.trajectories, strict=True)
-        )
-        relaxed_fit = replace(found.relaxed_fit, trajectories=trajectories)
-        found, current = replace(found, relaxed_fit=relaxed_fit, cost=found.cost + dearer), fitted
-    return found, current
 
 
 def _steady_noise(found: Search) -> NoiseModel:
