@@ -11,7 +11,7 @@ All limits are counts (recordings, seconds of them, steps): the same recordings 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from types import MappingProxyType
@@ -39,8 +39,9 @@ from discsim.validation.identification.noise import GroupNoise
 from discsim.validation.identification.observations import readings_of
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.plants import plant_of
-from discsim.validation.identification.readings import group_of
+from discsim.validation.identification.readings import Readings, group_of
 from discsim.validation.identification.segments import Trajectory
+from discsim.validation.identification.sensor_model import Values
 
 __all__ = [
     "Contradiction",
@@ -229,6 +230,14 @@ def _follows_lagging(
     return look is not None and look.follows
 
 
+def _beside(recordings: Sequence[Recording], look: Look, sensor: str) -> Iterator[tuple[Trajectory, Values, Readings]]:
+    """Yield the motions of a look and their numbers, and beside each what a sensor read that took no part in it."""
+    for i, trajectory in enumerate(look.fit.trajectories):
+        readings = next((r for r in readings_of(recordings[look.places[i]]) if r.sensor == sensor), None)
+        if readings is not None:
+            yield trajectory, look.fit.values(i), readings
+
+
 def _turned(recordings: Sequence[Recording], look: Look, sensor: str) -> bool:
     """Tell whether a motion that others tell is that of a sensor, too, if it is turned in its board by a few degrees.
 
@@ -236,11 +245,9 @@ def _turned(recordings: Sequence[Recording], look: Look, sensor: str) -> bool:
     told to within its noise: it is enough that a turn leaves little of the contradiction, or of the noise.
     """
     told = []
-    for i, trajectory in enumerate(look.fit.trajectories):
-        readings = next((r for r in readings_of(recordings[look.places[i]]) if r.sensor == sensor), None)
-        if readings is not None:
-            before, after = left_when_turned(trajectory, look.fit.values(i), readings, true_noise([readings]))
-            told.append(after <= max(CONSISTENCY.reconciled, CONSISTENCY.left_of_turn * before))
+    for trajectory, values, readings in _beside(recordings, look, sensor):
+        before, after = left_when_turned(trajectory, values, readings, true_noise([readings]))
+        told.append(after <= max(CONSISTENCY.reconciled, CONSISTENCY.left_of_turn * before))
     return 2 * sum(told) > len(told)
 
 
@@ -252,14 +259,11 @@ def _loses(recordings: Sequence[Recording], look: Look, sensor: str) -> bool:
     if sensor != "accelerometer":
         return False
     found = []
-    for i, trajectory in enumerate(look.fit.trajectories):
-        one = recordings[look.places[i]]
-        readings = next((r for r in readings_of(one) if r.sensor == sensor), None)
-        if readings is not None:
-            sd = np.array(
-                [true_noise([readings])[group_of(sensor, axis)].sd for axis in range(readings.value.shape[1])]
-            )
-            found.append(loses_samples(trajectory, look.fit.values(i), readings, one.sheets[sensor].rate_hz, sd))
+    for trajectory, values, readings in _beside(recordings, look, sensor):
+        noise = true_noise([readings])
+        sd = np.array([noise[group_of(sensor, axis)].sd for axis in range(readings.value.shape[1])])
+        rate_hz = trajectory.recording.sheets[sensor].rate_hz
+        found.append(loses_samples(trajectory, values, readings, rate_hz, sd))
     return bool(found) and all(found)
 
 
@@ -335,11 +339,7 @@ def _pulses(recordings: Sequence[Recording], whole: Look, sensor: str) -> bool:
 
 def _reconciled(recordings: Sequence[Recording], look: Look, sensor: str) -> bool:
     """Tell whether a motion that others tell is that of a sensor, too, if it is late, lags or lost samples."""
-    found = []
-    for i, trajectory in enumerate(look.fit.trajectories):
-        readings = next((r for r in readings_of(recordings[look.places[i]]) if r.sensor == sensor), None)
-        if readings is not None:
-            found.append(left_when_shifted(trajectory, look.fit.values(i), readings, true_noise([readings])))
+    found = [left_when_shifted(*one, true_noise([one[-1]])) for one in _beside(recordings, look, sensor)]
     levels = [level for level in found if np.isfinite(level)]
     return not levels or float(np.median(levels)) <= CONSISTENCY.reconciled
 

@@ -1,9 +1,9 @@
 """Samples that a logger's loop must skip: the pattern by which a part that free-runs shows beside a slower loop.
 
 Takes which of a part's samples each row of recordings shows; gives the loop beside which no row shows a sample that it
-cannot. A loop
-that is slower than the part skips a sample whenever it falls a whole period behind, at even distances, and no row ever
-shows one of those: what looks like a lost row there is none. Rows that are lost at random show every sample alike.
+cannot. A loop that is slower than the part skips a sample whenever it falls a whole period behind, at even distances,
+and no row ever shows one of those: what looks like a lost row there is none. Rows that are lost at random show every
+sample alike.
 The evidence is Bayes': the likelihood is averaged over all loops and phases that a sheet's rate allows, which charges
 for having looked at so many. Recordings of one logger share its loop, and so that charge.
 """

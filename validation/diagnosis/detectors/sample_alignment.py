@@ -204,7 +204,16 @@ class Alignment:
         counts = np.arange(self.most + 1)
         expected = line[1] + line[0] * self.shown
         off = (self.measured[:, None, :] - expected[self.place[:, None] + counts]) / sd
-        return np.asarray(np.minimum(np.nansum(off**2, axis=2), _MOST))
+        return _limited(off)
+
+    def misfit(self, counts: IntArray, line: FloatArray, sd: FloatArray) -> float:
+        """Return what all samples at their counts (n,) say against a line (2, k) in a noise (k,), each as `price`."""
+        return float(_limited(self.left(counts, line) / sd).sum())
+
+
+def _limited(off: FloatArray) -> FloatArray:
+    """Return the chi-squared of samples (..., k), each limited to what one may say."""
+    return np.asarray(np.minimum(np.nansum(off**2, axis=-1), _MOST))
 
 
 def alignment_of(
@@ -297,9 +306,8 @@ def lost_in_own_noise(own: Alignment, stated: FloatArray, loudest: FloatArray) -
                 break
         line = own.line(path)
         path, _ = _likeliest(own, line, _MARGIN * level)
-        without = np.minimum(np.nansum((own.left(none, own.line(none)) / (_MARGIN * level)) ** 2, axis=1), _MOST)
-        counted = np.minimum(np.nansum((own.left(path, line) / (_MARGIN * level)) ** 2, axis=1), _MOST)
-        losses = Losses(path.astype(float), float(without.sum() - counted.sum()) - _COST * float(path[-1]), level)
+        gain = own.misfit(none, own.line(none), _MARGIN * level) - own.misfit(path, line, _MARGIN * level)
+        losses = Losses(path.astype(float), gain - _COST * float(path[-1]), level)
         if found is None or np.sum(np.log(losses.noise)) < np.sum(np.log(found.noise)):
             found = losses
         if np.all(start <= stated):
