@@ -53,7 +53,9 @@ class Row(NamedTuple):
     effect is tried first, and ``grid_sigma`` how uncertain it is before it is fitted. A ``detector`` is named where one
     finds the effect and no linear question about whole recordings does. It ``moves_time`` where it moves nothing but
     the instants at which samples were taken; its parameters are places ``on_disc``; on the plants of ``unseen_on`` no
-    reading shows it, nor where a sheet of the sensors it ``needs`` is absent.
+    reading shows it, nor where a sheet of the sensors it ``needs`` is absent; on a plant some parameters may be
+    ``untold`` by any reading. It is ``of_part`` where it comes with how a sensor or a place is made, into all of a
+    logger's recordings.
 
     On its nature: an event ``lasts`` some seconds, or as long as the parameter that is named there says; an effect
     ``of_disc`` comes with a disc into all of its recordings; one that ``follows_spin`` makes the motion pulse with the
@@ -89,6 +91,8 @@ class Row(NamedTuple):
     moves_time: bool = False
     on_disc: bool = False
     unseen_on: tuple[str, ...] = ()
+    untold: Mapping[str, tuple[str, ...]] = _NOTHING
+    of_part: bool = False
     needs: tuple[str, ...] = ()
     lasts: float | str = 0.0
     of_disc: bool = False

@@ -100,6 +100,7 @@ ROWS = (
         form="readings = C<sup>T</sup> (true vector), C the rotation by ({rx_rad}, {ry_rad}, {rz_rad})",
         grows_with="the vector itself",
         trace="all sensors of the board show what is along other axes of the disc",
+        of_part=True,
     ),
     Row(
         "site.field",
@@ -114,6 +115,9 @@ ROWS = (
         trace="the field points elsewhere, or is of another size, than stated",
         bounds={"ratio": (0.2, 5.0)},
         positive=("ratio",),
+        # a free spin has no direction beside that of the field
+        untold={"free_spin": ("declination_rad", "inclination_rad")},
+        of_part=True,
     ),
     Row(
         "clock.units",

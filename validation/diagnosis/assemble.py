@@ -94,6 +94,8 @@ def _named(
     values.update({name: ParameterValue(value, sd) for name, value, sd in candidate.fixed_values})
     for name, value in candidate.shape_grid.items():
         values.setdefault(name, ParameterValue(float(value), None))
+    for name in candidate.row.untold.get(final.fit.plant.name, ()):
+        values.setdefault(name, ParameterValue(candidate.row.sizes[name], None))
     gain = max(less.score - final.score, 0.0)
     k = len(parameters_of(candidate))
     bic = gain - k * float(np.log(max(final.fit.count, 2)))

@@ -127,8 +127,9 @@ class Selection:
     event_entry, gust_entry : float
         The same of an event, whose instant is chosen, and of a gust, whose width is chosen, too: measured there.
     other_disc : float
-        What it costs more that a disc's aerodynamics or build should differ in some recordings: one disc is thrown, and
-        what does so is mostly something else; the benchmark measures how much room chance leaves.
+        What it costs more that a disc's aerodynamics or build should differ in some recordings, or how a sensor is made
+        and soldered: one disc is thrown with one logger, and what does so is mostly something else; the benchmark
+        measures how much room chance leaves.
     turned : float
         What it costs more that one sensor is turned in its board, where another effect explains as much: parts are
         soldered square to within a degree, and at one spin a turn about its axis is a delay. As much as to believe in

@@ -19,10 +19,13 @@ from discsim.validation.diagnosis.settings import UNKNOWN_LAW
 from discsim.validation.diagnosis.stages import Judged, Progress, Tried
 from discsim.validation.diagnosis.unknown_law.find import find_law
 from discsim.validation.identification.gauss_newton import Fit
-from discsim.validation.identification.residual_tests import unmodelled_residuals
+from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, UnmodelledResidual, unmodelled_residuals
 
-__all__ = ["RECALIBRATED_NAMES", "judged", "recalibrations", "standard_errors"]
+__all__ = ["RECALIBRATED_NAMES", "judged", "may_be_the_air", "recalibrations", "standard_errors"]
 
+
+#: axes of a gyroscope on which a wobble shows
+_TRANSVERSE = ("x_rad_s", "y_rad_s")
 
 RECALIBRATED_NAMES = {
     ("disc", "mass"): "mass_kg",
@@ -78,7 +81,24 @@ def judged(tried: Tried, progress: Progress) -> Judged:
 def _leaves_more_than_noise(found: Search) -> bool:
     final, settled = found.final, found.relaxed_fit.plant.durations.settled
     left = unmodelled_residuals(final.fit.linears, final.residuals, final.fit.noise)
-    return any(item.kind != "window" or item.from_s > settled for item in left) or misses(found, final)
+    left = [item for item in left if not (item.kind == "window" and item.from_s <= settled)]
+    left = [item for item in left if not may_be_the_air(item, final.fit)]
+    return bool(left) or misses(found, final)
+
+
+def may_be_the_air(item: UnmodelledResidual, fit: Fit) -> bool:
+    """Tell whether a window of a gyroscope leaves no more of a wobble than its plant's model of the air may.
+
+    The excess of a window is told by its z: of n readings of unit variance the squares scatter by the root of 2 n.
+    """
+    share = fit.plant.sizes.of_wobble
+    if not share or item.kind != "window" or item.recording is None or item.axis not in _TRANSVERSE:
+        return False
+    one = fit.trajectories[item.recording]
+    wobble = fit.plant.grows_with(one.nodes[:-1], one.states)["wobble"]
+    about = (one.nodes[1:] > item.from_s) & (one.nodes[:-1] < item.to_s)
+    excess = fit.noise[item.group].sd * float(np.sqrt(item.z * np.sqrt(2.0 / RESIDUAL_TESTS.window)))
+    return excess < share * float(np.max(wobble[about], initial=0.0))
 
 
 def _stacked(found: Search) -> bool:

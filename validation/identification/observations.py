@@ -32,7 +32,8 @@ def readings_of(recording: Recording) -> tuple[Readings, ...]:
             lower = clipping_level(recording) if sensor == "accelerometer" else None
             if lower is not None:
                 clipped, limit = np.abs(measured) >= lower - 1e-9 * lower, lower
-        good = np.isfinite(measured) & ~clipped
+        # times that were corrected may begin before the motion does
+        good = np.isfinite(measured) & ~clipped & (samples.t >= 0.0)[:, None]
         axes = tuple(SENSORS[sensor].columns)
         taken, weights = recording.averaged.get(sensor, (None, None))
         one = Readings(sensor, samples.t, measured, good, clipped, sd, axes, limit, taken, weights)

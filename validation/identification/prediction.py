@@ -26,6 +26,8 @@ __all__ = ["Sampled", "Shiftable", "read", "shiftable", "shown"]
 
 #: half the difference in time by which a reading's slope is taken, s
 _TIME_STEP = 2e-4
+#: how far behind a motion's end an instant is read at most, s: by a clock that ran away it would be run for ever
+_BEYOND = 10.0
 
 
 #: nodes and weights of a first-order lag: an integral over the past with weight exp(-s)
@@ -43,7 +45,7 @@ class Sampled:
         self.tau = 0.0
         self.written = readings.t if readings.taken is None else readings.taken.ravel()
         self.weights = readings.weights
-        taken = self.written - self.delays(values)
+        taken = np.minimum(self.written - self.delays(values), float(current.nodes[-1]) + _BEYOND)
         self.tau = sized(values, Lag, self.sensor).tau_s
         #: what is left of what a lag held when the recording began, a share (m,); None where that is left out
         self.dying: FloatArray | None = None

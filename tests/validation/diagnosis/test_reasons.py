@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from discsim.validation.diagnosis.assemble import reason_for
-from discsim.validation.diagnosis.selection.candidates import CandidateEffect
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
 from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.search_state import Considered
 
@@ -24,6 +26,14 @@ def test_a_candidate_is_dear_or_beaten_by_its_own_price(candidate):
 
 def test_an_event_costs_more_than_a_bias():
     assert price(IMPULSE) > price(BIAS)
+
+
+@pytest.mark.parametrize("id", ["gyro.scale", "mag.mount", "accel.lag", "mag.clock_rate", "site.field"])
+def test_how_a_part_is_made_in_one_recording_alone_is_dear(id: str):
+    """One logger flies: fits that ended beside each other had gained 46 by a scale, or a field, of one throw alone."""
+    everywhere = free_candidate(id)
+    assert price(replace(everywhere, recordings=frozenset([2]))) > price(everywhere) + 30.0
+    assert price(replace(BIAS, recordings=frozenset([2]))) == price(BIAS)
 
 
 def test_what_is_named_has_no_reason_against_it():

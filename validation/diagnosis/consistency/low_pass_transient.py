@@ -1,8 +1,9 @@
 """The transient of a low-pass: what the throw has left in an accelerometer, dying away while the disc already flies.
 
-Takes recordings; gives the time constant tau with proofs on recordings set aside. A low-pass hides what turns with the
-spin and keeps the acceleration of the hand: what it reads beyond the pull towards the axis falls off as exp(-t/tau),
-the same in every recording of one sensor (accel.lag).
+Takes recordings; gives the time constant tau with proofs on recordings set aside. A low-pass hides most of what turns
+with the spin and keeps the acceleration of the hand: what it reads beyond the pull towards the axis falls off as
+exp(-t/tau), the same in every recording of one sensor (accel.lag). A quick one leaves some of what turns, which is
+fitted beside it: the force of the air, which changes slowly.
 """
 
 from __future__ import annotations
@@ -13,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import ComplexArray, FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import Lag
 from discsim.recording import Recording
-from discsim.validation.diagnosis.consistency.phase_regression import centripetal_of
+from discsim.validation.diagnosis.consistency.phase_regression import angle_turned, centripetal_of
 from discsim.validation.identification.plants import plant_of
 
 __all__ = ["LowPassTransient", "TransientProof", "low_pass_transient_of"]
@@ -33,15 +34,22 @@ _FEWEST = 40
 
 @dataclass(frozen=True)
 class _Start:
-    """What an accelerometer reads beyond the pull towards the axis: t (n,) s and x + i y (n,)."""
+    """What an accelerometer reads beyond the pull towards the axis: t (n,) s, x + i y (n,), the angle turned (n,)."""
 
     name: str
     t: FloatArray
-    beyond: np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
+    beyond: ComplexArray
+    turned: FloatArray
 
     def left(self, tau: float | None) -> float:
-        """Return the squares left by an exponential of a time constant, and a constant; of None by the constant."""
-        columns = [np.ones(self.t.size)] if tau is None else [np.ones(self.t.size), np.exp(-self.t / tau)]
+        """Return the squares left by an exponential of a time constant, and what is there without one; of None by that.
+
+        That is a constant, and what is fixed in the air and turns with the spin: a parabola in time.
+        """
+        air = np.exp(-1j * self.turned)
+        columns = [np.ones(self.t.size), air, air * self.t, air * self.t**2]
+        if tau is not None:
+            columns.append(np.exp(-self.t / tau))
         Q, _ = np.linalg.qr(np.column_stack(columns).astype(complex))
         return float(np.sum(np.abs(self.beyond - Q @ (Q.conj().T @ self.beyond)) ** 2))
 
@@ -141,4 +149,5 @@ def _start(recording: Recording, name: str) -> _Start | None:
     if np.count_nonzero(good) < _FEWEST:
         return None
     beyond = felt[good] - pull[good]
-    return _Start(name, t[good] - t[good][0], beyond[:, 0] + 1j * beyond[:, 1])
+    turned = angle_turned(recording, t[good])
+    return _Start(name, t[good] - t[good][0], beyond[:, 0] + 1j * beyond[:, 1], turned)

@@ -54,10 +54,14 @@ def all_at_once(found: Search) -> ContinuousFit | None:
     if not lags or not far(found, found.base):
         return None
     competing = {candidate.id for candidate in found.candidates}
+    if any(q.group == _BOARD for q in found.own):
+        # beside a board that is turned a chip that is turned in it, too, is a row or two that were miscounted
+        competing -= TURNED
     every = [free_candidate(id) for id in free if id in CATALOGUE and id in competing and not CATALOGUE[id].grid]
     # what sensors told before any fit stays until a fit has it: about the relaxed fit algebra weighs it against itself
     told = {hint.candidate.id for hint in lags}
-    fits = _few(found, every, told)
+    turns = [free_candidate(id) for id in sorted(TURNED & competing) if CATALOGUE[id].type is Mount]
+    fits = _few(found, every, turns, told)
     if not any(_leaves_noise(one) for one in fits):
         fits += _many(found, every, told)
     fits = [one for one in fits if possible(one)]
@@ -124,18 +128,16 @@ def _cost(candidate: CandidateEffect) -> float:
     return price(candidate) + SELECTION.turned * (candidate.id in TURNED)
 
 
-def _few(found: Search, every: Sequence[CandidateEffect], told: Collection[str]) -> list[ContinuousFit]:
+def _few(
+    found: Search, every: Sequence[CandidateEffect], turns: Sequence[CandidateEffect], told: Collection[str]
+) -> list[ContinuousFit]:
     """Return fits in which chips that are turned take the place of matrices and scales; none where they run away.
 
     A turn is nested in a matrix: its numbers are opposite in pairs, to first order. Beside each other neither is worth
     its price, the one with more numbers is the last to go, and scales make up for the squares of the turn. So the fit
-    begins anew with the few: what was ``told``, hard iron, and each chip turned unless the whole board is. Of ``every``
-    other effect that counts which is worth its price beside them.
+    begins anew with the few: what was ``told``, hard iron, and the ``turns`` of each chip. Of ``every`` other effect
+    that counts which is worth its price beside them.
     """
-    competing = {candidate.id for candidate in found.candidates}
-    turns = tuple(free_candidate(id) for id in sorted(TURNED & competing) if CATALOGUE[id].type is Mount)
-    if any(q.group == _BOARD for q in found.own):
-        turns = ()
     few = tuple(one for one in every if one.id in told or one.row.type is HardIron)
     fits: list[ContinuousFit] = []
     fitted = _fitted(found, (*few, *turns))

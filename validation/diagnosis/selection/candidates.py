@@ -100,16 +100,21 @@ def candidates_for(recordings: Sequence[Recording], effects: Competing = CATALOG
         shape_grid: list[tuple[tuple[str, float], ...]] = [()]
         for name, values in row.grid.items():
             shape_grid = [(*shape, (name, value)) for shape in shape_grid for value in values]
-        candidates += [free_candidate(row.id, shape, effects.user_effect(row.id)) for shape in shape_grid]
+        plant = recordings[0].plant
+        candidates += [free_candidate(row.id, shape, effects.user_effect(row.id), plant) for shape in shape_grid]
     return tuple(candidates)
 
 
 def free_candidate(
-    id: str, shape: tuple[tuple[str, float], ...] = (), user: UserEffect | None = None
+    id: str, shape: tuple[tuple[str, float], ...] = (), user: UserEffect | None = None, plant: str = ""
 ) -> CandidateEffect:
-    """Return the candidate of an effect in all recordings with every parameter free but those of its ``shape``."""
+    """Return the candidate of an effect in all recordings with every parameter free but those of its ``shape``.
+
+    Nor are those free that no reading of its ``plant`` tells.
+    """
     row = CATALOGUE[id] if user is None else user.row
-    free = [name for name in row.fitted if name not in {name for name, _ in shape}]
+    held = {name for name, _ in shape}.union(row.untold.get(plant, ()))
+    free = [name for name in row.fitted if name not in held]
     return CandidateEffect(id, tuple(Column(id, name, _step(row, name), shape) for name in free), user=user)
 
 

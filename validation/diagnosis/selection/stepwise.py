@@ -354,7 +354,9 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
     there, here = ([offer for offer in some if on_the_disc(found, offer[0].start)] for some in (there, here))
     worth = in_turn(there, here) if distant and step > 0 else in_turn([*there, *here])
     present = {candidate.id for candidate in current.hypothesis.candidates}
-    told = [hint for hint in found.hints if hint.candidate.id not in present and (distant or _swallowed(current, hint))]
+    told = [hint for hint in found.hints if hint.candidate.id not in present]
+    # what a lag holds dies away too fast for slopes at no lag to tell
+    told = [hint for hint in told if distant or hint.candidate.id == _HELD or _swallowed(current, hint)]
     worth = [*((hint, found.relaxed_fit, 0.0) for hint in told), *worth]
     return found, worth
 

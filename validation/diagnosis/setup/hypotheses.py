@@ -236,6 +236,13 @@ def _shifting(base: _Base) -> list[str]:
 
 
 def _offsets(base: _Base) -> Iterator[Hypothesis]:
+    """Return the best offset of each sensor's times, where motion tells it from a wrong clock.
+
+    A rig that coasts slows down by a share of its rate each second: late is slow there, and fits weigh the two.
+    """
+    plant = plant_of(base.signals[0].recording)
+    if not (plant.airborne or plant.commanded):
+        return
     fastest = max(float(np.nanmax(np.abs(one.rate))) for one in base.signals)
     step = PHASE_STEP / fastest
     count = int(LATEST / step)

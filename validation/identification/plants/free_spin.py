@@ -235,6 +235,9 @@ FREE_SPIN = Plant(
         continuous=AllowedDefects(_WANDER),
         relaxed=AllowedDefects(_RELAXED),
         counted=AllowedDefects(_COUNTED),
+        # where a table of moments has a corner, a wobble across it bends within a segment: 1 and 2 % of one of 0.3 to
+        # 0.9 rad/s, for a turn and a half, of a disc as stated
+        of_wobble=0.03,
     ),
     # its beginning follows anything, or nothing before it is fitted whole: it is looked at for the figures of the
     # answer alone, once spin rates are apart. Just after release the wobble is largest, and what the air does to it is

@@ -218,7 +218,8 @@ class Sizes:
     any reading, one sigma. ``continuous`` are the defects of continuity that a fit allows whose segments are
     continuous, ``counted`` the same of recordings whose rows were counted one by one, where they are others;
     ``relaxed`` are those that it allows to stay beside the data whatever physics is missing. ``of_path`` is ``unknown``
-    where readings tell a path alone, of which a turn of the body about its own axis changes nothing.
+    where readings tell a path alone, of which a turn of the body about its own axis changes nothing. ``of_wobble`` is
+    the share of a wobble to which its model of the air follows it for a turn or two.
     """
 
     differences: FloatArray
@@ -227,6 +228,7 @@ class Sizes:
     relaxed: AllowedDefects
     counted: AllowedDefects | None = None
     of_path: FloatArray | None = None
+    of_wobble: float = 0.0
 
 
 class Durations(NamedTuple):

@@ -112,6 +112,21 @@ def test_an_accelerometer_that_still_holds_the_throw_is_found_by_the_others_time
     assert told(spins()).settling is None
 
 
+def test_a_quick_low_pass_is_found_beside_the_air_that_it_does_not_hide():
+    """Behind 50 ms a third of what turns with the spin is left, as much as the hand leaves in all readings."""
+    recordings = []
+    for k, recording in enumerate(spins()):
+        own, turned = recording.samples["accelerometer"], recording.samples["gyroscope"]
+        psi = np.interp(own.t, turned.t, np.cumsum(turned.value[:, 2]) * float(np.median(np.diff(turned.t))))
+        hand = np.exp(-own.t / 0.05)[:, None] * np.array([20.0, -8.0 * (k + 1), 0.0])
+        air = 4.0 * np.stack([np.cos(psi), -np.sin(psi), np.zeros_like(psi)], axis=1)
+        quick = Samples(own.t, own.value + hand + air)
+        recordings.append(replace(recording, samples={**recording.samples, "accelerometer": quick}))
+    found = told(recordings)
+    assert found.settling is not None
+    assert found.settling.tau_s == pytest.approx(0.05, rel=0.1)
+
+
 def test_what_is_told_is_plain_json_and_stands_in_tables():
     found = told([late(recording, k) for k, recording in enumerate(spins(effect("clock.rate", ratio=0.9)))])
     assert json.loads(json.dumps(found.to_json(), allow_nan=False))["contradiction"] is True

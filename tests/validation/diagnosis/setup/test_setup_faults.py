@@ -7,10 +7,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support.made import tables, throws
+from support.made import FIELD, RIG, tables, throws
 
 from discsim.effects import CATALOGUE, Effect, effect
 from discsim.recording import Recording
+from discsim.rig import spin_down
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc, load_site
 from discsim.trajectory import predict
@@ -134,6 +135,26 @@ def test_a_flipped_axis_of_one_short_throw_is_suspected_and_of_two_named(fault: 
 
 def test_nothing_is_suspected_of_a_sound_short_throw():
     assert suspected_fault(find_setup_faults([short_throw(0.0)])) is None
+
+
+def test_of_a_rig_that_coasts_no_offset_of_time_is_supposed():
+    """It loses a share of its rate each second: a clock of 0.9 % was taken for a magnetometer 0.14 s early."""
+    module = Instruments.from_parts("mpu9250").with_effects([effect("clock.rate", ratio=0.985)])
+    module = module.fitted("gyroscope", range=100.0)
+    rng = np.random.default_rng(4)
+    runs = [
+        record(spin_down(RIG, FIELD, rate, 25.0, yaw=0.3), module, rng, plant="spin_down", name=f"{rate:g}")
+        for rate in (60.0, 45.0)
+    ]
+    assert {item.kind for item in hypotheses(runs).found}.isdisjoint({"offset"})
+
+
+def test_a_free_spin_tells_the_size_of_a_field_and_no_direction():
+    spins = throws(plant="free_spin", seconds=1.0)
+    (field,) = [candidate for candidate in candidates_for(spins) if candidate.id == "site.field"]
+    assert [column.name for column in field.columns] == ["ratio"]
+    (field,) = [candidate for candidate in candidates_for(throws(seconds=1.0)) if candidate.id == "site.field"]
+    assert len(field.columns) == 3
 
 
 @pytest.mark.parametrize(("scale", "reversed"), [(-1.97, True), (-1.39, False), (-1.0, False)])
