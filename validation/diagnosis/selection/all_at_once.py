@@ -78,12 +78,12 @@ def _leaves_noise(fitted: ContinuousFit) -> bool:
 
 def _many(found: Search, every: Sequence[CandidateEffect], told: Collection[str]) -> list[ContinuousFit]:
     """Return the fit of all effects that the relaxed fit cannot do without, less those that it then can."""
-    asked = _held_out(found, _pruned(found.loose_board, every, found.own, told), told)
+    asked = _held_out(found, _pruned(found, found.loose_board, every, told), told)
     fitted = _fitted(found, asked)
     if fitted is None:
         return []
     about = found.about(fitted.fit)
-    fewer = _held_out(about, _pruned(about.equations, asked, found.own))
+    fewer = _held_out(about, _pruned(found, about.equations, asked))
     if len(fewer) < len(asked):
         # what two effects shared that are one in these recordings, one of them cannot have: again from the relaxed fit
         fitted = _fitted(found, fewer)
@@ -120,12 +120,13 @@ def _charged(found: Search, fitted: ContinuousFit) -> float:
     In the noise that it has left itself a sensor that it misses would be a noisy one.
     """
     left = chi2_in(fitted, found.relaxed_noise) + penalty_of(fitted.fit, fitted.fit.linears)
-    return left + sum(map(_cost, fitted.hypothesis.candidates))
+    return left + sum(_cost(found, one) for one in fitted.hypothesis.candidates)
 
 
-def _cost(candidate: CandidateEffect) -> float:
-    """Return what an effect must gain beside others."""
-    return price(candidate) + SELECTION.turned * (candidate.id in TURNED)
+def _cost(found: Search, candidate: CandidateEffect) -> float:
+    """Return what an effect must gain beside others: more where rows were counted, of which some are miscounted."""
+    counted = any(one.recording.averaged for one in found.relaxed_fit.trajectories)
+    return price(candidate) + SELECTION.turned * (candidate.id in TURNED) + SELECTION.miscounted * counted
 
 
 def _few(
@@ -148,7 +149,7 @@ def _few(
         if len(fits) == _ROUNDS:
             break
         about, present = _about(found, fitted.fit), fitted.hypothesis.candidates
-        chosen = _held_out(about, _chosen(about.equations, present, every, found.own, told), told)
+        chosen = _held_out(about, _chosen(found, about.equations, present, every, told), told)
         if any(set(chosen) == set(one.hypothesis.candidates) for one in fits):
             # what algebra offers about one fit it takes back about another: the better of both counts
             break
@@ -163,22 +164,24 @@ def _about(found: Search, fit: Fit) -> Search:
 
 
 def _chosen(
+    found: Search,
     equations: NormalEquations,
     present: Sequence[CandidateEffect],
     every: Sequence[CandidateEffect],
-    own: Sequence[Parameter],
     told: Collection[str],
 ) -> tuple[CandidateEffect, ...]:
     """Return the effects that are worth their price as algebra has it, added and left out one by one from a fit's."""
-    chosen = _pruned(equations, present, own, told)
+    chosen = _pruned(found, equations, present, told)
     while len(chosen) < _MOST:
         more = [one for one in every if one.id not in {item.id for item in chosen}]
-        gains = {one: worth_of_each(equations, (*chosen, one), own)[one.name] - _cost(one) for one in more}
+        gains = {
+            one: worth_of_each(equations, (*chosen, one), found.own)[one.name] - _cost(found, one) for one in more
+        }
         best = max(gains, key=lambda one: gains[one], default=None)
         if best is None or gains[best] <= 0.0:
             break
         chosen = (*chosen, best)
-    return _pruned(equations, chosen, own, told)
+    return _pruned(found, equations, chosen, told)
 
 
 def turn_of(values: Start, matrix: str, turned: str) -> Start:
@@ -225,9 +228,9 @@ def _rises(left: Callable[[Hypothesis], float], candidates: Sequence[CandidateEf
 
 
 def _pruned(
+    found: Search,
     equations: NormalEquations,
     candidates: Sequence[CandidateEffect],
-    own: Sequence[Parameter],
     kept: Collection[str] = (),
 ) -> tuple[CandidateEffect, ...]:
     """Return the effects that are each worth their price beside the others, at most as many as may be at once.
@@ -236,8 +239,8 @@ def _pruned(
     """
 
     def spare(left: Sequence[CandidateEffect]) -> dict[str, float]:
-        worth = worth_of_each(equations, left, own)
-        return {one.name: worth[one.name] - _cost(one) for one in left}
+        worth = worth_of_each(equations, left, found.own)
+        return {one.name: worth[one.name] - _cost(found, one) for one in left}
 
     return _eliminated(candidates, kept, spare)
 

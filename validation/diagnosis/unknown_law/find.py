@@ -319,4 +319,6 @@ def _believed(
         laws, reference = as_sensor_laws(about, fitted.fit, total)
     else:
         laws, reference = as_laws(tuple(t for t in terms if isinstance(t, Term)), fitted.fit, at, total)
+    if not laws:
+        return None
     return FoundLaw(laws[0], base.score - fitted.score, heldout, share, reference, fitted, laws[1:], chi2)

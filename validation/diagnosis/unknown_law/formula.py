@@ -19,7 +19,10 @@ __all__ = ["as_laws", "as_sensor_laws"]
 
 
 def as_sensor_laws(terms: Sequence[SensorTerm], fit: Fit, heldout: float | None) -> tuple[tuple[Law, ...], str]:
-    """Return sensor terms as laws, that of the strongest axis first, and their shapes in words."""
+    """Return sensor terms as laws, that of the strongest axis first, and their shapes in words.
+
+    None of them is a law where no reading tells one, as where the fit's covariance is not known.
+    """
     place = {q.name: j for j, q in enumerate(fit.parameters) if q.group == "term"}
     parts: dict[str, list[_Part]] = {}
     notes = []
@@ -31,6 +34,8 @@ def as_sensor_laws(terms: Sequence[SensorTerm], fit: Fit, heldout: float | None)
         for axis in axes:
             if axis != "shape" and (part := _part(term, i, axis, place, fit)) is not None:
                 parts.setdefault(f"{term.sensor}.{axis}", []).append(part)
+    if not parts:
+        return (), ""
     significant = 4.0 * SELECTION.per_parameter
     strongest = max(max(part.chi2 for part in mine) for mine in parts.values())
     laws = []
