@@ -174,9 +174,7 @@ def _chosen(
     chosen = _pruned(found, equations, present, told)
     while len(chosen) < _MOST:
         more = [one for one in every if one.id not in {item.id for item in chosen}]
-        gains = {
-            one: worth_of_each(equations, (*chosen, one), found.own)[one.name] - _cost(found, one) for one in more
-        }
+        gains = {one: worth_of_each(equations, (*chosen, one), found.own)[one.name] - _cost(found, one) for one in more}
         best = max(gains, key=lambda one: gains[one], default=None)
         if best is None or gains[best] <= 0.0:
             break

@@ -84,12 +84,17 @@ def pictured_from_above(
 
     Where nothing else tells the motion, algebra from far away lets winds and blows take up anything before.
     """
-    tracks = [recording.get("track") for recording in recordings]
-    plans = all(track is not None and not np.any(np.isfinite(track.value[:, 2])) for track in tracks)
     id = catalogued(Camera).id
-    if not plans or any(len(recording.samples) > 1 for recording in recordings):
+    if not plans_alone(recordings):
         return ()
     return tuple(ScreenedCandidate(candidate, np.inf, {}) for candidate in candidates if candidate.id == id)
+
+
+def plans_alone(recordings: Sequence[Recording]) -> bool:
+    """Tell whether recordings hold nothing but tracks without heights."""
+    tracks = [recording.get("track") for recording in recordings]
+    plans = all(track is not None and not np.any(np.isfinite(track.value[:, 2])) for track in tracks)
+    return plans and all(len(recording.samples) == 1 for recording in recordings)
 
 
 def scope_price(recordings: int) -> float:

@@ -41,6 +41,7 @@ from discsim.validation.diagnosis.selection.score_tests import (
     one_per_effect,
     pairs,
     pictured_from_above,
+    plans_alone,
     screened_candidates,
     start_of,
 )
@@ -192,17 +193,18 @@ def _selected_forward(found: Search) -> Search:
         most += len(found.final.hypothesis.candidates)
     for step in range(len(found.final.hypothesis.candidates), max(most, SELECTION.most_with_sensors)):
         current = found.final
-        if step >= _most(current, most):
+        if step >= _most(found, current, most):
             break
         found, better = next_effect(found, current, step)
         if better is None and (told := _without_swallowed(current)) is not None and not far(found, current):
             found, better = next_effect(found, told, step)
-        if step == 0 and far(found, current) and (better is None or far(found, better)) and not _told(better):
+        none_alone = far(found, current) and (better is None or far(found, better)) and not _told(better)
+        if step == 0 and none_alone and _most(found, current, most) > 1:
             found, together = _together(found)
             if together is not None:
                 found = _with_final(found, eliminated_backward(found, together))
                 continue
-        if better is None or len(better.hypothesis.candidates) > _most(better, most):
+        if better is None or len(better.hypothesis.candidates) > _most(found, better, most):
             break
         found, better = with_losses_recounted(found, better)
         if step == 0 and far(found, better) and not _told(better) and no_nearer(found, current, better):
@@ -262,8 +264,11 @@ def _without_swallowed(fitted: ContinuousFit) -> ContinuousFit | None:
     return replace(fitted, fit=replace(fitted.fit, noise=noise))
 
 
-def _most(fitted: ContinuousFit, most: int) -> int:
+def _most(found: Search, fitted: ContinuousFit, most: int) -> int:
     """Return how many effects a search for at most so many may come to from a fit: more of them errors of sensors."""
+    if len(found.recordings) == 1 and plans_alone(found.recordings):
+        # two curves in a plane take any two effects, and no other recording could bear them out
+        return 1
     acting = [candidate.row.acts_on for candidate in fitted.hypothesis.candidates]
     # a stack of one sensor's errors stands for what is none of them
     stacked = acting.count("motion") >= UNKNOWN_LAW.stack or any(acting.count(one) >= most for one in acting)
