@@ -253,7 +253,8 @@ def _failed(said: Said | None) -> str:
     if said.status is None:
         return f"**no answer within {PATIENCE:.0f} s**"
     line = next((line for line in said.text.splitlines() if line.startswith("discsim: ")), "")
-    sentence = line.removeprefix("discsim: ").rpartition("/")[2].removeprefix("recording: ")
+    # without the folder of this machine; what is refused may have a slash of its own, as in rad/s
+    sentence = re.sub(r"^\S*/(recording: )?", "", line.removeprefix("discsim: "))
     return f"**fault of the program**: {sentence}" if said.crashed else f"refused: {sentence}"
 
 
