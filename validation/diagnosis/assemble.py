@@ -18,6 +18,7 @@ from discsim.validation.diagnosis.consistency.driven import turning_of
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
 from discsim.validation.diagnosis.contradicted import contradicted_outcome
 from discsim.validation.diagnosis.design.next_recording import advise, confusions, in_words
+from discsim.validation.diagnosis.detectors.even_losses import lost_as_well
 from discsim.validation.diagnosis.held_out import Choice, choices_without_each, heldout_chi2, heldout_gain
 from discsim.validation.diagnosis.leftovers import pure_noise
 from discsim.validation.diagnosis.localisation import located_effect, located_unmodelled
@@ -63,6 +64,8 @@ from discsim.validation.identification.residual_tests import unmodelled_residual
 
 __all__ = ["outcome_of", "reason_for"]
 
+#: what tells lost samples from a slow clock where no motion does
+_COUNT_THEM = "a number written beside each sample: one that was lost leaves a gap in them, and a slow clock none"
 #: a parameter whose error is this share of the room it was given is not determined by the data
 _UNDETERMINED = 0.2
 
@@ -106,6 +109,9 @@ def _named(
         rival_bic = gain - rival.worse - len(parameters_of(rival.candidate)) * float(np.log(max(final.fit.count, 2)))
         told = advice.get((candidate.name, rival.candidate.name))
         confused.append(Confusion(rival.candidate.id, float(rival_bic), in_words(candidate.id, told), told))
+    if (lost := lost_as_well(final.fit, candidate)) is not None:
+        id, share, sd = lost
+        confused.append(Confusion(id, bic, _COUNT_THEM, parameters={"fraction": ParameterValue(share, sd)}))
     where = None if candidate.recordings is None else tuple(names[i] for i in sorted(candidate.recordings))
     return NamedEffect(candidate.id, values, Evidence(bic, held, p), where, tuple(confused))
 

@@ -33,7 +33,15 @@ from discsim.validation.identification.readings import Readings
 from discsim.validation.identification.segments import Trajectory, resegmented
 from discsim.validation.identification.sensor_model import Values
 
-__all__ = ["LostSamples", "Shifted", "dropped_accelerometer", "dropped_magnetometer", "loses_samples", "recounted"]
+__all__ = [
+    "LostSamples",
+    "Shifted",
+    "dropped_accelerometer",
+    "dropped_magnetometer",
+    "loses_samples",
+    "price_of_places",
+    "recounted",
+]
 
 
 @dataclass(frozen=True)
@@ -53,6 +61,11 @@ def _id_of(sensor: str) -> str:
     return catalogued(DroppedSamples, sensor).id
 
 
+def price_of_places(lost: float, share: float) -> float:
+    """Return what it costs to choose where samples were lost, a share of all: twice the logarithm of the choices."""
+    return float(2.0 * lost * (1.0 - np.log(share)))
+
+
 def _losses(id: str, trajectories: Sequence[Trajectory], sensor: str) -> tuple[CandidateEffect, float]:
     """Return the candidate of lost samples as trajectories hold them, and the price of where they are."""
     lost = sampled = 0.0
@@ -64,9 +77,8 @@ def _losses(id: str, trajectories: Sequence[Trajectory], sensor: str) -> tuple[C
         n, gone = float(counts.size), float(counts[-1])
         lost, sampled = lost + gone, sampled + n + gone
     share = lost / sampled
-    # where each one is lost is chosen: twice the logarithm of the choices
     if lost:
-        cost = 2.0 * lost * (1.0 - np.log(share))
+        cost = price_of_places(lost, share)
     sd = float(np.sqrt(max(share * (1.0 - share), 1.0 / sampled) / sampled))
     return CandidateEffect(id, (), None, (("fraction", share, sd),)), cost
 
