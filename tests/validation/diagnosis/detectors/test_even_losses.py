@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -40,6 +41,15 @@ def test_on_a_rig_that_coasts_a_slow_clock_may_have_lost_samples():
     assert found is not None
     assert found[0] == "accel.dropped_samples"
     assert found[1:] == pytest.approx((0.004, 2e-4))
+
+
+def test_of_a_fit_without_a_covariance_the_share_has_no_error():
+    fit = replace(clocked(coasting(), 0.996), covariance=np.empty((0, 0)))
+    assert lost_as_well(fit, free_candidate("accel.clock_rate")) == (
+        "accel.dropped_samples",
+        pytest.approx(0.004),
+        None,
+    )
 
 
 def test_a_fast_clock_has_lost_nothing():
