@@ -46,7 +46,7 @@ def lost_as_well(fit: Fit, candidate: CandidateEffect) -> tuple[str, float, floa
 
 
 def _of_sawtooth(fit: Fit, recording: int, readings: Readings) -> float:
-    """Return the chi-squared that a sawtooth of one sample makes of a sensor's readings; without end at no known rate."""
+    """Return the chi-squared that a sawtooth of one sample makes of readings; without end where no rate is known."""
     trajectory, values, sensor = fit.trajectories[recording], fit.values(recording), readings.sensor
     rate_hz = trajectory.recording.sheets[sensor].rate_hz
     if rate_hz <= 0.0:
