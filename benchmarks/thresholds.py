@@ -130,7 +130,7 @@ def asked(case: Case, recordings: Sequence[Recording]) -> dict[str, str]:
     found = screened(fitted)
     base = found.base
     near = screened_candidates(found.about(base.fit).equations, found.candidates, Hypothesis(), found.own)
-    odd = [p for p in near if p.candidate.recordings is not None and p.candidate.row.of_disc]
+    odd = [p for p in near if p.candidate.recordings is not None and p.candidate.row.in_all]
     best: dict[str, Sequence[ScreenedCandidate]] = {
         "effect": [p for p in near if p not in odd],
         "other_disc": odd,

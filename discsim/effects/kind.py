@@ -54,14 +54,14 @@ class Row(NamedTuple):
     finds the effect and no linear question about whole recordings does. It ``moves_time`` where it moves nothing but
     the instants at which samples were taken; its parameters are places ``on_disc``; on the plants of ``unseen_on`` no
     reading shows it, nor where a sheet of the sensors it ``needs`` is absent; on a plant some parameters may be
-    ``untold`` by any reading. It is ``of_part`` where it comes with how a sensor or a place is made, into all of a
-    logger's recordings.
+    ``untold`` by any reading.
 
-    On its nature: an event ``lasts`` some seconds, or as long as the parameter that is named there says; an effect
-    ``of_disc`` comes with a disc into all of its recordings; one that ``follows_spin`` makes the motion pulse with the
-    turns, one ``per_turn`` so many times as that parameter says; one of the motion that is ``also_read`` changes what a
-    sensor reads of a given motion, too; one that ``hides_readings`` leaves no reading behind that a fit could use;
-    parameters ``in_percent`` are shares; it ``becomes`` (another effect's id, by its parameter, at a value).
+    On its nature: an event ``lasts`` some seconds, or as long as the parameter that is named there says; what comes
+    with a disc, with how a sensor is made or with a place is ``in_all`` of its recordings; one that ``follows_spin``
+    makes the motion pulse with the turns, one ``per_turn`` so many times as that parameter says; one of the motion that
+    is ``also_read`` changes what a sensor reads of a given motion, too; one that ``hides_readings`` leaves no reading
+    behind that a fit could use; parameters ``in_percent`` are shares; it ``becomes`` (another effect's id, by its
+    parameter, at a value).
 
     Where a parameter is infinite at the baseline, ``regular`` tells what a fit moves instead; rules for a fit are then
     of those numbers.
@@ -92,10 +92,9 @@ class Row(NamedTuple):
     on_disc: bool = False
     unseen_on: tuple[str, ...] = ()
     untold: Mapping[str, tuple[str, ...]] = _NOTHING
-    of_part: bool = False
     needs: tuple[str, ...] = ()
     lasts: float | str = 0.0
-    of_disc: bool = False
+    in_all: bool = False
     follows_spin: bool = False
     per_turn: str = ""
     also_read: bool = False

@@ -88,7 +88,7 @@ ROWS = (
         form="C<sub>Y</sub> = {CYr} · γ",
         grows_with="advance ratio (spin over speed)",
         trace="a sideways force that changes side with the spin",
-        of_disc=True,
+        in_all=True,
     ),
     Row(
         "aero.spin_lift",
@@ -100,7 +100,7 @@ ROWS = (
         form="C<sub>L</sub> += {CLr} · |γ|",
         grows_with="advance ratio (spin over speed)",
         trace="lift that spin adds, whichever way it turns",
-        of_disc=True,
+        in_all=True,
     ),
     Row(
         "aero.spin_drag",
@@ -112,7 +112,7 @@ ROWS = (
         form="C<sub>D</sub> += {CDrr} · γ<sup>2</sup>",
         grows_with="advance ratio (spin over speed)",
         trace="drag that spin adds",
-        of_disc=True,
+        in_all=True,
     ),
     Row(
         "aero.spin_pitching_moment",
@@ -124,7 +124,7 @@ ROWS = (
         form="C<sub>M</sub> += {CMr} · γ",
         grows_with="advance ratio (spin over speed)",
         trace="a pitching moment that spin adds",
-        of_disc=True,
+        in_all=True,
     ),
     Row(
         "aero.stall",
@@ -139,7 +139,7 @@ ROWS = (
         bounds={"alpha_stall_rad": (-0.2, 0.8)},
         grid={"alpha_stall_rad": (0.03, 0.06, 0.1, 0.14, 0.18, 0.22, 0.28)},
         grid_sigma={"alpha_stall_rad": 0.1},
-        of_disc=True,
+        in_all=True,
     ),
     Row(
         "aero.yaw_reynolds",
@@ -151,7 +151,7 @@ ROWS = (
         form="CNr → CNr · (V / 15 m/s)<sup>{exponent}</sup>",
         grows_with="speed",
         trace="the spin decays by a coefficient that changes with speed",
-        of_disc=True,
+        in_all=True,
     ),
     Row(
         "aero.yaw_quadratic",
@@ -163,7 +163,7 @@ ROWS = (
         form="C<sub>N</sub> += {CNrr} · γ |γ|",
         grows_with="advance ratio (spin over speed)",
         trace="the spin decays faster than in proportion to itself",
-        of_disc=True,
+        in_all=True,
     ),
     Row(
         "aero.yaw_alpha",
@@ -175,7 +175,7 @@ ROWS = (
         form="C<sub>N</sub> += {CNraa} · γ α<sup>2</sup>",
         grows_with="angle of attack",
         trace="the spin decays faster at high angles of attack",
-        of_disc=True,
+        in_all=True,
     ),
     Row(
         "body.mass_imbalance",
@@ -188,7 +188,7 @@ ROWS = (
         grows_with="spin",
         trace="sensor and air act off the centre of mass: a trace that turns with the disc",
         on_disc=True,
-        of_disc=True,
+        in_all=True,
         follows_spin=True,
         also_read=True,
     ),
@@ -202,7 +202,7 @@ ROWS = (
         form="Iyy = Ixx + {dIyy_kg_m2}",
         grows_with="wobble",
         trace="the wobble pulses at twice the spin",
-        of_disc=True,
+        in_all=True,
         follows_spin=True,
     ),
     Row(

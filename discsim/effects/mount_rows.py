@@ -49,7 +49,7 @@ def _mount(prefix: str, sensor: str) -> Row:
         trace="one sensor's axes are not those of the others",
         bounds=dict.fromkeys(Mount._fields, (-0.5, 0.5)),
         apply=turned_in_board,
-        of_part=True,
+        in_all=True,
     )
 
 
@@ -69,6 +69,6 @@ ROWS = (
         trace="one axis shows a share of another",
         in_percent=True,
         apply=gyroscope_cross_axis,
-        of_part=True,
+        in_all=True,
     ),
 )

@@ -81,7 +81,7 @@ def load_user_effect(path: Path) -> UserEffect:
     if not isinstance(plants, tuple | list) or not plants or not set(plants) <= set(possible):
         raise InputError.at(path, None, f"PLANTS is {plants!r}, expected a tuple of some of {', '.join(possible)}")
     of_disc = id.partition(".")[0] in ("aero", "body")
-    row = Row(id, kind, acts_on, tuple(plants), _scale(path, found["SCALE"], kind), of_disc=of_disc, apply=function)
+    row = Row(id, kind, acts_on, tuple(plants), _scale(path, found["SCALE"], kind), in_all=of_disc, apply=function)
     text = (kind.__doc__ or "").strip().splitlines()
     effect = UserEffect(row, path, text[0] if text and not text[0].startswith(f"{kind.__name__}(") else id)
     _try(effect)

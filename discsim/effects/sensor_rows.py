@@ -29,7 +29,7 @@ def _lag(prefix: str, sensor: str) -> Row:
         trace="readings are late and too small, more so the faster the disc spins",
         bounds={"tau_s": (0.0, 0.5)},
         sign={"tau_s": 1.0},
-        of_part=True,
+        in_all=True,
     )
 
 
@@ -48,7 +48,7 @@ def _clock(prefix: str, sensor: str, called: str, trace: str, scale: float = 1e-
         bounds={"ratio": (0.7, 1.4)},
         moves_time=True,
         unseen_on=UNSEEN_IN_MEANS.get(sensor, ()),
-        of_part=True,
+        in_all=True,
     )
 
 
@@ -92,7 +92,7 @@ ROWS = (
         grows_with="field in body axes",
         trace="the field is bent: the circle of the readings is an ellipse",
         in_percent=True,
-        of_part=True,
+        in_all=True,
     ),
     _lag("mag", "magnetometer"),
     Row(
@@ -125,7 +125,7 @@ ROWS = (
         grows_with="square of the spin",
         trace="a reading that grows with the square of the spin",
         on_disc=True,
-        of_part=True,
+        in_all=True,
     ),
     Row(
         "accel.bias",
@@ -160,7 +160,7 @@ ROWS = (
         grows_with="specific force",
         trace="readings are off in proportion to themselves",
         in_percent=True,
-        of_part=True,
+        in_all=True,
     ),
     Row(
         "accel.cross_axis",
@@ -173,7 +173,7 @@ ROWS = (
         grows_with="specific force on another axis",
         trace="one axis shows a share of another",
         in_percent=True,
-        of_part=True,
+        in_all=True,
     ),
     Row(
         "accel.saturation",
@@ -213,7 +213,7 @@ ROWS = (
         grows_with="rate",
         trace="readings are off in proportion to themselves",
         in_percent=True,
-        of_part=True,
+        in_all=True,
     ),
     Row(
         "gyro.g_sensitivity",
@@ -227,7 +227,7 @@ ROWS = (
         trace="readings grow with the specific force",
         units={"kx": "rad/s per m/s²", "ky": "rad/s per m/s²", "kz": "rad/s per m/s²"},
         needs=("accelerometer",),
-        of_part=True,
+        in_all=True,
     ),
     _clock("gps", "gps", "the GPS", "fixes run away from the motion that the other sensors show", 1e-4),
     Row(
@@ -256,6 +256,6 @@ ROWS = (
         trace="all rates and times are off by one and the same factor",
         bounds={"ratio": (0.7, 1.4)},
         moves_time=True,
-        of_part=True,
+        in_all=True,
     ),
 )

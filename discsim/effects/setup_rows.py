@@ -100,7 +100,7 @@ ROWS = (
         form="readings = C<sup>T</sup> (true vector), C the rotation by ({rx_rad}, {ry_rad}, {rz_rad})",
         grows_with="the vector itself",
         trace="all sensors of the board show what is along other axes of the disc",
-        of_part=True,
+        in_all=True,
     ),
     Row(
         "site.field",
@@ -117,7 +117,7 @@ ROWS = (
         positive=("ratio",),
         # a free spin has no direction beside that of the field
         untold={"free_spin": ("declination_rad", "inclination_rad")},
-        of_part=True,
+        in_all=True,
     ),
     Row(
         "clock.units",

@@ -79,5 +79,5 @@ def price(candidate: CandidateEffect) -> float:
     row = candidate.row
     if row.event:
         return (SELECTION.event_entry if row.brief else SELECTION.gust_entry) + SELECTION.per_parameter * count
-    odd = candidate.recordings is not None and (row.of_disc or row.of_part)
+    odd = candidate.recordings is not None and row.in_all
     return SELECTION.entry + SELECTION.per_parameter * count + (SELECTION.other_disc if odd else 0.0)

@@ -198,8 +198,13 @@ def _selected_forward(found: Search) -> Search:
         found, better = next_effect(found, current, step)
         if better is None and (told := _without_swallowed(current)) is not None and not far(found, current):
             found, better = next_effect(found, told, step)
-        none_alone = far(found, current) and (better is None or far(found, better)) and not _told(better)
-        if step == 0 and none_alone and _most(found, current, most) > 1:
+        if (
+            step == 0
+            and far(found, current)
+            and (better is None or far(found, better))
+            and not _told(better)
+            and _most(found, current, most) > 1
+        ):
             found, together = _together(found)
             if together is not None:
                 found = _with_final(found, eliminated_backward(found, together))
