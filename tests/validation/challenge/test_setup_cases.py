@@ -243,7 +243,9 @@ def test_a_table_s_profile_is_no_sensor_and_keeps_its_seconds():
 def test_no_gyroscope_that_feels_acceleration_is_drawn_where_its_place_is_not_stated():
     """It feels the pull at the accelerometer's chip; without one its size is nobody's to tell."""
     drawn = [draw_case(seed, "rate_table", kind="setup") for seed in range(91040, 91060)]
+    drawn += [draw_case(seed, kind="two") for seed in range(310010, 310110)]
     felt = [case for case in drawn if any(item.effect.id == "gyro.g_sensitivity" for item in case.concealed)]
+    assert len(felt) > 2
     assert all("accelerometer" in case.instruments.sensors for case in felt)
     bare = [case for case in drawn if "accelerometer" not in case.instruments.sensors and len(case.concealed) > 1]
     assert bare

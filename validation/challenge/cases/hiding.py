@@ -59,8 +59,6 @@ def _faulty_setup(case: Case, effects: Sequence[str], rng: np.random.Generator) 
     if not physical and (effects or rng.random() < 0.5):
         return (fault,)
     beside = choose(case, rng, [fault], *physical)
-    while not (physical or _place_known(beside.effect.id, case)):
-        beside = choose(case, rng, [fault])
     while not ordinary(beside.effect, case.plant):
         beside = choose(case, rng, [fault], beside.effect.id)
     return fault, beside
@@ -81,7 +79,9 @@ def choose(
     if id is None:
         others = [item.effect.id for item in beside]
         there = [id for id in possible(case) if id not in ON_REQUEST]
-        id = str(rng.choice([id for id in there if all(_goes_with(id, other) for other in others)]))
+        fit = [id for id in there if all(_goes_with(id, other) for other in others)]
+        while id is None or not _place_known(id, case):
+            id = str(rng.choice(fit))
     only = int(rng.integers(len(case.runs))) if row(id).event else None
     return Concealed(draw_effect(id, case.plant, rng, case.recorded, largest=largest), only)
 
