@@ -17,7 +17,7 @@ from discsim.validation.challenge.report.page import write_page
 from discsim.validation.challenge.scores.detection import detections, fit_curve
 from discsim.validation.challenge.scores.result import RESULT, Scored, processor_times, rates_of, times
 from discsim.validation.reporting.run import Run, json_text, package_version, source_digest
-from discsim.validation.running.tasks import Task, claim, discard, run_tasks
+from discsim.validation.running.tasks import Task, claim, discard, idle_cores, run_tasks
 
 __all__ = ["challenge", "limit_of", "write_challenge"]
 
@@ -52,6 +52,8 @@ def challenge(
     claim(folder, {"drawn": drawn, "command": command, "versions": versions})
     seal_answers(requests, run.out)
     run.step(f"{len(requests)} answers are sealed; their digests stand in {run.out / 'sealed.json'}")
+    if note := idle_cores(scheduler, workers):
+        run.step(note)
     tasks = [Task(request.name, tuple(request)) for request in requests]
     done = sum((folder / f"{task.name}.json").exists() for task in tasks)
     if done:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import json
 import logging
-import os
 import signal
 import threading
 import zipfile
@@ -25,12 +24,12 @@ import numpy as np
 from discsim.errors import InputError
 from discsim.files import read_text, write_bytes, write_text
 from discsim.result import installed, require
-from discsim.threads import limited
+from discsim.threads import cores, limited
 
 if TYPE_CHECKING:
     from distributed import Client
 
-__all__ = ["Progress", "Task", "claim", "discard", "run_tasks"]
+__all__ = ["Progress", "Task", "claim", "discard", "idle_cores", "run_tasks"]
 
 T = TypeVar("T")
 
@@ -132,11 +131,18 @@ def run_tasks(
     done = {name: result for name in names if (result := _read(folder, name)) is not None}
     left = [task for task in tasks if task.name not in done]
     if left:
-        count = workers or (len(os.sched_getaffinity(0)) if installed("distributed") else 1)
+        count = workers or (cores() if installed("distributed") else 1)
         results = _results(left, function, shared, scheduler, count)
         for name, result in progress(results, len(left)) if progress else results:
             done[name] = _write(folder, name, result)
     return [done[name] for name in names]
+
+
+def idle_cores(scheduler: str | None, workers: int | None) -> str | None:
+    """Return what to tell who asked for neither and whose other cores stay idle, as Dask is missing; else None."""
+    if scheduler is not None or workers is not None or installed("distributed") or cores() < 2:
+        return None
+    return f"one process does the work; pip install 'discsim[cluster]' puts all {cores()} cores to it"
 
 
 def _results(

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from discsim.result import Result, require
 from discsim.validation.reporting.run import package_version
 from discsim.validation.running.progress import Progress, silent
-from discsim.validation.running.tasks import Task, claim, discard, run_tasks
+from discsim.validation.running.tasks import Task, claim, discard, idle_cores, run_tasks
 from discsim.validation.sweeps.cases import landing_of, rows_of, write_rows
 from discsim.validation.sweeps.chunks import Sweep, chunk_tasks, fly_truth, motion_from, score_chunk, truth_tasks
 from discsim.validation.sweeps.figures import draw_sweep
@@ -150,6 +150,8 @@ def sweep(
         if anew:
             discard(folder)
         claim(folder, identity)
+        if note := idle_cores(scheduler, workers):
+            say(note)
 
         def run(tasks: list[Task], what: str, function: Callable[..., Any], shared: object) -> list[Any]:
             there = sum((folder / f"{task.name}.npz").exists() for task in tasks)

@@ -267,3 +267,19 @@ def test_a_folder_belongs_to_one_piece_of_work(tmp_path):
         claim(folder, {})
     discard(folder)
     assert (folder / "notes.txt").exists()
+
+
+@pytest.mark.parametrize(("asked", "has_dask", "count"), [(None, False, 1), (None, True, 4), (2, False, 4)])
+def test_whose_other_cores_stay_idle_for_want_of_a_package_is_told_so(monkeypatch, asked, has_dask, count):
+    monkeypatch.setattr(execution, "installed", lambda package: has_dask)
+    monkeypatch.setattr(execution, "cores", lambda: count)
+    assert execution.idle_cores(None, asked) is None
+    monkeypatch.setattr(execution, "cores", lambda: 4)
+    told = execution.idle_cores(None, asked)
+    if asked or has_dask:
+        assert told is None
+    else:
+        assert told is not None
+        assert "discsim[cluster]" in told
+        assert "4 cores" in told
+    assert execution.idle_cores("tcp://127.0.0.1:8786", None) is None
