@@ -21,6 +21,7 @@ from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start,
 from discsim.validation.identification.from_afar import fitted_from_afar
 from discsim.validation.identification.gauss_newton import NO_BARS, Bars, Fit, penalty_of, refit
 from discsim.validation.identification.noise import NoiseModel, estimate_noise, likeliest_noise, log_likelihood
+from discsim.validation.identification.ordinary_errors import ordinary_errors
 from discsim.validation.identification.parameters import Parameter, values_of
 from discsim.validation.identification.segments import Trajectory
 from discsim.validation.identification.sensor_model import CLOCKS
@@ -74,6 +75,22 @@ class ContinuousFit:
     def charged(self) -> float:
         """What its effects are charged for the parameters that the readings tell, and for being unusual."""
         return sum(charge(candidate, self.told(candidate)) for candidate in self.hypothesis.candidates)
+
+    @property
+    def prior_penalty(self) -> float:
+        """What its effects' sizes cost by how large such errors ordinarily are: twice the negative log of that prior.
+
+        It only tells hypotheses apart that readings do not. Of effects that models/priors.toml does not hold any size
+        is as likely.
+        """
+        effects = {candidate.id for candidate in self.hypothesis.candidates}
+        sigmas = {(error.effect, error.name): error.sigma for error in ordinary_errors("relaxed fit")}
+        sizes = [
+            (v - q.stated) / sigmas[q.key]
+            for q, v in zip(self.fit.parameters, self.fit.at.tolist(), strict=True)
+            if q.group in effects and q.key in sigmas
+        ]
+        return float(np.dot(sizes, sizes))
 
 
 def continuous_fit(

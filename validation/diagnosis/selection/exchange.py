@@ -134,8 +134,12 @@ def rivals_of(found: Search) -> dict[str, list[Rival]]:
 
 
 def _merit(worse: float, rival: Rival, candidate: CandidateEffect, final: ContinuousFit) -> float:
-    """Return by how much a rival's score is worse than that of an effect, each charged for what readings tell of it."""
-    return worse + lead(rival.candidate, candidate, rival.fitted.told(rival.candidate), final.told(candidate))
+    """Return by how much a rival's score is worse than that of an effect.
+
+    Each is charged for what readings tell of it, and for how unlikely the sizes are that all effects have beside it.
+    """
+    charges = lead(rival.candidate, candidate, rival.fitted.told(rival.candidate), final.told(candidate))
+    return worse + charges + rival.fitted.prior_penalty - final.prior_penalty
 
 
 def takes_its_place(worse: float, rival: Rival, candidate: CandidateEffect, final: ContinuousFit) -> bool:

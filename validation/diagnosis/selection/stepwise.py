@@ -418,7 +418,7 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
         gain, chi2 = found.considered[-1].gain, chi2_in(refitted, noise)
         if gain > price(screened.candidate) and possible(refitted):
             # far from the data chi-squared says more than a likelihood that has swallowed the mismatch as noise
-            merit = (chi2 + cost if distant else refitted.score) + refitted.charged
+            merit = (chi2 + cost if distant else refitted.score) + refitted.charged + refitted.prior_penalty
             merit -= SELECTION.right_sign * any(q.key in ONE_SIDED for q in parameters_of(screened.candidate))
             fits.append((merit, refitted, fit, cost))
             best_chi2 = min(best_chi2, chi2)

@@ -1,5 +1,6 @@
 """Effects that recordings hardly tell apart: which of them is named."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,6 +13,7 @@ from discsim.rig import spin_down
 from discsim.sensors import Instruments, record
 from discsim.validation.diagnosis.selection.candidates import free_candidate
 from discsim.validation.diagnosis.selection.evidence import charge
+from discsim.validation.diagnosis.selection.exchange import takes_its_place
 from discsim.validation.diagnosis.selection.stepwise import Search, search
 
 
@@ -62,3 +64,18 @@ def test_a_parameter_that_no_reading_shows_is_not_charged():
     assert len(named.columns) == 3
     assert final.told(named) == 1
     assert final.charged == charge(named, 1) < charge(free_candidate("gyro.time_offset")) < charge(named)
+
+
+def test_of_two_that_readings_do_not_tell_apart_the_one_is_named_whose_size_a_part_can_have():
+    """A scale has a sigma of 5 % (models/priors.toml): 0.3 % off is nothing, and half of all is ten of them."""
+    final = coasted().final
+    (named,) = final.hypothesis.candidates
+    (late,) = (one for one in coasted().rivals[named.name] if one.candidate.id == "gyro.time_offset")
+    assert final.prior_penalty == pytest.approx((0.003 / 0.05) ** 2, rel=0.05)
+    assert late.fitted.prior_penalty == 0.0  # how wrong times may be nobody has written down
+    assert not takes_its_place(late.worse, late, named, final)
+    at = final.fit.at.copy()
+    at[[q.key for q in final.fit.parameters].index(("gyro.scale", "sz"))] = -0.5
+    absurd = replace(final, fit=replace(final.fit, at=at))
+    assert absurd.prior_penalty == pytest.approx(100.0, rel=0.01)
+    assert takes_its_place(late.worse, late, named, absurd)
