@@ -301,8 +301,15 @@ class _Read:
             )
             t, motion = s.instants[o], rows[0, mine]
             self.rows[which][o] = motion
-            read = partial(around.read, s.sensor, around.values, t)
-            ideal, follows = readings_of_neighbours(read, self._senses[which], rows, mine, spans, bool(around.central))
+            # weighted means share instants: each is read once
+            once, first, again = (
+                np.unique(mine, return_index=True, return_inverse=True)
+                if s.nodes > 1
+                else (mine, slice(None), slice(None))
+            )
+            read = partial(around.read, s.sensor, around.values, t[first])
+            ideal, follows = readings_of_neighbours(read, self._senses[which], rows, once, spans, bool(around.central))
+            ideal, follows = ideal[again], follows[again]
             self.ideal[which][o] = ideal + s.held[o]
             for j, place in enumerate(half - 1 - around.d):
                 if place >= 0 and around.columns[around.motion[place]].key in _ALSO_READ:
@@ -463,9 +470,8 @@ def _stack(
         # what the closing of forbidden defects adds
         closed = np.einsum("mwd,md->mw", M[:, :, :d], matching[segment])
         spread = s.nodes > 1
-        if spread:
-            M = _by_unknowns(M, segment, continuity)
-        prediction, slopes, closed = s.weighted(y), s.weighted(M), s.weighted(closed)
+        prediction, closed = s.weighted(y), s.weighted(closed)
+        slopes = _by_unknowns(s, M, segment, continuity) if spread else M
         for axis in range(s.width):
             index = _counted(s, prediction, axis)
             if index.size == 0:
@@ -506,13 +512,28 @@ def _stack(
     )
 
 
-def _by_unknowns(M: FloatArray, segment: IntArray, continuity: _Continuity) -> FloatArray:
-    """Return slopes (m, width, u + p) by the unknowns of a recording from those by the states of segments, M."""
-    d, u = continuity.sensitivities.shape[1], continuity.unknowns
-    full = np.empty((*M.shape[:2], continuity.sensitivities.shape[2]))
+def _by_unknowns(s: Sampled, M: FloatArray, segment: IntArray, continuity: _Continuity) -> FloatArray:
+    """Return slopes (n, width, u + p) of weighted readings by the unknowns of a recording.
+
+    ``M`` are those of what they are means of, by the states of its segments. The instants of one reading lie in few
+    segments: what it says of the state of each is summed first.
+    """
+    S, u = continuity.sensitivities, continuity.unknowns
+    d, full = S.shape[1], np.zeros((M.shape[0] // s.nodes, M.shape[1], S.shape[2]))
+    if full.shape[2] > u:
+        full[:, :, u:] = s.weighted(M[:, :, d:])
+    node, reading = np.divmod(np.arange(M.shape[0]), full.shape[0])
+    assert s.weights is not None
+    weights = s.weights[node, reading]
     for i in np.unique(segment):
-        full[segment == i] = M[segment == i, :, :d] @ continuity.sensitivities[i]
-    full[:, :, u:] += M[:, :, d:]
+        mine = np.flatnonzero((segment == i) & (weights != 0.0))
+        which, place = np.unique(reading[mine], return_inverse=True)
+        said = np.zeros((which.size, M.shape[1], d))
+        np.add.at(said, place, weights[mine, None, None] * M[mine, :, :d])
+        # a state follows what comes before it alone
+        before = d + i * continuity.allowed.size
+        full[which, :, :before] += said @ S[i, :, :before]
+        full[which, :, u:] += said @ S[i, :, u:]
     return full
 
 
