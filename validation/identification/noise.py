@@ -25,6 +25,8 @@ __all__ = ["GroupNoise", "NoiseModel", "chi_squared", "estimate_noise", "likelie
 CORRELATIONS = np.concatenate([np.linspace(0.05, 0.9, 18), 1.0 - np.geomspace(0.08, 0.005, 9)])
 #: lags (samples) at which noise is looked at
 LAGS = np.unique(np.geomspace(1, 100, 16).astype(int))
+#: the slowest noise, s: what is slower is not taken for noise
+_SLOWEST = 2.0
 #: correlation this weak is taken for none
 LEAST_CORRELATED = 0.04
 
@@ -106,15 +108,28 @@ def log_likelihood(linear: Linear, noise: NoiseModel, residual: FloatArray) -> f
     So a reading that one hypothesis leaves out, as those are in which a lag remembers what nobody recorded, neither
     wins nor loses.
     """
-    total = chi_squared(linear, noise, residual)
+    levels = (_level(linear, noise[channel.group], channel, channel.index.size) for channel in linear.channels)
+    return chi_squared(linear, noise, residual) + sum(levels)
+
+
+def log_likelihood_of_first(
+    linear: Linear, noise: NoiseModel, residual: FloatArray, counts: Mapping[tuple[str, str], int]
+) -> float:
+    """Return what of `log_likelihood` the first so many readings are, by sensor and axis."""
+    white = whitened(linear, noise, residual[:, None])[:, 0]
+    total = 0.0
     for channel in linear.channels:
-        own = noise[channel.group]
-        stated = float(linear.sd[channel.rows][0])
-        usual = stated if np.isfinite(stated) and stated > 0.0 else DEFAULT[channel.group]
-        total += channel.index.size * (2.0 * float(np.log(own.sd / usual)) - 1.0)
-        if own.correlation:
-            total += _log_determinant(own, channel.index)
+        first = counts.get((channel.sensor, channel.axis), 0)
+        total += float(np.sum(white[channel.rows][:first] ** 2)) + _level(linear, noise[channel.group], channel, first)
     return total
+
+
+def _level(linear: Linear, noise: GroupNoise, channel: Channel, count: int) -> float:
+    """Return -2 log likelihood of the first ``count`` readings of a channel, but for their chi-squared."""
+    stated = float(linear.sd[channel.rows][0])
+    usual = stated if np.isfinite(stated) and stated > 0.0 else DEFAULT[channel.group]
+    level = count * (2.0 * float(np.log(noise.sd / usual)) - 1.0)
+    return level + (_log_determinant(noise, channel.index[:count]) if noise.correlation and count else 0.0)
 
 
 def estimate_noise(
@@ -128,10 +143,12 @@ def estimate_noise(
     counts: dict[str, int] = {}
     products: dict[str, FloatArray] = {}
     pairs: dict[str, FloatArray] = {}
+    spacing: dict[str, float] = {}
     for linear, residual in zip(linears, residuals, strict=True):
         for channel in linear.channels:
             x = residual[channel.rows]
             group = channel.group
+            spacing[group] = min(spacing.get(group, np.inf), _spacing(linear, channel))
             squares[group] = squares.get(group, 0.0) + float(x @ x)
             counts[group] = counts.get(group, 0) + x.size
             at_lags = products.setdefault(group, np.zeros(LAGS.size))
@@ -149,13 +166,16 @@ def estimate_noise(
         phi, part = 0.0, 1.0
         if coloured and squares[group] > 0:
             rho = products[group] / np.maximum(pairs[group], 1.0) / (squares[group] / n)
-            phi, part = _correlation(rho, pairs[group])
+            phi, part = _correlation(rho, pairs[group], _slowest(group, spacing[group]))
         model[group] = GroupNoise(sd, phi, part)
     return model
 
 
-def _correlation(rho: FloatArray, pairs: FloatArray) -> tuple[float, float]:
-    """Return correlation and share of noise from its autocorrelations (k,) at the lags; (0, 1) where it is white."""
+def _correlation(rho: FloatArray, pairs: FloatArray, slowest: float) -> tuple[float, float]:
+    """Return correlation and share of noise from its autocorrelations (k,) at the lags; (0, 1) where it is white.
+
+    ``slowest`` is its longest memory in samples.
+    """
     some = pairs > 20
     lags, rho, weight = LAGS[some], rho[some], pairs[some]
     if lags.size == 0 or lags[0] != 1:
@@ -163,7 +183,8 @@ def _correlation(rho: FloatArray, pairs: FloatArray) -> tuple[float, float]:
     error = 1.0 / np.sqrt(weight)
     best, fit = (0.0, 1.0), float(np.sum((rho / error) ** 2))
     white = fit
-    for phi in CORRELATIONS:
+    most = float(np.exp(-1.0 / slowest))
+    for phi in CORRELATIONS[CORRELATIONS <= most]:
         shape = phi ** lags.astype(float)
         part = float(np.clip(np.sum(rho * shape / error**2) / np.sum((shape / error) ** 2), 0.0, 1.0))
         left = float(np.sum(((rho - part * shape) / error) ** 2))
@@ -175,12 +196,25 @@ def _correlation(rho: FloatArray, pairs: FloatArray) -> tuple[float, float]:
         return 0.0, 1.0
     # first lag alone when all of the noise has it: exact where the grid is coarse
     if part > 0.9 and 0.0 < rho[0] < CORRELATIONS[-1]:
-        return float(rho[0]), 1.0
+        return min(float(rho[0]), most), 1.0
     return phi, part
 
 
-#: the slowest noise that a likelihood is asked for, s: what is slower is not taken for noise
-_SLOWEST = 2.0
+def _spacing(linear: Linear, channel: Channel) -> float:
+    """Return the ordinary spacing of a channel's readings, s; without end where there are none."""
+    return float(np.median(np.diff(linear.t[channel.rows]))) if channel.index.size > 1 else np.inf
+
+
+def _slowest(group: str, spacing: float) -> float:
+    """Return the longest memory of a group's noise in samples, which lie ``spacing`` s apart.
+
+    Of a receiver 200 samples at least: its position wanders for minutes with satellites and atmosphere. In means over
+    turns so many would outlast the recording, and swallow every constant error.
+    """
+    least = -1.0 / float(np.log(CORRELATIONS[-1])) if group.startswith("gps") else 1.0
+    return max(_SLOWEST / spacing, least)
+
+
 #: residuals this many times the stated noise are not noise: what they are likeliest with says nothing
 _NOT_NOISE = 5.0
 
@@ -204,15 +238,10 @@ def likeliest_noise(linears: Sequence[Linear], residuals: Sequence[FloatArray], 
         ]
         count = sum(x.size for x, _ in parts)
         spacing = min(
-            (
-                float(np.median(np.diff(linear.t[channel.rows])))
-                for linear in linears
-                for channel in linear.channels
-                if channel.group == group and channel.index.size > 1
-            ),
+            (_spacing(linear, channel) for linear in linears for channel in linear.channels if channel.group == group),
             default=np.inf,
         )
-        slowest = max(-1.0 / float(np.log(CORRELATIONS[-1])), _SLOWEST / spacing)
+        slowest = _slowest(group, spacing)
         found[group] = _likeliest(parts, count, own, slowest)
     return found
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -153,6 +155,16 @@ def test_what_a_sheet_states_is_the_first_guess_and_something_stands_in_where_it
     silent = stated_noise([rows(("gyroscope", 5), sd=np.nan)])["gyroscope"]
     assert np.isfinite(silent.sd)
     assert silent.sd > 0
+
+
+@pytest.mark.parametrize(("group", "swallowed"), [("accelerometer", False), ("gps.position", True)])
+def test_a_constant_in_readings_that_lie_far_apart_is_noise_of_a_receiver_alone(group: str, swallowed: bool):
+    """Two hundred means over turns, 0.15 s apart, would remember for 30 s, as a receiver's position does."""
+    linear = rows(*[(group, 60)] * 3)
+    linear = replace(linear, t=15.0 * linear.t)
+    residual = np.repeat([20.0, -30.0, 15.0], 60) + np.random.default_rng(5).standard_normal(180)
+    for noise in (first := estimate_noise([linear], [residual]), likeliest_noise([linear], [residual], first)):
+        assert (noise[group].memory(0.15) > 2.01) is swallowed
 
 
 def slow(seed: int, memory: float) -> tuple[Linear, FloatArray]:
