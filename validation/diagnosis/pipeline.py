@@ -20,7 +20,11 @@ from discsim.validation.diagnosis.result import Outcome
 from discsim.validation.diagnosis.selection.refits import told_to
 from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault, with_turned_board
-from discsim.validation.diagnosis.setup_effects import free_parameters, with_reversed_axes
+from discsim.validation.diagnosis.setup_effects import (
+    free_parameters,
+    with_reversed_axes,
+    with_those_borne_out,
+)
 from discsim.validation.diagnosis.stages import Prepared, Progress, Question, Tried, silent
 from discsim.validation.diagnosis.verdict import judged
 from discsim.validation.identification.competing_effects import Competing
@@ -53,8 +57,8 @@ def diagnose(
     with told_to(progress):
         progress("checking the setup", 0, 5)
         tried = tried_with(_prepared_first(question), question)
-        for suppose in (likeliest_fault, reversed_axes):
-            supposed = suppose(tried)
+        for suppose in (likeliest_fault, reversed_axes, borne_out):
+            supposed = suppose(tried, question)
             again = tried if supposed is None else tried_under(supposed, question)
             tried = again if again.contradiction is None else tried
         return outcome_of(judged(tried, progress), question)
@@ -113,11 +117,18 @@ def prepared_under(setup: SetupFindings, question: Question) -> Prepared:
     return Prepared(setup, tuple(meant), tuple(fitted), (*warnings, *notes), agreeing, agreement, rows)
 
 
-def likeliest_fault(tried: Tried) -> SetupFindings | None:
+def likeliest_fault(tried: Tried, question: Question) -> SetupFindings | None:
     """Suppose a fault that other physics hides from the relations between sensors: what follows them tells it then."""
+    del question
     return None if tried.contradiction is None else with_likeliest_fault(tried.prepared.setup)
 
 
-def reversed_axes(tried: Tried) -> SetupFindings | None:
+def reversed_axes(tried: Tried, question: Question) -> SetupFindings | None:
     """Suppose axes reversed that a fit has found to read about -1 times what they should."""
+    del question
     return None if tried.fit is None else with_reversed_axes(tried.prepared.setup, tried.fit)
+
+
+def borne_out(tried: Tried, question: Question) -> SetupFindings | None:
+    """Suppose only the faults of a setup that a fit bears out: beside an effect that it found another may be none."""
+    return None if tried.fit is None else with_those_borne_out(tried.prepared.setup, question.recordings, tried.fit)

@@ -29,12 +29,20 @@ from discsim.validation.diagnosis.result import (
     ParameterValue,
     Verdict,
 )
+from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.diagnosis.setup import SetupFault, SetupFindings, said
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.parameters import Parameter
 from discsim.written import corrected
 
-__all__ = ["SetupAnswer", "answer_of_setup", "free_parameters", "on_board_axes", "with_reversed_axes"]
+__all__ = [
+    "SetupAnswer",
+    "answer_of_setup",
+    "free_parameters",
+    "on_board_axes",
+    "with_reversed_axes",
+    "with_those_borne_out",
+]
 
 #: how far a number of a fault may be from its first value, one sigma: s; rad; rad and share. Offsets are found to a few
 #: ms, rotations to a tenth of a radian (an accelerometer's place may be 3 mm of 16 off), fields to a few per cent
@@ -73,6 +81,34 @@ def with_reversed_axes(findings: SetupFindings, fit: Fit) -> SetupFindings | Non
             meant = tuple(corrected(one, [axes]) for one in findings.recordings)
             return SetupFindings((*findings.faults, SetupFault(axes, float("inf"), None)), meant, findings.hints)
     return None
+
+
+def with_those_borne_out(findings: SetupFindings, written: Sequence[Recording], fit: Fit) -> SetupFindings | None:
+    """Return findings without the faults whose numbers a fit has brought back to none; None if there are no such.
+
+    Relations between sensors may take a large error of one sensor for another field, as they cannot fit it; beside that
+    error the field is the stated one. ``written`` are the recordings as they stand in their files.
+    """
+    kept = tuple(fault for fault in findings.faults if _borne_out(fault.effect, fit))
+    if len(kept) == len(findings.faults):
+        return None
+    meant = tuple(written)
+    for fault in kept:
+        meant = tuple(corrected(one, [fault.effect]) for one in meant)
+    return replace(findings, faults=kept, recordings=meant)
+
+
+def _borne_out(fault: Effect, fit: Fit) -> bool:
+    """Tell whether a fault's numbers, as a fit has them, are further from none than what an effect must gain.
+
+    By their covariance (Wald), in which numbers that no reading tells are as uncertain as they were before the fit.
+    """
+    names = fault.row.parameters
+    covariance = _covariance_of(fit, fault.id, names) if fault.row.type in _SIGMA else None
+    if covariance is None:
+        return True
+    away = np.array(_numbers(_refined(fault, fit).effect.value)) - _numbers(fault.row.baseline)
+    return bool(away @ np.linalg.solve(covariance, away) > SELECTION.entry + SELECTION.per_parameter * len(names))
 
 
 def _numbers(value: tuple[float | str, ...]) -> list[float]:

@@ -18,15 +18,15 @@ from discsim.trajectory import predict
 from discsim.validation.checking.checked import check
 from discsim.validation.diagnosis.selection.candidates import available, candidates_for, parameters_of
 from discsim.validation.diagnosis.selection.stepwise import search
-from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, suspected_fault
+from discsim.validation.diagnosis.setup import SetupFault, SetupFindings, find_setup_faults, suspected_fault
 from discsim.validation.diagnosis.setup.find import may_be_physics
 from discsim.validation.diagnosis.setup.hypotheses import Hypothesis, hypotheses
 from discsim.validation.diagnosis.setup.relations import Columns
-from discsim.validation.diagnosis.setup_effects import with_reversed_axes
+from discsim.validation.diagnosis.setup_effects import free_parameters, with_reversed_axes, with_those_borne_out
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.parameters import AllowedDefects, Parameter
 from discsim.validation.scenarios.throws import Throw
-from discsim.written import as_written
+from discsim.written import as_written, corrected
 
 
 def test_a_setting_is_no_trial_of_the_search_and_a_size_is():
@@ -103,6 +103,23 @@ def test_an_axis_that_the_fit_finds_scaled_by_minus_one_is_a_reversed_column():
 def test_a_small_scale_is_no_reversed_column():
     made = tuple(tables(errors=[effect("gyro.scale", sx=0.0, sy=0.0, sz=0.03)]))
     assert with_reversed_axes(SetupFindings((), made), search(made).final.fit) is None
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_a_fault_that_the_fit_brings_back_to_nothing_is_none(there):
+    """Relations between sensors had told another field where an accelerometer has a cross-axis error of 1 %."""
+    fault = effect("site.field", ratio=0.97)
+    written = tuple(tables(errors=[fault] if there else []))
+    meant = tuple(corrected(one, [fault]) for one in written)
+    findings = SetupFindings((SetupFault(fault, 100.0, None),), meant)
+    fit = search(meant, free=free_parameters(findings)).final.fit
+    left = with_those_borne_out(findings, written, fit)
+    if there:
+        assert left is None
+    else:
+        assert left is not None
+        assert left.faults == ()
+        assert left.recordings == written
 
 
 @cache
