@@ -199,6 +199,9 @@ class Selection:
     worst, worst_share : float
         Rivals that algebra finds worse than this, and than this share of what the effect gains, are not refitted: time
         alone, for five times what leaves a rival confused.
+    rivals, alike : int
+        Rivals of an effect that are refitted, and of those that algebra cannot tell from it, which are mostly its
+        twins: time alone. At one spin a lag, an offset of time, a clock, a scale and a cross-axis error are alike.
     confused : float
         Hypotheses whose scores differ by less cannot be told apart: very strong evidence is 10 (Kass and Raftery).
     """
@@ -236,6 +239,8 @@ class Selection:
     better: float = 20.0
     worst: float = 60.0
     worst_share: float = 0.05
+    rivals: int = 3
+    alike: int = 6
     confused: float = 12.0
 
 

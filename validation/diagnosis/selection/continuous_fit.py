@@ -13,14 +13,20 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
-from discsim.effects.sensors import ClockRate
+from discsim.effects.sensors import ClockRate, Lag
 from discsim.validation.diagnosis.relaxed_fit import beginning
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from discsim.validation.diagnosis.selection.evidence import BOUNDS, charge
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
 from discsim.validation.identification.from_afar import fitted_from_afar
 from discsim.validation.identification.gauss_newton import NO_BARS, Bars, Fit, penalty_of, refit
-from discsim.validation.identification.noise import NoiseModel, estimate_noise, likeliest_noise, log_likelihood
+from discsim.validation.identification.noise import (
+    NoiseModel,
+    estimate_noise,
+    likeliest_noise,
+    log_likelihood,
+    log_likelihood_of_first,
+)
 from discsim.validation.identification.ordinary_errors import ordinary_errors
 from discsim.validation.identification.parameters import Parameter, values_of
 from discsim.validation.identification.segments import Trajectory
@@ -33,13 +39,14 @@ __all__ = ["ContinuousFit", "continuous_fit"]
 class ContinuousFit:
     """A fit whose segments are continuous, under a hypothesis.
 
-    ``score`` is -2 log likelihood with the noise estimated from its own residuals, priors included.
+    ``score`` is -2 log likelihood with the noise estimated from its own residuals, ``scored_in``, priors included.
     """
 
     hypothesis: Hypothesis
     fit: Fit
     score: float
     residuals: tuple[FloatArray, ...] = field(default_factory=tuple)
+    scored_in: NoiseModel = field(default_factory=dict)
 
     def squared_sizes(self, candidate: CandidateEffect) -> float:
         """Return how far a candidate's numbers are from where they act not, squared, in the fit's covariance (Wald).
@@ -71,6 +78,14 @@ class ContinuousFit:
         )
         return max(count - untold, 1)
 
+    def worse_than(self, other: ContinuousFit) -> float:
+        """Return by how much its score is higher than another's, on the readings that take part in both.
+
+        A lag remembers what nobody recorded, so that the first readings of its sensor take no part. Whether these
+        happen to fit well without it is no evidence.
+        """
+        return self.score - other.score - _left_out(self, other) + _left_out(other, self)
+
     @property
     def charged(self) -> float:
         """What its effects are charged for the parameters that the readings tell, and for being unusual."""
@@ -84,7 +99,8 @@ class ContinuousFit:
         is as likely.
         """
         effects = {candidate.id for candidate in self.hypothesis.candidates}
-        sigmas = {(error.effect, error.name): error.sigma for error in ordinary_errors("relaxed fit")}
+        ordinary = (*ordinary_errors("relaxed fit"), *ordinary_errors("choice between twins"))
+        sigmas = {(error.effect, error.name): error.sigma for error in ordinary}
         sizes = [
             (v - q.stated) / sigmas[q.key]
             for q, v in zip(self.fit.parameters, self.fit.at.tolist(), strict=True)
@@ -183,6 +199,24 @@ def _longer_and_longer(fit: Fit) -> FloatArray:
     return at
 
 
+def _left_out(fitted: ContinuousFit, beside: ContinuousFit) -> float:
+    """Return what of a fit's score are readings that a lag of another leaves out, for it remembers what came before."""
+    lags = {candidate.row.acts_on for candidate in beside.hypothesis.candidates if candidate.row.type is Lag}
+    if not lags:
+        return 0.0
+    total = 0.0
+    for linear, residual, less in zip(fitted.fit.linears, fitted.residuals, beside.fit.linears, strict=True):
+        begun = {(c.sensor, c.axis): int(c.index[0]) for c in less.channels if c.sensor in lags}
+        counts = {
+            (c.sensor, c.axis): int(np.searchsorted(c.index, begun[c.sensor, c.axis]))
+            for c in linear.channels
+            if (c.sensor, c.axis) in begun
+        }
+        if any(counts.values()):
+            total += log_likelihood_of_first(linear, fitted.scored_in, residual, counts)
+    return total
+
+
 def noise_of(fit: Fit) -> NoiseModel:
     """Return the noise that a fit's residuals show."""
     spent = len(fit.parameters) + 12 * len(fit.trajectories)
@@ -195,7 +229,7 @@ def scored(hypothesis: Hypothesis, fit: Fit) -> ContinuousFit:
     # of a sensor that has no reading left the noise stays: it has some again under a rival of this hypothesis
     fit = replace(fit, noise={**fit.noise, **likeliest_noise(fit.linears, residuals, noise_of(fit))})
     score = sum(log_likelihood(linear, fit.noise, e) for linear, e in zip(fit.linears, residuals, strict=True))
-    return ContinuousFit(hypothesis, fit, score + penalty_of(fit, fit.linears) + _of_starts(fit), residuals)
+    return ContinuousFit(hypothesis, fit, score + penalty_of(fit, fit.linears) + _of_starts(fit), residuals, fit.noise)
 
 
 def _of_starts(fit: Fit) -> float:

@@ -116,9 +116,10 @@ def rivals_of(found: Search) -> dict[str, list[Rival]]:
         seen: set[str] = set()
         for worse, screened in near:
             scoped = screened.candidate
-            if scoped.id in seen or worse > worst or len(seen) >= 3:
+            most = SELECTION.alike if worse < SELECTION.confused else SELECTION.rivals
+            if scoped.id in seen or worse > worst or len(seen) >= most:
                 continue
-            refitting(f"refitting in place of {candidate.id}", scoped.id, len(seen), 3)
+            refitting(f"refitting in place of {candidate.id}", scoped.id, len(seen), most)
             seen.add(scoped.id)
             other_fit = continuous_fit(
                 final.fit,
@@ -129,7 +130,7 @@ def rivals_of(found: Search) -> dict[str, list[Rival]]:
                 bars=_in_reach(final),
             )
             other_fit = replace(other_fit, score=other_fit.score + found.cost)
-            rivals[candidate.name].append(Rival(scoped, other_fit.score - final.score, other_fit))
+            rivals[candidate.name].append(Rival(scoped, other_fit.worse_than(final), other_fit))
     return rivals
 
 
@@ -167,7 +168,7 @@ def exchanged(found: Search) -> ContinuousFit | None:
                 better.append((_merit(rival.worse, rival, candidate, found.final), rival.fitted))
             elif size > 1 and rival.worse < SELECTION.better:
                 fewer = eliminated_backward(found, rival.fitted, kept=rival.candidate)
-                merit = fewer.score - found.final.score + SELECTION.rival * (fewer.hypothesis.size - size)
+                merit = fewer.worse_than(found.final) + SELECTION.rival * (fewer.hypothesis.size - size)
                 if (
                     len(fewer.hypothesis.candidates) < len(found.final.hypothesis.candidates)
                     and merit < -SELECTION.simpler

@@ -23,6 +23,7 @@ from discsim.validation.diagnosis.detectors.all import searched
 from discsim.validation.diagnosis.detectors.dropped_samples import Shifted
 from discsim.validation.diagnosis.relaxed_fit import clock_of_accelerometer, relaxed, unknowns, without_outliers
 from discsim.validation.diagnosis.selection.all_at_once import all_at_once
+from discsim.validation.diagnosis.selection.best_refit import Refitted, best_of
 from discsim.validation.diagnosis.selection.candidates import (
     CandidateEffect,
     candidates_for,
@@ -360,6 +361,10 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
             here.append((item, found.relaxed_fit if distant else current.fit, 0.0))
         else:
             there.append((item, found.relaxed_fit, 0.0))
+    if not distant:
+        # no more can be gained than is left: about segments that one recording has wrong algebra promises anything
+        left = chi2_in(current, found.relaxed_noise)
+        there = [offer for offer in there if offer[2] > 0.0 or offer[0].gain < left]
     # far from the data the two are asked in different noise: what they gain does not compare
     there, here = ([offer for offer in some if on_the_disc(found, offer[0].start)] for some in (there, here))
     worth = in_turn(there, here) if distant and step > 0 else in_turn([*there, *here])
@@ -377,7 +382,7 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
     noise = found.relaxed_noise
     chi2_now = chi2_in(current, noise)
     distant = far(found, current)
-    fits: list[tuple[float, ContinuousFit, Fit, float]] = []
+    fits: list[Refitted] = []
     seen: set[tuple[str, frozenset[int] | None]] = set()
     different = len({(offer[0].candidate.id, offer[0].candidate.recordings) for offer in offers})
     near_data, usual = chi2_now < SELECTION.near * current.fit.count, 0
@@ -417,15 +422,15 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
         found = _considering(found, (current.score, chi2_now), refitted, screened.candidate)
         gain, chi2 = found.considered[-1].gain, chi2_in(refitted, noise)
         if gain > price(screened.candidate) and possible(refitted):
-            # far from the data chi-squared says more than a likelihood that has swallowed the mismatch as noise
-            merit = (chi2 + cost if distant else refitted.score) + refitted.charged + refitted.prior_penalty
-            merit -= SELECTION.right_sign * any(q.key in ONE_SIDED for q in parameters_of(screened.candidate))
-            fits.append((merit, refitted, fit, cost))
+            charged = refitted.charged + refitted.prior_penalty
+            charged -= SELECTION.right_sign * any(q.key in ONE_SIDED for q in parameters_of(screened.candidate))
+            fits.append(Refitted(refitted, fit, cost, chi2 + cost, charged))
             best_chi2 = min(best_chi2, chi2)
             near_data |= chi2 < SELECTION.near * refitted.fit.count
     if not fits:
         return found, None
-    _, best, fit, cost = min(fits, key=lambda item: item[0])
+    chosen = best_of(fits, distant)
+    best, fit, cost = chosen.fitted, chosen.about, chosen.cost
     if cost > 0:
         found = replace(found, relaxed_fit=replace(found.relaxed_fit, trajectories=fit.trajectories))
     return replace(found, cost=found.cost + cost), best

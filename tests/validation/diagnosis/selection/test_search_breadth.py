@@ -39,11 +39,17 @@ COUNT = 1812
 
 
 def step(
-    monkeypatch: pytest.MonkeyPatch, *, far: bool, right: CandidateEffect, hints: Sequence[ScreenedCandidate] = ()
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    far: bool,
+    right: CandidateEffect,
+    hints: Sequence[ScreenedCandidate] = (),
+    of_relaxed: Sequence[ScreenedCandidate] = (),
 ) -> tuple[str, list[str], list[float]]:
     """Return what one step of the search adds, and what it refitted, where fits are not made but told.
 
-    Beside it how much below the present fit's merit each had to come, per reading, or be given up.
+    Beside it how much below the present fit's merit each had to come, per reading, or be given up. ``of_relaxed`` are
+    candidates as algebra about the relaxed fit has them, where that is other than about the present one.
     """
     recordings = coasts(seconds=1.0)
     fit = Fit(tuple(first_trajectory(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
@@ -56,7 +62,8 @@ def step(
     def told(fit: Fit, hypothesis: Hypothesis, *others: object, bars: Bars) -> ContinuousFit:
         refitted.append(hypothesis.candidates[-1].id)
         asked_for.append((merit_of(fit, fit.linears) - bars.free) / fit.count)
-        return ContinuousFit(hypothesis, fit, 0.0 if hypothesis.candidates[-1] == right else 5e5)
+        score = 0.0 if hypothesis.candidates[-1] == right else 5e5
+        return ContinuousFit(hypothesis, fit, score, tuple(one.residual for one in fit.linears), fit.noise)
 
     def chi2(fitted: ContinuousFit, noise: object) -> float:
         left = 20.0 if far else 1.1
@@ -71,7 +78,8 @@ def step(
     monkeypatch.setattr(searching, "searched", lambda *_: [])
     monkeypatch.setattr(searching, "screened_candidates", lambda *_: [])
     ranked = [ScreenedCandidate(candidate, 1e6 - rank, {}) for rank, candidate in enumerate(RANKED)]
-    monkeypatch.setattr(searching, "one_per_effect", lambda _: ranked)
+    asked = iter([list(of_relaxed) or ranked])
+    monkeypatch.setattr(searching, "one_per_effect", lambda _: next(asked, ranked))
     found = finding.Search(
         tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base, *UNASKED, hints=tuple(hints)
     )
@@ -100,6 +108,14 @@ def test_near_the_data_four_are_refitted(monkeypatch):
     # half of what an effect must gain, as algebra said of each
     half = [0.5 * price(candidate) for candidate in RANKED[:4]]
     np.testing.assert_allclose(bars, np.array(half) / COUNT)
+
+
+def test_near_the_data_nothing_is_refitted_that_promises_more_than_is_left(monkeypatch):
+    """Segments that one recording has wrong had promised a million; fixes that came late were not among the first."""
+    absurd = [ScreenedCandidate(candidate, 1e7 - rank, {}) for rank, candidate in enumerate(RANKED[7:11])]
+    best, refitted, _ = step(monkeypatch, far=False, right=RANKED[1], of_relaxed=absurd)
+    assert best == RANKED[1].id
+    assert refitted == [candidate.id for candidate in RANKED[:4]]
 
 
 def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present_one_is(monkeypatch):

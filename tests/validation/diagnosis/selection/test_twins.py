@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.made import FIELD, RIG
 
-from discsim.effects import effect
+from discsim.effects import Effect, effect
 from discsim.recording import Recording
 from discsim.rig import spin_down
 from discsim.sensors import Instruments, record
@@ -28,9 +28,9 @@ def test_an_offset_of_time_is_named_before_a_lag_only_where_it_explains_clearly_
     assert min(score, key=lambda what: score[what] + charge(free_candidate(f"{sensor}.{what}"))) == named
 
 
-def coasts_with_gyroscope() -> list[Recording]:
-    """Return run-downs of a rig with viscous friction alone, whose gyroscope reads 0.3 % too little, unclipped."""
-    module = Instruments.from_parts("mpu9250").with_effects([effect("gyro.scale", sz=-0.003)])
+def coasts_with_gyroscope(*errors: Effect) -> list[Recording]:
+    """Return run-downs of a rig with viscous friction alone, recorded by a gyroscope with these errors, unclipped."""
+    module = Instruments.from_parts("mpu9250").with_effects(errors)
     return [
         record(
             spin_down(RIG, FIELD, rate, 4.0, yaw=0.5 + k),
@@ -46,7 +46,8 @@ def coasts_with_gyroscope() -> list[Recording]:
 
 @cache
 def coasted() -> Search:
-    return search(coasts_with_gyroscope())
+    """Return what is found where a gyroscope reads 0.3 % too little."""
+    return search(coasts_with_gyroscope(effect("gyro.scale", sz=-0.003)))
 
 
 def test_what_decays_in_proportion_to_itself_is_read_at_a_wrong_scale_rather_than_late():
@@ -55,6 +56,24 @@ def test_what_decays_in_proportion_to_itself_is_read_at_a_wrong_scale_rather_tha
     assert named.id == "gyro.scale"
     late = {rival.candidate.id: rival.worse for rival in coasted().rivals[named.name]}
     assert abs(late["gyro.time_offset"]) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("error", "other"),
+    [(effect("gyro.lag", tau_s=0.012), "gyro.scale"), (effect("gyro.scale", sz=0.003), "gyro.lag")],
+    ids=["lag", "scale"],
+)
+def test_what_decays_in_proportion_to_itself_is_named_late_where_a_part_can_be_so_late(error, other):
+    """Late by 12 ms or too large by 0.03 % read alike, and so do 0.11 s and 0.3 %: no low-pass is so slow.
+
+    A lag leaves out the first readings of its sensor. Their chance alone had made it 23 worse than a scale; what they
+    say of a motion is worth a parameter or two.
+    """
+    found = search(coasts_with_gyroscope(error))
+    (named,) = found.final.hypothesis.candidates
+    assert named.id == error.id
+    alike = {rival.candidate.id: rival.worse for rival in found.rivals[named.name]}
+    assert abs(alike[other]) < 4.0
 
 
 def test_a_parameter_that_no_reading_shows_is_not_charged():
