@@ -36,7 +36,9 @@ THRESHOLD = 40.0
 #: steps of the unknowns of a release: m, m/s, rad, rad/s; small enough to be linear, large beside rounding
 _POSITION, _VELOCITY, _ANGLE, _RATE = 1e-3, 1e-4, 1e-5, 1e-4
 #: knots of what is unknown but smooth in a free spin, s
-_KNOTS_S = 0.3
+_KNOTS_S = 0.2
+#: the same where the air settles after a release, s, and for how long it does
+_QUICK, _SETTLING = 0.05, 0.4
 #: who finds what is counted row by row
 _COUNTED = catalogued(LostRows, "clock").detector
 #: readings by sensor: times (n,), values (n, k)
@@ -247,25 +249,33 @@ def _unknowns(case: Case, run: Run, sheet: _Sheet) -> FloatArray:
             moved.append((replace(run, rate=run.rate + _RATE), _RATE))
         return np.column_stack([sheet.column(readings(case, other, []), step) for other, step in moved])
     assert run.position is not None
+    moved += [(replace(run, position=run.position + _POSITION * axis), _POSITION) for axis in np.eye(3)]
+    moved += _moved_releases(run)
+    return np.column_stack([sheet.column(readings(case, other, []), step) for other, step in moved])
+
+
+def _moved_releases(run: Release) -> list[tuple[Release, float]]:
+    """Return releases with each of velocity, rates and angles moved, and by how much."""
     assert run.velocity is not None
     assert run.body_rate is not None
-    for axis in np.eye(3):
-        moved.append((replace(run, position=run.position + _POSITION * axis), _POSITION))
-        moved.append((replace(run, velocity=run.velocity + _VELOCITY * axis), _VELOCITY))
-        moved.append((replace(run, body_rate=run.body_rate + _RATE * axis), _RATE))
+    moved = [(replace(run, velocity=run.velocity + _VELOCITY * axis), _VELOCITY) for axis in np.eye(3)]
+    moved += [(replace(run, body_rate=run.body_rate + _RATE * axis), _RATE) for axis in np.eye(3)]
     moved.append((replace(run, roll=(run.roll or 0.0) + _ANGLE), _ANGLE))
     moved.append((replace(run, pitch=(run.pitch or 0.0) + _ANGLE), _ANGLE))
     moved.append((replace(run, yaw=(run.yaw or 0.0) + _ANGLE), _ANGLE))
-    return np.column_stack([sheet.column(readings(case, other, []), step) for other, step in moved])
+    return moved
 
 
 def _smooth_unknowns(case: Case, run: Release, sheet: _Sheet) -> FloatArray:
     """Return how readings of a free spin change if its attitude turns by every smooth function of time, or wobbles.
 
-    This is more than unknown air moments and an unknown spin decay can do, so the limit errs on the large side.
+    This is more than unknown air moments and an unknown spin decay can do, so the limit errs on the large side. A
+    wobble that dies as this one does may have begun with any phase and size: a low-pass of the gyroscope shifts it so.
     """
     motion = _motion(case, run, [], case.stated_disc, None)
-    return np.concatenate([_turned(case, motion, name, sheet) for name in sheet.base])
+    turned = np.concatenate([_turned(case, motion, name, sheet) for name in sheet.base])
+    begun = [sheet.column(readings(case, other, []), step) for other, step in _moved_releases(run)]
+    return np.column_stack([turned, *begun])
 
 
 def _turned(case: Case, motion: Motion, name: str, sheet: _Sheet) -> FloatArray:
@@ -295,9 +305,7 @@ def _turns(case: Case, motion: Motion, state: State) -> Iterator[tuple[FloatArra
     """Yield small turns in N (n, 3) with two derivatives: cubic splines along each axis, and a wobble that changes."""
     assert case.stated_disc is not None
     t = state.t
-    count = max(round((motion.end - motion.start) / _KNOTS_S), 2)
-    apart = (motion.end - motion.start) / count
-    knots = motion.start + apart * np.arange(-3, count + 4)
+    knots = _knots(motion.start, motion.end)
     for k in range(len(knots) - 4):
         bump = BSpline.basis_element(knots[k : k + 5], extrapolate=False)
         shape = [np.nan_to_num(form(t)) for form in (bump, bump.derivative(1), bump.derivative(2))]
@@ -316,6 +324,21 @@ def _turns(case: Case, motion: Motion, state: State) -> Iterator[tuple[FloatArra
                 np.cos(phase + shift)[:, None] * first + np.sin(phase + shift)[:, None] * np.cross(z, first)
             )
             yield way, now * np.cross(z, way), -(now**2) * way
+
+
+def _knots(start: float, end: float) -> FloatArray:
+    """Return knots (k,) of cubic splines from start to end, s, with three more at either side.
+
+    Within `_SETTLING` of release the moments of the air change several times as fast as later.
+    """
+    lasting = end - start
+    quick = int(min(_SETTLING, 0.5 * lasting) / _QUICK)
+    inner = np.concatenate(
+        [_QUICK * np.arange(quick), np.linspace(_QUICK * quick, lasting, max(round(lasting / _KNOTS_S), 2) + 1)]
+    )
+    before, after = inner[1] - inner[0], inner[-1] - inner[-2]
+    beside = np.arange(1, 4)
+    return np.asarray(start + np.concatenate([-before * beside[::-1], inner, lasting + after * beside]))
 
 
 def _rig_sigma(case: Case) -> Mapping[str, object]:
