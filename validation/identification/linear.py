@@ -57,6 +57,8 @@ class Linear:
         All defects as they stand.
     shifts : (n,) array
         What the closing adds to the prediction.
+    counted : bool
+        Whether instants were counted one by one: what is left then is more than noise.
     """
 
     raw: FloatArray
@@ -74,6 +76,7 @@ class Linear:
     matching: FloatArray
     mismatch: FloatArray
     shifts: FloatArray
+    counted: bool = False
 
     @property
     def unknowns(self) -> int:

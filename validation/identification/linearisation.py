@@ -509,6 +509,7 @@ def _stack(
         matching,
         continuity.mismatch,
         joined(shifts),
+        bool(current.recording.averaged),
     )
 
 

@@ -166,7 +166,7 @@ def estimate_noise(
         phi, part = 0.0, 1.0
         if coloured and squares[group] > 0:
             rho = products[group] / np.maximum(pairs[group], 1.0) / (squares[group] / n)
-            phi, part = _correlation(rho, pairs[group], _slowest(group, spacing[group]))
+            phi, part = _correlation(rho, pairs[group], _slowest(group, spacing[group], linears))
         model[group] = GroupNoise(sd, phi, part)
     return model
 
@@ -205,14 +205,15 @@ def _spacing(linear: Linear, channel: Channel) -> float:
     return float(np.median(np.diff(linear.t[channel.rows]))) if channel.index.size > 1 else np.inf
 
 
-def _slowest(group: str, spacing: float) -> float:
+def _slowest(group: str, spacing: float, linears: Sequence[Linear]) -> float:
     """Return the longest memory of a group's noise in samples, which lie ``spacing`` s apart.
 
-    Of a receiver 200 samples at least: its position wanders for minutes with satellites and atmosphere. In means over
-    turns so many would outlast the recording, and swallow every constant error.
+    Of a receiver 200 samples at least: its position wanders for minutes with satellites and atmosphere. So do readings
+    whose instants were counted, about a motion that follows miscounted ones. In means over turns so many would outlast
+    the recording, and swallow every constant error.
     """
-    least = -1.0 / float(np.log(CORRELATIONS[-1])) if group.startswith("gps") else 1.0
-    return max(_SLOWEST / spacing, least)
+    wanders = group.startswith("gps") or any(linear.counted for linear in linears)
+    return max(_SLOWEST / spacing, -1.0 / float(np.log(CORRELATIONS[-1])) if wanders else 1.0)
 
 
 #: residuals this many times the stated noise are not noise: what they are likeliest with says nothing
@@ -241,7 +242,7 @@ def likeliest_noise(linears: Sequence[Linear], residuals: Sequence[FloatArray], 
             (_spacing(linear, channel) for linear in linears for channel in linear.channels if channel.group == group),
             default=np.inf,
         )
-        slowest = _slowest(group, spacing)
+        slowest = _slowest(group, spacing, linears)
         found[group] = _likeliest(parts, count, own, slowest)
     return found
 
