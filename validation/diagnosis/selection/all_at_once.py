@@ -18,7 +18,7 @@ from discsim.effects.setup import BoardRotation
 from discsim.validation.diagnosis.held_out import heldout_chi2
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
-from discsim.validation.diagnosis.selection.evidence import NESTED, TURNED, price
+from discsim.validation.diagnosis.selection.evidence import NESTED, TURNED, lead, price
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
 from discsim.validation.diagnosis.selection.screening import NormalEquations, normal_equations_of
 from discsim.validation.diagnosis.selection.search_state import (
@@ -67,7 +67,7 @@ def all_at_once(found: Search) -> ContinuousFit | None:
     fits = [one for one in fits if possible(one)]
     if not fits:
         return None
-    fitted = min(fits, key=lambda one: _charged(found, one))
+    fitted = _simpler(found, min(fits, key=lambda one: _charged(found, one)), competing)
     return fitted if found.base.score - fitted.score > sum(map(price, fitted.hypothesis.candidates)) else None
 
 
@@ -119,14 +119,43 @@ def _charged(found: Search, fitted: ContinuousFit) -> float:
 
     In the noise that it has left itself a sensor that it misses would be a noisy one.
     """
-    left = chi2_in(fitted, found.relaxed_noise) + penalty_of(fitted.fit, fitted.fit.linears)
-    return left + sum(_cost(found, one) for one in fitted.hypothesis.candidates)
+    return _left(found, fitted) + sum(_cost(found, one) for one in fitted.hypothesis.candidates)
+
+
+def _left(found: Search, fitted: ContinuousFit) -> float:
+    """Return chi-squared of a fit with its priors in the noise of the relaxed fit."""
+    return chi2_in(fitted, found.relaxed_noise) + penalty_of(fitted.fit, fitted.fit.linears)
+
+
+def _simpler(found: Search, fitted: ContinuousFit, competing: Collection[str]) -> ContinuousFit:
+    """Return a fit with a chip that is turned in the place of a matrix where that explains as much for its parameters.
+
+    Fits of the few may have ended beside their optimum, so that a matrix is left; from where it stands its turn begins.
+    What rows that were miscounted leave may be worth the further numbers of a matrix, as it is any effect.
+    """
+    for turned, matrix in NESTED.items():
+        present = {candidate.id: candidate for candidate in fitted.hypothesis.candidates}
+        if matrix not in present or turned in present or turned not in competing:
+            continue
+        turn, values = free_candidate(turned), values_of_fit(fitted)
+        few = Hypothesis(tuple(turn if one.id == matrix else one for one in fitted.hypothesis.candidates))
+        start = {**values, **turn_of(values, matrix, turned)}
+        simpler = continuous_fit(fitted.fit, few, found.own, found.relaxed_noise, start, iterations=_STEPS)
+        worse = _left(found, simpler) - _left(found, fitted) + lead(turn, present[matrix])
+        if possible(simpler) and worse < SELECTION.miscounted * _counted(found):
+            fitted = simpler
+    return fitted
+
+
+def _counted(found: Search) -> bool:
+    """Tell whether rows were counted one by one."""
+    return any(one.recording.averaged for one in found.relaxed_fit.trajectories)
 
 
 def _cost(found: Search, candidate: CandidateEffect) -> float:
     """Return what an effect must gain beside others: more where rows were counted, of which some are miscounted."""
-    counted = any(one.recording.averaged for one in found.relaxed_fit.trajectories)
-    return price(candidate) + SELECTION.turned * (candidate.id in TURNED) + SELECTION.miscounted * counted
+    odd = SELECTION.turned * (candidate.id in TURNED) + SELECTION.miscounted * _counted(found)
+    return price(candidate) + odd
 
 
 def _few(
