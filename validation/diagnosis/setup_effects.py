@@ -105,10 +105,10 @@ def _borne_out(fault: Effect, fit: Fit) -> bool:
     """
     names = fault.row.parameters
     covariance = _covariance_of(fit, fault.id, names) if fault.row.type in _SIGMA else None
-    if covariance is None:
+    if covariance is None or not np.all(np.isfinite(covariance)):
         return True
     away = np.array(_numbers(_refined(fault, fit).effect.value)) - _numbers(fault.row.baseline)
-    return bool(away @ np.linalg.solve(covariance, away) > SELECTION.entry + SELECTION.per_parameter * len(names))
+    return bool(away @ np.linalg.lstsq(covariance, away)[0] > SELECTION.entry + SELECTION.per_parameter * len(names))
 
 
 def _numbers(value: tuple[float | str, ...]) -> list[float]:
