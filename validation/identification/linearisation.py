@@ -523,9 +523,8 @@ def _by_unknowns(s: Sampled, M: FloatArray, segment: IntArray, continuity: _Cont
     d, full = S.shape[1], np.zeros((M.shape[0] // s.nodes, M.shape[1], S.shape[2]))
     if full.shape[2] > u:
         full[:, :, u:] = s.weighted(M[:, :, d:])
-    node, reading = np.divmod(np.arange(M.shape[0]), full.shape[0])
     assert s.weights is not None
-    weights = s.weights[node, reading]
+    weights, reading = s.weights.ravel(), np.arange(M.shape[0]) % full.shape[0]
     for i in np.unique(segment):
         mine = np.flatnonzero((segment == i) & (weights != 0.0))
         which, place = np.unique(reading[mine], return_inverse=True)
