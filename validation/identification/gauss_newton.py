@@ -97,6 +97,11 @@ class Fit:
         return all(self.plant.from_release(trajectory.recording) for trajectory in self.trajectories)
 
     @property
+    def counted(self) -> bool:
+        """Whether rows of its recordings were counted one by one."""
+        return any(trajectory.recording.averaged for trajectory in self.trajectories)
+
+    @property
     def count(self) -> int:
         """Number of scalar readings that take part."""
         return sum(linear.residual.size for linear in self.linears)

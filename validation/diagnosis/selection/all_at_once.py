@@ -142,19 +142,14 @@ def _simpler(found: Search, fitted: ContinuousFit, competing: Collection[str]) -
         start = {**values, **turn_of(values, matrix, turned)}
         simpler = continuous_fit(fitted.fit, few, found.own, found.relaxed_noise, start, iterations=_STEPS)
         worse = _left(found, simpler) - _left(found, fitted) + lead(turn, present[matrix])
-        if possible(simpler) and worse < SELECTION.miscounted * _counted(found):
+        if possible(simpler) and worse < SELECTION.miscounted * found.relaxed_fit.counted:
             fitted = simpler
     return fitted
 
 
-def _counted(found: Search) -> bool:
-    """Tell whether rows were counted one by one."""
-    return any(one.recording.averaged for one in found.relaxed_fit.trajectories)
-
-
 def _cost(found: Search, candidate: CandidateEffect) -> float:
     """Return what an effect must gain beside others: more where rows were counted, of which some are miscounted."""
-    odd = SELECTION.turned * (candidate.id in TURNED) + SELECTION.miscounted * _counted(found)
+    odd = SELECTION.turned * (candidate.id in TURNED) + SELECTION.miscounted * found.relaxed_fit.counted
     return price(candidate) + odd
 
 

@@ -185,7 +185,7 @@ def _selected_forward(found: Search) -> Search:
     """Return the search with effects added as long as one is worth its price."""
     most = SELECTION.most_effects
     if (begun := all_at_once(found)) is not None:
-        if any(one.recording.averaged for one in begun.fit.trajectories):
+        if begun.fit.counted:
             # instants that were counted leave more than noise: what is weighed by it would be taken up for ever
             return replace(_with_final(found, begun), at_once=True)
         found = _with_final(found, eliminated_backward(found, begun))
