@@ -197,7 +197,7 @@ def _selected_forward(found: Search) -> Search:
         if step >= _most(found, current, most):
             break
         found, better = next_effect(found, current, step)
-        if better is None and (told := _without_swallowed(current)) is not None and not far(found, current):
+        if better is None and (told := _without_swallowed(found, current)) is not None and not far(found, current):
             found, better = next_effect(found, told, step)
         if (
             step == 0
@@ -235,7 +235,7 @@ def _selected_forward(found: Search) -> Search:
 
 def _in_stated_noise(found: Search, current: ContinuousFit, step: int) -> tuple[Search, ContinuousFit | None]:
     """Return the best further effect of a fit whose estimated noise has swallowed some; None where it has not."""
-    told = None if far(found, current) else _without_swallowed(current)
+    told = None if far(found, current) else _without_swallowed(found, current)
     return (found, None) if told is None else next_effect(found, told, step)
 
 
@@ -251,23 +251,24 @@ def past_hope(found: Search, before: ContinuousFit, after: ContinuousFit, furthe
     return left > SELECTION.steps_alike * further * max(was - left, 0.0)
 
 
-def _without_swallowed(fitted: ContinuousFit) -> ContinuousFit | None:
-    """Return a fit with the stated noise where what was estimated is so loud that it has swallowed an effect.
+def _without_swallowed(found: Search, fitted: ContinuousFit) -> ContinuousFit | None:
+    """Return a fit in noise that has swallowed no effect; None where what was estimated has swallowed none.
 
     A bias is nothing but loud and slow noise: in it no bias is worth its price. Nor is noise that is so loud and leaves
-    more than itself. None where nothing is swallowed.
+    more than itself: such a group's is as stated. Where recordings have a course in common it is as the relaxed fit
+    shows it, which follows the data.
     """
     left = unmodelled_residuals(fitted.fit.linears, fitted.residuals, fitted.fit.noise)
     stated, loud = stated_noise(fitted.fit.linears), RESIDUAL_TESTS.loud
-    groups = {
-        item.group
+    noise = {item.group: found.relaxed_noise[item.group] for item in left if item.kind == "course"}
+    noise |= {
+        item.group: stated[item.group]
         for item in left
         if item.kind == "swallowed" or fitted.fit.noise[item.group].sd > loud * stated[item.group].sd
     }
-    if not groups:
+    if not noise:
         return None
-    noise = {group: stated[group] if group in groups else level for group, level in fitted.fit.noise.items()}
-    return replace(fitted, fit=replace(fitted.fit, noise=noise))
+    return replace(fitted, fit=replace(fitted.fit, noise={**fitted.fit.noise, **noise}))
 
 
 def _most(found: Search, fitted: ContinuousFit, most: int) -> int:
@@ -362,9 +363,10 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
         else:
             there.append((item, found.relaxed_fit, 0.0))
     if not distant:
-        # no more can be gained than is left: about segments that one recording has wrong algebra promises anything
+        # no more can be gained than is left: about segments that one recording has wrong algebra promises anything.
+        # A limit at which readings stand moves nothing in a fit, and these readings are no part of what is left
         left = chi2_in(current, found.relaxed_noise)
-        there = [offer for offer in there if offer[2] > 0.0 or offer[0].gain < left]
+        there = [offer for offer in there if _in_chi2(offer) < left]
     # far from the data the two are asked in different noise: what they gain does not compare
     there, here = ([offer for offer in some if on_the_disc(found, offer[0].start)] for some in (there, here))
     worth = in_turn(there, here) if distant and step > 0 else in_turn([*there, *here])
@@ -374,6 +376,12 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
     told = [hint for hint in told if distant or hint.candidate.id == _HELD or _swallowed(current, hint)]
     worth = [*((hint, found.relaxed_fit, 0.0) for hint in told), *worth]
     return found, worth
+
+
+def _in_chi2(offer: Offer) -> float:
+    """Return what an offer promises of the readings that a fit counts: nothing where it explains why some are out."""
+    screened, _, cost = offer
+    return 0.0 if cost > 0.0 or screened.candidate.row.hides_readings else screened.gain
 
 
 def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Search, ContinuousFit | None]:

@@ -118,6 +118,44 @@ def test_near_the_data_nothing_is_refitted_that_promises_more_than_is_left(monke
     assert refitted == [candidate.id for candidate in RANKED[:4]]
 
 
+def test_near_the_data_a_limit_at_which_readings_stand_is_refitted_whatever_they_ask_for_beyond_it(monkeypatch):
+    """Clipped readings are no part of what is left: with a gain of 5e8 a limit of 30 m/s^2 was dropped, and missed."""
+    limit = CandidateEffect("accel.saturation", (), None, (("limit_m_s2", 30.32, 0.0014),))
+    best, _, _ = step(monkeypatch, far=False, right=limit, of_relaxed=[ScreenedCandidate(limit, 5e8, {})])
+    assert best == limit.id
+
+
+def test_what_recordings_have_in_common_over_time_is_asked_about_in_noise_that_has_not_taken_it_up():
+    """A recorder's clock beside a kick in a free spin: noise with a memory of 2 s left of its gain of 1017 only 6."""
+    recordings = coasts(seconds=4.0)
+    fit = Fit(tuple(first_trajectory(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
+    linears = linearised(fit)
+    fit = replace(fit, noise=stated_noise(linears), linears=linears)
+    rng = np.random.default_rng(3)
+    residuals = [rng.normal(0.0, linear.sd) if len(linear.sd) else linear.residual for linear in linears]
+    bent = [residual.copy() for residual in residuals]
+    for linear, residual in zip(linears, bent, strict=True):
+        channel = next(one for one in linear.channels if one.group == "accelerometer")
+        residual[channel.rows] += 2.0 * linear.sd[channel.rows] * linear.t[channel.rows]
+    told = {
+        **fit.noise,
+        "accelerometer": fit.noise["accelerometer"]._replace(sd=5.0 * fit.noise["accelerometer"].sd, correlation=0.94),
+    }
+    fit = replace(fit, noise=told)
+    found = finding.Search(
+        tuple(recordings),
+        (),
+        replace(fit, noise=stated_noise(linears)),
+        stated_noise(linears),
+        (),
+        *2 * (None,),
+        *UNASKED,
+    )
+    quiet = searching._without_swallowed(found, ContinuousFit(Hypothesis(), fit, 0.0, tuple(bent), told))
+    assert quiet is not None
+    assert quiet.fit.noise == stated_noise(linears)
+
+
 def test_a_fit_with_one_more_effect_that_is_worse_begins_again_where_the_present_one_is(monkeypatch):
     """Algebra asked for a number far off; from no effect at all the same fit comes to what it gains."""
     recordings = coasts(seconds=1.0)
