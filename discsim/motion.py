@@ -16,7 +16,10 @@ from discsim.frames import conjugate, euler_angles, multiply, rotation_vector, t
 from discsim.result import Result
 from discsim.splines import hermite, spline_slopes
 
-__all__ = ["COLUMNS", "Motion", "State", "Surroundings"]
+__all__ = ["COLUMNS", "JUMP_S", "Motion", "State", "Surroundings"]
+
+#: how far apart the two states are, s, between which an angular acceleration jumps: recordings tell no shorter time
+JUMP_S = 1e-6
 
 #: columns of a flight's truth: position and velocity in N, attitude, body rates
 COLUMNS = (
@@ -151,7 +154,10 @@ class Motion(Result):
 
     @cached_property
     def _angular_jerk(self) -> FloatArray:
-        return spline_slopes(self.t, self.angular_acceleration)
+        # what jumps between two states a moment apart is smooth before it and after it
+        jumps = np.flatnonzero(np.diff(self.t) < 1.5 * JUMP_S) + 1
+        pieces = zip(np.split(self.t, jumps), np.split(self.angular_acceleration, jumps), strict=True)
+        return np.concatenate([spline_slopes(t, a) if t.size > 1 else np.zeros((1, 3)) for t, a in pieces])
 
     def at(self, t: FloatArray) -> State:
         """Return the motion at instants t (m,) s between start and end.

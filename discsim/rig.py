@@ -29,7 +29,7 @@ from discsim.files import model_file, read_text
 from discsim.frames import flip_yz, multiply, turn
 from discsim.law import Law
 from discsim.limits import FASTEST_SPIN, LONGEST_RUN
-from discsim.motion import Motion
+from discsim.motion import JUMP_S, Motion
 from discsim.parameters import PARAMETERS, Tables, parameters, tables
 from discsim.profiles import read_shape
 from discsim.recording import COMMAND_HEADER, Recording, Samples, read_csv, read_recording
@@ -42,6 +42,8 @@ PLATEAUS_DEG_S = (0, 300, 600, 1000, 1500, 2000, 2500, 3000, 3500, 4000, 4500, 5
 PARTS = 23
 #: stiffness of the table's speed loop, 1/s: an error of speed dies out within some 10 ms
 SPEED_LOOP = 100.0
+#: knots of a profile are corners where both of their ramps last this many steps: closer ones follow a curve
+CORNER = 20
 #: header of a profile in degrees, beside that of a recording's command
 _IN_DEGREES = "time_s,rate_deg_s"
 
@@ -217,8 +219,9 @@ def turn_table(
     """Turn a rate table through a profile (t (n,) s, rate (n,) rad/s, piecewise linear) and return its true motion.
 
     ``yaw`` is the phase at t = 0 in rad, ``inertia`` the table's in kg m^2. Steps end on the profile's knots, so the
-    table follows ramps without error; `discsim.effects.rig` can add ripple and tilt. ``progress`` is handed at most
-    `PARTS` ranges of the profile's segments and yields them one by one, which shows how far it is.
+    table follows ramps without error, and its acceleration jumps at corners; `discsim.effects.rig` can add ripple and
+    tilt. ``progress`` is handed at most `PARTS` ranges of the profile's segments and yields them one by one, which
+    shows how far it is.
     """
     if len(profile) < 2 or profile.value.ndim != 1 or np.any(np.isnan(profile.value)):
         raise InputError("profile: expected at least two knots (time, rate) without gaps")
@@ -234,22 +237,26 @@ def turn_table(
         if stepped_data is data:
             drive_force(flat, segment, data.time, *views)
 
-    slopes = np.diff(profile.value) / np.diff(profile.t)
+    lasting = np.diff(profile.t)
+    slopes = np.diff(profile.value) / lasting
+    corner = (np.diff(slopes, prepend=slopes[0]) != 0.0) & (lasting > CORNER * timestep)
+    corner[1:] &= lasting[:-1] > CORNER * timestep
     ripple = SpeedRipple(*flat.view(PARAMETERS)[0]["rig_speed_ripple"])
     turning = False
     data.qvel[0] = profile.value[0]
     with own_warnings(), passive_force(model, drive):
         for k in chain.from_iterable(progress(_parts(slopes.size))):
             turning, before = bool(profile.value[k] or slopes[k]), turning
-            if turning != before:
-                # the ripple is there while the table turns: it sets in and ends with it
-                at_once = speed_ripple(ripple, float(data.qpos[0]) - yaw, 0.0)[0]
-                data.qvel[0] += at_once if turning else -at_once
+            # the ripple is there while the table turns: it sets in and ends with it
+            at_once = 0.0 if turning == before else speed_ripple(ripple, float(data.qpos[0]) - yaw, 0.0)[0]
+            data.qvel[0] += at_once if turning else -at_once
             segment[:] = profile.t[k], profile.value[k], slopes[k], yaw, inertia
             if k == 0:
                 hinge.note()
-            elif turning != before:
+            elif at_once:
                 hinge.note_again()
+            elif corner[k]:
+                hinge.run(float(profile.t[k]) + JUMP_S, timestep)
             hinge.run(float(profile.t[k + 1]), timestep)
     return hinge.motion()
 

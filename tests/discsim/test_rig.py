@@ -56,6 +56,13 @@ class TestTable:
         inside = (self.motion.t > 0.2005) & (self.motion.t < 0.55)
         np.testing.assert_allclose(self.motion.angular_acceleration[inside, 2], 30.0 / 0.35, rtol=1e-9)
 
+    def test_its_angular_acceleration_jumps_at_a_corner(self):
+        """It had run over within a step, and rung for some: a reading 70 us after a corner was ten deviations off."""
+        ramp = 30.0 / 0.35
+        t = np.array([0.198, 0.1995, 0.2 - 1e-6, 0.2 + 2e-6, 0.2005, 0.202, 0.5499, 0.5501])
+        told = self.motion.at(t).angular_acceleration[:, 2]
+        np.testing.assert_allclose(told, [0.0, 0.0, 0.0, ramp, ramp, ramp, ramp, 0.0], atol=1e-6)
+
     def test_every_knot_is_an_instant_of_the_motion(self):
         """Even where it is no whole number of steps from the last one; the last to the last bit."""
         motion = turn_table(knots((0.0, 1.0), (0.0123456, 2.0), (1 / 3, 2.0)), FIELD)

@@ -587,10 +587,11 @@ def _from_there(found: Search, current: ContinuousFit, better: ContinuousFit) ->
     squared, is of the order of what it gains.
     """
     candidate = better.hypothesis.candidates[-1]
-    if not found.relaxed_fit.plant.weakly_identified or candidate.fixed_values:
+    if candidate.fixed_values:
         return None
     gain = current.score - better.score
-    if gain > SELECTION.doubtful and better.squared_sizes(candidate) > SELECTION.borne_out * gain:
+    doubted = found.relaxed_fit.plant.weakly_identified and gain <= SELECTION.doubtful
+    if not doubted and better.squared_sizes(candidate) > SELECTION.borne_out * gain:
         return None
     start = values_of_fit(better)
     again = continuous_fit(better.fit, current.hypothesis, found.own, better.fit.noise, start)
