@@ -1,9 +1,10 @@
 """How much of a concealed effect the recordings of its case can show, computed without any diagnosis.
 
 The difference that an effect makes to noise-free readings, in standard deviations of the noise, less what the unknowns
-of the recordings take in (release states, yaw phases, coefficients within their stated sigma), is the gain in chi2
-that its true model brings on average: Fisher's information times the size squared. The detection limit is the size at
-which this gain is `THRESHOLD`. Motions come from the standalone model and from the rigs; nothing is fitted.
+of the recordings take in (release states, yaw phases, coefficients within their stated sigma) and less what the other
+concealed effect does, is the gain in chi2 that its true model brings on average: Fisher's information times the size
+squared. The detection limit is the size at which this gain is `THRESHOLD`. Motions are those of the true disc or rig,
+from the standalone model; nothing is fitted.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from scipy.interpolate import BSpline
 
 from discsim.arrays import BoolArray, FloatArray
 from discsim.disc import Disc, Release, Rig
-from discsim.effects.catalogue import Effect, catalogued, effect
+from discsim.effects.catalogue import CATALOGUE, Effect, catalogued, effect
+from discsim.effects.sensors import DroppedSamples
 from discsim.effects.timing_rows import LostRows
 from discsim.frames import body_to_ned
 from discsim.motion import Motion, State
@@ -27,9 +29,9 @@ from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, Noise, record
 from discsim.trajectory import predict
 from discsim.validation.challenge.cases.case import Case, Coast, Concealed, Run, Turning
-from discsim.validation.challenge.cases.sizes import hiding_of
+from discsim.validation.challenge.cases.sizes import HIDING, hiding_of
 
-__all__ = ["THRESHOLD", "sizes", "strength"]
+__all__ = ["THRESHOLD", "noncentrality", "sizes", "sizes_and_apart", "strength"]
 
 #: gain in chi2 that chance does not bring among fifty hypotheses of one to three parameters: 25 + 2 ln(n) and more
 THRESHOLD = 40.0
@@ -41,6 +43,10 @@ _KNOTS_S = 0.2
 _QUICK, _SETTLING = 0.05, 0.4
 #: who finds what is counted row by row
 _COUNTED = catalogued(LostRows, "clock").detector
+#: and sample by sample
+_DROPPED = catalogued(DroppedSamples, "accelerometer").detector
+#: what moves the centre of mass moves the accelerometer off it
+_ON_ACCELEROMETER = ("body.mass_imbalance",)
 #: readings by sensor: times (n,), values (n, k)
 Readings: TypeAlias = Mapping[str, tuple[FloatArray, FloatArray]]
 
@@ -56,50 +62,165 @@ def sizes(case: Case) -> dict[str, float]:
     Faults of the setup have none. Nor has, in a case like a real logger's, what is counted row by row: readings are not
     linear in a pattern of rows, and one of these effects shows by what another does to it. It counts as above it.
     """
-    return {
-        item.effect.id: sqrt(max(noncentrality(case, item), 0.0) / THRESHOLD)
-        for item in case.concealed
-        if not (item.effect.row.setup or (case.kind == "like_real" and item.effect.row.detector == _COUNTED))
-    }
+    return _sizes(case, _Bench.of(case))
+
+
+def sizes_and_apart(case: Case) -> tuple[dict[str, float], dict[str, float]]:
+    """Return sizes in units of the detection limit, and of the size at which an effect is told from others, by id.
+
+    The others are the effects of the same sensor that have no more numbers, each of any size: readings that one of
+    them explains as well are no evidence for the one that is concealed. What is lost sample by sample or cut off
+    leaves marks that no other effect leaves.
+    """
+    bench = _Bench.of(case)
+    seen = _sizes(case, bench)
+    told = {}
+    for item in _weighed(case):
+        others = _others(case, item)
+        marked = item.effect.row.hides_readings or item.effect.row.detector == _DROPPED
+        rivals = [] if marked else _rivals(case, item.effect)
+        beside = [_size(bench.noncentrality(item, [*others, *rival])) for rival in rivals]
+        told[item.effect.id] = min([seen[item.effect.id], *beside])
+    return seen, told
+
+
+def _sizes(case: Case, bench: _Bench) -> dict[str, float]:
+    return {item.effect.id: _size(bench.noncentrality(item, _others(case, item))) for item in _weighed(case)}
 
 
 def noncentrality(case: Case, item: Concealed) -> float:
     """Return the mean gain in chi2 of one concealed effect, all unknowns fitted with it and without."""
-    small, share = _small(item.effect, case)
-    shared = _Shared(len(case.stated_disc.sigma) if case.stated_disc is not None else len(_rig_sigma(case)))
-    gain = 0.0
-    for number, run in enumerate(case.runs):
-        if item.recording in (None, number):
-            here = replace(case, hands=case.hands[number : number + 1])
-            sheet = _Sheet.of(here, readings(here, run, []))
-            signature = sheet.column(readings(here, run, [small]), share)
-        else:
+    return _Bench.of(case).noncentrality(item)
+
+
+def _weighed(case: Case) -> list[Concealed]:
+    """Return the concealed effects that have a detection limit."""
+    real = case.kind == "like_real"
+    return [
+        item
+        for item in case.concealed
+        if not (item.effect.row.setup or (real and item.effect.row.detector == _COUNTED))
+    ]
+
+
+def _size(gain: float) -> float:
+    return sqrt(max(gain, 0.0) / THRESHOLD)
+
+
+@dataclass(frozen=True)
+class _Free:
+    """One number of an effect that is unknown: the effect with it at a small size, that size, and where it acts."""
+
+    effect: Effect
+    step: float
+    recording: int | None
+
+
+def _others(case: Case, item: Concealed) -> list[_Free]:
+    """Return the numbers of what is concealed beside an effect: who names it does not know them either."""
+    beside = [other for other in _weighed(case) if other is not item and not other.effect.row.hides_readings]
+    return [free for other in beside for free in _numbers(other.effect, case, other.recording)]
+
+
+def _rivals(case: Case, item: Effect) -> list[list[_Free]]:
+    """Return the numbers of each effect of the same sensor that has no more numbers than an effect."""
+    beside = {*_ON_ACCELEROMETER, *(id for id in HIDING if CATALOGUE[id].acts_on == "accelerometer")}
+    rivals = []
+    for id, hiding in HIDING.items():
+        row = CATALOGUE[id]
+        sensor = row.acts_on in case.sheets_of.sensors and row.acts_on == item.row.acts_on
+        if id == item.id or not (sensor or {id, item.id} <= beside) or len(hiding.sized) > len(_sized(item)):
             continue
-        basis = _orthonormal(_unknowns(here, run, sheet))
-        signature -= basis @ (basis.T @ signature)
-        gain += float(signature @ signature)
-        uncertain = _uncertain(here, run)
-        if uncertain:
-            columns = np.column_stack([sheet.column(made, step) for made, step in uncertain])
-            shared.add(columns - basis @ (basis.T @ columns), signature)
-    return gain - shared.taken_in()
+        if row.setup or row.detector or row.hides_readings or not row.acts_with(set(case.sheets_of.sensors)):
+            continue
+        if case.plant not in row.plants or case.plant in row.unseen_on:
+            continue
+        middle = {name: 0.5 * (low + high) for name, (low, high) in hiding.ranges.items()}
+        none = {name: hiding.about for name in hiding.sized}
+        rivals.append(_numbers(effect(id, **none, **middle), case, None))
+    return rivals
 
 
-class _Shared:
-    """Parameters that all recordings share, each known to one of its sigmas beforehand."""
+def _numbers(item: Effect, case: Case, recording: int | None) -> list[_Free]:
+    """Return each number of an effect by itself, at a size where readings are linear in it."""
+    if item.row.detector in (_DROPPED, _COUNTED):
+        clock, share = _small(item, case)
+        return [_Free(clock, share, recording)]
+    hiding, values = hiding_of(item.id), item.value._asdict()
+    step = 0.1 * hiding.limits(case.plant)[0]
+    none = {**values, **{name: hiding.about for name in hiding.sized}}
+    return [_Free(effect(item.id, **{**none, name: none[name] + step}), step, recording) for name in hiding.sized]
 
-    def __init__(self, count: int) -> None:
-        self.information, self.right = np.eye(count), np.zeros(count)
 
-    def add(self, columns: FloatArray, signature: FloatArray) -> None:
-        self.information += columns.T @ columns
-        self.right += columns.T @ signature
+def _sized(item: Effect) -> tuple[str, ...]:
+    return hiding_of(item.id).sized
 
-    def taken_in(self) -> float:
-        """What of the gain these parameters can bring, too."""
-        if not self.right.size:
-            return 0.0
-        return float(self.right @ np.linalg.solve(self.information, self.right))
+
+class _Bench:
+    """The recordings of a case as they are without what is concealed, and what each one's own unknowns take in."""
+
+    def __init__(
+        self, case: Case, motions: Sequence[Motion], sheets: Sequence[_Sheet], bases: Sequence[FloatArray]
+    ) -> None:
+        self.case, self.motions, self.sheets, self.bases = case, motions, sheets, bases
+        self._known: dict[tuple[int, Effect, float], FloatArray] = {}
+        self.shared = [
+            [self._less(number, sheet.column(made, step)) for made, step in _uncertain(sheet.case, run)]
+            for number, (sheet, run) in enumerate(zip(sheets, case.runs, strict=True))
+        ]
+
+    @classmethod
+    def of(cls, case: Case) -> _Bench:
+        motions, sheets, bases = [], [], []
+        for number, run in enumerate(case.runs):
+            here = replace(case, hands=case.hands[number : number + 1])
+            motions.append(_motion(here, run, [], here.disc, here.rig))
+            sheets.append(_Sheet.of(here, _measured(here, motions[-1], [])))
+            bases.append(_orthonormal(_unknowns(here, run, sheets[-1])))
+        return cls(case, motions, sheets, bases)
+
+    def noncentrality(self, item: Concealed, beside: Sequence[_Free] = ()) -> float:
+        """Return the mean gain in chi2 of one concealed effect, all unknowns fitted with it and without.
+
+        The numbers ``beside`` are unknown like the coefficients, and nothing is stated of them.
+        """
+        small, share = _small(item.effect, self.case)
+        known = len(self.shared[0])
+        information, right, gain = np.diag([1.0] * known + [0.0] * len(beside)), np.zeros(known + len(beside)), 0.0
+        for number in range(len(self.sheets)):
+            here = item.recording in (None, number)
+            if not (here or beside):
+                continue
+            unknown = [*self.shared[number], *(self._column(number, free) for free in beside)]
+            columns = np.reshape(unknown, (right.size, len(self.bases[number]))).T
+            information += columns.T @ columns
+            if here:
+                signature = self._column(number, _Free(small, share, item.recording))
+                gain += float(signature @ signature)
+                right += columns.T @ signature if right.size else right
+        if not right.size:
+            return gain
+        scale = np.sqrt(np.where(np.diag(information) > 0.0, np.diag(information), 1.0))
+        taken_in = np.linalg.lstsq(information / np.outer(scale, scale), right / scale, rcond=1e-10)[0]
+        return gain - float(right / scale @ taken_in)
+
+    def _column(self, number: int, free: _Free) -> FloatArray:
+        """Return what a number of an effect changes in one recording, per unit of it, less what is taken in."""
+        sheet, run = self.sheets[number], self.case.runs[number]
+        if free.recording not in (None, number):
+            return np.zeros(len(self.bases[number]))
+        known = self._known.get((number, free.effect, free.step))
+        if known is None:
+            if free.effect.row.acts_on == "motion":
+                made = readings(sheet.case, run, [free.effect])
+            else:
+                made = _measured(sheet.case, self.motions[number], [free.effect])
+            known = self._known[number, free.effect, free.step] = self._less(number, sheet.column(made, free.step))
+        return known
+
+    def _less(self, number: int, column: FloatArray) -> FloatArray:
+        basis = self.bases[number]
+        return np.asarray(column - basis @ (basis.T @ column))
 
 
 def _orthonormal(columns: FloatArray) -> FloatArray:
@@ -136,7 +257,7 @@ def readings(
     case: Case, run: Run, effects: Sequence[Effect], disc: Disc | None = None, rig: Rig | None = None
 ) -> Readings:
     """Return the noise-free readings of one run, which any ``hands`` of the case threw first."""
-    return _measured(case, _motion(case, run, effects, disc or case.stated_disc, rig or case.stated_rig), effects)
+    return _measured(case, _motion(case, run, effects, disc or case.disc, rig or case.rig), effects)
 
 
 def _motion(case: Case, run: Run, effects: Sequence[Effect], disc: Disc | None, rig: Rig | None) -> Motion:
@@ -272,7 +393,7 @@ def _smooth_unknowns(case: Case, run: Release, sheet: _Sheet) -> FloatArray:
     This is more than unknown air moments and an unknown spin decay can do, so the limit errs on the large side. A
     wobble that dies as this one does may have begun with any phase and size: a low-pass of the gyroscope shifts it so.
     """
-    motion = _motion(case, run, [], case.stated_disc, None)
+    motion = _motion(case, run, [], case.disc, None)
     turned = np.concatenate([_turned(case, motion, name, sheet) for name in sheet.base])
     begun = [sheet.column(readings(case, other, []), step) for other, step in _moved_releases(run)]
     return np.column_stack([turned, *begun])
@@ -303,7 +424,7 @@ def _turned(case: Case, motion: Motion, name: str, sheet: _Sheet) -> FloatArray:
 
 def _turns(case: Case, motion: Motion, state: State) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
     """Yield small turns in N (n, 3) with two derivatives: cubic splines along each axis, and a wobble that changes."""
-    assert case.stated_disc is not None
+    assert case.disc is not None
     t = state.t
     knots = _knots(motion.start, motion.end)
     for k in range(len(knots) - 4):
@@ -315,7 +436,7 @@ def _turns(case: Case, motion: Motion, state: State) -> Iterator[tuple[FloatArra
     z = body_to_ned(state.attitude)[..., 2]
     first = np.array([1.0, 0.0, 0.0]) - z[:, :1] * z
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    pace = case.stated_disc.Izz / case.stated_disc.Ixx * motion.rate[:, 2]
+    pace = case.disc.Izz / case.disc.Ixx * motion.rate[:, 2]
     phase = np.interp(t, motion.t, cumulative_trapezoid(pace, motion.t, initial=0))
     now = np.interp(t, motion.t, pace)[:, None]
     for growth in (np.ones_like(t), t / motion.end):
@@ -341,7 +462,7 @@ def _knots(start: float, end: float) -> FloatArray:
     return np.asarray(start + np.concatenate([-before * beside[::-1], inner, lasting + after * beside]))
 
 
-def _rig_sigma(case: Case) -> Mapping[str, object]:
+def _rig_sigma(case: Case) -> Mapping[str, float | FloatArray]:
     return case.stated_rig.sigma if case.stated_rig is not None else {}
 
 
@@ -349,13 +470,12 @@ def _uncertain(case: Case, run: Run) -> list[tuple[Readings, float]]:
     """Return readings with each parameter that has a stated sigma moved, and the step in sigmas."""
     step = 0.01
     made: list[tuple[Readings, float]] = []
-    if isinstance(run, Coast) and case.stated_rig is not None and case.stated_rig.sigma:
-        sigma = case.stated_rig.sigma["viscous_N_m_s"]
-        rig = replace(case.stated_rig, viscous=case.stated_rig.viscous + step * float(sigma))
+    if isinstance(run, Coast) and case.rig is not None and (known := _rig_sigma(case)):
+        rig = replace(case.rig, viscous=case.rig.viscous + step * float(known["viscous_N_m_s"]))
         made.append((readings(case, run, [], rig=rig), step))
-    disc = case.stated_disc
-    if isinstance(run, Release) and disc is not None and disc.sigma and disc.aero is not None:
-        for name, sigma in disc.sigma.items():
+    disc = case.disc
+    if isinstance(run, Release) and disc is not None and case.stated_disc is not None and disc.aero is not None:
+        for name, sigma in case.stated_disc.sigma.items():
             value = getattr(disc.aero, name) + step * float(sigma)
             moved = replace(disc, aero=disc.aero._replace(**{name: value}))
             made.append((readings(case, run, [], disc=moved), step))
