@@ -12,7 +12,7 @@ from typing import Any
 import discsim
 from discsim.files import digest, model_file, model_names, write_text
 from discsim.validation.challenge.blind import DIAGNOSE, Request, diagnose_blind, open_answers, seal_answers
-from discsim.validation.challenge.cases.detection_limit import sizes
+from discsim.validation.challenge.cases.detection_limit import sizes_and_apart
 from discsim.validation.challenge.report.page import write_page
 from discsim.validation.challenge.scores.detection import detections, fit_curve
 from discsim.validation.challenge.scores.result import RESULT, Scored, processor_times, rates_of, times
@@ -76,7 +76,7 @@ def challenge(
         progress=lambda items, total: run.progress(items, total, "limit"),
     )
     scored = [
-        Scored.opened(answer, **result, sizes=limit["sizes"], reproduce=request.command)
+        Scored.opened(answer, **result, sizes=limit["sizes"], apart=limit["apart"], reproduce=request.command)
         for request, answer, result, limit in zip(
             requests, open_answers(requests, run.out), results, limits, strict=True
         )
@@ -119,5 +119,6 @@ def code_digest() -> str:
 
 
 def limit_of(request: tuple[Any, ...], shared: Any) -> dict[str, dict[str, float]]:
-    """Return how far above their detection limits a case's concealed effects are."""
-    return {"sizes": sizes(Request(*request).draw())}
+    """Return how far a case's concealed effects are above what can be seen of them, and what is told from others."""
+    seen, told = sizes_and_apart(Request(*request).draw())
+    return {"sizes": seen, "apart": told}

@@ -17,7 +17,7 @@ from discsim.errors import InputError
 from discsim.validation.challenge.blind import Request, diagnose_blind, open_answers, seal_answers
 from discsim.validation.challenge.cases.case import Concealed
 from discsim.validation.challenge.cases.conceal import Answer
-from discsim.validation.challenge.cases.detection_limit import noncentrality, strength
+from discsim.validation.challenge.cases.detection_limit import noncentrality, sizes, sizes_and_apart, strength
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.challenge.report.page import GOALS, goal_rows, goals_met
 from discsim.validation.challenge.run import challenge
@@ -245,12 +245,13 @@ SCORED = [
 
 
 def test_the_summary_counts_what_a_person_would_count():
-    found = summary(SCORED, [5.0, 0.5, None, None, None, None, None])
+    found = summary(SCORED, [5.0, 0.5, *5 * [None]], [1.5, 0.2, *5 * [None]])
     counted = {name: (item.hits, item.of) for name, item in found.items()}
     assert counted == {
         "false_alarm_rate": (1, 3),
         "right_set_rate": (1, 2),
         "right_set_rate_above_twice_the_limit": (1, 1),
+        "right_set_rate_where_told_apart": (0, 0),
         "right_set_or_listed_confusion_rate": (1, 2),
         "right_verdict_rate": (4, 7),
         "right_place_rate": (1, 1),
@@ -488,11 +489,11 @@ def test_the_information_limit_of_a_wind_is_that_of_the_physics_reference():
 def test_an_effect_twice_as_large_is_twice_as_far_above_its_limit():
     case = draw_case(3, "spin_down", ["rig.quadratic_drag"])
     case = replace(case, runs=case.runs[:1])
-    sizes = []
+    found = []
     for size in (1e-8, 2e-8):
         friction = effect("rig.quadratic_drag", coefficient_N_m_s2=size)
-        sizes.append(strength(replace(case, concealed=(Concealed(friction),))))
-    assert sizes[1] == pytest.approx(2 * sizes[0], rel=1e-3)  # differences of 1e-3 of the size
+        found.append(strength(replace(case, concealed=(Concealed(friction),))))
+    assert found[1] == pytest.approx(2 * found[0], rel=1e-3)  # differences of 1e-3 of the size
 
 
 def test_a_limit_is_known_where_no_sensor_shows_an_unknown():
@@ -503,6 +504,25 @@ def test_a_limit_is_known_where_no_sensor_shows_an_unknown():
     found = strength(case)
     assert found is not None
     assert found > 0
+
+
+@pytest.mark.parametrize(("mirrored", "told_apart"), [(-1.0, False), (1.0, True)])
+def test_a_cross_axis_error_that_turns_an_accelerometer_is_not_told_from_a_turn(mirrored, told_apart):
+    case = draw_case(3, "rate_table", ["accel.cross_axis"])
+    turn = effect("accel.cross_axis", sxy=0.01, syx=mirrored * 0.01, sxz=0.002, szx=mirrored * 0.002)
+    seen, told = sizes_and_apart(replace(case, runs=case.runs[:2], concealed=(Concealed(turn),)))
+    assert seen["accel.cross_axis"] > 5.0
+    assert (told["accel.cross_axis"] > 2.0) is told_apart
+
+
+def test_what_another_concealed_effect_does_as_well_is_no_sign_of_an_effect():
+    """A scale of x and y is a place along the radius to a disc that spins steadily: 1 mm of 16 is 6 per cent."""
+    case = draw_case(3, "rate_table", ["accel.scale"])
+    scale = Concealed(effect("accel.scale", sx=0.01, sy=0.01, sz=0.0))
+    place = Concealed(effect("accel.position_offset", dx_m=1e-3, dy_m=1e-3, dz_m=0.0))
+    case = replace(case, runs=case.runs[:1])
+    alone, beside = (sizes(replace(case, concealed=one))["accel.scale"] for one in ((scale,), (scale, place)))
+    assert beside < 0.2 * alone
 
 
 def test_nothing_concealed_has_no_limit():

@@ -16,7 +16,16 @@ import numpy as np
 from discsim.errors import InputError
 from discsim.validation.challenge.cases.draw import KINDS, PLANT_SHARES
 from discsim.validation.challenge.masks import MASK_HEADER, mask_row, masked_results
-from discsim.validation.challenge.report.page import deviates_of, fault_of, found_of, goal_rows, hidden_of, percent
+from discsim.validation.challenge.report.page import (
+    SIZE,
+    deviates_of,
+    fault_of,
+    found_of,
+    goal_rows,
+    hidden_of,
+    percent,
+    size_of,
+)
 from discsim.validation.challenge.scores.detection import Sized, detections, fit_curve
 from discsim.validation.challenge.scores.result import Result, Scored, both_times, rates_of, times
 from discsim.validation.challenge.scores.scoring import confusion, has_power_law
@@ -204,13 +213,10 @@ def _failures(scored: Sequence[Scored]) -> str:
     lead = "; ".join(f"{fault}: {count}" for fault, count in counts.most_common())
     rows = []
     for item in sorted(wrong, key=lambda item: (-counts[fault_of(item)], fault_of(item), item.answer.seed)):
-        size = "" if item.strength is None else f"{item.strength:.2g}"
         said = found_of(item) if item.error is None else item.error.strip().splitlines()[-1][:160]
         plant = item.answer.plant.replace("_", " ")
-        rows.append((fault_of(item), plant, hidden_of(item), size, said, f"`{item.reproduce}`"))
-    return f"{lead}. Size is that of the least concealed effect in units of its detection limit.\n\n" + table(
-        ("fault", "plant", "concealed", "size", "found", "alone"), rows
-    )
+        rows.append((fault_of(item), plant, hidden_of(item), size_of(item), said, f"`{item.reproduce}`"))
+    return f"{lead}. {SIZE}\n\n" + table(("fault", "plant", "concealed", "size", "found", "alone"), rows)
 
 
 def masks_text(folders: Sequence[Path], plain: Result | None) -> str:

@@ -27,6 +27,7 @@ from discsim.validation.reporting.html import Section, write_report
 __all__ = [
     "GOALS",
     "MANY",
+    "SIZE",
     "Goal",
     "deviates_of",
     "draw_all",
@@ -36,6 +37,7 @@ __all__ = [
     "goals_met",
     "hidden_of",
     "percent",
+    "size_of",
     "write_page",
 ]
 
@@ -166,6 +168,7 @@ NAMES: Mapping[str, str] = {
     "false_alarm_rate": "false alarms: something named, or unexplained, where nothing is hidden",
     "right_set_rate": "effects named rightly, all sizes",
     "right_set_rate_above_twice_the_limit": "effects named rightly, above twice the detection limit",
+    "right_set_rate_where_told_apart": "effects named rightly, above twice the size at which they are told from others",
     "right_set_or_listed_confusion_rate": "named, or listed as indistinguishable from what is named",
     "right_verdict_rate": "right verdict, all cases",
     "right_place_rate": "right place (effects named rightly): recordings, instant of an event, sensor of a fault",
@@ -372,18 +375,38 @@ def fault_of(item: Scored) -> str:
     return "effects named beside the right ones" if hidden < named else "another effect named"
 
 
+#: what `size_of` tells
+SIZE = (
+    "Size is that of the least concealed effect in units of its detection limit; in brackets in units of the size at "
+    "which it is told from other effects of its sensor."
+)
+
+
+def size_of(item: Scored) -> str:
+    """Return the least concealed size in detection limits, and where it is told from others at another size, that."""
+    if item.strength is None:
+        return ""
+    seen, told = (f"{size:.2g}" for size in (item.strength, item.strength if item.told is None else item.told))
+    return seen if told == seen else f"{seen} ({told})"
+
+
 def _failures(scored: Sequence[Scored]) -> Section:
     rows = []
     for item in scored:
         if item.score.right:
             continue
-        size = "" if item.strength is None else f"{item.strength:.2g}"
-        what = (fault_of(item), hidden_of(item), size, found_of(item), (item.error or "")[-200:], item.reproduce)
+        what = (
+            fault_of(item),
+            hidden_of(item),
+            size_of(item),
+            found_of(item),
+            (item.error or "")[-200:],
+            item.reproduce,
+        )
         rows.append((str(item.answer.seed), *what))
     text = (
         "Each is reproduced alone by its command; its recordings and its answer are written by "
-        "discsim study conceal --seed SEED --out DIR with the same options. Size is that of the least "
-        "concealed effect in units of its detection limit."
+        f"discsim study conceal --seed SEED --out DIR with the same options. {SIZE}"
     )
     header = ("seed", "fault", "concealed", "size", "found", "error", "command")
     return Section("Failures" if rows else "No failures", (text,) if rows else (), header if rows else (), rows)

@@ -24,7 +24,8 @@ RESULT = "challenge.json"
 class Scored:
     """One case, opened: its answer, the diagnosis (None where there is none), its score, time and detection limit.
 
-    ``sizes`` holds each concealed effect of the catalogue in units of the smallest that can be seen, by id;
+    ``sizes`` holds each concealed effect of the catalogue in units of the smallest that can be seen, by id, ``apart``
+    the same in units of the smallest that is told from other effects of its sensor (empty in older files);
     ``reproduce`` is the command that does this case alone. ``cpu_seconds`` are None in files of older versions.
     """
 
@@ -37,6 +38,12 @@ class Scored:
     sizes: Mapping[str, float] = field(default_factory=dict)
     reproduce: str = ""
     cpu_seconds: float | None = None
+    apart: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def told(self) -> float | None:
+        """The least of the concealed sizes in units of that at which it is told from others; None where not known."""
+        return min(self.apart.values(), default=None)
 
     @property
     def strength(self) -> float | None:
@@ -66,6 +73,7 @@ class Scored:
             "score": self.score.to_json(),
             "size_over_limit": self.strength,
             "sizes_over_limit": dict(self.sizes),
+            "sizes_told_apart": dict(self.apart),
             "error": self.error,
             "seconds": self.seconds,
             "cpu_seconds": self.cpu_seconds,
@@ -92,6 +100,7 @@ class Scored:
             cpu_seconds=entry.get("cpu_seconds"),
             recordings_sha256=entry["recordings_sha256"],
             sizes=entry["sizes_over_limit"],
+            apart=entry.get("sizes_told_apart", {}),
             reproduce=entry["reproduce"],
         )
 
@@ -146,7 +155,8 @@ def both_times(scored: Sequence[Scored]) -> str:
 
 def rates_of(scored: Sequence[Scored]) -> dict[str, Rate]:
     """Return the shares that the challenge is judged by."""
-    return summary([(item.answer, item.diagnosis, item.score) for item in scored], [item.strength for item in scored])
+    cases = [(item.answer, item.diagnosis, item.score) for item in scored]
+    return summary(cases, [item.strength for item in scored], [item.told for item in scored])
 
 
 class Result(NamedTuple):

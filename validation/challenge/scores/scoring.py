@@ -314,20 +314,25 @@ def clustered_rate(groups: Iterable[Sequence[bool]]) -> Rate:
 
 
 def summary(
-    scored: Sequence[tuple[Answer, Mapping[str, Any] | None, CaseScore]], strengths: Sequence[float | None] = ()
+    scored: Sequence[tuple[Answer, Mapping[str, Any] | None, CaseScore]],
+    strengths: Sequence[float | None] = (),
+    told: Sequence[float | None] = (),
 ) -> dict[str, Rate]:
     """Return the shares that the challenge is judged by.
 
     ``strengths`` (where given) holds each case's smallest concealed size in units of its detection limit: the rate of
-    right sets is also told for the cases above twice that. A diagnosis that crashed is never right, and no false
+    right sets is also told for the cases above twice that; ``told`` the same in units of the size at which an effect
+    is told from others of its sensor. A diagnosis that crashed is never right, and no false
     alarm. Parameters of one case depend on each other; the intervals of the coverage allow for it.
     """
-    strengths = list(strengths) or [None] * len(scored)
+
+    def above_twice(sizes: Sequence[float | None]) -> Rate:
+        """Return the share of right sets of cases whose size is known and at least two."""
+        pairs = zip(scored, sizes or [None] * len(scored), strict=True)
+        return rate(s.right_set for (a, _, s), size in pairs if a.effects and size is not None and size >= 2.0)
+
     blank = [(d, s) for a, d, s in scored if a.kind in NOTHING]
     hidden = [s for a, _, s in scored if a.effects]
-    strong = [
-        s for (a, _, s), size in zip(scored, strengths, strict=True) if a.effects and size is not None and size >= 2.0
-    ]
     unknown = [(d, s) for a, d, s in scored if a.kind == "off_catalogue"]
     real = [(a, s) for a, _, s in scored if a.kind == "like_real"]
     errors = [[(d.effect, abs(z)) for d in s.deviations if (z := d.in_sd) is not None] for _, _, s in scored]
@@ -343,7 +348,8 @@ def summary(
     return {
         "false_alarm_rate": rate(d is not None and d["verdict"] in _ALARMS for d, _ in blank),
         "right_set_rate": rate(s.right_set for s in hidden),
-        "right_set_rate_above_twice_the_limit": rate(s.right_set for s in strong),
+        "right_set_rate_above_twice_the_limit": above_twice(strengths),
+        "right_set_rate_where_told_apart": above_twice(told),
         "right_set_or_listed_confusion_rate": rate(s.within_confusion for s in hidden),
         "right_verdict_rate": rate(s.right_verdict for _, _, s in scored),
         "right_place_rate": rate(bool(place) for place in placed),
