@@ -14,13 +14,17 @@ __all__ = ["Channel", "Linear"]
 
 @dataclass(frozen=True)
 class Channel:
-    """One axis of one sensor in a linearisation: where its rows are, and their place among the sensor's samples."""
+    """One axis of one sensor in a linearisation: where its rows are, and their place among the sensor's samples.
+
+    A row is worth as many independent samples as ``worth`` says: more than one where it is a mean.
+    """
 
     sensor: str
     axis: str
     group: str
     rows: slice
     index: IntArray
+    worth: float = 1.0
 
 
 @dataclass(frozen=True)

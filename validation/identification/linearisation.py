@@ -488,7 +488,9 @@ def _stack(
             t.append(readings.t[index])
             sd.append(np.broadcast_to(readings.sd, readings.value.shape)[index, axis])
             rows = slice(at, at + index.size)
-            channels.append(Channel(s.sensor, readings.axes[axis], group_of(s.sensor, axis), rows, index))
+            channels.append(
+                Channel(s.sensor, readings.axes[axis], group_of(s.sensor, axis), rows, index, readings.worth)
+            )
             at += index.size
 
     def joined(parts: list[Any]) -> Any:

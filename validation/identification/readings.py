@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from discsim.arrays import BoolArray, FloatArray
 
 __all__ = ["Readings", "group_of"]
@@ -30,6 +32,13 @@ class Readings:
     #: written times and weights (w, n) of the samples that each reading is a mean of; None where it is one sample
     taken: FloatArray | None = None
     weights: FloatArray | None = None
+
+    @property
+    def worth(self) -> float:
+        """How many independent samples a reading is worth: one, or what its weights make of several."""
+        if self.weights is None or self.weights.size == 0:
+            return 1.0
+        return 1.0 / max(float(np.median(np.sum(self.weights**2, axis=0))), 1e-9)
 
     def at(self, chosen: BoolArray) -> Readings:
         """Return some of the readings, ``chosen`` (n,)."""

@@ -22,7 +22,15 @@ from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.noise import NoiseModel, estimate_noise, log_likelihood, whitened
 from discsim.validation.identification.normal_equations import inverse_of
 
-__all__ = ["RESIDUAL_TESTS", "ResidualTests", "UnmodelledResidual", "Whiteness", "unmodelled_residuals", "whiteness"]
+__all__ = [
+    "RESIDUAL_TESTS",
+    "ResidualTests",
+    "UnmodelledResidual",
+    "Whiteness",
+    "loudest",
+    "unmodelled_residuals",
+    "whiteness",
+]
 
 
 @dataclass(frozen=True)
@@ -48,6 +56,8 @@ class ResidualTests:
     loud, slow : float
         No noise is this many times as loud as stated, with a memory beyond this share of the longest recording: the
         blind test's loudest noise is three times as loud as stated.
+    loud_samples : float
+        Nor is noise of means over turns this many times as loud as stated of one sample: that same loudest noise.
     """
 
     bands: int = 24
@@ -59,6 +69,7 @@ class ResidualTests:
     course_terms: int = 5
     course_gain: float = 90.0
     loud: float = 10.0
+    loud_samples: float = 3.0
     slow: float = 0.1
 
 
@@ -187,6 +198,16 @@ def _common_trends(
     return found
 
 
+def loudest(group: str, linears: Sequence[Linear], limits: ResidualTests = RESIDUAL_TESTS) -> float:
+    """Return how loud noise of a group may be: so many times what is stated of its readings, or of a sample of means.
+
+    Noise that is slow beside a turn is as loud in a mean over turns as in each sample.
+    """
+    linear, channel = next((one, c) for one in linears for c in one.channels if c.group == group)
+    stated, of_one = float(linear.sd[channel.rows][0]), float(np.sqrt(channel.worth))
+    return stated * max(limits.loud, limits.loud_samples * of_one if of_one > 1.0 else 0.0)
+
+
 def _absorbed_by_noise(linears: Sequence[Linear], noise: NoiseModel, limits: ResidualTests) -> list[UnmodelledResidual]:
     """Test that no noise so loud and slow was supposed that it has swallowed what is missing."""
     found = []
@@ -196,14 +217,13 @@ def _absorbed_by_noise(linears: Sequence[Linear], noise: NoiseModel, limits: Res
         channels = [(linear, c) for linear in linears for c in linear.channels if c.group == group and c.index.size > 1]
         if not channels:
             continue
-        stated = float(channels[0][0].sd[channels[0][1].rows][0])
+        most = loudest(group, linears, limits)
         times = [linear.t[c.rows] for linear, c in channels]
         interval = float(np.median(np.diff(times[0])))
         longest = max(float(t[-1] - t[0]) for t in times)
-        if slow.sd > limits.loud * stated and slow.memory(interval) > limits.slow * longest:
-            found.append(
-                UnmodelledResidual(group, None, "swallowed", slow.sd / stated, 0.0, max(float(t[-1]) for t in times))
-            )
+        if slow.sd > most and slow.memory(interval) > limits.slow * longest:
+            excess, end = limits.loud * slow.sd / most, max(float(t[-1]) for t in times)
+            found.append(UnmodelledResidual(group, None, "swallowed", excess, 0.0, end))
     return found
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_noise import coloured, rows
 
 from discsim.arrays import FloatArray
 from discsim.validation.identification.noise import estimate_noise
-from discsim.validation.identification.residual_tests import UnmodelledResidual, unmodelled_residuals
+from discsim.validation.identification.residual_tests import UnmodelledResidual, loudest, unmodelled_residuals
 
 N, AXES, RECORDINGS = 600, 3, 4
 
@@ -92,3 +94,12 @@ def test_the_strongest_remainder_comes_first():
 def test_what_is_many_times_as_loud_as_stated_and_hardly_changes_is_no_noise(sd: float, phi: float, kinds: list[str]):
     """Loud noise is noise, and slow noise is; what is both has swallowed something that is missing."""
     assert [item.kind for item in left(noise(3, sd, phi))] == kinds
+
+
+def test_noise_of_a_mean_may_be_as_slow_as_the_mean_and_then_is_as_loud_as_of_a_sample():
+    """Means of 80 samples state a ninth of a sample's noise; noise of 1.4 times that, a second long, was no noise."""
+    one = rows(("accelerometer", 100))
+    mean = replace(one, sd=one.sd / 9.0, channels=tuple(replace(channel, worth=81.0) for channel in one.channels))
+    assert loudest("accelerometer", [one]) == pytest.approx(10.0)
+    assert loudest("accelerometer", [mean]) == pytest.approx(3.0)
+    assert loudest("accelerometer", [replace(mean, channels=one.channels)]) == pytest.approx(10.0 / 9.0)

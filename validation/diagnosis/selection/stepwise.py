@@ -65,7 +65,7 @@ from discsim.validation.identification.competing_effects import CATALOGUED, Comp
 from discsim.validation.identification.gauss_newton import Bars, Fit, merit_of
 from discsim.validation.identification.noise import NoiseModel, estimate_noise, robust_noise, stated_noise
 from discsim.validation.identification.parameters import Parameter
-from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, unmodelled_residuals
+from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, loudest, unmodelled_residuals
 from discsim.validation.identification.stated_parameters import stated_parameters
 
 __all__ = ["joined", "past_hope", "screened", "search", "settled", "tried_without"]
@@ -259,12 +259,12 @@ def _without_swallowed(found: Search, fitted: ContinuousFit) -> ContinuousFit | 
     shows it, which follows the data.
     """
     left = unmodelled_residuals(fitted.fit.linears, fitted.residuals, fitted.fit.noise)
-    stated, loud = stated_noise(fitted.fit.linears), RESIDUAL_TESTS.loud
+    stated = stated_noise(fitted.fit.linears)
     noise = {item.group: found.relaxed_noise[item.group] for item in left if item.kind == "course"}
     noise |= {
         item.group: stated[item.group]
         for item in left
-        if item.kind == "swallowed" or fitted.fit.noise[item.group].sd > loud * stated[item.group].sd
+        if item.kind == "swallowed" or fitted.fit.noise[item.group].sd > loudest(item.group, fitted.fit.linears)
     }
     if not noise:
         return None
