@@ -451,6 +451,12 @@ def _counted(s: Sampled, prediction: FloatArray, axis: int) -> IntArray:
     return np.flatnonzero(good)
 
 
+def _channel(s: Sampled, axis: int, at: int, index: IntArray) -> Channel:
+    """Return where the rows of an axis stand, from ``at`` on, of readings ``index`` (n,) of its sensor."""
+    readings, rows = s.readings, slice(at, at + index.size)
+    return Channel(s.sensor, readings.axes[axis], group_of(s.sensor, axis), rows, index, readings.worth)
+
+
 def _stack(
     current: Trajectory,
     samples: Sequence[Sampled],
@@ -487,10 +493,7 @@ def _stack(
             shifts.append(closed[index, axis])
             t.append(readings.t[index])
             sd.append(np.broadcast_to(readings.sd, readings.value.shape)[index, axis])
-            rows = slice(at, at + index.size)
-            channels.append(
-                Channel(s.sensor, readings.axes[axis], group_of(s.sensor, axis), rows, index, readings.worth)
-            )
+            channels.append(_channel(s, axis, at, index))
             at += index.size
 
     def joined(parts: list[Any]) -> Any:

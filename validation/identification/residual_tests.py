@@ -69,8 +69,8 @@ class ResidualTests:
     course_terms: int = 5
     course_gain: float = 90.0
     loud: float = 10.0
-    loud_samples: float = 3.0
     slow: float = 0.1
+    loud_samples: float = 3.0
 
 
 RESIDUAL_TESTS = ResidualTests()

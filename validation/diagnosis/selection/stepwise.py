@@ -68,7 +68,7 @@ from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, loudest, unmodelled_residuals
 from discsim.validation.identification.stated_parameters import stated_parameters
 
-__all__ = ["joined", "past_hope", "screened", "search", "settled", "tried_without"]
+__all__ = ["joined", "past_hope", "screened", "search", "settled", "tried_without", "without_swallowed"]
 
 Report: TypeAlias = Callable[[str, int, int], None]
 #: what is proposed, the fit whose motion a fit of it starts from, and what choosing lost samples costs
@@ -197,7 +197,7 @@ def _selected_forward(found: Search) -> Search:
         if step >= _most(found, current, most):
             break
         found, better = next_effect(found, current, step)
-        if better is None and (told := _without_swallowed(found, current)) is not None and not far(found, current):
+        if better is None and (told := without_swallowed(found, current)) is not None and not far(found, current):
             found, better = next_effect(found, told, step)
         if (
             step == 0
@@ -235,7 +235,7 @@ def _selected_forward(found: Search) -> Search:
 
 def _in_stated_noise(found: Search, current: ContinuousFit, step: int) -> tuple[Search, ContinuousFit | None]:
     """Return the best further effect of a fit whose estimated noise has swallowed some; None where it has not."""
-    told = None if far(found, current) else _without_swallowed(found, current)
+    told = None if far(found, current) else without_swallowed(found, current)
     return (found, None) if told is None else next_effect(found, told, step)
 
 
@@ -251,7 +251,7 @@ def past_hope(found: Search, before: ContinuousFit, after: ContinuousFit, furthe
     return left > SELECTION.steps_alike * further * max(was - left, 0.0)
 
 
-def _without_swallowed(found: Search, fitted: ContinuousFit) -> ContinuousFit | None:
+def without_swallowed(found: Search, fitted: ContinuousFit) -> ContinuousFit | None:
     """Return a fit in noise that has swallowed no effect; None where what was estimated has swallowed none.
 
     A bias is nothing but loud and slow noise: in it no bias is worth its price. Nor is noise that is so loud and leaves

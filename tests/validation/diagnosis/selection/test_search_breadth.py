@@ -151,7 +151,7 @@ def test_what_recordings_have_in_common_over_time_is_asked_about_in_noise_that_h
         *2 * (None,),
         *UNASKED,
     )
-    quiet = searching._without_swallowed(found, ContinuousFit(Hypothesis(), fit, 0.0, tuple(bent), told))
+    quiet = searching.without_swallowed(found, ContinuousFit(Hypothesis(), fit, 0.0, tuple(bent), told))
     assert quiet is not None
     assert quiet.fit.noise == stated_noise(linears)
 
