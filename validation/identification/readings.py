@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -33,7 +34,7 @@ class Readings:
     taken: FloatArray | None = None
     weights: FloatArray | None = None
 
-    @property
+    @cached_property
     def worth(self) -> float:
         """How many independent samples a reading is worth: one, or what its weights make of several."""
         if self.weights is None or self.weights.size == 0:

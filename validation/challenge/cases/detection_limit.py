@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from math import pi, sqrt
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -29,7 +29,7 @@ from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, Noise, record
 from discsim.trajectory import predict
 from discsim.validation.challenge.cases.case import Case, Coast, Concealed, Run, Turning
-from discsim.validation.challenge.cases.sizes import HIDING, hiding_of
+from discsim.validation.challenge.cases.sizes import HIDING, conceivable, hiding_of
 
 __all__ = ["THRESHOLD", "noncentrality", "sizes", "sizes_and_apart", "strength"]
 
@@ -62,7 +62,7 @@ def sizes(case: Case) -> dict[str, float]:
     Faults of the setup have none. Nor has, in a case like a real logger's, what is counted row by row: readings are not
     linear in a pattern of rows, and one of these effects shows by what another does to it. It counts as above it.
     """
-    return _sizes(case, _Bench.of(case))
+    return _sizes(case, _Bench(case))
 
 
 def sizes_and_apart(case: Case) -> tuple[dict[str, float], dict[str, float]]:
@@ -72,7 +72,7 @@ def sizes_and_apart(case: Case) -> tuple[dict[str, float], dict[str, float]]:
     them explains as well are no evidence for the one that is concealed. What is lost sample by sample or cut off
     leaves marks that no other effect leaves.
     """
-    bench = _Bench.of(case)
+    bench = _Bench(case)
     seen = _sizes(case, bench)
     told = {}
     for item in _weighed(case):
@@ -90,7 +90,7 @@ def _sizes(case: Case, bench: _Bench) -> dict[str, float]:
 
 def noncentrality(case: Case, item: Concealed) -> float:
     """Return the mean gain in chi2 of one concealed effect, all unknowns fitted with it and without."""
-    return _Bench.of(case).noncentrality(item)
+    return _Bench(case).noncentrality(item)
 
 
 def _weighed(case: Case) -> list[Concealed]:
@@ -126,14 +126,12 @@ def _rivals(case: Case, item: Effect) -> list[list[_Free]]:
     """Return the numbers of each effect of the same sensor that has no more numbers than an effect."""
     beside = {*_ON_ACCELEROMETER, *(id for id in HIDING if CATALOGUE[id].acts_on == "accelerometer")}
     rivals = []
-    for id, hiding in HIDING.items():
-        row = CATALOGUE[id]
+    for id in conceivable(case.plant, tuple(case.sheets_of.sensors)):
+        row, hiding = CATALOGUE[id], HIDING.get(id)
         sensor = row.acts_on in case.sheets_of.sensors and row.acts_on == item.row.acts_on
-        if id == item.id or not (sensor or {id, item.id} <= beside) or len(hiding.sized) > len(_sized(item)):
+        if hiding is None or id == item.id or not (sensor or {id, item.id} <= beside):
             continue
-        if row.setup or row.detector or row.hides_readings or not row.acts_with(set(case.sheets_of.sensors)):
-            continue
-        if case.plant not in row.plants or case.plant in row.unseen_on:
+        if row.detector or row.hides_readings or len(hiding.sized) > len(hiding_of(item.id).sized):
             continue
         middle = {name: 0.5 * (low + high) for name, (low, high) in hiding.ranges.items()}
         none = {name: hiding.about for name in hiding.sized}
@@ -152,32 +150,37 @@ def _numbers(item: Effect, case: Case, recording: int | None) -> list[_Free]:
     return [_Free(effect(item.id, **{**none, name: none[name] + step}), step, recording) for name in hiding.sized]
 
 
-def _sized(item: Effect) -> tuple[str, ...]:
-    return hiding_of(item.id).sized
+class _Quiet(NamedTuple):
+    """One recording as it is without what is concealed, what its own unknowns take in, and what is uncertain in all."""
+
+    motion: Motion
+    sheet: _Sheet
+    basis: FloatArray
+    shared: list[FloatArray]
+
+
+def _less(column: FloatArray, basis: FloatArray) -> FloatArray:
+    return np.asarray(column - basis @ (basis.T @ column))
 
 
 class _Bench:
-    """The recordings of a case as they are without what is concealed, and what each one's own unknowns take in."""
+    """The recordings of a case as they are without what is concealed; each is made when it is asked for."""
 
-    def __init__(
-        self, case: Case, motions: Sequence[Motion], sheets: Sequence[_Sheet], bases: Sequence[FloatArray]
-    ) -> None:
-        self.case, self.motions, self.sheets, self.bases = case, motions, sheets, bases
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        self._quiet: dict[int, _Quiet] = {}
         self._known: dict[tuple[int, Effect, float], FloatArray] = {}
-        self.shared = [
-            [self._less(number, sheet.column(made, step)) for made, step in _uncertain(sheet.case, run)]
-            for number, (sheet, run) in enumerate(zip(sheets, case.runs, strict=True))
-        ]
 
-    @classmethod
-    def of(cls, case: Case) -> _Bench:
-        motions, sheets, bases = [], [], []
-        for number, run in enumerate(case.runs):
-            here = replace(case, hands=case.hands[number : number + 1])
-            motions.append(_motion(here, run, [], here.disc, here.rig))
-            sheets.append(_Sheet.of(here, _measured(here, motions[-1], [])))
-            bases.append(_orthonormal(_unknowns(here, run, sheets[-1])))
-        return cls(case, motions, sheets, bases)
+    def quiet(self, number: int) -> _Quiet:
+        """Return a recording by its number."""
+        if number not in self._quiet:
+            run, here = self.case.runs[number], replace(self.case, hands=self.case.hands[number : number + 1])
+            motion = _motion(here, run, [], here.disc, here.rig)
+            sheet = _Sheet.of(here, _measured(here, motion, []))
+            basis = _orthonormal(_unknowns(here, run, sheet))
+            shared = [_less(sheet.column(made, step), basis) for made, step in _uncertain(here, run)]
+            self._quiet[number] = _Quiet(motion, sheet, basis, shared)
+        return self._quiet[number]
 
     def noncentrality(self, item: Concealed, beside: Sequence[_Free] = ()) -> float:
         """Return the mean gain in chi2 of one concealed effect, all unknowns fitted with it and without.
@@ -185,14 +188,15 @@ class _Bench:
         The numbers ``beside`` are unknown like the coefficients, and nothing is stated of them.
         """
         small, share = _small(item.effect, self.case)
-        known = len(self.shared[0])
+        known = len(self.quiet(item.recording or 0).shared)
         information, right, gain = np.diag([1.0] * known + [0.0] * len(beside)), np.zeros(known + len(beside)), 0.0
-        for number in range(len(self.sheets)):
+        for number in range(len(self.case.runs)):
             here = item.recording in (None, number)
             if not (here or beside):
                 continue
-            unknown = [*self.shared[number], *(self._column(number, free) for free in beside)]
-            columns = np.reshape(unknown, (right.size, len(self.bases[number]))).T
+            quiet = self.quiet(number)
+            unknown = [*quiet.shared, *(self._column(number, free) for free in beside)]
+            columns = np.reshape(unknown, (right.size, len(quiet.basis))).T
             information += columns.T @ columns
             if here:
                 signature = self._column(number, _Free(small, share, item.recording))
@@ -206,21 +210,19 @@ class _Bench:
 
     def _column(self, number: int, free: _Free) -> FloatArray:
         """Return what a number of an effect changes in one recording, per unit of it, less what is taken in."""
-        sheet, run = self.sheets[number], self.case.runs[number]
+        quiet = self.quiet(number)
         if free.recording not in (None, number):
-            return np.zeros(len(self.bases[number]))
+            return np.zeros(len(quiet.basis))
         known = self._known.get((number, free.effect, free.step))
         if known is None:
+            here = quiet.sheet.case
             if free.effect.row.acts_on == "motion":
-                made = readings(sheet.case, run, [free.effect])
+                made = readings(here, self.case.runs[number], [free.effect])
             else:
-                made = _measured(sheet.case, self.motions[number], [free.effect])
-            known = self._known[number, free.effect, free.step] = self._less(number, sheet.column(made, free.step))
+                made = _measured(here, quiet.motion, [free.effect])
+            column = quiet.sheet.column(made, free.step)
+            known = self._known[number, free.effect, free.step] = _less(column, quiet.basis)
         return known
-
-    def _less(self, number: int, column: FloatArray) -> FloatArray:
-        basis = self.bases[number]
-        return np.asarray(column - basis @ (basis.T @ column))
 
 
 def _orthonormal(columns: FloatArray) -> FloatArray:
