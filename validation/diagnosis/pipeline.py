@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from discsim.effects.own import UserEffect
+from discsim.effects.sensors import DroppedSamples
+from discsim.effects.setup import TimeOffset
 from discsim.recording import Recording
 from discsim.validation.diagnosis.assemble import outcome_of
 from discsim.validation.diagnosis.consistency.early_verdict import contradiction_after, contradiction_in
@@ -24,9 +26,10 @@ from discsim.validation.diagnosis.setup_effects import (
     free_parameters,
     with_reversed_axes,
     with_those_borne_out,
+    without_offsets,
 )
 from discsim.validation.diagnosis.stages import Prepared, Progress, Question, Tried, silent
-from discsim.validation.diagnosis.verdict import judged
+from discsim.validation.diagnosis.verdict import judged, leaves_more_than_noise
 from discsim.validation.identification.competing_effects import Competing
 from discsim.validation.identification.plants.plan import Plan
 from discsim.validation.identification.stated_parameters import stated_parameters
@@ -57,10 +60,11 @@ def diagnose(
     with told_to(progress):
         progress("checking the setup", 0, 5)
         tried = tried_with(_prepared_first(question), question)
-        for suppose in (likeliest_fault, reversed_axes, borne_out):
+        for suppose, stands in _SUPPOSITIONS:
             supposed = suppose(tried, question)
-            again = tried if supposed is None else tried_under(supposed, question)
-            tried = again if again.contradiction is None else tried
+            if supposed is not None:
+                again = tried_under(supposed, question)
+                tried = again if stands(again) else tried
         return outcome_of(judged(tried, progress), question)
 
 
@@ -117,10 +121,33 @@ def prepared_under(setup: SetupFindings, question: Question) -> Prepared:
     return Prepared(setup, tuple(meant), tuple(fitted), (*warnings, *notes), agreeing, agreement, rows)
 
 
+def _follows(tried: Tried) -> bool:
+    """Tell whether sensors do not contradict one another under a supposition."""
+    return tried.contradiction is None
+
+
+def _explains(tried: Tried) -> bool:
+    """Tell whether a supposition leaves no more than noise."""
+    return tried.found is not None and not leaves_more_than_noise(tried.found)
+
+
 def likeliest_fault(tried: Tried, question: Question) -> SetupFindings | None:
     """Suppose a fault that other physics hides from the relations between sensors: what follows them tells it then."""
     del question
     return None if tried.contradiction is None else with_likeliest_fault(tried.prepared.setup)
+
+
+def times_as_written(tried: Tried, question: Question) -> SetupFindings | None:
+    """Suppose that no sensor's times are off where, corrected for that, no effects explain the data, or losses do.
+
+    Samples that were lost shift a sensor's times, and one offset may make up for most of them.
+    """
+    if tried.found is None:
+        return None
+    late = {fault.effect.row.acts_on for fault in tried.prepared.setup.faults if fault.effect.row.type is TimeOffset}
+    named = [candidate.row for candidate in tried.found.final.hypothesis.candidates]
+    losing = any(row.type is DroppedSamples and row.acts_on in late for row in named)
+    return without_offsets(tried.prepared.setup, question.recordings) if losing or not _explains(tried) else None
 
 
 def reversed_axes(tried: Tried, question: Question) -> SetupFindings | None:
@@ -132,3 +159,12 @@ def reversed_axes(tried: Tried, question: Question) -> SetupFindings | None:
 def borne_out(tried: Tried, question: Question) -> SetupFindings | None:
     """Suppose only the faults of a setup that a fit bears out: beside an effect that it found another may be none."""
     return None if tried.fit is None else with_those_borne_out(tried.prepared.setup, question.recordings, tried.fit)
+
+
+#: what is supposed once effects were searched, one after the other, and what tells whether it stands
+_SUPPOSITIONS = (
+    (likeliest_fault, _follows),
+    (times_as_written, _explains),
+    (reversed_axes, _follows),
+    (borne_out, _follows),
+)

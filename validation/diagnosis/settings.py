@@ -164,8 +164,8 @@ class Selection:
         What is left may be this many times what all further effects would take if each took as much as the last: the
         largest comes first, and two that are asked for one by one take less than together.
     refitted, refitted_at_most : int
-        Candidates that are refitted at a step, near the data and while none comes near: algebra from far away ranks
-        many a wrong one before the right one, which was the seventh at worst.
+        Candidates that are refitted at a step, near the data and while none comes near, or none gains though more than
+        noise is left: algebra ranks many a wrong one before the right one, which was the eighth at worst.
     pairs_refitted : int
         Pairs that are refitted where no effect alone comes near: time alone.
     hopeless, hopeless_near : float

@@ -42,6 +42,7 @@ __all__ = [
     "on_board_axes",
     "with_reversed_axes",
     "with_those_borne_out",
+    "without_offsets",
 ]
 
 #: how far a number of a fault may be from its first value, one sigma: s; rad; rad and share. Offsets are found to a few
@@ -89,13 +90,29 @@ def with_those_borne_out(findings: SetupFindings, written: Sequence[Recording], 
     Relations between sensors may take a large error of one sensor for another field, as they cannot fit it; beside that
     error the field is the stated one. ``written`` are the recordings as they stand in their files.
     """
-    kept = tuple(fault for fault in findings.faults if _borne_out(fault.effect, fit))
+    return _with_only([fault for fault in findings.faults if _borne_out(fault.effect, fit)], findings, written)
+
+
+def without_offsets(findings: SetupFindings, written: Sequence[Recording]) -> SetupFindings | None:
+    """Return findings without the times that were taken to be off; None if there are no such.
+
+    Relations between sensors take samples that were lost, or a clock that steps, for times that are off.
+    """
+    return _with_only(
+        [fault for fault in findings.faults if fault.effect.row.type is not TimeOffset], findings, written
+    )
+
+
+def _with_only(
+    kept: Sequence[SetupFault], findings: SetupFindings, written: Sequence[Recording]
+) -> SetupFindings | None:
+    """Return findings with some of their faults, None if those are all; ``written`` are the recordings of the files."""
     if len(kept) == len(findings.faults):
         return None
     meant = tuple(written)
     for fault in kept:
         meant = tuple(corrected(one, [fault.effect]) for one in meant)
-    return replace(findings, faults=kept, recordings=meant)
+    return replace(findings, faults=tuple(kept), recordings=meant)
 
 
 def _borne_out(fault: Effect, fit: Fit) -> bool:

@@ -21,7 +21,14 @@ from discsim.validation.diagnosis.unknown_law.find import find_law
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, UnmodelledResidual, unmodelled_residuals
 
-__all__ = ["RECALIBRATED_NAMES", "judged", "may_be_the_air", "recalibrations", "standard_errors"]
+__all__ = [
+    "RECALIBRATED_NAMES",
+    "judged",
+    "leaves_more_than_noise",
+    "may_be_the_air",
+    "recalibrations",
+    "standard_errors",
+]
 
 
 #: axes of a gyroscope on which a wobble shows
@@ -56,7 +63,7 @@ def judged(tried: Tried, progress: Progress) -> Judged:
     if found.at_once and rows is not None and agreement is not None:
         set_aside = tuple(heldout_fits(found.final))
         leftovers = leftovers_of(found, set_aside, rows.names, agreement)
-    left = _leaves_more_than_noise(found) and not nothing_but_pure_error(leftovers)
+    left = leaves_more_than_noise(found) and not nothing_but_pure_error(leftovers)
     if left or _stacked(found):
         progress("looking for a law", 4, 5)
         law = find_law(
@@ -78,7 +85,8 @@ def judged(tried: Tried, progress: Progress) -> Judged:
     return Judged(tried, verdict, law, leftovers, set_aside)
 
 
-def _leaves_more_than_noise(found: Search) -> bool:
+def leaves_more_than_noise(found: Search) -> bool:
+    """Tell whether what was found leaves residuals that no noise has, or is far from data that a motion follows."""
     final, settled = found.final, found.relaxed_fit.plant.durations.settled
     left = unmodelled_residuals(final.fit.linears, final.residuals, final.fit.noise)
     left = [item for item in left if not (item.kind == "window" and item.from_s <= settled)]

@@ -19,7 +19,7 @@ from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.selection.screening import NormalEquations, normal_equations_of
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Fit
-from discsim.validation.identification.noise import NoiseModel, chi_squared
+from discsim.validation.identification.noise import NoiseModel, chi_squared, robust_noise
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.residual_tests import unmodelled_residuals
 
@@ -35,6 +35,7 @@ __all__ = [
     "no_nearer",
     "on_the_disc",
     "possible",
+    "steady_noise",
     "values_of_fit",
 ]
 
@@ -204,3 +205,14 @@ def from_here(screened: ScreenedCandidate, current: ContinuousFit) -> ScreenedCa
     """Return a screened candidate whose start keeps what the fit has found for everything else."""
     own = {key: value for key, value in screened.start.items() if key[0][0] == screened.candidate.id}
     return replace(screened, start={**values_of_fit(current), **own})
+
+
+def steady_noise(found: Search) -> NoiseModel:
+    """Return the noise in which events are looked for: without what a short one adds, where most readings are well."""
+    linears = found.relaxed_fit.linears
+    steady = robust_noise(linears, [linear.residual for linear in linears])
+    stated = {c.group: float(linear.sd[c.rows][0]) for linear in linears for c in linear.channels}
+    well = all(
+        not np.isfinite(stated[group]) or noise.sd < SELECTION.short * stated[group] for group, noise in steady.items()
+    )
+    return steady if well else found.relaxed_noise

@@ -57,13 +57,14 @@ from discsim.validation.diagnosis.selection.search_state import (
     no_nearer,
     on_the_disc,
     possible,
+    steady_noise,
     values_of_fit,
 )
 from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
 from discsim.validation.diagnosis.uninflated_noise import uninflated_noise
 from discsim.validation.identification.competing_effects import CATALOGUED, Competing
 from discsim.validation.identification.gauss_newton import Bars, Fit, merit_of
-from discsim.validation.identification.noise import NoiseModel, estimate_noise, robust_noise, stated_noise
+from discsim.validation.identification.noise import NoiseModel, estimate_noise, stated_noise
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, loudest, unmodelled_residuals
 from discsim.validation.identification.stated_parameters import stated_parameters
@@ -355,7 +356,7 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
             )
         ]
     found = _with_lost_samples(found, current)
-    for item in searched(found.relaxed_fit, current, found.own, _steady_noise(found), found.lost_samples.found):
+    for item in searched(found.relaxed_fit, current, found.own, steady_noise(found), found.lost_samples.found):
         if isinstance(item, Shifted):
             there.append((item.screened, replace(found.relaxed_fit, trajectories=item.trajectories), item.cost))
         elif current.hypothesis.candidates:
@@ -399,7 +400,7 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
         key = (screened.candidate.id, screened.candidate.recordings)
         if key in seen:
             continue
-        most = SELECTION.refitted if near_data else SELECTION.refitted_at_most
+        most = _most_refitted(current, near_data, bool(fits))
         if usual >= most:
             break
         refitting(f"effect {step + 1}, refitting with", screened.candidate.id, len(seen), min(most, different))
@@ -442,6 +443,16 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
     if cost > 0:
         found = replace(found, relaxed_fit=replace(found.relaxed_fit, trajectories=fit.trajectories))
     return replace(found, cost=found.cost + cost), best
+
+
+def _most_refitted(current: ContinuousFit, near_data: bool, gained: bool) -> int:
+    """Return how many candidates a step refits: few near the data, where one has gained or nothing but noise is left.
+
+    Of noise that the relaxed fit shows too loud a small effect is near the data, and many promise more than it.
+    """
+    if near_data and not gained:
+        near_data = not unmodelled_residuals(current.fit.linears, current.residuals, current.fit.noise)
+    return SELECTION.refitted if near_data else SELECTION.refitted_at_most
 
 
 def joined(found: Search, current: ContinuousFit, screened: ScreenedCandidate, bars: Bars) -> ContinuousFit | None:
@@ -551,19 +562,8 @@ def _with_lost_samples(found: Search, current: ContinuousFit) -> Search:
     """Return a search that knows what samples were lost as its relaxed fit tells them, but for those that are taken."""
     known = [q for q in found.own if q.key not in found.relaxed_fit.plant.own_keys]
     taken = {candidate.id for candidate in current.hypothesis.candidates}
-    lost = found.lost_samples.about(found.relaxed_fit, known, lambda: _steady_noise(found), taken)
+    lost = found.lost_samples.about(found.relaxed_fit, known, lambda: steady_noise(found), taken)
     return replace(found, lost_samples=lost)
-
-
-def _steady_noise(found: Search) -> NoiseModel:
-    """Return the noise in which events are looked for: without what a short one adds, where most readings are well."""
-    linears = found.relaxed_fit.linears
-    steady = robust_noise(linears, [linear.residual for linear in linears])
-    stated = {c.group: float(linear.sd[c.rows][0]) for linear in linears for c in linear.channels}
-    well = all(
-        not np.isfinite(stated[group]) or noise.sd < SELECTION.short * stated[group] for group, noise in steady.items()
-    )
-    return steady if well else found.relaxed_noise
 
 
 def tried_without(found: Search, candidate: CandidateEffect) -> ContinuousFit:
