@@ -366,8 +366,9 @@ def outcome_of(judged: Judged, question: Question) -> Outcome:
     suspicion = () if perhaps is None else (f"P{perhaps.sentence[1:]}.",)
     warnings = (*suspicion, *setup.warnings, *unsaid, *searched_for, *ready.notes)
     turning = None
-    # where rows had to be counted, what sensors say of one another at the times as written is not so
-    if judged.verdict == "unexplained" and rows is None and not plant_of(ready.meant[0]).path_known:
+    # where rows have to be counted, what sensors say of one another at the times as written is not so
+    even = rows is None and (agreement is None or agreement.own_clock is None)
+    if judged.verdict == "unexplained" and even and not plant_of(ready.meant[0]).path_known:
         turning = turning_of(question.recordings, question.names)
     if found is not None:
         told = () if turning is None else turning.sentences

@@ -24,6 +24,15 @@ _AGAIN = "The same again once these sensors agree: until then no effect can be l
 _FREE = (
     "A stretch in which nothing drives the body: its sensors agree, and no law of motion here is of one that is driven."
 )
+#: the same where rows were counted, and what that comes to, of one recording
+_ANOTHER = (
+    "Another throw with the same logger, diagnosed together with this one: where two recordings agree on how their "
+    "rows are to be counted, the count is believed."
+)
+_ALONE = (
+    "The rows are not evenly spaced, as told under which sensors agree: no motion follows them as they are written, "
+    "and one recording alone does not prove how they are to be counted."
+)
 
 
 def contradicted_outcome(
@@ -54,6 +63,7 @@ def contradicted_outcome(
     chi2 = float(np.mean(np.concatenate([one.after for one in shown]) ** 2)) if shown else 0.0
     figures = FitFigures(chi2, None)
     first = recordings[0]
+    alone = len(recordings) == 1 and agreement is not None and agreement.own_clock is not None
     diagnosis = Diagnosis(
         tuple(datasets),
         first.plant,
@@ -62,8 +72,8 @@ def contradicted_outcome(
         figures,
         figures,
         located,
-        next_recordings=(_AGAIN if turning is None or not turning.reconciled else _FREE,),
-        warnings=(*_sentences(found, turning), *warnings),
+        next_recordings=(_ANOTHER if alone else _AGAIN if turning is None or not turning.reconciled else _FREE,),
+        warnings=(*((_ALONE,) if alone else ()), *_sentences(found, turning), *warnings),
         agreement=agreement,
         partly=() if turning is None else turning.partly,
     )

@@ -58,8 +58,22 @@ def leftovers_of(
 
 def nothing_but_pure_error(left: Sequence[Leftover]) -> bool:
     """Tell whether effects leave little more than pure error, of every sensor on every recording set aside."""
-    much = CONSISTENCY.beyond_pure
+    much = _most_beyond_pure(len({one.recording for one in left}))
     return bool(left) and all(one.pure is not None and one.left <= much * one.pure for one in left)
+
+
+def _most_beyond_pure(recordings: int) -> float:
+    """Return how many times its pure error one of so many recordings may keep by the numbers of the others.
+
+    What those and it do not have in common adds to the square: its own part, and that of a mean over the others, which
+    is one over their number (the variance of a prediction: Draper and Smith, 3.1).
+    """
+
+    def unshared(others: int) -> float:
+        return 1.0 + 1.0 / max(others, 1)
+
+    excess = CONSISTENCY.beyond_pure**2 - 1.0
+    return float(np.sqrt(1.0 + excess * unshared(recordings - 1) / unshared(CONSISTENCY.beyond_pure_others)))
 
 
 def pure_noise(agreement: Agreement, otherwise: NoiseModel) -> dict[str, GroupNoise]:

@@ -51,6 +51,8 @@ class Consistency:
         How many times the pure error of its rows effects may leave of a sensor that explain recordings whose rows were
         counted: at twice, what a motion with physics lacks beside one without is less than the root of 3 of it. Throws
         without any effect leave 5 to 300 times.
+    beyond_pure_others : int
+        How many others that is with the numbers of. With those of one other it may be 2.3 times: these err as it does.
     few, again : int
         Recordings that are looked at, and those that are looked at again without some sensors: time alone.
     """
@@ -63,6 +65,7 @@ class Consistency:
     ripples: int = 2
     lost: float = 100.0
     beyond_pure: float = 2.0
+    beyond_pure_others: int = 3
     few: int = 3
     again: int = 2
 
