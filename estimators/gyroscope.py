@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from discsim.arrays import FloatArray, sd_by_median
+from discsim.arrays import BoolArray, FloatArray, sd_by_median
 from discsim.clipping import SAME, step_of
 from discsim.estimators.rate import YawRate
 from discsim.recording import Samples, SensorSheet
@@ -15,12 +15,12 @@ __all__ = ["gyroscope", "rate_reference"]
 def gyroscope(samples: Samples, sheet: SensorSheet) -> YawRate:
     """Rate about +z_B as the gyroscope gives it, signed; ``samples.value`` is (n, 3) rad/s.
 
-    NaN where z is missing or stands at a limit, stated or not (an MPU-9250 clips at 2000 deg/s). The standard deviation
-    is the noise alone, the larger of stated and observed, and the rounding to the resolution, stated or observed: scale
-    and bias, which a data sheet gives as a spread over parts and which need a rate table to be known, are not in it.
+    NaN where z is missing or stands at a limit, stated or not (an MPU-9250 clips at 2000 deg/s), with that in
+    ``beyond``. The standard deviation is the noise alone, the larger of stated and observed, and the rounding to the
+    resolution, stated or observed: scale and bias, which a data sheet gives as a spread over parts and which need a
+    rate table to be known, are not in it.
     """
-    z = np.where(sheet.clipped(samples.value)[:, 2], np.nan, samples.value[:, 2])
-    return _measured("gyroscope", samples.t, z, sheet)
+    return _measured("gyroscope", samples.t, samples.value[:, 2], sheet.clipped(samples.value)[:, 2], sheet)
 
 
 def rate_reference(samples: Samples, sheet: SensorSheet) -> YawRate:
@@ -28,16 +28,17 @@ def rate_reference(samples: Samples, sheet: SensorSheet) -> YawRate:
 
     NaN and standard deviation as in `gyroscope`.
     """
-    value = samples.value
-    return _measured("rate_reference", samples.t, np.where(sheet.clipped(value), np.nan, value), sheet)
+    return _measured("rate_reference", samples.t, samples.value, sheet.clipped(samples.value), sheet)
 
 
-def _measured(method: str, t: FloatArray, rate: FloatArray, sheet: SensorSheet) -> YawRate:
+def _measured(method: str, t: FloatArray, read: FloatArray, clipped: BoolArray, sheet: SensorSheet) -> YawRate:
+    rate = np.where(clipped, np.nan, read)
     noise = max(sheet.noise_rms or 0.0, _observed_noise(rate))
     # a number of six digits is rounded, too
     least = SAME * float(np.max(np.abs(rate[np.isfinite(rate)]), initial=0.0))
     sd = np.hypot(noise, max(sheet.resolution or step_of(rate[:, None]), least) / np.sqrt(12))
-    return YawRate(method, t, rate, np.where(np.isfinite(rate), sd, np.nan), signed=True)
+    beyond = np.where(clipped, read, np.nan) if np.any(clipped) else None
+    return YawRate(method, t, rate, np.where(np.isfinite(rate), sd, np.nan), signed=True, beyond=beyond)
 
 
 def _observed_noise(rate: FloatArray) -> float:

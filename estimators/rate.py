@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,15 @@ from discsim.result import Result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["YawRate"]
+__all__ = ["Median", "YawRate"]
+
+
+class Median(NamedTuple):
+    """The median of rates, rad/s, and of their standard deviations; ``beyond`` where it is more than that in size."""
+
+    rate: float
+    sd: float
+    beyond: bool
 
 
 @dataclass(frozen=True)
@@ -35,6 +43,8 @@ class YawRate(Result):
         not average out: it may keep its sign for a whole flight.
     lower, upper : (n,) array or None
         Worst-case bounds, rad/s, where the method has them (Eq. 11).
+    beyond : (n,) array or None
+        Where the sensor clipped, the limit that the rate is beyond, rad/s, with its sign; NaN elsewhere.
     """
 
     method: str
@@ -45,11 +55,12 @@ class YawRate(Result):
     precession_sd: FloatArray | None = None
     lower: FloatArray | None = None
     upper: FloatArray | None = None
+    beyond: FloatArray | None = None
 
     _dimension: ClassVar[str] = "time_s"
 
     def __post_init__(self) -> None:
-        for name in ("t", "rate", "sd", "precession_sd", "lower", "upper"):
+        for name in ("t", "rate", "sd", "precession_sd", "lower", "upper", "beyond"):
             value = getattr(self, name)
             if value is None:
                 continue
@@ -66,12 +77,31 @@ class YawRate(Result):
     def __repr__(self) -> str:
         return f"<YawRate {self.summary()}>"
 
+    @property
+    def median(self) -> Median:
+        """The median of the known rates and of those that are beyond a limit (censored values); NaN where none is."""
+        known = np.isfinite(self.rate)
+        values, bounds = self.rate[known], np.empty(0)
+        if self.beyond is not None:
+            bounds = self.beyond[~known & np.isfinite(self.beyond)]
+        if not values.size + bounds.size:
+            return Median(float("nan"), float("nan"), False)
+        middle = float(np.median(np.concatenate([values, bounds])))
+        # more than half are beyond a limit of its sign: so is the median
+        side = bounds[np.sign(bounds) == np.sign(middle)]
+        censored = 2 * side.size > values.size + bounds.size
+        sd = float("nan") if censored or not values.size else float(np.median(self.sd[known]))
+        return Median(middle, sd, bool(censored))
+
     def summary(self) -> str:
         """Return one line: the method, how many values are known, the median rate and standard deviation."""
         known = np.isfinite(self.rate)
         if not known.any():
             return f"by {self.method}: none of {len(self)} values is known"
-        median, sd = np.degrees([np.median(self.rate[known]), np.median(self.sd[known])])
+        found = self.median
+        median, sd = np.degrees([found.rate, found.sd])
+        if found.beyond:
+            return f"by {self.method}: {known.sum()} of {len(self)} known, median beyond {median:.5g} deg/s, its limit"
         sign = "" if self.signed else "magnitude, "
         return f"by {self.method}: {sign}{known.sum()} of {len(self)} known, median {median:.5g} +- {sd:.2g} deg/s"
 

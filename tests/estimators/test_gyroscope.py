@@ -47,3 +47,28 @@ def test_a_rate_reference_passes_with_its_sign_and_its_gaps():
     estimate = rate_reference(samples, SensorSheet(100.0, 0.0006))
     np.testing.assert_array_equal(estimate.rate, samples.value)
     assert estimate.method == "rate_reference"
+
+
+@pytest.mark.parametrize(
+    ("rate", "median", "beyond"),
+    [
+        # six of a hundred readings happened not to clip
+        (np.concatenate([np.linspace(30.0, 34.0, 6), np.full(94, 56.0)]), RANGE, True),
+        (-np.concatenate([np.linspace(30.0, 34.0, 6), np.full(94, 56.0)]), -RANGE, True),
+        # most of a slow-down is within the range: the median counts what is beyond it as more
+        (np.linspace(50.0, 10.0, 101), 30.0, False),
+        (np.linspace(-20.0, 20.0, 101), 0.0, False),
+    ],
+    ids=["clipped", "clipped, turning back", "slowing down", "never clipped"],
+)
+def test_of_a_gyroscope_that_mostly_clips_the_median_is_its_limit_or_more(rate, median, beyond):
+    found = gyroscope(turning(rate), SensorSheet(200.0, 0.003, 0.001, RANGE)).median
+    assert found.rate == pytest.approx(median, abs=1e-9)
+    assert found.beyond is beyond
+    assert np.isnan(found.sd) == beyond
+
+
+def test_a_rate_that_nothing_tells_has_no_median():
+    found = rate_reference(Samples(np.arange(4.0), np.full(4, np.nan)), SensorSheet(100.0, 0.0006)).median
+    assert np.isnan(found.rate)
+    assert not found.beyond

@@ -103,6 +103,8 @@ def _print(found: SpinEstimates) -> None:
             "" if np.isnan(cell) else f"{cell:.2f}" if abs(cell) >= 0.005 or not cell else f"{cell:.1g}"
             for cell in cells
         ]
+        if figures.get("median_is_beyond"):
+            shown = [f"beyond {shown[0]}", ""]
         table.add_row(rate.method, str(len(rate)), f"{100 * figures['share_unknown']:.0f} %", *shown)
     Console().print(table)
     for line in found.remarks:

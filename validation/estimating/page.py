@@ -23,7 +23,13 @@ def answer_of(rates: Sequence[YawRate]) -> str:
     known = np.isfinite(rate.rate)
     value = np.degrees(rate.rate[known] if rate.signed else np.abs(rate.rate[known]))
     low, high = np.percentile(value, (1.0, 99.0))
-    middle, sd = float(np.median(value)), float(np.degrees(np.median(rate.sd[known])))
+    if rate.median.beyond:
+        return (
+            f"Spin rate beyond {np.degrees(rate.median.rate):,.0f} deg/s, the limit of the sensor, by {rate.method}: "
+            f"most of its readings are clipped, and it is known for {100 * known.mean():.0f} % of the time only, "
+            f"between {low:,.1f} and {high:,.1f} deg/s then."
+        )
+    middle, sd = np.degrees(rate.median[:2]).tolist()
     turns = abs(middle) / 360.0
     said = f"Spin rate {middle:,.1f} deg/s in the middle ({turns:.2f} turns a second, {60 * turns:,.0f} rpm)"
     spread = f"from {low:,.1f} to {high:,.1f} deg/s (98 % of the values)"
@@ -70,10 +76,12 @@ def _row(rate: YawRate) -> tuple[str, ...]:
     known = np.isfinite(rate.rate)
     if not known.any():
         return (rate.method, str(len(rate)), "100 %", "–", "–", "–", "–")
-    value, sd = np.degrees(rate.rate[known]), np.degrees(np.median(rate.sd[known]))
-    figures = (f"{x:.2f}" for x in (np.median(value), *np.percentile(value, (1.0, 99.0))))
+    value, sd = np.degrees(rate.rate[known]), np.degrees(rate.median.sd)
+    ends = (f"{x:.2f}" for x in np.percentile(value, (1.0, 99.0)))
     unknown = f"{100 * (1 - known.mean()):.0f} %"
-    return (rate.method, str(len(rate)), unknown, *figures, _short(float(sd)))
+    if rate.median.beyond:
+        return (rate.method, str(len(rate)), unknown, f"beyond {np.degrees(rate.median.rate):.0f}", *ends, "–")
+    return (rate.method, str(len(rate)), unknown, f"{np.degrees(rate.median.rate):.2f}", *ends, _short(float(sd)))
 
 
 def _short(sd: float) -> str:

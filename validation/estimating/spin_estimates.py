@@ -226,16 +226,15 @@ def estimate_json(
 def figures_of(rate: YawRate) -> dict[str, Any]:
     """Return the entry of a method in estimate.json."""
     known = np.isfinite(rate.rate)
-    median = float(np.median(rate.rate[known])) if known.any() else float("nan")
-    sd = float(np.median(rate.sd[known])) if known.any() else float("nan")
-    part: dict[str, float] = {}
+    median = rate.median
+    part: dict[str, float | bool] = {"median_is_beyond": True} if median.beyond else {}
     if rate.precession_sd is not None and np.any(rate.precession_sd[known] > 0):
         part["median_precession_sd_rad_s"] = float(np.median(rate.precession_sd[known]))
     return {
         "count": len(rate),
         "share_unknown": float(1 - known.mean()) if len(rate) else float("nan"),
-        "median_rate_rad_s": median,
-        "median_sd_rad_s": sd,
+        "median_rate_rad_s": median.rate,
+        "median_sd_rad_s": median.sd,
         **part,
         "signed": rate.signed,
     }

@@ -76,6 +76,31 @@ def test_unknown_values_are_empty_cells(folder, tmp_path):
     assert report["methods"]["fft"]["median_rate_rad_s"] is None
 
 
+def test_a_gyroscope_that_mostly_clips_is_told_to_be_beyond_its_limit(tmp_path, capsys):
+    """3200 deg/s seen by a part that ends at 2000: the 6 % of readings before it span up are no spin of the throw."""
+    t, rng = np.arange(500) / 100, np.random.default_rng(0)
+    rate = np.minimum(np.radians(3200.0) * t / 0.48, np.radians(3200.0)) + rng.normal(0.0, 0.02, t.size)
+    limit = np.radians(2000.0)
+    value = np.stack([rng.normal(0, 0.02, t.size), rng.normal(0, 0.02, t.size), np.clip(rate, -limit, limit)], axis=1)
+    made = Recording(
+        "free_spin",
+        "clipped",
+        Environment(),
+        sheets={"gyroscope": SensorSheet(100.0, 0.02, None, limit)},
+        samples={"gyroscope": Samples(t, value)},
+    )
+    write_recording(made, tmp_path / "clipped")
+    command(tmp_path / "clipped", out=tmp_path / "out", pad=None)
+    assert "beyond 2000.00" in capsys.readouterr().out
+    assert (
+        "Spin rate beyond 2,000 deg/s, the limit of the sensor, by gyroscope"
+        in (tmp_path / "out/report.html").read_text()
+    )
+    figures = json.loads((tmp_path / "out" / "estimate.json").read_text())["methods"]["gyroscope"]
+    assert figures["median_is_beyond"]
+    assert figures["median_sd_rad_s"] is None
+
+
 def test_the_same_command_gives_the_same_bytes(folder, tmp_path):
     for name in ("one", "two"):
         command(folder, method="all", out=tmp_path / name, pad=None, step=20)
