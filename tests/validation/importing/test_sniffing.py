@@ -103,6 +103,26 @@ def test_what_a_header_says_wrong_is_seen_and_said(tmp_path):
     assert "although the header says rad/s" in unit.why
 
 
+@pytest.mark.parametrize(
+    ("size", "unit", "why"),
+    [
+        (0.78, "gauss", "is the earth's field with iron near the sensor in gauss, although the header says uT"),
+        (780.0, "mgauss", "is the earth's field with iron near the sensor in mgauss, although the header says uT"),
+        (78.0, "uT", "the header says so; 78 uT"),
+        (1e-5, "uT", "is not the earth's field, nor is it in another unit"),
+    ],
+)
+def test_a_field_with_iron_that_no_header_s_unit_explains_is_not_believed(tmp_path, size, unit, why):
+    field = made_log().mag
+    field = field * size / np.median(np.linalg.norm(field, axis=1))
+    columns = [("time_s", made_log().t), *three(named("mag_{}_uT"), field)]
+    proposal = sniff(write_table(tmp_path / "log.csv", columns, digits=9))
+    (found,) = [decision for decision in proposal.all_decisions if decision.what == "magnetometer unit"]
+    assert found.choice == unit
+    assert why in found.why
+    assert ("the earth's field with iron" in found.why) is (size > 0.1)
+
+
 def test_a_second_imu_and_an_acceleration_without_gravity_are_named_and_left_out(tmp_path):
     notes = sniff(two_sensors_of_a_kind(tmp_path, made_log())).notes
     assert any("imu2_acc_x" in note and "a second one" in note for note in notes)
