@@ -32,7 +32,7 @@ from discsim.validation.importing.sniffing.magnitudes import (
     magnetometer_unit,
     rest_norm,
 )
-from discsim.validation.importing.sniffing.names import sensor_of, timeless
+from discsim.validation.importing.sniffing.names import is_time_name, sensor_of, timeless
 from discsim.validation.importing.sniffing.own_clock import OwnClocks, own_clocks
 from discsim.validation.importing.sniffing.preamble import stated_worths
 from discsim.validation.importing.sniffing.proposal import Proposal, ProposedSensor
@@ -216,7 +216,8 @@ def _with_unused(proposal: Proposal, tables: Sequence[Numbers], named: Sequence[
     used = {(triple.numbers.path, name) for triple in named for name in triple.names}
     for numbers in tables:
         columns = numbers.table.columns
-        used |= {(numbers.path, name) for name in columns if name in stamps or f"'{name}'" in said}
+        used |= {(numbers.path, name) for name in columns if name in stamps or is_time_name(name)}
+        used |= {(numbers.path, name) for name in columns if f"'{name}'" in said}
         used |= {(numbers.path, columns[numbers.ids[0]])} if numbers.ids is not None else set()
     if proposal.positions is not None:
         used |= {(proposal.positions.path, name) for name in SENSORS["gps"].columns}
