@@ -156,6 +156,19 @@ def test_a_magnetometer_alone_finds_the_throw_too(tmp_path):
     assert throw.spin == pytest.approx(SPIN * np.exp(-0.15 * (middle - RELEASE)), rel=0.02)
 
 
+@pytest.mark.parametrize(("wander", "squeezed"), [(0.0, 1.0), (16.0, 1.0), (0.0, 0.6)])
+def test_the_field_s_rate_is_that_of_its_turns_about_a_centre_that_wanders_or_on_an_ellipse(tmp_path, wander, squeezed):
+    t = np.arange(0.0, 3.0, 0.0124)
+    phase, slow = -55.0 * t, np.pi * t / 3.0
+    field = np.column_stack([20.0 * np.cos(phase), squeezed * 20.0 * np.sin(phase), np.full(t.size, 45.0)])
+    field += wander * np.column_stack([np.sin(slow), np.cos(slow), 0.0 * t])
+    field += 0.3 * np.random.default_rng(7).standard_normal(field.shape)
+    raw = write_table(tmp_path / "log.csv", [("time_s", t), *three(named("mag_{}_uT"), field)])
+    proposed(raw, tmp_path)
+    (throw,) = stretches(read_readings(raw, read_map(tmp_path / "map.toml")))
+    assert throw.spin == pytest.approx(55.0, rel=0.01)
+
+
 def test_a_swing_of_the_arm_and_a_rest_are_no_throws(tmp_path):
     log = made_log()
     before = log.t < RELEASE - 0.2
