@@ -129,6 +129,23 @@ def test_a_second_imu_and_an_acceleration_without_gravity_are_named_and_left_out
     assert any("linear_acc_x" in note and "without gravity" in note for note in notes)
 
 
+@pytest.mark.parametrize(
+    ("gyro", "mag", "said"),
+    [
+        ((1, 1, 1), np.eye(3), False),
+        ((1, 1, -1), np.eye(3), True),
+        ((1, 1, 1), np.diag([1, 1, -1]), True),
+        ((1, 1, 1), np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]]), False),  # AK8963 in an MPU-9250: a rotation
+    ],
+)
+def test_a_magnetometer_that_mirrors_the_gyroscope_is_said_aloud(tmp_path, gyro, mag, said):
+    log = made_log()
+    columns = [("time_s", log.t), *three(named("gyro_{}_dps"), log.gyro / DEG * np.array(gyro))]
+    columns += [*three(named("acc_{}_g"), log.accel / 9.80665), *three(named("mag_{}_uT"), log.mag @ mag)]
+    notes = sniff(write_table(tmp_path / "log.csv", columns)).notes
+    assert any("mirror images" in note and "the sign of the spin" in note for note in notes) is said
+
+
 # --------------------------------------------------------------------------------------------------- throws
 
 

@@ -327,7 +327,7 @@ def _proposal(
     )
     name = re.sub(r"[^\w.-]+", "-", raw.resolve().stem).strip("-") or "log"
     decisions = (*own.decisions, *axes.decisions) if found else ()  # positions alone have no axes of a board
-    return Proposal(name, raw, plant, layout, clock, sensors, decisions, tuple(notes))
+    return Proposal(name, raw, plant, layout, clock, sensors, decisions, (*axes.notes, *notes))
 
 
 def _stated(sensor: str, triple: Triple, value: FloatArray) -> tuple[Reading | None, bool]:
