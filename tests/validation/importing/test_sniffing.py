@@ -103,10 +103,47 @@ def test_what_a_header_says_wrong_is_seen_and_said(tmp_path):
     assert "although the header says rad/s" in unit.why
 
 
+@pytest.mark.parametrize(
+    ("size", "unit", "why"),
+    [
+        (0.78, "gauss", "is the earth's field with iron near the sensor in gauss, although the header says uT"),
+        (780.0, "mgauss", "is the earth's field with iron near the sensor in mgauss, although the header says uT"),
+        (78.0, "uT", "the header says so; 78 uT"),
+        (1e-5, "uT", "is not the earth's field, nor is it in another unit"),
+    ],
+)
+def test_a_field_with_iron_that_no_header_s_unit_explains_is_not_believed(tmp_path, size, unit, why):
+    field = made_log().mag
+    field = field * size / np.median(np.linalg.norm(field, axis=1))
+    columns = [("time_s", made_log().t), *three(named("mag_{}_uT"), field)]
+    proposal = sniff(write_table(tmp_path / "log.csv", columns, digits=9))
+    (found,) = [decision for decision in proposal.all_decisions if decision.what == "magnetometer unit"]
+    assert found.choice == unit
+    assert why in found.why
+    assert ("the earth's field with iron" in found.why) is (size > 0.1)
+
+
 def test_a_second_imu_and_an_acceleration_without_gravity_are_named_and_left_out(tmp_path):
     notes = sniff(two_sensors_of_a_kind(tmp_path, made_log())).notes
     assert any("imu2_acc_x" in note and "a second one" in note for note in notes)
     assert any("linear_acc_x" in note and "without gravity" in note for note in notes)
+
+
+@pytest.mark.parametrize(
+    ("gyro", "mag", "said"),
+    [
+        ((1, 1, 1), np.eye(3), False),
+        ((1, 1, -1), np.eye(3), True),
+        ((1, 1, 1), np.diag([1, 1, -1]), True),
+        ((1, 1, 1), np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]]), False),  # AK8963 in an MPU-9250: a rotation
+    ],
+)
+def test_a_magnetometer_that_mirrors_the_gyroscope_is_said_aloud(tmp_path, gyro, mag, said):
+    log = made_log()
+    columns = [("time_s", log.t), *three(named("gyro_{}_dps"), log.gyro / DEG * np.array(gyro))]
+    columns += [*three(named("acc_{}_g"), log.accel / 9.80665), *three(named("mag_{}_uT"), log.mag @ mag)]
+    notes = sniff(write_table(tmp_path / "log.csv", columns)).notes
+    assert any("mirror images" in note and "the sign of the spin" in note for note in notes) is said
 
 
 # --------------------------------------------------------------------------------------------------- throws
@@ -134,6 +171,19 @@ def test_a_magnetometer_alone_finds_the_throw_too(tmp_path):
     assert LANDING - 0.5 < throw.end < LANDING + 0.1
     middle = (throw.start + throw.end) / 2
     assert throw.spin == pytest.approx(SPIN * np.exp(-0.15 * (middle - RELEASE)), rel=0.02)
+
+
+@pytest.mark.parametrize(("wander", "squeezed"), [(0.0, 1.0), (16.0, 1.0), (0.0, 0.6)])
+def test_the_field_s_rate_is_that_of_its_turns_about_a_centre_that_wanders_or_on_an_ellipse(tmp_path, wander, squeezed):
+    t = np.arange(0.0, 3.0, 0.0124)
+    phase, slow = -55.0 * t, np.pi * t / 3.0
+    field = np.column_stack([20.0 * np.cos(phase), squeezed * 20.0 * np.sin(phase), np.full(t.size, 45.0)])
+    field += wander * np.column_stack([np.sin(slow), np.cos(slow), 0.0 * t])
+    field += 0.3 * np.random.default_rng(7).standard_normal(field.shape)
+    raw = write_table(tmp_path / "log.csv", [("time_s", t), *three(named("mag_{}_uT"), field)])
+    proposed(raw, tmp_path)
+    (throw,) = stretches(read_readings(raw, read_map(tmp_path / "map.toml")))
+    assert throw.spin == pytest.approx(55.0, rel=0.01)
 
 
 def test_a_swing_of_the_arm_and_a_rest_are_no_throws(tmp_path):

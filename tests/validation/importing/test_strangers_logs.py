@@ -201,6 +201,37 @@ def test_a_throw_beyond_a_small_range_is_found(tmp_path):
     assert throw.spin == pytest.approx(32, rel=0.05)
 
 
+# ------------------------------------------------------------------------------------------------ misspelt names
+
+
+@pytest.mark.parametrize("typo", ["GryZ [dps]", "GyrrZ [dps]", "GyZ [dps]", "GyrZ [dsp]", "gyrz [dps]"])
+def test_a_slip_in_one_name_that_leaves_a_sensor_out_is_asked_about(tmp_path, typo):
+    names = ["GyrX [dps]", "GyrY [dps]", typo]
+    columns = [("t_s", LOG.t), *three(named("Acc{} [g]"), LOG.accel / G0), *three(names, LOG.gyro / DEG)]
+    proposal = sniff(write_table(tmp_path / "log.csv", [*columns, ("batt_V", 4.0 + 0 * LOG.t)]))
+    asked = f"of the gyroscope x and y were found and z was not: is it '{typo}'? Rename it, or state it in a map"
+    assert proposal.notes == (asked, f"not used: GyrX [dps], GyrY [dps], {typo}, batt_V")
+    assert all(f"# {note}\n" in map_text(proposal) for note in proposal.notes)
+    with pytest.raises(InputError, match="is it '"):
+        sniff(write_table(tmp_path / "alone.csv", columns[:1] + columns[4:]))
+
+
+def test_of_two_names_that_are_a_slip_away_and_of_none_neither_is_proposed(tmp_path):
+    columns = [("t_s", LOG.t), *three(named("a{}"), LOG.accel / G0), *three(["gx", "gy", "spin"], LOG.gyro / DEG)]
+    none = sniff(write_table(tmp_path / "none.csv", columns))
+    two = sniff(write_table(tmp_path / "two.csv", [*columns, ("gzz", LOG.t), ("ggz", LOG.t)]))
+    for proposal in (none, two):
+        assert "z was not: name its column as 'gx' and 'gy' are named" in proposal.notes[0]
+    whole = three(named("q{}"), np.column_stack([LOG.t, LOG.t, LOG.t]))
+    beside = sniff(write_table(tmp_path / "beside.csv", [*columns[:-1], ("gzz", LOG.gyro[:, 2]), *whole]))
+    assert "is it 'gzz'?" in beside.notes[0]  # qz has mates of its own
+
+
+def test_a_log_all_of_whose_columns_are_read_says_nothing_of_others(tmp_path):
+    columns = [("t_s", LOG.t), *three(named("a{}"), LOG.accel / G0), *three(named("g{}"), LOG.gyro / DEG)]
+    assert sniff(write_table(tmp_path / "log.csv", columns)).notes == ()
+
+
 # ------------------------------------------------------------------------------------------------------- archives
 
 

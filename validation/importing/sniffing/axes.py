@@ -26,6 +26,13 @@ ONE_AXIS = 0.8
 EXPLAINED = 0.5
 #: ... and where it explains all but a tenth of their power.
 CLEARLY = 0.3
+#: Said where only mirrored axes lay the magnetometer on the gyroscope. All three reversed fit as well, and are told
+#: apart by the field's dip: south of the equator ordinary axes look mirrored.
+MIRRORED = (
+    "gyroscope and magnetometer are mirror images of one another, if the field points down, as north of the equator: "
+    "one of them has an axis reversed, or two swapped, unless their data sheets draw them so; which one is open, and "
+    "with it the sign of the spin"
+)
 #: Ways to lay the axes are told apart where one leaves this much less than the other, in the ratio's own size.
 APART = 0.8
 
@@ -40,11 +47,15 @@ class Reading3:
 
 @dataclass(frozen=True)
 class BodyAxes:
-    """Per sensor the matrix from its axes to the body's, what was decided, and the spin axis (None: no spin seen)."""
+    """Per sensor the matrix from its axes to the body's, what was decided, and the spin axis (None: no spin seen).
+
+    ``notes`` are what a user should know besides.
+    """
 
     matrix: Mapping[str, FloatArray]
     decisions: tuple[Decision, ...]
     spin_axis: int | None
+    notes: tuple[str, ...] = ()
 
 
 def letters(matrix: FloatArray) -> list[str]:
@@ -71,6 +82,8 @@ def body_axes(sensors: Mapping[str, Reading3]) -> BodyAxes:
         laid, decision = _laid(gyro, field, sensors.get("accelerometer"))
         matrix["magnetometer"] = base @ laid
         decisions.append(decision)
+        if np.linalg.det(laid) < 0:
+            return BodyAxes(matrix, tuple(decisions), axis, (MIRRORED,))
     return BodyAxes(matrix, tuple(decisions), axis)
 
 

@@ -30,6 +30,8 @@ REST = 0.12
 #: The earth's field, uT, and what a hard iron of its size makes of the readings' norm.
 FIELD = (22.0, 67.0)
 FIELD_WITH_IRON = (10.0, 150.0)
+#: About the middle of the earth's field, uT: from it sizes are counted on a logarithmic scale.
+MIDDLE = 45.0
 #: Counts per g of usual parts: 16 bits over 2, 4, 8, 16 g; 12, 10 and 8 bits of older parts. A factor of 2 apart.
 PER_G = (16384.0, 8192.0, 4096.0, 2048.0, 1024.0, 512.0, 256.0, 64.0)
 #: Counts per deg/s over 250, 500, 1000, 2000 deg/s (InvenSense, Bosch) and 245 to 4000 deg/s (ST).
@@ -168,26 +170,33 @@ def magnetometer_unit(value: FloatArray, stated: Reading | None, *, counts: bool
         if FIELD[0] <= field <= FIELD[1]:
             why = f"the header says so, and {field:.0f} uT ({what}) is the earth's field"
             return Unit(stated.unit, stated.scale, _said(name, stated.unit, "certain", why))
-        if FIELD_WITH_IRON[0] <= field <= FIELD_WITH_IRON[1] or not fits:
+        if FIELD_WITH_IRON[0] <= field <= FIELD_WITH_IRON[1]:
             why = f"the header says so; {field:.3g} uT ({what}) is the earth's field with iron near the sensor"
             return Unit(stated.unit, stated.scale, _said(name, stated.unit, "likely", why))
-        why = f"{size:.4g} ({what}) is the earth's field in {fits[0]}, although the header says {stated.unit}"
-        return Unit(fits[0], 1.0, _said(name, fits[0], "likely", why))
+        with_iron = [unit for unit in factors if FIELD_WITH_IRON[0] <= size * factors[unit] <= FIELD_WITH_IRON[1]]
+        if fits:
+            why = f"{size:.4g} ({what}) is the earth's field in {fits[0]}, although the header says {stated.unit}"
+            return Unit(fits[0], 1.0, _said(name, fits[0], "likely", why))
+        if with_iron:
+            near = min(with_iron, key=lambda unit: abs(np.log(size * factors[unit] / MIDDLE)))
+            why = f"{size:.4g} ({what}) is the earth's field with iron near the sensor in {near}"
+            return Unit(near, 1.0, _said(name, near, "guess", f"{why}, although the header says {stated.unit}"))
+        why = f"the header says so, but {field:.3g} uT ({what}) is not the earth's field, nor is it in another unit"
+        return Unit(stated.unit, stated.scale, _said(name, stated.unit, "guess", why))
     counted = stated is not None and stated.unit == COUNTS
     if fits and not counted and not (_whole(value) and (counts or fits[0] == "nT")):
         why = f"{size:.4g} ({what}) is the earth's field"
         return Unit(fits[0], 1.0, _said(name, fits[0], "likely", why))
     if _whole(value):
         return _magnetometer_counts(size, what)
-    # nearest to 45 uT, the middle of the earth's field on a logarithmic scale
-    unit = min(factors, key=lambda unit: abs(np.log(max(size, 1e-12) * factors[unit] / 45)))
+    unit = min(factors, key=lambda unit: abs(np.log(max(size, 1e-12) * factors[unit] / MIDDLE)))
     why = f"no unit in the header; {size:.4g} ({what}) is nearest to the earth's field in it"
     return Unit(unit, 1.0, _said(name, unit, "guess", why))
 
 
 def _magnetometer_counts(size: float, what: str) -> Unit:
     fits = {part: per for part, per in PER_UT.items() if FIELD[0] <= size / per <= FIELD[1]}
-    part = min(fits or PER_UT, key=lambda part: abs(np.log(size / PER_UT[part] / 45)))
+    part = min(fits or PER_UT, key=lambda part: abs(np.log(size / PER_UT[part] / MIDDLE)))
     per = PER_UT[part]
     others = ", ".join(other for other in fits if other != part)
     sure: Sureness = "likely" if len(fits) == 1 else "guess"

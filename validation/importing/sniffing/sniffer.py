@@ -32,12 +32,13 @@ from discsim.validation.importing.sniffing.magnitudes import (
     magnetometer_unit,
     rest_norm,
 )
-from discsim.validation.importing.sniffing.names import sensor_of, timeless
+from discsim.validation.importing.sniffing.names import is_time_name, sensor_of, timeless
 from discsim.validation.importing.sniffing.own_clock import OwnClocks, own_clocks
 from discsim.validation.importing.sniffing.preamble import stated_worths
 from discsim.validation.importing.sniffing.proposal import Proposal, ProposedSensor
 from discsim.validation.importing.sniffing.turning import Fit, best_worth, steps_between
 from discsim.validation.importing.sniffing.units import COUNTS, Reading
+from discsim.validation.importing.sniffing.unused import missing_axes, unused_columns
 
 __all__ = ["sniff"]
 
@@ -80,10 +81,12 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     found = {s: found[s] for s in ORDER if s in found and _on(clock, found[s][0].numbers)}
     if not found and not fixes:
         raise _nothing(raw, files, failures)
-    notes += _others(found, left)
+    others = _others(found, left)
     own = own_clocks(clock, {sensor: triple for sensor, (triple, _) in found.items()})
-    proposal = _proposal(raw, plant, layout, clock, own, found, [*notes, *own.notes])
-    return replace(proposal, positions=fixes[0] if fixes else None)
+    proposal = _proposal(raw, plant, layout, clock, own, found, [*notes, *(note for _, note in others), *own.notes])
+    proposal = replace(proposal, positions=fixes[0] if fixes else None)
+    named = [*(triple for triple, _ in found.values()), *(triple for triple, _ in others)]
+    return _with_unused(proposal, [file.numbers for file in files], named, own)
 
 
 # --------------------------------------------------------------------------------------------------- reading
@@ -189,7 +192,8 @@ def _rests(triple: Triple) -> bool:
     return any(abs(shared / one - 1) < REST for one in (G0, 1.0, 1000.0, *counts))
 
 
-def _others(found: dict[str, tuple[Triple, Decision]], left: Sequence[Triple]) -> list[str]:
+def _others(found: dict[str, tuple[Triple, Decision]], left: Sequence[Triple]) -> list[tuple[Triple, str]]:
+    """Return the triples that are a sensor's and are left out, each with a line that says why."""
     notes = []
     chosen = [triple for triple, _ in found.values()]
     for triple in left:
@@ -199,8 +203,26 @@ def _others(found: dict[str, tuple[Triple, Decision]], left: Sequence[Triple]) -
             why = "worked out from other readings, or without gravity"
         else:
             why = "a second one" if triple.sensor in found else "worked out from other readings"
-        notes.append(f"left out: {triple.sensor} in {triple.label} of {triple.numbers.path.name} ({why})")
+        note = f"left out: {triple.sensor} in {triple.label} of {triple.numbers.path.name} ({why})"
+        notes.append((triple, note))
     return notes[:6]
+
+
+def _with_unused(proposal: Proposal, tables: Sequence[Numbers], named: Sequence[Triple], own: OwnClocks) -> Proposal:
+    """Return the proposal with lines on the columns that neither it nor a line of it names, the gravest first."""
+    clocks = (proposal.clock, *own.clocks.values())
+    stamps = {name for clock in clocks for name in (clock.column, clock.counter) if name is not None}
+    said = " ".join([*proposal.notes, *(decision.text for decision in proposal.all_decisions)])
+    used = {(triple.numbers.path, name) for triple in named for name in triple.names}
+    for numbers in tables:
+        columns = numbers.table.columns
+        used |= {(numbers.path, name) for name in columns if name in stamps or is_time_name(name)}
+        used |= {(numbers.path, name) for name in columns if f"'{name}'" in said}
+        used |= {(numbers.path, columns[numbers.ids[0]])} if numbers.ids is not None else set()
+    if proposal.positions is not None:
+        used |= {(proposal.positions.path, name) for name in SENSORS["gps"].columns}
+    asked = missing_axes(tables, used, {sensor.sensor for sensor in proposal.sensors})
+    return replace(proposal, notes=(*asked, *proposal.notes, *unused_columns(tables, used)))
 
 
 def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) -> InputError:
@@ -211,6 +233,7 @@ def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) 
     also = f" ({len(failures)} other files there are no tables)" if failures else ""
     guessed = files[0].numbers.dialect.layout.encoding in ("cp1252", "latin-1") and not columns.isascii()
     also += "; the text is no UTF-8 and its encoding could not be told (save it as UTF-8)" * guessed
+    also += "".join(f"; {asked}" for asked in missing_axes([file.numbers for file in files], (), ()))
     return InputError.at(
         raw,
         None,
@@ -304,7 +327,7 @@ def _proposal(
     )
     name = re.sub(r"[^\w.-]+", "-", raw.resolve().stem).strip("-") or "log"
     decisions = (*own.decisions, *axes.decisions) if found else ()  # positions alone have no axes of a board
-    return Proposal(name, raw, plant, layout, clock, sensors, decisions, tuple(notes))
+    return Proposal(name, raw, plant, layout, clock, sensors, decisions, (*axes.notes, *notes))
 
 
 def _stated(sensor: str, triple: Triple, value: FloatArray) -> tuple[Reading | None, bool]:

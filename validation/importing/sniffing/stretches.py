@@ -16,7 +16,7 @@ import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.signal import savgol_filter
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.clipping import clipped
 from discsim.validation.importing.conversion import RawReadings
 from discsim.validation.importing.sniffing.axes import FAST
@@ -33,6 +33,8 @@ SHORTEST, TURNS = 0.3, 2.0
 ONE_AXIS = 0.9
 #: Twice the largest air force on a disc, 2 g, over a row at 100 Hz is 0.4 m/s; a ground hit takes some m/s in a row.
 IMPACT = 0.5
+#: Soft iron and a turn that is not about z make an ellipse of the field's circle; one three times as long is no spin.
+LONGEST_ELLIPSE = 3.0
 #: A magnetometer alone tells the rate from the field's turning over this span, s.
 FIELD_SPAN = 0.25
 
@@ -62,13 +64,22 @@ class Stretch:
 
 
 class _Rate(NamedTuple):
-    """Who shows the rate, time (n,), its size (n,), where its axis stands still in the body, where it is clipped."""
+    """Who shows the rate, time (n,), its size (n,), where its axis stands still in the body, where it is clipped.
+
+    ``plane`` (n,) is the field across the spin axis, x + i y, as read; empty of a gyroscope.
+    """
 
     sensor: str
     t: FloatArray
     rate: FloatArray
     steady: BoolArray
     clipped: BoolArray
+    plane: ComplexArray = np.empty(0, dtype=np.complex128)
+
+    def spin(self, inside: BoolArray) -> float:
+        """Return the size of the rate over some rows, rad/s: the median of a gyroscope's, of the field's turns."""
+        median = float(np.median(self.rate[inside]))
+        return median if self.plane.size == 0 else _turning(self.t[inside], self.plane[inside], median)
 
 
 def stretches(read: RawReadings) -> list[Stretch]:
@@ -104,11 +115,11 @@ def _spin(seen: _Rate, field: _Rate | None, start: float, end: float) -> tuple[s
         if one is None:
             continue
         inside = (one.t >= start) & (one.t <= end)
-        spin = float(np.median(one.rate[inside])) if inside.any() else 0.0
+        spin = one.spin(inside) if inside.any() else 0.0
         if spin > 0 and not np.mean(one.clipped[inside]) > 0.5:
             return one.sensor, spin, False
     inside = (seen.t >= start) & (seen.t <= end)
-    return seen.sensor, float(np.median(seen.rate[inside])), True
+    return seen.sensor, seen.spin(inside), True
 
 
 def _gyroscope_rate(read: RawReadings) -> _Rate | None:
@@ -143,7 +154,50 @@ def _field_rate(read: RawReadings) -> _Rate | None:
     rate = median_filter(np.append(turn, turn[-1]), _count(t, FIELD_SPAN))
     size = uniform_filter1d(np.abs(plane), _count(t, FIELD_SPAN), mode="nearest")
     # a field that goes round has a steady size; 5 uT is a quarter of the weakest horizontal field of temperate places
-    return _Rate("magnetometer", t, rate, np.asarray(size > 5.0), np.zeros(t.size, dtype=np.bool_))
+    whole = value[:, 0] + 1j * value[:, 1]
+    return _Rate("magnetometer", t, rate, np.asarray(size > 5.0), np.zeros(t.size, dtype=np.bool_), whole)
+
+
+def _turning(t: FloatArray, plane: ComplexArray, rough: float) -> float:
+    """Return the size of the rate at which a field (n,) goes round the ellipse through it, rad/s, the median of turns.
+
+    About a centre that is off, or on an ellipse, the turn per row comes and goes with each turn, and its median over
+    rows is up to a fifth low. ``rough``, such a median, bridges rows that are further apart, and is the answer where
+    readings fit no ellipse.
+    """
+    level = _levelled(plane)
+    if level is None:
+        return rough
+    step, spacing = np.angle(level[1:] * np.conj(level[:-1])), np.diff(t)
+    row = float(np.median(spacing))
+    near = spacing < 1.5 * row
+    if near.sum() < 3:
+        return rough
+    mean = float(np.sum(step[near]) / np.sum(spacing[near]))
+    expected = mean * spacing  # the turn of each step lies within half a turn of it
+    turns = expected + np.angle(np.exp(1j * (step - expected)))
+    phase = np.maximum.accumulate(np.concatenate([[0.0], np.cumsum(turns * np.sign(mean))]))
+    starts = phase + 2 * np.pi <= phase[-1]
+    if not starts.any():
+        return rough
+    return float(np.median(2 * np.pi / (np.interp(phase[starts] + 2 * np.pi, phase, t) - t[starts])))
+
+
+def _levelled(plane: ComplexArray) -> ComplexArray | None:
+    """Return a field (n,) about the centre of the ellipse through it, stretched to a circle; None without one."""
+    scale = float(plane.std())
+    if plane.size < 8 or scale == 0:
+        return None
+    mean = plane.mean()
+    x, y = (plane - mean).real / scale, (plane - mean).imag / scale
+    a, b, c, d, e = np.linalg.lstsq(np.column_stack([x * x, x * y, y * y, x, y]), np.ones_like(x), rcond=None)[0]
+    form = np.array([[a, b / 2], [b / 2, c]])
+    size, axes = np.linalg.eigh(form)
+    if not (size[0] > 0 and size[1] < LONGEST_ELLIPSE**2 * size[0]):
+        return None
+    centre = -np.linalg.solve(2 * form, np.array([d, e]))
+    round_ = (np.column_stack([x, y]) - centre) @ (axes * np.sqrt(size)) @ axes.T  # stretched without turning it
+    return np.asarray(round_[:, 0] + 1j * round_[:, 1])
 
 
 def _count(t: FloatArray, span: float) -> int:

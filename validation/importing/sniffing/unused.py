@@ -1,0 +1,128 @@
+"""Columns that no sensor of the proposed map reads. Takes the tables and what is read of them; gives notes.
+
+A typo in one column's name leaves two of a sensor's three, and so the whole sensor out: that is asked about aloud.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Collection, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from discsim.validation.importing.sniffing.groups import FEWEST_ROWS, Numbers
+from discsim.validation.importing.sniffing.names import penalty_of, read_name, sensor_of
+from discsim.validation.importing.sniffing.units import COUNTS, readings_of
+
+__all__ = ["missing_axes", "unused_columns"]
+
+#: A log of hundreds of columns, or a folder of as many files, fills no screen with them.
+MOST_NAMES, MOST_FILES = 60, 6
+#: What the reader puts behind a name that stands in the header for the second time.
+_AGAIN = re.compile(r"\.\d+$")
+#: A column that stands this far back (worked out from readings) is no sensor's.
+NO_READING = 9
+
+
+def unused_columns(tables: Sequence[Numbers], used: Collection[tuple[Path, str]]) -> list[str]:
+    """Return a line for each table with the columns of numbers that are not ``used`` (file and name)."""
+    notes = []
+    for numbers in tables:
+        names = [_shown(numbers.table.columns[k]) for k in _left(numbers, used)]
+        more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+        if names:
+            notes.append(f"not used{_of(numbers, tables)}: {', '.join(names[:MOST_NAMES])}{more}")
+    others = len(notes) - MOST_FILES
+    return notes[:MOST_FILES] + ([f"not used: columns of {others} more files"] if others > 0 else [])
+
+
+def missing_axes(tables: Sequence[Numbers], used: Collection[tuple[Path, str]], found: Collection[str]) -> list[str]:
+    """Return a line for each sensor not ``found`` of which two columns are there, and the third under no such name."""
+    notes = []
+    for numbers in tables:
+        left = _left(numbers, used)
+        by_base: dict[tuple[str, str], dict[int, int]] = defaultdict(dict)
+        for k in left:
+            name = read_name(numbers.names[k])
+            if name.axis is not None:
+                by_base[name.base, name.unit].setdefault(name.axis, k)
+        for (base, unit), axes in by_base.items():
+            sensor = _meant(base, unit)
+            if len(axes) == 2 and sensor is not None and sensor not in found:
+                whole = {k for mates in by_base.values() if len(mates) > 1 for k in mates.values()}
+                alone = [numbers.table.columns[k] for k in left if k not in whole]
+                notes.append(_asked(numbers, sensor, axes, alone) + _of(numbers, tables))
+    return notes[:MOST_FILES]
+
+
+def _of(numbers: Numbers, tables: Sequence[Numbers]) -> str:
+    return f" (in {_shown(numbers.path.name)})" if len(tables) > 1 else ""
+
+
+def _shown(name: str) -> str:
+    return "".join(c for c in name if c.isprintable())
+
+
+def _left(numbers: Numbers, used: Collection[tuple[Path, str]]) -> list[int]:
+    """Return the columns of numbers that are not used."""
+    enough = np.isfinite(numbers.values).sum(axis=0) >= FEWEST_ROWS
+    return [k for k, name in enumerate(numbers.table.columns) if enough[k] and (numbers.path, name) not in used]
+
+
+def _meant(base: str, unit: str) -> str | None:
+    """Return the sensor that two columns' shared name and unit speak of, or None."""
+    units = [reading.sensor for reading in readings_of(unit)]
+    sensor = sensor_of(base) or next((one for one in units if one != COUNTS), None)
+    other = bool(units) and not {sensor, COUNTS} & set(units)  # an angle, a speed
+    known = sensor in ("gyroscope", "accelerometer", "magnetometer")
+    return sensor if known and not other and penalty_of(base) < NO_READING else None
+
+
+def _asked(numbers: Numbers, sensor: str, axes: dict[int, int], alone: Sequence[str]) -> str:
+    """Return what is asked about the third column: whether it is the only one ``alone`` whose name is a slip away."""
+    columns = numbers.table.columns
+    (first, one), (second, two) = sorted(axes.items())
+    (third,) = {0, 1, 2} - set(axes)
+    name = _expected(columns[one], columns[two], third)
+    near = [
+        other
+        for other in alone
+        if name is not None
+        and _a_slip_away(_AGAIN.sub("", other).casefold(), name.casefold())
+        and sensor_of(read_name(other).base) in (None, sensor)
+    ]
+    found = f"of the {sensor} {'xyz'[first]} and {'xyz'[second]} were found and {'xyz'[third]} was not"
+    if len(near) == 1:
+        return f"{found}: is it '{_shown(near[0])}'? Rename it, or state it in a map"
+    those = f"'{_shown(columns[one])}' and '{_shown(columns[two])}'"
+    return f"{found}: name its column as {those} are named, or state it in a map"
+
+
+def _expected(one: str, two: str, axis: int) -> str | None:
+    """Return the name that a third axis would have beside two that differ in one letter, or None.
+
+    >>> _expected("GyrX [dps]", "GyrY [dps]", 2), _expected("gyro[0]", "gyro[2]", 1), _expected("rateX", "gyroY", 2)
+    ('GyrZ [dps]', 'gyro[1]', None)
+    """
+    places = [k for k, (a, b) in enumerate(zip(one, two, strict=False)) if a != b]
+    if len(one) != len(two) or len(places) != 1 or one[places[0]] not in "xyzXYZ012":
+        return None
+    letter = one[places[0]]
+    third = str(axis) if letter.isdigit() else "xyz"[axis].upper() if letter.isupper() else "xyz"[axis]
+    return one[: places[0]] + third + one[places[0] + 1 :]
+
+
+def _a_slip_away(one: str, two: str) -> bool:
+    """Tell names that are equal, or where a sign is wrong, too many or missing, or two neighbours are swapped.
+
+    >>> [_a_slip_away(name, "gyrz") for name in ("gryz", "gyyrz", "gyz", "gyrx", "rgzy", "az")]
+    [True, True, True, True, False, False]
+    """
+    if len(one) == len(two):
+        off = [k for k, (a, b) in enumerate(zip(one, two, strict=True)) if a != b]
+        swapped = len(off) == 2 and off[1] == off[0] + 1 and one[off[0]] == two[off[1]] and one[off[1]] == two[off[0]]
+        return len(off) <= 1 or swapped
+    shorter, longer = sorted((one, two), key=len)
+    return len(longer) == len(shorter) + 1 and any(longer[:k] + longer[k + 1 :] == shorter for k in range(len(longer)))
