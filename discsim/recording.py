@@ -210,6 +210,7 @@ def read_recording(folder: Path | str) -> Recording:
     """Read a recording folder; raises `InputError` naming file, line and what was expected."""
     folder = Path(folder)
     try:
+        _refuse_file(folder)
         return _read_folder(folder)
     except OSError as error:  # a folder that may not be looked into, a name that is too long
         raise InputError.at(folder, None, f"cannot be read ({error.strerror}); expected a recording") from None
@@ -269,6 +270,7 @@ def read_dataset(folder: Path | str) -> list[Recording]:
     """Read a data set: its sub-folders with a ``recording.toml``, in name order (or one recording's own folder)."""
     folder = Path(folder)
     try:
+        _refuse_file(folder)
         if (folder / "recording.toml").exists():
             return [read_recording(folder)]
         if not folder.is_dir():
@@ -284,6 +286,16 @@ def read_dataset(folder: Path | str) -> list[Recording]:
     if not members:
         raise InputError.at(folder, None, "no recording in it; expected sub-folders with a recording.toml")
     return [read_recording(member) for member in members]
+
+
+def _refuse_file(path: Path) -> None:
+    """Raise `InputError` for a path that is a file, with the command that makes a recording of a log."""
+    if not path.is_file():
+        return
+    folder = "this is a file; expected the folder of a recording"
+    if path.name == "recording.toml":
+        raise InputError.at(path, None, f"{folder}: {path.parent}")
+    raise InputError.at(path, None, f"{folder}: bring it in first, discsim import {path} --out DIR")
 
 
 def _there(file: Path) -> bool:

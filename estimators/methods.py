@@ -19,7 +19,7 @@ from discsim.estimators.likelihood import likelihood
 from discsim.estimators.rate import YawRate
 from discsim.estimators.tracking import tracking
 from discsim.estimators.usable import FASTEST, Usable, unclipped, usable
-from discsim.recording import Recording
+from discsim.recording import Recording, Samples
 from discsim.threads import one_thread
 
 __all__ = [
@@ -319,12 +319,29 @@ def clock_notes(recording: Recording) -> list[str]:
     scatter = float(sd_by_median(shares - share))
     if not (share > 0 and abs(share - 1) > OFF_CLOCK and scatter < OFF_CLOCK / 3):
         return []
-    interval = 1000 * recording.need("magnetometer").interval
     return [
-        f"the gyroscope turns {share:.3f} times as fast as the field, always (within {scatter:.3f}): rows of "
-        f"{interval / share:.4g} ms, where the time stamps say {interval:.4g} ms, would explain it (then the gyroscope "
-        "is right), and so would a scale of the gyroscope (then the magnetometer is)"
+        f"the gyroscope turns {share:.3f} times as fast as the field, always (within {scatter:.3f}): "
+        f"{_spacing(recording, share)}, would explain it (then the gyroscope is right), and so would a scale of the "
+        "gyroscope (then the magnetometer is)"
     ]
+
+
+def _spacing(recording: Recording, share: float) -> str:
+    """Say what spacing of the rows makes the field turn ``share`` times as fast.
+
+    Rows are the log's, which are those of its fastest sensor: a slower one's reading stands on several of them.
+    """
+    row = 1000 * min(samples.interval for samples in recording.samples.values() if len(samples) > 1)
+    own = 1000 * recording.need("magnetometer").interval
+    said = "the time stamps say" if not _spacing_sigma(recording) else "they were taken as"
+    held = f" (a reading of the magnetometer every {own / row:.3g} rows)" if own > 1.5 * row else ""
+    return f"rows of {row / share:.4g} ms, where {said} {row:.4g} ms{held}"
+
+
+def _spacing_sigma(recording: Recording) -> float:
+    """Return what share of itself the spacing of the rows is stated to be off by, one sigma; 0 where none is."""
+    field = recording.sheets.get("magnetometer")
+    return 0.0 if field is None else float(np.max(field.sigma.get("rate_hz", 0.0))) / field.rate_hz
 
 
 def axis_notes(recording: Recording) -> list[str]:
@@ -380,7 +397,7 @@ def missing_sensors(recording: Recording, name: str) -> tuple[str, ...]:
 
 
 def sampling_notes(recording: Recording) -> list[str]:
-    """Say where a sensor's time stamps contradict the sampling rate that its sheet states, and where rows are missing.
+    """Say where a sensor's time stamps contradict the sampling rate that is stated, and where rows are missing.
 
     The stamps are used; `fft`, which needs an even grid, is silent where the magnetometer's is not.
     """
@@ -396,9 +413,12 @@ def sampling_notes(recording: Recording) -> list[str]:
         stated = recording.sheets[sensor].rate_hz
         if len(samples) < 2:
             continue
-        found = 1 / samples.interval
+        found = 1 / _mean_step(samples)
         if abs(found / stated - 1) > RATE_TOLERANCE:
-            notes.append(f"{sensor}: time stamps say {found:.4g} Hz, its sheet {stated:.4g} Hz; the stamps are used")
+            notes.append(
+                f"{sensor}: time stamps say {found:.4g} Hz, rate_hz of recording.toml {stated:.4g} Hz; the stamps are "
+                "used"
+            )
         gaps = int(np.count_nonzero(np.diff(samples.t) > 1.5 * samples.interval))
         if gaps:
             silent = "; fft is silent across them" if sensor == "magnetometer" else ""
@@ -406,6 +426,12 @@ def sampling_notes(recording: Recording) -> list[str]:
                 f"{sensor}: {gaps} steps longer than one and a half of the usual {samples.interval:.4g} s{silent}"
             )
     return notes
+
+
+def _mean_step(samples: Samples) -> float:
+    """Return the mean step of the stamps, s, where no row is missing: of whole milliseconds the median is off."""
+    steps = np.diff(samples.t)
+    return float(np.mean(steps[np.abs(steps - samples.interval) <= samples.interval / 2]))
 
 
 def folding_notes(recording: Recording) -> list[str]:

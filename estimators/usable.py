@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from discsim.arrays import FloatArray
 from discsim.clipping import clipping_notes, constant_axes, dead_axes
 from discsim.errors import InputError
+from discsim.glitches import FASTEST_SPIN, glitches
 from discsim.recording import Recording, Samples
 
 __all__ = ["FASTEST", "Usable", "remembered", "unclipped", "usable"]
@@ -70,9 +71,9 @@ def usable(recording: Recording) -> Usable:
 
     Rows without any reading, which a faster log has between a slower sensor's, are no rows of that sensor. Left out are
     sensors that are dead (every reading of every axis is the same, or missing), or whose readings are too few or too
-    far apart for a spin; axes of a gyroscope that never change while others do; readings beyond `LARGEST`; and of
-    readings of one instant all but the first. Clipped readings stay, for each method to judge: that there was much is
-    all that they say. Raises `InputError` where nothing is left.
+    far apart for a spin; axes of a gyroscope that never change while others do; readings beyond `LARGEST`; single rates
+    that no throw has (`discsim.glitches`); and of readings of one instant all but the first. Clipped readings stay, for
+    each method to judge: that there was much is all that they say. Raises `InputError` where nothing is left.
     """
     kept: dict[str, Samples] = {}
     gone: dict[str, str] = {}
@@ -114,6 +115,13 @@ def _sound(sensor: str, samples: Samples) -> tuple[Samples, list[str]]:
     if np.any(wild):
         value = np.where(wild, np.nan, value)
         notes.append(f"{sensor}: {np.count_nonzero(wild)} readings beyond {LARGEST[sensor]:.0e}, which no sensor gives")
+    if np.any(alone := glitches(sensor, value)):
+        value = np.where(alone, np.nan, value)
+        first_at = t[np.flatnonzero(np.any(alone.reshape(t.size, -1), axis=1))[0]]
+        notes.append(
+            f"{sensor}: single readings beyond {FASTEST_SPIN:g} rad/s, apart from those before and after, are left "
+            f"out as glitches of the log: {np.count_nonzero(alone)}, the first at {first_at:.3f} s"
+        )
     there = np.any(np.isfinite(value.reshape(t.size, -1)), axis=1)
     if not np.all(there):
         t, value = t[there], value[there]

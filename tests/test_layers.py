@@ -23,6 +23,7 @@ MAY_IMPORT = {
         "discsim.compiled",
         "discsim.disc",
         "discsim.errors",
+        "discsim.glitches",
         "discsim.recording",
         "discsim.result",
         "discsim.threads",

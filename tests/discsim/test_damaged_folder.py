@@ -29,7 +29,14 @@ def test_a_folder_that_is_not_there_is_refused(tmp_path):
 
 
 def test_a_file_instead_of_a_folder_is_refused(flight):
-    assert "expected a recording" in refusal(flight / "recording.toml")
+    assert refusal(flight / "recording.toml") == f": this is a file; expected the folder of a recording: {flight}"
+
+
+def test_a_log_instead_of_a_folder_is_refused_with_the_command_that_brings_it_in(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("t,gx,gy,gz\n")
+    asked = f": this is a file; expected the folder of a recording: bring it in first, discsim import {log} --out DIR"
+    assert refusal(log) == asked
 
 
 def test_a_folder_without_recording_toml_is_refused(flight):

@@ -165,3 +165,16 @@ def test_rows_that_a_faster_log_leaves_empty_are_no_rows(sound):
     assert known.mean() > 0.9
     # without a gyroscope the field's precession stays: up to 15 deg/s, and leakage at five turns a window
     assert np.degrees(np.median(np.abs(found.rate[known] - truth.r(found.t[known])))) < 20.0
+
+
+def test_single_rates_that_no_throw_has_are_left_out_aloud(sound):
+    made, _ = sound
+    gyro = made.need("gyroscope")
+    value = gyro.value.copy()
+    value[40::97, 2] *= 100
+    slipped = replace(made, samples={**made.samples, "gyroscope": Samples(gyro.t, value)})
+    found = estimate(slipped, "gyroscope")
+    assert np.nanmax(np.abs(found.rate)) < 250
+    assert np.count_nonzero(np.isfinite(found.rate)) == len(gyro) - value[40::97].shape[0]
+    assert any("single readings beyond 250 rad/s" in note for note in usable(slipped).notes)
+    assert best_of(slipped)[0].method == best_of(made)[0].method

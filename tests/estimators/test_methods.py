@@ -10,7 +10,7 @@ import pytest
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.estimators import METHODS, best, estimate
-from discsim.estimators.methods import all_methods, folding_notes, sampling_notes
+from discsim.estimators.methods import all_methods, clock_notes, folding_notes, sampling_notes
 from discsim.recording import Recording, Samples, SensorSheet
 
 SHEETS = {
@@ -91,7 +91,9 @@ def test_time_stamps_that_contradict_the_sheet_are_noted():
     assert sampling_notes(recording) == []
     slow = Samples(recording.need("gyroscope").t * 1.04, recording.need("gyroscope").value)
     off = Recording("rate_table", "x", Environment(), sheets=recording.sheets, samples={"gyroscope": slow})
-    assert sampling_notes(off) == ["gyroscope: time stamps say 192.3 Hz, its sheet 200 Hz; the stamps are used"]
+    assert sampling_notes(off) == [
+        "gyroscope: time stamps say 192.3 Hz, rate_hz of recording.toml 200 Hz; the stamps are used"
+    ]
 
 
 @pytest.mark.parametrize("sensor", ["rate_reference", "gyroscope", "accelerometer"])
@@ -181,3 +183,33 @@ def test_a_sampling_rate_that_is_not_known_well_is_noted():
     (line,) = sampling_notes(replace(whole, sheets={"magnetometer": sheet}))
     assert line.startswith("the spacing of the rows is known to 4 % only: rates from the field scale with it")
     assert sampling_notes(whole) == []
+
+
+def test_stamps_of_whole_milliseconds_do_not_contradict_the_rate_that_is_their_mean():
+    """Rows of 12.4 ms are stamped 12, 12, 13: their median says 83.3 Hz, their mean the true 80.6 Hz."""
+    t = np.round(0.0124 * np.arange(300), 3)
+    lost = np.delete(t, slice(100, 140))
+    sheets = {"gyroscope": SensorSheet(1 / 0.0124)}
+    for stamps, gaps in ((t, 0), (lost, 1)):
+        samples = {"gyroscope": Samples(stamps, np.zeros((stamps.size, 3)))}
+        made = Recording("free_spin", "x", Environment(), sheets=sheets, samples=samples)
+        notes = sampling_notes(made)
+        assert len(notes) == gaps, notes
+        assert not any("rate_hz" in note for note in notes)
+
+
+def as_if_rows_were(whole, factor, sigma):
+    """Return a recording whose stamps are off by a factor, with a magnetometer that is stated to be so unsure."""
+    samples = {name: Samples(factor * one.t, one.value) for name, one in whole.samples.items()}
+    sheets = {name: replace(sheet, rate_hz=sheet.rate_hz / factor) for name, sheet in whole.sheets.items()}
+    rate = sheets["magnetometer"].rate_hz
+    sheets["magnetometer"] = replace(sheets["magnetometer"], sigma={"rate_hz": sigma * rate} if sigma else {})
+    return replace(whole, samples=samples, sheets=sheets)
+
+
+def test_the_spacing_that_explains_a_gyroscope_is_that_of_the_logs_rows_not_of_a_slower_magnetometer():
+    """Rows of 5 ms that are taken as 10: the magnetometer, of every second row, seems to have 20."""
+    whole = spinning(1800.0, ("magnetometer", "gyroscope"))
+    assert clock_notes(whole) == []
+    (note,) = clock_notes(as_if_rows_were(whole, 2.0, 0.7))
+    assert "rows of 5 ms, where they were taken as 10 ms (a reading of the magnetometer every 2 rows)" in note

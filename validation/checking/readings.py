@@ -10,9 +10,10 @@ from discsim.arrays import BoolArray, FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import Scale
 from discsim.effects.setup import AccelerometerUnit, GpsAxes, GyroscopeUnit, MagnetometerUnit
-from discsim.recording import Recording
+from discsim.glitches import FASTEST_SPIN, beyond_spin, glitches
+from discsim.recording import SENSORS, Recording, Samples
 from discsim.validation.checking.finding import Finding
-from discsim.validation.checking.statements import FASTEST_SPIN, FIELD
+from discsim.validation.checking.statements import FIELD
 
 __all__ = ["at_rest", "reading_findings"]
 
@@ -162,10 +163,10 @@ def _rate(recording: Recording) -> Iterator[Finding]:
         samples = recording.get(sensor)
         if samples is None:
             continue
-        size = (
-            np.abs(samples.value) if samples.value.ndim == 1 else np.linalg.norm(np.nan_to_num(samples.value), axis=1)
-        )
-        fastest = float(np.nanquantile(size, 0.99)) if np.any(np.isfinite(size)) else 0.0
+        alone = glitches(sensor, samples.value)
+        table = np.where(alone, np.nan, samples.value).reshape(len(samples), -1)
+        size = np.linalg.norm(np.nan_to_num(table), axis=1)
+        fastest = float(np.quantile(size, 0.99)) if np.any(np.isfinite(table)) else 0.0
         if fastest > FASTEST_SPIN:
             yield Finding(
                 f"{sensor}.units" if sensor != "gyroscope" else catalogued(GyroscopeUnit).id,
@@ -175,6 +176,31 @@ def _rate(recording: Recording) -> Iterator[Finding]:
                 f"up to {FASTEST_SPIN:g} rad/s, the fastest throws spin at 200",
                 "it is written in deg/s" if fastest < 100 * FASTEST_SPIN else "its unit is wrong",
             )
+        else:
+            yield from _wild_rates(sensor, samples, alone)
+
+
+def _wild_rates(sensor: str, samples: Samples, alone: BoolArray) -> Iterator[Finding]:
+    """Yield, of each axis, the few readings that are beyond what a throw has; ``alone``: which stand alone."""
+    beyond = beyond_spin(sensor, samples.value).reshape(len(samples), -1)
+    for axis, column in enumerate(SENSORS[sensor].columns):
+        rows = np.flatnonzero(beyond[:, axis])
+        if rows.size == 0:
+            continue
+        single = bool(np.all(alone.reshape(beyond.shape)[rows, axis]))
+        name = f" of {column[0]}" if beyond.shape[1] > 1 else ""
+        count = f"{rows.size} readings{name} are" if rows.size > 1 else f"1 reading{name} is"
+        yield Finding(
+            f"{sensor}.glitch",
+            "warning" if single else "error",
+            sensor,
+            f"{count} beyond {FASTEST_SPIN:g} rad/s, the first at {samples.t[rows[0]]:.3f} s, the largest "
+            f"{np.max(np.abs(samples.value.reshape(beyond.shape)[rows, axis])):.4g}",
+            "none: the fastest throws spin at 200",
+            "glitches of the log: `estimate` leaves out such as stand alone; make them gaps"
+            if single
+            else "they are no glitches of single rows, and `estimate` uses them; make them gaps",
+        )
 
 
 def _path(recording: Recording) -> Iterator[Finding]:

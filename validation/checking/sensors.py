@@ -10,6 +10,7 @@ import numpy as np
 from discsim.arrays import BoolArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.setup import ClockUnit
+from discsim.glitches import glitches
 from discsim.recording import SENSORS, Recording
 from discsim.validation.checking.finding import Finding
 from discsim.validation.checking.noise import noise_of
@@ -82,8 +83,9 @@ class SensorCheck:
 
 
 def clipped(recording: Recording, sensor: str) -> BoolArray:
-    """Tell which readings stand at the end of the sensor's range."""
-    return recording.sheets[sensor].clipped(recording.samples[sensor].value)
+    """Tell which readings stand at the end of the sensor's range, glitches of the log aside."""
+    value = recording.samples[sensor].value
+    return recording.sheets[sensor].clipped(np.where(glitches(sensor, value), np.nan, value))
 
 
 def check_sensor(recording: Recording, sensor: str) -> SensorCheck:
@@ -112,7 +114,9 @@ def check_sensor(recording: Recording, sensor: str) -> SensorCheck:
         *_clipped_shares(recording, sensor),
         float(np.median(found_steps)) if found_steps else None,
         sheet.resolution,
-        noise_of(samples.value) if one_unit and sensor != "track" else None,
+        noise_of(np.where(glitches(sensor, samples.value), np.nan, samples.value))
+        if one_unit and sensor != "track"
+        else None,
         sheet.noise_rms if one_unit else None,
         tuple((float(samples.t[k]), float(steps[k])) for k in long),
         _frozen(recording, sensor, 1.0 if held is None else held.rows_per_reading),

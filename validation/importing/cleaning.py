@@ -12,10 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray, IntArray
+from discsim.glitches import FASTEST_SPIN, glitches
 from discsim.validation.importing.held import find_held, find_interpolated, fresh_rows, step_of
 from discsim.validation.importing.timing import row_timing
 
-__all__ = ["Cleaned", "Readings", "body_moves", "cleaned", "frozen_runs"]
+__all__ = ["Cleaned", "Readings", "body_moves", "cleaned", "frozen_runs", "without_glitches"]
 
 #: a sensor that shows one value on this many rows, while the body moves, is dead
 CONSTANT = 50
@@ -51,6 +52,21 @@ class Cleaned:
     readings: Readings | None
     rate_hz: float | None
     notes: tuple[str, ...]
+
+
+def without_glitches(sensor: str, found: Readings) -> tuple[Readings, IntArray, list[str]]:
+    """Return readings with gaps for single ones that no throw has, the numbers of their rows, and what to say."""
+    alone = glitches(sensor, found.value)
+    if not np.any(alone):
+        return found, found.number[:0], []
+    number = found.number[np.any(alone, axis=1)]
+    axes = " and ".join("xyz"[axis] for axis in np.flatnonzero(np.any(alone, axis=0))) if alone.shape[1] > 1 else ""
+    note = (
+        f"{f'{sensor} {axes}'.rstrip()}: single readings beyond {FASTEST_SPIN:g} rad/s, apart from those before and "
+        f"after, in {number.size} rows of the log, the first row {number[0]}: glitches of the log (a lost decimal "
+        "point?); they become gaps"
+    )
+    return Readings(found.number, found.time, np.where(alone, np.nan, found.value)), number, [note]
 
 
 def cleaned(sensor: str, found: Readings, others: Mapping[str, Readings], stamped: bool) -> Cleaned:

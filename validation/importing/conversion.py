@@ -17,10 +17,11 @@ from discsim.arrays import BoolArray, FloatArray, IntArray
 from discsim.clipping import clipping_notes
 from discsim.disc import Release
 from discsim.errors import InputError
+from discsim.glitches import FASTEST_SPIN
 from discsim.limits import LARGEST_READING, time_fault
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from discsim.validation.importing.cell_texts import CellTexts, number
-from discsim.validation.importing.cleaning import Readings, cleaned
+from discsim.validation.importing.cleaning import Readings, cleaned, without_glitches
 from discsim.validation.importing.import_map import ImportMap, SensorMap, TimeBase
 from discsim.validation.importing.raw_table import RawTable, Repair, RepairList, read_raw
 from discsim.validation.importing.row_clock import RowClock, row_clock
@@ -210,7 +211,12 @@ def _read_sensors(
                 else "is this the right map?"
             )
             notes.append(f"WARNING: {lost} of the {sensor}'s {chosen} rows were left out; {why}")
-        readings[sensor] = found
+        readings[sensor], glitching, said = without_glitches(sensor, found)
+        notes += said
+        for row in glitching:
+            line = int(table.line[np.searchsorted(table.number, row)])
+            what = f"{sensor}: a single reading beyond {FASTEST_SPIN:g} rad/s"
+            repairs.add(None, table.path, line, what, f"glitch of {sensor} made a gap")
     if not readings:
         wanted = "; or ".join(_quoted(sensor_map.columns[0]) for sensor_map in import_map.sensors.values())
         raise InputError.at(

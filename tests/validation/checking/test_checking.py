@@ -128,6 +128,30 @@ def test_a_unit_that_is_not_the_files_is_an_error_that_names_it(sensor, factor, 
     assert words in sentence(check, id)
 
 
+def with_rates(rows: slice, rate: float) -> Recording:
+    recording = rolled()
+    gyro = recording.samples["gyroscope"]
+    value = gyro.value.copy()
+    value[rows, 2] *= rate / np.radians(1500.0)
+    return replace(recording, samples={**recording.samples, "gyroscope": Samples(gyro.t, value)})
+
+
+def test_single_rates_that_no_throw_has_are_named_with_their_time_and_are_no_noise():
+    """A lost decimal point: 26.18 rad/s written as 2618."""
+    check = check_recording(with_rates(slice(500, 1200, 90), 2618.0))
+    assert ids(check) == ["gyroscope.glitch"]
+    said = sentence(check, "gyroscope.glitch")
+    assert "8 readings of z are beyond 250 rad/s, the first at 2.500 s, the largest 2619" in said
+    (gyroscope,) = (sensor for sensor in check.sensors if sensor.sensor == "gyroscope")
+    assert gyroscope.noise == pytest.approx(0.003, rel=0.2)
+
+
+def test_rates_that_no_throw_has_over_two_rows_are_an_error_for_estimate_uses_them():
+    check = check_recording(with_rates(slice(600, 602), 2618.0))
+    assert ids(check, "error") == ["gyroscope.glitch"]
+    assert "`estimate` uses them" in sentence(check, "gyroscope.glitch")
+
+
 def test_z_up_is_said_with_the_line_to_write():
     check = check_recording(replace(scaled(rolled(), "accelerometer", [1.0, -1.0, -1.0])))
     assert ids(check) == ["accel.upside_down"]

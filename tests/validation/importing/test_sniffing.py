@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import sys
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -158,6 +159,23 @@ def test_the_throw_is_cut_inside_release_and_impact(tmp_path):
     assert throw.first == round(200 * throw.start)
     assert throw.stop == round(200 * throw.end) + 1
     assert throw.spin == pytest.approx(SPIN * np.exp(-0.15 * 1.5), rel=0.01)
+
+
+def test_the_throw_is_found_in_spite_of_lost_decimal_points_which_are_said_and_become_gaps(tmp_path):
+    log = made_log()
+    gyro = log.gyro.copy()
+    gyro[50::97, 2] *= 100
+    raw = plain_names(tmp_path, replace(log, gyro=gyro))
+    proposed(raw, tmp_path)
+    read = read_readings(raw, read_map(tmp_path / "map.toml"))
+    (throw,) = stretches(read)
+    assert RELEASE <= throw.start <= RELEASE + 0.1
+    assert throw.end - throw.start == pytest.approx(LANDING - RELEASE, abs=0.2)
+    slipped = np.count_nonzero(np.isnan(read.readings["gyroscope"].value[:, 2]))
+    assert slipped > 3
+    assert np.nanmax(np.abs(read.readings["gyroscope"].value)) < 250
+    assert any(note.startswith("gyroscope z: single readings beyond 250 rad/s") for note in read.notes)
+    assert sum("glitch" in repair.action for repair in read.repairs) == slipped
 
 
 def test_a_magnetometer_alone_finds_the_throw_too(tmp_path):

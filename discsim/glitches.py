@@ -1,0 +1,47 @@
+"""Readings of a rate that no thrown body has and that stand alone: slips of a log, such as a lost decimal point."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from discsim.arrays import BoolArray, FloatArray
+
+__all__ = ["FASTEST_SPIN", "beyond_spin", "glitches"]
+
+#: Fastest spin of a throw, rad/s: the fastest have 200, and no gyroscope of a logger reads beyond 80 (4500 deg/s).
+FASTEST_SPIN = 250.0
+
+#: A glitch differs from each neighbour by more than this share of itself; a motion has neighbours like itself.
+APART = 0.5
+
+#: Where more of the rows are beyond `FASTEST_SPIN`, the unit is wrong, or the body is no throw: no glitches.
+MOST = 0.05
+
+RATES = ("gyroscope", "rate_reference")
+
+
+def beyond_spin(sensor: str, value: FloatArray) -> BoolArray:
+    """Tell which readings, (n,) or (n, k) rad/s, are beyond `FASTEST_SPIN`; none of a sensor that shows no rate."""
+    if sensor not in RATES:
+        return np.zeros(value.shape, dtype=np.bool_)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.abs(value) > FASTEST_SPIN)
+
+
+def glitches(sensor: str, value: FloatArray) -> BoolArray:
+    """Tell which readings, (n,) or (n, k) rad/s, are beyond `FASTEST_SPIN` and apart from both neighbours.
+
+    Neighbours are the readings of the same axis before and after, across gaps; they are within `FASTEST_SPIN`.
+    """
+    beyond = beyond_spin(sensor, value)
+    rows = beyond.reshape(len(value), -1)
+    if not np.any(rows) or np.mean(np.any(rows, axis=1)) > MOST:
+        return np.zeros(value.shape, dtype=np.bool_)
+    found = np.zeros(rows.shape, dtype=np.bool_)
+    for axis, column in enumerate(value.reshape(len(value), -1).T):
+        there = np.flatnonzero(np.isfinite(column))
+        seen = column[there]
+        apart = np.abs(np.diff(seen)) > APART * np.maximum(np.abs(seen[1:]), np.abs(seen[:-1]))
+        apart &= rows[there[1:], axis] != rows[there[:-1], axis]
+        found[there, axis] = rows[there, axis] & np.append(True, apart) & np.append(apart, True)
+    return found.reshape(value.shape)
