@@ -48,7 +48,7 @@ class SensorCheck:
     even : bool
         Stamps are even to the last digit: of a rule and not of a clock, so that they show no lateness.
     clipped_share : float
-        Share of readings at the end of the range.
+        Share of rows with a reading at the end of the range.
     clipped_axes : mapping
         The same of each column that has any.
     resolution, stated_resolution, noise, stated_noise : float or None
@@ -125,13 +125,13 @@ def check_sensor(recording: Recording, sensor: str) -> SensorCheck:
 
 
 def _clipped_shares(recording: Recording, sensor: str) -> tuple[float, dict[str, float]]:
-    """Return the share of readings that clip, and that of each column where it is not zero."""
+    """Return the share of rows in which a reading clips, and that of each column where it is not zero."""
     samples = recording.samples[sensor]
     numbers = np.isfinite(samples.value).reshape(len(samples), -1)
     at_end = clipped(recording, sensor).reshape(len(samples), -1) & numbers
     shares = np.sum(at_end, axis=0) / np.maximum(np.sum(numbers, axis=0), 1)
     axes = {name: float(share) for name, share in zip(SENSORS[sensor].columns, shares, strict=True) if share > 0}
-    return float(np.sum(at_end)) / max(int(np.sum(numbers)), 1), axes
+    return float(np.sum(np.any(at_end, axis=1))) / max(int(np.sum(np.any(numbers, axis=1))), 1), axes
 
 
 def _frozen(recording: Recording, sensor: str, standing: float) -> tuple[tuple[float, float], ...]:

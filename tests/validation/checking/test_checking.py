@@ -273,6 +273,7 @@ def test_a_frozen_magnetometer_and_a_dead_axis_are_said_and_a_clipped_one_is_not
     check = check_recording(replace(recording, samples=recording.samples | {"gyroscope": Samples(gyro.t, full)}))
     assert check.sensors[2].dead_axes == ()
     assert check.sensors[2].clipped_axes == {"z_rad_s": 1.0}
+    assert check.sensors[2].clipped_share == 1.0  # of rows, though two of three axes are within the range
     assert "z_rad_s in 100 % of its rows" in sentence(check, "gyroscope.clipped")
 
 
