@@ -56,6 +56,8 @@ ALTERNATING = -0.4
 NOISIEST = 0.02
 #: What rounding alone leaves in fourth differences, in steps: 1/sqrt(12), and what 32 readings scatter by.
 ROUNDING = 0.33
+#: Loudest noise, in steps, that toggling between two numbers looks like: to and fro with every reading gives 0.96.
+LOUDEST_TOGGLING = 1.0
 #: Readings over which the noise is looked at, and the share of such windows that are quieter than what counts: the
 #: quietest of all would be so by chance.
 WINDOW, QUIETEST = 32, 0.05
@@ -239,14 +241,14 @@ class _Noise:
         self.rows, self.step = rows, step
         moving = np.flatnonzero(~constant_axes(rows))
         each = [rows] if rows is value else [value, rows]
-        self.each = {i: min(_quietest(one[:, i]) for one in each) for i in moving.tolist()}
+        self.each = {i: min(_quietest(one[:, i], step) for one in each) for i in moving.tolist()}
 
     def steps(self, axis: int, without: BoolArray) -> float:
         """Return it in steps for the readings of an axis that are not ``without`` (n,), or else of the other axes.
 
         NaN where there are too few readings, or they show motion alone.
         """
-        own = _quietest(np.where(without, np.nan, self.rows[:, axis]))
+        own = _quietest(np.where(without, np.nan, self.rows[:, axis]), self.step)
         others = [noise for other, noise in self.each.items() if other != axis]
         found = [noise for noise in (own, *others) if np.isfinite(noise)]
         if not found:
@@ -254,8 +256,11 @@ class _Noise:
         return float(np.sqrt(max((min(found) / self.step) ** 2 - ROUNDING**2, 0.0)))
 
 
-def _quietest(column: FloatArray) -> float:
+def _quietest(column: FloatArray, step: float = np.inf) -> float:
     """Return the noise of the quietest windows of readings (n,), NaN where no window shows any.
+
+    Windows that stand still say nothing of a sensor whose others are louder than toggling between two numbers, a
+    ``step`` apart, can be: a log may write zeros, or hold one reading, while the body is at rest.
 
     From fourth differences, which have sqrt(70) times white noise and next to nothing of smooth motion. Those of white
     noise alternate, neighbours correlating by -0.8; where they do not, they are motion and say nothing.
@@ -273,20 +278,25 @@ def _quietest(column: FloatArray) -> float:
         _white_windows(rough[start : start + PIECE + width], width, scale, total)
         for start in range(0, rough.size - width + 1, PIECE)
     ]
-    squares = np.concatenate(white)
-    return scale * float(np.sqrt(np.quantile(squares, QUIETEST) / width / 70.0)) if squares.size else float("nan")
+    squares, changing = np.concatenate(white, axis=1)
+
+    def noise(windows: FloatArray) -> float:
+        return scale * float(np.sqrt(np.quantile(windows, QUIETEST) / width / 70.0)) if windows.size else float("nan")
+
+    loud = noise(squares[changing > width / 2])
+    return loud if loud > LOUDEST_TOGGLING * step else noise(squares)
 
 
 def _white_windows(rough: FloatArray, width: int, scale: float, total: float) -> FloatArray:
-    """Return the sums of squares, over ``scale`` squared, of the first windows of ``rough`` (n,) that hold white noise.
+    """Return of the first windows of ``rough`` (n,) that hold white noise the sums of squares, over ``scale`` squared.
 
-    ``total`` is the sum over all of a sensor's readings: what running sums leave of a window of zeros is below it.
+    The second row of (2, m) counts how many of a window's differences are not zero. ``total`` is the sum over all of a sensor's readings: what running sums leave of a window of zeros is below it.
     """
-    products = np.stack([(rough / scale) ** 2, np.append(rough[1:] * (rough[:-1] / scale / scale), 0.0)])
-    sums = np.cumsum(np.concatenate([np.zeros((2, 1)), products], axis=1), axis=1)
-    squares, neighbours = (sums[:, width:] - sums[:, :-width])[:, :PIECE]
+    products = np.stack([(rough / scale) ** 2, np.append(rough[1:] * (rough[:-1] / scale / scale), 0.0), rough != 0])
+    sums = np.cumsum(np.concatenate([np.zeros((3, 1)), products], axis=1), axis=1)
+    squares, neighbours, changing = (sums[:, width:] - sums[:, :-width])[:, :PIECE]
     squares = np.where(squares < 1e-13 * max(total, 1e-300), 0.0, squares)
-    return np.asarray(squares[neighbours <= ALTERNATING * squares])
+    return np.asarray(np.stack([squares, changing])[:, neighbours <= ALTERNATING * squares])
 
 
 def _is_limit(column: FloatArray, axis: int, top: float, step: float, quiet: _Noise) -> bool:

@@ -1,4 +1,4 @@
-"""Readings of a rate that no thrown body has and that stand alone: slips of a log, such as a lost decimal point."""
+"""Readings of a rate that no thrown body has, alone or a few on end: slips of a log, such as a lost decimal point."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ FASTEST_SPIN = 250.0
 
 #: A glitch differs from each neighbour by more than this share of itself; a motion has neighbours like itself.
 APART = 0.5
+
+#: Most readings on end that are glitches: a slip lasts a row or two, a motor that starts stays where it leapt to.
+ON_END = 3
 
 #: Where more of the rows are beyond `FASTEST_SPIN`, the unit is wrong, or the body is no throw: no glitches.
 MOST = 0.05
@@ -29,7 +32,7 @@ def beyond_spin(sensor: str, value: FloatArray) -> BoolArray:
 
 
 def glitches(sensor: str, value: FloatArray) -> BoolArray:
-    """Tell which readings, (n,) or (n, k) rad/s, are beyond `FASTEST_SPIN` and apart from both neighbours.
+    """Tell which readings, (n,) or (n, k) rad/s, leap beyond `FASTEST_SPIN` and back, `ON_END` at most on end.
 
     Neighbours are the readings of the same axis before and after, across gaps; they are within `FASTEST_SPIN`.
     """
@@ -40,8 +43,10 @@ def glitches(sensor: str, value: FloatArray) -> BoolArray:
     found = np.zeros(rows.shape, dtype=np.bool_)
     for axis, column in enumerate(value.reshape(len(value), -1).T):
         there = np.flatnonzero(np.isfinite(column))
-        seen = column[there]
-        apart = np.abs(np.diff(seen)) > APART * np.maximum(np.abs(seen[1:]), np.abs(seen[:-1]))
-        apart &= rows[there[1:], axis] != rows[there[:-1], axis]
-        found[there, axis] = rows[there, axis] & np.append(True, apart) & np.append(apart, True)
+        seen, wild = column[there], rows[there, axis]
+        leaps = np.abs(np.diff(seen)) > APART * np.maximum(np.abs(seen[1:]), np.abs(seen[:-1]))
+        ends = np.flatnonzero(np.diff(np.concatenate([[False], wild, [False]]).astype(np.int8)))
+        for first, after in zip(ends[::2], ends[1::2], strict=True):
+            if after - first <= ON_END and np.all(leaps[max(first - 1, 0) : first]) and np.all(leaps[after - 1 : after]):
+                found[there[first:after], axis] = True
     return found.reshape(value.shape)

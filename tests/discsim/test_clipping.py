@@ -40,6 +40,20 @@ def test_a_gyroscope_at_its_limit_is_seen_whatever_is_stated(step, sign, stated)
     assert not found[:, :2].any()
 
 
+@pytest.mark.parametrize("step", [STEP, 0.0])
+@pytest.mark.parametrize("resting", [0.0, 0.25])
+def test_a_log_that_writes_one_number_at_rest_hides_no_limit(step, resting):
+    """Zeros, or a bias to the last digit, before and after a throw that clips: the throw shows the noise."""
+    rate = np.radians(3797.0) * np.exp(-np.arange(600) / 400)
+    throw = np.clip(wobbling(rate, np.random.default_rng(2), step=step), -LIMIT, LIMIT)
+    rest = np.full((500, 3), resting)
+    found = clipped(np.concatenate([rest, throw, rest]), None, None)
+    beyond = np.concatenate([np.zeros(500, bool), rate > LIMIT + 5 * NOISE, np.zeros(500, bool)])
+    assert found[beyond, 2].all()
+    assert not found[~beyond & (np.arange(1600) > 900)].any()
+    assert not found[:, :2].any()
+
+
 def test_a_gyroscope_that_clips_all_through_is_told_by_its_other_axes():
     seen = np.clip(wobbling(np.full(400, 66.0), np.random.default_rng(1)), -LIMIT, LIMIT)
     assert clipped(seen, None, None)[:, 2].all()

@@ -26,10 +26,17 @@ def test_single_readings_beyond_any_throw_are_told_also_at_the_ends_and_beside_a
     assert np.flatnonzero(glitches("rate_reference", value[:, 2])).tolist() == [0, 50, 120, 199]
 
 
-def test_what_lasts_or_rises_to_it_is_no_glitch():
-    """Two rows may be a motion; a rotor of 400 rad/s gets there by readings that are near their neighbours."""
+def test_a_slip_of_three_rows_is_told_whatever_its_rows_are_among_themselves():
     value = spin()
-    value[50:52, 2] = 2800.0
+    value[50:53, 2] = 2800.0, 2810.0, -3200.0
+    value[198:, 2] = 2800.0
+    assert np.argwhere(glitches("gyroscope", value)).tolist() == [[row, 2] for row in (50, 51, 52, 198, 199)]
+
+
+def test_what_lasts_or_rises_to_it_is_no_glitch():
+    """Four rows may be a motion; a rotor of 400 rad/s gets there by readings that are near their neighbours."""
+    value = spin()
+    value[50:54, 2] = 2800.0
     assert not np.any(glitches("gyroscope", value))
     value = spin()
     value[40:61, 2] += 12.0 * (10 - np.abs(np.arange(-10, 11))) + 120.0 * np.cos(np.linspace(-np.pi / 2, np.pi / 2, 21))
