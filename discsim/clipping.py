@@ -290,7 +290,8 @@ def _quietest(column: FloatArray, step: float = np.inf) -> float:
 def _white_windows(rough: FloatArray, width: int, scale: float, total: float) -> FloatArray:
     """Return of the first windows of ``rough`` (n,) that hold white noise the sums of squares, over ``scale`` squared.
 
-    The second row of (2, m) counts how many of a window's differences are not zero. ``total`` is the sum over all of a sensor's readings: what running sums leave of a window of zeros is below it.
+    The second row of (2, m) counts how many of a window's differences are not zero. ``total`` is the sum over all of a
+    sensor's readings: what running sums leave of a window of zeros is below it.
     """
     products = np.stack([(rough / scale) ** 2, np.append(rough[1:] * (rough[:-1] / scale / scale), 0.0), rough != 0])
     sums = np.cumsum(np.concatenate([np.zeros((3, 1)), products], axis=1), axis=1)

@@ -47,6 +47,7 @@ def glitches(sensor: str, value: FloatArray) -> BoolArray:
         leaps = np.abs(np.diff(seen)) > APART * np.maximum(np.abs(seen[1:]), np.abs(seen[:-1]))
         ends = np.flatnonzero(np.diff(np.concatenate([[False], wild, [False]]).astype(np.int8)))
         for first, after in zip(ends[::2], ends[1::2], strict=True):
-            if after - first <= ON_END and np.all(leaps[max(first - 1, 0) : first]) and np.all(leaps[after - 1 : after]):
+            there_and_back = np.all(leaps[max(first - 1, 0) : first]) and np.all(leaps[after - 1 : after])
+            if there_and_back and after - first <= ON_END:
                 found[there[first:after], axis] = True
     return found.reshape(value.shape)

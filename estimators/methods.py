@@ -62,6 +62,9 @@ FOLDED_SHARE = 0.01
 #: by more than this is beyond the scale of any gyroscope (3 % over parts and temperature).
 SPINNING, FEWEST_SHARES, OFF_CLOCK = 3.0, 8, 0.05
 
+#: Where the spacing of the rows is known roughly only, a ratio off by this many of its scatters is worth a note.
+OFF_SCATTERS = 2.0
+
 #: From this share of the rate about z on, rates across it are no wobble (a disc's is a tenth at most).
 ACROSS = 0.5
 
@@ -317,7 +320,8 @@ def clock_notes(recording: Recording) -> list[str]:
         return []
     share = float(np.median(shares))
     scatter = float(sd_by_median(shares - share))
-    if not (share > 0 and abs(share - 1) > OFF_CLOCK and scatter < OFF_CLOCK / 3):
+    far = OFF_SCATTERS * scatter if _spacing_sigma(recording) else OFF_CLOCK
+    if not (share > 0 and abs(share - 1) > far and scatter < OFF_CLOCK / 3):
         return []
     return [
         f"the gyroscope turns {share:.3f} times as fast as the field, always (within {scatter:.3f}): "

@@ -119,7 +119,7 @@ def _sound(sensor: str, samples: Samples) -> tuple[Samples, list[str]]:
         value = np.where(alone, np.nan, value)
         first_at = t[np.flatnonzero(np.any(alone.reshape(t.size, -1), axis=1))[0]]
         notes.append(
-            f"{sensor}: single readings beyond {FASTEST_SPIN:g} rad/s, apart from those before and after, are left "
+            f"{sensor}: readings beyond {FASTEST_SPIN:g} rad/s, apart from those before and after, are left "
             f"out as glitches of the log: {np.count_nonzero(alone)}, the first at {first_at:.3f} s"
         )
     there = np.any(np.isfinite(value.reshape(t.size, -1)), axis=1)

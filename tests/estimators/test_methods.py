@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -213,3 +214,16 @@ def test_the_spacing_that_explains_a_gyroscope_is_that_of_the_logs_rows_not_of_a
     assert clock_notes(whole) == []
     (note,) = clock_notes(as_if_rows_were(whole, 2.0, 0.7))
     assert "rows of 5 ms, where they were taken as 10 ms (a reading of the magnetometer every 2 rows)" in note
+
+
+def test_a_spacing_known_roughly_is_named_from_where_the_gyroscope_shows_that_it_is_off():
+    """3 % may be a gyroscope's scale where time stamps say the spacing, and is the spacing where that was guessed."""
+    whole = spinning(1800.0, ("magnetometer", "gyroscope"))
+    gyroscope = whole.samples["gyroscope"]
+    # rows that come late, which no calibration takes up: then the two contradict one another
+    uneven = gyroscope.value * (1 + 0.006 * np.sin(np.linspace(0, 25, len(gyroscope))))[:, None]
+    whole = replace(whole, samples=whole.samples | {"gyroscope": Samples(gyroscope.t, uneven)})
+    (note,) = clock_notes(as_if_rows_were(whole, 1.03, 0.04))
+    assert re.search(r"the gyroscope turns 1\.03\d times as fast as the field, always \(within 0\.00\d\)", note)
+    assert re.search(r"rows of (4\.9\d*|5(\.0\d*)?) ms, where they were taken as 5\.15 ms", note)
+    assert clock_notes(as_if_rows_were(whole, 1.03, 0.0)) == []

@@ -181,7 +181,7 @@ def _rate(recording: Recording) -> Iterator[Finding]:
 
 
 def _wild_rates(sensor: str, samples: Samples, alone: BoolArray) -> Iterator[Finding]:
-    """Yield, of each axis, the few readings that are beyond what a throw has; ``alone``: which stand alone."""
+    """Yield, of each axis, the few readings that are beyond what a throw has; ``alone``: which are glitches."""
     beyond = beyond_spin(sensor, samples.value).reshape(len(samples), -1)
     for axis, column in enumerate(SENSORS[sensor].columns):
         rows = np.flatnonzero(beyond[:, axis])
@@ -197,9 +197,9 @@ def _wild_rates(sensor: str, samples: Samples, alone: BoolArray) -> Iterator[Fin
             f"{count} beyond {FASTEST_SPIN:g} rad/s, the first at {samples.t[rows[0]]:.3f} s, the largest "
             f"{np.max(np.abs(samples.value.reshape(beyond.shape)[rows, axis])):.4g}",
             "none: the fastest throws spin at 200",
-            "glitches of the log: `estimate` leaves out such as stand alone; make them gaps"
+            "glitches of the log, three rows on end at most: `estimate` leaves them out; make them gaps"
             if single
-            else "they are no glitches of single rows, and `estimate` uses them; make them gaps",
+            else "more than three rows on end are no glitch, and `estimate` uses them; make them gaps",
         )
 
 

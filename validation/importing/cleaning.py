@@ -55,14 +55,14 @@ class Cleaned:
 
 
 def without_glitches(sensor: str, found: Readings) -> tuple[Readings, IntArray, list[str]]:
-    """Return readings with gaps for single ones that no throw has, the numbers of their rows, and what to say."""
+    """Return readings with gaps for those apart that no throw has, the numbers of their rows, and what to say."""
     alone = glitches(sensor, found.value)
     if not np.any(alone):
         return found, found.number[:0], []
     number = found.number[np.any(alone, axis=1)]
     axes = " and ".join("xyz"[axis] for axis in np.flatnonzero(np.any(alone, axis=0))) if alone.shape[1] > 1 else ""
     note = (
-        f"{f'{sensor} {axes}'.rstrip()}: single readings beyond {FASTEST_SPIN:g} rad/s, apart from those before and "
+        f"{f'{sensor} {axes}'.rstrip()}: readings beyond {FASTEST_SPIN:g} rad/s, apart from those before and "
         f"after, in {number.size} rows of the log, the first row {number[0]}: glitches of the log (a lost decimal "
         "point?); they become gaps"
     )

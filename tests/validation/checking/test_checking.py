@@ -146,8 +146,8 @@ def test_single_rates_that_no_throw_has_are_named_with_their_time_and_are_no_noi
     assert gyroscope.noise == pytest.approx(0.003, rel=0.2)
 
 
-def test_rates_that_no_throw_has_over_two_rows_are_an_error_for_estimate_uses_them():
-    check = check_recording(with_rates(slice(600, 602), 2618.0))
+def test_rates_that_no_throw_has_over_four_rows_are_an_error_for_estimate_uses_them():
+    check = check_recording(with_rates(slice(600, 604), 2618.0))
     assert ids(check, "error") == ["gyroscope.glitch"]
     assert "`estimate` uses them" in sentence(check, "gyroscope.glitch")
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.validation.importing.clock import is_stamp, iso_seconds
+from discsim.validation.importing.sniffing.coarse_stamps import Counted, counted_rows
 from discsim.validation.importing.sniffing.decision import Decision, Sureness
 from discsim.validation.importing.sniffing.groups import Numbers
 from discsim.validation.importing.sniffing.names import is_time_name, read_name, sensor_of, timeless
@@ -28,6 +29,8 @@ SPACING = (5e-5, 0.5)
 SLOWEST_FIX = 60.0
 #: Loggers without time stamps write 100 rows a second more often than any other number; all rates scale with it.
 STEP = 0.01
+#: Steps that differ by no more than this share are the usual one, rounded; the mean is of these.
+ROUNDED = 0.5
 #: Share of steps that ascend in a column of time: a log has some doubled or swapped rows, never every tenth.
 ASCENDING = 0.9
 #: Share of rows at which a column of time goes on: several sensors' rows share a stamp, a second's rows are no time;
@@ -131,7 +134,8 @@ def _evenly(value: FloatArray, name: str) -> bool:
 def _unit(value: FloatArray, name: str, slowest: float) -> tuple[str | None, Sureness, str]:
     """Return the unit of time stamps, how sure that is, and why; rows are at most ``slowest`` s apart."""
     steps = np.diff(value[np.isfinite(value)])
-    step = float(np.median(steps[steps > 0]))
+    usual = float(np.median(steps[steps > 0]))
+    step = float(np.mean(steps[np.abs(steps / usual - 1) <= ROUNDED]))  # whole milliseconds at 80 Hz are 12 or 13 apart
     largest = float(np.nanmax(value))
     fits = [unit for unit, scale in SCALES.items() if SPACING[0] <= step * scale <= slowest]
     written = _written(name)
@@ -188,7 +192,8 @@ def _stamps(cells: Iterable[str]) -> FloatArray:
 def _without(numbers: Numbers) -> Clock:
     """Return the clock of a table without time stamps: rows at one rate, counted by a column where one counts.
 
-    The rate is the one that the lines above the table or the file's name state, or a guess.
+    The rate is the one that stamps of whole seconds count, or that the lines above the table or the file's name state,
+    or a guess.
     """
     off = OFF_GUESSED
     step, sure, why = STEP, _sure("guess"), f"no time stamps; rows taken as {1 / STEP:.0f} a second: state step_s"
@@ -202,6 +207,10 @@ def _without(numbers: Numbers) -> Clock:
     if stated is not None and SPACING[0] <= 1 / stated[0] <= SPACING[1]:
         off, step, sure = OFF_STATED, float(f"{1 / stated[0]:.12g}"), _sure("likely")
         why = f"no time stamps; '{stated[1][:60]}' says {stated[0]:.6g} rows a second"
+    if (coarse := _coarse(numbers)) is not None:
+        name, counted = coarse
+        off, step, sure = counted.off, float(f"{1 / counted.rate:.6g}"), _sure("likely")
+        why = f"'{name}' stands still over many rows, and counts {counted.rate:.6g} a second over {counted.span:.4g} s"
     for k, name in enumerate(numbers.table.columns):
         value = numbers.values[:, k]
         steps = np.diff(value[np.isfinite(value)])
@@ -209,6 +218,27 @@ def _without(numbers: Numbers) -> Clock:
             why = f"{why}; '{name}' counts the rows"
             return Clock(None, "s", name, step, Decision("time", f"{step} s a row", sure, why), off)
     return Clock(None, "s", None, step, Decision("time", f"{step} s a row", sure, why), off)
+
+
+def _coarse(numbers: Numbers) -> tuple[str, Counted] | None:
+    """Return the column of time that goes on once in many rows, by whole seconds or minutes, and what it counts."""
+    for k, name in enumerate(numbers.table.columns):
+        cells = numbers.cells(k)
+        if sum(map(is_stamp, first := list(islice(cells, 50)))) > 0.5 * len(first):
+            counted = counted_rows(_stamps(cells))
+        elif is_time_name(numbers.names[k]) and _in_seconds(numbers.values[:, k], numbers.names[k]):
+            counted = counted_rows(numbers.values[:, k])
+        else:
+            continue
+        if counted is not None and SPACING[0] <= 1 / counted.rate <= SPACING[1]:
+            return name, counted
+    return None
+
+
+def _in_seconds(value: FloatArray, name: str) -> bool:
+    """Tell whole seconds, since 1970 or by the name's unit, from a count of anything else."""
+    largest = float(np.nanmax(value, initial=0.0))
+    return bool(np.all(value[np.isfinite(value)] % 1 == 0)) and (_written(name) == "s" or EPOCH[0] < largest < EPOCH[1])
 
 
 def _sure(sureness: Sureness) -> Sureness:
