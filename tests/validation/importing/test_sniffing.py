@@ -31,6 +31,7 @@ from discsim.recording import read_dataset, read_recording
 from discsim.validation.cli import main
 from discsim.validation.importing import find_map, import_recording, read_map, read_readings
 from discsim.validation.importing.sniffing import Proposal, map_text, opened, recognised, sniff, stretches
+from discsim.validation.importing.sniffing.axes import letters
 from discsim.validation.importing.sniffing.raw_page import envelope
 
 
@@ -145,6 +146,56 @@ def test_a_magnetometer_that_mirrors_the_gyroscope_is_said_aloud(tmp_path, gyro,
     columns += [*three(named("acc_{}_g"), log.accel / 9.80665), *three(named("mag_{}_uT"), log.mag @ mag)]
     notes = sniff(write_table(tmp_path / "log.csv", columns)).notes
     assert any("mirror images" in note and "the sign of the spin" in note for note in notes) is said
+
+
+@pytest.mark.parametrize("clips", [False, True])
+@pytest.mark.parametrize("odd", ALL)
+def test_a_sensor_whose_axes_are_swapped_is_told_by_the_two_others(tmp_path, odd, clips):
+    """Two columns of the header in the wrong order: the spin axis of one sensor is not that of the others."""
+    log = made_log()
+    gyro = np.clip(log.gyro, -17.5, 17.5) if clips else log.gyro
+    arm = np.stack([0.015 * log.gyro[:, 2] ** 2, 0 * log.t, 0 * log.t], axis=1)  # 31 mm off the axis in all
+    accel = log.accel + arm
+    shown = {"gyroscope": gyro / DEG, "accelerometer": accel / 9.80665, "magnetometer": log.mag}
+    shown[odd] = shown[odd][:, [2, 1, 0]]
+    names = {"gyroscope": "gyro_{}_dps", "accelerometer": "acc_{}_g", "magnetometer": "mag_{}_uT"}
+    columns = [("time_s", log.t)]
+    for sensor, value in shown.items():
+        columns += three(named(names[sensor]), value)
+    raw = write_table(tmp_path / "log.csv", columns)
+    proposal = proposed(raw, tmp_path)
+    # of the magnetometer the field shows step by step how it lies, without a guess
+    guessed = any(f"the {odd}'s x and z are taken as swapped" in note for note in proposal.notes)
+    assert guessed is (odd != "magnetometer")
+    recording = import_recording(raw, read_map(tmp_path / "map.toml")).recording
+    spinning = (log.t > RELEASE + 0.2) & (log.t < LANDING - 0.2)
+    for sensor, truth in zip(ALL, (gyro, accel, log.mag), strict=True):
+        samples = recording.samples[sensor]
+        there = np.interp(samples.t, log.t, spinning.astype(float)) == 1
+        expected = np.interp(samples.t[there], log.t, truth[:, 2])
+        assert_allclose(samples.value[there, 2], expected, atol=0.2 + TOLERANCE[sensor], err_msg=sensor)
+
+
+@pytest.mark.parametrize(
+    ("gyro", "mag", "axes", "said"),
+    [
+        ((1, 1, 1), (1, 1, 1), "x y z", False),
+        ((1, 1, -1), (1, 1, 1), "x y z", True),
+        ((1, 1, 1), (-1, 1, 1), "x y z", True),
+        ((1, 1, 1), (1, -1, -1), "x -y -z", False),
+    ],
+)
+def test_a_clipping_gyroscope_still_tells_which_way_the_field_goes_round(tmp_path, gyro, mag, axes, said):
+    log = made_log()
+    clipped = np.clip(log.gyro, -17.5, 17.5) / DEG * np.array(gyro)
+    quiet = np.abs(log.gyro).max(axis=1) < 17.5
+    clipped[quiet] = 0.0  # no turn is left by which the two could be compared one by one
+    columns = [("time_s", log.t), *three(named("gyro_{}_dps"), clipped)]
+    columns += [*three(named("acc_{}_g"), log.accel / 9.80665), *three(named("mag_{}_uT"), log.mag * np.array(mag))]
+    proposal = proposed(write_table(tmp_path / "log.csv", columns), tmp_path)
+    assert any("mirror images" in note for note in proposal.notes) is said
+    (sensor,) = (one for one in proposal.sensors if one.sensor == "magnetometer")
+    assert " ".join(letters(sensor.axes)) == axes
 
 
 # --------------------------------------------------------------------------------------------------- throws

@@ -155,7 +155,7 @@ def _sensor(proposal: Proposal, sensor: ProposedSensor) -> list[str]:
 def _about(decision: Decision, sensor: str) -> bool:
     if decision.what.endswith(" time"):
         return decision.what == f"{sensor} time"
-    return not decision.what.startswith("magnetometer") or sensor == "magnetometer"
+    return decision.what == f"{sensor} axes" or not decision.what.endswith(" axes")
 
 
 def _determinant(matrix: FloatArray) -> float:

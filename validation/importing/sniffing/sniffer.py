@@ -16,7 +16,7 @@ from discsim.recording import SENSORS, Plant
 from discsim.validation.importing.import_map import G0
 from discsim.validation.importing.raw_table import REPAIRS, Layout, RepairList, read_raw
 from discsim.validation.importing.sniffing.archive import MAX_FILES
-from discsim.validation.importing.sniffing.axes import Reading3, body_axes
+from discsim.validation.importing.sniffing.axes import body_axes
 from discsim.validation.importing.sniffing.behaviour import WORTHS, by_behaviour
 from discsim.validation.importing.sniffing.clock import SPACING, Clock, clocks_of, seconds
 from discsim.validation.importing.sniffing.decision import Decision
@@ -36,6 +36,7 @@ from discsim.validation.importing.sniffing.names import is_time_name, sensor_of,
 from discsim.validation.importing.sniffing.own_clock import OwnClocks, own_clocks
 from discsim.validation.importing.sniffing.preamble import stated_worths
 from discsim.validation.importing.sniffing.proposal import Proposal, ProposedSensor
+from discsim.validation.importing.sniffing.spin_axis import Reading3
 from discsim.validation.importing.sniffing.turning import Fit, best_worth, steps_between
 from discsim.validation.importing.sniffing.units import COUNTS, Reading
 from discsim.validation.importing.sniffing.unused import missing_axes, unused_columns

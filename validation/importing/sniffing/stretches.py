@@ -19,7 +19,7 @@ from scipy.signal import savgol_filter
 from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.clipping import clipped
 from discsim.validation.importing.conversion import RawReadings
-from discsim.validation.importing.sniffing.axes import FAST
+from discsim.validation.importing.sniffing.spin_axis import FAST
 
 __all__ = ["Stretch", "stretches"]
 
