@@ -26,7 +26,7 @@ from discsim.toml_table import TomlTable, read_toml
 from discsim.validation.importing.raw_table import REPAIRS, Layout
 from discsim.validation.importing.throw import MeasuredThrow
 
-__all__ = ["ImportMap", "SensorMap", "TimeBase", "find_map", "read_map"]
+__all__ = ["UNITS", "ImportMap", "SensorMap", "TimeBase", "find_map", "read_map"]
 
 G0 = 9.80665  # standard gravity, the "g" of data sheets
 UNITS: Mapping[str, Mapping[str, float]] = MappingProxyType(

@@ -372,6 +372,10 @@ REFUSED = {
     "short.csv": (b"t_s,gx_dps,gy_dps,gz_dps\n0,1,2,3\n0.1,1,2,4\n", "2 rows of numbers in it"),
     "binary.bin": (bytes(range(256)) * 40, "is binary, no text"),
     "book.xlsx": (b"PK\x03\x04" + bytes(100), "export it as CSV"),
+    "rpm.csv": (
+        b"ms,rpm\n" + b"".join(b"%d,%d\n" % (10 * k, 600 - k) for k in range(50)),
+        """'rpm' is a rate about one axis: a map takes it in [sensors.rate_reference], columns = ["rpm"], unit = "rpm\"""",
+    ),
     "broken.zip": (b"PK\x03\x04" + bytes(100), "cannot be unpacked"),
 }
 

@@ -39,7 +39,7 @@ from discsim.validation.importing.sniffing.proposal import Proposal, ProposedSen
 from discsim.validation.importing.sniffing.spin_axis import Reading3
 from discsim.validation.importing.sniffing.turning import Fit, best_worth, steps_between
 from discsim.validation.importing.sniffing.units import COUNTS, Reading
-from discsim.validation.importing.sniffing.unused import missing_axes, unused_columns
+from discsim.validation.importing.sniffing.unused import missing_axes, one_axis_rate, unused_columns
 
 __all__ = ["sniff"]
 
@@ -235,6 +235,8 @@ def _nothing(raw: Path, files: Sequence[_File], failures: Sequence[InputError]) 
     guessed = files[0].numbers.dialect.layout.encoding in ("cp1252", "latin-1") and not columns.isascii()
     also += "; the text is no UTF-8 and its encoding could not be told (save it as UTF-8)" * guessed
     also += "".join(f"; {asked}" for asked in missing_axes([file.numbers for file in files], (), ()))
+    if alone := one_axis_rate([file.numbers for file in files]):
+        also += f"; {alone} (docs/importing.md)"
     return InputError.at(
         raw,
         None,

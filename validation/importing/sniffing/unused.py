@@ -12,11 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
+from discsim.validation.importing.import_map import UNITS
 from discsim.validation.importing.sniffing.groups import FEWEST_ROWS, Numbers
 from discsim.validation.importing.sniffing.names import penalty_of, read_name, sensor_of
 from discsim.validation.importing.sniffing.units import COUNTS, readings_of
 
-__all__ = ["missing_axes", "unused_columns"]
+__all__ = ["missing_axes", "one_axis_rate", "unused_columns"]
 
 #: A log of hundreds of columns, or a folder of as many files, fills no screen with them.
 MOST_NAMES, MOST_FILES = 60, 6
@@ -55,6 +56,20 @@ def missing_axes(tables: Sequence[Numbers], used: Collection[tuple[Path, str]], 
                 alone = [numbers.table.columns[k] for k in left if k not in whole]
                 notes.append(_asked(numbers, sensor, axes, alone) + _of(numbers, tables))
     return notes[:MOST_FILES]
+
+
+def one_axis_rate(tables: Sequence[Numbers]) -> str | None:
+    """Return how a map takes a column that is a rate about one axis, or None where no column's unit is one."""
+    for numbers in tables:
+        for k in _left(numbers, ()):
+            units = [reading.unit for reading in readings_of(read_name(numbers.names[k]).unit)]
+            name = _shown(numbers.table.columns[k])
+            bare = [reading.unit for reading in readings_of(name)]  # 'rpm'
+            for unit in (*units, *bare):
+                if unit in UNITS["rad_s"] and unit != "Hz":  # 'rate (Hz)' is a sampling rate as often
+                    text = f'columns = ["{name}"], unit = "{unit}"'
+                    return f"'{name}' is a rate about one axis: a map takes it in [sensors.rate_reference], {text}"
+    return None
 
 
 def _of(numbers: Numbers, tables: Sequence[Numbers]) -> str:
