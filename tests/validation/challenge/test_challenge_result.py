@@ -292,6 +292,27 @@ def test_more_cases_without_anything_in_them_count_for_the_false_alarms_and_only
         documented(page, plain, "--blank", plain)
 
 
+def test_challenges_of_one_code_on_other_seeds_are_pooled_also_from_what_was_kept(tmp_path, plain):
+    with start_run(tmp_path / "more", 60) as run:
+        challenge(run, [Request(60, "flight", (), "nothing")], workers=1, command=blind(tmp_path))
+    page, kept = tmp_path / "docs" / "page.md", tmp_path / "kept"
+    text = documented(page, plain, "--more", tmp_path / "more", "--keep", kept)
+    assert "(seeds 40 to 42)" in text
+    assert "(seeds 60 to 60)" in text
+    assert "Together 4 cases. 2 are answered rightly" in text
+    assert sorted(file.name for file in kept.iterdir()) == ["40.json.gz", "60.json.gz"]
+    assert documented(page, kept / "40.json.gz", "--more", kept / "60.json.gz") == text
+    with pytest.raises(InputError, match="3 seeds are there already, the first 40"):
+        documented(page, plain, "--more", kept / "40.json.gz")
+    other = json.loads((tmp_path / "more" / "challenge.json").read_text()) | {"code_sha256": "0" * 64}
+    (tmp_path / "more" / "challenge.json").write_text(json.dumps(other))
+    with pytest.raises(InputError, match="code 000000000000, mask None; expected"):
+        documented(page, plain, "--more", tmp_path / "more")
+    (kept / "40.json.gz").write_bytes(b"no gzip")
+    with pytest.raises(InputError, match="cannot be read"):
+        read_result(kept / "40.json.gz")
+
+
 def test_effects_near_their_limit_count_in_the_curve(tmp_path, plain, monkeypatch):
     """The same ones here, so there are twice as many."""
     near = tmp_path / "near" / "challenge.json"

@@ -374,7 +374,7 @@ REFUSED = {
     "book.xlsx": (b"PK\x03\x04" + bytes(100), "export it as CSV"),
     "rpm.csv": (
         b"ms,rpm\n" + b"".join(b"%d,%d\n" % (10 * k, 600 - k) for k in range(50)),
-        """'rpm' is a rate about one axis: a map takes it in [sensors.rate_reference], columns = ["rpm"], unit = "rpm\"""",
+        "'rpm' is a rate about one axis: a map takes it in [sensors.rate_reference], columns = [\"rpm\"], unit = ",
     ),
     "broken.zip": (b"PK\x03\x04" + bytes(100), "cannot be unpacked"),
 }

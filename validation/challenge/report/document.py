@@ -64,7 +64,9 @@ def plain_command(command: str) -> str:
 
 
 def made_by(result: Result) -> str:
-    """Return a line that says how a result was made."""
+    """Return a line that says how a result was made, or each of those that are pooled in it."""
+    if result.parts:
+        return f"{' '.join(map(made_by, result.parts))} Together {len(result.scored)} cases."
     first, last = result.seeds
     return (
         f"`{plain_command(result.command)}` (seeds {first} to {last}), discsim {result.version}, code "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -160,13 +161,17 @@ def rates_of(scored: Sequence[Scored]) -> dict[str, Rate]:
 
 
 class Result(NamedTuple):
-    """A finished challenge: the command that gave it, version and code, what was put over every case, the cases."""
+    """A finished challenge: the command that gave it, version and code, what was put over every case, the cases.
+
+    ``parts`` are the challenges that were pooled in it; none where it is one.
+    """
 
     command: str
     version: str
     code: str
     mask: str | None
     scored: list[Scored]
+    parts: tuple[Result, ...] = ()
 
     @property
     def seeds(self) -> tuple[int, int]:
@@ -174,17 +179,35 @@ class Result(NamedTuple):
         numbers = [item.answer.seed for item in self.scored]
         return min(numbers), max(numbers)
 
+    def pooled(self, *others: Result) -> Result:
+        """Return this challenge and others of the same code, mask and version as one; raises `InputError` otherwise."""
+        parts = (self, *others)
+        for k, part in enumerate(parts):
+            if (part.version, part.code, part.mask) != (self.version, self.code, self.mask):
+                raise InputError(
+                    f"{part.command}: of discsim {part.version}, code {part.code[:12]}, mask {part.mask}; expected "
+                    f"{self.version}, {self.code[:12]} and {self.mask}, to count in one table"
+                )
+            known = {item.answer.seed for other in parts[:k] for item in other.scored}
+            if twice := known & {item.answer.seed for item in part.scored}:
+                raise InputError(f"{part.command}: {len(twice)} seeds are there already, the first {min(twice)}")
+        return self._replace(scored=[item for part in parts for item in part.scored], parts=parts)
 
-def read_result(folder: Path) -> Result:
-    """Read what `discsim.validation.challenge.run.challenge` left; raises `InputError` where it is not there."""
-    file = folder / RESULT
+
+def read_result(place: Path) -> Result:
+    """Read what `discsim.validation.challenge.run.challenge` left: its folder, or its file, which may be gzipped.
+
+    Raises `InputError` where it is not there or cannot be read.
+    """
+    file = place / RESULT if place.is_dir() else place
     try:
-        kept = json.loads(file.read_text("utf-8"))
+        content = file.read_bytes()
+        kept = json.loads(gzip.decompress(content) if file.suffix == ".gz" else content)
         scored = [Scored.from_json(entry) for entry in kept["cases"]]
         return Result(kept["made_by"], kept["version"], kept["code_sha256"], kept["mask"], scored)
     except FileNotFoundError:
         raise InputError(f"{file}: is not there; expected the folder of a finished discsim challenge") from None
-    except (ValueError, KeyError, TypeError) as error:
+    except (OSError, EOFError, ValueError, KeyError, TypeError) as error:
         raise InputError(
             f"{file}: cannot be read ({type(error).__name__}: {error}); expected what discsim challenge of this "
             "version wrote (the same command writes it again from its checkpoints)"
