@@ -235,6 +235,12 @@ def _shifting(base: _Base) -> list[str]:
     return [name for name in (BOARD[:1] if rig else BOARD) if any(name in one.recording for one in base.signals)]
 
 
+def _fastest(base: _Base) -> float:
+    """Return the fastest spin that any recording shows, rad/s; where a gyroscope clips all through it shows none."""
+    shown = [np.abs(one.rate[np.isfinite(one.rate)]) for one in base.signals]
+    return float(np.max(np.concatenate(shown)))
+
+
 def _offsets(base: _Base) -> Iterator[Hypothesis]:
     """Return the best offset of each sensor's times, where motion tells it from a wrong clock.
 
@@ -243,7 +249,7 @@ def _offsets(base: _Base) -> Iterator[Hypothesis]:
     plant = plant_of(base.signals[0].recording)
     if not (plant.airborne or plant.commanded):
         return
-    fastest = max(float(np.nanmax(np.abs(one.rate))) for one in base.signals)
+    fastest = _fastest(base)
     step = PHASE_STEP / fastest
     count = int(LATEST / step)
     for sensor in _shifting(base):
@@ -263,7 +269,7 @@ def _rivals(base: _Base) -> Iterator[Hypothesis]:
     """
     if not plant_of(base.signals[0].recording).airborne:
         return
-    fastest = max(float(np.nanmax(np.abs(one.rate))) for one in base.signals)
+    fastest = _fastest(base)
     longest = max(float(one.grid[-1]) for one in base.signals)
     step = PHASE_STEP / (fastest * longest)
 

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support.made import FIELD, RIG, tables, throws
+from support.made import DRIVER, FIELD, MODULE, RIG, flight, tables, throws
 
 from discsim.effects import CATALOGUE, Effect, effect
 from discsim.recording import Recording
@@ -103,6 +103,19 @@ def test_an_axis_that_the_fit_finds_scaled_by_minus_one_is_a_reversed_column():
 def test_a_small_scale_is_no_reversed_column():
     made = tuple(tables(errors=[effect("gyro.scale", sx=0.0, sy=0.0, sz=0.03)]))
     assert with_reversed_axes(SetupFindings((), made), search(made).final.fit) is None
+
+
+def test_a_throw_whose_gyroscope_clips_all_through_leaves_the_others_to_be_looked_at():
+    """Without a magnetometer it shows no rate at all; the diagnosis ended in a traceback then."""
+    made = []
+    for k, spin in enumerate((70.0, 30.0)):
+        motion = flight((), heading=0.4 + k, spin=spin, seconds=1.5)
+        whole = record(motion, MODULE, np.random.default_rng(k), plant="flight", name=f"throw-{k}", disc=DRIVER)
+        samples = {name: samples for name, samples in whole.samples.items() if name != "magnetometer"}
+        made.append(replace(whole, samples=samples))
+    sheet, seen = made[0].sheets["gyroscope"], made[0].samples["gyroscope"].value
+    assert np.all(sheet.clipped(seen)[:, 2])
+    assert "rival" in {item.kind for item in hypotheses(made).found}
 
 
 @pytest.mark.parametrize("there", [True, False])
