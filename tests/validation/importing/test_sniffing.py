@@ -98,6 +98,42 @@ def test_a_log_without_stamps_takes_its_step_from_the_field_that_turns_with_the_
     assert (alone.clock.step, alone.clock.decision.sure) == (0.01, "guess")
 
 
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("timestamp", lambda t: f"2025-06-01 12:00:{int(t):02d}"),
+        ("Time", lambda t: f"23:59:{int(t):02d}"),
+        ("time", lambda t: str(1_714_557_600 + int(t))),
+        ("time_s", lambda t: str(int(t))),
+    ],
+)
+def test_stamps_of_whole_seconds_count_the_rows(tmp_path, name, shown):
+    """197 rows a second, with a pause of half a second in which none was written; the first second is cut off."""
+    log = made_log()
+    time = 0.3 + np.arange(log.t.size) / 197.0
+    time[1200:] += 0.5
+    columns = [(name, [shown(t) for t in time]), *three(named("gyro_{}_dps"), log.gyro / DEG)]
+    columns += [*three(named("acc_{}_g"), log.accel / 9.80665), *three(named("mag_{}_uT"), log.mag)]
+    clock = sniff(write_table(tmp_path / "log.csv", columns)).clock
+    assert clock.column is None
+    assert clock.step == pytest.approx(1 / 197, rel=0.002)
+    assert clock.step == pytest.approx(1 / 197, rel=3 * clock.off)
+    assert clock.off < 0.002
+    assert clock.decision.sure == "likely"
+    assert f"'{name}' stands still over many rows, and counts 197" in clock.decision.why
+
+
+def test_stamps_that_change_once_count_no_rows(tmp_path):
+    log = made_log()
+    columns = [
+        ("time", [f"2025-06-01 12:0{int(t > 5)}" for t in log.t]),
+        *three(named("acc_{}_g"), log.accel / 9.80665),
+    ]
+    decision = sniff(write_table(tmp_path / "log.csv", columns)).clock.decision
+    assert decision.sure == "guess"
+    assert "'time' tells no time here (its first cell is '2025-06-01 12:00')" in decision.why
+
+
 def test_what_a_header_says_wrong_is_seen_and_said(tmp_path):
     proposal = sniff(degrees_written_as_radians(tmp_path, made_log()))
     (unit,) = [decision for decision in proposal.all_decisions if decision.what == "gyroscope unit"]

@@ -213,7 +213,7 @@ def _sense(gyro: Reading3, field: Reading3, spin: int) -> int:
     """Tell whether the field goes round as the gyroscope says (1), the other way (-1), or that neither is clear (0).
 
     A body's turning makes the field turn by as much the other way in its axes. Beyond half a turn from reading to
-    reading the way is not seen.
+    reading the way is not seen; a gyroscope that clips may show half of the spin.
     """
     rate = while_spinning(gyro, gyro).value[:, spin]
     seen = while_spinning(field, gyro)
@@ -225,7 +225,7 @@ def _sense(gyro: Reading3, field: Reading3, spin: int) -> int:
     x, y = (value[fresh] - value[fresh].mean(axis=0)).T
     angle = np.angle((x[1:] + 1j * y[1:]) * (x[:-1] - 1j * y[:-1]))
     step, least = float(np.median(np.diff(seen.t[fresh]))), float(np.nanmedian(rate))
-    clear = np.mean(np.sign(angle) == np.sign(np.median(angle))) > ONE_WAY and abs(least) * step < np.pi
+    clear = np.mean(np.sign(angle) == np.sign(np.median(angle))) > ONE_WAY and abs(least) * step < np.pi / 2
     return -int(np.sign(np.median(angle)) * np.sign(least)) if clear else 0
 
 
