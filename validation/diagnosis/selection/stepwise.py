@@ -31,6 +31,7 @@ from discsim.validation.diagnosis.selection.candidates import (
     parameters_of,
 )
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
+from discsim.validation.diagnosis.selection.event_instants import with_best_instant
 from discsim.validation.diagnosis.selection.evidence import ONE_SIDED, TURNED, charge, price
 from discsim.validation.diagnosis.selection.exchange import eliminated_backward, exchanged, rivals_of, widened
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
@@ -213,7 +214,7 @@ def _selected_forward(found: Search) -> Search:
                 continue
         if better is None or len(better.hypothesis.candidates) > _most(found, better, most):
             break
-        found, better = with_losses_recounted(found, better)
+        found, better = with_losses_recounted(found, with_best_instant(found, better))
         if step == 0 and far(found, better) and not _told(better) and no_nearer(found, current, better):
             # neither one effect nor two come near the data, nor does any lead there
             return replace(found, final=better)
