@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.recording import SENSORS
 from discsim.validation.diagnosis.result import Located
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.diagnosis.selection.hypothesis import fitted_parameters
@@ -57,6 +58,8 @@ def located_effect(found: Search, candidate: CandidateEffect, names: Sequence[st
     sd = {group: noise.sd for group, noise in found.final.fit.noise.items()}
     excess = excess_of(without(found, candidate), found.final.residuals, found.final.fit.linears, sd)
     row, own = candidate.row, candidate.user
+    if row.hides_readings and all(sensor != row.acts_on for _, sensor, _ in excess):
+        return [_at_its_limit(found, candidate, names)]
     grows, text = (row.grows_with, row.trace) if own is None else (None, own.text)
     mine = {
         key: value for key, value in excess.items() if candidate.recordings is None or key[0] in candidate.recordings
@@ -82,10 +85,24 @@ def located_effect(found: Search, candidate: CandidateEffect, names: Sequence[st
             instant = _instant(found, candidate)
             width = 2.0 * abs(_value(found, candidate, row.lasts)) if isinstance(row.lasts, str) else 3.0 * row.lasts
             start, stop = max(instant - width, 0.0), instant + width
-        where = "all" if candidate.recordings is None else ", ".join(names[i] for i in sorted(candidate.recordings))
+        where = _where(candidate, names)
         said = f"{text} (at {_instant(found, candidate):.3f} s)" if event else text
         places.append(Located(where, sensor, axis, start, stop, min(max(share, 0.0), 1.0), said, grows))
     return places
+
+
+def _where(candidate: CandidateEffect, names: Sequence[str]) -> str:
+    return "all" if candidate.recordings is None else ", ".join(names[i] for i in sorted(candidate.recordings))
+
+
+def _at_its_limit(found: Search, candidate: CandidateEffect, names: Sequence[str]) -> Located:
+    """Return where a sensor has no reading left that takes part in a fit: at its largest axis, all the time."""
+    row, scope = candidate.row, candidate.recordings
+    acting = [one for i, one in enumerate(found.recordings) if scope is None or i in scope]
+    values = np.concatenate([one.samples[row.acts_on].value for one in acting if row.acts_on in one.samples])
+    axis = SENSORS[row.acts_on].columns[int(np.argmax(np.nanmax(np.abs(values), axis=0)))]
+    end = max(one.end for one in acting)
+    return Located(_where(candidate, names), row.acts_on, axis, 0.0, end, 1.0, row.trace, row.grows_with)
 
 
 def _value(found: Search, candidate: CandidateEffect, name: str) -> float:
