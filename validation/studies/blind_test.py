@@ -55,8 +55,9 @@ def command(
     if masks:
         text = with_part(text, "masks", masks_text(masks, plain))
     write_text(page, text)
-    for place in [] if keep is None or out is None else (out, *(more or ()), *(blank or ())):
-        _keep(place, keep)
+    if keep is not None and out is not None:
+        for place in (out, *(more or ()), *(blank or ())):
+            _keep(place, keep)
 
 
 def _keep(place: Path, folder: Path) -> None:

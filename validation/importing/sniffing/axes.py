@@ -218,7 +218,7 @@ def _sense(gyro: Reading3, field: Reading3, spin: int) -> int:
     rate = while_spinning(gyro, gyro).value[:, spin]
     seen = while_spinning(field, gyro)
     value = seen.value[:, [(spin + 1) % 3, (spin + 2) % 3]]
-    fresh = np.isfinite(value).all(axis=1)
+    fresh = np.asarray(np.all(np.isfinite(value), axis=1))
     fresh[1:] &= np.any(np.diff(value, axis=0) != 0, axis=1)
     if fresh.sum() < 16:
         return 0
