@@ -19,7 +19,7 @@ from discsim.validation.challenge.scores.result import RESULT, Scored, processor
 from discsim.validation.reporting.run import Run, json_text, package_version, source_digest
 from discsim.validation.running.tasks import Task, claim, discard, idle_cores, run_tasks
 
-__all__ = ["challenge", "limit_of", "write_challenge"]
+__all__ = ["challenge", "code_digest", "limit_of", "write_challenge"]
 
 #: folder of what is done, in --out
 CHECKPOINTS = "checkpoints"
@@ -107,15 +107,19 @@ def write_challenge(
 
 
 def code_digest() -> str:
-    """Return the SHA-256 of simulation, diagnosis, concealment and discs: a result of other code is no result of it."""
+    """Return the SHA-256 of simulation, diagnosis, concealment and their models: a result of others is no result of it.
+
+    Models are the discs and parts that cases are drawn with, and the ordinary errors by which twins are told.
+    """
     here = Path(__file__).parents[1]
     places = [here / "challenge" / name for name in _AFTERWARDS]
     afterwards = {file for place in places for file in (place.rglob("*.py") if place.is_dir() else [place])}
     folders = (Path(discsim.__file__).parent, *(here / name for name in ("identification", "diagnosis", "challenge")))
     files = (here / "scenarios" / "throws.py", here / "commands" / "diagnose.py")
     code = source_digest(*folders, *files, without=afterwards)
-    discs = [digest(model_file(f"discs/{name}.toml")) for name in model_names("discs")]
-    return hashlib.sha256("".join((code, *discs)).encode()).hexdigest()
+    read = [f"{folder}/{name}.toml" for folder in ("discs", "parts") for name in model_names(folder)]
+    models = [digest(model_file(name)) for name in (*read, "priors.toml")]
+    return hashlib.sha256("".join((code, *models)).encode()).hexdigest()
 
 
 def limit_of(request: tuple[Any, ...], shared: Any) -> dict[str, dict[str, float]]:

@@ -14,13 +14,14 @@ from scipy.stats import binom
 
 from discsim.effects.catalogue import effect
 from discsim.errors import InputError
+from discsim.files import model_file
 from discsim.validation.challenge.blind import Request, diagnose_blind, open_answers, seal_answers
 from discsim.validation.challenge.cases.case import Concealed
 from discsim.validation.challenge.cases.conceal import Answer
 from discsim.validation.challenge.cases.detection_limit import noncentrality, sizes, sizes_and_apart, strength
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.challenge.report.page import GOALS, goal_rows, goals_met
-from discsim.validation.challenge.run import challenge
+from discsim.validation.challenge.run import challenge, code_digest
 from discsim.validation.challenge.scores.result import Scored, rates_of, read_result
 from discsim.validation.challenge.scores.scoring import CaseScore, clustered_rate, confusion, rate, score_case, summary
 from discsim.validation.reporting.run import start_run
@@ -455,6 +456,18 @@ def test_a_challenge_scores_reports_and_goes_on_where_it_was_stopped(tmp_path, s
     monkeypatch.setattr("discsim.validation.challenge.run.code_digest", lambda: "as it is now")
     with start_run(tmp_path / "out", 40) as run, pytest.raises(InputError, match="versions differ"):
         challenge(run, requests, workers=1, command=spy)
+
+
+@pytest.mark.parametrize("name", ["discs/driver.toml", "parts/mpu9250.toml", "priors.toml"])
+def test_models_that_decide_a_case_are_part_of_its_code(tmp_path, monkeypatch, name):
+    before = code_digest()
+    changed = tmp_path / "changed.toml"
+    changed.write_text(model_file(name).read_text() + "# changed\n")
+    other = {name: changed}
+    monkeypatch.setattr(
+        "discsim.validation.challenge.run.model_file", lambda asked: other.get(asked) or model_file(asked)
+    )
+    assert code_digest() != before
 
 
 def test_more_cases_join_those_that_are_done(tmp_path, spy):
