@@ -8,7 +8,17 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["BoolArray", "ComplexArray", "FloatArray", "IntArray", "readonly", "sd_by_median", "sealed", "vector3"]
+__all__ = [
+    "BoolArray",
+    "ComplexArray",
+    "FloatArray",
+    "IntArray",
+    "readonly",
+    "runs",
+    "sd_by_median",
+    "sealed",
+    "vector3",
+]
 
 FloatArray: TypeAlias = NDArray[np.float64]
 BoolArray: TypeAlias = NDArray[np.bool_]
@@ -40,6 +50,12 @@ def sd_by_median(values: ArrayLike, axis: int | None = None) -> Any:
     A median absolute deviation is about the values' own median; of residuals zero is known to be the middle.
     """
     return 1.4826 * np.median(np.abs(values), axis=axis)
+
+
+def runs(chosen: BoolArray) -> list[tuple[int, int]]:
+    """Return the first place and the one after the last of each run of chosen (n,) places."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
+    return [(int(first), int(after)) for first, after in edges.reshape(-1, 2)]
 
 
 def vector3(values: ArrayLike | Sequence[float], what: str) -> FloatArray:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, runs
 from discsim.threads import side_by_side
 
 if TYPE_CHECKING:
@@ -316,7 +316,7 @@ def _is_limit(column: FloatArray, axis: int, top: float, step: float, quiet: _No
         return False
     # the best chance that a constant input has of one reading, and of that one before any larger
     chance = max(erf(1.0 / (2.0 * np.sqrt(2.0) * noise)), 1e-12)
-    longest = _longest_run(at_top)
+    longest = max((after - first for first, after in runs(at_top)), default=0)
     if longest >= SHORTEST and longest * np.log(chance) + np.log(column.size) < np.log(CHANCE):
         return True
     equal, expected = _equal(column[np.isfinite(column)], top, step)
@@ -334,11 +334,6 @@ def _most_frequent(column: FloatArray, top: float, step: float) -> int:
     if others.size == 0:
         return 0
     return int(np.max(np.unique(np.rint((top - others) / step), return_counts=True)[1]))
-
-
-def _longest_run(chosen: BoolArray) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
-    return int(np.max(edges[1::2] - edges[::2], initial=0))
 
 
 # ---------------------------------------------------------------------------------------------------- in words

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, runs
 
 __all__ = ["FASTEST_SPIN", "beyond_spin", "glitches"]
 
@@ -45,8 +45,7 @@ def glitches(sensor: str, value: FloatArray) -> BoolArray:
         there = np.flatnonzero(np.isfinite(column))
         seen, wild = column[there], rows[there, axis]
         leaps = np.abs(np.diff(seen)) > APART * np.maximum(np.abs(seen[1:]), np.abs(seen[:-1]))
-        ends = np.flatnonzero(np.diff(np.concatenate([[False], wild, [False]]).astype(np.int8)))
-        for first, after in zip(ends[::2], ends[1::2], strict=True):
+        for first, after in runs(wild):
             there_and_back = np.all(leaps[max(first - 1, 0) : first]) and np.all(leaps[after - 1 : after])
             if there_and_back and after - first <= ON_END:
                 found[there[first:after], axis] = True

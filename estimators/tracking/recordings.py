@@ -9,7 +9,7 @@ from math import sqrt
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, runs
 from discsim.estimators.likelihood import (
     LEAST,
     LikelihoodSettings,
@@ -185,14 +185,13 @@ def _runs(t: FloatArray, fits: ToneFit, gyroscope: Samples | None) -> list[tuple
     reach = 0.5 * lengths + 0.25
     for first, last in zip(np.searchsorted(t, times - reach), np.searchsorted(t, times + reach, "right"), strict=True):
         covered[first:last] = True
-    runs = []
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], covered, [False]]).astype(int)))
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
+    found = []
+    for first, last in runs(covered):
         # a hole in the time stamps loses the turns as well
         holes = first + 1 + np.flatnonzero(np.diff(t[first:last]) > 1.0)
         for a, b in zip([first, *holes], [*holes, last], strict=True):
-            runs.append((int(a), int(b), rate[a:b]))
-    return runs
+            found.append((int(a), int(b), rate[a:b]))
+    return found
 
 
 def _known(t: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray] | None:

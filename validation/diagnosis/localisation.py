@@ -55,11 +55,11 @@ def without(found: Search, candidate: CandidateEffect) -> list[FloatArray]:
 
 def located_effect(found: Search, candidate: CandidateEffect, names: Sequence[str]) -> list[Located]:
     """Return where an effect shows: for an event its instant, for a sensor's fault the sensor and axis."""
-    sd = {group: noise.sd for group, noise in found.final.fit.noise.items()}
-    excess = excess_of(without(found, candidate), found.final.residuals, found.final.fit.linears, sd)
-    row, own = candidate.row, candidate.user
-    if row.hides_readings and all(sensor != row.acts_on for _, sensor, _ in excess):
+    row, own, linears = candidate.row, candidate.user, found.final.fit.linears
+    if row.hides_readings and all(channel.sensor != row.acts_on for one in linears for channel in one.channels):
         return [_at_its_limit(found, candidate, names)]
+    sd = {group: noise.sd for group, noise in found.final.fit.noise.items()}
+    excess = excess_of(without(found, candidate), found.final.residuals, linears, sd)
     grows, text = (row.grows_with, row.trace) if own is None else (None, own.text)
     mine = {
         key: value for key, value in excess.items() if candidate.recordings is None or key[0] in candidate.recordings

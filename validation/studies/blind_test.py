@@ -13,7 +13,7 @@ from discsim.files import read_text, write_bytes, write_text
 from discsim.validation.challenge.masks import masked_results
 from discsim.validation.challenge.report.document import PREFIX, masks_text, pooled, result_text, with_part
 from discsim.validation.challenge.report.page import draw_all
-from discsim.validation.challenge.scores.result import RESULT, Result, read_result
+from discsim.validation.challenge.scores.result import Result, read_result, result_file
 from discsim.validation.challenge.scores.scoring import NOTHING
 
 __all__ = ["command"]
@@ -43,12 +43,15 @@ def command(
     if out is None and not masks:
         raise InputError("nothing to write; expected the folder of a challenge, or --masks")
     text = read_text(page)
-    plain = None if out is None else read_result(out)
-    if plain is not None:
-        if plain.mask is not None:
-            raise InputError(f"{out}: was made under the mask {plain.mask}; expected it under --masks")
-        plain = plain.pooled(*map(read_result, more)) if more else plain
+    plain: Result | None = None
+    read: list[Result] = []
+    if out is not None:
+        first, *others = read = [read_result(place) for place in (out, *(more or ()))]
+        if first.mask is not None:
+            raise InputError(f"{out}: was made under the mask {first.mask}; expected it under --masks")
+        plain = first.pooled(*others)
         without = [_blank(folder, plain) for folder in blank or ()]
+        read += without
         near = masked_results(masks or ()).get("near_limit")
         drawn = draw_all(plain.scored, page.parent / "images", PREFIX, pooled(plain, near))
         text = with_part(text, "result", result_text(plain, list(drawn), near, without))
@@ -56,17 +59,15 @@ def command(
         text = with_part(text, "masks", masks_text(masks, plain))
     write_text(page, text)
     if keep is not None and out is not None:
-        for place in (out, *(more or ()), *(blank or ())):
-            _keep(place, keep)
+        for place, result in zip((out, *(more or ()), *(blank or ())), read, strict=True):
+            _keep(result_file(place), keep / f"{result.seeds[0]}.json.gz")
 
 
-def _keep(place: Path, folder: Path) -> None:
-    """Write a challenge's file, gzipped, as the number of its first seed: the same bytes for the same cases."""
-    file = place / RESULT if place.is_dir() else place
+def _keep(file: Path, kept: Path) -> None:
+    """Write a challenge's file to ``kept``, gzipped: the same bytes for the same cases. What is kept already stays."""
     if file.suffix != ".gz":
-        folder.mkdir(parents=True, exist_ok=True)
-        first, _ = read_result(place).seeds
-        write_bytes(folder / f"{first}.json.gz", gzip.compress(file.read_bytes(), mtime=0))
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes(kept, gzip.compress(file.read_bytes(), mtime=0))
 
 
 def _blank(folder: Path, plain: Result) -> Result:

@@ -15,7 +15,18 @@ from discsim.errors import InputError
 from discsim.validation.challenge.cases.conceal import Answer
 from discsim.validation.challenge.scores.scoring import CaseScore, Rate, score_case, summary
 
-__all__ = ["RESULT", "Result", "Scored", "Times", "both_times", "processor_times", "rates_of", "read_result", "times"]
+__all__ = [
+    "RESULT",
+    "Result",
+    "Scored",
+    "Times",
+    "both_times",
+    "processor_times",
+    "rates_of",
+    "read_result",
+    "result_file",
+    "times",
+]
 
 #: the file of a challenge's result
 RESULT = "challenge.json"
@@ -181,6 +192,8 @@ class Result(NamedTuple):
 
     def pooled(self, *others: Result) -> Result:
         """Return this challenge and others of the same code, mask and version as one; raises `InputError` otherwise."""
+        if not others:
+            return self
         parts = (self, *others)
         for k, part in enumerate(parts):
             if (part.version, part.code, part.mask) != (self.version, self.code, self.mask):
@@ -194,12 +207,17 @@ class Result(NamedTuple):
         return self._replace(scored=[item for part in parts for item in part.scored], parts=parts)
 
 
+def result_file(place: Path) -> Path:
+    """Return the file of a finished challenge, which is named itself or by its folder."""
+    return place / RESULT if place.is_dir() else place
+
+
 def read_result(place: Path) -> Result:
     """Read what `discsim.validation.challenge.run.challenge` left: its folder, or its file, which may be gzipped.
 
     Raises `InputError` where it is not there or cannot be read.
     """
-    file = place / RESULT if place.is_dir() else place
+    file = result_file(place)
     try:
         content = file.read_bytes()
         kept = json.loads(gzip.decompress(content) if file.suffix == ".gz" else content)

@@ -36,14 +36,13 @@ def with_best_instant(found: Search, current: ContinuousFit) -> ContinuousFit:
     trajectory = current.fit.trajectories[number]
     start = values_of_fit(current)
     key = ((candidate.id, "t_s"), candidate.recordings)
-    near = int(np.searchsorted(trajectory.nodes, start[key]))
-    rate = abs(float(trajectory.states[max(near - 1, 0)][spin]))
+    rate = abs(float(trajectory.states[trajectory.segment_of(np.array(start[key]))][spin]))
+    bars = Bars(merit_of(current.fit, current.fit.linears))
     best = current
     for turns in _TURNS if rate > 0.0 else ():
         instant = start[key] + turns * 2.0 * np.pi / rate
         if not found.relaxed_fit.plant.durations.event_from < instant < trajectory.nodes[-1]:
             continue
-        bars = Bars(merit_of(current.fit, current.fit.linears))
         moved = {**start, key: instant}
         fitted = continuous_fit(current.fit, current.hypothesis, found.own, current.fit.noise, moved, bars=bars)
         best = min(best, replace(fitted, score=fitted.score + found.cost), key=lambda one: one.score)

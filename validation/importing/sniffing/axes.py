@@ -117,8 +117,8 @@ def _downward(axis: int, sensors: Mapping[str, Reading3], *, flies: bool) -> tup
     if accel is None:
         why = "no accelerometer to tell up from down, so the direction of spin is open"
         return True, Decision(what, f"along {name}", "guess", why)
-    along, norm = accel.value[:, axis], np.linalg.norm(accel.value, axis=1)
-    still = resting(accel, sensors.get("gyroscope")) & (np.abs(norm - G0) < 0.15 * G0)
+    along = accel.value[:, axis]
+    still = resting(accel, sensors.get("gyroscope"))
     upright = still & (np.abs(along) > 0.7 * G0)  # within 45 degrees
     rest = float(np.sign(along[upright]).mean()) if upright.sum() >= 10 else 0.0
     flight = _lift(axis, sensors) if flies else 0.0
@@ -233,7 +233,7 @@ def _upward(field: Reading3, accel: Reading3 | None) -> float:
     """Return the field's component against gravity at rest, uT; 0 where no rest is known."""
     if accel is None:
         return 0.0
-    still = resting(accel, None) & (np.abs(np.linalg.norm(accel.value, axis=1) - G0) < 0.15 * G0)
+    still = resting(accel, None)
     if still.sum() < 10:
         return 0.0
     there = np.column_stack([np.interp(accel.t[still], field.t, field.value[:, k]) for k in range(3)])
@@ -252,7 +252,7 @@ def _of_two(alike: list[Fit], field: Reading3, accel: Reading3 | None) -> tuple[
     pair = [fit for fit in ranked if np.array_equal(fit.axes, best.axes) or np.array_equal(fit.axes, -best.axes)]
     if accel is None or len(pair) < 2:
         return best, ""
-    still = resting(accel, None) & (np.abs(np.linalg.norm(accel.value, axis=1) - G0) < 0.15 * G0)
+    still = resting(accel, None)
     if still.sum() < 10:
         return best, ""
     t, up = accel.t[still], accel.value[still] / G0

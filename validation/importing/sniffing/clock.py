@@ -93,8 +93,7 @@ def _rank(numbers: Numbers, k: int, clock: Clock) -> int:
 
 def _clock(numbers: Numbers, k: int, name: str) -> Clock | None:
     cells = numbers.cells(k)
-    first = list(islice(cells, 50))
-    if sum(map(is_stamp, first)) > 0.5 * len(first):
+    if _are_stamps(cells):
         time = _stamps(cells)
         why = Decision("time", f"'{name}', date and time", "certain", "its cells are dates with a time")
         return Clock(name, "iso", None, None, why) if _ascends(time) else None
@@ -183,6 +182,12 @@ def _written(name: str) -> str | None:
     return None
 
 
+def _are_stamps(cells: Iterable[str]) -> bool:
+    """Tell a column most of whose first cells are dates with a time."""
+    first = list(islice(cells, 50))
+    return sum(map(is_stamp, first)) > 0.5 * len(first)
+
+
 def _stamps(cells: Iterable[str]) -> FloatArray:
     """Return dates with a time (or times of day) as seconds; NaN where one is neither."""
     found = [iso_seconds(cell) for cell in cells]
@@ -224,8 +229,13 @@ def _coarse(numbers: Numbers) -> tuple[str, Counted] | None:
     """Return the column of time that goes on once in many rows, by whole seconds or minutes, and what it counts."""
     for k, name in enumerate(numbers.table.columns):
         cells = numbers.cells(k)
-        if sum(map(is_stamp, first := list(islice(cells, 50)))) > 0.5 * len(first):
-            counted = counted_rows(_stamps(cells))
+        if _are_stamps(cells):
+            changed = ~cells.repeated()
+            if np.mean(changed) > STEPS:
+                continue  # a clock, or none
+            stamps = np.full(len(changed), np.nan)
+            stamps[changed] = _stamps(cells[row] for row in np.flatnonzero(changed).tolist())
+            counted = counted_rows(stamps)
         elif is_time_name(numbers.names[k]) and _in_seconds(numbers.values[:, k], numbers.names[k]):
             counted = counted_rows(numbers.values[:, k])
         else:

@@ -32,17 +32,18 @@ class Counted(NamedTuple):
 def counted_rows(stamps: FloatArray) -> Counted | None:
     """Return the rows per second between changes of ``stamps``, (n,) s that ascend; None where they tell none.
 
-    The first and the last second are cut off by the log. A change lies between two rows: the count of a stretch is sure
-    to a row, which has a standard deviation of 1/sqrt(6) where both its ends are anywhere within one.
+    Rows that repeat the stamp before may be left out, as NaN. The first and the last second are cut off by the log. A
+    change lies between two rows: the count of a stretch is sure to a row, which has a standard deviation of 1/sqrt(6)
+    where both its ends are anywhere within one.
     """
     known = np.flatnonzero(np.isfinite(stamps))
     steps = np.diff(stamps[known])
     changes = np.flatnonzero(steps > 0)
     if changes.size < FEWEST + 1 or np.any(steps < 0):
         return None
-    rows = np.diff(known[changes]).astype(np.float64)
-    # a stamp that has just changed is true to a row; how far it went since is the length of the second before
-    spans = np.diff(stamps[known[changes + 1]])
+    # a stamp that has just changed is true to a row
+    new = known[changes + 1]
+    rows, spans = np.diff(new).astype(np.float64), np.diff(stamps[new])
     each = rows / spans
     usual = np.abs(each / np.median(each) - 1) <= USUAL
     rows, spans = rows[usual], spans[usual]

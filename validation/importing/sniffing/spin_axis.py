@@ -74,7 +74,7 @@ def lying_axis(sensors: Mapping[str, Reading3], why: str = "") -> tuple[int | No
     if accel is None:
         return _none(why)
     norm = np.linalg.norm(accel.value, axis=1)
-    still = resting(accel, sensors.get("gyroscope")) & (np.abs(norm - G0) < 0.15 * G0)
+    still = resting(accel, sensors.get("gyroscope"))
     upright = np.abs(accel.value[still]) > 0.9 * norm[still, None]  # within 25 degrees
     share = upright.mean(axis=0) if len(upright) >= 10 else np.zeros(3)
     axis = int(np.argmax(share))
@@ -98,7 +98,6 @@ def odd_one(sensors: Mapping[str, Reading3]) -> Odd | None:
         axis, decision = _still_axis(while_spinning(field, gyro))
         stands = axis if decision.sure == "likely" else None
     lies, _ = lying_axis(sensors)
-    pulled = "accelerometer" in sensors and abs(along_spin(turns, sensors)) > MOST_LIFT
     said = f"the gyroscope turns about {'xyz'[turns]}"
     if stands is not None:
         said += f", the field stands still along {'xyz'[stands]}"
@@ -110,9 +109,10 @@ def odd_one(sensors: Mapping[str, Reading3]) -> Odd | None:
         return Odd("magnetometer", stands, turns, _swap("magnetometer", stands, turns, said))
     if lies is None or lies == turns:
         return None
-    if not pulled:
+    pull = abs(along_spin(turns, sensors))
+    if pull <= MOST_LIFT:
         return Odd(None, lies, turns, f"{said}: it rests on its rim, or the accelerometer's axes are swapped")
-    said += f", but {abs(along_spin(turns, sensors)):.2g} m/s^2 along {'xyz'[turns]} are no lift"
+    said += f", but {pull:.2g} m/s^2 along {'xyz'[turns]} are no lift"
     if stands is not None:
         return Odd("accelerometer", lies, turns, _swap("accelerometer", lies, turns, said))
     return Odd(None, lies, turns, f"{said}: the axes of gyroscope or accelerometer are swapped; which is open")
@@ -141,9 +141,9 @@ def along_spin(axis: int, sensors: Mapping[str, Reading3]) -> float:
 
 
 def resting(accel: Reading3, gyro: Reading3 | None) -> BoolArray:
-    """Return the rows without a jump (5 % of g from the row before) and without turning, (n,)."""
+    """Return the rows (n,) that read gravity alone: no jump (5 % of g from the row before), no turning, about g."""
     step = np.linalg.norm(np.diff(accel.value, axis=0, prepend=accel.value[:1]), axis=1)
-    still = step < 0.05 * G0
+    still = (step < 0.05 * G0) & (np.abs(np.linalg.norm(accel.value, axis=1) - G0) < 0.15 * G0)
     if gyro is not None:
         rate = np.interp(accel.t, gyro.t, np.nan_to_num(np.linalg.norm(gyro.value, axis=1), nan=np.inf))
         still &= rate < 1.0  # rad/s: centripetal pull at 0.1 m is then 1 % of g
@@ -188,7 +188,7 @@ def _fast(rate: FloatArray) -> BoolArray:
     """Return the rows of at least half the largest rate that is kept for more than a few rows, (n,)."""
     norm = np.linalg.norm(rate, axis=1)
     norm = np.where(np.isfinite(norm), norm, 0.0)
-    top = np.sort(norm)[-min(norm.size, max(5, norm.size // 200))]
+    top = np.partition(norm, place := -min(norm.size, max(5, norm.size // 200)))[place]
     return np.asarray((norm >= 0.5 * top) & (norm > FAST))
 
 

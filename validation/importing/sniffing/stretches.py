@@ -16,7 +16,7 @@ import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.signal import savgol_filter
 
-from discsim.arrays import BoolArray, ComplexArray, FloatArray
+from discsim.arrays import BoolArray, ComplexArray, FloatArray, runs
 from discsim.clipping import clipped
 from discsim.validation.importing.conversion import RawReadings
 from discsim.validation.importing.sniffing.spin_axis import FAST
@@ -95,7 +95,7 @@ def stretches(read: RawReadings) -> list[Stretch]:
     zero = min(float(found.time[0]) for found in read.readings.values())
     main = next(iter(read.readings.values()))
     found = []
-    for first, stop in _runs(free):
+    for first, stop in runs(free):
         start, end = float(seen.t[first]), float(seen.t[stop - 1])
         if end - start < SHORTEST:
             continue
@@ -224,8 +224,3 @@ def _impacts(read: RawReadings, t: FloatArray) -> BoolArray:
     for moment in time[1:][jump > IMPACT]:
         hit |= np.abs(t - moment) <= HALF
     return hit
-
-
-def _runs(mask: BoolArray) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
