@@ -43,6 +43,7 @@ def command(
 
     started = time.monotonic()
     limits = parse_sizes(",".join(limit or ()), "--limit")
+    rates, against = _in_folder(rates, "rate.csv"), _in_folder(against, "truth.csv")
     with start_run(out, inputs=[rates, against]):
         found = score_rates(read_rates(rates, magnitude=magnitude), read_truth(against), limits)
         found.report(out)
@@ -51,3 +52,8 @@ def command(
     typer.echo(found.summary())
     if not found.ok:
         raise typer.Exit(1)
+
+
+def _in_folder(path: Path, name: str) -> Path:
+    """Return the file of that name where ``path`` is a folder that some command wrote, else the path itself."""
+    return path / name if path.is_dir() else path

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
@@ -22,6 +23,16 @@ _RATES: Mapping[str, float] = MappingProxyType(
     {"rate_rad_s": 1.0, "r_rad_s": 1.0, "rate_deg_s": _DEG, "rate_rpm": _RPM, "yaw_rate_deg_s": _DEG}
 )
 _SDS: Mapping[str, float] = MappingProxyType({"sd_rad_s": 1.0, "sd_deg_s": _DEG, "sd_rpm": _RPM})
+#: other names of a rate with its unit, as Rate (deg/s) or spin_dps, and rad/s per unit; Hz alone is no rate of turning
+_RATE_NAME = re.compile(r"(?:yaw|spin|r|omega)?[ _]?(?:rate)?[ _]?[(\[]?(rad[_/]s|deg[_/]s|°/s|dps|rpm|hz)[)\]]?", re.I)
+_RATE_UNITS: Mapping[str, float] = MappingProxyType(
+    {"rad/s": 1.0, "deg/s": _DEG, "°/s": _DEG, "dps": _DEG, "rpm": _RPM, "hz": 2.0 * np.pi}
+)
+#: other names of a time, as Time (s), t_ms or timestamp, and seconds per unit
+_TIME_NAME = re.compile(r"(?:timestamp|time|t)[ _]?[(\[]?(s|sec|seconds|ms|us|µs)?[)\]]?", re.I)
+_TIME_UNITS: Mapping[str, float] = MappingProxyType({"ms": 1e-3, "us": 1e-6, "µs": 1e-6})
+#: what stands between cells, in the order in which it is looked for in a header; a comma is in numbers beside the first
+_BETWEEN = (";", "\t", ",")
 #: methods that give magnitudes, as `estimate` writes them
 _UNSIGNED = ("fft", "accelerometer")
 
@@ -30,8 +41,9 @@ def read_rates(path: Path, *, magnitude: bool = False) -> list[YawRate]:
     """Read rates over time, one for each name in a column ``method`` if there is one.
 
     Columns: ``time_s``, one of ``rate_rad_s``, ``rate_deg_s``, ``rate_rpm``; if present ``method`` and ``sd_...``.
-    An empty cell is a value that is not known. ``magnitude`` says that the rates have no sign. Raises `InputError`
-    naming file, line and what was expected.
+    Names that say the same, as ``Time (ms)`` and ``spin_dps``, are taken too; so are cells between semicolons, with
+    decimal commas, and between tabs. An empty cell is a value that is not known. ``magnitude`` says that the rates have
+    no sign. Raises `InputError` naming file, line and what was expected.
     """
     return [
         YawRate(name, t, rate, sd, signed=not (magnitude or name in _UNSIGNED)) for name, t, rate, sd in _groups(path)
@@ -55,10 +67,12 @@ def read_truth(path: Path) -> YawRate:
 def _groups(path: Path) -> Iterator[tuple[str, FloatArray, FloatArray, FloatArray]]:
     """Yield name, times, rates and sds (n,) of each method of a file, in the order of the file."""
     lines = read_text(path).splitlines()
-    rows = list(csv.reader(lines))
+    between = next((one for one in _BETWEEN if lines and one in lines[0]), ",")
+    rows = list(csv.reader(lines, delimiter=between))
     header = [cell.strip() for cell in rows[0]] if rows else []
-    rate_column = next((name for name in _RATES if name in header), None)
-    if "time_s" not in header or rate_column is None:
+    time_at, per_time = _time_column(header)
+    rate_at, per_rate = _rate_column(header)
+    if time_at is None or rate_at is None:
         raise InputError.at(
             path, 1, f"header {', '.join(header) or 'is empty'}; expected time_s and one of {', '.join(_RATES)}"
         )
@@ -71,10 +85,12 @@ def _groups(path: Path) -> Iterator[tuple[str, FloatArray, FloatArray, FloatArra
         if len(row) != len(header):
             raise InputError.at(path, number, f"has {len(row)} cells; expected {len(header)}")
         name = path.stem if method is None else row[method].strip()
-        time = _number(path, number, row[header.index("time_s")])
+        if between == ";":
+            row = [cell.replace(",", ".") for cell in row]
+        time = _number(path, number, row[time_at]) * per_time
         if not np.isfinite(time):
             raise InputError.at(path, number, "has no time; expected a number of seconds")
-        rate = _number(path, number, row[header.index(rate_column)]) * _RATES[rate_column]
+        rate = _number(path, number, row[rate_at]) * per_rate
         sd = 0.0 if sd_column is None else _number(path, number, row[header.index(sd_column)]) * _SDS[sd_column]
         table = tables.setdefault(name, [])
         if table and time <= table[-1][0]:
@@ -87,6 +103,29 @@ def _groups(path: Path) -> Iterator[tuple[str, FloatArray, FloatArray, FloatArra
         known = np.isfinite(rate_rad_s)
         # an sd that is not told is none
         yield name, t, rate_rad_s, np.where(known, np.nan_to_num(sd_rad_s), np.nan)
+
+
+def _time_column(header: Sequence[str]) -> tuple[int | None, float]:
+    """Return where a header has the time, and seconds per unit: ``time_s``, else the first name that means a time."""
+    if "time_s" in header:
+        return header.index("time_s"), 1.0
+    named = ((k, found) for k, cell in enumerate(header) if (found := _TIME_NAME.fullmatch(cell)))
+    for k, found in named:
+        return k, _TIME_UNITS.get((found[1] or "s").lower(), 1.0)
+    return None, 1.0
+
+
+def _rate_column(header: Sequence[str]) -> tuple[int | None, float]:
+    """Return where a header has the rate, and rad/s per unit: one of `_RATES`, else the first that tells its unit."""
+    for name, per_unit in _RATES.items():
+        if name in header:
+            return header.index(name), per_unit
+    named = (
+        (k, found) for k, cell in enumerate(header) if (found := _RATE_NAME.fullmatch(cell)) and cell.lower() != "hz"
+    )
+    for k, found in named:
+        return k, _RATE_UNITS[found[1].lower().replace("_", "/")]
+    return None, 1.0
 
 
 def _number(path: Path, line: int, cell: str) -> float:

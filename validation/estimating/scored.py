@@ -24,7 +24,8 @@ __all__ = ["FIGURES", "RateErrors", "ScoredRates", "score_rates"]
 class RateErrors(NamedTuple):
     """How far one rate is from the truth, deg/s where no unit is named.
 
-    ``known`` is the share of its values, within the truth's time, that are known; ``delay`` how late it follows
+    ``values`` are those within the truth's time, ``outside`` the others; ``known`` is the share of the former that are
+    known; ``delay`` how late it follows
     changes of the truth, s (NaN where that does not change, or by one slope only). ``within`` is the share of its
     errors within two of its own standard deviations, NaN where it states none.
     """
@@ -38,6 +39,8 @@ class RateErrors(NamedTuple):
     p95: float
     delay: float
     within: float
+    outside: int = 0
+    note: str = ""
 
 
 #: figures that may be limited, and what each limit means
@@ -73,6 +76,11 @@ class ScoredRates:
         """Whether all is within the limits."""
         return all(item.ok for item in self.scores)
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What looks wrong in how rates are written, not in the rates: a unit, a sign, times without a truth."""
+        return tuple(f"note: {one.method}: {one.note}" for one in self.errors if one.note)
+
     def summary(self) -> str:
         """Return a line for each rate, and for each limit."""
         lines = [
@@ -81,7 +89,7 @@ class ScoredRates:
             + (f", {1000 * one.delay:+.1f} ms late" if np.isfinite(one.delay) else "")
             for one in self.errors
         ]
-        return "\n".join([*lines, *map(_line, self.scores)])
+        return "\n".join([*lines, *self.notes, *map(_line, self.scores)])
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of score.json."""
@@ -157,7 +165,7 @@ def _errors_told(found: ScoredRates, figure: Path) -> Section:
         for one in found.errors
     ]
     figures = [("Rates, and what they differ from the truth by", figure)]
-    return Section("Errors", (text,), header, rows, figures)
+    return Section("Errors", (text, *found.notes), header, rows, figures)
 
 
 def _or_dash(value: float, decimals: int, unit: str = "") -> str:
@@ -212,6 +220,8 @@ def _delay(t: FloatArray, slope: FloatArray, error: FloatArray) -> float:
 def _errors(rate: YawRate, truth: YawRate) -> RateErrors:
     t, true = rate.t, truth.at(rate.t)
     covered = (t >= truth.t[0]) & (t <= truth.t[-1])
+    outside = int(np.count_nonzero(~covered))
+    _with_seconds(rate, truth)
     if not np.any(covered):
         raise InputError(
             f"{rate.method}: times {t[0]:g} to {t[-1]:g} s, the truth's {truth.t[0]:g} to {truth.t[-1]:g} s; "
@@ -221,7 +231,7 @@ def _errors(rate: YawRate, truth: YawRate) -> RateErrors:
     known = float(np.count_nonzero(np.isfinite(rate.rate[covered])) / np.count_nonzero(covered))
     if not np.any(both):
         nothing = (np.nan,) * 6
-        return RateErrors(rate.method, int(covered.sum()), known, *nothing)
+        return RateErrors(rate.method, int(covered.sum()), known, *nothing, outside)
     measured, actual = (rate.rate[both], true[both]) if rate.signed else (np.abs(rate.rate[both]), np.abs(true[both]))
     error = measured - actual
     size = np.degrees(np.abs(error))
@@ -242,4 +252,49 @@ def _errors(rate: YawRate, truth: YawRate) -> RateErrors:
         float(np.percentile(size, 95)),
         delay,
         within,
+        outside,
+        _note(measured, actual, outside, t.size),
     )
+
+
+#: what rates are of the truth where they stand under a wrong name or with a wrong sign, and what is likely then
+_MISTAKEN: Mapping[float, str] = {
+    -1.0: "the truth's with the other sign; a sensor upside down? --magnitude compares without signs",
+    180.0 / np.pi: "57.3 times the truth's: deg/s under a name of rad/s?",
+    np.pi / 180.0: "1/57.3 of the truth's: rad/s under a name of deg/s?",
+    30.0 / np.pi: "9.55 times the truth's: rpm under a name of rad/s?",
+    np.pi / 30.0: "1/9.55 of the truth's: rad/s under a name of rpm?",
+    6.0: "6 times the truth's: deg/s under a name of rpm?",
+    1.0 / 6.0: "1/6 of the truth's: rpm under a name of deg/s?",
+    0.5 / np.pi: "1/6.28 of the truth's: turns per second under a name of rad/s?",
+}
+#: a rate is such a multiple to this share of it: less than half of what is between 1/6 and 1/6.28
+_MULTIPLE = 0.02
+
+
+def _note(measured: FloatArray, actual: FloatArray, outside: int, values: int) -> str:
+    """Return what looks wrong in how rates (n,) beside a truth (n,) are written; empty where nothing does."""
+    of_truth = float(actual @ actual)
+    ratio = float(measured @ actual) / of_truth if of_truth > 0.0 else 1.0
+    for multiple, said in _MISTAKEN.items():
+        rest = measured - multiple * actual
+        if abs(ratio / multiple - 1.0) < _MULTIPLE and rest @ rest < (_MULTIPLE * multiple) ** 2 * of_truth:
+            return f"the rates are {said}"
+    if 2 * outside > values:
+        return f"{outside} of {values} values lie outside the truth's time and are not scored"
+    return ""
+
+
+#: spans of rates by the truth's that no log has beside its truth, and the unit that is likely then: an hour for 3.6 s
+_SPANS: Mapping[str, tuple[float, float]] = {"milliseconds": (500.0, 2000.0), "microseconds": (5e5, 2e6)}
+
+
+def _with_seconds(rate: YawRate, truth: YawRate) -> None:
+    """Raise `InputError` where the times of a rate last so much longer than the truth's that they are no seconds."""
+    span = float(rate.t[-1] - rate.t[0]) / max(float(truth.t[-1] - truth.t[0]), 1e-12)
+    for unit, (low, high) in _SPANS.items():
+        if low < span < high:
+            raise InputError(
+                f"{rate.method}: times last {rate.t[-1] - rate.t[0]:g} s, the truth's {truth.t[-1] - truth.t[0]:g} s; "
+                f"expected seconds (these look like {unit}: name the column time_{'ms' if low < 1e3 else 'us'})"
+            )

@@ -153,3 +153,52 @@ def test_a_truth_is_one_rate_over_time(tmp_path):
     path.write_text("time_s,rate_rad_s\n0,1\n")
     with pytest.raises(InputError, match="fewer than two"):
         read_truth(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "t", "spin"),
+    [
+        ("Time (ms), Spin rate (deg/s)\n0,90\n500,180\n", 0.5, np.pi),
+        ("t_us;spin_dps\n0;90,0\n500000;180,0\n", 0.5, np.pi),
+        ("timestamp\tyaw_rate_rpm\n0\t30\n0.5\t60\n", 0.5, 2 * np.pi),
+    ],
+)
+def test_other_names_units_and_separators_that_say_the_same_are_read(tmp_path, text, t, spin):
+    path = tmp_path / "mine.csv"
+    path.write_text(text)
+    (found,) = read_rates(path)
+    assert (found.t[1], found.rate[1]) == pytest.approx((t, spin))
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"), [(180 / np.pi, "deg/s under a name of rad/s"), (1 / 6, "rpm"), (-1.0, "the other sign")]
+)
+def test_a_unit_or_a_sign_that_is_likely_wrong_is_noted(factor, said):
+    found = score_rates([rate(T, factor * (SPIN + 0.1))], TRUTH)
+    assert said in found.errors[0].note
+    assert said in found.summary()
+
+
+def test_no_note_where_rates_are_merely_wrong():
+    found = score_rates([rate(T, 1.1 * SPIN), rate(T, SPIN - 100.0), rate(T, np.full(T.size, 8.0))], TRUTH)
+    assert [one.note for one in found.errors] == ["", "", ""]
+
+
+def test_values_outside_the_truth_s_time_are_counted_and_noted_where_most_are():
+    t = np.linspace(0.0, 30.0, 301)
+    found = score_rates([rate(t, np.full(t.size, 50.0))], TRUTH).errors[0]
+    assert (found.values, found.outside) == (101, 200)
+    assert "200 of 301 values lie outside" in found.note
+
+
+def test_milliseconds_under_the_name_of_seconds_are_refused():
+    with pytest.raises(InputError, match="look like milliseconds: name the column time_ms"):
+        score_rates([rate(1000 * T, SPIN)], TRUTH)
+
+
+def test_folders_that_commands_wrote_stand_for_their_files(tmp_path, monkeypatch):
+    for name in ("rate", "truth"):
+        (tmp_path / name).mkdir()
+        write(tmp_path / name / f"{name}.csv", "time_s,rate_rad_s", T, SPIN)
+    words = [str(tmp_path / "rate"), "--against", str(tmp_path / "truth"), "--out", str(tmp_path / "out")]
+    assert command(monkeypatch, *words) == 0
