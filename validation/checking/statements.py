@@ -7,7 +7,7 @@ from math import pi
 
 import numpy as np
 
-from discsim.disc import Disc, Release
+from discsim.disc import Aero, Disc, Release
 from discsim.glitches import FASTEST_SPIN
 from discsim.recording import Recording
 from discsim.validation.checking.finding import Finding, Severity
@@ -28,6 +28,8 @@ DIAMETER = (0.18, 0.32)
 HEIGHT = 1 / 6
 #: a fast throw is 36 m/s (the distance record is of 40); with a margin
 FASTEST = 45.0
+#: angle of attack of the least drag, rad: published ones are -0.17 (-CL0/CLa of Hummel, 2003) to 0.07
+ZERO_LIFT = 0.3
 #: a storm, m/s
 WIND = 30.0
 
@@ -131,6 +133,30 @@ def _disc(disc: Disc, *, thrown: bool) -> Iterator[Finding]:
         )
     if mass_ok and diameter_ok:  # bounds of inertia need both
         yield from _inertia(disc, unusual, remedy)
+    if disc.aero is not None:
+        yield from _aero(disc.aero)
+
+
+def _aero(aero: Aero) -> Iterator[Finding]:
+    """Yield a yaw damping of the wrong sign, and an angle that is in degrees."""
+    if aero.CNr > 0:
+        yield Finding(
+            "disc.CNr",
+            "warning",
+            "[disc.aero]",
+            f"CNr is {aero.CNr:g}",
+            "at most zero",
+            "a positive one drives what it should damp",
+        )
+    if abs(aero.alpha0) > ZERO_LIFT:
+        yield Finding(
+            "disc.alpha0",
+            "error",
+            "[disc.aero]",
+            f"alpha0_rad is {aero.alpha0:g}",
+            f"within +-{ZERO_LIFT} rad",
+            "in degrees?",
+        )
 
 
 def _inertia(disc: Disc, unusual: Severity, remedy: str) -> Iterator[Finding]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -59,7 +60,9 @@ def command(
         str, typer.Option(help="A shipped throw's name, or a TOML file with the keys of [release].")
     ] = "driver",
     speed: Annotated[float | None, typer.Option(help="In the place of the throw's: speed, m/s.")] = None,
-    launch: Annotated[float | None, typer.Option(help="... launch angle of the velocity, deg up.")] = None,
+    launch: Annotated[
+        float | None, typer.Option(min=-90.0, max=90.0, help="... launch angle of the velocity, deg up.")
+    ] = None,
     heading: Annotated[float | None, typer.Option(help="... heading, deg clockwise from north.")] = None,
     hyzer: Annotated[float | None, typer.Option(help="... hyzer, deg of lean to the side it fades to.")] = None,
     nose: Annotated[float | None, typer.Option(help="... nose angle, deg of the disc's plane above its path.")] = None,
@@ -98,6 +101,7 @@ def command(
     from discsim.recording import write_recording
     from discsim.sensors import Instruments, record
     from discsim.shipped import load_throw
+    from discsim.validation.checking.statements import statement_findings
     from discsim.validation.reporting.run import start_run
     from discsim.validation.reporting.truth import write_flight_truth
 
@@ -121,7 +125,9 @@ def command(
         recording = record(motion, instruments, run.rng, plant="flight", name=out.resolve().name, disc=body)
         write_recording(recording, out)
         write_flight_truth(out / "truth.csv", motion)
-    for note in (*notes, *passed, f"{out}: {_end(motion)}"):
+    unlikely = [found.sentence for found in statement_findings(replace(recording, release=release))
+                if found.severity != "note"]  # fmt: skip
+    for note in (*notes, *passed, *unlikely, f"{out}: {_end(motion)}"):
         typer.echo(note)
 
 

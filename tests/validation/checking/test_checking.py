@@ -197,6 +197,20 @@ def test_a_disc_in_other_units_is_an_error_that_names_them(disc, id, words):
     assert words in sentence(check, id)
 
 
+@pytest.mark.parametrize(
+    ("change", "id", "words"),
+    [
+        ({"alpha0": -3.0}, "disc.alpha0", "in degrees?"),
+        ({"CNr": 0.0045}, "disc.CNr", "expected at most zero"),
+    ],
+)
+def test_an_aerodynamic_number_that_cannot_be_is_named(change, id, words):
+    disc, there = load_disc("driver")
+    assert disc.aero is not None
+    recording = replace(rolled(), disc=replace(disc, aero=disc.aero._replace(**change)), environment=there)
+    assert words in sentence(check_recording(recording), id)
+
+
 @pytest.mark.parametrize("name", model_names("discs"))
 def test_every_shipped_disc_is_one(name):
     disc, there = load_disc(name)

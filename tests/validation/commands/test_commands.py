@@ -171,6 +171,27 @@ def test_an_effect_on_the_command_line_reaches_flight_and_sensors(monkeypatch, t
     assert "hard_iron" not in (tmp_path / "windy" / "recording.toml").read_text()
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--speed", "80"], "thrown at 80 m/s; expected up to 45; in km/h?"),
+        (["--spin", "4000"], "expected up to 250 rad/s; in deg/s?"),
+        (["--module", "mass_kg=15"], "mass_kg is 15.179"),
+        ([], ""),
+    ],
+)
+def test_a_throw_or_a_disc_that_cannot_be_is_said_aloud(monkeypatch, tmp_path, capsys, words, said):
+    flown = ["fly", "--engine", "trajectory", "--duration", "0.2", "--out", str(tmp_path / "flight"), *words]
+    assert run(monkeypatch, *flown) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 1 + bool(said)
+    assert said in lines[0]
+
+
+def test_a_launch_beyond_straight_up_is_refused(monkeypatch, tmp_path):
+    assert run(monkeypatch, "fly", "--launch", "120", "--out", str(tmp_path / "flight")) == 2
+
+
 def test_a_fault_of_the_setup_is_flown_by_command_and_by_model(monkeypatch, tmp_path):
     """Same seed, so what was meant is the same: only what is written differs."""
     faults = [effect("mag.axes", axes="x -y z"), effect("gyro.units", written_in="deg/s")]
