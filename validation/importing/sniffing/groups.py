@@ -13,6 +13,7 @@ import numpy as np
 from discsim.arrays import BoolArray, FloatArray
 from discsim.recording import SENSORS
 from discsim.validation.importing.cell_texts import CellTexts, number
+from discsim.validation.importing.overflow import continued
 from discsim.validation.importing.raw_table import RawTable
 from discsim.validation.importing.sniffing.dialect import Dialect
 from discsim.validation.importing.sniffing.names import Name, penalty_of, read_name, says_nothing, sensor_of
@@ -112,9 +113,15 @@ class Triple:
 
     @cached_property
     def values(self) -> FloatArray:
-        """Its readings as written, (n, 3)."""
+        """Its readings as written, (n, 3); a gyroscope's continued where its register overflowed."""
         value = np.asarray(self.numbers.values[:, list(self.columns)])
-        return value if self.where is None else value[self.rows]
+        value = value if self.where is None else value[self.rows]
+        if self.sensor != "gyroscope":
+            return value
+        whole = [continued(column) for column in value.T]
+        if all(one is None for one in whole):
+            return value
+        return np.column_stack([c if one is None else one.value for c, one in zip(value.T, whole, strict=True)])
 
     @property
     def label(self) -> str:
