@@ -31,10 +31,11 @@ _ID_NAMES = ("id", "sensor", "sensorname", "sensor_name", "sensor_id", "sensorid
 
 @dataclass(frozen=True)
 class Numbers:
-    """A table's cells as numbers, and what its dialect says of it."""
+    """A table's cells as numbers, what its dialect says of it, and whether it is the only file there."""
 
     table: RawTable
     dialect: Dialect
+    alone: bool = False
 
     @property
     def path(self) -> Path:
@@ -177,7 +178,8 @@ def _named(
         if sensor == COUNTS:
             sensor = None
     back = penalty_of(name.base) + penalty_of("" if where is None else where[1])
-    if len(numbers.names) <= 8:  # a file per sensor: its name speaks of its columns
+    # a file per sensor: its name speaks of its columns; that of an only file (motion.csv, bias.csv) is the user's
+    if len(numbers.names) <= 8 and (not numbers.alone or source == "the file's name"):
         back += penalty_of(numbers.path.stem)
     return Triple(numbers, columns, name.base, sensor, source, tuple(meant), name.unit, back, where)
 
