@@ -58,6 +58,7 @@ def command(
     from discsim.recording import read_dataset
     from discsim.validation.estimating.spin_estimates import estimate_spin
     from discsim.validation.reporting.options import at_place
+    from discsim.validation.reporting.place import swapped_place
     from discsim.validation.reporting.run import Run, start_run
 
     zeros = max(0, 2**14 - window) if pad is None else pad
@@ -68,6 +69,8 @@ def command(
     given = read_dataset(recording)
     placed = [replace(one, environment=at_place(one.environment, place, date)) for one in given]
     shown = Run(out, [], None)  # what fails leaves no folder behind
+    if doubt := swapped_place(place, date, given):
+        shown.step(doubt)
     found = []
     for number, one in enumerate(placed, start=1):
         if len(placed) > 1:

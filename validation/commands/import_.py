@@ -65,6 +65,7 @@ def command(
     from discsim.validation.importing.imported_log import LogPart, take
     from discsim.validation.importing.sniffing import opened, recognised, sniff
     from discsim.validation.reporting.options import at_place
+    from discsim.validation.reporting.place import swapped_place
     from discsim.validation.reporting.run import start_run
 
     part = LogPart(None if rows is None else parse_rows(rows), throw, all_throws)
@@ -85,7 +86,7 @@ def command(
             import_map = replace(import_map, environment=at_place(import_map.environment, place, date))
             found = take(logged, raw.name, import_map, part, decisions)
             found.report(out)
-            _tell(run, found.remarks)
+            _tell(run, [*found.remarks, *filter(None, [swapped_place(place, date, found.recordings)])])
     for line in found.lines:
         typer.echo(line)
 

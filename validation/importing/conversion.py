@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-from bisect import bisect_left
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,18 +12,18 @@ from pathlib import Path
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray, IntArray
 from discsim.clipping import clipping_notes
 from discsim.disc import Release
 from discsim.errors import InputError
 from discsim.glitches import FASTEST_SPIN
-from discsim.limits import LARGEST_READING, time_fault
+from discsim.limits import time_fault
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
-from discsim.validation.importing.cell_texts import CellTexts, number
 from discsim.validation.importing.cleaning import Readings, cleaned, without_glitches
 from discsim.validation.importing.import_map import ImportMap, SensorMap, TimeBase
+from discsim.validation.importing.overflow import without_overflow
 from discsim.validation.importing.raw_table import RawTable, Repair, RepairList, read_raw
 from discsim.validation.importing.row_clock import RowClock, row_clock
+from discsim.validation.importing.sensor_rows import chosen_rows, sensor_rows
 from discsim.validation.importing.timing import row_timing
 
 __all__ = [
@@ -99,6 +98,8 @@ def read_readings(raw: Path, import_map: ImportMap, rows: slice | None = None) -
     repairs = RepairList(import_map.repairs)
     tables = _read_tables(raw, import_map, repairs)
     readings, notes = _read_sensors(raw, tables, import_map, rows, repairs)
+    readings, import_map, said = _over_the_ends(readings, import_map, tables, repairs)
+    notes += said
     # what was read as numbers is no longer needed as text
     emptied = {id(table): table.emptied() for table in tables.values()}
     tables = {sensor: emptied[id(table)] for sensor, table in tables.items()}
@@ -193,8 +194,8 @@ def _read_sensors(
             clocks[key] = row_clock(table, import_map, base, repairs)
             notes += _stretches(table, clocks[key], cut)
         clock = clocks[key]
-        found = _readings(table, sensor, names, sensor_map, import_map, clock, cut, repairs)
-        chosen = _chosen_rows(table, sensor_map)
+        found = sensor_rows(table, sensor, names, sensor_map, import_map, clock, cut, repairs)
+        chosen = chosen_rows(table, sensor_map)
         lost = chosen - found.time.size
         if found.time.size == 0:
             raise InputError.at(table.path, None, f"no usable row of the {sensor}; expected numbers in {names}")
@@ -223,6 +224,30 @@ def _read_sensors(
             raw, None, f"no sensor of the map '{import_map.name}' in it; expected {wanted}; {_there(tables, raw)}"
         )
     return readings, notes
+
+
+def _over_the_ends(
+    readings: dict[str, Readings], import_map: ImportMap, tables: dict[str, RawTable], repairs: RepairList
+) -> tuple[dict[str, Readings], ImportMap, list[str]]:
+    """Return readings and map with what a gyroscope's register that overflowed hid, or gaps there, and what to say.
+
+    All rows are looked at: the leap stands in the spin-up, before a throw.
+    """
+    gyro = readings.get("gyroscope")
+    if gyro is None:
+        return readings, import_map, []
+    found, beyond, said = without_overflow(gyro, readings)
+    if not said:
+        return readings, import_map, []
+    table = tables["gyroscope"]
+    line = int(table.line[np.searchsorted(table.number, gyro.number[np.argmax(beyond)])])
+    became = "continued" if np.array_equal(np.isnan(found.value), np.isnan(gyro.value)) else "made gaps"
+    action = f"{np.count_nonzero(beyond)} rows of gyroscope {became}, the first here"
+    repairs.add(None, table.path, line, "gyroscope: its register overflows", action)
+    readings = {**readings, "gyroscope": found}
+    own = import_map.sensors["gyroscope"]
+    own = replace(own, sheet=replace(own.sheet, range=None))  # what is continued is no reading at a limit
+    return readings, replace(import_map, sensors={**import_map.sensors, "gyroscope": own}), said
 
 
 def _own_rows(table: RawTable, names: Sequence[str]) -> RawTable:
@@ -394,143 +419,6 @@ def _there(tables: dict[str, RawTable], raw: Path) -> str:
     if not tables:
         return f"the files there are {_quoted(sorted(child.name for child in raw.iterdir()))}"
     return f"the columns there are {_quoted(next(iter(tables.values())).columns)}"
-
-
-# ---------------------------------------------------------------------------------------------------- readings
-
-
-def _chosen_rows(table: RawTable, sensor_map: SensorMap) -> int:
-    if sensor_map.time is not None:
-        return len(table)
-    if sensor_map.where is None:
-        return table.total
-    return int(np.count_nonzero(table.column(sensor_map.where[0]).equal(sensor_map.where[1])))
-
-
-def _readings(
-    table: RawTable,
-    sensor: str,
-    names: list[str],
-    sensor_map: SensorMap,
-    import_map: ImportMap,
-    clock: RowClock,
-    cut: slice | None,
-    repairs: RepairList,
-) -> Readings:
-    """Return the rows of one sensor that hold numbers and whose time ascends, of one stretch of the clock."""
-    here = clock.known
-    if sensor_map.where is not None:
-        here &= table.column(sensor_map.where[0]).equal(sensor_map.where[1])
-    if clock.starts and here.any():
-        wanted = np.zeros(table.total, dtype=np.bool_)
-        wanted[slice(None) if cut is None else cut] = True
-        counted = here & wanted[table.number]
-        counted[np.argmax(here)] |= not counted.any()
-        here &= clock.stretch == clock.longest(counted)
-    rows = np.flatnonzero(here)
-    value, sound = _values(table, rows, sensor, names, import_map, repairs)
-    kept = np.flatnonzero(sound)
-    kept = kept[_ascending(table, rows[kept], clock.time[rows[kept]], repairs)]
-    read = sensor_map.factor * value[kept]
-    if len(SENSORS[sensor].columns) == 3:
-        unseen = np.full(len(kept), np.nan)
-        # + 0.0 turns the -0.0 of a reversed zero into 0.0
-        columns = [unseen if axis is None else axis[1] * read[:, axis[0]] + 0.0 for axis in sensor_map.axes]
-        read = np.column_stack(columns)
-    if kept.size == len(table):  # sensors of one table share what they have in common
-        return Readings(table.number, clock.time, read)
-    return Readings(table.number[rows[kept]], clock.time[rows[kept]], read)
-
-
-def _values(
-    table: RawTable, rows: IntArray, sensor: str, names: list[str], import_map: ImportMap, repairs: RepairList
-) -> tuple[FloatArray, BoolArray]:
-    """Return a sensor's readings (n, k) in some rows (n,) as written, NaN for gaps, and which rows hold no other text.
-
-    A column that is empty in every row is listed once.
-    """
-    decimal, factor = import_map.layout.decimal, import_map.sensors[sensor].factor
-    value = np.empty((rows.size, len(names)))
-    hollow = set()
-    odd = np.zeros(rows.size, dtype=np.bool_)
-    for k, name in enumerate(names):
-        column = CellTexts(table.column(name).cells[rows])
-        if rows.size and np.all(column.equal("")):
-            hollow.add(name)
-            what = f"'{name}' is empty in every row"
-            repairs.add("number", table.path, int(table.line[rows[0]]), what, "gaps throughout")
-        value[:, k], _ = column.numbers(decimal)
-        with np.errstate(invalid="ignore"):
-            odd |= ~(np.abs(value[:, k] * factor) <= LARGEST_READING) & (name not in hollow)
-    sound = np.ones(rows.size, dtype=np.bool_)
-    for row in np.flatnonzero(odd).tolist():
-        found = _value(table, int(rows[row]), sensor, names, hollow, import_map, repairs)
-        sound[row] = found is not None
-        value[row] = np.nan if found is None else found
-    return value, sound
-
-
-def _value(
-    table: RawTable,
-    row: int,
-    sensor: str,
-    names: list[str],
-    hollow: set[str],
-    import_map: ImportMap,
-    repairs: RepairList,
-) -> list[float] | None:
-    """Return a row's readings of a sensor, NaN for gaps; None where a cell is no number. Each is listed."""
-    factor, line = import_map.sensors[sensor].factor, int(table.line[row])
-    value = []
-    for name in names:
-        cell = table.column(name)[row]
-        reading = number(cell, import_map.layout.decimal)
-        if reading is None:
-            what = f"'{name}' is '{cell[:40]}', no number"
-            repairs.add("number", table.path, line, what, f"row left out of {sensor}")
-            return None
-        if np.isnan(reading) and name not in hollow:
-            what = f"'{cell[:40]}'" if cell else "empty"
-            repairs.add("number", table.path, line, f"'{name}' is {what}", "gap")
-        elif abs(reading * factor) > LARGEST_READING:
-            what = f"'{name}' is '{cell[:40]}', more than {LARGEST_READING:g} in the {sensor}'s unit"
-            repairs.add("number", table.path, line, what, "gap")
-            reading = float("nan")
-        value.append(reading)
-    return value
-
-
-def _ascending(table: RawTable, rows: IntArray, times: FloatArray, repairs: RepairList) -> IntArray:
-    """Return the indices to keep of times (n,) s of rows (n,) so that time ascends strictly and the fewest are lost."""
-    if np.all(np.diff(times) > 0):
-        return np.arange(times.size)
-    # longest strictly ascending subsequence; of two equal stamps the first stays
-    ends: list[float] = []
-    chain: list[int] = []
-    before: list[int] = []
-    for index, time in enumerate(times.tolist()):
-        place = bisect_left(ends, time)
-        before.append(chain[place - 1] if place else -1)
-        if place == len(ends):
-            ends.append(time)
-            chain.append(index)
-        elif time < ends[place]:
-            ends[place], chain[place] = time, index
-    kept = []
-    index = chain[-1] if chain else -1
-    while index >= 0:
-        kept.append(index)
-        index = before[index]
-    kept.reverse()
-    first = {times[index]: index for index in reversed(kept)}
-    for index in np.setdiff1d(np.arange(times.size), kept).tolist():
-        what = f"time {times[index]:.9g} s is out of order"
-        if times[index] in first:
-            again = int(rows[first[times[index]]])
-            whole = table.cells(int(rows[index])) == table.cells(again)
-            what = f"time {times[index]:.9g} s is doubled" + ", and so is the row" * whole
-        repairs.add("time", table.path, int(table.line[rows[index]]), what, "row left out")
-    return np.array(kept)
 
 
 # --------------------------------------------------------------------------------------------- the recording

@@ -21,6 +21,7 @@ from discsim.validation.diagnosis.setup import find_setup_faults, suspected_faul
 from discsim.validation.importing.conversion import Imported, RawReadings, read_readings, repairs_csv
 from discsim.validation.importing.import_map import ImportMap, find_map, read_map
 from discsim.validation.importing.raw_table import Repair
+from discsim.validation.importing.resting import rest_notes
 from discsim.validation.importing.sniffing import (
     Decision,
     Stretch,
@@ -79,6 +80,8 @@ class ImportedLog(Result):
         What a proposed map decided, with reasons; empty with a map that was given.
     map_text : str
         The proposed map as TOML; empty with a map that was given.
+    notes : tuple of str
+        What a proposed map leaves out, and what was asked about names; empty with a map that was given.
     """
 
     name: str
@@ -89,6 +92,7 @@ class ImportedLog(Result):
     read: RawReadings
     decisions: tuple[Decision, ...] = ()
     map_text: str = ""
+    notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"<ImportedLog '{self.name}': {len(self.imported)} recordings, {len(self.throws)} throws found>"
@@ -102,6 +106,7 @@ class ImportedLog(Result):
     def remarks(self) -> list[str]:
         """What was repaired and noted, and what `check` finds wrong: a line each."""
         lines = list(dict.fromkeys(note for one in self.imported for note in one.notes))
+        lines += rest_notes(self.read.readings, self.import_map.environment)
         lines.append(self.imported[0].summary)
         lines += dict.fromkeys(advice for one in self.recordings for advice in check_recording(one).advice)
         axes = {sensor: own.axes for sensor, own in self.import_map.sensors.items()}
@@ -124,8 +129,8 @@ class ImportedLog(Result):
         return lines
 
     def summary(self) -> str:
-        """Return what was decided, the rows of each sensor, the throws, and the remarks: a line each."""
-        return "\n".join([*(decision.text for decision in self.decisions), *self.lines, *self.remarks])
+        """Return what was decided and left out, the rows of each sensor, the throws, and the remarks: a line each."""
+        return "\n".join([*(decision.text for decision in self.decisions), *self.notes, *self.lines, *self.remarks])
 
     def table(self) -> dict[str, list[Any]]:
         """Return a row for each repair: recording, and what repairs.csv has."""
@@ -210,12 +215,13 @@ def import_log(
         known = recognised(logged) if map == "auto" else named
         text = ""
         decisions: tuple[Decision, ...] = ()
+        notes: tuple[str, ...] = ()
         if known is None:
             screened = sniff(logged, plant)
-            text, decisions = map_text(screened), tuple(screened.all_decisions)
+            text, decisions, notes = map_text(screened), tuple(screened.all_decisions), tuple(screened.notes)
             write_text(Path(place) / "map.toml", text)
             known = read_map(Path(place) / "map.toml")
         if environment is not None:
             known = replace(known, environment=environment)
         found = take(logged, path.name, known, part, decisions)
-    return replace(found, map_text=text)
+    return replace(found, map_text=text, notes=notes)

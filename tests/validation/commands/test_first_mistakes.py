@@ -47,6 +47,11 @@ def restarted(table: np.ndarray) -> np.ndarray:
     return table
 
 
+def wrapped(table: np.ndarray, end: float) -> np.ndarray:
+    table[:, GYRO] = (table[:, GYRO] + end) % (2 * end) - end
+    return table
+
+
 MISTAKES: dict[str, Callable[[Path], str]] = {
     "rad/s under a header of deg/s": lambda folder: text(scaled(rows(folder), GYRO, np.pi / 180), {"g": "_dps"}),
     "milligauss under a header of uT": lambda folder: text(scaled(rows(folder), MAG, 10.0), {"m": "_uT"}),
@@ -58,6 +63,7 @@ MISTAKES: dict[str, Callable[[Path], str]] = {
     "semicolons and decimal commas": lambda folder: text(rows(folder), sep=";").replace(".", ","),
     "a clock that starts anew": lambda folder: text(restarted(rows(folder, throws=2))),
     "a gyroscope at the end of its range": lambda folder: text(rows(folder, spin_deg_s=3600.0)),
+    "a gyroscope whose register overflows": lambda folder: text(wrapped(rows(folder), 1000.0)),
     "one axis reversed, one throw": lambda folder: text(scaled(rows(folder), slice(9, 10), -1.0)),
     "one axis reversed, two throws": lambda folder: text(scaled(rows(folder, throws=2), slice(9, 10), -1.0)),
 }

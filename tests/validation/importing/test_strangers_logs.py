@@ -227,6 +227,35 @@ def test_of_two_names_that_are_a_slip_away_and_of_none_neither_is_proposed(tmp_p
     assert "is it 'gzz'?" in beside.notes[0]  # qz has mates of its own
 
 
+@pytest.mark.parametrize("names", [["gyr_x", "gyo_y", "gyrox_z"], ["gyro x", "gyor y", "gyrp z"]])
+def test_columns_of_a_sensor_no_two_of_which_are_named_alike_are_named_with_the_line_of_a_map(tmp_path, names):
+    columns = [("t_s", LOG.t), *three(named("Acc{} [g]"), LOG.accel / G0), *three(names, LOG.gyro / DEG)]
+    proposal = sniff(write_table(tmp_path / "log.csv", [*columns, ("batt_V", 4.0 + 0 * LOG.t)]))
+    quoted = ", ".join(f'"{name}"' for name in names)
+    x, y, z = names
+    assert proposal.notes[0] == (
+        f"the gyroscope was not taken, for its columns are not named alike: probably x in '{x}', y in '{y}', z in "
+        f"'{z}'. Rename them alike, or write in a map: [sensors.gyroscope] columns = [{quoted}], unit = its unit"
+    )
+    with pytest.raises(InputError, match="not named alike"):
+        sniff(write_table(tmp_path / "alone.csv", columns[:1] + columns[4:]))
+
+
+def test_the_axis_that_columns_not_named_alike_lack_is_named(tmp_path):
+    names = ["gyr_x", "spin", "gyrox_z"]
+    columns = [("t_s", LOG.t), *three(named("Acc{} [g]"), LOG.accel / G0), *three(names, LOG.gyro / DEG)]
+    (line, _) = sniff(write_table(tmp_path / "log.csv", columns)).notes
+    assert "probably x in 'gyr_x', z in 'gyrox_z'; y was not found" in line
+
+
+def test_a_third_column_of_another_spelling_is_proposed_with_its_unit(tmp_path):
+    names = ["acc_x [g]", "acc_y [g]", "acel_z [g]"]
+    columns = [("t_s", LOG.t), *three(named("g{}"), LOG.gyro), *three(names, LOG.accel / G0)]
+    (line, _) = sniff(write_table(tmp_path / "log.csv", columns)).notes
+    assert "is it 'acel_z [g]'? Rename it, or write in a map: [sensors.accelerometer] columns = [" in line
+    assert line.endswith('unit = "g"')
+
+
 def test_a_log_all_of_whose_columns_are_read_says_nothing_of_others(tmp_path):
     columns = [("t_s", LOG.t), *three(named("a{}"), LOG.accel / G0), *three(named("g{}"), LOG.gyro / DEG)]
     assert sniff(write_table(tmp_path / "log.csv", columns)).notes == ()

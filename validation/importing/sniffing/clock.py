@@ -207,7 +207,12 @@ def _without(numbers: Numbers) -> Clock:
     ]
     if unread:
         cell = next(cell for cell in numbers.cells(unread[0]) if cell)
-        why = f"'{numbers.table.columns[unread[0]]}' tells no time here (its first cell is '{cell[:30]}'); {why[16:]}"
+        steps = np.diff(numbers.values[:, unread[0]])
+        back = "; it runs BACKWARDS: turn the rows round, or all turns come in reversed" * bool(
+            np.mean(steps < 0) > ASCENDING
+        )
+        name = numbers.table.columns[unread[0]]
+        why = f"'{name}' tells no time here (its first cell is '{cell[:30]}'{back}); {why[16:]}"
     stated = stated_rate((*numbers.dialect.preamble, numbers.path.stem))
     if stated is not None and SPACING[0] <= 1 / stated[0] <= SPACING[1]:
         off, step, sure = OFF_STATED, float(f"{1 / stated[0]:.12g}"), _sure("likely")

@@ -23,6 +23,8 @@ HEAD_LINES = 200
 #: A line is a record where this share of its cells are numbers or stamps: a record of a long table (sensor, time, x, y,
 #: z) has four of five, a logged event beside numbers two of five; a header has none.
 RECORD_SHARE = 0.4
+#: What the last column is called where the header has a name too few.
+UNNAMED = "unnamed"
 _COMMENTS = ("#", "%", "//", "!")
 _LIST = re.compile(r"\[[^\[\]]*,[^\[\]]*\]")
 
@@ -55,8 +57,8 @@ def dialect_of(path: Path) -> Dialect:
     records = [index for index, _ in islice(_records(_bare(lines, comment), width, layout), 2)]
     if len(records) < 2:
         raise InputError.at(path, None, _no_rows(sample[0]))
-    head = list(islice(lines, records[0] + 1))
-    above = tuple(line.strip() for line in head[:-1] if line.strip())
+    head = list(islice(lines, records[1] + 1))
+    above = tuple(line.strip() for line in head[: records[0]] if line.strip())
     return replace(_named(path, head, layout, records[0], width, _remarks(layout)), preamble=above)
 
 
@@ -171,14 +173,20 @@ def _records(bare: Iterable[tuple[int, str]], width: int, layout: Layout) -> Ite
 
 
 def _named(path: Path, lines: list[str], layout: Layout, record: int, width: int, remarks: tuple[str, ...]) -> Dialect:
-    """Find the line of names above the first record (and one of units between), or number the columns."""
+    """Find the line of names above the first record (and one of units between), or number the columns.
+
+    ``lines`` are the file's up to its second record.
+    """
     above = [index for index in range(record) if lines[index].strip()]
     texts = [_header_cells(lines[index], layout) for index in above]
     units: tuple[str, ...] = ()
     if len(texts) > 1 and len(texts[-1]) == len(texts[-2]) >= width - 1 and _looks_like_units(texts[-1], layout):
         units, texts, above = tuple(texts.pop()), texts, above[:-1]
         units = units[:width]
-    names = _fitting(texts[-1], width, lines[record], layout) if texts else None
+    rows = [layout.cells(lines[record]), layout.cells(lines[-1])]
+    names = _fitting(texts[-1], width, rows, layout) if texts else None
+    if names is not None and names[-1] == UNNAMED:
+        remarks = (*remarks, f"the header has {width - 1} names for {width} columns: the last is taken to have none")
     if names is None:
         joined = _joined(path, layout, above, width)
         if joined is not None:
@@ -206,15 +214,29 @@ def _header_cells(line: str, layout: Layout) -> list[str]:
     return cells
 
 
-def _fitting(cells: list[str], width: int, record: str, layout: Layout) -> tuple[str, ...] | None:
-    """Return names for ``width`` columns: a record may have an empty last cell, or a row number without a name."""
+def _fitting(cells: list[str], width: int, rows: list[list[str]], layout: Layout) -> tuple[str, ...] | None:
+    """Return names for ``width`` columns by the first two records.
+
+    A record may have an empty last cell, or a row number without a name, which goes up by one; else the last column
+    has none: names that are moved by one are another sensor's.
+    """
     if _share(cells, layout) >= RECORD_SHARE or not any(re.search(r"[^\W\d_]", cell) for cell in cells):
         return None
     if len(cells) == width:
         return tuple(cells)
     if len(cells) == width - 1:
-        return (*cells, "") if not layout.cells(record)[-1] else ("", *cells)
+        if not rows[0][-1]:
+            return (*cells, "")
+        return ("", *cells) if _counts(rows) else (*cells, UNNAMED)
     return None
+
+
+def _counts(rows: list[list[str]]) -> bool:
+    """Tell a row number in the first cell of two records: a whole number that goes up by one, or any other text."""
+    first, second = (row[0].strip().strip("\"'") for row in (rows[0], rows[-1]))
+    if not (first.isdecimal() and second.isdecimal()):
+        return not re.fullmatch(r"[+-]?\d*[.,]?\d+([eE][+-]?\d+)?", first)
+    return int(second) - int(first) == 1
 
 
 def _looks_like_units(cells: list[str], layout: Layout) -> bool:

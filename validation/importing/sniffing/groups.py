@@ -13,6 +13,7 @@ import numpy as np
 from discsim.arrays import BoolArray, FloatArray
 from discsim.recording import SENSORS
 from discsim.validation.importing.cell_texts import CellTexts, number
+from discsim.validation.importing.overflow import continued
 from discsim.validation.importing.raw_table import RawTable
 from discsim.validation.importing.sniffing.dialect import Dialect
 from discsim.validation.importing.sniffing.names import Name, penalty_of, read_name, says_nothing, sensor_of
@@ -30,10 +31,11 @@ _ID_NAMES = ("id", "sensor", "sensorname", "sensor_name", "sensor_id", "sensorid
 
 @dataclass(frozen=True)
 class Numbers:
-    """A table's cells as numbers, and what its dialect says of it."""
+    """A table's cells as numbers, what its dialect says of it, and whether it is the only file there."""
 
     table: RawTable
     dialect: Dialect
+    alone: bool = False
 
     @property
     def path(self) -> Path:
@@ -112,9 +114,15 @@ class Triple:
 
     @cached_property
     def values(self) -> FloatArray:
-        """Its readings as written, (n, 3)."""
+        """Its readings as written, (n, 3); a gyroscope's continued where its register overflowed."""
         value = np.asarray(self.numbers.values[:, list(self.columns)])
-        return value if self.where is None else value[self.rows]
+        value = value if self.where is None else value[self.rows]
+        if self.sensor != "gyroscope":
+            return value
+        whole = [continued(column) for column in value.T]
+        if all(one is None for one in whole):
+            return value
+        return np.column_stack([c if one is None else one.value for c, one in zip(value.T, whole, strict=True)])
 
     @property
     def label(self) -> str:
@@ -170,7 +178,8 @@ def _named(
         if sensor == COUNTS:
             sensor = None
     back = penalty_of(name.base) + penalty_of("" if where is None else where[1])
-    if len(numbers.names) <= 8:  # a file per sensor: its name speaks of its columns
+    # a file per sensor: its name speaks of its columns; that of an only file (motion.csv, bias.csv) is the user's
+    if len(numbers.names) <= 8 and (not numbers.alone or source == "the file's name"):
         back += penalty_of(numbers.path.stem)
     return Triple(numbers, columns, name.base, sensor, source, tuple(meant), name.unit, back, where)
 

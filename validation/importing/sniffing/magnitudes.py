@@ -215,6 +215,7 @@ def gyroscope_unit(value: FloatArray, stated: Reading | None, turned: float | No
     name = "gyroscope"
     peak = float(np.nanmax(np.linalg.norm(value, axis=1)))
     worths = {"rad/s": 1.0, "deg/s": _RAD, "mdeg/s": _RAD / 1000, "rpm": np.pi / 30, "Hz": 2 * np.pi}
+    worths |= {"mrad/s": 1e-3} if stated is not None and stated.unit == "mrad/s" else {}
     near = None
     if turned is not None:
         near = min(worths, key=lambda unit: abs(np.log(turned / worths[unit])))

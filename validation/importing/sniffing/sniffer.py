@@ -36,6 +36,7 @@ from discsim.validation.importing.sniffing.names import is_time_name, sensor_of,
 from discsim.validation.importing.sniffing.own_clock import OwnClocks, own_clocks
 from discsim.validation.importing.sniffing.preamble import stated_worths
 from discsim.validation.importing.sniffing.proposal import Proposal, ProposedSensor
+from discsim.validation.importing.sniffing.pull import arm, unit_by_pull
 from discsim.validation.importing.sniffing.spin_axis import Reading3
 from discsim.validation.importing.sniffing.turning import Fit, best_worth, steps_between
 from discsim.validation.importing.sniffing.units import COUNTS, Reading
@@ -96,14 +97,14 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
 def _read(raw: Path) -> tuple[list[_File], list[InputError]]:
     """Read the file, or every file of a folder that is a table; what failed in a folder is left for the last word."""
     if raw.is_file():
-        return [_file(raw)], []
+        return [_file(raw, alone=True)], []
     paths = sorted(path for path in raw.iterdir() if path.is_file() and not path.name.startswith("."))
     if len(paths) > MAX_FILES:
         raise InputError.at(raw, None, f"holds {len(paths)} files; expected one folder of a logger's export")
     files, failures = [], []
     for path in paths:
         try:
-            files.append(_file(path))
+            files.append(_file(path, alone=len(paths) == 1))
         except InputError as error:
             failures.append(error)
     if not files:
@@ -115,10 +116,10 @@ def _read(raw: Path) -> tuple[list[_File], list[InputError]]:
     return files, failures
 
 
-def _file(path: Path) -> _File:
+def _file(path: Path, *, alone: bool) -> _File:
     dialect = dialect_of(path)
     table = read_raw(path, dialect.layout, RepairList(REPAIRS))
-    numbers = Numbers(table, dialect)
+    numbers = Numbers(table, dialect, alone)
     clocks = clocks_of(numbers)
     names = table.columns
     taken = [names.index(name) for clock in clocks for name in (clock.column, clock.counter) if name is not None]
@@ -316,6 +317,7 @@ def _proposal(
             text = f"{stated.scale:.6g} {stated.unit} a count"
             why = units[sensor].decision.why.replace("the header says so", "a line above the table says so")
             units[sensor] = units[sensor]._replace(decision=Decision(f"{sensor} unit", text, "certain", why))
+    units = _by_pull(found, times, units)
     if clock.column is None and "gyroscope" in units:
         clock, slower = _fitted(clock, fit, units["gyroscope"])
         times = {sensor: slower * time for sensor, time in times.items()}
@@ -331,6 +333,20 @@ def _proposal(
     name = re.sub(r"[^\w.-]+", "-", raw.resolve().stem).strip("-") or "log"
     decisions = (*own.decisions, *axes.decisions) if found else ()  # positions alone have no axes of a board
     return Proposal(name, raw, plant, layout, clock, sensors, decisions, (*axes.notes, *notes))
+
+
+def _by_pull(
+    found: dict[str, tuple[Triple, Decision]], times: dict[str, FloatArray], units: dict[str, Unit]
+) -> dict[str, Unit]:
+    """Return the units, a gyroscope's by the pull to the centre where that refutes the unit of the header."""
+    if {"gyroscope", "accelerometer"} - set(found) or not found["gyroscope"][0].units:
+        return units
+    gyro, accel = (
+        _reading(times[sensor], found[sensor][0].values * units[sensor].factor(SENSORS[sensor].unit))
+        for sensor in ("gyroscope", "accelerometer")
+    )
+    unit = unit_by_pull(units["gyroscope"], arm(gyro, accel))
+    return units if unit is None else {**units, "gyroscope": unit}
 
 
 def _stated(sensor: str, triple: Triple, value: FloatArray) -> tuple[Reading | None, bool]:

@@ -28,6 +28,7 @@ _RATE = {
     "rad/s": "rad/s rads-1 rads^-1 rad_s rads radps rad/sec rad/second radian/s radians/s rad_sec рад/с",
     "deg/s": "deg/s dps deg_s degs degps deg/sec deg_sec degree/s degrees/s degree/sec degrees/sec degs-1 grad/s gr/s",
     "mdeg/s": "mdeg/s mdps mdeg_s",
+    "mrad/s": "mrad/s mrad_s mrads",
     "rpm": "rpm u/min 1/min tr/min rev/min r/min min-1",
     "Hz": "hz rev/s rps u/s turns/s",
 }

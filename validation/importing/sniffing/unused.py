@@ -1,10 +1,11 @@
 """Columns that no sensor of the proposed map reads. Takes the tables and what is read of them; gives notes.
 
-A typo in one column's name leaves two of a sensor's three, and so the whole sensor out: that is asked about aloud.
+A typo in the names of one or two columns leaves a whole sensor out: that is asked about aloud.
 """
 
 from __future__ import annotations
 
+import json
 import re
 from collections import defaultdict
 from collections.abc import Collection, Sequence
@@ -25,6 +26,12 @@ MOST_NAMES, MOST_FILES = 60, 6
 _AGAIN = re.compile(r"\.\d+$")
 #: A column that stands this far back (worked out from readings) is no sensor's.
 NO_READING = 9
+#: How the names of sensors begin in logs, in full and cut off: a name that is a slip away from one may mean it.
+_SPELLINGS = {
+    "gyroscope": ("gyr", "gyro", "gyros", "gyroscope"),
+    "accelerometer": ("acc", "accel", "acceleration", "accelerometer"),
+    "magnetometer": ("mag", "magn", "magneto", "magnetic", "magnetometer"),
+}
 
 
 def unused_columns(tables: Sequence[Numbers], used: Collection[tuple[Path, str]]) -> list[str]:
@@ -40,7 +47,10 @@ def unused_columns(tables: Sequence[Numbers], used: Collection[tuple[Path, str]]
 
 
 def missing_axes(tables: Sequence[Numbers], used: Collection[tuple[Path, str]], found: Collection[str]) -> list[str]:
-    """Return a line for each sensor not ``found`` of which two columns are there, and the third under no such name."""
+    """Return a line for each sensor not ``found`` of which two columns are there, and the third under no such name.
+
+    Also where no two are named alike: the line names the columns that were probably meant.
+    """
     notes = []
     for numbers in tables:
         left = _left(numbers, used)
@@ -49,12 +59,17 @@ def missing_axes(tables: Sequence[Numbers], used: Collection[tuple[Path, str]], 
             name = read_name(numbers.names[k])
             if name.axis is not None:
                 by_base[name.base, name.unit].setdefault(name.axis, k)
+        asked: set[str] = set()
         for (base, unit), axes in by_base.items():
             sensor = _meant(base, unit)
             if len(axes) == 2 and sensor is not None and sensor not in found:
                 whole = {k for mates in by_base.values() if len(mates) > 1 for k in mates.values()}
                 alone = [numbers.table.columns[k] for k in left if k not in whole]
                 notes.append(_asked(numbers, sensor, axes, alone) + _of(numbers, tables))
+                asked.add(sensor)
+        for sensor in _SPELLINGS:
+            if sensor not in found and sensor not in asked and (line := _not_alike(numbers, sensor, left)):
+                notes.append(line + _of(numbers, tables))
     return notes[:MOST_FILES]
 
 
@@ -111,8 +126,49 @@ def _asked(numbers: Numbers, sensor: str, axes: dict[int, int], alone: Sequence[
     found = f"of the {sensor} {'xyz'[first]} and {'xyz'[second]} were found and {'xyz'[third]} was not"
     if len(near) == 1:
         return f"{found}: is it '{_shown(near[0])}'? Rename it, or state it in a map"
+    probable = _probable(numbers, sensor, [one, two, *(columns.index(other) for other in alone)])
+    if len(probable) == 3:
+        also = f"Rename it, or write in a map: {_map_line(numbers, sensor, probable)}"
+        return f"{found}: is it '{_shown(columns[probable[third]])}'? {also}"
     those = f"'{_shown(columns[one])}' and '{_shown(columns[two])}'"
     return f"{found}: name its column as {those} are named, or state it in a map"
+
+
+def _not_alike(numbers: Numbers, sensor: str, left: Sequence[int]) -> str | None:
+    """Return what is asked about a sensor no two of whose columns share a name, or None where two are not there."""
+    axes = _probable(numbers, sensor, left)
+    if len(axes) < 2:
+        return None
+    said = ", ".join(f"{'xyz'[axis]} in '{_shown(numbers.table.columns[k])}'" for axis, k in sorted(axes.items()))
+    start = f"the {sensor} was not taken, for its columns are not named alike: probably {said}"
+    if len(axes) == 2:
+        (third,) = {0, 1, 2} - set(axes)
+        return f"{start}; {'xyz'[third]} was not found: name its column as these, or state it in a map"
+    return f"{start}. Rename them alike, or write in a map: {_map_line(numbers, sensor, axes)}"
+
+
+def _probable(numbers: Numbers, sensor: str, left: Sequence[int]) -> dict[int, int]:
+    """Return the one column of each axis (0, 1, 2) whose name may mean a sensor; none where no name surely does."""
+    axes: dict[int, list[int]] = defaultdict(list)
+    sure = False
+    for k in left:
+        name = read_name(numbers.names[k])
+        meant = _meant(name.base, name.unit)
+        # of a unit that is known, and another sensor's or none's, it is no slip
+        slip = meant is None and not readings_of(name.unit) and sensor_of(name.base) is None
+        near = slip and any(_a_slip_away(name.base.casefold(), one) for one in _SPELLINGS[sensor])
+        if name.axis is not None and (meant == sensor or near):
+            axes[name.axis].append(k)
+            sure |= meant == sensor
+    return {axis: those[0] for axis, those in axes.items() if sure and len(those) == 1}
+
+
+def _map_line(numbers: Numbers, sensor: str, axes: dict[int, int]) -> str:
+    """Return how a map states a sensor's three columns, with their unit where a name says it."""
+    columns = ", ".join(json.dumps(numbers.table.columns[axes[axis]], ensure_ascii=False) for axis in range(3))
+    units = [one for k in axes.values() for one in readings_of(read_name(numbers.names[k]).unit)]
+    unit = next((f'"{one.unit}"' for one in units if one.sensor == sensor), "its unit")
+    return f"[sensors.{sensor}] columns = [{columns}], unit = {unit}"
 
 
 def _expected(one: str, two: str, axis: int) -> str | None:
