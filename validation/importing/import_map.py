@@ -34,7 +34,7 @@ UNITS: Mapping[str, Mapping[str, float]] = MappingProxyType(
         "uT": {"uT": 1.0, "nT": 1e-3, "mT": 1e3, "T": 1e6, "gauss": 1e2, "mgauss": 0.1},
         "m_s2": {"m/s^2": 1.0, "g": G0, "mg": 1e-3 * G0},
         "rad_s": {
-            **{"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": np.pi / 180, "mdeg/s": np.pi / 180e3},
+            **{"rad/s": 1.0, "deg/s": np.pi / 180, "mdeg/s": np.pi / 180e3, "mrad/s": 1e-3},
             **{"rpm": np.pi / 30, "Hz": 2 * np.pi},
         },
         "m": {"m": 1.0},

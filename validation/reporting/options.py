@@ -253,8 +253,8 @@ def at_place(environment: Environment, place: str | None, day: str | None) -> En
         raise InputError(f"--date {day}: expected YYYY-MM-DD, such as 2025-08-31") from None
     if abs(latitude) > 90.0 >= abs(longitude):
         raise InputError(
-            f"--place {place}: latitude {latitude:g} is beyond a pole; expected LAT,LON, degrees north and east: are "
-            f"they swapped? Then --place {longitude:g},{latitude:g}"
+            f"--place {place}: no place at latitude {latitude:g}; expected LAT,LON, degrees north and east: are they "
+            f"swapped? Then --place {longitude:g},{latitude:g}"
         )
     field = world_magnetic_field(latitude, longitude, when)
     sigma = {**environment.sigma, "magnetic_field_ned_uT": FIELD_MODEL_SIGMA}
