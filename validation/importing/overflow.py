@@ -44,6 +44,9 @@ FIELD_AGREES = 0.06
 FORCE_AGREES = 0.2
 #: Steps of 0.02 rad stand above a magnetometer's noise (1 % of the field), and so tell which way it goes round.
 SEEN = 0.02
+#: Parts of a log over which the sum of the two rates is compared with their difference, and how near that sum is to a
+#: known span: half the scale of a gyroscope (3 %).
+WINDOWS, SUM = 8, 0.015
 #: Fewest rows that show a spin.
 FEWEST = 8
 
@@ -151,6 +154,10 @@ def without_overflow(found: Readings, others: Mapping[str, Readings]) -> tuple[R
     for axis in range(value.shape[1]):
         result = continued(value[:, axis], spacing, _unit_of(value))
         if result is None:
+            if (told := _never_within(found, axis, others.get("magnetometer"))) is not None:
+                value[:, axis] = np.nan
+                beyond[:] = True
+                notes.append(told)
             continue
         over = result.turns != 0
         said = _witness(found, result, axis, others)
@@ -173,6 +180,36 @@ def without_overflow(found: Readings, others: Mapping[str, Readings]) -> tuple[R
             )
         beyond |= over
     return (Readings(found.number, found.time, value) if notes else found), beyond, notes
+
+
+def _never_within(found: Readings, axis: int, field: Readings | None) -> str | None:
+    """Return what to say of an axis that overflowed all through a log, so that no leap shows; None where none did.
+
+    A spin that slows down beyond the end reads ever more the other way: its size and the field's turning have one sum,
+    the span of a known part, while each of them changes.
+    """
+    rate = found.value[:, axis]
+    if field is None or not np.isfinite(rate).any() or np.sign(np.nanmin(rate)) != np.sign(np.nanmax(rate)):
+        return None
+    turned, seen = _steps(found.time, rate, np.ones(rate.size, dtype=np.bool_), axis, field, circle=True)
+    parts = min(WINDOWS, turned.size // FEWEST)
+    spacing = float(np.median(np.diff(_across(field, axis, circle=True)[1]))) if parts > 2 else 0.0
+    if parts < 3 or not np.median(np.abs(turned)) > SEEN:
+        return None
+    written, true = (
+        np.array([abs(float(np.mean(one))) / spacing for one in np.array_split(steps, parts)])
+        for steps in (turned, seen)
+    )
+    total, apart = written + true, true - written
+    end = _DEG * min(ENDS, key=lambda one: abs(np.log(2 * _DEG * one / np.median(total))))
+    if np.std(total) > 0.25 * np.std(apart) or abs(np.median(total) / (2 * end) - 1) > SUM or np.min(apart) < 0:
+        return None
+    return (
+        f"WARNING: gyroscope {'xyz'[axis]}: its register overflowed all through this log, it seems: it reads up to "
+        f"{np.degrees(np.max(written)):.0f} deg/s while the field turns at {np.degrees(np.max(true)):.0f}, and where "
+        f"one of them falls the other rises, as beyond a range of {np.degrees(end):.0f} deg/s: not to be trusted, now "
+        "gaps"
+    )
 
 
 def _unit_of(value: FloatArray) -> float:
@@ -221,10 +258,10 @@ def _off(
 
 
 def _steps(
-    time: FloatArray, rate: FloatArray, rows: BoolArray, axis: int, field: Readings
+    time: FloatArray, rate: FloatArray, rows: BoolArray, axis: int, field: Readings, *, circle: bool = False
 ) -> tuple[FloatArray, FloatArray]:
     """Return what a rate turns between the field's readings in some rows, rad, and how far the field went round."""
-    plane, t = _across(field, axis)
+    plane, t = _across(field, axis, circle=circle)
     sound = np.isfinite(rate)
     if t.size < FEWEST or sound.sum() < FEWEST:
         return np.empty(0), np.empty(0)
@@ -237,16 +274,24 @@ def _steps(
     return turned[both], np.asarray(np.angle(plane[1:] * np.conj(plane[:-1])))[both]
 
 
-def _across(field: Readings, axis: int) -> tuple[ComplexArray, FloatArray]:
-    """Return the field (m,) across an axis, x + i y about its mean over a second, and its times; repeats left out."""
+def _across(field: Readings, axis: int, *, circle: bool) -> tuple[ComplexArray, FloatArray]:
+    """Return the field (m,) across an axis, x + i y, and its times; repeats left out.
+
+    It is taken about its mean over a second, or about the centre of the one circle that all of it goes round.
+    """
     fresh = np.array(np.isfinite(field.value).all(axis=1))
     fresh[1:] &= np.any(np.diff(field.value, axis=0) != 0, axis=1)
     t, value = field.time[fresh], field.value[fresh]
     if t.size < FEWEST:
         return np.empty(0, dtype=np.complex128), t
+    plane = value[:, (axis + 1) % 3] + 1j * value[:, (axis + 2) % 3]
+    if circle:
+        design = np.column_stack([2 * plane.real, 2 * plane.imag, np.ones(t.size)])
+        x, y, _ = np.linalg.lstsq(design, np.abs(plane) ** 2, rcond=None)[0]
+        return plane - complex(x, y), t
     wide = max(3, min(t.size // 2, round(1.0 / max(float(np.median(np.diff(t))), 1e-9))))
-    centred = value - uniform_filter1d(value, wide, axis=0, mode="nearest")
-    return centred[:, (axis + 1) % 3] + 1j * centred[:, (axis + 2) % 3], t
+    mean = uniform_filter1d(plane.real, wide, mode="nearest") + 1j * uniform_filter1d(plane.imag, wide, mode="nearest")
+    return np.asarray(plane - mean), t
 
 
 def _pulls(found: Readings, result: Continued, axis: int, accel: Readings) -> bool:

@@ -101,3 +101,16 @@ def test_rows_that_run_backwards_are_told(tmp_path):
 def test_what_is_left_out_stands_in_the_summary(tmp_path):
     columns = [("t_s", LOG.t), *three(named("g{}"), LOG.gyro / DEG), ("batt", 4.0 + 0 * LOG.t)]
     assert "not used: batt" in import_log(write_table(tmp_path / "log.csv", columns)).summary()
+
+
+def test_a_line_of_names_of_another_width_is_told(tmp_path):
+    raw = both(tmp_path / "log.csv", LOG.gyro / DEG, LOG.accel)
+    header, *rows = raw.read_text().splitlines()
+    raw.write_text("\n".join([f"{header},temp,batt", *rows, ""]))
+    assert "the line of names has 9 for 7 columns and was not used: mend it" in import_log(raw).summary()
+
+
+def test_a_third_column_without_numbers_is_named(tmp_path):
+    columns = [("t_s", LOG.t), ("gx", LOG.gyro[:, 0]), ("gy", ["NaN"] * LOG.t.size), ("gz", LOG.gyro[:, 2])]
+    raw = write_table(tmp_path / "log.csv", [*columns, *three(named("a{}"), LOG.accel)])
+    assert "x and z were found and y was not: 'gy' is there and holds too few numbers" in import_log(raw).summary()

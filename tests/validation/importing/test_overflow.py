@@ -78,6 +78,26 @@ def test_a_log_that_ends_in_the_flight_is_continued_too(tmp_path):
     assert_allclose(gyro.value[:, 2], LOG.gyro[:last, 2], atol=1e-5)
 
 
+def test_a_spin_beyond_the_end_all_through_a_log_is_told_by_the_field_that_slows_down(tmp_path):
+    """No leap is in it: it came in as -1857 deg/s. The same rows within the range are left alone."""
+    beyond = slice(int((RELEASE + 0.1) * RATE), int((RELEASE + 0.8) * RATE))
+    whole = import_log(log(tmp_path, "gam", beyond))
+    assert np.all(np.isnan(whole.recordings[0].samples["gyroscope"].value[:, 2]))
+    assert any("overflowed all through this log" in note for note in whole.remarks)
+    assert whole.throws[0].spin == pytest.approx(np.median(LOG.gyro[beyond, 2]), rel=0.02)
+    sound = import_log(log(tmp_path, "gam", beyond, end=2293.76))
+    assert not any("overflow" in note for note in sound.remarks)
+
+
+def test_a_clock_that_is_off_makes_no_overflow(tmp_path):
+    """Then the field turns faster than the gyroscope says by one share, and slows down with it."""
+    raw = log(tmp_path, "gam", slice(int((RELEASE + 0.1) * RATE), int((RELEASE + 2.8) * RATE)), end=4000.0)
+    header, *rows = raw.read_text().splitlines()
+    fast = (f"{0.8 * float(row.partition(',')[0]):.3f},{row.partition(',')[2]}" for row in rows)
+    raw.write_text("\n".join([header, *fast, ""]))
+    assert not any("overflow" in note for note in import_log(raw).remarks)
+
+
 def test_what_is_continued_stands_at_no_stated_range(tmp_path):
     raw = log(tmp_path)
     text = import_log(raw).map_text

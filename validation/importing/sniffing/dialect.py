@@ -191,6 +191,9 @@ def _named(path: Path, lines: list[str], layout: Layout, record: int, width: int
         joined = _joined(path, layout, above, width)
         if joined is not None:
             return Dialect(joined[0], joined[1], (), True, record, width, (*remarks, "header broken over two lines"))
+        if texts and _names_sensors(texts[-1]):
+            fault = f"the line of names has {len(texts[-1])} for {width} columns and was not used: mend it"
+            remarks = (*remarks, fault)
         columns = tuple(f"c{k + 1}" for k in range(width))
         start = record if not layout.comment and above else 0
         return Dialect(replace(layout, skip_lines=start, columns=columns), columns, (), False, record, width, remarks)
@@ -237,6 +240,12 @@ def _counts(rows: list[list[str]]) -> bool:
     if not (first.isdecimal() and second.isdecimal()):
         return not re.fullmatch(r"[+-]?\d*[.,]?\d+([eE][+-]?\d+)?", first)
     return int(second) - int(first) == 1
+
+
+def _names_sensors(cells: list[str]) -> bool:
+    from discsim.validation.importing.sniffing.names import read_name, sensor_of
+
+    return sum(sensor_of(read_name(cell).base) is not None for cell in cells) > 2
 
 
 def _looks_like_units(cells: list[str], layout: Layout) -> bool:

@@ -124,6 +124,10 @@ def _asked(numbers: Numbers, sensor: str, axes: dict[int, int], alone: Sequence[
         and sensor_of(read_name(other).base) in (None, sensor)
     ]
     found = f"of the {sensor} {'xyz'[first]} and {'xyz'[second]} were found and {'xyz'[third]} was not"
+    if name in columns:
+        return (
+            f"{found}: '{_shown(name)}' is there and holds too few numbers; a map may leave it out (docs/importing.md)"
+        )
     if len(near) == 1:
         return f"{found}: is it '{_shown(near[0])}'? Rename it, or state it in a map"
     probable = _probable(numbers, sensor, [one, two, *(columns.index(other) for other in alone)])
