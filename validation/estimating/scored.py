@@ -286,15 +286,18 @@ def _note(measured: FloatArray, actual: FloatArray, outside: int, values: int) -
 
 
 #: spans of rates by the truth's that no log has beside its truth, and the unit that is likely then: an hour for 3.6 s
-_SPANS: Mapping[str, tuple[float, float]] = {"milliseconds": (500.0, 2000.0), "microseconds": (5e5, 2e6)}
+_SPANS: Mapping[tuple[str, str], tuple[float, float]] = {
+    ("milliseconds", "time_ms"): (500.0, 2000.0),
+    ("microseconds", "time_us"): (5e5, 2e6),
+}
 
 
 def _with_seconds(rate: YawRate, truth: YawRate) -> None:
     """Raise `InputError` where the times of a rate last so much longer than the truth's that they are no seconds."""
     span = float(rate.t[-1] - rate.t[0]) / max(float(truth.t[-1] - truth.t[0]), 1e-12)
-    for unit, (low, high) in _SPANS.items():
+    for (unit, column), (low, high) in _SPANS.items():
         if low < span < high:
             raise InputError(
                 f"{rate.method}: times last {rate.t[-1] - rate.t[0]:g} s, the truth's {truth.t[-1] - truth.t[0]:g} s; "
-                f"expected seconds (these look like {unit}: name the column time_{'ms' if low < 1e3 else 'us'})"
+                f"expected seconds (these look like {unit}: name the column {column})"
             )

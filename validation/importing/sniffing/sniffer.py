@@ -321,10 +321,7 @@ def _proposal(
     if clock.column is None and "gyroscope" in units:
         clock, slower = _fitted(clock, fit, units["gyroscope"])
         times = {sensor: slower * time for sensor, time in times.items()}
-    readings = {
-        sensor: _reading(times[sensor], triple.values * units[sensor].factor(SENSORS[sensor].unit))
-        for sensor, (triple, _) in found.items()
-    }
+    readings = {sensor: _in_si(sensor, triple, times[sensor], units[sensor]) for sensor, (triple, _) in found.items()}
     axes = body_axes(readings)
     sensors = tuple(
         ProposedSensor(sensor, triple, decision, units[sensor], axes.matrix[sensor], own.clocks.get(sensor))
@@ -335,6 +332,11 @@ def _proposal(
     return Proposal(name, raw, plant, layout, clock, sensors, decisions, (*axes.notes, *notes))
 
 
+def _in_si(sensor: str, triple: Triple, time: FloatArray, unit: Unit) -> Reading3:
+    """Return a sensor's readings in the recording's unit."""
+    return _reading(time, triple.values * unit.factor(SENSORS[sensor].unit))
+
+
 def _by_pull(
     found: dict[str, tuple[Triple, Decision]], times: dict[str, FloatArray], units: dict[str, Unit]
 ) -> dict[str, Unit]:
@@ -342,8 +344,7 @@ def _by_pull(
     if {"gyroscope", "accelerometer"} - set(found) or not found["gyroscope"][0].units:
         return units
     gyro, accel = (
-        _reading(times[sensor], found[sensor][0].values * units[sensor].factor(SENSORS[sensor].unit))
-        for sensor in ("gyroscope", "accelerometer")
+        _in_si(sensor, found[sensor][0], times[sensor], units[sensor]) for sensor in ("gyroscope", "accelerometer")
     )
     unit = unit_by_pull(units["gyroscope"], arm(gyro, accel))
     return units if unit is None else {**units, "gyroscope": unit}
