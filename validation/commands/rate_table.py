@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from discsim.effects.catalogue import Effect
     from discsim.environment import Environment
     from discsim.law import Law
+    from discsim.rate_tables import RateTable
     from discsim.recording import Samples
     from discsim.validation.experiments.table_recording import MeasuredRun
     from discsim.validation.reporting.run import Run
@@ -37,8 +38,9 @@ def command(
     profile: Annotated[
         Path | None,
         typer.Option(
-            help="CSV of knots (time_s,rate_rad_s or time_s,rate_deg_s), a TOML shape (trapezoids, sine, sweep), or a "
-            "recording whose rate reference is followed. Default: 0 to 5000 deg/s in steps."
+            help="CSV of knots (time_s,rate_rad_s or time_s,rate_deg_s; other names with units too), a TOML shape "
+            "(trapezoids, sine, sweep), or a recording whose rate reference is followed. Default: 0 to 5000 deg/s in "
+            "steps."
         ),
     ] = None,
     mount: Annotated[
@@ -89,7 +91,6 @@ def command(
     """
     from discsim.environment import Environment
     from discsim.errors import InputError
-    from discsim.rig import default_profile, read_profile
     from discsim.validation.experiments.table_recording import read_run
     from discsim.validation.reporting.run import start_run
 
@@ -97,9 +98,7 @@ def command(
         raise InputError("--recording states the parts and their places; expected it without --parts and --radius")
     bench = _bench(table, parts, radius, mount)
     real = None if recording is None else read_run(recording)
-    knots = read_profile(profile) if profile is not None else default_profile()
-    if real is not None and profile is None:
-        knots = real.profile_for(bench.table)
+    knots = _knots(profile, bench.table, real)
     sensors = tuple(bench.sensors) if real is None else tuple(real.recording.samples)
     acting = _acting(model, effect, own, sensors, out.resolve().name)
     stated = Environment() if real is None else real.recording.environment
@@ -147,6 +146,20 @@ class _Asked(NamedTuple):
             progress=lambda parts: run.progress(parts, len(parts), "part of the profile"),
         )
         return with_all_methods(result) if self.method == "all" else result
+
+
+def _knots(path: Path | None, table: RateTable, real: MeasuredRun | None) -> Samples:
+    """Return the profile: that of ``path``, else of the measured run, else the default; says what is odd in it."""
+    from discsim.rig import default_profile
+    from discsim.validation.scenarios.profile_files import read_knots, speed_note
+
+    if path is None:
+        return default_profile() if real is None else real.profile_for(table)
+    stated = read_knots(path)
+    for note in (*stated.notes, speed_note(stated, table)):
+        if note:
+            typer.echo(f"note: {note}")
+    return stated.knots
 
 
 def _bench(table: str | None, parts: str | None, radius: float | None, mount: str) -> Bench:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from discsim.errors import InputError
 from discsim.estimators.rate import YawRate
 from discsim.files import read_text
 
-__all__ = ["read_rates", "read_truth"]
+__all__ = ["Told", "read_rates", "read_told", "read_truth"]
 
 _DEG, _RPM = float(np.radians(1.0)), 2.0 * np.pi / 60.0
 #: columns that hold a rate, and rad/s per unit of each; a flight's truth has its rate about z_B as r_rad_s
@@ -24,7 +25,11 @@ _RATES: Mapping[str, float] = MappingProxyType(
 )
 _SDS: Mapping[str, float] = MappingProxyType({"sd_rad_s": 1.0, "sd_deg_s": _DEG, "sd_rpm": _RPM})
 #: other names of a rate with its unit, as Rate (deg/s) or spin_dps, and rad/s per unit; Hz alone is no rate of turning
-_RATE_NAME = re.compile(r"(?:yaw|spin|r|omega)?[ _]?(?:rate)?[ _]?[(\[]?(rad[_/]s|deg[_/]s|°/s|dps|rpm|hz)[)\]]?", re.I)
+_RATE_NAME = re.compile(
+    r"(?:yaw|spin|r|omega|table|target|command)?[ _]?(?:rate|speed|velocity)?[ _]?"
+    r"[(\[]?(rad[_/]s|deg[_/]s|°/s|dps|rpm|hz)[)\]]?",
+    re.I,
+)
 _RATE_UNITS: Mapping[str, float] = MappingProxyType(
     {"rad/s": 1.0, "deg/s": _DEG, "°/s": _DEG, "dps": _DEG, "rpm": _RPM, "hz": 2.0 * np.pi}
 )
@@ -64,8 +69,22 @@ def read_truth(path: Path) -> YawRate:
     return YawRate("truth", t, rate, np.where(np.isfinite(rate), 0.0, np.nan), signed=True)
 
 
-def _groups(path: Path) -> Iterator[tuple[str, FloatArray, FloatArray, FloatArray]]:
-    """Yield name, times, rates and sds (n,) of each method of a file, in the order of the file."""
+class Told(NamedTuple):
+    """What a CSV file tells of rates: names of its columns, rad/s per unit, and the rows of each method with lines.
+
+    A row is time s, rate rad/s and sd rad/s; NaN where a rate is not known. ``lines`` counts those of the whole file.
+    """
+
+    header: str
+    time_name: str
+    rate_name: str
+    per_rate: float
+    tables: Mapping[str, list[tuple[float, float, float]]]
+    lines: Sequence[int]
+
+
+def read_told(path: Path) -> Told:
+    """Read the rates of a CSV file; raises `InputError` naming file, line and what was expected."""
     lines = read_text(path).splitlines()
     between = next((one for one in _BETWEEN if lines and one in lines[0]), ",")
     rows = list(csv.reader(lines, delimiter=between))
@@ -79,6 +98,7 @@ def _groups(path: Path) -> Iterator[tuple[str, FloatArray, FloatArray, FloatArra
     sd_column = next((name for name in _SDS if name in header), None)
     method = header.index("method") if "method" in header else None
     tables: dict[str, list[tuple[float, float, float]]] = {}
+    at: list[int] = []
     for number, row in enumerate(rows[1:], start=2):
         if not row or not any(cell.strip() for cell in row):
             continue
@@ -96,9 +116,15 @@ def _groups(path: Path) -> Iterator[tuple[str, FloatArray, FloatArray, FloatArra
         if table and time <= table[-1][0]:
             raise InputError.at(path, number, f"time {time:g} s follows {table[-1][0]:g} s; expected ascending time")
         table.append((time, rate, sd))
+        at.append(number)
     if not tables:
         raise InputError.at(path, None, "holds no row; expected rates over time")
-    for name, table in tables.items():
+    return Told(lines[0], header[time_at], header[rate_at], per_rate, tables, at)
+
+
+def _groups(path: Path) -> Iterator[tuple[str, FloatArray, FloatArray, FloatArray]]:
+    """Yield name, times, rates and sds (n,) of each method of a file, in the order of the file."""
+    for name, table in read_told(path).tables.items():
         t, rate_rad_s, sd_rad_s = np.array(table).T
         known = np.isfinite(rate_rad_s)
         # an sd that is not told is none

@@ -10,9 +10,10 @@ from discsim.disc import Disc
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.recording import Samples
-from discsim.rig import PLATEAUS_DEG_S, default_profile, read_profile
+from discsim.rig import PLATEAUS_DEG_S, default_profile
 from discsim.sensors import Instruments
 from discsim.shipped import load_disc, load_throw
+from discsim.validation.scenarios.profile_files import read_knots
 from discsim.validation.scenarios.throws import FULL_SET, PARTS, QUICK_SET, StatedThrow, Throw
 
 __all__ = ["QUICK_PLATEAUS", "Subject", "shipped_subject", "stated_subject"]
@@ -71,5 +72,5 @@ def stated_subject(
         surroundings,
         names,
         stated or own.throws,
-        own.profile if profile is None else read_profile(profile),
+        own.profile if profile is None else read_knots(profile).knots,
     )

@@ -64,10 +64,15 @@ def command(
 
 
 def _keep(file: Path, kept: Path) -> None:
-    """Write a challenge's file to ``kept``, gzipped: the same bytes for the same cases. What is kept already stays."""
+    """Write a challenge's file to ``kept``, gzipped: the same bytes for the same cases. What is kept already stays.
+
+    The folder that the challenge was written to is called by its own name, for nobody else has those above it.
+    """
     if file.suffix != ".gz":
         kept.parent.mkdir(parents=True, exist_ok=True)
-        write_bytes(kept, gzip.compress(file.read_bytes(), mtime=0))
+        folder = file.resolve().parent
+        text = file.read_text(encoding="utf-8").replace(str(folder), folder.name)
+        write_bytes(kept, gzip.compress(text.encode(), mtime=0))
 
 
 def _blank(folder: Path, plain: Result) -> Result:

@@ -21,11 +21,12 @@ from discsim.errors import InputError
 from discsim.estimators.methods import METHODS
 from discsim.files import digest, model_file, model_names
 from discsim.recording import Samples
-from discsim.rig import default_profile, profile_fault, read_profile
+from discsim.rig import default_profile, profile_fault
 from discsim.sensors import Instruments
 from discsim.sensors.sampling import Noise
 from discsim.shipped import load_disc, load_site, load_throw
 from discsim.toml_table import TomlTable, read_toml
+from discsim.validation.scenarios.profile_files import read_knots
 from discsim.validation.sweeps.mounts import MOUNT_FIELDS, MountDesign
 
 __all__ = ["Axis", "Case", "Plan", "plan_file", "read_plan"]
@@ -216,7 +217,7 @@ class _Kind(NamedTuple):
 
 
 def _profile(text: str, folder: Path) -> Samples:
-    return read_profile(folder / text)
+    return read_knots(folder / text).knots
 
 
 def _parts(text: str, folder: Path) -> Instruments:

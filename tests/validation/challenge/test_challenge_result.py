@@ -296,7 +296,11 @@ def test_challenges_of_one_code_on_other_seeds_are_pooled_also_from_what_was_kep
     with start_run(tmp_path / "more", 60) as run:
         challenge(run, [Request(60, "flight", (), "nothing")], workers=1, command=blind(tmp_path))
     page, kept = tmp_path / "docs" / "page.md", tmp_path / "kept"
+    made = json.loads((tmp_path / "more" / "challenge.json").read_text())
+    made["made_by"] = f"discsim challenge --seed 60 --out {tmp_path / 'more'}"
+    (tmp_path / "more" / "challenge.json").write_text(json.dumps(made))
     text = documented(page, plain, "--more", tmp_path / "more", "--keep", kept)
+    assert read_result(kept / "60.json.gz").command == "discsim challenge --seed 60 --out more"
     assert "(seeds 40 to 42)" in text
     assert "(seeds 60 to 60)" in text
     assert "Together 4 cases. 2 are answered rightly" in text
