@@ -3,9 +3,10 @@
 The text is a sum of products of powers. A factor is a number, a coefficient, a symbol of `SYMBOLS`, its magnitude
 ``|r|`` or its direction ``sign(r)``; an exponent is a number or a coefficient. ``c * |r|^n * sign(r) + b * V^2`` with
 the coefficients c, n and b is a law, and so is ``-c r V``: a blank or a dot multiplies, too. What dies away in time has
-the factor ``exp(-t/tau)``; what repeats as a disc turns, ``cos(k psi + phase)`` or ``sin(k psi)``, psi being the angle
-turned since the recording began: it stands only in a law about a sensor. So does ``play(x, w)``, what a reading x
-shows behind a play of +-w: Prandtl's operator, the simplest hysteresis.
+the factor ``exp(-t/tau)``; what swings in time, ``cos(w t + phase)`` or ``sin(w t)``; what repeats as a disc turns,
+``cos(k psi + w t + phase)``, psi being the angle turned since the recording began: it stands only in a law about a
+sensor. So does ``play(x, w)``, what a reading x shows behind a play of +-w: Prandtl's operator, the simplest
+hysteresis.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import exp, isfinite, pi, pow
+from math import cos, exp, isfinite, pi, pow
 from types import MappingProxyType
 
 import numpy as np
@@ -41,8 +42,8 @@ _LONGEST = 5000
 #: size of an exponent: r^30 is 1e111 at the fastest spin, and no force grows so
 _STEEPEST = 30.0
 #: a row of a law's numbers: place of its target, coefficient, of each symbol the power of its magnitude and its sign
-#: to a power, decay in 1/s, order and phase of the angle turned, play of its sensor's reading
-_DECAY, _ORDER, _PHASE, _PLAY, LAW_WIDTH = (2 + 2 * _COUNT + k for k in range(5))
+#: to a power, decay in 1/s, order of the angle turned, phase, play of its sensor's reading, rad/s of what swings
+_DECAY, _ORDER, _PHASE, _PLAY, _SWING, LAW_WIDTH = (2 + 2 * _COUNT + k for k in range(6))
 _TOKEN = re.compile(r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*·/^|(),]))")
 
 
@@ -110,8 +111,12 @@ class Law:
                     term = term * np.abs(x) ** power * (np.sign(x) if odd else 1.0)
             if row[_DECAY]:
                 term = term * np.exp(-row[_DECAY] * np.asarray(state["t"], dtype=np.float64))
-            if row[_ORDER]:
-                term = term * np.cos(row[_ORDER] * np.asarray(state["psi"], dtype=np.float64) + row[_PHASE])
+            if row[_ORDER] or row[_SWING]:
+                angle = np.asarray(row[_PHASE])
+                for factor, symbol in ((row[_ORDER], "psi"), (row[_SWING], "t")):
+                    if factor:
+                        angle = angle + factor * np.asarray(state[symbol], dtype=np.float64)
+                term = term * np.cos(angle)
             total = total + term
         return total
 
@@ -165,16 +170,16 @@ class _Parser:
 
     def _product(self, sign: float) -> list[float]:
         coefficient, powers, odd = sign, [0.0] * _COUNT, [0.0] * _COUNT
-        decay, order, phase, width = 0.0, 0.0, 0.0, 0.0
+        decay, order, phase, width, swing = 0.0, 0.0, 0.0, 0.0, 0.0
         inverse = 1.0
         while True:
             if self._peek() == "exp":
                 decay += inverse * self._decay()
             elif self._peek() in ("cos", "sin"):
-                if order or inverse < 0.0:
+                if order or swing or inverse < 0.0:
                     raise self._error("a second cos or sin in one product, or one below a stroke")
-                order, phase = self._turn()
-                if not order:
+                order, swing, phase = self._turn()
+                if not (order or swing):
                     coefficient *= np.cos(phase)
             elif self._peek() == "play":
                 if width or inverse < 0.0:
@@ -190,7 +195,7 @@ class _Parser:
                     powers[place] += inverse * power
                     odd[place] = (odd[place] + is_odd) % 2.0
             if self._peek() in ("", "+", "-"):
-                row = [float(coefficient), *powers, *odd, decay, order, phase, width]
+                row = [float(coefficient), *powers, *odd, decay, order, phase, width, swing]
                 if width and sum(map(abs, powers[-len(_READINGS) :])) != 1.0:
                     raise self._error("a play times a reading")
                 if not all(map(isfinite, row)) or max(map(abs, powers)) > _STEEPEST:
@@ -216,20 +221,21 @@ class _Parser:
             raise self._error("a time constant of zero")
         return 1.0 / tau
 
-    def _turn(self) -> tuple[float, float]:
-        """Read ``cos(k psi + phase)`` or the sine; return k and the phase of the cosine."""
-        phase = -0.5 * pi if self._take("cos", "sin") == "sin" else 0.0
+    def _turn(self) -> tuple[float, float, float]:
+        """Read ``cos(k psi + w t + phase)`` or the sine; return k, w and the phase of the cosine."""
+        found = {"psi": 0.0, "t": 0.0, "": -0.5 * pi if self._take("cos", "sin") == "sin" else 0.0}
         self._take("(")
-        order = 1.0
-        if self._peek() != "psi":
-            order = self._number(self._take())
-            self._skip("*", "·")
-        self._take("psi")
-        if self._peek() != ")":
-            sign = -1.0 if self._take("+", "-") == "-" else 1.0
-            phase += sign * self._number(self._take())
-        self._take(")")
-        return order, phase
+        sign = -1.0 if self._skip("-") else 1.0
+        while True:
+            factor, of = 1.0, self._take()
+            if of not in ("psi", "t"):
+                factor, of = self._number(of), ""
+                if self._skip("*", "·") or self._peek() in ("psi", "t"):
+                    of = self._take("psi", "t")
+            found[of] += sign * factor
+            if self._take("+", "-", ")") == ")":
+                return found["psi"], found["t"], found[""]
+            sign = -1.0 if self._tokens[self._next - 1] == "-" else 1.0
 
     def _play(self) -> tuple[int, float]:
         """Read ``play(x, w)``; return the place of the reading and w."""
@@ -321,6 +327,8 @@ def law_wrench(
                 term *= np.sign(state[k])
         if rows[i, _DECAY] != 0.0:
             term *= exp(-rows[i, _DECAY] * t)
+        if rows[i, _SWING] != 0.0:
+            term *= cos(rows[i, _SWING] * t + rows[i, _PHASE])
         out[int(rows[i, 0])] += term
     return (
         cos_beta * out[0] - sin_beta * out[1],

@@ -37,6 +37,8 @@ COEFFICIENTS = {"c": 3e-6, "n": 1.5, "b": -2e-3, "tau": 3.0}
         ("b", -2e-3),
         ("b exp(-t/tau)", -2e-3 * exp(-0.5)),
         ("b * V / exp(-t/tau) + exp(-t / 0.5)", -2e-3 * 17.0 * exp(0.5) + exp(-3.0)),
+        ("b V sin(tau t - 1)", -2e-3 * 17.0 * sin(3.5)),
+        ("2 cos(1) + cos(t)", 2.0 * cos(1.0) + cos(1.5)),
     ],
 )
 def test_a_law_is_what_its_text_says(text, expected):
@@ -51,7 +53,7 @@ def test_the_compiled_law_acts_in_the_heading_frame_whatever_the_frame_it_is_ask
     P, Q = p_H * cos(beta) - q_H * sin(beta), p_H * sin(beta) + q_H * cos(beta)
     state = {"t": 1.5, "h": 2.0, "V": V, "alpha": alpha, "p_H": p_H, "q_H": q_H, "r": r}
     for place, target in enumerate(WRENCH_TARGETS):
-        law = Law("b |r|^0.7 V q_H + 0.1 alpha p_H", target, COEFFICIENTS)
+        law = Law("b |r|^0.7 V q_H + 0.1 alpha p_H cos(tau t + 1)", target, COEFFICIENTS)
         out = np.array(law_wrench(law.rows, 1.5, 2.0, u, v, w, P, Q, r)).reshape(2, 3)
         in_heading = np.stack(
             [out[:, 0] * cos(beta) + out[:, 1] * sin(beta), -out[:, 0] * sin(beta) + out[:, 1] * cos(beta), out[:, 2]],
@@ -83,6 +85,8 @@ def test_a_law_about_a_sensor_may_hold_its_reading():
         ("b cos(psi)", -2e-3 * cos(7.0)),
         ("b cos(n psi + tau) - c sin(2 * psi)", -2e-3 * cos(1.5 * 7.0 + 3.0) - 3e-6 * sin(14.0)),
         ("b r sin(0.5psi - 1) exp(-t/tau)", 0.12 * sin(2.5) * exp(-0.5)),
+        ("b cos(psi - n * t + tau)", -2e-3 * cos(7.0 - 2.25 + 3.0)),
+        ("sin(-tau t + 2 psi)", sin(14.0 - 4.5)),
     ],
 )
 def test_a_law_about_a_sensor_may_repeat_as_the_disc_turns(text, expected):

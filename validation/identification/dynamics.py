@@ -32,6 +32,7 @@ LAW_PLACES = (
     "order",
     "phase",
     "play",
+    "swing",
     *(f"at_{symbol}" for symbol in SYMBOLS),
 )
 _PLACES, _COUNT = len(LAW_PLACES), len(SYMBOLS)

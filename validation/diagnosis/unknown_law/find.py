@@ -81,7 +81,10 @@ def _held_out(before: Fit, after: Fit) -> tuple[dict[int, float], dict[int, tupl
         levels, squared = [], []
         for i in range(count):
             others = np.sum([r.gram for j, r in enumerate(reduced) if j != i], axis=0)
-            step, _, _ = common_step(others, fit.parameters, fit.at)
+            told = [j for j, q in enumerate(fit.parameters) if q.recordings != frozenset({i})]
+            some = [*told, len(fit.parameters)]
+            step = np.zeros(len(fit.parameters))
+            step[told], _, _ = common_step(others[np.ix_(some, some)], [fit.parameters[j] for j in told], fit.at[told])
             acting = np.array([q.acts_in(i) for q in fit.parameters], dtype=bool)
             step = np.where(acting, step, 0.0)
             left = linears[i].after(nuisance_step(reduced[i], step), step)
@@ -89,7 +92,9 @@ def _held_out(before: Fit, after: Fit) -> tuple[dict[int, float], dict[int, tupl
             squared.append(chi_squared(linears[i], levelled, left))
         sides.append(levels)
         squares.append(squared)
-    gains = {i: 0.5 * (sides[0][i] - sides[1][i]) for i in range(count)}
+    # a recording's own numbers of a law took part: each gains one half by chance, and as much is lost elsewhere
+    price = [sum(q.group == "term" and q.recordings == frozenset({i}) for q in after.parameters) for i in range(count)]
+    gains = {i: 0.5 * (sides[0][i] - sides[1][i]) - price[i] for i in range(count)}
     return gains, {i: (squares[0][i], squares[1][i]) for i in range(count)}
 
 
@@ -258,15 +263,19 @@ def _more_sensor_terms(
         if both is None or _priced(both) + SELECTION.entry > _priced(best):
             continue
         gained, _ = _held_out(fitted.fit, both.fit)
-        if _holds(gained):
+        if _holds(gained, two):
             best, terms = both, two
     return best, terms
 
 
-def _holds(heldout: Mapping[int, float]) -> bool:
-    """Tell whether recordings held out gain enough, half of them anything; where none could be held out it may."""
+def _holds(heldout: Mapping[int, float], terms: Sequence[Term | SensorTerm] = ()) -> bool:
+    """Tell whether recordings held out gain enough, half of them anything; where none could be held out it may.
+
+    Of a term whose coefficients each recording has for itself every recording must gain: little else is foretold.
+    """
     gains = np.array([*heldout.values()])
-    return not heldout or bool(2.0 * np.sum(gains) >= UNKNOWN_LAW.held_out and np.mean(gains > 0.0) >= 0.5)
+    least = 1.0 if any(isinstance(term, SensorTerm) and term.own for term in terms) else 0.5
+    return not heldout or bool(2.0 * np.sum(gains) >= UNKNOWN_LAW.held_out and np.mean(gains > 0.0) >= least)
 
 
 def _key(term: Term | SensorTerm) -> tuple[object, ...]:
@@ -311,7 +320,7 @@ def _believed(
         return None
     share = _share(base.fit, fitted.fit, noise)
     heldout, chi2 = _held_out(base.fit, fitted.fit)
-    if not _holds(heldout) or share < UNKNOWN_LAW.share:
+    if not _holds(heldout, terms) or share < UNKNOWN_LAW.share:
         return None
     total = sum(heldout.values()) if heldout else None
     about = tuple(term for term in terms if isinstance(term, SensorTerm))

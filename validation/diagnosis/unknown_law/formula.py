@@ -8,9 +8,10 @@ from math import exp, log
 
 import numpy as np
 
+from discsim.arrays import FloatArray
 from discsim.validation.diagnosis.result import Law, ParameterValue
 from discsim.validation.diagnosis.settings import SELECTION
-from discsim.validation.diagnosis.unknown_law.terms import SensorTerm
+from discsim.validation.diagnosis.unknown_law.terms import SIDES, SensorTerm
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.normal_equations import inverse_of
 from discsim.validation.identification.plants.law_terms import Term
@@ -28,7 +29,11 @@ def as_sensor_laws(terms: Sequence[SensorTerm], fit: Fit, heldout: float | None)
     notes = []
     for i, term in enumerate(terms):
         s = place[f"{i}.shape"]
-        notes.append(f"{term.kind} of the {term.sensor}, {fit.at[s]:.4g} ± {float(np.sqrt(fit.covariance[s, s])):.2g}")
+        shape, sd = float(fit.at[s]), float(np.sqrt(fit.covariance[s, s]))
+        if term.kind == "swinging":
+            notes.append(_alternating(shape, sd, fit, term.sensor))
+        else:
+            notes.append(f"{term.kind} of the {term.sensor}, {shape:.4g} ± {sd:.2g}")
         prefix = f"{i}."
         axes = dict.fromkeys(name[len(prefix) :].partition(".")[0] for name in place if name.startswith(prefix))
         for axis in axes:
@@ -66,7 +71,8 @@ def _part(term: SensorTerm, i: int, axis: str, place: Mapping[str, int], fit: Fi
     """Return what the i-th term does to an axis, or None where no reading tells it."""
     C, s = fit.covariance, place[f"{i}.shape"]
     shape, shape_sd = float(fit.at[s]), float(np.sqrt(C[s, s]))
-    js = [place[f"{i}.{axis}.{j}"] for j in range(term.size)]
+    of = ".0" if term.own else ""  # of the first recording, where each has its own
+    js = [place[f"{i}.{axis}.{j}{of}"] for j in range(term.size)]
     values, block = fit.at[js], C[np.ix_(js, js)]
     if not np.any(np.diag(block) > 0):
         return None
@@ -80,6 +86,8 @@ def _part(term: SensorTerm, i: int, axis: str, place: Mapping[str, int], fit: Fi
             "k": ParameterValue(shape, shape_sd),
         }
         return _Part("{a} * cos({k} * psi) + {b} * sin({k} * psi)", coefficients, chi2)
+    if term.kind == "swinging":
+        return _swing(values, block, ParameterValue(shape, shape_sd), chi2)
     if term.kind in ("warming", "settling", "play"):
         symbol = axis.partition("_")[0]
         scale = term.unit**-2 if term.kind == "settling" else 1.0
@@ -100,6 +108,35 @@ def _part(term: SensorTerm, i: int, axis: str, place: Mapping[str, int], fit: Fi
         "n": ParameterValue(shape, shape_sd),
     }
     return _Part(text, coefficients, chi2)
+
+
+def _swing(values: FloatArray, block: FloatArray, w: ParameterValue, chi2: float) -> _Part:
+    """Return what swings as a sum of those of its lines that are told, the strongest where none is."""
+    pairs = [slice(2 * k, 2 * k + 2) for k in range(len(SIDES))]
+    told = [float(values[pair] @ inverse_of(block[pair, pair]) @ values[pair]) for pair in pairs]
+    coefficients: dict[str, ParameterValue] = {}
+    texts = []
+    for k, side in enumerate(SIDES):
+        if told[k] < min(4.0 * SELECTION.per_parameter, max(told)):
+            continue
+        angle = {1: "({w} * t + psi)", -1: "({w} * t - psi)", 0: "({w} * t)"}[side]
+        for j, (letter, wave) in enumerate((("a", "cos"), ("b", "sin"))):
+            name, at = f"{letter}{k + 1}", 2 * k + j
+            coefficients[name] = ParameterValue(float(values[at]), float(np.sqrt(block[at, at])))
+            texts.append(f"{{{name}}} * {wave}{angle}")
+    return _Part(" + ".join(texts), {**coefficients, "w": w}, chi2)
+
+
+def _alternating(w: float, sd: float, fit: Fit, sensor: str) -> str:
+    """Return in words what swings, with the frequencies that readings at these instants cannot tell from it."""
+    hertz = w / (2.0 * np.pi)
+    gaps = [np.diff(r.t) for each in fit.trajectories for r in each.readings if r.sensor == sensor]
+    rate = 1.0 / float(np.median(np.concatenate(gaps)))
+    return (
+        f"what swings outside at {hertz:.6g} ± {sd / (2.0 * np.pi):.2g} Hz, in another phase in each recording "
+        f"(coefficients of the first); at {rate:.4g} readings a second {rate - hertz:.6g} and {rate + hertz:.6g} Hz "
+        f"read the same"
+    )
 
 
 def _factor(symbol: str, power: str) -> str:

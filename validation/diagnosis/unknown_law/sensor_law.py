@@ -1,4 +1,4 @@
-"""Laws on a sensor: warming, drift, rate, reading and turning terms, screened by score tests and fitted."""
+"""Laws on a sensor: warming, drift, rate, reading, turning and swinging terms, screened by score tests and fitted."""
 
 from __future__ import annotations
 
@@ -46,6 +46,23 @@ _SETTLED = 3
 
 #: orders of the spin that are looked at, peaks of the spectrum that are tried
 _ORDERS, _PEAKS = (0.15, 4.0), 3
+
+
+#: that of a swing, so that it moves no phase by more than milliradians within a minute
+_SWING_STEP = 1e-7
+
+
+#: how far a swing may be from the peak of a spectrum, rad/s: lines of a recording of ten seconds are 0.6 wide
+_SWING_SD = 0.3
+
+
+#: swings nearer than this are one, rad/s
+_SAME_SWING = 1.0
+
+
+#: slower swings than so many in a recording are its drifts; a peak stands out from the median power by this factor,
+#: where the highest of noise, of five lines in each of three recordings, by 2.5; a channel needs so many readings
+_LONGEST_SWINGS, _STANDS_OUT, _FEWEST = 10.0, 5.0, 50
 
 
 #: orders of the spin nearer than this are one
@@ -108,12 +125,19 @@ def _reading(
     return np.asarray(readings.value[index, axis] - linear.residual[rows])
 
 
-def _columns_of(linear: Linear, trajectory: Trajectory, term: SensorTerm, shape: float) -> FloatArray:
-    """Return the columns (n, axes size) of a sensor term's coefficients."""
+def _columns_of(
+    linear: Linear, trajectory: Trajectory, term: SensorTerm, shape: float, width: int, recording: int
+) -> FloatArray:
+    """Return the columns (n, width) of a sensor term's coefficients, zero where a recording lacks the sensor.
+
+    Each axis has its own; where each recording has its own, too, those of the others stay zero.
+    """
+    columns = np.zeros((linear.raw.size, width))
     axes = len(_axes(trajectory, term.sensor))
-    columns = np.zeros((linear.raw.size, axes * term.size))
-    for rows, axis, basis in _seen(linear, trajectory, term, shape):
-        columns[rows, axis * term.size : (axis + 1) * term.size] = basis
+    first = recording * axes * term.size if term.own else 0
+    for rows, axis, basis in _seen(linear, trajectory, term, shape) if axes else ():
+        at = first + axis * term.size
+        columns[rows, at : at + term.size] = basis
     return columns
 
 
@@ -164,6 +188,43 @@ def orders(fit: Fit, sensor: str) -> list[float]:
     return found
 
 
+def swings(fit: Fit, sensor: str) -> list[float]:
+    """Return the rates, rad/s, of what swings in a frame that does not turn, as a sensor's residuals have it.
+
+    A field that alternates outside stands across the spin axis at lines beside it, by the spin to either side. Only
+    peaks that stand out from the spectrum are told, the highest first.
+    """
+    length, fastest = 0.0, np.inf
+    parts: list[tuple[FloatArray, FloatArray]] = []
+    for linear, trajectory in zip(fit.linears, fit.trajectories, strict=True):
+        spin = turned(trajectory)
+        for channel in linear.channels:
+            if channel.sensor == sensor and channel.rows.stop - channel.rows.start > _FEWEST:
+                t, e = linear.t[channel.rows], linear.residual[channel.rows]
+                psi, e = spin.angle(t), e - e.mean()
+                sides = (0.0,) if channel.axis.startswith("z") else (1.0, -1.0)
+                parts += [(t, e * np.exp(-1j * side * psi)) for side in sides]
+                length = max(length, float(np.ptp(t)))
+                fastest = min(fastest, np.pi / float(np.median(np.diff(t))))
+    if not parts or fit.plant.airborne:
+        return []
+    step = 0.5 * np.pi / length
+    tried = np.arange(_LONGEST_SWINGS * 2.0 * np.pi / length, fastest, step)
+    power = np.zeros(tried.size)
+    for t, e in parts:
+        turning, by = e * np.exp(-1j * tried[0] * t) if tried.size else e, np.exp(-1j * step * t)
+        for j in range(tried.size):
+            power[j] += abs(np.sum(turning)) ** 2 / e.size
+            turning = turning * by
+    found: list[float] = []
+    for j in np.argsort(power)[::-1]:
+        if power[j] < _STANDS_OUT * np.median(power) or len(found) == _PEAKS:
+            break
+        if all(abs(tried[j] - other) > 12.0 * step for other in found):
+            found.append(float(tried[j]))
+    return found
+
+
 def sensor_library(fit: Fit) -> list[SensorTerm]:
     """Return the terms about sensors that are asked for first."""
     terms = []
@@ -176,7 +237,8 @@ def sensor_library(fit: Fit) -> list[SensorTerm]:
         spread = float(np.std(np.concatenate(values)))
         units = {"drift": length, "rate": spin, "settling": spin, "reading": spread}
         for kind in SENSORS[sensor]:
-            shape_grid = orders(fit, sensor) if kind == "turning" else SHAPES[kind]
+            spectral = {"turning": orders, "swinging": swings}
+            shape_grid = spectral[kind](fit, sensor) if kind in spectral else SHAPES[kind]
             if kind == "play":
                 shape_grid = [spread * share for share in shape_grid if spread > 0.0]
             unit = float(f"{max(units.get(kind, 1.0), 1e-6):.1g}")
@@ -193,26 +255,36 @@ class SettledTerm:
 
 
 def _shape_step(term: SensorTerm) -> float:
-    return _PLAY_STEP if term.kind == "play" else _SHAPE_STEP
+    return {"play": _PLAY_STEP, "swinging": _SWING_STEP}.get(term.kind, _SHAPE_STEP)
+
+
+def _shape_sd(term: SensorTerm) -> float:
+    """Return how far a shape may be from where it starts: an order of the spin or a swing by less than a line."""
+    return {"turning": 0.01, "swinging": _SWING_SD}.get(term.kind, 0.3 * term.shape)
+
+
+def _coefficients(trajectories: Sequence[Trajectory], term: SensorTerm) -> list[str]:
+    """Return the names of a term's coefficients, AXIS.NUMBER, and AXIS.NUMBER.RECORDING where each has its own."""
+    axes = max((_axes(trajectory, term.sensor) for trajectory in trajectories), key=len)
+    names = [f"{axis}.{j}" for axis in axes for j in range(term.size)]
+    return [f"{name}.{k}" for k in range(len(trajectories)) for name in names] if term.own else names
 
 
 def _width(trajectories: Sequence[Trajectory], term: SensorTerm) -> int:
     """Return the number of a term's coefficients."""
-    return max(len(_axes(trajectory, term.sensor)) for trajectory in trajectories) * term.size
+    return len(_coefficients(trajectories, term))
 
 
 def _beside_terms(
-    linear: Linear, trajectory: Trajectory, settled: Sequence[SettledTerm], widths: Sequence[int]
+    linear: Linear, trajectory: Trajectory, settled: Sequence[SettledTerm], widths: Sequence[int], recording: int
 ) -> Linear:
     """Return a linearisation less what terms do, with columns for their coefficients, and last for their shapes."""
     less, columns, slopes = np.zeros(linear.raw.size), [], []
     for one, width in zip(settled, widths, strict=True):
-        if not _axes(trajectory, one.term.sensor):
-            columns.append(np.zeros((linear.raw.size, width)))
-            slopes.append(np.zeros(linear.raw.size))
-            continue
         shape, h = one.term.shape, _shape_step(one.term) * one.term.shape
-        here, above, below = (_columns_of(linear, trajectory, one.term, x) for x in (shape, shape + h, shape - h))
+        here, above, below = (
+            _columns_of(linear, trajectory, one.term, x, width, recording) for x in (shape, shape + h, shape - h)
+        )
         columns.append(here)
         slopes.append(((above - below) @ one.coefficients) / (2.0 * h))
         less += here @ one.coefficients
@@ -227,18 +299,17 @@ def asked_of_sensors(
         return []
     defects, p = fit.defects, len(fit.parameters)
     known = [_width(fit.trajectories, one.term) for one in settled]
-    wide, places, at = [], [], p + sum(known) + len(settled)
+    wide: list[Linear] = []
+    places, at = [], p + sum(known) + len(settled)
     first = at
     for term in terms:
         width = _width(fit.trajectories, term)
         places.append(range(at, at + width))
         at += width
-    for bare, trajectory in zip(linearised(fit), fit.trajectories, strict=True):
-        linear = _beside_terms(bare, trajectory, settled, known) if settled else bare
+    for i, (bare, trajectory) in enumerate(zip(linearised(fit), fit.trajectories, strict=True)):
+        linear = _beside_terms(bare, trajectory, settled, known, i) if settled else bare
         parts = [
-            _columns_of(bare, trajectory, term, term.shape)
-            if _axes(trajectory, term.sensor)
-            else np.zeros((linear.raw.size, len(place)))
+            _columns_of(bare, trajectory, term, term.shape, len(place), i)
             for term, place in zip(terms, places, strict=True)
         ]
         wide.append(_widened(linear, np.hstack(parts)))
@@ -263,7 +334,8 @@ def further_sensor_terms(library: Sequence[SensorTerm], settled: Sequence[Settle
 
     def one_of(term: SensorTerm, known: SensorTerm) -> bool:
         alike = (term.sensor, term.kind) == (known.sensor, known.kind)
-        return alike and (term.kind != "turning" or abs(term.shape - known.shape) < _SAME_ORDER)
+        near = {"turning": _SAME_ORDER, "swinging": _SAME_SWING}.get(term.kind, np.inf)
+        return alike and abs(term.shape - known.shape) < near
 
     return [term for term in library if not any(one_of(term, one.term) for one in settled)]
 
@@ -287,19 +359,19 @@ def fitted_sensor_law(
 
     The trajectories keep their readings; what the terms take off them is part of the residual.
     """
-    names, widths = [], []
+    numbers: list[Parameter] = []
+    widths = []
     for i, term in enumerate(terms):
-        axes = max((_axes(trajectory, term.sensor) for trajectory in start.trajectories), key=len)
-        names += [f"{i}.{axis}.{j}" for axis in axes for j in range(term.size)]
-        widths.append(len(axes) * term.size)
-    p, count = len(own), len(names)
+        mine = _coefficients(start.trajectories, term)
+        of = [frozenset({int(name.rpartition(".")[2])}) if term.own else None for name in mine]
+        numbers += [Parameter("term", f"{i}.{n}", 0.0, 1.0, recordings=k) for n, k in zip(mine, of, strict=True)]
+        widths.append(len(mine))
+    p, count = len(own), len(numbers)
     parameters = (
         *own,
-        *(Parameter("term", name, 0.0, 1.0) for name in names),
+        *numbers,
         *(
-            Parameter(
-                "term", f"{i}.shape", t.shape, _shape_step(t) * t.shape, 0.3 * t.shape if t.kind != "turning" else 0.01
-            )
+            Parameter("term", f"{i}.shape", t.shape, _shape_step(t) * t.shape, _shape_sd(t))
             for i, t in enumerate(terms)
         ),
     )
@@ -311,7 +383,8 @@ def fitted_sensor_law(
         shapes, parts = fit.at[p + count :], np.split(fit.at[p : p + count], np.cumsum(widths)[:-1])
         here = zip(terms, shapes.tolist(), parts, strict=True)
         settled = [SettledTerm(replace(term, shape=shape), c) for term, shape, c in here]
-        linears = [_beside_terms(a, b, settled, widths) for a, b in zip(bare, fit.trajectories, strict=True)]
+        each = enumerate(zip(bare, fit.trajectories, strict=True))
+        linears = [_beside_terms(a, b, settled, widths, k) for k, (a, b) in each]
         fit = replace(fit, linears=tuple(linears))
         merit = sum(chi_squared(linear, fit.noise, linear.residual) for linear in linears)
         reduced = mapped(

@@ -9,7 +9,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.law import behind_play
 
-__all__ = ["SENSORS", "SHAPES", "SensorTerm"]
+__all__ = ["SENSORS", "SHAPES", "SIDES", "SensorTerm"]
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,11 @@ class SensorTerm:
     reading     c |x|^n sign(x), x the axis's own reading     n
     play        c play(x, w) - c x, Prandtl's operator        w in the sensor's unit
     turning     a cos(k psi) + b sin(k psi)                   k
+    swinging    lines at w + spin, w - spin and w             w in rad/s
     ==========  ============================================  ======================
+
+    What swings is a field that alternates outside, as that of a mains cable: fixed in N, it stands in B at w beside the
+    spin. Its phase is another one in each recording, and so are its coefficients.
     """
 
     sensor: str
@@ -38,7 +42,12 @@ class SensorTerm:
     @property
     def size(self) -> int:
         """Number of coefficients of an axis."""
-        return 2 if self.kind == "turning" else 1
+        return {"turning": 2, "swinging": 6}.get(self.kind, 1)
+
+    @property
+    def own(self) -> bool:
+        """Whether each recording has coefficients of its own."""
+        return self.kind == "swinging"
 
     def basis(self, t: FloatArray, r: FloatArray, psi: FloatArray, x: FloatArray, shape: float) -> FloatArray:
         """Return what coefficients of one add to readings, (n, size), at t, spin r, angle psi, reading x."""
@@ -50,11 +59,17 @@ class SensorTerm:
             return np.asarray(behind_play(np.ascontiguousarray(x), shape) - x)[:, None]
         if self.kind == "turning":
             return np.stack([np.cos(shape * psi), np.sin(shape * psi)], axis=1)
+        if self.kind == "swinging":
+            angles = [shape * t + order * psi for order in SIDES]
+            return np.stack([wave(angle) for angle in angles for wave in (np.cos, np.sin)], axis=1)
         y = {"drift": t, "rate": r, "reading": x}[self.kind]
         return np.asarray(np.sign(y) * np.abs(y / self.unit) ** shape)[:, None]
 
 
-#: shapes that are tried first; those of what turns with the disc come from the spectrum of the residuals
+#: times the spin by which the lines of what swings outside lie beside its own: across the spin axis, and along it
+SIDES = (1, -1, 0)
+
+#: shapes that are tried first; those of what turns or swings come from the spectrum of the residuals
 SHAPES = {
     "warming": tuple(0.5 * 2.0**k for k in range(6)),
     "drift": (1.0, 2.0),
@@ -68,7 +83,7 @@ SHAPES = {
 
 #: kinds of law that a sensor can have
 SENSORS = {
-    "magnetometer": ("warming", "drift", "rate", "turning"),
+    "magnetometer": ("warming", "drift", "rate", "turning", "swinging"),
     "accelerometer": ("warming", "drift", "rate", "settling", "reading", "play", "turning"),
     "gyroscope": ("warming", "drift", "rate", "reading", "play", "turning"),
 }

@@ -19,6 +19,7 @@ from discsim.shipped import load_disc
 from discsim.threads import limited
 from discsim.validation.challenge.cases.hidden_physics import coast, haunted
 from discsim.validation.challenge.cases.off_catalogue import (
+    MainsField,
     OffCatalogue,
     PowerLawTorque,
     RotatingMagnet,
@@ -92,6 +93,29 @@ def test_a_magnet_that_turns_beside_the_sensor_is_a_law_of_the_angle_turned():
     amplitude = np.hypot(found.law.coefficients["a"].value, found.law.coefficients["b"].value)
     # 0.6 uT of noise on 1200 samples
     assert amplitude == pytest.approx(6.0, abs=0.15)
+
+
+def test_a_field_that_alternates_outside_is_a_law_of_its_frequency_in_any_phase():
+    secret = MainsField(4.0, 50.164, (0.6, -0.64, 0.48))
+    found = law_of(coasting([secret] * 3))
+    assert found is not None
+    laws = {law.target: law for law in (found.law, *found.also)}
+    assert set(laws) == {"magnetometer.x_uT", "magnetometer.y_uT", "magnetometer.z_uT"}
+    # at 100 readings a second the line stands at 49.836 Hz
+    assert within(found, "w", 2.0 * np.pi * 49.836)
+    assert "50.16" in found.reference
+    along = laws["magnetometer.z_uT"].coefficients
+    # 0.6 uT of noise on 500 readings
+    assert np.hypot(along["a3"].value, along["b3"].value) == pytest.approx(4.0 * 0.48, abs=0.15)
+    across = laws["magnetometer.x_uT"].coefficients
+    lines = [np.hypot(across[f"a{k}"].value, across[f"b{k}"].value) for k in (1, 2)]
+    assert lines == pytest.approx([2.0 * np.hypot(0.6, 0.64)] * 2, abs=0.2)
+    assert all(gain > 50.0 for gain in found.heldout.values())
+
+
+def test_fields_that_alternate_at_other_frequencies_are_no_law():
+    secrets = [MainsField(4.0, frequency, (0.6, -0.64, 0.48)) for frequency in (50.1, 43.0, 37.0)]
+    assert law_of(coasting(secrets)) is None
 
 
 def test_a_gyroscope_that_warms_up_on_a_table_is_a_law_of_time():
