@@ -296,9 +296,13 @@ def _spread(ranked: Sequence[tuple[float, float, Term | SensorTerm]]) -> list[tu
 def _share(base: Fit, fit: Fit, noise: NoiseModel) -> float:
     """Return the part of the excess of chi2 over the number of readings that a fit takes away, in white noise.
 
-    Noise with a memory weighs the differences of neighbours most, which hold none of what a law explains.
+    Noise with a memory weighs the differences of neighbours most, which hold none of what a law explains; noise that
+    holds what it explains, as that of a swing from reading to reading, gives way to what the fit leaves.
     """
-    white = {group: item._replace(correlation=0.0) for group, item in noise.items()}
+    left = {
+        group: min(item.sd, fit.noise[group].sd) if group in fit.noise else item.sd for group, item in noise.items()
+    }
+    white = {group: item._replace(sd=left[group], correlation=0.0) for group, item in noise.items()}
     before, after = (sum(chi_squared(linear, white, linear.residual) for linear in one.linears) for one in (base, fit))
     return min((before - after) / max(before - base.count, 1.0), 1.0)
 

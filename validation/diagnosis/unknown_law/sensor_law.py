@@ -206,8 +206,8 @@ def swings(fit: Fit, sensor: str) -> list[float]:
                 parts += [(t, e * np.exp(-1j * side * psi)) for side in sides]
                 length = max(length, float(np.ptp(t)))
                 fastest = min(fastest, np.pi / float(np.median(np.diff(t))))
-    if not parts or fit.plant.airborne:
-        return []
+    if not parts or (fit.plant.airborne and not fit.plant.weakly_identified):
+        return []  # far from any cable, and about no axis that keeps its direction
     step = 0.5 * np.pi / length
     tried = np.arange(_LONGEST_SWINGS * 2.0 * np.pi / length, fastest, step)
     power = np.zeros(tried.size)

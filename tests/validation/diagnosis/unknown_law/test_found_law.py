@@ -194,10 +194,10 @@ def test_two_terms_about_two_sensors_are_found_beside_each_other():
     assert abs(tau.value - 3.0) < 3.0 * tau.sd
 
 
-def test_a_gyroscope_that_warms_up_in_free_spin_is_a_law_of_time():
-    """No model predicts a free spin's motion, so only laws about sensors are asked for."""
+def spun(secret: OffCatalogue) -> list[Recording]:
+    """Three throws whose path no sensor tells."""
     driver, field = load_disc("driver")
-    module = haunted(MODULE.fitted("gyroscope", range=104.72), Warming("gyroscope", (-0.04, 0.05, 0.02), 0.8))
+    module = haunted(MODULE.fitted("gyroscope", range=104.72), secret)
     bare = replace(driver, aero=None)
     made = []
     for number, (spin, tilt) in enumerate(((62.0, 0.2), (-48.0, -0.1), (55.0, 0.1))):
@@ -212,7 +212,20 @@ def test_a_gyroscope_that_warms_up_in_free_spin_is_a_law_of_time():
         motion = fly(driver, field, release, duration=2.5)
         rng = np.random.default_rng(number)
         made.append(record(motion, module, rng, plant="free_spin", name=f"throw-{number}", disc=bare))
-    found = law_of(made)
+    return made
+
+
+def test_a_field_that_alternates_outside_is_told_in_free_spin():
+    found = law_of(spun(MainsField(5.0, 59.9, (0.5, 0.5, -0.7))))
+    assert found is not None
+    # at 100 readings a second the line stands at 40.1 Hz
+    assert within(found, "w", 2.0 * np.pi * 40.1)
+    assert "and 140.1" in found.reference
+
+
+def test_a_gyroscope_that_warms_up_in_free_spin_is_a_law_of_time():
+    """No model predicts a free spin's motion, so only laws about sensors are asked for."""
+    found = law_of(spun(Warming("gyroscope", (-0.04, 0.05, 0.02), 0.8)))
     assert found is not None
     assert found.law.target.startswith("gyroscope.")
     assert within(found, "tau", 0.8)
