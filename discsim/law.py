@@ -5,7 +5,8 @@ The text is a sum of products of powers. A factor is a number, a coefficient, a 
 the coefficients c, n and b is a law, and so is ``-c r V``: a blank or a dot multiplies, too. What dies away in time has
 the factor ``exp(-t/tau)``; what swings in time, ``cos(w t + phase)`` or ``sin(w t)``; what repeats as a disc turns,
 ``cos(k psi + w t + phase)``, psi being the angle turned since the recording began: it stands only in a law about a
-sensor. So does ``play(x, w)``, what a reading x shows behind a play of +-w: Prandtl's operator, the simplest
+sensor. In one about the axis of a rig ``yaw`` stands in its place, the angle of the rig itself. Only in a law about a
+sensor does ``play(x, w)`` stand, what a reading x shows behind a play of +-w: Prandtl's operator, the simplest
 hysteresis.
 """
 
@@ -42,7 +43,7 @@ _LONGEST = 5000
 #: size of an exponent: r^30 is 1e111 at the fastest spin, and no force grows so
 _STEEPEST = 30.0
 #: a row of a law's numbers: place of its target, coefficient, of each symbol the power of its magnitude and its sign
-#: to a power, decay in 1/s, order of the angle turned, phase, play of its sensor's reading, rad/s of what swings
+#: to a power, decay in 1/s, order of the angle, phase, play of its sensor's reading, rad/s of what swings
 _DECAY, _ORDER, _PHASE, _PLAY, _SWING, LAW_WIDTH = (2 + 2 * _COUNT + k for k in range(6))
 _TOKEN = re.compile(r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*·/^|(),]))")
 
@@ -71,7 +72,7 @@ class Law:
                 "such as magnetometer.x_uT"
             )
         for name, value in self.coefficients.items():
-            if not re.fullmatch(r"[A-Za-z_]\w*", name) or name in (*SYMBOLS, *_FUNCTIONS, "psi"):
+            if not re.fullmatch(r"[A-Za-z_]\w*", name) or name in (*SYMBOLS, *_FUNCTIONS, "psi", "yaw"):
                 raise InputError(
                     f"law: a coefficient is called '{name}'; expected a name that is no symbol of the state"
                 )
@@ -84,18 +85,29 @@ class Law:
         if self.target in WRENCH_TARGETS:
             if np.any(rows[:, 2 + SYMBOLS.index("x") : 2 + _COUNT]):
                 raise InputError("law: x, y and z are a sensor's reading; expected them only in a law about a sensor")
-            if np.any(rows[:, _ORDER]):
+            if "psi" in self._angles:
                 raise InputError("law: psi is the angle turned; expected it only in a law about a sensor")
+        if "yaw" in self._angles and self.target != "moment_z_N_m":
+            raise InputError("law: yaw is the angle of a rig; expected it only in a law about moment_z_N_m")
 
     @cached_property
     def rows(self) -> FloatArray:
         """The law as numbers, a row per term, for `law_wrench`."""
-        parser = _Parser(self.text, self.coefficients)
         place = WRENCH_TARGETS.index(self.target) if self.target in WRENCH_TARGETS else -1
-        return readonly([[place, *term] for term in parser.terms()])
+        return readonly([[place, *term] for term in _Parser(self.text, self.coefficients).terms()])
+
+    @cached_property
+    def _angles(self) -> frozenset[str]:
+        """Which of the angles psi and yaw stand in the text."""
+        return frozenset(re.findall(r"[A-Za-z_]\w*", self.text)) & {"psi", "yaw"}
+
+    @property
+    def about_a_rig(self) -> bool:
+        """Whether it holds the angle of a rig, which a disc in the air does not have."""
+        return "yaw" in self._angles
 
     def evaluate(self, state: Mapping[str, ArrayLike]) -> FloatArray:
-        """Return the law at states given by symbol (psi, too), each a number or (n,), in the order of time.
+        """Return the law at states given by symbol (psi or yaw, too), each a number or (n,), in the order of time.
 
         Raises KeyError where one is missing.
         """
@@ -113,7 +125,7 @@ class Law:
                 term = term * np.exp(-row[_DECAY] * np.asarray(state["t"], dtype=np.float64))
             if row[_ORDER] or row[_SWING]:
                 angle = np.asarray(row[_PHASE])
-                for factor, symbol in ((row[_ORDER], "psi"), (row[_SWING], "t")):
+                for factor, symbol in ((row[_ORDER], "yaw" if row[0] >= 0.0 else "psi"), (row[_SWING], "t")):
                     if factor:
                         angle = angle + factor * np.asarray(state[symbol], dtype=np.float64)
                 term = term * np.cos(angle)
@@ -223,18 +235,18 @@ class _Parser:
 
     def _turn(self) -> tuple[float, float, float]:
         """Read ``cos(k psi + w t + phase)`` or the sine; return k, w and the phase of the cosine."""
-        found = {"psi": 0.0, "t": 0.0, "": -0.5 * pi if self._take("cos", "sin") == "sin" else 0.0}
+        found = {"psi": 0.0, "yaw": 0.0, "t": 0.0, "": -0.5 * pi if self._take("cos", "sin") == "sin" else 0.0}
         self._take("(")
         sign = -1.0 if self._skip("-") else 1.0
         while True:
             factor, of = 1.0, self._take()
-            if of not in ("psi", "t"):
+            if of not in ("psi", "yaw", "t"):
                 factor, of = self._number(of), ""
-                if self._skip("*", "·") or self._peek() in ("psi", "t"):
-                    of = self._take("psi", "t")
+                if self._skip("*", "·") or self._peek() in ("psi", "yaw", "t"):
+                    of = self._take("psi", "yaw", "t")
             found[of] += sign * factor
             if self._take("+", "-", ")") == ")":
-                return found["psi"], found["t"], found[""]
+                return found["psi"] + found["yaw"], found["t"], found[""]
             sign = -1.0 if self._tokens[self._next - 1] == "-" else 1.0
 
     def _play(self) -> tuple[int, float]:
@@ -307,11 +319,11 @@ def behind_play(x: FloatArray, width: float) -> FloatArray:
 
 @compiled
 def law_wrench(
-    rows: FloatArray, t: float, h: float, u: float, v: float, w: float, P: float, Q: float, r: float
+    rows: FloatArray, t: float, h: float, u: float, v: float, w: float, P: float, Q: float, r: float, yaw: float = 0.0
 ) -> tuple[float, float, float, float, float, float]:
     """Force (N) and moment (N m) of a law's rows, to be added to those of the air; arguments as for ``air_wrench``.
 
-    Like it, in any frame whose z axis is that of the body. For a rig's axis only r matters.
+    Like it, in any frame whose z axis is that of the body. For a rig's axis only r and yaw matter.
     """
     V = norm3(u, v, w)
     cos_beta, sin_beta, alpha = heading_angles(u, v, w)
@@ -327,8 +339,8 @@ def law_wrench(
                 term *= np.sign(state[k])
         if rows[i, _DECAY] != 0.0:
             term *= exp(-rows[i, _DECAY] * t)
-        if rows[i, _SWING] != 0.0:
-            term *= cos(rows[i, _SWING] * t + rows[i, _PHASE])
+        if rows[i, _SWING] != 0.0 or rows[i, _ORDER] != 0.0:
+            term *= cos(rows[i, _ORDER] * yaw + rows[i, _SWING] * t + rows[i, _PHASE])
         out[int(rows[i, 0])] += term
     return (
         cos_beta * out[0] - sin_beta * out[1],

@@ -159,6 +159,8 @@ def tables(disc: Disc | None, law: Law | Sequence[Law] | None = None, effects: S
         along_both = CubicSpline(speed, along_rate, axis=2).c  # (4, nv - 1, 4, nr - 1)
         spline = np.ascontiguousarray(np.transpose(along_both, (3, 1, 2, 0)))
     laws = [law] if isinstance(law, Law) else law or ()
+    if disc is not None and any(each.about_a_rig for each in laws):
+        raise InputError("law: yaw is the angle of a rig; expected none of it in a law upon a disc in the air")
     rows = np.concatenate([np.empty((0, LAW_WIDTH)), *(each.rows for each in laws if each.target in WRENCH_TARGETS)])
     own = [(one.address, item.value) for item in effects if item.row.acts_on == "motion" and (one := item.applied)]
     sizes = np.zeros((len(own), max((len(value) for _, value in own), default=0)))

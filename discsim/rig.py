@@ -117,11 +117,13 @@ def profile_fault(knots: Samples) -> tuple[int, str] | None:
 
 
 @compiled
-def bearing_force(flat: FloatArray, tables: Tables, t: float, qvel: FloatArray, qfrc: FloatArray) -> None:
+def bearing_force(
+    flat: FloatArray, tables: Tables, t: float, qpos: FloatArray, qvel: FloatArray, qfrc: FloatArray
+) -> None:
     """Add the torque of a spin-down rig: ``Izz rdot = -viscous r`` and what a baseline leaves out."""
     p = flat.view(PARAMETERS)[0]
     r = qvel[0]
-    qfrc[0] += bearing_torque(p, tables, t, r) + p.rig.Izz * spin_step(p.event_spin_step, t, r)
+    qfrc[0] += bearing_torque(p, tables, t, qpos[0], r) + p.rig.Izz * spin_step(p.event_spin_step, t, r)
 
 
 @compiled
@@ -286,7 +288,7 @@ def spin_down(
     flat = parameters(environment, rig=rig, effects=effects)
     hinge = _Hinge(environment, flat, rig.Izz, yaw)
     model, data = hinge.model, hinge.data
-    views = (data.qvel, data.qfrc_passive)
+    views = (data.qpos, data.qvel, data.qfrc_passive)
 
     def brake(stepped_model: Any, stepped_data: Any) -> None:
         if stepped_data is data:

@@ -73,6 +73,21 @@ def test_a_rigs_axis_needs_its_spin_alone():
         assert wrench[5] == pytest.approx(copysign(3e-6 * abs(r) ** 1.5, -r) if r else 0.0, rel=1e-13)
 
 
+def test_a_rigs_axis_may_hold_its_own_angle_and_nothing_else_may():
+    law = Law("c * cos(3 yaw + n)", "moment_z_N_m", COEFFICIENTS)
+    assert law_wrench(law.rows, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.7)[5] == pytest.approx(3e-6 * cos(3.6))
+    assert float(law.evaluate({"yaw": 0.7})) == pytest.approx(3e-6 * cos(3.6))
+    for text, target in (
+        ("c cos(yaw)", "magnetometer.x_uT"),
+        ("c cos(yaw)", "moment_x_N_m"),
+        ("c yaw", "moment_z_N_m"),
+    ):
+        with pytest.raises(InputError, match="yaw"):
+            Law(text, target, COEFFICIENTS)
+    with pytest.raises(InputError, match="yaw is the angle of a rig"):
+        fly(DRIVER, FIELD, throw(), duration=1.0, law=law)
+
+
 def test_a_law_about_a_sensor_may_hold_its_reading():
     law = Law("b * x * |x|", "accelerometer.x_m_s2", COEFFICIENTS)
     x = np.array([-10.0, 0.0, 5.0])

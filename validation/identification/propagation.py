@@ -140,9 +140,10 @@ def _events(values: Values, columns: Sequence[Column] = ()) -> tuple[tuple[float
 
 
 def _order(values: Values, columns: Sequence[Column] = ()) -> float:
-    """Return the highest order of a speed ripple among values and among the shapes that columns are taken at."""
+    """Return the highest order of what repeats in a turn, among values and among the shapes of columns."""
     found = [values.get(key, 0.0) for key in _PER_TURN]
-    found += [n for c in columns for name, n in c.given if (c.group, name) in _PER_TURN]
+    found += [n for (group, name), n in values.items() if group == "law" and name.endswith(".order")]
+    found += [n for c in columns for name, n in c.given if (c.group, name) in _PER_TURN or name.endswith(".order")]
     return max(abs(order) for order in found)
 
 

@@ -281,7 +281,7 @@ def _holds(heldout: Mapping[int, float], terms: Sequence[Term | SensorTerm] = ()
 def _key(term: Term | SensorTerm) -> tuple[object, ...]:
     if isinstance(term, SensorTerm):
         return term.sensor, term.kind
-    return term.target, frozenset(symbol for symbol, _ in term.powers), bool(term.decay)
+    return term.target, frozenset(symbol for symbol, _ in term.powers), bool(term.decay), bool(term.order)
 
 
 def _spread(ranked: Sequence[tuple[float, float, Term | SensorTerm]]) -> list[tuple[float, float, Term | SensorTerm]]:

@@ -190,6 +190,11 @@ def _as_law(terms: Mapping[int, Term], fit: Fit, at: Mapping[str, float], heldou
             sd = float(np.sqrt(C[place[name], place[name]]))
             coefficients["tau" + mark] = ParameterValue(1.0 / decay, sd / decay**2)
             factors.append(f"exp(-t/tau{mark})")
+        if term.order:
+            phase = place[f"{i}.phase"]
+            coefficients["phase" + mark] = ParameterValue(float(fit.at[phase]), float(np.sqrt(C[phase, phase])))
+            factors.append(f"cos({term.order} * yaw + phase{mark})")
+            where.append(f"{term.order} times in a turn")
         scale = exp(logarithm)
         sd = abs(c) * scale * float(np.sqrt(max(float(row @ C @ row), 0.0)))
         coefficients["c" + mark] = ParameterValue(c * scale, sd)

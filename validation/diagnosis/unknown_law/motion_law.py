@@ -59,6 +59,12 @@ def _constant(target: str, plant: Plant, term: int = 0) -> Column:
     )
 
 
+def _wave(term: Term, phase: float, plant: Plant, place: int) -> Column:
+    """Return the column of what repeats in a turn, at a phase."""
+    constant = _constant(term.target, plant, place)
+    return constant._replace(given=(*constant.given, (f"{place}.order", float(term.order)), (f"{place}.phase", phase)))
+
+
 def _weighed(linear: Linear, nodes: FloatArray, first: int, targets: Sequence[int], weights: FloatArray) -> Linear:
     """Return a linearisation with terms for its last columns, made of those of constants.
 
@@ -87,33 +93,49 @@ def _weighed(linear: Linear, nodes: FloatArray, first: int, targets: Sequence[in
 def normal_equations_of_terms(
     fit: Fit, terms: Sequence[Term], states: Sequence[Mapping[str, FloatArray]], at: Mapping[str, float]
 ) -> NormalEquations:
-    """Return the board of a fit's own parameters and terms, its segments jumping as they may."""
+    """Return the board of a fit's own parameters and terms, its segments jumping as they may.
+
+    What repeats in a turn is too quick to be weighed by segments: it has two columns, of its cosine and its sine, which
+    come before those of all others.
+    """
     plant, defects = fit.plant, fit.defects
-    targets = list(dict.fromkeys(term.target for term in terms))
-    place_of = [targets.index(term.target) for term in terms]
+    slow = [term for term in terms if not term.order]
+    targets = list(dict.fromkeys(term.target for term in slow))
+    place_of = [targets.index(term.target) for term in slow]
     taken = len({int(q.name.partition(".")[0]) for q in fit.parameters if q.group == "law"})
     own = [column_of(q) for q in fit.parameters]
-    bare = linearised_columns(fit, [*own, *(_constant(target, plant, taken) for target in targets)])
+    waves = [_wave(term, phase, plant, taken) for term in terms if term.order for phase in (0.0, -0.5 * np.pi)]
+    bare = linearised_columns(fit, [*own, *waves, *(_constant(target, plant, taken) for target in targets)])
+    first = len(own) + len(waves)
     linears = [
-        _weighed(linear, trajectory.nodes, len(own), place_of, np.array([term.weight(state, at) for term in terms]))
+        _weighed(linear, trajectory.nodes, first, place_of, np.array([term.weight(state, at) for term in slow]))
         for linear, trajectory, state in zip(bare, fit.trajectories, states, strict=True)
     ]
     reduced = mapped(
         lambda linear, trajectory: reduce(linear, trajectory, fit.noise, defects), linears, fit.trajectories
     )
-    columns = (*own, *(Column("law", f"{j}.candidate", 1.0) for j in range(len(terms))))
+    columns = (*own, *(Column("law", f"{j}.candidate", 1.0) for j in range(len(waves) + len(slow))))
     grams = to_baseline(np.stack([r.gram for r in reduced]), fit)
     return NormalEquations(columns, grams, {column: j for j, column in enumerate(columns)})
 
 
-def _asked(equations: NormalEquations, own: Sequence[Parameter], terms: int) -> Iterator[tuple[float, float]]:
-    """Yield what each term would gain in chi2, and its coefficient."""
+def _asked(
+    equations: NormalEquations, own: Sequence[Parameter], terms: Sequence[Term]
+) -> Iterator[tuple[float, float, Term]]:
+    """Yield what each term would gain in chi2, its coefficient, and the term, with its phase where it repeats."""
     taken = [(column_of(q), q) for q in own]
     base = equations.solve(taken).chi2
-    for j in range(terms):
-        column = Column("law", f"{j}.candidate", 1.0)
-        answer: ScoreTest = equations.solve([*taken, (column, Parameter("law", column.name, 0.0, 1.0))])
-        yield base - answer.chi2, float(answer.value[-1])
+    quick = 2 * sum(term.order > 0 for term in terms)
+    places = {True: iter(range(quick)), False: iter(range(quick, quick + len(terms)))}
+    for term in terms:
+        mine = [next(places[term.order > 0]) for _ in range(2 if term.order else 1)]
+        free = [Column("law", f"{j}.candidate", 1.0) for j in mine]
+        answer: ScoreTest = equations.solve([*taken, *((c, Parameter("law", c.name, 0.0, 1.0)) for c in free)])
+        if term.order:
+            a, b = (float(x) for x in answer.value[-2:])
+            yield base - answer.chi2, float(np.hypot(a, b)), replace(term, phase=float(np.arctan2(-b, a)))
+        else:
+            yield base - answer.chi2, float(answer.value[-1]), term
 
 
 def _parameters(
@@ -131,6 +153,9 @@ def _parameters(
         if term.decay:
             found.append(Parameter("law", f"{i}.decay", term.decay, 0.01 * term.decay, 2.0 * term.decay))
             start.append(term.decay)
+        if term.order:
+            found.append(Parameter("law", f"{i}.phase", term.phase, 1e-3, np.pi))
+            start.append(term.phase)
     return tuple(found), np.array(start)
 
 
@@ -141,6 +166,8 @@ def _fixed(terms: Sequence[Term], at: Mapping[str, float]) -> dict[tuple[str, st
         fixed["law", f"{i}.target"] = float(WRENCH_TARGETS.index(term.target))
         fixed |= {("law", f"{i}.odd_{symbol}"): 1.0 for symbol in term.odd}
         fixed |= {("law", f"{i}.at_{symbol}"): at[symbol] for symbol, _ in term.powers}
+        if term.order:
+            fixed["law", f"{i}.order"] = float(term.order)
     return fixed
 
 
@@ -180,5 +207,4 @@ def candidate_laws(
     """Return gain, coefficient and term, best first, the best few of each target."""
     states = [state_of(trajectory, fit.values(i)) for i, trajectory in enumerate(fit.trajectories)]
     equations = normal_equations_of_terms(fit, terms, states, at)
-    found = [(gain, c, term) for (gain, c), term in zip(_asked(equations, own, len(terms)), terms, strict=True)]
-    return sorted(found, key=lambda item: -item[0])
+    return sorted(_asked(equations, own, terms), key=lambda item: -item[0])

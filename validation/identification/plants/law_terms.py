@@ -16,13 +16,16 @@ __all__ = ["Term"]
 class Term:
     """One product of powers about motion: ``target = c |x|^n ...``, keeping the signs of the symbols in ``odd``.
 
-    ``powers`` are pairs of symbol and exponent; ``decay`` (1/s) makes it die away in time.
+    ``powers`` are pairs of symbol and exponent; ``decay`` (1/s) makes it die away in time. What repeats ``order`` times
+    in a turn of a rig is ``c cos(order yaw + phase)``.
     """
 
     target: str
     powers: tuple[tuple[str, float], ...] = ()
     odd: tuple[str, ...] = ()
     decay: float = 0.0
+    order: int = 0
+    phase: float = 0.0
 
     def weight(self, state: Mapping[str, FloatArray], at: Mapping[str, float]) -> FloatArray:
         """Return the term at states (k,) for a coefficient of one, symbols taken in units of ``at``."""

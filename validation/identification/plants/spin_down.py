@@ -40,15 +40,19 @@ _YAW, _SPIN = 0, 1
 # ---------------------------------------------------------------------------------------------------- its motion
 
 
+#: longest step of the integrator, s, and in radians of what repeats in a turn
+_STEP, _REPEATED = 0.01, 0.3
+
+
 def _longest_step(given: Given, state: FloatArray, start: float, stop: float) -> float:
-    del given, state, start, stop
-    return 0.01
+    del start, stop
+    return min(_STEP, _REPEATED / max(given.order * abs(float(state[_SPIN])), 1.0))
 
 
 @compiled
-def _friction(p: Any, tables: Tables, t: float, r: float) -> float:
+def _friction(p: Any, tables: Tables, t: float, psi: float, r: float) -> float:
     """Angular acceleration of a rig that runs down, rad/s^2."""
-    return float(bearing_torque(p, tables, t, r) / p.rig.Izz + spin_step(p.event_spin_step, t, r))
+    return float(bearing_torque(p, tables, t, psi, r) / p.rig.Izz + spin_step(p.event_spin_step, t, r))
 
 
 @compiled_nogil
@@ -69,16 +73,18 @@ def spin_down_segments(
         flat = flats[c, :SIZE].copy()
         p, acting = flat.view(PARAMETERS)[0], acting_tables(tables, flats[c])
         psi[0], r[0] = states[c, 0], states[c, 1]
-        slope[0] = _friction(p, acting, times[0], r[0])
+        slope[0] = _friction(p, acting, times[0], psi[0], r[0])
         for k in range(n - 1):
             t, h = times[k], times[k + 1] - times[k]
             k1 = slope[k]
-            k2 = _friction(p, acting, t + 0.5 * h, r[k] + 0.5 * h * k1)
-            k3 = _friction(p, acting, t + 0.5 * h, r[k] + 0.5 * h * k2)
-            k4 = _friction(p, acting, t + h, r[k] + h * k3)
+            r2 = r[k] + 0.5 * h * k1
+            k2 = _friction(p, acting, t + 0.5 * h, psi[k] + 0.5 * h * r[k], r2)
+            r3 = r[k] + 0.5 * h * k2
+            k3 = _friction(p, acting, t + 0.5 * h, psi[k] + 0.5 * h * r2, r3)
+            k4 = _friction(p, acting, t + h, psi[k] + h * r3, r[k] + h * k3)
             r[k + 1] = r[k] + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
             psi[k + 1] = psi[k] + h * r[k] + h * h / 6.0 * (k1 + k2 + k3)
-            slope[k + 1] = _friction(p, acting, times[k + 1], r[k + 1])
+            slope[k + 1] = _friction(p, acting, times[k + 1], psi[k + 1], r[k + 1])
         _between(p, times, psi, r, slope, out, rows[c])
         ends[c] = 0.0
         ends[c, 0], ends[c, 1] = psi[last], r[last]
@@ -118,6 +124,8 @@ _TERMS = (
     *(Term("moment_z_N_m", (("r", n),) if n else (), ("r",)) for n in _POWERS),
     # friction that changes with time, as a bearing warms
     *(Term("moment_z_N_m", (("r", 1.0),), ("r",), 1.0 / tau) for tau in (2.0, 4.0, 8.0, 16.0)),
+    # places of a turn in which it holds, as poles or balls do
+    *(Term("moment_z_N_m", order=order) for order in range(1, 9)),
 )
 
 

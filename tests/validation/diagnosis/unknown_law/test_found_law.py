@@ -13,12 +13,13 @@ from discsim.engine import fly
 from discsim.environment import Environment
 from discsim.law import Law
 from discsim.recording import Recording, Samples
-from discsim.rig import turn_table
+from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
 from discsim.threads import limited
 from discsim.validation.challenge.cases.hidden_physics import coast, haunted
 from discsim.validation.challenge.cases.off_catalogue import (
+    Cogging,
     MainsField,
     OffCatalogue,
     PowerLawTorque,
@@ -78,6 +79,24 @@ def test_the_torque_of_an_odd_bearing_is_found_with_its_exponent():
     r = np.array([-60.0, 45.0, 60.0])
     torque = found.law.for_model().evaluate({"r": r, "t": np.zeros(3)})
     np.testing.assert_allclose(torque, [secret.torque(x) for x in r], rtol=0.03)
+
+
+def test_a_bearing_that_holds_in_places_of_a_turn_is_a_law_of_the_rigs_own_angle():
+    secret = Cogging(0.03, 3)
+    found = law_of(coasting([secret] * 3))
+    assert found is not None
+    assert found.law.target == "moment_z_N_m"
+    assert found.law.text == "c * cos(3 * yaw + phase)"
+    assert within(found, "c", 0.03)
+    assert within(found, "phase", 0.0)
+    assert all(gain > 0.0 for gain in found.heldout.values())
+    # and what it found lets a rig run down as it did
+    run = {"duration": 2.0, "yaw": 0.3, "timestep": 5e-4}
+    truth = coast(RIG, FIELD, 60.0, 2.0, secret=secret, yaw=0.3)
+    again = spin_down(RIG, FIELD, 60.0, law=found.law.for_model(), **run)
+    plain = spin_down(RIG, FIELD, 60.0, **run)
+    rate = [np.interp(truth.t, motion.t, motion.rate[:, 2]) - truth.rate[:, 2] for motion in (again, plain)]
+    assert np.std(rate[0]) < 0.03 * np.std(rate[1])
 
 
 def test_a_torque_that_differs_from_run_to_run_is_no_law():
