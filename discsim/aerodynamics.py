@@ -195,8 +195,9 @@ def total_wrench(
     """Force (N) and moment (N m) of the air, of laws and of effects that are called, at time t; as for `air_wrench`."""
     Fx, Fy, Fz, Mx, My, Mz = air_wrench(p, tables, h, u, v, w, P, Q, r)
     if tables.law.shape[0] > 0:
-        Lx, Ly, Lz, Kx, Ky, Kz = law_wrench(tables.law, t, h, u, v, w, P, Q, r)
-        Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz
+        Lx, Ly, Lz, Kx, Ky, Kz, share = law_wrench(tables.law, t, h, u, v, w, P, Q, r)
+        s = 1.0 + share
+        Fx, Fy, Fz, Mx, My, Mz = s * Fx + Lx, s * Fy + Ly, s * Fz + Lz, s * Mx + Kx, s * My + Ky, s * Mz + Kz
     if tables.own_calls.size > 0:
         Lx, Ly, Lz, Kx, Ky, Kz = own_wrench(tables.own_calls, tables.own_sizes, t, h, u, v, w, P, Q, r)
         Fx, Fy, Fz, Mx, My, Mz = Fx + Lx, Fy + Ly, Fz + Lz, Mx + Kx, My + Ky, Mz + Kz

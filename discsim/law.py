@@ -28,13 +28,17 @@ from discsim.errors import InputError, printable
 from discsim.frames import heading_angles, norm3
 from discsim.recording import SENSORS
 
-__all__ = ["LAW_WIDTH", "SYMBOLS", "WRENCH_TARGETS", "Law", "behind_play", "law_wrench"]
+__all__ = ["AIR_SHARE", "LAW_WIDTH", "MOTION_TARGETS", "SYMBOLS", "WRENCH_TARGETS", "Law", "behind_play", "law_wrench"]
 
 #: symbols that a law may hold: time s, height m, airspeed m/s, angle of attack rad, rates in the H frame and spin
 #: rad/s; x, y, z are a sensor's own reading before noise, in its unit, and stand only in a law about that sensor
 SYMBOLS = ("t", "h", "V", "alpha", "p_H", "q_H", "r", "x", "y", "z")
+#: by which share of what is modelled the force and moment of the air are larger: of a disc that grows lighter, too
+AIR_SHARE = "air_share"
 #: what a law about motion may give: force and moment of the H frame, whose z axis is that of the body
 WRENCH_TARGETS = ("force_x_N", "force_y_N", "force_z_N", "moment_x_N_m", "moment_y_N_m", "moment_z_N_m")
+#: and all that it may be about
+MOTION_TARGETS = (*WRENCH_TARGETS, AIR_SHARE)
 _FUNCTIONS = ("sign", "exp", "cos", "sin", "play")
 _READINGS = ("x", "y", "z")
 _COUNT = len(SYMBOLS)
@@ -52,7 +56,7 @@ _TOKEN = re.compile(r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|
 class Law:
     """A term that the catalogue does not hold: ``target = text``.
 
-    ``target`` is one of `WRENCH_TARGETS` (``moment_z_N_m`` also for a rig's axis) or ``SENSOR.COLUMN`` as in
+    ``target`` is one of `MOTION_TARGETS` (``moment_z_N_m`` also for a rig's axis) or ``SENSOR.COLUMN`` as in
     ``magnetometer.x_uT``. ``sigma`` has one standard deviation per coefficient, absent where it is unknown. Raises
     `InputError` for a text that is no law.
     """
@@ -66,9 +70,9 @@ class Law:
         object.__setattr__(self, "coefficients", MappingProxyType(dict(self.coefficients)))
         object.__setattr__(self, "sigma", MappingProxyType(dict(self.sigma)))
         columns = [f"{sensor}.{column}" for sensor, kind in SENSORS.items() for column in kind.columns]
-        if self.target not in (*WRENCH_TARGETS, *columns):
+        if self.target not in (*MOTION_TARGETS, *columns):
             raise InputError(
-                f"law: target is {self.target!r}, expected one of {', '.join(WRENCH_TARGETS)} or a sensor's column "
+                f"law: target is {self.target!r}, expected one of {', '.join(MOTION_TARGETS)} or a sensor's column "
                 "such as magnetometer.x_uT"
             )
         for name, value in self.coefficients.items():
@@ -82,7 +86,7 @@ class Law:
             known = ", ".join(self.coefficients) or "none"
             raise InputError(f"law: sigma of '{min(strange)}', which is no coefficient; expected some of {known}")
         rows = self.rows
-        if self.target in WRENCH_TARGETS:
+        if self.target in MOTION_TARGETS:
             if np.any(rows[:, 2 + SYMBOLS.index("x") : 2 + _COUNT]):
                 raise InputError("law: x, y and z are a sensor's reading; expected them only in a law about a sensor")
             if "psi" in self._angles:
@@ -93,7 +97,7 @@ class Law:
     @cached_property
     def rows(self) -> FloatArray:
         """The law as numbers, a row per term, for `law_wrench`."""
-        place = WRENCH_TARGETS.index(self.target) if self.target in WRENCH_TARGETS else -1
+        place = MOTION_TARGETS.index(self.target) if self.target in MOTION_TARGETS else -1
         return readonly([[place, *term] for term in _Parser(self.text, self.coefficients).terms()])
 
     @cached_property
@@ -320,15 +324,17 @@ def behind_play(x: FloatArray, width: float) -> FloatArray:
 @compiled
 def law_wrench(
     rows: FloatArray, t: float, h: float, u: float, v: float, w: float, P: float, Q: float, r: float, yaw: float = 0.0
-) -> tuple[float, float, float, float, float, float]:
+) -> tuple[float, float, float, float, float, float, float]:
     """Force (N) and moment (N m) of a law's rows, to be added to those of the air; arguments as for ``air_wrench``.
+
+    Last comes the share by which those of the air are larger themselves.
 
     Like it, in any frame whose z axis is that of the body. For a rig's axis only r and yaw matter.
     """
     V = norm3(u, v, w)
     cos_beta, sin_beta, alpha = heading_angles(u, v, w)
     state = (t, h, V, alpha, cos_beta * P + sin_beta * Q, cos_beta * Q - sin_beta * P, r)
-    out = np.zeros(6)
+    out = np.zeros(7)
     for i in range(rows.shape[0]):
         term = rows[i, 1]
         for k in range(len(state)):
@@ -349,4 +355,5 @@ def law_wrench(
         cos_beta * out[3] - sin_beta * out[4],
         sin_beta * out[3] + cos_beta * out[4],
         out[5],
+        out[6],
     )

@@ -18,7 +18,7 @@ from discsim.disc import Aero, Disc, Rig
 from discsim.effects.catalogue import CATALOGUE, Effect, by_id
 from discsim.environment import Environment
 from discsim.errors import InputError
-from discsim.law import LAW_WIDTH, WRENCH_TARGETS, Law
+from discsim.law import LAW_WIDTH, MOTION_TARGETS, Law
 
 __all__ = ["PARAMETERS", "AngleTables", "Tables", "flight_parameters", "parameter_index", "parameters", "tables"]
 
@@ -161,7 +161,7 @@ def tables(disc: Disc | None, law: Law | Sequence[Law] | None = None, effects: S
     laws = [law] if isinstance(law, Law) else law or ()
     if disc is not None and any(each.about_a_rig for each in laws):
         raise InputError("law: yaw is the angle of a rig; expected none of it in a law upon a disc in the air")
-    rows = np.concatenate([np.empty((0, LAW_WIDTH)), *(each.rows for each in laws if each.target in WRENCH_TARGETS)])
+    rows = np.concatenate([np.empty((0, LAW_WIDTH)), *(each.rows for each in laws if each.target in MOTION_TARGETS)])
     own = [(one.address, item.value) for item in effects if item.row.acts_on == "motion" and (one := item.applied)]
     sizes = np.zeros((len(own), max((len(value) for _, value in own), default=0)))
     for place, (_, value) in zip(sizes, own, strict=True):

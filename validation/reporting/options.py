@@ -17,7 +17,7 @@ from discsim.effects.catalogue import Effect, by_id, effect, row
 from discsim.effects.own import UserEffect
 from discsim.environment import FIELD_MODEL_SIGMA, Environment, world_magnetic_field
 from discsim.errors import InputError
-from discsim.law import WRENCH_TARGETS, Law
+from discsim.law import MOTION_TARGETS, Law
 from discsim.limits import limit_of
 from discsim.model_file import Model, read_model
 from discsim.module import Module
@@ -161,7 +161,7 @@ def flight_effects(
     Beside them a line for each that is passed over. Raises `InputError` for a model with a law about the motion, which
     the flights of many throws do not know.
     """
-    if model is not None and any(law.target in WRENCH_TARGETS for law in model.laws):
+    if model is not None and any(law.target in MOTION_TARGETS for law in model.laws):
         raise InputError("the model has a law about the motion; expected one without (discsim fly takes it)")
     effects, notes = all_effects(model, texts, "flight", (), None)
     held = () if model is None else model.effects
@@ -181,9 +181,9 @@ def laws_upon(model: Model | None, plant: Plant, sensors: Sequence[str]) -> tupl
     for law in () if model is None else model.laws:
         passed = f"the model's law about {law.target} is passed over"
         sensor = law.target.partition(".")[0]
-        if law.target in WRENCH_TARGETS and plant == "rate_table":
+        if law.target in MOTION_TARGETS and plant == "rate_table":
             notes.append(f"{passed}: a rate table turns as commanded, whatever acts on it")
-        elif law.target not in WRENCH_TARGETS and sensor not in sensors:
+        elif law.target not in MOTION_TARGETS and sensor not in sensors:
             notes.append(f"{passed}: there is no {sensor} on board, only {', '.join(sensors)}")
         else:
             acting.append(law)

@@ -162,6 +162,7 @@ _TARGETS = MappingProxyType(
         "moment_x_N_m": "rolling moment (x of H), N m",
         "moment_y_N_m": "pitching moment (y of H), N m",
         "moment_z_N_m": "moment about the spin axis, N m",
+        "air_share": "share by which the air's force and moment are larger than modelled (or the disc lighter)",
     }
 )
 _SYMBOLS = MappingProxyType({"alpha": "α", "p_H": "p<sub>H</sub>", "q_H": "q<sub>H</sub>"})

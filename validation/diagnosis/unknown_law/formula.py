@@ -9,6 +9,7 @@ from math import exp, log
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.law import AIR_SHARE
 from discsim.validation.diagnosis.result import Law, ParameterValue
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.diagnosis.unknown_law.terms import SIDES, SensorTerm
@@ -139,6 +140,11 @@ def _alternating(w: float, sd: float, fit: Fit, sensor: str) -> str:
     )
 
 
+def _unit(target: str) -> str:
+    """Return the unit of what a law about motion gives, after a blank."""
+    return "" if target == AIR_SHARE else " N" if target.endswith("_N") else " N m"
+
+
 def _factor(symbol: str, power: str) -> str:
     return f"|{symbol}|^{power}"
 
@@ -200,7 +206,7 @@ def _as_law(terms: Mapping[int, Term], fit: Fit, at: Mapping[str, float], heldou
         coefficients["c" + mark] = ParameterValue(c * scale, sd)
         parts.append(" * ".join(["c" + mark, *factors]))
         notes.append(
-            f"{c:.4g} ± {float(np.sqrt(C[j, j])):.2g} {'N' if term.target.endswith('_N') else 'N m'}"
+            f"{c:.4g} ± {float(np.sqrt(C[j, j])):.2g}{_unit(term.target)}"
             + (f" at {', '.join(where)}" if where else "")
         )
     target = next(iter(terms.values())).target

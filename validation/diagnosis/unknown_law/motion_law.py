@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.law import WRENCH_TARGETS
+from discsim.law import MOTION_TARGETS
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, noise_of, scored
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
@@ -55,7 +55,7 @@ def _constant(target: str, plant: Plant, term: int = 0) -> Column:
         "law",
         f"{term}.coefficient",
         plant.laws.step(target),
-        ((f"{term}.target", float(WRENCH_TARGETS.index(target))),),
+        ((f"{term}.target", float(MOTION_TARGETS.index(target))),),
     )
 
 
@@ -163,7 +163,7 @@ def _fixed(terms: Sequence[Term], at: Mapping[str, float]) -> dict[tuple[str, st
     """Return the numbers of terms that a fit leaves alone."""
     fixed = {}
     for i, term in enumerate(terms):
-        fixed["law", f"{i}.target"] = float(WRENCH_TARGETS.index(term.target))
+        fixed["law", f"{i}.target"] = float(MOTION_TARGETS.index(term.target))
         fixed |= {("law", f"{i}.odd_{symbol}"): 1.0 for symbol in term.odd}
         fixed |= {("law", f"{i}.at_{symbol}"): at[symbol] for symbol, _ in term.powers}
         if term.order:

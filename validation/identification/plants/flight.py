@@ -21,7 +21,7 @@ from discsim.effects.kind import BOARD
 from discsim.errors import InputError
 from discsim.flight_equations import derivative, in_body
 from discsim.frames import body_to_ned, multiply, quaternion_from_matrix, to_body, turn
-from discsim.law import WRENCH_TARGETS
+from discsim.law import AIR_SHARE, WRENCH_TARGETS
 from discsim.parameters import PARAMETERS, Tables
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
@@ -183,6 +183,9 @@ def _terms() -> tuple[Term, ...]:
                 terms.append(Term(target, named, odd))
         if target == "moment_z_N_m":
             terms += [Term(target, (("r", n),), ("r",)) for n in (1.5, 2.0, 2.5, 3.0, 4.0)]
+    # all that the air does: of a disc that dries or sheds mass, and in air that is another one higher up
+    terms += [Term(AIR_SHARE, decay=1.0 / tau) for tau in (0.25, 0.5, 1.0, 2.0)]
+    terms.append(Term(AIR_SHARE, (("h", 1.0),)))
     return tuple(terms)
 
 

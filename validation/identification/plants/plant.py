@@ -16,6 +16,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.frames import conjugate, multiply, rotation_vector, turn
+from discsim.law import AIR_SHARE
 from discsim.parameters import Tables
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
@@ -278,6 +279,10 @@ def _time_alone(recording: Recording, t: FloatArray, states: FloatArray, values:
     return {"t": t}
 
 
+#: half the difference in a share of what the air does
+_SHARE_STEP = 1e-3
+
+
 @dataclass(frozen=True)
 class MotionLaws:
     """What an unknown law about the motion may be made of.
@@ -293,6 +298,8 @@ class MotionLaws:
 
     def step(self, target: str) -> float:
         """Return half the difference in a force or moment."""
+        if target == AIR_SHARE:
+            return _SHARE_STEP
         return self.force_step if target.endswith("_N") else self.moment_step
 
 
