@@ -21,6 +21,7 @@ from discsim.validation.importing.sniffing.behaviour import WORTHS, by_behaviour
 from discsim.validation.importing.sniffing.clock import SPACING, Clock, clocks_of, seconds
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.dialect import dialect_of
+from discsim.validation.importing.sniffing.exchanged import exchanged
 from discsim.validation.importing.sniffing.groups import FEWEST_ROWS, Numbers, Triple, triples_of
 from discsim.validation.importing.sniffing.magnitudes import (
     PER_G,
@@ -71,7 +72,7 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     """
     files, failures = _read(raw)
     layout, files, notes = _one_layout(files)
-    found, left = _assigned(files)
+    found, left, exchanges = _assigned(files)
     fixes = [file.numbers for file in files if file.numbers.tells_positions]
     clock = _one_clock([triple.numbers for triple, _ in found.values()] or fixes or [file.numbers for file in files])
     fixes = [numbers for numbers in fixes if _on(clock, numbers)][:1]
@@ -85,7 +86,8 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
         raise _nothing(raw, files, failures)
     others = _others(found, left)
     own = own_clocks(clock, {sensor: triple for sensor, (triple, _) in found.items()})
-    proposal = _proposal(raw, plant, layout, clock, own, found, [*notes, *(note for _, note in others), *own.notes])
+    notes = [*exchanges, *notes, *(note for _, note in others), *own.notes]
+    proposal = _proposal(raw, plant, layout, clock, own, found, notes)
     proposal = replace(proposal, positions=fixes[0] if fixes else None)
     named = [*(triple for triple, _ in found.values()), *(triple for triple, _ in others)]
     return _with_unused(proposal, [file.numbers for file in files], named, own)
@@ -155,21 +157,29 @@ def _one_layout(files: Sequence[_File]) -> tuple[Layout, list[_File], list[str]]
 # --------------------------------------------------------------------------------------------------- sensors
 
 
-def _assigned(files: Sequence[_File]) -> tuple[dict[str, tuple[Triple, Decision]], list[Triple]]:
-    """Return the best triple of each sensor by names, and the rest."""
+def _assigned(files: Sequence[_File]) -> tuple[dict[str, tuple[Triple, Decision]], list[Triple], list[str]]:
+    """Return the best triple of each sensor by names, the rest, and a note where names are exchanged."""
     triples = [triple for file in files for triple in file.triples]
-    found: dict[str, tuple[Triple, Decision]] = {}
+    named: dict[str, Triple] = {}
     for sensor in ORDER:
         mine = [t for t in triples if t.sensor == sensor and t.penalty < NO_READING]
         if not mine:
             continue
         # of several the one with gravity in it, then the plainest name, then the first
-        best = min(mine, key=lambda t: (sensor == "accelerometer" and _weightless(t), t.penalty, triples.index(t)))
-        if sensor == "accelerometer" and _weightless(best) and (len(mine) > 1 or not _rests(best)):
-            continue  # no sensor's reading, and nothing here could use it
-        found[sensor] = (best, Decision(sensor, best.label, "certain", f"{best.source} says so"))
-    used = [triple for triple, _ in found.values()]
-    return found, [triple for triple in triples if triple not in used]
+        named[sensor] = min(
+            mine, key=lambda t: (sensor == "accelerometer" and _weightless(t), t.penalty, triples.index(t))
+        )
+    meant, decisions, notes = exchanged(named)
+    said = {decision.what: decision for decision in decisions}
+    accel = meant.get("accelerometer")
+    several = sum(t.sensor == "accelerometer" and t.penalty < NO_READING for t in triples) > 1
+    if accel is not None and _weightless(accel) and (several or not _rests(accel)):
+        del meant["accelerometer"], named["accelerometer"]  # no sensor's reading, and nothing here could use it
+    found = {
+        sensor: (triple, said.get(sensor) or Decision(sensor, triple.label, "certain", f"{triple.source} says so"))
+        for sensor, triple in meant.items()
+    }
+    return found, [triple for triple in triples if triple not in named.values()], notes
 
 
 def _weightless(triple: Triple) -> bool:
