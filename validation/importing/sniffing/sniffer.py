@@ -35,9 +35,10 @@ from discsim.validation.importing.sniffing.magnitudes import (
 )
 from discsim.validation.importing.sniffing.names import is_time_name, sensor_of, timeless
 from discsim.validation.importing.sniffing.own_clock import OwnClocks, own_clocks
-from discsim.validation.importing.sniffing.preamble import stated_worths
+from discsim.validation.importing.sniffing.preamble import stated_rate, stated_worths
 from discsim.validation.importing.sniffing.proposal import Proposal, ProposedSensor
-from discsim.validation.importing.sniffing.pull import arm, unit_by_pull
+from discsim.validation.importing.sniffing.pull import arm, doubted, unit_by_pull
+from discsim.validation.importing.sniffing.seen_turns import SeenTurns, clock_note, rate_note, seen_turns
 from discsim.validation.importing.sniffing.spin_axis import Reading3
 from discsim.validation.importing.sniffing.turning import Fit, best_worth, steps_between
 from discsim.validation.importing.sniffing.units import COUNTS, Reading
@@ -310,14 +311,15 @@ def _proposal(
         for sensor, (triple, _) in found.items()
     }
     fit = _turned(found, times)
+    turns = seen_turns({sensor: triple for sensor, (triple, _) in found.items()}, times, fit)
     units: dict[str, Unit] = {}
     for sensor, (triple, _) in found.items():
         sound = np.isfinite(triple.values).all(axis=1)
         value = triple.values if sound.all() else triple.values[sound]
         stated, above = _stated(sensor, triple, value)
         if sensor == "gyroscope":
-            turned = fit.worth if fit is not None and fit.ratio < TELLING and clock.column is not None else None
-            units[sensor] = gyroscope_unit(value, stated, turned)
+            told = turns if clock.column is not None else None
+            units[sensor] = gyroscope_unit(value, stated, told and told.worth, told.by if told else "the field")
         elif sensor == "accelerometer":
             units[sensor] = accelerometer_unit(value, stated)
         else:
@@ -327,7 +329,11 @@ def _proposal(
             text = f"{stated.scale:.6g} {stated.unit} a count"
             why = units[sensor].decision.why.replace("the header says so", "a line above the table says so")
             units[sensor] = units[sensor]._replace(decision=Decision(f"{sensor} unit", text, "certain", why))
-    units = _by_pull(found, times, units)
+    units, pull = _by_pull(found, times, units)
+    if "gyroscope" in found and turns is None and found["gyroscope"][0].units:
+        peak = float(np.nanmax(np.abs(found["gyroscope"][0].values)))
+        units = {**units, "gyroscope": doubted(units["gyroscope"], peak, pull)}
+    notes = [*_on_time(clock, found, times, units, turns, pull), *notes]
     if clock.column is None and "gyroscope" in units:
         clock, slower = _fitted(clock, fit, units["gyroscope"])
         times = {sensor: slower * time for sensor, time in times.items()}
@@ -349,15 +355,32 @@ def _in_si(sensor: str, triple: Triple, time: FloatArray, unit: Unit) -> Reading
 
 def _by_pull(
     found: dict[str, tuple[Triple, Decision]], times: dict[str, FloatArray], units: dict[str, Unit]
-) -> dict[str, Unit]:
-    """Return the units, a gyroscope's by the pull to the centre where that refutes the unit of the header."""
+) -> tuple[dict[str, Unit], float | None]:
+    """Return the units, a gyroscope's by the pull to the centre where that refutes the header's, and the arm, m."""
     if {"gyroscope", "accelerometer"} - set(found) or not found["gyroscope"][0].units:
-        return units
+        return units, None
     gyro, accel = (
         _in_si(sensor, found[sensor][0], times[sensor], units[sensor]) for sensor in ("gyroscope", "accelerometer")
     )
-    unit = unit_by_pull(units["gyroscope"], arm(gyro, accel))
-    return units if unit is None else {**units, "gyroscope": unit}
+    seen = arm(gyro, accel)
+    unit = unit_by_pull(units["gyroscope"], seen)
+    return (units, seen) if unit is None else ({**units, "gyroscope": unit}, None)
+
+
+def _on_time(
+    clock: Clock,
+    found: dict[str, tuple[Triple, Decision]],
+    times: dict[str, FloatArray],
+    units: dict[str, Unit],
+    turns: SeenTurns | None,
+    pull: float | None,
+) -> list[str]:
+    """Return what contradicts the stamps: the turning of what stands still in the room, a rate that is stated."""
+    notes = [clock_note(clock, units["gyroscope"], turns, pull)] if "gyroscope" in units else []
+    for sensor, (triple, _) in list(found.items())[:1]:
+        above = (*triple.numbers.dialect.preamble, triple.numbers.path.stem)
+        notes.append(rate_note(clock, times[sensor], stated_rate(above)))
+    return [note for note in notes if note]
 
 
 def _stated(sensor: str, triple: Triple, value: FloatArray) -> tuple[Reading | None, bool]:
