@@ -16,13 +16,16 @@ from discsim.validation.importing.sniffing.groups import Triple
 __all__ = ["exchanged"]
 
 
-def exchanged(named: Mapping[str, Triple]) -> tuple[dict[str, Triple], list[Decision], list[str]]:
+def exchanged(
+    named: Mapping[str, Triple], seen: Mapping[str, tuple[str, str]] | None = None
+) -> tuple[dict[str, Triple], list[Decision], list[str]]:
     """Return the triples by the sensors that they are, a decision for each that is not as its name says, and notes.
 
     A name is not believed where its readings are another sensor's, and those of that name are this one's. The units
-    of exchanged names are not believed either.
+    of exchanged names are not believed either. ``seen`` is what each one's readings are, and why; by default what
+    `looks_like` says of them.
     """
-    seen = {sensor: looks_like(triple.values) for sensor, triple in named.items()}
+    seen = seen or {sensor: looks_like(triple.values) for sensor, triple in named.items()}
     wrong = {sensor: (meant, why) for sensor, (meant, why) in seen.items() if meant and meant != sensor}
     if not wrong or {meant for meant, _ in wrong.values()} != set(wrong):
         return dict(named), [], []

@@ -23,6 +23,7 @@ from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.dialect import dialect_of
 from discsim.validation.importing.sniffing.exchanged import exchanged
 from discsim.validation.importing.sniffing.groups import FEWEST_ROWS, Numbers, Triple, triples_of
+from discsim.validation.importing.sniffing.lift import along, unit_by_lift
 from discsim.validation.importing.sniffing.magnitudes import (
     PER_G,
     REST,
@@ -53,6 +54,9 @@ TELLING = 0.35
 #: What a step from the gyroscope's rate and the field's turning may be off by, a share (one sigma): a gyroscope's scale
 #: (3 % over parts and temperature), and what was found on four measured logs (1 to 6 %, rms 3 %).
 OFF_FITTED = 0.04
+#: A log rests on gravity where its rate is below this, rad/s, in more than this share of its rows: `gravity_norm` looks
+#: for what most windows share, and a rest of a twentieth of a spin is what `rest_norm` takes.
+SLOW, RESTS = 1.0, 0.05
 #: A column that stands this far back (gravity taken off, worked out, in the earth's axes) is no sensor's reading.
 NO_READING = 9
 
@@ -85,6 +89,7 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     found = {s: found[s] for s in ORDER if s in found and _on(clock, found[s][0].numbers)}
     if not found and not fixes:
         raise _nothing(raw, files, failures)
+    found, exchanges = _turned_about(clock, found, exchanges)
     others = _others(found, left)
     own = own_clocks(clock, {sensor: triple for sensor, (triple, _) in found.items()})
     notes = [*exchanges, *notes, *(note for _, note in others), *own.notes]
@@ -181,6 +186,34 @@ def _assigned(files: Sequence[_File]) -> tuple[dict[str, tuple[Triple, Decision]
         for sensor, triple in meant.items()
     }
     return found, [triple for triple in triples if triple not in named.values()], notes
+
+
+def _turned_about(
+    clock: Clock, found: dict[str, tuple[Triple, Decision]], notes: list[str]
+) -> tuple[dict[str, tuple[Triple, Decision]], list[str]]:
+    """Return the sensors, gyroscope and accelerometer exchanged where the field turns as the other one says."""
+    if notes or set(ORDER) - set(found):
+        return found, notes
+    times = {sensor: seconds(clock, triple.numbers)[triple.rows] for sensor, (triple, _) in found.items()}
+    fit = _turned(found, times)
+    if fit is None or (fit.ratio < TELLING and _keeps_axis(fit, found["gyroscope"][0])):
+        return found, notes
+    field = found["magnetometer"][0]
+    accel = found["accelerometer"][0]
+    steps = steps_between(times["accelerometer"], accel.values, times["magnetometer"], field.values)
+    other = best_worth(steps, WORTHS)
+    if other is None or other.ratio >= TELLING or not _keeps_axis(other, accel):
+        return found, notes
+    why = f"it says how {field.label} turns ({100 * other.ratio:.0f} % of the changes left)"
+    seen = {"gyroscope": ("accelerometer", f"{accel.label} is the gyroscope"), "accelerometer": ("gyroscope", why)}
+    meant, decisions, said = exchanged({sensor: found[sensor][0] for sensor in seen}, seen)
+    return {**found, **{one.what: (meant[one.what], one) for one in decisions}}, said
+
+
+def _keeps_axis(fit: Fit, triple: Triple) -> bool:
+    """Tell whether the field turns about the axis on which a triple reads most: a steady pull is like a rate on x."""
+    axis = int(np.argmax(np.nanmean(triple.values**2, axis=0)))
+    return bool(abs(fit.axes[axis, axis]) > 0.5)
 
 
 def _weightless(triple: Triple) -> bool:
@@ -329,6 +362,7 @@ def _proposal(
             text = f"{stated.scale:.6g} {stated.unit} a count"
             why = units[sensor].decision.why.replace("the header says so", "a line above the table says so")
             units[sensor] = units[sensor]._replace(decision=Decision(f"{sensor} unit", text, "certain", why))
+    units = _by_lift(found, times, units)
     units, pull = _by_pull(found, times, units)
     if "gyroscope" in found and turns is None and found["gyroscope"][0].units:
         peak = float(np.nanmax(np.abs(found["gyroscope"][0].values)))
@@ -351,6 +385,22 @@ def _proposal(
 def _in_si(sensor: str, triple: Triple, time: FloatArray, unit: Unit) -> Reading3:
     """Return a sensor's readings in the recording's unit."""
     return _reading(time, triple.values * unit.factor(SENSORS[sensor].unit))
+
+
+def _by_lift(
+    found: dict[str, tuple[Triple, Decision]], times: dict[str, FloatArray], units: dict[str, Unit]
+) -> dict[str, Unit]:
+    """Return the units, an accelerometer's by lift where nothing in the log rests on gravity."""
+    if {"gyroscope", "accelerometer"} - set(found):
+        return units
+    gyro = _in_si("gyroscope", found["gyroscope"][0], times["gyroscope"], units["gyroscope"])
+    if np.mean(np.linalg.norm(gyro.value, axis=1) < SLOW) > RESTS:
+        return units
+    triple, unit = found["accelerometer"][0], units["accelerometer"]
+    stated = bool(triple.units) and triple.units[0].unit != COUNTS
+    counts = np.array_equal(sound := triple.values[np.isfinite(triple.values).all(axis=1)], np.round(sound))
+    by_lift = unit_by_lift(unit, along(gyro, times["accelerometer"], triple.values), stated=stated, counts=counts)
+    return units if by_lift is None else {**units, "accelerometer": by_lift}
 
 
 def _by_pull(
