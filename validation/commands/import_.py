@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple, TypeAlias
 
 import typer
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from discsim.validation.importing import ImportMap
+    from discsim.validation.importing.imported_log import LogPart
     from discsim.validation.importing.sniffing import Proposal
     from discsim.validation.reporting.run import Run
 
@@ -32,7 +33,10 @@ MapOption: TypeAlias = Annotated[
 
 def command(
     raw: Annotated[
-        Path, typer.Argument(help="What the logger wrote: a file, a zip, or a folder with one file per sensor.")
+        Path,
+        typer.Argument(
+            help="What the logger wrote: a file, a zip, a folder with one file per sensor, or one per throw."
+        ),
     ],
     map_: MapOption = "auto",
     rows: Annotated[
@@ -62,31 +66,84 @@ def command(
     or, with a map: discsim import 2025-08-31-001-rb.csv --map flatball --rows 1590:1830 --out throw-1
     """
     from discsim.validation.importing import find_map, parse_rows, read_map
-    from discsim.validation.importing.imported_log import LogPart, take
-    from discsim.validation.importing.sniffing import opened, recognised, sniff
-    from discsim.validation.reporting.options import at_place
-    from discsim.validation.reporting.place import swapped_place
-    from discsim.validation.reporting.run import start_run
+    from discsim.validation.importing.imported_log import LogPart
+    from discsim.validation.importing.sniffing import listed, opened, several_logs
 
     part = LogPart(None if rows is None else parse_rows(rows), throw, all_throws)
     part.check()
     named = None if map_ in ("auto", "sniff") else read_map(find_map(map_))
     _leave_alone(raw, out)
+    asked = _Asked(raw, map_, named, part, plant, write_map, place, date)
     said: list[str] = []
     with opened(raw, said.append) as logged:
-        known = recognised(logged) if map_ == "auto" else named
-        proposal = sniff(logged, plant) if known is None else None
-        if known is not None and named is None:
-            said.append(f"taken: the shipped map '{known.name}', made for these columns (--map sniff asks anew)")
-        with start_run(out, None, [raw, *([known.path] if known else [])]) as run:
-            _tell(run, said)
-            decisions = proposal.all_decisions if proposal else []
-            import_map = known or _proposed(run, proposal, write_map or out / "map.toml")
-            proposal = None  # its table is as large as the one that is read now
-            import_map = replace(import_map, environment=at_place(import_map.environment, place, date))
-            found = take(logged, raw.name, import_map, part, decisions)
-            found.report(out)
-            _tell(run, [*found.remarks, *filter(None, [swapped_place(place, date, found.recordings)])])
+        logs = several_logs(logged)
+        if not logs:
+            _import(asked, logged, raw.name, out, said)
+            return
+        typer.echo(f"{len(logs)} logs of the same columns in {raw.name}: {listed(logs)}; each is imported by itself")
+        done = _each(asked, logs, out)
+    kind = "a data set each" if all_throws else "recordings of one data set"
+    typer.echo(f"{kind}: discsim diagnose {' '.join(map(str, done)) if all_throws else out}")
+
+
+class _Asked(NamedTuple):
+    """What was asked of an import, for each log of a folder; ``named`` is the map of that name."""
+
+    raw: Path
+    map_: str
+    named: ImportMap | None
+    part: LogPart
+    plant: Literal["free_spin", "rate_table"]
+    write_map: Path | None
+    place: str | None
+    date: str | None
+
+
+def _each(asked: _Asked, logs: Sequence[Path], out: Path) -> list[Path]:
+    """Import each of several logs into a folder of its own, and return these; one that fails is told and left out."""
+    from discsim.errors import InputError
+
+    done: list[Path] = []
+    failures: list[InputError] = []
+    twice = len({log.stem for log in logs}) < len(logs)
+    for log in logs:
+        target = out / (log.name if twice else log.stem)
+        typer.echo(f"{log.name}:")
+        try:
+            _import(asked, log, log.name, target, [])
+            done.append(target)
+        except InputError as error:
+            typer.echo(f"LEFT OUT: {error}", err=True)
+            failures.append(error)
+    if not done:
+        raise failures[0]
+    return done
+
+
+def _import(asked: _Asked, logged: Path, name: str, out: Path, said: list[str]) -> None:
+    """Import one log that is `opened` into ``out``; ``said`` are notes on how it was read."""
+    from discsim.validation.importing.imported_log import take
+    from discsim.validation.importing.resting import dip_at_rest
+    from discsim.validation.importing.sniffing import recognised, sniff
+    from discsim.validation.reporting.options import at_place
+    from discsim.validation.reporting.place import swapped_place
+    from discsim.validation.reporting.run import start_run
+
+    place, date = asked.place, asked.date
+    known = recognised(logged) if asked.map_ == "auto" else asked.named
+    proposal = sniff(logged, asked.plant) if known is None else None
+    if known is not None and asked.named is None:
+        said.append(f"taken: the shipped map '{known.name}', made for these columns (--map sniff asks anew)")
+    with start_run(out, None, [asked.raw, *([known.path] if known else [])]) as run:
+        _tell(run, said)
+        decisions = proposal.all_decisions if proposal else []
+        import_map = known or _proposed(run, proposal, asked.write_map or out / "map.toml")
+        proposal = None  # its table is as large as the one that is read now
+        import_map = replace(import_map, environment=at_place(import_map.environment, place, date))
+        found = take(logged, name, import_map, asked.part, decisions)
+        found.report(out)
+        dip = dip_at_rest(found.read.readings, import_map.environment.gravity)
+        _tell(run, [*found.remarks, *filter(None, [swapped_place(place, date, found.recordings, dip)])])
     for line in found.lines:
         typer.echo(line)
 

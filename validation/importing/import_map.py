@@ -50,6 +50,7 @@ class TimeBase:
     """Time of a row: a column times ``scale`` (s), or the row's number (or its counter) times ``step`` (s).
 
     ``iso``: the column holds dates and times, or times of the day. ``step_sigma``: what ``step`` may be off by, s.
+    ``spacings``: the column holds what went by since the row before, and is added up.
     """
 
     column: str | None = None
@@ -58,6 +59,7 @@ class TimeBase:
     counter: str | None = None
     iso: bool = False
     step_sigma: float | None = None
+    spacings: bool = False
 
 
 @dataclass(frozen=True)
@@ -204,10 +206,13 @@ def _layout(table: TomlTable | None) -> Layout:
     columns = _texts(table, "columns") or ()
     comment = table.text("comment", required=False) or ""
     lists, encoding, thousands = table.flag("lists"), _encoding(table), table.text("thousands", required=False) or ""
+    labelled = table.flag("labelled")
+    if labelled and not columns:
+        raise table.error("labelled", "'labelled' is true, expected 'columns' with it: the names before the cells")
     # either may be the separator as well, where numbers stand in quotes
     if len(thousands) > 1 or (thousands and thousands == decimal):
         raise table.error("thousands", f"'thousands' is '{thousands}', expected one character of its own")
-    layout = Layout(separator, decimal, skip_lines, columns, comment, lists, encoding, thousands)
+    layout = Layout(separator, decimal, skip_lines, columns, comment, lists, encoding, thousands, labelled)
     table.finish()
     return layout
 
@@ -226,14 +231,15 @@ def _time_base(table: TomlTable) -> TimeBase:
     column = table.text("column", required=False)
     unit = table.text("unit", required=False, choices=tuple(TIME_UNITS)) or "s"
     step = table.number("step", "s", required=False, positive=True)
-    counter = table.text("counter", required=False)
+    counter, spacings = table.text("counter", required=False), table.flag("spacings")
     if (column is None) == (step is None):
         raise table.error(None, "expected either 'column' (of time stamps) or 'step_s' (of rows at one rate) in [time]")
+    if spacings and (column is None or unit == "iso"):
+        raise table.error("spacings", "'spacings' is true, expected a 'column' of numbers in s, ms, us or ns with it")
     table.finish()
     sigma = table.sigma.get("step_s")
-    return TimeBase(
-        column, TIME_UNITS[unit], step, counter, unit == "iso", None if sigma is None else float(np.max(sigma))
-    )
+    off = None if sigma is None else float(np.max(sigma))
+    return TimeBase(column, TIME_UNITS[unit], step, counter, unit == "iso", off, spacings)
 
 
 def _environment(table: TomlTable, *, flying: bool) -> Environment:

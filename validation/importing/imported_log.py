@@ -25,9 +25,11 @@ from discsim.validation.importing.resting import rest_notes
 from discsim.validation.importing.sniffing import (
     Decision,
     Stretch,
+    listed,
     map_text,
     opened,
     recognised,
+    several_logs,
     sniff,
     stretches,
     write_raw_page,
@@ -212,6 +214,11 @@ def import_log(
     named = None if map in ("auto", "sniff") else read_map(find_map(map))
     # a proposed map is a file as any other while the log is read: what is read of it is named and digested
     with opened(path) as logged, TemporaryDirectory() as place:
+        if logs := several_logs(logged):
+            what = f"{len(logs)} logs of the same columns in it ({listed(logs)})"
+            raise InputError.at(
+                path, None, f"{what}; expected one: import each, or all by `discsim import {path.name}`"
+            )
         known = recognised(logged) if map == "auto" else named
         text = ""
         decisions: tuple[Decision, ...] = ()

@@ -18,7 +18,7 @@ from discsim.errors import InputError
 from discsim.validation.importing.cell_texts import CellTexts, number, packed
 from discsim.validation.importing.text_lines import TextLines
 
-__all__ = ["REPAIRS", "Layout", "RawTable", "Repair", "RepairList", "read_raw"]
+__all__ = ["REPAIRS", "Layout", "RawTable", "Repair", "RepairList", "labelled_cells", "read_raw"]
 
 #: What a map may allow, and what is then done.
 REPAIRS = {
@@ -65,6 +65,31 @@ _BLANKS = " \t\x0b\x0c\x1c\x1d\x1e\x1f"
 _MONITOR = re.compile(r"^(\d\d?:\d\d:\d\d(?:\.\d+)?) -> ")
 
 
+#: A name, a colon or an equals sign, and a number (or what stands for none) with its unit.
+_LABEL = re.compile(
+    r"([^\W\d][^:=,;|\t]*?)\s*[:=]\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|NaN|null|--)"
+    r"(?:\s*(?:m/s\^?2|m/s²|rad/s|deg/s|dps|uT|µT|g|ms|us|s)(?=[\s,;|]|$))?(?:[\s,;|]+|$)"
+)
+
+
+def labelled_cells(line: str) -> list[tuple[str, str]]:
+    """Return the names and cells of a line whose cells have their names before them; empty where it is none.
+
+    >>> labelled_cells("gx:1.0 gy:-2 gz:0.5"), labelled_cells("12:03:20.100 -> Gyro X: 1.0, t = 2")
+    ([('gx', '1.0'), ('gy', '-2'), ('gz', '0.5')], [('time', '12:03:20.100'), ('Gyro X', '1.0'), ('t', '2')])
+    """
+    monitor = _MONITOR.match(line)
+    found = [] if monitor is None else [("time", monitor[1])]
+    at, text = 0, (line if monitor is None else line[monitor.end() :]).strip()
+    while at < len(text):
+        match = _LABEL.match(text, at)
+        if match is None:
+            return []
+        found.append((match[1].strip(), match[2]))
+        at = match.end()
+    return found
+
+
 @dataclass(frozen=True)
 class Layout:
     """How the text of a raw file is laid out.
@@ -87,6 +112,8 @@ class Layout:
         Name of the text's encoding, as Python knows it.
     thousands : str
         Mark between thousands (``1.234,56`` has ``.``); empty where there is none. A number has no zero before it.
+    labelled : bool
+        Whether each cell has its name before it (``gx:1.0 gy:2.0``), as for Arduino's serial plotter.
     """
 
     separator: str = ","
@@ -97,9 +124,12 @@ class Layout:
     lists: bool = False
     encoding: str = "utf-8"
     thousands: str = ""
+    labelled: bool = False
 
     def cells(self, line: str) -> list[str]:
         """Return the cells of one line, without the blanks around them."""
+        if self.labelled:
+            return [cell for _, cell in labelled_cells(line)]
         if "-> " in line:
             line = _MONITOR.sub(rf"\1{' ' if self.separator == 'blank' else self.separator}", line)
         if self.separator == "blank":
@@ -224,7 +254,7 @@ class _Rows:
         """Return the cells of lines that are all sound rows, plainly written; None where one may be otherwise."""
         layout, text = self.layout, "\n".join(lines)
         marks = ('"', "-> ", *([layout.comment] if layout.comment else []))
-        if self.width < 2 or layout.lists or layout.thousands or any(mark in text for mark in marks):
+        if self.width < 2 or layout.lists or layout.thousands or layout.labelled or any(mark in text for mark in marks):
             return None
         if layout.separator == "blank":
             cells = [line.split() for line in lines]

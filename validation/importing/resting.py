@@ -13,7 +13,7 @@ from discsim.arrays import FloatArray
 from discsim.environment import Environment
 from discsim.validation.importing.cleaning import Readings
 
-__all__ = ["rest_notes"]
+__all__ = ["dip_at_rest", "rest_notes"]
 
 #: It lies still over this long, s, where the force scatters by less than this share, and is gravity to this share
 #: (zero-g offsets of cheap parts are 0.08 g, scales 3 %).
@@ -38,6 +38,25 @@ def rest_notes(readings: Mapping[str, Readings], environment: Environment) -> li
         return []
     means = _still(readings, environment.gravity)
     return [*_bias(means, readings), *_sign(means, environment)]
+
+
+def dip_at_rest(readings: Mapping[str, Readings], gravity: float) -> float | None:
+    """Return the field's dip below the horizon while the log lies still, degrees; None where it does not show.
+
+    ``readings`` are those of a whole log by sensor in body axes, ``gravity`` m/s^2.
+    """
+    accel = readings.get("accelerometer")
+    if accel is None or accel.time.size < 2 or "magnetometer" not in readings:
+        return None
+    means = _still(readings, gravity)
+    return float(np.degrees(np.arcsin(_down(means)))) if "magnetometer" in means else None
+
+
+def _down(means: Mapping[str, FloatArray]) -> float:
+    """Return the sine of the field's dip by the means at rest."""
+    force, field = means["accelerometer"], means["magnetometer"]
+    sizes = np.linalg.norm(force, axis=1) * np.linalg.norm(field, axis=1)
+    return -float(np.median(np.sum(force * field, axis=1) / np.maximum(sizes, 1e-9)))
 
 
 def _still(readings: Mapping[str, Readings], gravity: float) -> dict[str, FloatArray]:
@@ -77,9 +96,7 @@ def _bias(means: Mapping[str, FloatArray], readings: Mapping[str, Readings]) -> 
 def _sign(means: Mapping[str, FloatArray], environment: Environment) -> list[str]:
     if "magnetometer" not in means or not environment.field_known:
         return []
-    force, field = means["accelerometer"], means["magnetometer"]
-    sizes = np.linalg.norm(force, axis=1) * np.linalg.norm(field, axis=1)
-    down = -float(np.median(np.sum(force * field, axis=1) / np.maximum(sizes, 1e-9)))
+    down = _down(means)
     expected = float(environment.magnetic_field[2] / np.linalg.norm(environment.magnetic_field))
     if min(abs(down), abs(expected)) < TELLING or down * expected > 0:
         return []

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, IntArray
 from discsim.validation.importing.clock import Break, iso_seconds, mended
 from discsim.validation.importing.import_map import ImportMap, TimeBase
 from discsim.validation.importing.raw_table import RawTable, RepairList
 
-__all__ = ["RowClock", "row_clock"]
+__all__ = ["RowClock", "added_up", "row_clock"]
 
 
 #: no clock of a logger shows more, s from its zero: microseconds since 1970 that are taken for ms are 1.8e12
@@ -55,6 +55,20 @@ def row_clock(table: RawTable, import_map: ImportMap, base: TimeBase, repairs: R
     return RowClock(time, stretch, tuple(starts))
 
 
+def added_up(spacing: FloatArray, number: IntArray) -> FloatArray:
+    """Return the time (n,) of rows by what went by since the row before each (n,), in its unit; ``number`` counts them.
+
+    A row that was left out took the usual (median) spacing. A row without a spacing has no time, and took the usual.
+
+    >>> added_up(np.array([9.0, 5.0, np.nan, 5.0]), np.array([0, 1, 2, 4])).tolist()
+    [0.0, 5.0, nan, 20.0]
+    """
+    usual = float(np.nanmedian(spacing))
+    whole = np.where(np.isfinite(spacing), spacing, usual) + usual * (np.diff(number, prepend=number[0] - 1) - 1)
+    time = np.cumsum(whole) - whole[0]
+    return np.where(np.isfinite(spacing), time, np.nan)
+
+
 def _action(found: Break) -> str:
     return f"time goes on: {found.shift:.9g} s added from here" if found.shift else "a new stretch begins here"
 
@@ -89,6 +103,7 @@ def _times(table: RawTable, counters: FloatArray, base: TimeBase, decimal: str, 
         time = np.array([np.nan if one is None else one for one in found], dtype=np.float64)
     else:
         time, _ = column.numbers(decimal)
+        time = added_up(time, table.number) if base.spacings else time
     counted = ~np.isnan(counters)
     with np.errstate(invalid="ignore"):
         sound = np.abs(time * base.scale) <= FURTHEST

@@ -23,12 +23,18 @@ CONTRADICTS = 0.2
 ALL_ROUND = 0.2
 #: Fewest readings that show a size.
 FEWEST = 16
+#: Dips in degrees that differ by less agree (soft iron, an accelerometer's offset of 80 mg: 5 each); that differ by
+#: more contradict one another: a hard iron of 20 uT turns a field of 45 by 26.
+DIP_AGREES, DIP_CONTRADICTS = 10.0, 30.0
 
 
-def swapped_place(place: str | None, day: str | None, recordings: Sequence[Recording]) -> str | None:
+def swapped_place(
+    place: str | None, day: str | None, recordings: Sequence[Recording], dip_deg: float | None = None
+) -> str | None:
     """Return a warning where the field read contradicts that of ``--place`` and agrees with that of LON,LAT.
 
-    None where nothing is stated, no magnetometer reads, or the fields of both are alike.
+    Its size is compared, and where ``dip_deg`` is known, its dip below the horizon in degrees. None where nothing is
+    stated, no magnetometer reads, or the fields of both are alike.
     """
     sizes = [size for one in recordings if "magnetometer" in one and (size := field_read(one)) is not None]
     if place is None or day is None or not sizes:
@@ -36,18 +42,25 @@ def swapped_place(place: str | None, day: str | None, recordings: Sequence[Recor
     first, _, second = (part.strip() for part in place.partition(","))
     other = f"{second},{first}"
     try:
-        stated, swapped = (
-            float(np.linalg.norm(at_place(Environment(), one, day).magnetic_field)) for one in (place, other)
-        )
+        fields = [at_place(Environment(), one, day).magnetic_field for one in (place, other)]
     except InputError:  # the other is no place
         return None
+    stated, swapped = (float(np.linalg.norm(field)) for field in fields)
     size = float(np.median(sizes))
-    if abs(size / stated - 1) < CONTRADICTS or abs(size / swapped - 1) > AGREES:
+    ask = "are latitude and longitude swapped? Expected LAT,LON, degrees north and east"
+    if abs(size / stated - 1) >= CONTRADICTS and abs(size / swapped - 1) <= AGREES:
+        return (
+            f"WARNING: --place {place}: the field there is of {stated:.3g} uT, the magnetometer reads {size:.3g} uT, "
+            f"as at --place {other} ({swapped:.3g} uT): {ask}"
+        )
+    here, there = (float(np.degrees(np.arcsin(field[2] / np.linalg.norm(field)))) for field in fields)
+    if dip_deg is None or abs(size / swapped - 1) >= CONTRADICTS:
+        return None
+    if abs(dip_deg - here) < DIP_CONTRADICTS or abs(dip_deg - there) > DIP_AGREES:
         return None
     return (
-        f"WARNING: --place {place}: the field there is of {stated:.3g} uT, the magnetometer reads {size:.3g} uT, as at "
-        f"--place {other} ({swapped:.3g} uT): are latitude and longitude swapped? Expected LAT,LON, degrees north and "
-        "east"
+        f"WARNING: --place {place}: the field there dips by {here:.0f} deg, at rest it dips by {dip_deg:.0f} deg, as "
+        f"at --place {other} ({there:.0f} deg): {ask}"
     )
 
 

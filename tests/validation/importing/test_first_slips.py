@@ -29,10 +29,18 @@ def spun(raw: Path) -> np.ndarray:
     return import_log(raw).recordings[0].samples["gyroscope"].value[:, 2]
 
 
-def test_rad_s_under_a_header_of_deg_s_is_told_by_the_pull_to_the_centre(tmp_path):
-    """Without a magnetometer nothing else tells: the spin came in 57 times too slow."""
+def test_rad_s_under_a_header_of_deg_s_are_told_by_gravity_in_a_hand(tmp_path):
+    """Without a magnetometer: the spin came in 57 times too slow."""
     whole = import_log(both(tmp_path / "log.csv", LOG.gyro, LOG.accel, "gyro_{}_dps"))
     assert_allclose(whole.recordings[0].samples["gyroscope"].value[:, 2], LOG.gyro[:, 2], atol=1e-5)
+    assert "gyroscope unit: rad/s (likely: gravity turns as fast as rad/s would, although" in whole.summary()
+
+
+def test_rad_s_under_a_header_of_deg_s_are_told_by_the_pull_to_the_centre_of_a_throw_alone(tmp_path):
+    kept = slice(810, 1390)
+    columns = [("t_s", LOG.t[kept]), *three(named("gyro_{}_dps"), LOG.gyro[kept])]
+    whole = import_log(write_table(tmp_path / "log.csv", columns + three(named("acc_{}_g"), LOG.accel[kept] / G0)))
+    assert_allclose(np.abs(whole.recordings[0].samples["gyroscope"].value), np.abs(LOG.gyro[kept]), atol=1e-5)
     assert "gyroscope unit: rad/s (likely: the pull to the centre is that of 16" in whole.summary()
 
 

@@ -48,6 +48,20 @@ def test_a_place_is_suspected_where_the_field_agrees_with_the_one_swapped(dip_de
     assert f"as at --place {ZURICH}" in said
 
 
+def test_a_place_is_suspected_by_the_dip_where_the_sizes_are_alike():
+    """Cape Verde's field has 32 uT, and that of the place swapped 27; they dip by 9 and by -65 degrees."""
+    right, wrong = "15.0,-23.5", "-23.5,15.0"
+    here, there = (world_magnetic_field(*map(float, one.split(",")), date.fromisoformat(DAY)) for one in (right, wrong))
+    size = float(np.linalg.norm(here))
+    dips = [float(np.degrees(np.arcsin(field[2] / np.linalg.norm(field)))) for field in (here, there)]
+    assert abs(dips[0] - dips[1]) > 40
+    said = swapped_place(wrong, DAY, [turned(size, dip_deg=dips[0])], dips[0])
+    assert said is not None
+    assert "are latitude and longitude swapped? Expected LAT,LON" in said
+    assert swapped_place(right, DAY, [turned(size, dip_deg=dips[0])], dips[0]) is None
+    assert swapped_place(right, DAY, [turned(size)], dips[0] - 20) is None  # a hard iron
+
+
 def test_a_field_that_agrees_with_neither_place_and_fields_that_are_alike_say_nothing_of_a_swap():
     assert swapped_place(SWAPPED, DAY, [turned(65.0)]) is None  # a wrong scale, or a magnet
     alike = float(np.linalg.norm(world_magnetic_field(-23.5, -46.6, date.fromisoformat(DAY))))

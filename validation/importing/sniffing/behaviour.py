@@ -13,7 +13,7 @@ from discsim.validation.importing.sniffing.groups import Triple
 from discsim.validation.importing.sniffing.magnitudes import FIELD, PER_G, REST, field_size, gravity_norm, rest_norm
 from discsim.validation.importing.sniffing.turning import best_worth, steps_between
 
-__all__ = ["WORTHS", "by_behaviour"]
+__all__ = ["WORTHS", "by_behaviour", "looks_like"]
 
 #: What one reading of a gyroscope may be worth, rad/s: rad/s, deg/s, mdeg/s, and counts of 16 bits over 2000 deg/s.
 WORTHS = (1.0, np.pi / 180, np.pi / 180e3, np.pi / 180 / 16.384)
@@ -51,6 +51,19 @@ def by_behaviour(triples: Sequence[Triple], times: Sequence[FloatArray]) -> list
             found.append((triples[k], sensor, said._replace(sure="guess")))
             left = _clear_of(triples, [k], left)
     return found
+
+
+def looks_like(value: FloatArray) -> tuple[str, str]:
+    """Return what sensor readings (n, 3) as written are by their size alone, and why; empty where that does not tell.
+
+    An accelerometer's quietest readings and those that it shares most are both gravity: a gyroscope on a table that
+    turns at 1000 deg/s for long shares 1000, but is quietest at nothing.
+    """
+    sound = value[np.isfinite(value).all(axis=1)]
+    why = _gravity(sound)
+    if why and abs(rest_norm(sound) / gravity_norm(sound) - 1) < REST:
+        return "accelerometer", why
+    return _alone(sound)
 
 
 def _clear_of(triples: Sequence[Triple], taken: Sequence[int], left: Sequence[int]) -> list[int]:

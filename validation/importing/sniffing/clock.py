@@ -11,10 +11,11 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.validation.importing.clock import is_stamp, iso_seconds
+from discsim.validation.importing.row_clock import added_up
 from discsim.validation.importing.sniffing.coarse_stamps import Counted, counted_rows
 from discsim.validation.importing.sniffing.decision import Decision, Sureness
 from discsim.validation.importing.sniffing.groups import Numbers
-from discsim.validation.importing.sniffing.names import is_time_name, read_name, sensor_of, timeless
+from discsim.validation.importing.sniffing.names import is_spacing_name, is_time_name, read_name, sensor_of, timeless
 from discsim.validation.importing.sniffing.preamble import stated_rate
 from discsim.validation.importing.sniffing.units import readings_of, split_unit
 
@@ -47,7 +48,8 @@ OFF_GUESSED, OFF_STATED = 0.7, 0.03
 class Clock:
     """Time of a row: a column with its unit, or a step (with a counter where there is one), and why.
 
-    ``off`` is the share of a step without stamps that it may be off by (one sigma).
+    ``off`` is the share of a step without stamps that it may be off by (one sigma). ``spacings``: the column holds
+    what went by since the row before.
     """
 
     column: str | None
@@ -56,6 +58,7 @@ class Clock:
     step: float | None
     decision: Decision
     off: float = 0.0
+    spacings: bool = False
 
     def with_step(self, step: float, decision: Decision, off: float) -> Clock:
         """Return the clock with another step, that may be off by that share of it."""
@@ -69,6 +72,9 @@ def clocks_of(numbers: Numbers) -> list[Clock]:
         clock = _clock(numbers, k, name)
         if clock is not None:
             found.append((_rank(numbers, k, clock), k, clock))
+    if not found:
+        steps = [clock for k in range(len(numbers.names)) if (clock := _added_up(numbers, k)) is not None]
+        found += [(0, k, clock) for k, clock in enumerate(steps)]
     return [clock for *_, clock in sorted(found, key=lambda item: item[:2])] + [_without(numbers)]
 
 
@@ -83,7 +89,8 @@ def seconds(clock: Clock, numbers: Numbers) -> FloatArray:
     k = numbers.table.columns.index(clock.column)
     if clock.unit == "iso":
         return _stamps(numbers.cells(k))
-    return numbers.values[:, k] * SCALES[clock.unit]
+    value = numbers.values[:, k]
+    return (added_up(value, numbers.table.number) if clock.spacings else value) * SCALES[clock.unit]
 
 
 def _rank(numbers: Numbers, k: int, clock: Clock) -> int:
@@ -112,6 +119,23 @@ def _clock(numbers: Numbers, k: int, name: str) -> Clock | None:
         sure, why_unit = "guess", f"its name says nothing known here, but it ascends as a clock does: {why_unit}"
     said = Decision("time", f"'{name}' in {unit}", sure, why_unit)
     return Clock(name, unit, None, None, said)
+
+
+def _added_up(numbers: Numbers, k: int) -> Clock | None:
+    """Return the clock that a column of spacings of the rows makes, or None where it is none."""
+    name, value = numbers.names[k], numbers.values[:, k]
+    sound = value[np.isfinite(value)]
+    # the first row has none before it: loggers write zero, or the time since they were switched on
+    if not is_spacing_name(name) or sound.size < 2 or not np.all(sound[1:] >= 0) or not np.mean(sound > 0) > ASCENDING:
+        return None
+    time = added_up(value, numbers.table.number)
+    unit, sure, why = _unit(time, name, SPACING[1])
+    if unit is None:
+        return None
+    span = float(np.nanmax(time)) * SCALES[unit]
+    why = f"spacings of the rows, ADDED UP to {span:.4g} s; a row that is lost takes its time with it; {why}"
+    column = numbers.table.columns[k]
+    return Clock(column, unit, None, None, Decision("time", f"'{column}' in {unit}", sure, why), spacings=True)
 
 
 def _ascends(value: FloatArray, rising: float = STEPS) -> bool:

@@ -12,7 +12,7 @@ from pathlib import Path
 from discsim.errors import InputError
 from discsim.validation.importing.cell_texts import GAPS
 from discsim.validation.importing.clock import is_stamp
-from discsim.validation.importing.raw_table import Layout, RepairList, read_raw
+from discsim.validation.importing.raw_table import Layout, RepairList, labelled_cells, read_raw
 from discsim.validation.importing.sniffing.text import encoding_of
 from discsim.validation.importing.text_lines import TextLines
 
@@ -23,6 +23,8 @@ HEAD_LINES = 200
 #: A line is a record where this share of its cells are numbers or stamps: a record of a long table (sensor, time, x, y,
 #: z) has four of five, a logged event beside numbers two of five; a header has none.
 RECORD_SHARE = 0.4
+#: Names stand before the cells of a log where they do in this share of its lines: some break off, some are messages.
+LABELLED = 0.8
 #: What the last column is called where the header has a name too few.
 UNNAMED = "unnamed"
 _COMMENTS = ("#", "%", "//", "!")
@@ -53,6 +55,9 @@ def dialect_of(path: Path) -> Dialect:
     lines = TextLines(path, encoding)
     comment = _comment(lines)
     sample = _sample(lines, comment)
+    _refuse_echo(path, sample)
+    if (labelled := _labelled(sample, encoding)) is not None:
+        return labelled
     layout, width = _separators(path, sample, Layout(comment=comment, encoding=encoding))
     records = [index for index, _ in islice(_records(_bare(lines, comment), width, layout), 2)]
     if len(records) < 2:
@@ -60,6 +65,28 @@ def dialect_of(path: Path) -> Dialect:
     head = list(islice(lines, records[1] + 1))
     above = tuple(line.strip() for line in head[: records[0]] if line.strip())
     return replace(_named(path, head, layout, records[0], width, _remarks(layout)), preamble=above)
+
+
+def _refuse_echo(path: Path, sample: Sequence[str]) -> None:
+    """Refuse what ROS prints of a topic, which is no table."""
+    if any(re.match(r"\s*(angular_velocity|linear_acceleration|magnetic_field):\s*$", line) for line in sample):
+        raise InputError.at(
+            path,
+            None,
+            "is the YAML that `ros2 topic echo` (`rostopic echo`) prints, no table; expected the bag itself as .mcap, "
+            "or a table: `rostopic echo -b BAG -p TOPIC > imu.csv`",
+        )
+
+
+def _labelled(sample: Sequence[str], encoding: str) -> Dialect | None:
+    """Return the dialect of lines whose cells have their names before them, or None where most lines are others."""
+    names = Counter(tuple(name for name, _ in labelled_cells(line)) for line in sample)
+    best, count = names.most_common(1)[0] if names else ((), 0)
+    if len(best) < 3 or count < LABELLED * len(sample):
+        return None
+    unique = tuple(name if name not in best[:k] else f"{name}.{k + 1}" for k, name in enumerate(best))
+    layout = Layout(separator="blank", columns=unique, encoding=encoding, labelled=True)
+    return Dialect(layout, unique, (), True, 0, len(unique), ("each cell has its name before it", *_remarks(layout)))
 
 
 def _no_rows(line: str) -> str:

@@ -77,7 +77,9 @@ class Numbers:
                 continue
             words = all(number(text, self.dialect.layout.decimal) is None for text in few)
             telling = sum(sensor_of(text) is not None for text in few)
-            if words and (name.strip().lower() in _ID_NAMES or telling > 1):
+            called = name.strip().lower() in _ID_NAMES
+            numbered = called and len(few) > 1 and all(text.isdecimal() for text in few)
+            if (words and (called or telling > 1)) or numbered:
                 return k, few
         return None
 

@@ -206,11 +206,11 @@ def _magnetometer_counts(size: float, what: str) -> Unit:
     return Unit("uT", 1 / per, _said("magnetometer", text, sure, why))
 
 
-def gyroscope_unit(value: FloatArray, stated: Reading | None, turned: float | None) -> Unit:
+def gyroscope_unit(value: FloatArray, stated: Reading | None, turned: float | None, by: str = "the field") -> Unit:
     """Return a gyroscope's unit.
 
-    ``turned`` is how many rad/s one of its readings is worth by the turning of the field in the same log, None where
-    that does not tell. A header's unit stands against all but that; without one, size and steps decide.
+    ``turned`` is how many rad/s one of its readings is worth by the turning of ``by`` (the field, gravity) in the same
+    log, None where that does not tell. A header's unit stands against all but that; without one, size and steps decide.
     """
     name = "gyroscope"
     peak = float(np.nanmax(np.linalg.norm(value, axis=1)))
@@ -224,10 +224,10 @@ def gyroscope_unit(value: FloatArray, stated: Reading | None, turned: float | No
     if stated is not None and stated.unit != COUNTS:
         worth = worths[stated.unit] * stated.scale
         if near == stated.unit:
-            why = "the header says so, and the field turns as fast"
+            why = f"the header says so, and {by} turns as fast"
             return Unit(stated.unit, stated.scale, _said(name, stated.unit, "certain", why))
         if near is not None:
-            why = f"the field turns as fast as {near} would, although the header says {stated.unit}"
+            why = f"{by} turns as fast as {near} would, although the header says {stated.unit}"
             return Unit(near, 1.0, _said(name, near, "likely", why))
         if peak * worth > LARGEST_RAD_S and peak * _RAD < LARGEST_RAD_S and stated.unit == "rad/s":
             why = f"the header says rad/s, but {peak:.0f} rad/s is beyond any gyroscope"
@@ -235,17 +235,17 @@ def gyroscope_unit(value: FloatArray, stated: Reading | None, turned: float | No
         why = f"the header says so; up to {np.degrees(peak * worth):.0f} deg/s"
         return Unit(stated.unit, stated.scale, _said(name, stated.unit, "certain", why))
     if near is not None and stated is None:
-        return Unit(near, 1.0, _said(name, near, "likely", "the field turns as fast in this unit"))
+        return Unit(near, 1.0, _said(name, near, "likely", f"{by} turns as fast in this unit"))
     if _whole(value) and (peak > 5000 or stated is not None):
-        return _gyroscope_counts(turned)
+        return _gyroscope_counts(turned, by)
     return _by_size(value, peak)
 
 
-def _gyroscope_counts(turned: float | None) -> Unit:
+def _gyroscope_counts(turned: float | None, by: str) -> Unit:
     name = "gyroscope"
     if turned is not None:
         per = min(PER_DEG_S, key=lambda per: abs(np.log(turned / (_RAD / per))))
-        why = f"whole numbers; by the turning of the field one count is 1/{_RAD / turned:.4g} deg/s"
+        why = f"whole numbers; by the turning of {by} one count is 1/{_RAD / turned:.4g} deg/s"
         return Unit("deg/s", 1 / per, _said(name, f"1/{per:.5g} deg/s a count", "likely", why))
     why = "whole numbers; taken as 16 bits over 2000 deg/s, the usual range of a fast motion"
     return Unit("deg/s", 1 / 16.384, _said(name, "1/16.384 deg/s a count", "guess", why))

@@ -8,7 +8,17 @@ from typing import NamedTuple
 
 from discsim.validation.importing.sniffing.units import readings_of, split_unit
 
-__all__ = ["Name", "foreign_words", "is_time_name", "penalty_of", "read_name", "says_nothing", "sensor_of", "timeless"]
+__all__ = [
+    "Name",
+    "foreign_words",
+    "is_spacing_name",
+    "is_time_name",
+    "penalty_of",
+    "read_name",
+    "says_nothing",
+    "sensor_of",
+    "timeless",
+]
 
 
 class Name(NamedTuple):
@@ -52,9 +62,16 @@ _STAND_BACK = {
     2: "uncal uncalibrated unfilt debug 2 second",
     1: "filt filtered lpf",
 }
+#: ... but these are read as they are: an angular velocity, and what ROS calls the specific force (sensor_msgs/Imu).
+_AS_READ = ("angular_velocity", "angular velocity", "linear_acceleration")
 _TIME_STEMS = (
     "time zeit temps tiempo tempo tijd czas cas czas tid aika zaman vreme время час 时间 時間 시간 timestamp stamp "
     "seconds millis micros elapsed clock epoch uhrzeit datum date"
+)
+#: Names of a column that holds what went by since the row before, without blanks and unit.
+_SPACINGS = (
+    "dt deltat deltatime timedelta tdelta delta difftime timediff elapsedsincelast sincelast interval looptime "
+    "cycletime sampletime period dtime"
 )
 #: Words for time beside the name of a sensor.
 _TIME_WORDS = ("t", "ts")
@@ -130,7 +147,10 @@ def sensor_of(base: str) -> str | None:
 
 def penalty_of(base: str) -> int:
     """Return how far a column stands back behind the plain sensor's: words of what was worked out from it."""
-    words = set(re.split(r"[\s_\-.()]+", _plain(base)))
+    plain = _plain(base)
+    for name in _AS_READ:
+        plain = plain.replace(name, "")
+    words = set(re.split(r"[\s_\-.()]+", plain))
     return sum(weight for weight, listed in _STAND_BACK.items() for word in listed.split() if word in words)
 
 
@@ -157,6 +177,17 @@ def is_time_name(name: str) -> bool:
         or (timeless(rest) != "" and sensor_of(timeless(rest)) is not None)  # t_gyro
         or (unit != "" and any(r.sensor == "time" for r in readings_of(unit)) and sensor_of(rest) is None)
     )
+
+
+def is_spacing_name(name: str) -> bool:
+    """Tell whether a column is called after what went by since the row before.
+
+    >>> [is_spacing_name(name) for name in ("dt_us", "delta [ms]", "loopTime", "Δt", "dt", "time", "t_ms")]
+    [True, True, True, True, True, False, False]
+    """
+    rest, unit = split_unit(name.strip().replace("Δ", "d"))
+    known = not unit or any(reading.sensor == "time" for reading in readings_of(unit))
+    return known and re.sub(r"[\s_\-.]+", "", _plain(rest)) in _SPACINGS.split()
 
 
 def says_nothing(base: str) -> bool:

@@ -92,6 +92,7 @@ def map_text(proposal: Proposal) -> str:
     ]
     if clock.column is not None:
         lines += [f"column = {_text(clock.column)}", f"unit = {_text(clock.unit)}"]
+        lines += ["spacings = true # of each row from the one before"] * clock.spacings
     else:
         lines += [f"step_s = {clock.step}"]
         if clock.step is not None and clock.off:
@@ -124,6 +125,7 @@ def _layout(layout: Layout) -> list[str]:
     lines += [f"skip_lines = {layout.skip_lines}"] * (layout.skip_lines > 0)
     lines += [f"columns = {_texts(layout.columns)}"] * bool(layout.columns)
     lines += ["lists = true"] * layout.lists
+    lines += ["labelled = true"] * layout.labelled
     return ["", "[layout]", *lines] if lines else []
 
 

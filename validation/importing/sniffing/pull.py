@@ -13,7 +13,7 @@ from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.magnitudes import Unit
 from discsim.validation.importing.sniffing.spin_axis import Reading3
 
-__all__ = ["arm", "unit_by_pull"]
+__all__ = ["arm", "doubted", "unit_by_pull"]
 
 #: Fewest rows, and how much the rate changes over them (ninth tenth over first): the pull must follow its square.
 ROWS, CHANGES = 30, 1.15
@@ -22,6 +22,10 @@ ROWS, CHANGES = 30, 1.15
 MISSES = 0.1
 #: Arms in m that a disc, a wheel or a phone on a table can have, and from which on none has.
 POSSIBLE, IMPOSSIBLE = (0.002, 0.5), 3.0
+#: ... and down to which none has: chips are 3 mm wide, and nobody glues one to a twentieth of that.
+NEAREST = 1.5e-4
+#: Rates that a thing may have in rad/s (573 to 5730 deg/s) and, slowly turned by hand, in deg/s as well.
+DOUBTED = (10.0, 100.0)
 
 
 def arm(gyro: Reading3, accel: Reading3) -> float | None:
@@ -43,7 +47,7 @@ def arm(gyro: Reading3, accel: Reading3) -> float | None:
 
 def unit_by_pull(unit: Unit, seen: float | None) -> Unit | None:
     """Return the unit by which the arm is possible where it is not by the one stated; None where nothing tells."""
-    if seen is None or seen < IMPOSSIBLE:
+    if seen is None or NEAREST < seen < IMPOSSIBLE:
         return None
     worths = UNITS["rad_s"]
     for one in ("rad/s", "deg/s"):
@@ -51,7 +55,23 @@ def unit_by_pull(unit: Unit, seen: float | None) -> Unit | None:
         if one != unit.unit and POSSIBLE[0] < size < POSSIBLE[1]:
             why = (
                 f"the pull to the centre is that of {1000 * size:.3g} mm from the axis, although the header says "
-                f"{unit.unit}, by which it would be {seen:.3g} m"
+                f"{unit.unit}, by which it would be {seen:.2g} m"
             )
             return Unit(one, 1.0, Decision("gyroscope unit", one, "likely", why))
     return None
+
+
+def doubted(unit: Unit, peak: float, seen: float | None) -> Unit:
+    """Return a gyroscope's unit in rad/s with the doubt that it may be deg/s, of a log in which nothing turns to tell.
+
+    ``peak`` is its largest reading as written; ``seen`` the arm of the accelerometer in m, None where it does not show.
+    """
+    if unit.unit != "rad/s" or unit.scale != 1.0 or not DOUBTED[0] < peak < DOUBTED[1]:
+        return unit
+    if seen is not None and POSSIBLE[0] < seen < POSSIBLE[1]:
+        return unit
+    why = (
+        f"{unit.decision.why}; whether it is deg/s, up to {peak:.0f} deg/s, nothing here tells: no field and no "
+        "gravity that turns, no pull to the centre"
+    )
+    return unit._replace(decision=unit.decision._replace(sure="likely", why=why))

@@ -21,7 +21,9 @@ from discsim.validation.importing.sniffing.behaviour import WORTHS, by_behaviour
 from discsim.validation.importing.sniffing.clock import SPACING, Clock, clocks_of, seconds
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.dialect import dialect_of
+from discsim.validation.importing.sniffing.exchanged import exchanged
 from discsim.validation.importing.sniffing.groups import FEWEST_ROWS, Numbers, Triple, triples_of
+from discsim.validation.importing.sniffing.lift import along, unit_by_lift
 from discsim.validation.importing.sniffing.magnitudes import (
     PER_G,
     REST,
@@ -34,9 +36,10 @@ from discsim.validation.importing.sniffing.magnitudes import (
 )
 from discsim.validation.importing.sniffing.names import is_time_name, sensor_of, timeless
 from discsim.validation.importing.sniffing.own_clock import OwnClocks, own_clocks
-from discsim.validation.importing.sniffing.preamble import stated_worths
+from discsim.validation.importing.sniffing.preamble import stated_rate, stated_worths
 from discsim.validation.importing.sniffing.proposal import Proposal, ProposedSensor
-from discsim.validation.importing.sniffing.pull import arm, unit_by_pull
+from discsim.validation.importing.sniffing.pull import arm, doubted, unit_by_pull
+from discsim.validation.importing.sniffing.seen_turns import SeenTurns, clock_note, rate_note, seen_turns
 from discsim.validation.importing.sniffing.spin_axis import Reading3
 from discsim.validation.importing.sniffing.turning import Fit, best_worth, steps_between
 from discsim.validation.importing.sniffing.units import COUNTS, Reading
@@ -51,6 +54,9 @@ TELLING = 0.35
 #: What a step from the gyroscope's rate and the field's turning may be off by, a share (one sigma): a gyroscope's scale
 #: (3 % over parts and temperature), and what was found on four measured logs (1 to 6 %, rms 3 %).
 OFF_FITTED = 0.04
+#: A log rests on gravity where its rate is below this, rad/s, in more than this share of its rows: `gravity_norm` looks
+#: for what most windows share, and a rest of a twentieth of a spin is what `rest_norm` takes.
+SLOW, RESTS = 1.0, 0.05
 #: A column that stands this far back (gravity taken off, worked out, in the earth's axes) is no sensor's reading.
 NO_READING = 9
 
@@ -71,7 +77,7 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     """
     files, failures = _read(raw)
     layout, files, notes = _one_layout(files)
-    found, left = _assigned(files)
+    found, left, exchanges = _assigned(files)
     fixes = [file.numbers for file in files if file.numbers.tells_positions]
     clock = _one_clock([triple.numbers for triple, _ in found.values()] or fixes or [file.numbers for file in files])
     fixes = [numbers for numbers in fixes if _on(clock, numbers)][:1]
@@ -83,9 +89,11 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     found = {s: found[s] for s in ORDER if s in found and _on(clock, found[s][0].numbers)}
     if not found and not fixes:
         raise _nothing(raw, files, failures)
+    found, exchanges = _turned_about(clock, found, exchanges)
     others = _others(found, left)
     own = own_clocks(clock, {sensor: triple for sensor, (triple, _) in found.items()})
-    proposal = _proposal(raw, plant, layout, clock, own, found, [*notes, *(note for _, note in others), *own.notes])
+    notes = [*exchanges, *notes, *(note for _, note in others), *own.notes]
+    proposal = _proposal(raw, plant, layout, clock, own, found, notes)
     proposal = replace(proposal, positions=fixes[0] if fixes else None)
     named = [*(triple for triple, _ in found.values()), *(triple for triple, _ in others)]
     return _with_unused(proposal, [file.numbers for file in files], named, own)
@@ -155,21 +163,57 @@ def _one_layout(files: Sequence[_File]) -> tuple[Layout, list[_File], list[str]]
 # --------------------------------------------------------------------------------------------------- sensors
 
 
-def _assigned(files: Sequence[_File]) -> tuple[dict[str, tuple[Triple, Decision]], list[Triple]]:
-    """Return the best triple of each sensor by names, and the rest."""
+def _assigned(files: Sequence[_File]) -> tuple[dict[str, tuple[Triple, Decision]], list[Triple], list[str]]:
+    """Return the best triple of each sensor by names, the rest, and a note where names are exchanged."""
     triples = [triple for file in files for triple in file.triples]
-    found: dict[str, tuple[Triple, Decision]] = {}
+    named: dict[str, Triple] = {}
     for sensor in ORDER:
         mine = [t for t in triples if t.sensor == sensor and t.penalty < NO_READING]
         if not mine:
             continue
         # of several the one with gravity in it, then the plainest name, then the first
-        best = min(mine, key=lambda t: (sensor == "accelerometer" and _weightless(t), t.penalty, triples.index(t)))
-        if sensor == "accelerometer" and _weightless(best) and (len(mine) > 1 or not _rests(best)):
-            continue  # no sensor's reading, and nothing here could use it
-        found[sensor] = (best, Decision(sensor, best.label, "certain", f"{best.source} says so"))
-    used = [triple for triple, _ in found.values()]
-    return found, [triple for triple in triples if triple not in used]
+        named[sensor] = min(
+            mine, key=lambda t: (sensor == "accelerometer" and _weightless(t), t.penalty, triples.index(t))
+        )
+    meant, decisions, notes = exchanged(named)
+    said = {decision.what: decision for decision in decisions}
+    accel = meant.get("accelerometer")
+    several = sum(t.sensor == "accelerometer" and t.penalty < NO_READING for t in triples) > 1
+    if accel is not None and _weightless(accel) and (several or not _rests(accel)):
+        del meant["accelerometer"], named["accelerometer"]  # no sensor's reading, and nothing here could use it
+    found = {
+        sensor: (triple, said.get(sensor) or Decision(sensor, triple.label, "certain", f"{triple.source} says so"))
+        for sensor, triple in meant.items()
+    }
+    return found, [triple for triple in triples if triple not in named.values()], notes
+
+
+def _turned_about(
+    clock: Clock, found: dict[str, tuple[Triple, Decision]], notes: list[str]
+) -> tuple[dict[str, tuple[Triple, Decision]], list[str]]:
+    """Return the sensors, gyroscope and accelerometer exchanged where the field turns as the other one says."""
+    if notes or set(ORDER) - set(found):
+        return found, notes
+    times = {sensor: seconds(clock, triple.numbers)[triple.rows] for sensor, (triple, _) in found.items()}
+    fit = _turned(found, times)
+    if fit is None or (fit.ratio < TELLING and _keeps_axis(fit, found["gyroscope"][0])):
+        return found, notes
+    field = found["magnetometer"][0]
+    accel = found["accelerometer"][0]
+    steps = steps_between(times["accelerometer"], accel.values, times["magnetometer"], field.values)
+    other = best_worth(steps, WORTHS)
+    if other is None or other.ratio >= TELLING or not _keeps_axis(other, accel):
+        return found, notes
+    why = f"it says how {field.label} turns ({100 * other.ratio:.0f} % of the changes left)"
+    seen = {"gyroscope": ("accelerometer", f"{accel.label} is the gyroscope"), "accelerometer": ("gyroscope", why)}
+    meant, decisions, said = exchanged({sensor: found[sensor][0] for sensor in seen}, seen)
+    return {**found, **{one.what: (meant[one.what], one) for one in decisions}}, said
+
+
+def _keeps_axis(fit: Fit, triple: Triple) -> bool:
+    """Tell whether the field turns about the axis on which a triple reads most: a steady pull is like a rate on x."""
+    axis = int(np.argmax(np.nanmean(triple.values**2, axis=0)))
+    return bool(abs(fit.axes[axis, axis]) > 0.5)
 
 
 def _weightless(triple: Triple) -> bool:
@@ -300,14 +344,15 @@ def _proposal(
         for sensor, (triple, _) in found.items()
     }
     fit = _turned(found, times)
+    turns = seen_turns({sensor: triple for sensor, (triple, _) in found.items()}, times, fit)
     units: dict[str, Unit] = {}
     for sensor, (triple, _) in found.items():
         sound = np.isfinite(triple.values).all(axis=1)
         value = triple.values if sound.all() else triple.values[sound]
         stated, above = _stated(sensor, triple, value)
         if sensor == "gyroscope":
-            turned = fit.worth if fit is not None and fit.ratio < TELLING and clock.column is not None else None
-            units[sensor] = gyroscope_unit(value, stated, turned)
+            told = turns if clock.column is not None else None
+            units[sensor] = gyroscope_unit(value, stated, told and told.worth, told.by if told else "the field")
         elif sensor == "accelerometer":
             units[sensor] = accelerometer_unit(value, stated)
         else:
@@ -317,7 +362,12 @@ def _proposal(
             text = f"{stated.scale:.6g} {stated.unit} a count"
             why = units[sensor].decision.why.replace("the header says so", "a line above the table says so")
             units[sensor] = units[sensor]._replace(decision=Decision(f"{sensor} unit", text, "certain", why))
-    units = _by_pull(found, times, units)
+    units = _by_lift(found, times, units)
+    units, pull = _by_pull(found, times, units)
+    if "gyroscope" in found and turns is None and found["gyroscope"][0].units:
+        peak = float(np.nanmax(np.abs(found["gyroscope"][0].values)))
+        units = {**units, "gyroscope": doubted(units["gyroscope"], peak, pull)}
+    notes = [*_on_time(clock, found, times, units, turns, pull), *notes]
     if clock.column is None and "gyroscope" in units:
         clock, slower = _fitted(clock, fit, units["gyroscope"])
         times = {sensor: slower * time for sensor, time in times.items()}
@@ -337,17 +387,50 @@ def _in_si(sensor: str, triple: Triple, time: FloatArray, unit: Unit) -> Reading
     return _reading(time, triple.values * unit.factor(SENSORS[sensor].unit))
 
 
-def _by_pull(
+def _by_lift(
     found: dict[str, tuple[Triple, Decision]], times: dict[str, FloatArray], units: dict[str, Unit]
 ) -> dict[str, Unit]:
-    """Return the units, a gyroscope's by the pull to the centre where that refutes the unit of the header."""
-    if {"gyroscope", "accelerometer"} - set(found) or not found["gyroscope"][0].units:
+    """Return the units, an accelerometer's by lift where nothing in the log rests on gravity."""
+    if {"gyroscope", "accelerometer"} - set(found):
         return units
+    gyro = _in_si("gyroscope", found["gyroscope"][0], times["gyroscope"], units["gyroscope"])
+    if np.mean(np.linalg.norm(gyro.value, axis=1) < SLOW) > RESTS:
+        return units
+    triple, unit = found["accelerometer"][0], units["accelerometer"]
+    stated = bool(triple.units) and triple.units[0].unit != COUNTS
+    counts = np.array_equal(sound := triple.values[np.isfinite(triple.values).all(axis=1)], np.round(sound))
+    by_lift = unit_by_lift(unit, along(gyro, times["accelerometer"], triple.values), stated=stated, counts=counts)
+    return units if by_lift is None else {**units, "accelerometer": by_lift}
+
+
+def _by_pull(
+    found: dict[str, tuple[Triple, Decision]], times: dict[str, FloatArray], units: dict[str, Unit]
+) -> tuple[dict[str, Unit], float | None]:
+    """Return the units, a gyroscope's by the pull to the centre where that refutes the header's, and the arm, m."""
+    if {"gyroscope", "accelerometer"} - set(found) or not found["gyroscope"][0].units:
+        return units, None
     gyro, accel = (
         _in_si(sensor, found[sensor][0], times[sensor], units[sensor]) for sensor in ("gyroscope", "accelerometer")
     )
-    unit = unit_by_pull(units["gyroscope"], arm(gyro, accel))
-    return units if unit is None else {**units, "gyroscope": unit}
+    seen = arm(gyro, accel)
+    unit = unit_by_pull(units["gyroscope"], seen)
+    return (units, seen) if unit is None else ({**units, "gyroscope": unit}, None)
+
+
+def _on_time(
+    clock: Clock,
+    found: dict[str, tuple[Triple, Decision]],
+    times: dict[str, FloatArray],
+    units: dict[str, Unit],
+    turns: SeenTurns | None,
+    pull: float | None,
+) -> list[str]:
+    """Return what contradicts the stamps: the turning of what stands still in the room, a rate that is stated."""
+    notes = [clock_note(clock, units["gyroscope"], turns, pull)] if "gyroscope" in units else []
+    for sensor, (triple, _) in list(found.items())[:1]:
+        above = (*triple.numbers.dialect.preamble, triple.numbers.path.stem)
+        notes.append(rate_note(clock, times[sensor], stated_rate(above)))
+    return [note for note in notes if note]
 
 
 def _stated(sensor: str, triple: Triple, value: FloatArray) -> tuple[Reading | None, bool]:

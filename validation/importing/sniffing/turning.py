@@ -16,7 +16,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from discsim.arrays import FloatArray, IntArray
 
-__all__ = ["PERMUTATIONS", "Fit", "Steps", "best_axes", "best_worth", "steps_between"]
+__all__ = ["PERMUTATIONS", "Fit", "Steps", "best_axes", "best_worth", "left_by", "steps_between"]
 
 #: Steps of 0.02 rad stand above a magnetometer's noise (1 % of the field); one beyond 1.5 rad says little of its axis.
 SMALLEST, LARGEST = 0.02, 1.5
@@ -152,6 +152,21 @@ def best_worth(steps: Sequence[Steps], worths: Sequence[float]) -> Fit | None:
         low, high = (low, upper) if left[0] < left[1] else (lower, high)
     refined = _fits(those, float(np.exp((low + high) / 2)), [best.axes])
     return min([best, *refined], key=lambda fit: fit.ratio)
+
+
+def left_by(steps: Sequence[Steps], worth: float) -> float | None:
+    """Return what turning by a worth leaves of a vector's changes (a ratio of medians), its axes as the gyroscope's.
+
+    It has no offset: one that is free makes up for a worth that is wrong, where turns are small. None of too few steps.
+    """
+    left, change = [], []
+    for one in steps:
+        chosen = _chosen(one, worth)
+        if chosen is not None:
+            before, after, turn = chosen
+            left.append(np.linalg.norm(after - np.einsum("nij,nj->ni", _rotations(turn * worth), before), axis=1))
+            change.append(np.linalg.norm(after - before, axis=1))
+    return float(np.median(np.concatenate(left)) / np.median(np.concatenate(change))) if left else None
 
 
 def best_axes(steps: Sequence[Steps], worth: float) -> list[Fit]:

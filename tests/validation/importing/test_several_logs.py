@@ -1,0 +1,68 @@
+"""A folder of several throws' files: each is imported by itself; a folder with a file per sensor is one log."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from support.made_logs import DEG, G0, made_log, three, write_table
+
+from discsim.errors import InputError
+from discsim.recording import read_recording
+from discsim.validation.cli import main
+from discsim.validation.importing.imported_log import import_log
+
+LOG = made_log()
+FLIGHT, HELD = slice(600, 1500), slice(0, 400)
+
+
+def write(path: Path, kept: slice) -> Path:
+    columns = [("t_s", LOG.t[kept]), *three(["gx", "gy", "gz"], LOG.gyro[kept] / DEG)]
+    return write_table(path, columns + three(["ax", "ay", "az"], LOG.accel[kept] / G0))
+
+
+def run(monkeypatch, *words: str) -> int:
+    monkeypatch.setattr(sys, "argv", ["discsim", *words])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    return int(stop.value.code or 0)
+
+
+def test_each_log_of_a_folder_becomes_a_recording_of_one_data_set(tmp_path, monkeypatch, capsys):
+    """The first alone was taken; the others were said to be a second gyroscope."""
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "day" / "throw_1.csv", FLIGHT)
+    write(tmp_path / "day" / "throw_2.csv", FLIGHT)
+    write(tmp_path / "day" / "held.csv", HELD)
+    (tmp_path / "day" / "notes.txt").write_text("windy\n")
+    assert run(monkeypatch, "import", "day", "--throw", "1", "--out", "set") == 0
+    said = capsys.readouterr()
+    assert (
+        "3 logs of the same columns in day: held.csv, throw_1.csv, throw_2.csv; each is imported by itself" in said.out
+    )
+    assert "LEFT OUT: " in said.err
+    assert "held.csv: no throw found in it" in said.err
+    assert "recordings of one data set: discsim diagnose set" in said.out
+    for name in ("throw_1", "throw_2"):
+        assert len(read_recording(tmp_path / "set" / name).samples["gyroscope"]) > 400
+    assert not (tmp_path / "set" / "held" / "recording.toml").exists()
+
+
+def test_python_asks_which(tmp_path):
+    for name in ("a", "b"):
+        write(tmp_path / "day" / f"{name}.csv", FLIGHT)
+    with pytest.raises(InputError, match=r"2 logs of the same columns in it \(a.csv, b.csv\); expected one"):
+        import_log(tmp_path / "day")
+
+
+def test_a_file_per_sensor_is_one_log(tmp_path):
+    for name, value in (("Gyroscope", LOG.gyro), ("Accelerometer", LOG.accel)):
+        write_table(tmp_path / "day" / f"{name}.csv", [("time", LOG.t), *three(["x", "y", "z"], value)])
+    assert set(import_log(tmp_path / "day").recordings[0].samples) == {"gyroscope", "accelerometer"}
+
+
+def test_a_folder_with_another_table_beside_is_one_log(tmp_path):
+    write(tmp_path / "day" / "imu.csv", FLIGHT)
+    write_table(tmp_path / "day" / "mag.csv", [("t_s", LOG.t[FLIGHT]), *three(["mx", "my", "mz"], LOG.mag[FLIGHT])])
+    assert set(import_log(tmp_path / "day").recordings[0].samples) == {"gyroscope", "accelerometer", "magnetometer"}

@@ -1,0 +1,120 @@
+"""How fast a gyroscope's log turns by what stands still in the room: the field, or gravity while a hand holds it.
+
+Takes the readings of both; gives what one reading of the gyroscope is worth, and what that says of the clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.validation.importing.sniffing.behaviour import WORTHS
+from discsim.validation.importing.sniffing.clock import Clock
+from discsim.validation.importing.sniffing.groups import Triple
+from discsim.validation.importing.sniffing.magnitudes import Unit, gravity_norm
+from discsim.validation.importing.sniffing.pull import POSSIBLE
+from discsim.validation.importing.sniffing.turning import Fit, best_worth, left_by, steps_between
+
+__all__ = ["SeenTurns", "clock_note", "rate_note", "seen_turns"]
+
+#: Less than this share of the changes is left where the gyroscope explains them, `sniffer.TELLING` for the field.
+TELLING = 0.35
+#: A hand holds it where the specific force is gravity to this share: it moves what it turns by less than 1 m/s^2.
+HELD = 0.1
+#: How often too large a step of the stamps may be: a tick of 0.1 ms, 10 ms or 100 us that is taken for another unit.
+TICKS = (10.0, 0.1, 100.0, 0.01, 1000.0, 0.001)
+#: A ratio is a power of ten where it is one to this factor: a clock that is off by 30 % is the worst known.
+POWER = 1.3
+#: Rows a second that are stated, and those of the stamps, contradict from this factor on: an oscillator is off by some
+#: per cent, and a logger that loses a tenth of its rows is common.
+CONTRADICTS = 1.25
+
+
+class SeenTurns(NamedTuple):
+    """What one reading of a gyroscope is worth, rad/s, by the turning of ``by`` ("the field", "gravity")."""
+
+    worth: float
+    by: str
+
+
+def seen_turns(found: Mapping[str, Triple], times: Mapping[str, FloatArray], fit: Fit | None) -> SeenTurns | None:
+    """Return how fast the log turns by the field (``fit``: of the usual worths), else by gravity; None: none tells.
+
+    ``times`` (n,) s are those of each sensor's rows. Stamps may be wrong by a power of ten: that is tried, too.
+    """
+    if fit is not None and fit.ratio < TELLING:
+        return SeenTurns(fit.worth, "the field")
+    if "gyroscope" not in found:
+        return None
+    gyro, t = found["gyroscope"], times["gyroscope"]
+    if "magnetometer" in found:
+        steps = steps_between(t, gyro.values, times["magnetometer"], found["magnetometer"].values)
+        seen = best_worth(steps, [worth * tick for worth in WORTHS[:2] for tick in TICKS])
+        if seen is not None and seen.ratio < TELLING:
+            return SeenTurns(seen.worth, "the field")
+    if "accelerometer" not in found:
+        return None
+    worth = _by_gravity(t, gyro.values, times["accelerometer"], found["accelerometer"].values)
+    return None if worth is None else SeenTurns(worth, "gravity")
+
+
+def _by_gravity(t: FloatArray, gyro: FloatArray, t_accel: FloatArray, accel: FloatArray) -> float | None:
+    """Return what a reading of a gyroscope is worth, rad/s, by how gravity turns while a hand holds it; None of none.
+
+    An accelerometer lies as the gyroscope of its chip does, and its offset is small (80 mg): neither is fitted.
+    """
+    held = np.abs(np.linalg.norm(accel, axis=1) / gravity_norm(_sound(accel)) - 1) < HELD
+    steps = steps_between(t, gyro, t_accel, np.where(held[:, None], accel, np.nan))
+    tried = [worth * tick for worth in WORTHS for tick in (1.0, *TICKS)]
+    left = {worth: seen for worth in tried if (seen := left_by(steps, worth)) is not None}
+    if not left or min(left.values()) > TELLING:
+        return None
+    best = min(left, key=lambda worth: left[worth])
+    near = [float(best * factor) for factor in np.geomspace(1 / POWER, POWER, 13)]
+    return min(near, key=lambda worth: left_by(steps, worth) or np.inf)
+
+
+def _sound(value: FloatArray) -> FloatArray:
+    return value[np.isfinite(value).all(axis=1)]
+
+
+def clock_note(clock: Clock, unit: Unit, turns: SeenTurns | None, pull: float | None) -> str | None:
+    """Return a warning where the log turns ten times (a power of it) as fast as its gyroscope and its stamps say.
+
+    ``pull`` is the arm of the accelerometer by the gyroscope alone, m (`arm`), which tells the two apart; None where
+    it does not show.
+    """
+    if clock.column is None or turns is None:
+        return None
+    ratio = turns.worth / unit.factor("rad_s")
+    power = 10.0 ** round(float(np.log10(ratio)))
+    if power == 1.0 or not 1 / POWER < ratio / power < POWER:
+        return None
+    rows = f"the rows are {power:g} times as far apart as '{clock.column}' in {clock.unit} says"
+    scale = f"the gyroscope's readings are worth {power:g} times as much as {unit.unit}"
+    why = "which of the two is open"
+    if pull is not None:
+        stamps, readings = (POSSIBLE[0] < one < POSSIBLE[1] for one in (pull, pull / power**2))
+        if stamps != readings:
+            why = f"the pull to the centre shows that {rows if stamps else scale}"
+    return (
+        f"WARNING: {turns.by} turns {ratio:.3g} times as fast as the gyroscope says: {rows}, or {scale}; {why}: "
+        "mend the column, or every rate from the field, or every time, is wrong by that"
+    )
+
+
+def rate_note(clock: Clock, time: FloatArray, stated: tuple[float, str] | None) -> str | None:
+    """Return a warning where the stamps (n,) s make other rows a second than ``stated`` (and the line that does)."""
+    steps = np.diff(time[np.isfinite(time)])
+    if clock.column is None or stated is None or not np.any(steps > 0):
+        return None
+    rate = 1 / float(np.median(steps[steps > 0]))
+    if 1 / CONTRADICTS < rate / stated[0] < CONTRADICTS:
+        return None
+    return (
+        f"WARNING: '{clock.column}' in {clock.unit} makes {rate:.4g} rows a second, but '{stated[1][:60]}' says "
+        f"{stated[0]:.6g}: if that is the rate of this log, the column is in another unit; the column is believed"
+    )
