@@ -28,12 +28,15 @@ class Refitted(NamedTuple):
     charged: float
 
 
-def best_of(fits: Sequence[Refitted], distant: bool) -> Refitted:
-    """Return the refit that explains most for what is charged.
+def best_of(fits: Sequence[Refitted], distant: bool, far: Sequence[bool]) -> Refitted:
+    """Return the refit that explains most for what is charged; ``far`` tells of each whether it is far from the data.
 
-    Which is best is asked on the readings that take part in both, as each may leave out others.
+    Which is best is asked on the readings that take part in both, as each may leave out others. What only tells why
+    readings are out has its evidence from a motion that does not follow the data: it waits where another comes near.
     """
     if distant:
+        if not all(far):
+            fits = [one for one, off in zip(fits, far, strict=True) if not (off and one.cost < 0.0)]
         # far from the data chi-squared says more than a likelihood that has swallowed the mismatch as noise
         return min(fits, key=lambda one: one.chi2 + one.charged)
     first = min(fits, key=lambda one: one.fitted.score + one.charged).fitted

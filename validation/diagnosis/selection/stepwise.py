@@ -439,7 +439,7 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
             near_data |= chi2 < SELECTION.near * refitted.fit.count
     if not fits:
         return found, None
-    chosen = best_of(fits, distant)
+    chosen = best_of(fits, distant, [far(found, one.fitted) for one in fits])
     best, fit, cost = chosen.fitted, chosen.about, chosen.cost
     if cost > 0:
         found = replace(found, relaxed_fit=replace(found.relaxed_fit, trajectories=fit.trajectories))
