@@ -47,8 +47,8 @@ from discsim.validation.diagnosis.selection.all_at_once import worth_of_each
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, in_parameters, parameters_of
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
 from discsim.validation.diagnosis.selection.evidence import price
+from discsim.validation.diagnosis.selection.exchange import tried_without
 from discsim.validation.diagnosis.selection.search_state import Considered, Search, chi2_in
-from discsim.validation.diagnosis.selection.stepwise import tried_without
 from discsim.validation.diagnosis.settings import settings_told
 from discsim.validation.diagnosis.setup import suspected_fault
 from discsim.validation.diagnosis.setup_effects import SetupAnswer, answer_of_setup, on_board_axes

@@ -19,7 +19,15 @@ from discsim.validation.diagnosis.selection.search_state import Rival, Search, f
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Bars, merit_of
 
-__all__ = ["eliminated_backward", "exchanged", "rivals_of", "takes_its_place", "widened"]
+__all__ = [
+    "eliminated_backward",
+    "exchanged",
+    "rivals_of",
+    "takes_its_place",
+    "tried_without",
+    "widened",
+    "without_superfluous",
+]
 
 
 def _in_reach(fitted: ContinuousFit) -> Bars:
@@ -80,6 +88,43 @@ def eliminated_backward(found: Search, current: ContinuousFit, kept: CandidateEf
             return current
         current = weakest
     return current
+
+
+def tried_without(found: Search, candidate: CandidateEffect) -> ContinuousFit:
+    """Return the fit of the final hypothesis without one of its effects."""
+    final = found.final
+    rest = final.hypothesis.without(candidate)
+    if not rest.candidates:
+        return found.base
+    for step in found.steps:
+        if set(step.hypothesis.candidates) == set(rest.candidates):
+            return step
+    return continuous_fit(
+        found.relaxed_fit, rest, found.own, found.relaxed_noise, values_of_fit(final), iterations=5, polish=1
+    )
+
+
+def without_superfluous(found: Search) -> Search:
+    """Leave out effects without which a fit that is begun anew explains as much.
+
+    A fit that goes on from one with the effect may end beside the optimum, and the effect then seems worth its price.
+    """
+    # what choosing lost samples cost stands in the score of some fits and not of others
+    while not found.cost and len(found.final.hypothesis.candidates) > 1:
+        weakest: ContinuousFit | None = None
+        for number, candidate in enumerate(found.final.hypothesis.candidates):
+            if candidate.fixed_values:
+                continue
+            refitting("beginning anew without", candidate.id, number, len(found.final.hypothesis.candidates))
+            less = tried_without(found, candidate)
+            found = found if any(step is less for step in found.steps) else found.with_step(less)
+            worse = less.worse_than(found.final)
+            if worse < price(candidate) and (weakest is None or less.score < weakest.score):
+                weakest = less
+        if weakest is None:
+            return found
+        found = replace(found, final=weakest)
+    return found
 
 
 def rivals_of(found: Search) -> dict[str, list[Rival]]:

@@ -33,7 +33,13 @@ from discsim.validation.diagnosis.selection.candidates import (
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.event_instants import with_best_instant
 from discsim.validation.diagnosis.selection.evidence import ONE_SIDED, TURNED, charge, price
-from discsim.validation.diagnosis.selection.exchange import eliminated_backward, exchanged, rivals_of, widened
+from discsim.validation.diagnosis.selection.exchange import (
+    eliminated_backward,
+    exchanged,
+    rivals_of,
+    widened,
+    without_superfluous,
+)
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
 from discsim.validation.diagnosis.selection.recounting import with_losses_recounted
 from discsim.validation.diagnosis.selection.refits import refitting
@@ -70,7 +76,7 @@ from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, loudest, unmodelled_residuals
 from discsim.validation.identification.stated_parameters import stated_parameters
 
-__all__ = ["joined", "past_hope", "screened", "search", "settled", "tried_without", "without_swallowed"]
+__all__ = ["joined", "past_hope", "screened", "search", "settled", "without_swallowed"]
 
 Report: TypeAlias = Callable[[str, int, int], None]
 #: what is proposed, the fit whose motion a fit of it starts from, and what choosing lost samples costs
@@ -298,7 +304,7 @@ def settled(found: Search) -> Search:
             found = _with_final(found, wide)
         if found.relaxed_fit.plant.weakly_identified and not lost(found, found.final):
             # what an effect gained upon a fit that stood beside its optimum, others gain without it
-            found = replace(found, final=eliminated_backward(found, found.final))
+            found = without_superfluous(replace(found, final=eliminated_backward(found, found.final)))
         found = found.about(found.final.fit)
         # where the fit is far from the data nothing is named, and nothing need be told apart
         found = replace(found, rivals={} if lost(found, found.final) else rivals_of(found))
@@ -565,20 +571,6 @@ def _with_lost_samples(found: Search, current: ContinuousFit) -> Search:
     taken = {candidate.id for candidate in current.hypothesis.candidates}
     lost = found.lost_samples.about(found.relaxed_fit, known, lambda: steady_noise(found), taken)
     return replace(found, lost_samples=lost)
-
-
-def tried_without(found: Search, candidate: CandidateEffect) -> ContinuousFit:
-    """Return the fit of the final hypothesis without one of its effects."""
-    final = found.final
-    rest = final.hypothesis.without(candidate)
-    if not rest.candidates:
-        return found.base
-    for step in found.steps:
-        if set(step.hypothesis.candidates) == set(rest.candidates):
-            return step
-    return continuous_fit(
-        found.relaxed_fit, rest, found.own, found.relaxed_noise, values_of_fit(final), iterations=5, polish=1
-    )
 
 
 def _from_there(found: Search, current: ContinuousFit, better: ContinuousFit) -> ContinuousFit | None:
