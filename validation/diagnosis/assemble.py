@@ -187,10 +187,11 @@ def _with_law(found: Search, law: FoundLaw) -> tuple[FitFigures, FitFigures, tup
 
 
 def _leaves(law: FoundLaw, names: Sequence[str]) -> str:
-    """Return in words what is left once a law is in."""
+    """Return in words how often what swings does so, and what is left once a law is in."""
     left = unmodelled_residuals(law.fitted.fit.linears, law.fitted.residuals, law.fitted.fit.noise)
+    swinging = f"{law.swinging} " if law.swinging else ""
     if not left:
-        return "With it nothing but noise is left."
+        return f"{swinging}With it nothing but noise is left."
     places = []
     for item in left:
         where = item.group.replace("gps.", "gps ")
@@ -199,7 +200,9 @@ def _leaves(law: FoundLaw, names: Sequence[str]) -> str:
         places.append(where)
     listed = "; ".join(dict.fromkeys(places[:3]))
     more = f" and {len(left) - 3} more places" if len(left) > 3 else ""
-    return f"It explains {100.0 * law.share:.0f} % of the excess, and more than noise is left: {listed}{more}."
+    return (
+        f"{swinging}It explains {100.0 * law.share:.0f} % of the excess, and more than noise is left: {listed}{more}."
+    )
 
 
 def _reference(found: Search, unexplained: bool, counted: Agreement | None) -> NoiseModel:

@@ -20,7 +20,7 @@ from discsim.validation.diagnosis.result import Law
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
-from discsim.validation.diagnosis.unknown_law.formula import as_laws, as_sensor_laws
+from discsim.validation.diagnosis.unknown_law.formula import as_laws, as_sensor_laws, swinging_in_words
 from discsim.validation.diagnosis.unknown_law.motion_law import candidate_laws, fitted_law, reference_of, state_of
 from discsim.validation.diagnosis.unknown_law.sensor_law import (
     asked_of_sensors,
@@ -48,7 +48,7 @@ class FoundLaw:
     by recording while it took no part, ``chi2`` its chi-squared there before and after in the noise of the fit with the
     law, ``share`` the part of the excess of chi2 that it explains. ``fitted`` is that fit. ``reference`` says
     the same law in another way: its value at an ordinary state, which is known better than its coefficients, whose
-    errors are continuous with those of the exponents.
+    errors are continuous with those of the exponents. ``swinging`` tells in words how often what swings does so.
     """
 
     law: Law
@@ -59,6 +59,7 @@ class FoundLaw:
     fitted: ContinuousFit
     also: tuple[Law, ...] = field(default_factory=tuple)
     chi2: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    swinging: str = ""
 
 
 # --------------------------------------------------------------------------------------------------- fitting
@@ -334,4 +335,5 @@ def _believed(
         laws, reference = as_laws(tuple(t for t in terms if isinstance(t, Term)), fitted.fit, at, total)
     if not laws:
         return None
-    return FoundLaw(laws[0], base.score - fitted.score, heldout, share, reference, fitted, laws[1:], chi2)
+    words = swinging_in_words(about, fitted.fit)
+    return FoundLaw(laws[0], base.score - fitted.score, heldout, share, reference, fitted, laws[1:], chi2, words)

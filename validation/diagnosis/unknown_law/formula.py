@@ -17,7 +17,7 @@ from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.normal_equations import inverse_of
 from discsim.validation.identification.plants.law_terms import Term
 
-__all__ = ["as_laws", "as_sensor_laws"]
+__all__ = ["as_laws", "as_sensor_laws", "swinging_in_words"]
 
 
 def as_sensor_laws(terms: Sequence[SensorTerm], fit: Fit, heldout: float | None) -> tuple[tuple[Law, ...], str]:
@@ -30,11 +30,7 @@ def as_sensor_laws(terms: Sequence[SensorTerm], fit: Fit, heldout: float | None)
     notes = []
     for i, term in enumerate(terms):
         s = place[f"{i}.shape"]
-        shape, sd = float(fit.at[s]), float(np.sqrt(fit.covariance[s, s]))
-        if term.kind == "swinging":
-            notes.append(_alternating(shape, sd, fit, term.sensor))
-        else:
-            notes.append(f"{term.kind} of the {term.sensor}, {shape:.4g} ± {sd:.2g}")
+        notes.append(f"{term.kind} of the {term.sensor}, {fit.at[s]:.4g} ± {float(np.sqrt(fit.covariance[s, s])):.2g}")
         prefix = f"{i}."
         axes = dict.fromkeys(name[len(prefix) :].partition(".")[0] for name in place if name.startswith(prefix))
         for axis in axes:
@@ -128,15 +124,21 @@ def _swing(values: FloatArray, block: FloatArray, w: ParameterValue, chi2: float
     return _Part(" + ".join(texts), {**coefficients, "w": w}, chi2)
 
 
-def _alternating(w: float, sd: float, fit: Fit, sensor: str) -> str:
-    """Return in words what swings, with the frequencies that readings at these instants cannot tell from it."""
+def swinging_in_words(terms: Sequence[SensorTerm], fit: Fit) -> str:
+    """Return how often what swings does so, and what readings at these instants cannot tell from it; else nothing."""
+    place = {q.name: j for j, q in enumerate(fit.parameters) if q.group == "term"}
+    at = [(term.sensor, place[f"{i}.shape"]) for i, term in enumerate(terms) if term.kind == "swinging"]
+    return " ".join(_in_hertz(float(fit.at[s]), float(np.sqrt(fit.covariance[s, s])), fit, sensor) for sensor, s in at)
+
+
+def _in_hertz(w: float, sd: float, fit: Fit, sensor: str) -> str:
     hertz = w / (2.0 * np.pi)
     gaps = [np.diff(r.t) for each in fit.trajectories for r in each.readings if r.sensor == sensor]
     rate = 1.0 / float(np.median(np.concatenate(gaps)))
     return (
-        f"what swings outside at {hertz:.6g} ± {sd / (2.0 * np.pi):.2g} Hz, in another phase in each recording "
-        f"(coefficients of the first); at {rate:.4g} readings a second {rate - hertz:.6g} and {rate + hertz:.6g} Hz "
-        f"read the same"
+        f"It swings at {hertz:.6g} ± {sd / (2.0 * np.pi):.2g} Hz, in another phase in each recording (the coefficients "
+        f"are those of the first); at {rate:.4g} readings a second {rate - hertz:.6g} and {rate + hertz:.6g} Hz read "
+        "the same."
     )
 
 

@@ -124,7 +124,7 @@ def test_a_field_that_alternates_outside_is_a_law_of_its_frequency_in_any_phase(
     assert set(laws) == {"magnetometer.x_uT", "magnetometer.y_uT", "magnetometer.z_uT"}
     # at 100 readings a second the line stands at 49.836 Hz
     assert within(found, "w", 2.0 * np.pi * 49.836)
-    assert "50.16" in found.reference
+    assert "at 100 readings a second 50.16" in found.swinging
     along = laws["magnetometer.z_uT"].coefficients
     # 0.6 uT of noise on 500 readings
     assert np.hypot(along["a3"].value, along["b3"].value) == pytest.approx(4.0 * 0.48, abs=0.15)
@@ -241,7 +241,7 @@ def test_a_field_that_alternates_outside_is_told_in_free_spin():
     assert found is not None
     # at 100 readings a second the line stands at 40.1 Hz
     assert within(found, "w", 2.0 * np.pi * 40.1)
-    assert "and 140.1" in found.reference
+    assert "and 140.1" in found.swinging
 
 
 def test_a_gyroscope_that_warms_up_in_free_spin_is_a_law_of_time():
