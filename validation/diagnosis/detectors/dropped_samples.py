@@ -184,10 +184,14 @@ def _with_losses(fit: Fit, counted: Fit, sensor: str) -> Fit:
 
 
 def _own_times(anew: Trajectory, old: Trajectory, lost: Mapping[str, FloatArray]) -> Trajectory:
-    """Return the segments of a fit to repaired recordings as segments of the recording itself, its losses beside it."""
+    """Return the segments of a fit to repaired recordings as segments of the recording itself, its losses beside it.
+
+    Only what lost samples was written at other times. Means over turns of another sensor may be one more or less: they
+    go by the turns that the readings show.
+    """
     some = {sensor: counts for sensor, counts in lost.items() if counts.size}
     written = {readings.sensor: readings.t for readings in old.readings}
-    readings = tuple(replace(r, t=written[r.sensor]) for r in anew.readings)
+    readings = tuple(replace(r, t=written[r.sensor]) if r.sensor in some else r for r in anew.readings)
     return replace(anew, recording=old.recording, readings=readings, lost={**old.lost, **some}, effects=old.effects)
 
 
