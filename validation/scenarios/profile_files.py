@@ -14,7 +14,7 @@ from discsim.recording import COMMAND_HEADER, Samples
 from discsim.rig import profile_fault, read_profile
 from discsim.validation.estimating.rate_files import Told, read_told
 
-__all__ = ["Profile", "read_knots", "speed_note"]
+__all__ = ["Profile", "fastest_shipped", "read_knots", "speed_note"]
 
 #: headers that say what they hold, the first in deg/s; `discsim.rig.read_profile` reads them
 _PLAIN = ("time_s,rate_deg_s", COMMAND_HEADER)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
-from discsim.arrays import FloatArray, IntArray
+from discsim.arrays import ComplexArray, FloatArray, IntArray
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, noise_of, scored
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.screening import NormalEquations, column_of
@@ -173,18 +173,30 @@ def orders(fit: Fit, sensor: str) -> list[float]:
         return []
     step = 1.0 / length
     tried = np.arange(_ORDERS[0], _ORDERS[1], step)
+    return _peaks(tried, _spectrum(parts, tried, step), 12.0 * step)
+
+
+def _spectrum(
+    parts: Sequence[tuple[FloatArray, FloatArray | ComplexArray]], tried: FloatArray, step: float
+) -> FloatArray:
+    """Return the power (k,) of all parts, each of angles and values (n,), at orders ``tried`` (k,), a step apart."""
     power = np.zeros(tried.size)
-    for psi, e in parts:
-        turning, by = np.exp(-1j * tried[0] * psi), np.exp(-1j * step * psi)
+    for x, e in parts:
+        turning, by = np.exp(-1j * tried[0] * x), np.exp(-1j * step * x)
         for j in range(tried.size):
             power[j] += abs(np.sum(e * turning)) ** 2 / e.size
             turning = turning * by
+    return power
+
+
+def _peaks(tried: FloatArray, power: FloatArray, apart: float, least: float = 0.0) -> list[float]:
+    """Return where a spectrum has its highest peaks of at least a power, the highest first, so far ``apart``."""
     found: list[float] = []
     for j in np.argsort(power)[::-1]:
-        if all(abs(tried[j] - other) > 12.0 * step for other in found):
-            found.append(float(tried[j]))
-        if len(found) == _PEAKS:
+        if power[j] < least or len(found) == _PEAKS:
             break
+        if all(abs(tried[j] - other) > apart for other in found):
+            found.append(float(tried[j]))
     return found
 
 
@@ -194,8 +206,10 @@ def swings(fit: Fit, sensor: str) -> list[float]:
     A field that alternates outside stands across the spin axis at lines beside it, by the spin to either side. Only
     peaks that stand out from the spectrum are told, the highest first.
     """
+    if fit.plant.airborne and not fit.plant.weakly_identified:
+        return []  # far from any cable, and about no axis that keeps its direction
     length, fastest = 0.0, np.inf
-    parts: list[tuple[FloatArray, FloatArray]] = []
+    parts: list[tuple[FloatArray, FloatArray | ComplexArray]] = []
     for linear, trajectory in zip(fit.linears, fit.trajectories, strict=True):
         spin = turned(trajectory)
         for channel in linear.channels:
@@ -206,23 +220,14 @@ def swings(fit: Fit, sensor: str) -> list[float]:
                 parts += [(t, e * np.exp(-1j * side * psi)) for side in sides]
                 length = max(length, float(np.ptp(t)))
                 fastest = min(fastest, np.pi / float(np.median(np.diff(t))))
-    if not parts or (fit.plant.airborne and not fit.plant.weakly_identified):
-        return []  # far from any cable, and about no axis that keeps its direction
+    if not parts:
+        return []
     step = 0.5 * np.pi / length
     tried = np.arange(_LONGEST_SWINGS * 2.0 * np.pi / length, fastest, step)
-    power = np.zeros(tried.size)
-    for t, e in parts:
-        turning, by = e * np.exp(-1j * tried[0] * t) if tried.size else e, np.exp(-1j * step * t)
-        for j in range(tried.size):
-            power[j] += abs(np.sum(turning)) ** 2 / e.size
-            turning = turning * by
-    found: list[float] = []
-    for j in np.argsort(power)[::-1]:
-        if power[j] < _STANDS_OUT * np.median(power) or len(found) == _PEAKS:
-            break
-        if all(abs(tried[j] - other) > 12.0 * step for other in found):
-            found.append(float(tried[j]))
-    return found
+    if not tried.size:
+        return []
+    power = _spectrum(parts, tried, step)
+    return _peaks(tried, power, 12.0 * step, _STANDS_OUT * float(np.median(power)))
 
 
 def sensor_library(fit: Fit) -> list[SensorTerm]:
@@ -263,11 +268,17 @@ def _shape_sd(term: SensorTerm) -> float:
     return {"turning": 0.01, "swinging": _SWING_SD}.get(term.kind, 0.3 * term.shape)
 
 
-def _coefficients(trajectories: Sequence[Trajectory], term: SensorTerm) -> list[str]:
-    """Return the names of a term's coefficients, AXIS.NUMBER, and AXIS.NUMBER.RECORDING where each has its own."""
+def _coefficients(trajectories: Sequence[Trajectory], term: SensorTerm, number: int = 0) -> list[Parameter]:
+    """Return the coefficients of a term, called NUMBER.AXIS.PLACE, with .RECORDING behind where each has its own."""
     axes = max((_axes(trajectory, term.sensor) for trajectory in trajectories), key=len)
-    names = [f"{axis}.{j}" for axis in axes for j in range(term.size)]
-    return [f"{name}.{k}" for k in range(len(trajectories)) for name in names] if term.own else names
+    names = [f"{number}.{axis}.{j}" for axis in axes for j in range(term.size)]
+    if not term.own:
+        return [Parameter("term", name, 0.0, 1.0) for name in names]
+    return [
+        Parameter("term", f"{name}.{k}", 0.0, 1.0, recordings=frozenset({k}))
+        for k in range(len(trajectories))
+        for name in names
+    ]
 
 
 def _width(trajectories: Sequence[Trajectory], term: SensorTerm) -> int:
@@ -362,9 +373,8 @@ def fitted_sensor_law(
     numbers: list[Parameter] = []
     widths = []
     for i, term in enumerate(terms):
-        mine = _coefficients(start.trajectories, term)
-        of = [frozenset({int(name.rpartition(".")[2])}) if term.own else None for name in mine]
-        numbers += [Parameter("term", f"{i}.{n}", 0.0, 1.0, recordings=k) for n, k in zip(mine, of, strict=True)]
+        mine = _coefficients(start.trajectories, term, i)
+        numbers += mine
         widths.append(len(mine))
     p, count = len(own), len(numbers)
     parameters = (

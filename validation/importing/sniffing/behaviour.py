@@ -13,11 +13,11 @@ from discsim.validation.importing.sniffing.groups import Triple
 from discsim.validation.importing.sniffing.magnitudes import FIELD, PER_G, REST, field_size, gravity_norm, rest_norm
 from discsim.validation.importing.sniffing.turning import best_worth, steps_between
 
-__all__ = ["WORTHS", "by_behaviour", "looks_like"]
+__all__ = ["TELLING", "WORTHS", "by_behaviour", "looks_like"]
 
 #: What one reading of a gyroscope may be worth, rad/s: rad/s, deg/s, mdeg/s, and counts of 16 bits over 2000 deg/s.
 WORTHS = (1.0, np.pi / 180, np.pi / 180e3, np.pi / 180 / 16.384)
-#: What a gyroscope leaves of the field's changes (a ratio) where both are recognised by it.
+#: What a gyroscope leaves of the changes of the field, or of gravity, at most (a ratio) where it is believed by it.
 TELLING = 0.35
 #: At rest a gyroscope reads its offset, below 20 deg/s, and in a spin hundreds: less than a tenth of its largest.
 STILL = 0.1

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.validation.importing.sniffing.behaviour import WORTHS
+from discsim.validation.importing.sniffing.behaviour import TELLING, WORTHS
 from discsim.validation.importing.sniffing.clock import Clock
 from discsim.validation.importing.sniffing.groups import Triple
 from discsim.validation.importing.sniffing.magnitudes import Unit, gravity_norm
@@ -20,8 +20,6 @@ from discsim.validation.importing.sniffing.turning import Fit, best_worth, left_
 
 __all__ = ["SeenTurns", "clock_note", "rate_note", "seen_turns"]
 
-#: Less than this share of the changes is left where the gyroscope explains them, `sniffer.TELLING` for the field.
-TELLING = 0.35
 #: A hand holds it where the specific force is gravity to this share: it moves what it turns by less than 1 m/s^2.
 HELD = 0.1
 #: How often too large a step of the stamps may be: a tick of 0.1 ms, 10 ms or 100 us that is taken for another unit.

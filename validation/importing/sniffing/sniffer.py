@@ -17,7 +17,7 @@ from discsim.validation.importing.import_map import G0
 from discsim.validation.importing.raw_table import REPAIRS, Layout, RepairList, read_raw
 from discsim.validation.importing.sniffing.archive import MAX_FILES
 from discsim.validation.importing.sniffing.axes import body_axes
-from discsim.validation.importing.sniffing.behaviour import WORTHS, by_behaviour
+from discsim.validation.importing.sniffing.behaviour import TELLING, WORTHS, by_behaviour
 from discsim.validation.importing.sniffing.clock import SPACING, Clock, clocks_of, seconds
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.dialect import dialect_of
@@ -49,8 +49,6 @@ __all__ = ["sniff"]
 
 #: In this order they stand in the map; rows are counted in the first one's file.
 ORDER = ("gyroscope", "accelerometer", "magnetometer")
-#: A gyroscope's worth is taken from the field's turning where it leaves less than this of the field's changes.
-TELLING = 0.35
 #: What a step from the gyroscope's rate and the field's turning may be off by, a share (one sigma): a gyroscope's scale
 #: (3 % over parts and temperature), and what was found on four measured logs (1 to 6 %, rms 3 %).
 OFF_FITTED = 0.04
