@@ -375,9 +375,10 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
         # A limit at which readings stand moves nothing in a fit, and these readings are no part of what is left
         left = chi2_in(current, found.relaxed_noise)
         there = [offer for offer in there if _in_chi2(offer) < left]
-    # far from the data the two are asked in different noise: what they gain does not compare
+    # what the two promise does not compare: far from the data they are asked in different noise, and near them the
+    # segments of a fit that follows may promise much of a sensor that has nothing to gain
     there, here = ([offer for offer in some if on_the_disc(found, offer[0].start)] for some in (there, here))
-    worth = in_turn(there, here) if distant and step > 0 else in_turn([*there, *here])
+    worth = in_turn(there, here)
     present = {candidate.id for candidate in current.hypothesis.candidates}
     told = [hint for hint in found.hints if hint.candidate.id not in present]
     # what a lag holds dies away too fast for slopes at no lag to tell
