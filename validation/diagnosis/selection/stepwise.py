@@ -456,11 +456,14 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
 def _most_refitted(current: ContinuousFit, near_data: bool, gained: bool) -> int:
     """Return how many candidates a step refits: few near the data, where one has gained or nothing but noise is left.
 
-    Of noise that the relaxed fit shows too loud a small effect is near the data, and many promise more than it.
+    While none has gained, those few of each of the two fits that are asked. Of noise that the relaxed fit shows too
+    loud a small effect is near the data, and many promise more than it.
     """
     if near_data and not gained:
         near_data = not unmodelled_residuals(current.fit.linears, current.residuals, current.fit.noise)
-    return SELECTION.refitted if near_data else SELECTION.refitted_at_most
+    if not near_data:
+        return SELECTION.refitted_at_most
+    return SELECTION.refitted if gained else 2 * SELECTION.refitted
 
 
 def joined(found: Search, current: ContinuousFit, screened: ScreenedCandidate, bars: Bars) -> ContinuousFit | None:

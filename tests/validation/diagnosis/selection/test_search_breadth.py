@@ -45,14 +45,16 @@ def step(
     right: CandidateEffect,
     hints: Sequence[ScreenedCandidate] = (),
     of_relaxed: Sequence[ScreenedCandidate] = (),
+    of_present: Sequence[ScreenedCandidate] = (),
     gaining: bool = True,
     unmodelled: bool = True,
 ) -> tuple[str, list[str], list[float]]:
     """Return what one step of the search adds, and what it refitted, where fits are not made but told.
 
     Beside it how much below the present fit's merit each had to come, per reading, or be given up. ``of_relaxed`` are
-    candidates as algebra about the relaxed fit has them, where that is other than about the present one. Unless
-    ``gaining`` none but the right one gains, and the present fit leaves noise alone unless ``unmodelled``.
+    candidates as algebra about the relaxed fit has them, and ``of_present`` those about the present one, where they are
+    other than `RANKED`. Unless ``gaining`` none but the right one gains, and the present fit leaves noise alone unless
+    ``unmodelled``.
     """
     recordings = coasts(seconds=1.0)
     fit = Fit(tuple(first_trajectory(one) for one in recordings), (), np.empty(0), SPIN_DOWN.sizes.continuous, {})
@@ -84,8 +86,8 @@ def step(
     monkeypatch.setattr(searching, "searched", lambda *_: [])
     monkeypatch.setattr(searching, "screened_candidates", lambda *_: [])
     ranked = [ScreenedCandidate(candidate, 1e6 - rank, {}) for rank, candidate in enumerate(RANKED)]
-    asked = iter([list(of_relaxed) or ranked])
-    monkeypatch.setattr(searching, "one_per_effect", lambda _: next(asked, ranked))
+    asked = iter([list(of_relaxed) or ranked, list(of_present) or ranked])
+    monkeypatch.setattr(searching, "one_per_effect", lambda _: next(asked))
     found = finding.Search(
         tuple(recordings), (), fit, fit.noise, tuple(RANKED), base, base, *UNASKED, hints=tuple(hints)
     )
@@ -121,9 +123,22 @@ def test_near_the_data_more_are_refitted_where_none_of_four_gains_and_more_than_
     assert best == RIGHT.id
     # with it four have been refitted, and more, so that it is the last
     assert refitted == [candidate.id for candidate in RANKED[:7]]
-    best, refitted, _ = step(monkeypatch, far=False, right=RIGHT, gaining=False, unmodelled=False)
+    best, refitted, _ = step(monkeypatch, far=False, right=RANKED[8], gaining=False, unmodelled=False)
     assert best == ""
-    assert refitted == [candidate.id for candidate in RANKED[:4]]
+    assert refitted == [candidate.id for candidate in RANKED[:8]]
+
+
+def test_near_the_data_what_the_present_fit_asks_for_is_not_kept_waiting_by_what_segments_promise():
+    """Beside a clock of a magnetometer they had promised 450 of an accelerometer that gained 4: it was the eighth."""
+    promised = [ScreenedCandidate(candidate, 1900.0 - rank, {}) for rank, candidate in enumerate(RANKED[7:15])]
+    found = [ScreenedCandidate(RIGHT, 210.0, {})]
+    for gaining in (True, False):
+        with pytest.MonkeyPatch.context() as patched:
+            best, refitted, _ = step(
+                patched, far=False, right=RIGHT, of_relaxed=promised, of_present=found, gaining=gaining
+            )
+        assert best == RIGHT.id
+        assert refitted[:2] == [RANKED[7].id, RIGHT.id]
 
 
 def test_near_the_data_nothing_is_refitted_that_promises_more_than_is_left(monkeypatch):
