@@ -16,6 +16,7 @@ from discsim.engine import fly
 from discsim.recording import Recording
 from discsim.sensors import record
 from discsim.shipped import load_disc
+from discsim.validation.diagnosis.detectors.dropped_samples import dropped_magnetometer
 from discsim.validation.diagnosis.relaxed_fit import first_trajectory, relaxed, unknowns
 from discsim.validation.diagnosis.selection import stepwise
 from discsim.validation.diagnosis.selection.candidates import free_candidate
@@ -23,7 +24,14 @@ from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit,
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.score_tests import hinted
 from discsim.validation.diagnosis.selection.search_state import possible, values_of_fit
-from discsim.validation.identification.gauss_newton import NO_BARS, Fit, GaussNewtonStep, linearised, linearised_columns
+from discsim.validation.identification.gauss_newton import (
+    NO_BARS,
+    Fit,
+    GaussNewtonStep,
+    linearised,
+    linearised_columns,
+    refit,
+)
 from discsim.validation.identification.noise import estimate_noise, stated_noise, whitened
 from discsim.validation.identification.normal_equations import reduce
 from discsim.validation.identification.parameters import AllowedDefects, Parameter
@@ -209,3 +217,15 @@ def test_far_from_the_data_a_refit_begins_with_segments_that_are_joined_and_coun
     far_away = hinted(effect(id))
     fitted = stepwise.joined(biased(), biased().base, far_away, NO_BARS)
     assert (fitted is not None) is near
+
+
+def test_means_over_turns_go_by_the_turns_that_a_repaired_magnetometer_shows() -> None:
+    """With the lost samples at their own times an accelerometer has one mean fewer: its times had stayed as many."""
+    lost = effect("mag.dropped_samples", fraction=0.03)
+    fit = relaxed(throws((), (lost,), module=BLIND, plant="free_spin"))
+    (found,) = dropped_magnetometer(fit, ())
+    before, after = ({r.sensor: r for r in one.readings} for one in (fit.trajectories[0], found.trajectories[0]))
+    assert after["accelerometer"].t.size < before["accelerometer"].t.size
+    for readings in after.values():
+        assert readings.t.size == readings.value.shape[0]
+    assert np.isfinite(refit(replace(fit, trajectories=found.trajectories), iterations=1).merit)
