@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from discsim.arrays import BoolArray, IntArray
 from discsim.errors import InputError
 from discsim.validation.importing.cell_texts import CellTexts, number, packed
+from discsim.validation.importing.labelled import MONITOR, RecordLines, labelled_cells
 from discsim.validation.importing.text_lines import TextLines
 
-__all__ = ["REPAIRS", "Layout", "RawTable", "Repair", "RepairList", "labelled_cells", "read_raw"]
+__all__ = ["REPAIRS", "Layout", "RawTable", "Repair", "RepairList", "read_raw"]
 
 #: What a map may allow, and what is then done.
 REPAIRS = {
@@ -61,33 +62,6 @@ class RepairList:
 
 #: blanks of ASCII beside the end of a line
 _BLANKS = " \t\x0b\x0c\x1c\x1d\x1e\x1f"
-#: What Arduino's serial monitor puts before a line.
-_MONITOR = re.compile(r"^(\d\d?:\d\d:\d\d(?:\.\d+)?) -> ")
-
-
-#: A name, a colon or an equals sign, and a number (or what stands for none) with its unit.
-_LABEL = re.compile(
-    r"([^\W\d][^:=,;|\t]*?)\s*[:=]\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|NaN|null|--)"
-    r"(?:\s*(?:m/s\^?2|m/s²|rad/s|deg/s|dps|uT|µT|g|ms|us|s)(?=[\s,;|]|$))?(?:[\s,;|]+|$)"
-)
-
-
-def labelled_cells(line: str) -> list[tuple[str, str]]:
-    """Return the names and cells of a line whose cells have their names before them; empty where it is none.
-
-    >>> labelled_cells("gx:1.0 gy:-2 gz:0.5"), labelled_cells("12:03:20.100 -> Gyro X: 1.0, t = 2")
-    ([('gx', '1.0'), ('gy', '-2'), ('gz', '0.5')], [('time', '12:03:20.100'), ('Gyro X', '1.0'), ('t', '2')])
-    """
-    monitor = _MONITOR.match(line)
-    found = [] if monitor is None else [("time", monitor[1])]
-    at, text = 0, (line if monitor is None else line[monitor.end() :]).strip()
-    while at < len(text):
-        match = _LABEL.match(text, at)
-        if match is None:
-            return []
-        found.append((match[1].strip(), match[2]))
-        at = match.end()
-    return found
 
 
 @dataclass(frozen=True)
@@ -113,7 +87,8 @@ class Layout:
     thousands : str
         Mark between thousands (``1.234,56`` has ``.``); empty where there is none. A number has no zero before it.
     labelled : bool
-        Whether each cell has its name before it (``gx:1.0 gy:2.0``), as for Arduino's serial plotter.
+        Whether each cell has its name before it (``gx:1.0 gy:2.0``), as for Arduino's serial plotter; a record may go
+        over several lines.
     """
 
     separator: str = ","
@@ -131,7 +106,7 @@ class Layout:
         if self.labelled:
             return [cell for _, cell in labelled_cells(line)]
         if "-> " in line:
-            line = _MONITOR.sub(rf"\1{' ' if self.separator == 'blank' else self.separator}", line)
+            line = MONITOR.sub(rf"\1{' ' if self.separator == 'blank' else self.separator}", line)
         if self.separator == "blank":
             return line.split()
         try:
@@ -231,6 +206,7 @@ class _Rows:
         self.line: list[IntArray] = []
         self.texts: list[list[NDArray[Any]]] = [[] for _ in range(width)]
         self.blank: int | None = None
+        self.records = RecordLines(layout.columns) if layout.labelled else None
 
     def add(self, lines: list[str], start: int, before: int) -> None:
         """Add the lines of a block from ``start`` on; ``before`` lines stand above the block."""
@@ -267,8 +243,13 @@ class _Rows:
 
     def _one_by_one(self, lines: list[str], first: int) -> tuple[IntArray, IntArray, list[list[str]]]:
         """Return numbers, lines and cells of the sound rows; what is damaged is listed."""
-        numbers, places, rows = [], [], []
+        numbers: list[int] = []
+        places: list[int] = []
+        rows: list[list[str]] = []
         for line, whole in enumerate(lines, start=first):
+            if self.records is not None:
+                self._labelled(line, whole, self.records, numbers, places, rows)
+                continue
             self._tell_blank(line)
             text = _without_comment(self.path, line, whole, self.layout, self.repairs)
             if not text.strip():
@@ -284,6 +265,27 @@ class _Rows:
                 self.repairs.add("width", self.path, line, what, "row left out")
             self.total += 1
         return np.array(numbers, dtype=np.int64), np.array(places, dtype=np.int64), rows
+
+    def _labelled(
+        self,
+        line: int,
+        text: str,
+        records: RecordLines,
+        numbers: list[int],
+        places: list[int],
+        rows: list[list[str]],
+    ) -> None:
+        """Add the record that a line of names and numbers ends to the rows; what breaks off is listed."""
+        ended, broken = records.add(line, text)
+        for place, count in broken:
+            what = f"data row {self.total} has {count} cells under names of its columns, expected {self.width}"
+            self.repairs.add("width", self.path, place, what, "row left out")
+            self.total += 1
+        for place, cells in ended:
+            numbers.append(self.total)
+            places.append(place)
+            rows.append(cells)
+            self.total += 1
 
     def _tell_blank(self, line: int | None) -> None:
         """List the blank line before this one: the file's last line may be blank."""

@@ -44,6 +44,30 @@ def test_rad_s_under_a_header_of_deg_s_are_told_by_the_pull_to_the_centre_of_a_t
     assert "gyroscope unit: rad/s (likely: the pull to the centre is that of 16" in whole.summary()
 
 
+def test_a_unit_that_nothing_states_is_told_by_the_pull_to_the_centre(tmp_path):
+    """Rounded to 0.01 the rad/s looked like a gyroscope's deg/s, and no throw was found."""
+    kept = slice(810, 1390)
+    columns = [("t_s", LOG.t[kept]), *three(named("g{}"), np.round(LOG.gyro[kept], 2))]
+    raw = write_table(tmp_path / "log.csv", columns + three(named("acc_{}_g"), LOG.accel[kept] / G0))
+    whole = import_log(raw)
+    assert_allclose(np.abs(whole.recordings[0].samples["gyroscope"].value), np.abs(LOG.gyro[kept]), atol=0.006)
+    why = "the pull to the centre is that of 16.1 mm from the axis, by deg/s it would be 53 m"
+    assert f"gyroscope unit: rad/s (likely: {why})" in whole.summary()
+
+
+def test_a_line_of_units_with_some_that_are_none_known_is_one(tmp_path):
+    """Shimmer's has `local_flux` of a magnetometer, and `m/(s^2)`: it was taken for the names."""
+    raw = both(tmp_path / "log.csv", LOG.gyro / DEG, LOG.accel * G0, mag=LOG.mag / 50)
+    rows = raw.read_text().splitlines()[1:]
+    units = ["s", *3 * ["deg/s"], *3 * ["m/(s^2)"], *3 * ["local_flux"]]
+    names = [f"Shimmer_5E2F_{kind}_{axis}_CAL" for kind in ("Gyro", "Accel_WR", "Mag") for axis in "XYZ"]
+    raw.write_text("\n".join([",".join(["Timestamp", *names]), ",".join(units), *rows, ""]))
+    whole = import_log(raw)
+    assert_allclose(whole.recordings[0].samples["gyroscope"].value[:, 2], LOG.gyro[:, 2], atol=1e-5)
+    assert_allclose(whole.recordings[0].samples["accelerometer"].value[:, 2], LOG.accel[:, 2], atol=1e-4)
+    assert "gyroscope unit: deg/s (certain: the header says so" in whole.summary()
+
+
 @pytest.mark.parametrize("arm", [0.3, 1.5])
 def test_a_right_header_is_believed_whatever_the_arm_is_up_to_metres(tmp_path, arm):
     """A swing on a rope is a motion, too."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from support.made_logs import DEG, G0, made_log
 
+from discsim.arrays import FloatArray
 from discsim.errors import InputError
 from discsim.validation.importing.imported_log import import_log
 
@@ -47,3 +50,58 @@ def test_what_ros_prints_of_a_topic_is_refused_with_what_to_do(tmp_path):
     (tmp_path / "imu.yaml").write_text(message * 50)
     with pytest.raises(InputError, match=r"is the YAML that `ros2 topic echo` .* prints, no table; expected the bag"):
         import_log(tmp_path / "imu.yaml")
+
+
+def block(gyro: FloatArray, accel: FloatArray, stamp: str = "") -> list[str]:
+    """Return the lines that an example of Adafruit's for an MPU6050 prints of one reading."""
+    values = [(*accel, "m/s^2"), (*gyro, "rad/s")]
+    lines = [
+        f"{name} X: {x:.2f}, Y: {y:.2f}, Z: {z:.2f} {unit}"
+        for name, (x, y, z, unit) in zip(("Acceleration", "Rotation"), values, strict=True)
+    ]
+    return [f"{stamp}{line}" for line in (*lines, "Temperature: 24.50 degC", "")]
+
+
+def test_a_record_over_several_lines_is_joined(tmp_path):
+    raw = tmp_path / "serial.txt"
+    blocks = [block(gyro, accel) for gyro, accel in zip(LOG.gyro, LOG.accel, strict=True)]
+    del blocks[30][1]  # the rotation of one reading is missing
+    raw.write_text("\n".join(["Adafruit MPU6050 test!", "MPU6050 Found!", "", *chain(*blocks)]))
+    whole = import_log(raw)
+    samples = whole.recordings[0].samples
+    for name, values in (("gyroscope", LOG.gyro), ("accelerometer", LOG.accel)):
+        assert_allclose(samples[name].value, np.delete(values, 30, axis=0), atol=0.006)
+    # the reading that is left out keeps its place in time
+    assert np.argmax(np.diff(samples["gyroscope"].t)) == 29
+    assert "gyroscope unit: rad/s (certain: the header says so" in whole.summary()
+    left_out = [repair.what for repair in whole.imported[0].repairs if "row left out" in repair.action]
+    assert "data row 32 has 3 cells under names of its columns, expected 7" in left_out
+
+
+def test_of_a_record_over_several_lines_the_stamp_of_the_first_is_the_time(tmp_path):
+    raw = tmp_path / "serial.txt"
+    lines = [
+        line
+        for t, gyro, accel in zip(LOG.t, LOG.gyro, LOG.accel, strict=True)
+        for line in block(gyro, accel, f"12:00:{t:06.3f} -> ")
+    ]
+    raw.write_text("\n".join(lines))
+    assert_allclose(import_log(raw).recordings[0].samples["gyroscope"].t, LOG.t, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        "Scaled. Acc (mg) [ {0:09.2f}, {1:09.2f}, {2:.2f} ], Gyr (DPS) [ {3:.2f}, {4:.2f}, {5:.2f} ], Tmp (C) [ 24.5 ]",
+        "Accel: {0:.2f}, {1:.2f}, {2:.2f} mg Gyro: {3:.2f}, {4:.2f}, {5:.2f} dps",
+        "acc=({0:.2f} {1:.2f} {2:.2f}) mg; gyro=({3:.2f} {4:.2f} {5:.2f}) dps",
+    ],
+)
+def test_three_numbers_behind_one_name_are_its_axes(tmp_path, form):
+    raw = tmp_path / "serial.txt"
+    rows = zip(LOG.accel / G0 * 1000, LOG.gyro / DEG, strict=True)
+    raw.write_text("\n".join(form.format(*accel, *gyro) for accel, gyro in rows))
+    whole = import_log(raw)
+    assert_allclose(whole.recordings[0].samples["gyroscope"].value, LOG.gyro, atol=1e-4)
+    assert_allclose(whole.recordings[0].samples["accelerometer"].value, LOG.accel, atol=1e-4)
+    assert len(whole.throws) == 1

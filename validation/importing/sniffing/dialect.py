@@ -12,7 +12,8 @@ from pathlib import Path
 from discsim.errors import InputError
 from discsim.validation.importing.cell_texts import GAPS
 from discsim.validation.importing.clock import is_stamp
-from discsim.validation.importing.raw_table import Layout, RepairList, labelled_cells, read_raw
+from discsim.validation.importing.labelled import names_of_records
+from discsim.validation.importing.raw_table import Layout, RepairList, read_raw
 from discsim.validation.importing.sniffing.text import encoding_of
 from discsim.validation.importing.text_lines import TextLines
 
@@ -25,6 +26,8 @@ HEAD_LINES = 200
 RECORD_SHARE = 0.4
 #: Names stand before the cells of a log where they do in this share of its lines: some break off, some are messages.
 LABELLED = 0.8
+#: Between the lines of a record over several there may be blank ones and headings: up to three to two of names.
+WITH_NAMES = 0.4
 #: What the last column is called where the header has a name too few.
 UNNAMED = "unnamed"
 _COMMENTS = ("#", "%", "//", "!")
@@ -56,7 +59,8 @@ def dialect_of(path: Path) -> Dialect:
     comment = _comment(lines)
     sample = _sample(lines, comment)
     _refuse_echo(path, sample)
-    if (labelled := _labelled(sample, encoding)) is not None:
+    head = list(islice(lines, HEAD_LINES))
+    if (labelled := _labelled(head, encoding) or _labelled(sample, encoding)) is not None:
         return labelled
     layout, width = _separators(path, sample, Layout(comment=comment, encoding=encoding))
     records = [index for index, _ in islice(_records(_bare(lines, comment), width, layout), 2)]
@@ -78,11 +82,13 @@ def _refuse_echo(path: Path, sample: Sequence[str]) -> None:
         )
 
 
-def _labelled(sample: Sequence[str], encoding: str) -> Dialect | None:
-    """Return the dialect of lines whose cells have their names before them, or None where most lines are others."""
-    names = Counter(tuple(name for name, _ in labelled_cells(line)) for line in sample)
-    best, count = names.most_common(1)[0] if names else ((), 0)
-    if len(best) < 3 or count < LABELLED * len(sample):
+def _labelled(lines: Sequence[str], encoding: str) -> Dialect | None:
+    """Return the dialect of lines whose cells have their names before them, or None where most lines are others.
+
+    Between the lines of a record over several there may be blank ones and headings.
+    """
+    best, count, with_names = names_of_records(lines)
+    if len(best) < 3 or count < LABELLED * with_names or with_names < WITH_NAMES * len(lines):
         return None
     unique = tuple(name if name not in best[:k] else f"{name}.{k + 1}" for k, name in enumerate(best))
     layout = Layout(separator="blank", columns=unique, encoding=encoding, labelled=True)
@@ -280,7 +286,9 @@ def _looks_like_units(cells: list[str], layout: Layout) -> bool:
 
     full = [cell.strip("()[]{}<> ") for cell in cells if cell.strip("()[]{}<>- ")]
     known = sum(bool(readings_of(cell)) for cell in full)
-    return bool(full) and known > len(full) / 2 and not any(_is_number(cell, layout) for cell in full)
+    # names are other ones in each column, and units repeat: some may be of no unit known here
+    repeated = len(set(full)) <= len(full) / 2
+    return (known > len(full) / 2 or (known > 1 and repeated)) and not any(_is_number(cell, layout) for cell in full)
 
 
 def _joined(path: Path, layout: Layout, above: list[int], width: int) -> tuple[Layout, tuple[str, ...]] | None:

@@ -46,17 +46,24 @@ def arm(gyro: Reading3, accel: Reading3) -> float | None:
 
 
 def unit_by_pull(unit: Unit, seen: float | None) -> Unit | None:
-    """Return the unit by which the arm is possible where it is not by the one stated; None where nothing tells."""
-    if seen is None or NEAREST < seen < IMPOSSIBLE:
+    """Return the unit by which the arm is possible where it is not by the one stated; None where nothing tells.
+
+    One that was a guess gives way as soon as by it the arm is none that a disc can have, and is no guess where it is.
+    """
+    guessed = unit.decision.sure == "guess"
+    if seen is None or (NEAREST < seen < IMPOSSIBLE and not guessed):
         return None
+    shown = "the pull to the centre is that of {:.3g} mm from the axis"
+    if guessed and unit.scale == 1.0 and POSSIBLE[0] < seen < POSSIBLE[1]:
+        return unit._replace(decision=unit.decision._replace(sure="likely", why=shown.format(1000 * seen)))
     worths = UNITS["rad_s"]
     for one in ("rad/s", "deg/s"):
         size = seen * (worths[unit.unit] * unit.scale / worths[one]) ** 2
         if one != unit.unit and POSSIBLE[0] < size < POSSIBLE[1]:
-            why = (
-                f"the pull to the centre is that of {1000 * size:.3g} mm from the axis, although the header says "
-                f"{unit.unit}, by which it would be {seen:.2g} m"
-            )
+            other = f"by {unit.unit} it would be {seen:.2g} m"
+            if not guessed:
+                other = f"although the header says {unit.unit}, by which it would be {seen:.2g} m"
+            why = f"{shown.format(1000 * size)}, {other}"
             return Unit(one, 1.0, Decision("gyroscope unit", one, "likely", why))
     return None
 

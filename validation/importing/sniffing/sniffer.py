@@ -404,8 +404,10 @@ def _by_lift(
 def _by_pull(
     found: dict[str, tuple[Triple, Decision]], times: dict[str, FloatArray], units: dict[str, Unit]
 ) -> tuple[dict[str, Unit], float | None]:
-    """Return the units, a gyroscope's by the pull to the centre where that refutes the header's, and the arm, m."""
-    if {"gyroscope", "accelerometer"} - set(found) or not found["gyroscope"][0].units:
+    """Return the units, a gyroscope's by the pull to the centre where that refutes header or guess, and the arm, m."""
+    if {"gyroscope", "accelerometer"} - set(found):
+        return units, None
+    if not found["gyroscope"][0].units and units["gyroscope"].decision.sure != "guess":
         return units, None
     gyro, accel = (
         _in_si(sensor, found[sensor][0], times[sensor], units[sensor]) for sensor in ("gyroscope", "accelerometer")

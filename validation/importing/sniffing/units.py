@@ -20,7 +20,7 @@ class Reading(NamedTuple):
 COUNTS = "counts"
 OTHER = "other"
 _ACCELERATION = {
-    "m/s^2": "m/s2 m/s/s m/s**2 ms-2 ms2 mps2 mpss m/sec2 mss ms^-2 m_s2 m_s_2 m_s^2 meterpersecond2 м/с2 m/s²",
+    "m/s^2": "m/s2 m/(s2) m/s/s m/s**2 ms-2 ms2 mps2 mpss m/sec2 mss ms^-2 m_s2 m_s_2 m_s^2 meterpersecond2 м/с2 m/s²",
     "g": "g gn gee gravity gforce",
     "mg": "mg millig mgee",
 }

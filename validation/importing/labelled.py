@@ -1,0 +1,155 @@
+"""Lines whose cells have their names before them, as examples for Arduino print them.
+
+Takes lines; gives names and cells. A record may go over several lines, a sensor in each.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+
+__all__ = ["MONITOR", "RecordLines", "labelled_cells", "names_of_records"]
+
+#: What Arduino's serial monitor puts before a line.
+MONITOR = re.compile(r"^(\d\d?:\d\d:\d\d(?:\.\d+)?) -> ")
+
+_NAME = r"([^\W\d][^:=,;|\t\[]*?)"
+#: a number, or what stands for none
+_NUMBER = r"(?:[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|NaN|null|--)"
+_UNITS = "m/s\\^?2|m/s²|m/s/s|rad/s|radians/s|deg/s|degrees/s|°/s|dps|DPS|uT|µT|mG|mg|G|g|ms|us|s|deg ?C|°C|C"
+#: behind a cell comes its unit, perhaps, then what parts it from the next
+_END = rf"(?:\s*({_UNITS})(?=[\s,;|]|$))?(?:[\s,;|]+|$)"
+_ONE = re.compile(rf"{_NAME}\s*[:=]\s*({_NUMBER}){_END}")
+#: three numbers behind one name, in brackets or not
+_THREE = re.compile(rf"{_NAME}\s*(?:[:=]\s*)?\[\s*({_NUMBER}(?:[\s,;]+{_NUMBER})*)\s*\]{_END}")
+_BARE_THREE = re.compile(rf"{_NAME}\s*[:=]\s*[(<]?\s*({_NUMBER}(?:\s*[,;\t ]\s*{_NUMBER}){{2}})\s*[)>]?{_END}")
+#: a word of its own before the first name ("Scaled. Acc (mg)")
+_WORD = re.compile(r"^[^\W\d]+\.\s+")
+_AXIS = re.compile(r"(.*?)[\s_.]*\b([xyzXYZ])")
+
+
+def labelled_cells(line: str) -> list[tuple[str, str]]:
+    """Return the names and cells of a line whose cells have their names before them; empty where it is none.
+
+    Three numbers behind one name are its x, y and z; an axis alone is that of the name before it. A unit behind a cell
+    comes to its name, and one behind the last of three axes to theirs.
+
+    >>> labelled_cells("gx:1.0 gy:-2 gz:0.5"), labelled_cells("12:03:20.100 -> Gyro X: 1.0, t = 2")
+    ([('gx', '1.0'), ('gy', '-2'), ('gz', '0.5')], [('time', '12:03:20.100'), ('Gyro X', '1.0'), ('t', '2')])
+    >>> labelled_cells("Rotation X: 0.1, Y: 0, Z: 2 rad/s")
+    [('Rotation X (rad/s)', '0.1'), ('Rotation Y (rad/s)', '0'), ('Rotation Z (rad/s)', '2')]
+    >>> labelled_cells("Mag (uT) [ 1, 2, 3 ]")
+    [('Mag (uT) x', '1'), ('Mag (uT) y', '2'), ('Mag (uT) z', '3')]
+    """
+    monitor = MONITOR.match(line)
+    found = [] if monitor is None else [("time", monitor[1])]
+    text = _WORD.sub("", (line if monitor is None else line[monitor.end() :]).strip())
+    if not text:
+        return []
+    at, owner, units = 0, "", dict[str, str]()
+    cells: list[tuple[str, str, str]] = []
+    while at < len(text):
+        if (match := _THREE.match(text, at) or _BARE_THREE.match(text, at)) is not None:
+            numbers, owner = re.split(r"[\s,;]+", match[2].strip()), match[1].strip()
+            named = _names_of(owner, len(numbers))
+        elif (match := _ONE.match(text, at)) is not None:
+            numbers, name = [match[2]], match[1].strip()
+            axis = _AXIS.fullmatch(name)
+            if axis is not None and not axis[1] and owner:
+                name = f"{owner} {name}"
+            else:
+                owner = name if axis is None else axis[1]
+            named = [name]
+        else:
+            return []
+        if match[3]:
+            units[owner] = match[3]
+        cells += [(owner, name, number) for name, number in zip(named, numbers, strict=True)]
+        at = match.end()
+    return found + [(f"{name} ({units[owner]})" if owner in units else name, cell) for owner, name, cell in cells]
+
+
+def _names_of(name: str, count: int) -> list[str]:
+    """Return the names of so many numbers behind one name."""
+    if count == 1:
+        return [name]
+    return [f"{name} {'xyz'[k] if count == 3 else k + 1}" for k in range(count)]
+
+
+def names_of_records(lines: Sequence[str]) -> tuple[tuple[str, ...], int, int]:
+    """Return the names of most records' cells, in how many of the ``lines`` they stand, and how many have any.
+
+    A record begins anew with the line behind a blank one, else with that which was the first; the serial monitor's
+    time is that of its first line.
+    """
+    named, after_blank, blank = [], Counter[tuple[str, ...]](), False
+    for line in lines:
+        if names := tuple(name for name, _ in labelled_cells(line)):
+            named.append(names)
+            after_blank[names] += blank
+            blank = False
+        else:
+            blank = blank or not MONITOR.sub("", line).strip()
+    if not named:
+        return (), 0, 0
+    alone, count = Counter(named).most_common(1)[0]
+    if 2 * count > len(named):
+        return alone, count, len(named)
+    first = after_blank.most_common(1)[0][0] if any(after_blank.values()) else named[0]
+    records: list[list[tuple[str, ...]]] = []
+    for names in named:
+        if names == first:
+            records.append([])
+        if records:
+            records[-1].append(names)
+    lengths = Counter(tuple(record) for record in records)
+    best, times = lengths.most_common(1)[0] if lengths else ((), 0)
+    joined = (*best[0], *(name for names in best[1:] for name in _timeless(names))) if best else ()
+    return joined, times * len(best), len(named)
+
+
+def _timeless(names: tuple[str, ...]) -> tuple[str, ...]:
+    return names[1:] if names[:1] == ("time",) else names
+
+
+class RecordLines:
+    """Joins lines to records of some ``columns``, a record over one line or several."""
+
+    def __init__(self, columns: Sequence[str]) -> None:
+        # what stands twice is numbered
+        self._names = tuple(re.sub(r"\.\d+$", "", name) for name in columns)
+        self._cells: list[str] = []
+        self._begun = 0
+        self._several = False
+
+    def add(self, number: int, line: str) -> tuple[list[tuple[int, list[str]]], list[tuple[int, int]]]:
+        """Take a line; return the record that it ends, and what is broken off, each with its first line's number.
+
+        Of a record the cells come with it, of what is broken off their count. Between the lines of records over
+        several there may be any others, as blank ones and headings.
+        """
+        pairs = labelled_cells(line)
+        if not pairs and (self._several or self._cells):
+            return [], []
+        broken = []
+        if self._cells:
+            more = pairs[1:] if self._names[0] == "time" and pairs[:1] and pairs[0][0] == "time" else pairs
+            if self._fits(more):
+                pairs, self._several = more, True
+            else:
+                broken.append((self._begun, len(self._cells)))
+                self._cells = []
+        if not self._fits(pairs):
+            return [], [*broken, (number, len(pairs))] if line.strip() else broken
+        if not self._cells:
+            self._begun = number
+        self._cells += [cell for _, cell in pairs]
+        if len(self._cells) < len(self._names):
+            return [], broken
+        record, self._cells = self._cells, []
+        return [(self._begun, record)], broken
+
+    def _fits(self, pairs: Sequence[tuple[str, str]]) -> bool:
+        begun = len(self._cells)
+        return bool(pairs) and tuple(name for name, _ in pairs) == self._names[begun : begun + len(pairs)]
