@@ -113,6 +113,7 @@ def _replay(recording: Path | None, disc: str | None, model: Path | None, throw:
     from discsim.effects.own import load_user_effects
     from discsim.engine import fly
     from discsim.shipped import load_throw
+    from discsim.validation.checking.statements import unlikely_flight
     from discsim.validation.viewing.replay import replay_motion, replay_recording
 
     if recording is not None:
@@ -120,7 +121,10 @@ def _replay(recording: Path | None, disc: str | None, model: Path | None, throw:
     body, environment, stated = disc_to_fly(disc, model, load_user_effects(own))
     effects, _ = all_effects(stated, None, "flight", (), None)
     laws, _ = laws_upon(stated, "flight", ())
-    motion = fly(body, environment, load_throw(throw), effects, law=laws)
+    release = load_throw(throw)
+    for note in unlikely_flight(body, environment, release):
+        typer.echo(note)
+    motion = fly(body, environment, release, effects, law=laws)
     return replay_motion(motion, body.diameter, f"flown in MuJoCo: disc {disc or model}, throw {throw}")
 
 
