@@ -11,7 +11,10 @@ import pytest
 
 from discsim.disc import Release
 from discsim.files import model_file
+from discsim.recording import Samples, write_recording
+from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc, load_throw
+from discsim.trajectory import predict
 from discsim.validation.checking.statements import unlikely_flight
 from discsim.validation.cli import main
 
@@ -95,3 +98,26 @@ def test_each_thing_is_said_once():
     fast = Release(velocity=np.array([80.0, 0.0, 0.0]))
     said = unlikely_flight(replace(disc, mass=179.0), there, fast, fast)
     assert len(said) == 2
+
+
+def test_a_path_in_another_unit_is_told_beside_its_picture(monkeypatch, capsys, tmp_path):
+    disc, there = load_disc("driver")
+    motion = predict(disc, there, load_throw("driver")).motion()
+    module = Instruments.from_parts("mpu9250", "neo_m8n")
+    made = record(motion, module, np.random.default_rng(0), plant="flight", name="mine", disc=disc)
+    gps = made.need("gps")
+    feet = Samples(gps.t, gps.value * np.array([3.2808] * 3 + [1.0] * 3))
+    write_recording(replace(made, samples={**made.samples, "gps": feet}), tmp_path / "mine")
+    asked = ["view", str(tmp_path / "mine"), "--video", "x.png", "--span", "5:1", "--out", str(tmp_path / "out")]
+    _, said, error = run(monkeypatch, capsys, *asked)
+    assert "the position in feet?" in said
+    assert "no motion from 5 to 1 s" in error
+
+
+@pytest.mark.parametrize(
+    ("sd", "expected"), [("speed=0.5,speed=2", "'speed' stands there twice"), ("Speed=0.5", "did you mean 'speed'?")]
+)
+def test_a_standard_deviation_stated_twice_or_by_another_name_is_refused(monkeypatch, capsys, tmp_path, sd, expected):
+    code, _, error = run(monkeypatch, capsys, "scatter", "--sd", sd, "--out", str(tmp_path / "out"))
+    assert code == 2
+    assert expected in error
