@@ -8,11 +8,12 @@ from math import pi
 import numpy as np
 
 from discsim.disc import Aero, Disc, Release
+from discsim.environment import Environment
 from discsim.glitches import FASTEST_SPIN
 from discsim.recording import Recording
 from discsim.validation.checking.finding import Finding, Severity
 
-__all__ = ["FIELD", "statement_findings"]
+__all__ = ["FIELD", "statement_findings", "unlikely_flight"]
 
 #: the Earth's field at the ground, uT: 22 (south Atlantic) to 67 (near the southern magnetic pole), with a margin
 FIELD = (20.0, 70.0)
@@ -36,7 +37,7 @@ WIND = 30.0
 
 def statement_findings(recording: Recording) -> Iterator[Finding]:
     """Yield what cannot be, or is unlikely, among the stated numbers of a recording."""
-    yield from _environment(recording)
+    yield from _environment(recording.environment, seen="magnetometer" in recording)
     if recording.disc is not None:
         yield from _disc(recording.disc, thrown=recording.plant == "flight")
     if recording.release is not None:
@@ -44,12 +45,22 @@ def statement_findings(recording: Recording) -> Iterator[Finding]:
     yield from _position(recording)
 
 
+def unlikely_flight(disc: Disc | None, environment: Environment, *releases: Release) -> list[str]:
+    """Return what cannot be, or is unlikely, about a disc, its surroundings and throws of it, a sentence each."""
+    found = [*_environment(environment, seen=False)]
+    if disc is not None:
+        found += _disc(disc, thrown=True)
+    for release in releases:
+        found += _release(release)
+    return list(dict.fromkeys(finding.sentence for finding in found if finding.severity != "note"))
+
+
 def _outside(value: float, limits: tuple[float, float]) -> bool:
     return not limits[0] <= value <= limits[1]
 
 
-def _environment(recording: Recording) -> Iterator[Finding]:
-    there = recording.environment
+def _environment(there: Environment, *, seen: bool) -> Iterator[Finding]:
+    """Yield what is wrong with gravity, field, air and wind; a field of zero where a magnetometer has ``seen`` it."""
     if _outside(there.gravity, GRAVITY):
         guess = "in g? write 9.81" if 0.9 < there.gravity < 1.1 else "write the place's, 9.81 will do"
         yield Finding(
@@ -61,7 +72,7 @@ def _environment(recording: Recording) -> Iterator[Finding]:
             guess,
         )
     size = float(np.linalg.norm(there.magnetic_field))
-    if size == 0 and "magnetometer" in recording:
+    if size == 0 and seen:
         yield Finding(
             "site.field",
             "warning",

@@ -11,7 +11,9 @@ import typer
 from discsim.validation.reporting.options import ModelOption, OutOption
 
 if TYPE_CHECKING:
-    from discsim.recording import Recording
+    from discsim.disc import Disc, Release
+    from discsim.environment import Environment
+    from discsim.recording import Plant, Recording
     from discsim.validation.identification.plants.plan import Plan
 
 __all__ = ["command"]
@@ -60,6 +62,8 @@ def command(
     from discsim.validation.reporting.options import disc_to_fly, known_plant, rig_of
     from discsim.validation.reporting.run import start_run
 
+    if plan is not None and plan.is_dir():
+        raise InputError(f"{plan}: is a folder; expected a TOML file of recordings, or a data set as --like {plan}")
     if like is not None and plan is not None:
         raise InputError(f"{plan} and --like {like} both say what is recorded; expected one of them")
     kind = known_plant(plant)
@@ -71,6 +75,8 @@ def command(
         asked, named = read_dataset(like), [*named, like]
     further = None if candidates is None else read_plans(candidates, plant)
     release = load_throw(throw)
+    for note in _doubts(asked, kind, (body, place, release) if rig is None and like is None else None):
+        typer.echo(note)
     with start_run(out, inputs=[*filter(None, (plan, model, candidates)), *named]) as run:
         found = tell(
             asked,
@@ -88,3 +94,36 @@ def command(
         found.report(out)
     typer.echo(found.summary())
     typer.echo(f"read {out / 'report.html'}")
+
+
+def _doubts(
+    asked: Sequence[Plan] | Sequence[Recording] | int, plant: Plant, flown: tuple[Disc, Environment, Release] | None
+) -> list[str]:
+    """Return what cannot be, or is unlikely, about the hardware (None: not stated here) and what is planned of it."""
+    import numpy as np
+
+    from discsim.disc import Release
+    from discsim.validation.checking.statements import unlikely_flight
+    from discsim.validation.identification.plants import PLANTS
+    from discsim.validation.identification.plants.plan import Plan
+    from discsim.validation.scenarios.profile_files import fastest_shipped
+
+    plans = [] if isinstance(asked, int) else [one for one in asked if isinstance(one, Plan)]
+    if plant == "rate_table":
+        fastest = fastest_shipped()
+        asks = {one.text: float(np.abs(one.command.value).max()) for one in plans if one.command is not None}
+        return [
+            f"'{text}' asks for {np.degrees(rate):.6g} deg/s, and the fastest table shipped turns "
+            f"{np.degrees(fastest):.6g} deg/s; were deg/s meant under rate_rad_s?"
+            for text, rate in asks.items()
+            if rate > fastest * (1.0 + 1e-9)
+        ]
+    if flown is None or plant == "spin_down":
+        return []
+    body, place, throw = flown
+    layout = PLANTS[plant].layout
+    releases = [throw] if isinstance(asked, int) else []
+    for one in plans:
+        velocity = None if layout.velocity is None else one.state[layout.velocity]
+        releases.append(Release(velocity=velocity, body_rate=one.state[layout.rate]))
+    return unlikely_flight(body, place, *releases)

@@ -42,6 +42,7 @@ def command(
     Example: discsim scatter --disc driver --sd speed=0.5,launch=1,hyzer=2,nose=1,spin=50,wind=1 --out scatter
     """
     from discsim.shipped import load_throw
+    from discsim.validation.checking.statements import unlikely_flight
     from discsim.validation.reporting.options import disc_to_fly, flight_effects, parse_sizes
     from discsim.validation.reporting.run import start_run
     from discsim.validation.scattering.fitted import read_fitted
@@ -71,7 +72,7 @@ def command(
             progress=run.progress,
         )
         found.report(out)
-    for note in notes:
+    for note in (*notes, *unlikely_flight(body, place, release)):
         typer.echo(note)
     typer.echo(found.summary())
     typer.echo(f"read {out / 'report.html'}")

@@ -73,6 +73,9 @@ def _tell(found: Swept, below: float, out: Path) -> None:
     """Write and say which tolerance of mount stays below a share of the rate."""
     from discsim.validation.sweeps.tolerance import draw_tolerances, sentences_of, write_tolerances
 
+    if not found.sweep.plan.mounts.varies:
+        typer.echo("the plan varies no mount, so that no tolerance is told; expected a range in [mounts], such as x_m")
+        return
     told = found.tolerances(below)
     if not told:
         typer.echo("no estimator was scored on enough mounts to tell a tolerance; expected 56 or more")

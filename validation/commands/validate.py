@@ -14,6 +14,7 @@ from discsim.errors import InputError
 from discsim.validation.reporting.options import ModelOption, OutOption, SeedOption, disc_to_fly, given_files
 
 if TYPE_CHECKING:
+    from discsim.validation.experiments.subject import Subject
     from discsim.validation.experiments.validation_run import Validated
 
 __all__ = ["command"]
@@ -86,8 +87,8 @@ def command(
     # with a disc, parts, throws or profile of one's own the scores scatter otherwise
     shipped = {} if any((disc, model, *names, profile)) else shipped_limits(quick)
     judging = replace(Judging.read(shipped, limits, against), **_recorded(record_limits, repeat, margin))
-    if stated is not None and (stated.effects or stated.laws):
-        typer.echo(f"{model}: its effects and laws are passed over; the scores are of its disc")
+    passed = stated is not None and (stated.effects or stated.laws)
+    _doubt(subject, f"{model}: its effects and laws are passed over; the scores are of its disc" if passed else None)
     inputs = given_files(model, profile, recordings, limits, disc, *names[0], *names[1])
     with start_run(out, seed, inputs) as run:
         done = validate(run, quick=quick, junit=junit, subject=subject, judging=judging, recordings=mine)
@@ -103,6 +104,15 @@ def _told(done: Validated, out: Path) -> bool:
     within, count = sum(item.ok for item in done.scores), len(done.scores)
     typer.echo(f"{within} of {count} scores within tolerance; report: {out / 'report.html'}")
     return within == count
+
+
+def _doubt(subject: Subject, passed: str | None) -> None:
+    """Print what is passed over, and what cannot be about the disc that is flown, its surroundings and its throws."""
+    from discsim.validation.checking.statements import unlikely_flight
+
+    unlikely = unlikely_flight(subject.disc, subject.environment, *(one.release for one in subject.throws))
+    for note in (*filter(None, [passed]), *unlikely):
+        typer.echo(note)
 
 
 def _recorded(record: Path | None, repeat: int | None, margin: float | None) -> dict[str, Any]:

@@ -112,15 +112,24 @@ def _check_opengl() -> None:
 def _replay(recording: Path | None, disc: str | None, model: Path | None, throw: str, own: list[Path]) -> Replay:
     from discsim.effects.own import load_user_effects
     from discsim.engine import fly
+    from discsim.recording import read_recording
     from discsim.shipped import load_throw
+    from discsim.validation.checking.readings import path_findings
+    from discsim.validation.checking.statements import unlikely_flight
     from discsim.validation.viewing.replay import replay_motion, replay_recording
 
     if recording is not None:
-        return replay_recording(recording)
+        replay = replay_recording(recording)
+        for found in path_findings(read_recording(recording)):
+            typer.echo(found.sentence)
+        return replay
     body, environment, stated = disc_to_fly(disc, model, load_user_effects(own))
     effects, _ = all_effects(stated, None, "flight", (), None)
     laws, _ = laws_upon(stated, "flight", ())
-    motion = fly(body, environment, load_throw(throw), effects, law=laws)
+    release = load_throw(throw)
+    for note in unlikely_flight(body, environment, release):
+        typer.echo(note)
+    motion = fly(body, environment, release, effects, law=laws)
     return replay_motion(motion, body.diameter, f"flown in MuJoCo: disc {disc or model}, throw {throw}")
 
 

@@ -18,7 +18,7 @@ from discsim.validation.reporting.html import Section, Tone, write_report
 from discsim.validation.reporting.run import json_text
 from discsim.validation.reporting.scores import Score, at_most, score
 
-__all__ = ["FIGURES", "RateErrors", "ScoredRates", "score_rates"]
+__all__ = ["FIGURES", "RateErrors", "ScoredRates", "multiple_of", "score_rates"]
 
 
 class RateErrors(NamedTuple):
@@ -267,19 +267,27 @@ _MISTAKEN: Mapping[float, str] = {
     6.0: "6 times the truth's: deg/s under a name of rpm?",
     1.0 / 6.0: "1/6 of the truth's: rpm under a name of deg/s?",
     0.5 / np.pi: "1/6.28 of the truth's: turns per second under a name of rad/s?",
+    2.0 * np.pi: "6.28 times the truth's: rad/s under a name of turns per second?",
 }
 #: a rate is such a multiple to this share of it: less than half of what is between 1/6 and 1/6.28
 _MULTIPLE = 0.02
 
 
-def _note(measured: FloatArray, actual: FloatArray, outside: int, values: int) -> str:
-    """Return what looks wrong in how rates (n,) beside a truth (n,) are written; empty where nothing does."""
+def multiple_of(measured: FloatArray, actual: FloatArray) -> float | None:
+    """Return which multiple of a truth (n,) rates (n,) are by a wrong unit or sign; None where they are none."""
     of_truth = float(actual @ actual)
     ratio = float(measured @ actual) / of_truth if of_truth > 0.0 else 1.0
-    for multiple, said in _MISTAKEN.items():
+    for multiple in _MISTAKEN:
         rest = measured - multiple * actual
         if abs(ratio / multiple - 1.0) < _MULTIPLE and rest @ rest < (_MULTIPLE * multiple) ** 2 * of_truth:
-            return f"the rates are {said}"
+            return multiple
+    return None
+
+
+def _note(measured: FloatArray, actual: FloatArray, outside: int, values: int) -> str:
+    """Return what looks wrong in how rates (n,) beside a truth (n,) are written; empty where nothing does."""
+    if (multiple := multiple_of(measured, actual)) is not None:
+        return f"the rates are {_MISTAKEN[multiple]}"
     if 2 * outside > values:
         return f"{outside} of {values} values lie outside the truth's time and are not scored"
     return ""

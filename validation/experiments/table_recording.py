@@ -18,7 +18,9 @@ from discsim.recording import Recording, Samples, read_recording, write_recordin
 from discsim.rig import measured_profile
 from discsim.sensors import Accelerometer, Gyroscope, Instruments, Magnetometer, RateReference, Sensor
 from discsim.sensors.sampling import Noise, Sampling
+from discsim.validation.checking.statements import statement_findings
 from discsim.validation.diagnosis.setup import find_setup_faults
+from discsim.validation.experiments.reference_doubts import reference_notes, refuse_wrong_reference
 from discsim.validation.reporting.figures import colour, new_figure, save_figure, symmetric_log
 from discsim.validation.reporting.markdown import literal
 from discsim.validation.scenarios.rate_table import (
@@ -74,14 +76,20 @@ class MeasuredRun:
 
 
 def read_run(folder: Path) -> MeasuredRun:
-    """Read a rate-table recording; raises `InputError` where it is another plant or has no rate reference."""
+    """Read a rate-table recording.
+
+    Raises `InputError` where it is another plant, has no rate reference or one in another unit, or shows no spin.
+    """
     recording = read_recording(folder)
     if recording.plant != "rate_table":
         raise InputError(f"{folder}: plant is {recording.plant}; expected rate_table")
+    refuse_wrong_reference(recording, measured_profile(recording))
     setup = find_setup_faults([recording])
     data = setup.recordings[0]
-    notes = tuple(f"{fault.sentence}; scored are the readings so corrected" for fault in setup.faults)
-    return MeasuredRun(data, notes, measured_profile(data))
+    notes = [f"{fault.sentence}; scored are the readings so corrected" for fault in setup.faults]
+    notes += [found.sentence for found in statement_findings(data) if found.severity != "note"]
+    profile = measured_profile(data)
+    return MeasuredRun(data, (*notes, *reference_notes(papers_rates(data), profile)), profile)
 
 
 def _sensor(name: str, recording: Recording) -> Sensor | None:

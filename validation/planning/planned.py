@@ -81,12 +81,11 @@ class Planned(Result):
         named = sum(any(np.isfinite(size) for size in one.named) for one in self.limits.effects)
         never = {frozenset((p.id, p.rival)) for p in self.limits.pairs if not np.isfinite(p.apart)}
         told = f"{named} of {len(self.limits.effects)} effects can be named; {len(never)} pairs cannot be told apart"
+        recordings = f"{self.count} recording{'s' * (self.count > 1)}"
         CNr = next((one for one in self.coefficients if one.name == "CNr"), None)
         if CNr is None or not np.isfinite(CNr.alone):
-            return f"{self.count} recordings: {told}"
-        return (
-            f"{self.count} recordings: C_Nr to {CNr.alone:.1g} ({CNr.together:.1g} with all coefficients free); {told}"
-        )
+            return f"{recordings}: {told}"
+        return f"{recordings}: C_Nr to {CNr.alone:.1g} ({CNr.together:.1g} with all coefficients free); {told}"
 
     def summary(self) -> str:
         """Return the headline, the best next recording and the best change of hardware: a line each."""
@@ -212,7 +211,7 @@ def plan(
         asked = throws_about(like, plans) if isinstance(plans, int) else [p for p in plans if isinstance(p, Plan)]
     if not asked:
         raise InputError("no recording is planned; expected at least one")
-    say(f"simulating {len(asked)} recordings")
+    say(f"simulating {len(asked)} recording{'s' * (len(asked) > 1)}")
     trajectories = _trajectories(asked, bench)
     questions = _questions(trajectories)
     say(f"asking {len(questions.candidates)} hypotheses of them")

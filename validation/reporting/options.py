@@ -330,10 +330,12 @@ def rig_of(model: Path | None, plant: Plant) -> Rig | None:
 
 
 def parse_sizes(text: str, option: str) -> dict[str, float]:
-    """Return the numbers of NAME=NUMBER,NAME=NUMBER; raises `InputError` for what is none."""
+    """Return the numbers of NAME=NUMBER,NAME=NUMBER; raises `InputError` for what is none, and for a name twice."""
     sizes: dict[str, float] = {}
     for item in filter(None, text.split(",")):
         name, _, value = (part.strip() for part in item.partition("="))
+        if name in sizes:
+            raise InputError(f"{option} {text}: '{name}' stands there twice; expected each name once")
         try:
             sizes[name] = float(value)
         except ValueError:

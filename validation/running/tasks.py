@@ -196,6 +196,8 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
         with cluster, Client(cluster, set_as_default=False) as client:
             yield client
         return
+    if not scheduler.rpartition(":")[2].isdecimal():  # Dask would wait, and leave a traceback of what it waited for
+        raise InputError(f"--scheduler {scheduler}: has no port; expected an address such as tcp://localhost:8786")
     try:
         client = Client(scheduler, timeout=PATIENCE_S, set_as_default=False)
     except (OSError, ValueError) as error:  # nobody there; no address at all

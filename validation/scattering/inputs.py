@@ -208,7 +208,10 @@ def inputs_of(
     for given, size in (sd or {}).items():
         for name in _SHORT.get(given, (given,)):
             if name not in items:
-                raise InputError(f"--sd {given}: unknown; expected some of {', '.join([*items, *_SHORT])}")
+                known = [*items, *_SHORT]
+                near = {one.casefold(): one for one in known}.get(given.casefold())
+                hint = f"; did you mean '{near}'?" if near else ""
+                raise InputError(f"--sd {given}: unknown{hint} (expected some of {', '.join(known)})")
             if not (np.isfinite(size) and size >= 0.0):
                 raise InputError(f"--sd {given}={size:g}: expected a standard deviation, zero or more")
             items[name] = items[name]._replace(sd=float(size), source="given")

@@ -63,8 +63,10 @@ def _knots(path: Path, told: Told) -> Samples:
     return Samples(t, rate)
 
 
-def speed_note(profile: Profile, table: RateTable) -> str | None:
+def speed_note(profile: Profile, table: RateTable, name: str = "--profile") -> str | None:
     """Return what to say of a profile that asks for more than the table gives, and None where it does not.
+
+    ``name`` is what the profile is called.
 
     Of a table whose fastest rate is not stated the fastest of the shipped ones is taken (``models/tables``).
     """
@@ -74,7 +76,7 @@ def speed_note(profile: Profile, table: RateTable) -> str | None:
     if asked <= fastest * (1.0 + 1e-9):
         return None
     gives = "the table turns at most" if np.isfinite(own) else "the fastest table shipped turns"
-    note = f"--profile asks for {np.degrees(asked):.6g} deg/s, and {gives} {np.degrees(fastest):.6g} deg/s"
+    note = f"{name} asks for {np.degrees(asked):.6g} deg/s, and {gives} {np.degrees(fastest):.6g} deg/s"
     if profile.in_radians and np.radians(asked) <= fastest:
         note += f"; were deg/s meant under rad/s? Then the header is '{_PLAIN[0]}'"
     return note

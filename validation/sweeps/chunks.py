@@ -57,20 +57,30 @@ def truth_tasks(plan: Plan) -> list[Task]:
 
 
 def fly_truth(number: int, plan: Plan) -> dict[str, FloatArray]:
-    """Return the arrays of a truth run's motion, in MuJoCo: of a rate table or a flight."""
+    """Return the arrays of a truth run's motion, in MuJoCo: of a rate table or a flight.
+
+    Raises `InputError` where it cannot be, or is too short to be scored, with what the plan calls it.
+    """
+    try:
+        motion = _flown(number, plan)
+        segments(plan, motion, plan.truths[number])
+    except InputError as error:
+        raise InputError(f"{plan.called(number)}: {error}") from None
+    arrays = {name: np.asarray(getattr(motion, name)) for name in _MOTION}
+    return {**arrays, "centre_of_mass": np.asarray(motion.centre_of_mass)}
+
+
+def _flown(number: int, plan: Plan) -> Motion:
     settings = plan.truths[number]
     effects = plan.effects(settings, moving=True)
     environment = plan.environment(settings)
     if plan.plant == "rate_table":
         profile = settings.get("profile", plan.profile)
         rng = np.random.default_rng(np.random.SeedSequence(plan.seed, spawn_key=(1, number)))
-        motion = turn_table(profile, environment, effects, yaw=float(rng.uniform(0, 2 * np.pi)))
-    else:
-        disc = settings["disc"][0] if "disc" in settings else load_disc("driver")[0]
-        release = settings.get("throw") or load_throw("driver")
-        motion = fly(disc, environment, release, effects, duration=plan.duration)
-    arrays = {name: np.asarray(getattr(motion, name)) for name in _MOTION}
-    return {**arrays, "centre_of_mass": np.asarray(motion.centre_of_mass)}
+        return turn_table(profile, environment, effects, yaw=float(rng.uniform(0, 2 * np.pi)))
+    disc = settings["disc"][0] if "disc" in settings else load_disc("driver")[0]
+    release = settings.get("throw") or load_throw("driver")
+    return fly(disc, environment, release, effects, duration=plan.duration)
 
 
 def motion_from(arrays: Mapping[str, FloatArray], plan: Plan, number: int) -> Motion:

@@ -119,9 +119,9 @@ def _size_over_radius(axes: Axes, shown: xr.Dataset, sweep: Sweep, limit: float 
         read = np.isfinite(error[:, :, s])
         whole = read.mean(axis=1) > READ
         size = np.array([rms(error[k, :, s]) if whole[k] else np.nan for k in range(len(radii))])
-        label = f"{rate:.0f} deg/s" + ("" if whole.any() else ", beyond its range")
+        label = f"{rate:.0f} deg/s" + ("" if whole.any() else ", beyond its range" if rate else ", no share of it")
         axes.plot(1000 * radii, size, "o-", ms=4, lw=1.0, color=shade(scale(rate)), label=label)
-        farthest = 1000 * limit / np.radians(rate) ** 2 if limit else np.inf
+        farthest = 1000 * limit / np.radians(rate) ** 2 if limit and rate else np.inf
         if 1000 * radii[0] < farthest < 1000 * radii[-1]:
             axes.axvline(farthest, color=shade(scale(rate)), lw=0.9, ls=":")
     fine = np.geomspace(radii[0], radii[-1], 60)

@@ -56,6 +56,11 @@ class MountDesign:
     points: tuple[int, ...] = (1, 1, 1, 1, 1, 1)
     base: int = 0
 
+    @property
+    def varies(self) -> bool:
+        """Whether any mount differs from another by more than its module."""
+        return bool(np.any(self.upper > self.lower))
+
     def __post_init__(self) -> None:
         for name in ("lower", "upper"):
             object.__setattr__(self, name, readonly(getattr(self, name)))

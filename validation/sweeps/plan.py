@@ -20,6 +20,7 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.estimators.methods import METHODS
 from discsim.files import digest, model_file, model_names
+from discsim.limits import limit_of
 from discsim.recording import Samples
 from discsim.rig import default_profile, profile_fault
 from discsim.sensors import Instruments
@@ -27,6 +28,7 @@ from discsim.sensors.sampling import Noise
 from discsim.shipped import load_disc, load_site, load_throw
 from discsim.toml_table import TomlTable, read_toml
 from discsim.validation.scenarios.profile_files import read_knots
+from discsim.validation.sweeps.doubts import plan_notes
 from discsim.validation.sweeps.mounts import MOUNT_FIELDS, MountDesign
 
 __all__ = ["Axis", "Case", "Plan", "plan_file", "read_plan"]
@@ -81,6 +83,8 @@ class Plan:
     profile: Samples | None = None
     duration: float = 30.0
     files: Mapping[str, str] = field(default_factory=dict)
+    #: what is odd in what the plan names, a line each
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         size = len(self.estimators) * self.mounts.count
@@ -97,6 +101,13 @@ class Plan:
         return tuple(
             dict(zip((axis.name for axis in moving), combination, strict=True)) for combination in combinations
         )
+
+    def called(self, truth: int) -> str:
+        """Return what a truth run is about, for errors in it: the plan's own names of what moves it."""
+        moving = [axis for axis in self.axes if axis.moves]
+        names = list(product(*(axis.values for axis in moving)))[truth]
+        told = ", ".join(f"{axis.name} {name}" for axis, name in zip(moving, names, strict=True))
+        return f"sweep '{self.name}'{', ' * bool(told)}{told}"
 
     @cached_property
     def cases(self) -> tuple[Case, ...]:
@@ -278,7 +289,7 @@ def read_plan(path: Path, *, count: int | None = None, seed: int | None = None) 
     plant, profile, duration = _read_truth(_need(top, "truth"))
     files: dict[str, str] = {}
     axes = _read_axes(top.table("axes"), plant, path.parent, files)
-    named = {axis.name for axis in axes}
+    named, top_states_rates = {axis.name for axis in axes}, profile is not None
     if len(named & {"magnet_m", "magnet_A_m2"}) == 1:
         raise top.error("axes", "a magnet needs both axes.magnet_m (its distance) and axes.magnet_A_m2 (its moment)")
     if "profile" in named:
@@ -297,7 +308,9 @@ def read_plan(path: Path, *, count: int | None = None, seed: int | None = None) 
     if profile is not None and not _level(profile):
         raise InputError.at(path, None, "truth: no plateau is long enough to be scored; expected hold_s above 1.4")
     seed = stated_seed if seed is None else seed
-    plan = Plan(name, plant, axes, mounts, estimators, seed, drawn, fft_step, profile, duration, files)
+    stated = profile if top_states_rates else None
+    notes = plan_notes(axes, stated, path.parent)
+    plan = Plan(name, plant, axes, mounts, estimators, seed, drawn, fft_step, profile, duration, files, notes)
     for case in plan.cases:
         _check_case(plan, case, path)
     return plan
@@ -339,6 +352,9 @@ def _whole(table: TomlTable, key: str, lowest: int, *, default: int | None = Non
     value = table.raw(key)
     if value is None and default is not None:
         return default
+    if value is None:
+        where = f"[{table.name}]" if table.name else "the top level"
+        raise table.error(None, f"missing key '{key}' in {where}; expected a whole number from {lowest}")
     if isinstance(value, bool) or not isinstance(value, int) or value < lowest:
         raise table.error(key, f"'{key}' is {value!r}, expected a whole number from {lowest}")
     return value
@@ -350,6 +366,8 @@ def _read_truth(table: TomlTable) -> tuple[Literal["rate_table", "flight"], Samp
     if plant == "rate_table":
         rates = table.numbers("rates_deg_s", required=False)
         if rates is not None:
+            if not np.any(rates):
+                raise table.error("rates_deg_s", "'truth.rates_deg_s' holds no rate but zero; expected some to score")
             hold, ramp = table.need("hold", "s", positive=True), table.need("ramp", "s", positive=True)
             profile = default_profile(rates.tolist(), hold, ramp)
             if found := profile_fault(profile):
@@ -430,6 +448,8 @@ def _source(key: str, name: str, folder: Path) -> Path:
 def _read_effect(table: TomlTable, key: str, plant: str) -> Axis:
     """Read the sizes of one parameter of an effect, ``"accel.bias.bx_m_s2" = [0.0, 0.5]``."""
     id, _, name = key.rpartition(".")
+    if not id:
+        raise table.error(key, f"'axes.effect.{key}': expected one key in quotes, such as \"accel.bias.bx_m_s2\"")
     try:
         kind = row(id)
         effect(id, **{name: kind.sizes.get(name, 0.0)})
@@ -440,6 +460,10 @@ def _read_effect(table: TomlTable, key: str, plant: str) -> Axis:
     if kind.type is PositionOffset:
         raise table.error(key, f"'{key}': mounts move the accelerometer; expected [mounts] instead")
     values = tuple(_number(table, key, value) for value in _listed(table, key))
+    limit = limit_of(name)
+    for value in values:
+        if beyond := limit.fault(value, divides=name in kind.positive):
+            raise table.error(key, f"'{key}' has {value:g}, {beyond}")
     return Axis(key, values, values, kind.acts_on == "motion")
 
 

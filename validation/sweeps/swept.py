@@ -150,7 +150,7 @@ def sweep(
         if anew:
             discard(folder)
         claim(folder, identity)
-        if note := idle_cores(scheduler, workers):
+        for note in (*asked.notes, *filter(None, [idle_cores(scheduler, workers)])):
             say(note)
 
         def run(tasks: list[Task], what: str, function: Callable[..., Any], shared: object) -> list[Any]:

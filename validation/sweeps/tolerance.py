@@ -62,6 +62,8 @@ def tolerances_of(scores: xr.Dataset, sweep: Sweep, below: float) -> list[Tolera
             for segment in range(scores.sizes["segment"]):
                 rate = float(one.rate_deg_s.isel(segment=segment))
                 here = one.isel(segment=segment)
+                if rate == 0.0:  # no error is a share of nothing
+                    continue
                 error = np.where(here.known.values >= READ, here.bias_deg_s.values / rate, np.nan)
                 told = np.isfinite(error)
                 scored = np.isfinite(here.known.values)

@@ -16,18 +16,22 @@ from discsim.model_file import Model, write_model
 from discsim.recording import Recording
 from discsim.result import Result
 from discsim.threads import one_thread
+from discsim.validation.checking.doubts import mended_flights
 from discsim.validation.reporting.run import json_text
 from discsim.validation.running.given import Given, given_recordings
 from discsim.validation.running.progress import Progress, silent
 from discsim.validation.yaw_damping.compared import SOURCES, Compared, Source, compare_sources
 from discsim.validation.yaw_damping.figures import draw_fit, draw_sources, draw_surface
 from discsim.validation.yaw_damping.model import fitted_model, tabulated_model
-from discsim.validation.yaw_damping.observations import Throw, observe
+from discsim.validation.yaw_damping.observations import Throw, need_flight, observe
 from discsim.validation.yaw_damping.output_error import Fit, fit_yaw_damping
 from discsim.validation.yaw_damping.page import write_fit_page
 from discsim.validation.yaw_damping.paper_table import PaperTable, paper_table, table_csv
 
 __all__ = ["FittedYawDamping", "check_method", "cnr_json", "fit_recordings", "notes"]
+
+#: findings about numbers that no fit uses: C_Nr is free whatever is stated
+_NOT_USED = ("disc.CNr",)
 
 
 @dataclass(frozen=True, repr=False)
@@ -37,7 +41,7 @@ class FittedYawDamping(Result):
     Attributes
     ----------
     recordings : tuple of Recording
-        The throws, all of one disc.
+        The throws, all of one disc, with setup faults mended.
     throws : tuple of Throw
         What of each the fit used.
     fit : Fit
@@ -46,6 +50,8 @@ class FittedYawDamping(Result):
         The paper's table over spin rate and airspeed.
     sources : tuple of Compared
         The same by each source of spin, the chosen one first.
+    doubts : tuple of str
+        What is doubtful before anything is fitted: faults of the setup, stated numbers that cannot be.
     """
 
     recordings: tuple[Recording, ...]
@@ -53,6 +59,7 @@ class FittedYawDamping(Result):
     fit: Fit
     paper: PaperTable
     sources: tuple[Compared, ...]
+    doubts: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"<FittedYawDamping: {self.headline}>"
@@ -75,8 +82,8 @@ class FittedYawDamping(Result):
 
     @property
     def notes(self) -> list[str]:
-        """Where the residuals contradict what the recordings state, a line each."""
-        return notes(self.fit)
+        """What is doubtful, and where the residuals contradict what the recordings state, a line each."""
+        return [*self.doubts, *notes(self.fit)]
 
     @property
     def model(self) -> Model:
@@ -106,7 +113,7 @@ class FittedYawDamping(Result):
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of cnr.json."""
-        return cnr_json(self.fit, self.sources)
+        return {**cnr_json(self.fit, self.sources), "notes": self.notes}
 
     def report(self, folder: Path | str) -> Path:
         """Write cnr.json, cnr_table.csv, models, figures and report.html; return the path of the first."""
@@ -118,7 +125,7 @@ class FittedYawDamping(Result):
         draw_fit(self.throws, self.fit, self.paper, out / "fit.png")
         draw_surface(self.paper, self.fit, out / "surface.png")
         draw_sources(self.sources, out / "sources.png")
-        write_fit_page(out, self.fit, self.paper, self.sources, self.notes)
+        write_fit_page(out, self.fit, self.paper, self.sources, notes(self.fit), self.doubts)
         return out / "cnr.json"
 
 
@@ -141,18 +148,22 @@ def fit_recordings(
 
     ``recordings`` are flights with what tells the spin, and a track or GPS: recordings, a folder, or a sequence of
     either. ``method`` of `discsim.estimators.estimate` gives the spin; with ``compare`` C_Nr is fitted by the paper's
-    sources, too. Raises `InputError` for an unknown method, throws of several discs, or nothing that tells the release.
+    sources, too. Setup faults (an axis, a unit, an offset in time) are mended first, and noted. Raises `InputError` for
+    an unknown method, throws of several discs, or nothing that tells the release.
     """
     check_method(method)
     given = given_recordings(recordings)
-    throws = list(progress((observe(one, method) for one in given), len(given), "spin rate of throw"))
+    for one in given:
+        need_flight(one)
+    data, doubts = mended_flights(given, done="fitted", passed=_NOT_USED)
+    throws = list(progress((observe(one, method) for one in data), len(data), "spin rate of throw"))
     say("fitting model flights")
     fit, paper = fit_yaw_damping(throws), paper_table(throws)
     found = [Compared(Source(method), fit, paper)]
     if compare:
         others = [source for source in SOURCES if source != found[0].source]
-        found += progress(compare_sources(given, fit, others), len(others), "other source")
-    return FittedYawDamping(tuple(given), tuple(throws), fit, paper, tuple(found))
+        found += progress(compare_sources(data, fit, others), len(others), "other source")
+    return FittedYawDamping(data, tuple(throws), fit, paper, tuple(found), doubts)
 
 
 def cnr_json(fit: Fit, found: Sequence[Compared]) -> dict[str, Any]:

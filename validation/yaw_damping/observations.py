@@ -15,7 +15,7 @@ from discsim.estimators.rate import YawRate
 from discsim.recording import Recording
 from discsim.validation.identification.plants.flight import FLIGHT
 
-__all__ = ["SHARED_S", "Throw", "misplaced", "observe"]
+__all__ = ["SHARED_S", "Throw", "misplaced", "need_flight", "observe"]
 
 #: neighbouring spin rates share data: windows of the paper's method span 1.28 s, and the errors of the smoothers keep
 #: their sign for 0.3 to 2.4 s (measured on the throws of `discsim validate`). Values count as one per this time, s.
@@ -75,9 +75,8 @@ def observe(recording: Recording, method: str = "best", rate: YawRate | None = N
     Raises `InputError` where the recording is no flight or longer than one, the method fails or knows too little, or
     nothing tells the direction of a spin whose method gives magnitudes only.
     """
+    need_flight(recording)
     where = recording.path or recording.name
-    if recording.plant != "flight":
-        raise InputError(f"{where}: is a {recording.plant}; expected a flight, for C_Nr needs an airspeed")
     rate = estimate(recording, method) if rate is None else rate
     known = np.isfinite(rate.rate) & (rate.sd > 0)
     if np.count_nonzero(known) < FEWEST:
@@ -94,6 +93,13 @@ def observe(recording: Recording, method: str = "best", rate: YawRate | None = N
     sign = 1.0 if rate.signed else _direction(recording, rate)
     spin, sd = readonly(sign * rate.rate[known]), readonly(rate.sd[known])
     return Throw(recording, rate.method, readonly(rate.t[known]), spin, sd, t, path, path_sd)
+
+
+def need_flight(recording: Recording) -> None:
+    """Raise `InputError` for what is no flight."""
+    if recording.plant != "flight":
+        where = recording.path or recording.name
+        raise InputError(f"{where}: is a {recording.plant}; expected a flight, for C_Nr needs an airspeed")
 
 
 def misplaced(recording: Recording, error: float) -> Recording:

@@ -15,8 +15,18 @@ from discsim.validation.yaw_damping.paper_table import PaperTable
 __all__ = ["write_fit_page"]
 
 
-def write_fit_page(out: Path, fit: Fit, paper: PaperTable, sources: Sequence[Compared], notes: Sequence[str]) -> Path:
-    """Write report.html into ``out``, where the figures are already; return the path of the page."""
+def write_fit_page(
+    out: Path,
+    fit: Fit,
+    paper: PaperTable,
+    sources: Sequence[Compared],
+    notes: Sequence[str],
+    before: Sequence[str] = (),
+) -> Path:
+    """Write report.html into ``out``, where the figures are already; return the path of the page.
+
+    ``notes`` are of the fit, and what is doubtful ``before`` it of the recordings.
+    """
     share = f", {100 * fit.sd / abs(fit.CNr):.2g} % of it" if fit.CNr else ""
     lead = (
         f"C_Nr = {fit.CNr:.6f} ± {fit.sd:.6f} (one standard deviation{share}), from "
@@ -24,14 +34,17 @@ def write_fit_page(out: Path, fit: Fit, paper: PaperTable, sources: Sequence[Com
     )
     if notes:
         lead += " The model does not fit as well as it should: see below before you use it."
-    doubts = [Section("Before you believe it", [f"{note[:1].upper()}{note[1:]}." for note in notes])] if notes else []
+    elif before:
+        lead += " Of the recordings something must be known: see below before you use it."
+    heeded = [*before, *notes]
+    doubts = [Section("Before you believe it", [f"{note[:1].upper()}{note[1:]}." for note in heeded])] if heeded else []
     sections = [*doubts, _throws(fit, out), _sources(sources, out), _others(fit), _table(out, fit, paper)]
     write_report(
         out / "report.html",
         "The yaw damping derivative C_Nr",
         lead,
         [section for section in sections if section is not None],
-        "heed" if notes else "good",
+        "heed" if heeded else "good",
     )
     return out / "report.html"
 

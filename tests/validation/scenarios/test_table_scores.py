@@ -23,6 +23,7 @@ from discsim.recording import Samples, read_recording, write_recording
 from discsim.rig import read_profile, turn_table
 from discsim.sensors import Instruments, record
 from discsim.validation.cli import main
+from discsim.validation.experiments.reference_doubts import refuse_wrong_reference
 from discsim.validation.experiments.table_recording import compare, differences, lines_through, read_run
 from discsim.validation.scenarios.rate_table import Bench, plateaus, rate_table_checks, run_rate_table, with_all_methods
 from discsim.validation.scenarios.table_scores import delay_of, score_rates
@@ -149,6 +150,16 @@ def measured(tmp_path_factory):
     return folder
 
 
+def with_reference(folder, out, change):
+    """Write the run with another rate reference, t (n,) s and rate (n,) rad/s; what was before 0 s is left out."""
+    recording = read_recording(folder)
+    reference = recording.need("rate_reference")
+    t, rate = change(reference.t, reference.value)
+    samples = {**recording.samples, "rate_reference": Samples(t[t >= 0], rate[t >= 0])}
+    write_recording(replace(recording, samples=samples), out / "changed")
+    return out / "changed"
+
+
 class TestMeasuredRun:
     def test_the_sensor_that_is_not_as_stated_is_named_and_the_others_are_not(self, measured):
         real = read_run(measured)
@@ -189,6 +200,33 @@ class TestMeasuredRun:
         rates = {"gyroscope": told(bias=bias)}
         one, other = (score_rates({"gyroscope": rate}, truth, (0.0, 8.0)) for rate in (rates["gyroscope"], told()))
         assert len(differences(one, other, rates)) == told_of
+
+    @pytest.mark.parametrize(
+        ("factor", "unit"), [(180 / np.pi, "deg/s"), (30 / np.pi, "rpm"), (0.5 / np.pi, "turns per second")]
+    )
+    def test_a_reference_in_another_unit_is_refused_by_what_the_sensors_read(self, measured, tmp_path, factor, unit):
+        """Scores were written beside it, of thousands of deg/s, and the sensors were to be diagnosed."""
+        with pytest.raises(InputError, match=rf"rate_reference.csv is in {unit}, by fft.*expected rad/s"):
+            read_run(with_reference(measured, tmp_path, lambda t, rate: (t, factor * rate)))
+
+    def test_a_reference_in_milliseconds_is_refused(self, measured, tmp_path):
+        """An emulation of hours was begun."""
+        with pytest.raises(InputError, match="milliseconds"):
+            read_run(with_reference(measured, tmp_path, lambda t, rate: (1000 * t, rate)))
+
+    @pytest.mark.parametrize(("late", "way"), [(1.7, "1.70 s late"), (-0.9, "0.90 s early")])
+    def test_a_reference_on_a_clock_of_its_own_is_noted(self, measured, tmp_path, late, way):
+        (note,) = read_run(with_reference(measured, tmp_path, lambda t, rate: (t + late, rate))).notes
+        assert note.startswith(f"the rate reference is {way} beside")
+
+    def test_a_sound_reference_is_believed_without_a_word(self, measured):
+        assert read_run(measured).notes == ()
+
+    def test_a_reference_alone_is_refused(self, measured):
+        whole = read_recording(measured)
+        alone = replace(whole, samples={"rate_reference": whole.need("rate_reference")})
+        with pytest.raises(InputError, match="no sensor that shows a spin"):
+            refuse_wrong_reference(alone, whole.need("rate_reference"))
 
     def test_lines_through_a_log_leave_no_more_than_its_scatter(self, measured):
         log = read_run(measured).profile
