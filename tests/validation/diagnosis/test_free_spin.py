@@ -17,6 +17,8 @@ from discsim.recording import Recording
 from discsim.sensors import record
 from discsim.shipped import load_disc
 from discsim.validation.diagnosis.detectors.dropped_samples import dropped_magnetometer
+from discsim.validation.diagnosis.detectors.events import events
+from discsim.validation.diagnosis.detectors.local_problem import local_problems
 from discsim.validation.diagnosis.relaxed_fit import first_trajectory, relaxed, unknowns
 from discsim.validation.diagnosis.selection import stepwise
 from discsim.validation.diagnosis.selection.candidates import free_candidate
@@ -229,3 +231,19 @@ def test_means_over_turns_go_by_the_turns_that_a_repaired_magnetometer_shows() -
     for readings in after.values():
         assert readings.t.size == readings.value.shape[0]
     assert np.isfinite(refit(replace(fit, trajectories=found.trajectories), iterations=1).merit)
+
+
+@pytest.mark.parametrize(("instant", "size"), [(0.62, 0.016), (0.65, 0.012)])
+def test_a_kick_between_the_boundaries_of_a_wandering_motion_is_found_at_its_instant(
+    instant: float, size: float
+) -> None:
+    """At the boundaries, where the motion may wander as it is, a kick that gains 130 promised nothing."""
+    kick = effect("event.spin_step", t_s=instant, dr_rad_s=size)
+    fit = relaxed(throws((kick,), only=1, module=BLIND, plant="free_spin"))
+    noise = estimate_noise(fit.linears, [linear.residual for linear in fit.linears])
+    own = unknowns([trajectory.recording for trajectory in fit.trajectories])
+    found = events(local_problems(fit, noise, own, Hypothesis()))
+    assert [event.candidate.recordings for event in found] == [frozenset({1})]
+    start = {key[1]: value for (key, _), value in found[0].start.items()}
+    assert start["t_s"] == pytest.approx(instant, abs=0.03)
+    assert start["dr_rad_s"] == pytest.approx(size, rel=0.4)

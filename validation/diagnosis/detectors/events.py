@@ -6,7 +6,7 @@ filter, the other unknowns projected out (generalised likelihood ratio: Willsky 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -29,6 +29,8 @@ __all__ = ["events"]
 
 #: what pushes a disc, and by how much less than an event's gain a first look at it may promise
 _PUSH, _SHORT_OF = catalogued(Impulse).id, 10.0
+#: instants in a segment of a motion that may wander: of 0.2 s, as fine as others are cut
+_PARTS = 4
 #: what of a state an event makes jump
 _MOVES: Mapping[type[Any], Callable[[Layout], slice | int | None]] = {
     Impulse: lambda layout: layout.velocity,
@@ -36,25 +38,50 @@ _MOVES: Mapping[type[Any], Callable[[Layout], slice | int | None]] = {
 }
 
 
-def _jumps(problem: LocalProblem, directions: Sequence[int]) -> FloatArray:
-    """Return what a jump of the state in some directions at each boundary (k - 1,) would gain."""
-    d = problem.trajectory.plant.layout.directions
-    k = len(problem.trajectory.states)
+def _jumps(problem: LocalProblem, kind: type[Any], parts: int) -> tuple[FloatArray, FloatArray]:
+    """Return instants (m,) s, and what a jump of what a kind of event moves would gain at each of them.
+
+    The instants part each segment in ``parts``; the first is no instant.
+    """
+    layout, nodes = problem.trajectory.plant.layout, problem.trajectory.nodes
+    d, k = layout.directions, len(problem.trajectory.states)
     moves = problem.linear.sensitivities[:, :, :d]
     A = np.hstack([problem.white, problem.left[:, None]])
-    # products of the rows after each boundary with the first state's columns
-    products = np.zeros((k, d, A.shape[1]))
-    for i in range(k):
-        rows = A[problem.segment == i]
+    length = np.diff(nodes)
+    part = np.floor(parts * (problem.linear.t - nodes[problem.segment]) / length[problem.segment])
+    cell = parts * problem.segment + np.clip(part, 0, parts - 1).astype(int)
+    # products of the rows after each instant with the first state's columns
+    products = np.zeros((k * parts, d, A.shape[1]))
+    for i in range(k * parts):
+        rows = A[cell == i]
         products[i] = rows[:, :d].T @ rows
     after = np.cumsum(products[::-1], axis=0)[::-1]
-    gain = np.zeros(max(k - 1, 0))
-    for j in range(1, k):
-        back = undone(moves[j], np.eye(d)[:, list(directions)])
-        own = back.T @ after[j][:, :d] @ back
-        cross = (back.T @ after[j]).T
-        gain[j - 1], _ = problem.explained(own, cross[:-1], cross[-1])
-    return gain
+    instants, gain = np.zeros(k * parts), np.zeros(k * parts)
+    for i in range(1, k * parts):
+        j, since = i // parts, length[i // parts] * (i % parts) / parts
+        back = undone(moves[j], _jump(layout, kind, since))
+        own = back.T @ after[i][:, :d] @ back
+        cross = (back.T @ after[i]).T
+        instants[i] = nodes[j] + since
+        gain[i], _ = problem.explained(own, cross[:-1], cross[-1])
+    return instants[1:], gain[1:]
+
+
+def _jump(layout: Layout, kind: type[Any], since: float) -> FloatArray:
+    """Return the change of a state (d, c) that some time later, s, has become a jump of what an event moves alone.
+
+    What a jump of a rate or a velocity has turned or moved until then is taken back.
+    """
+    places = _MOVES[kind](layout)
+    assert places is not None
+    directions = layout.directions_of(places)
+    change = np.eye(layout.directions)[:, list(directions)]
+    leads = layout.position if kind is Impulse else layout.attitude if layout.yaw is None else layout.yaw
+    if leads is not None:
+        # a spin turns about the body's last axis
+        led = layout.directions_of(leads)[-len(directions) :]
+        change[list(led), range(len(directions))] -= since
+    return change
 
 
 def _needles(problem: LocalProblem) -> tuple[FloatArray, FloatArray]:
@@ -95,24 +122,25 @@ def _events_at(
 def events(problems: LocalProblems, least: float = DETECTORS.least) -> list[ScreenedCandidate]:
     """Return events, at most one of each kind per recording, that would gain more than ``least``, best first.
 
-    A jump of velocity or spin is asked for at every boundary of finely cut motion, which costs no simulation; the
-    instant is then read off the event's true signature, in which a pulse of 10 ms is a needle.
+    A jump of velocity or spin is asked for at every boundary of finely cut motion, and within segments where motion may
+    wander between them, which costs no simulation; the instant is then read off the event's true signature, in which a
+    pulse of 10 ms is a needle.
     """
     recordings = [trajectory.recording for trajectory in problems.fit.trajectories]
     layout, times = problems.fit.plant.layout, problems.fit.plant.durations
-    kinds: list[tuple[str, Sequence[int], tuple[str, ...]]] = [
-        (row.id, layout.directions_of(places), tuple(name for name in row.parameters if name != "t_s"))
+    kinds: list[tuple[str, type[Any], tuple[str, ...]]] = [
+        (row.id, row.type, tuple(name for name in row.parameters if name != "t_s"))
         for row in detected(recordings, "events")
-        if (places := _MOVES[row.type](layout)) is not None
+        if _MOVES[row.type](layout) is not None
     ]
+    # where motion may wander from segment to segment, a jump between two of them is nothing new
+    parts = _PARTS if np.any(problems.fit.defects.allowed) else 1
 
-    def scanned(task: tuple[int, tuple[str, Sequence[int], tuple[str, ...]]]) -> FloatArray:
-        i, (id, directions, _) = task
-        return np.zeros(0) if problems.has(id, i) else _jumps(problems.by_recording[i], directions)
+    def scanned(task: tuple[int, tuple[str, type[Any], tuple[str, ...]]]) -> tuple[FloatArray, FloatArray]:
+        i, (id, kind, _) = task
+        return (np.zeros(0), np.zeros(0)) if problems.has(id, i) else _jumps(problems.by_recording[i], kind, parts)
 
-    def one(
-        task: tuple[int, tuple[str, Sequence[int], tuple[str, ...]]], instants: FloatArray
-    ) -> ScreenedCandidate | None:
+    def one(task: tuple[int, tuple[str, type[Any], tuple[str, ...]]], instants: FloatArray) -> ScreenedCandidate | None:
         i, (id, _, names) = task
         problem = problems.by_recording[i]
         candidate = CandidateEffect(id, tuple(Column(id, name, 0.02) for name in names))
@@ -122,22 +150,21 @@ def events(problems: LocalProblems, least: float = DETECTORS.least) -> list[Scre
         if near.size == 0:
             return None
         best = max(_events_at(problem, problems.fit, i, candidate, near), key=gain_of)
-        about = best.candidate.shape_grid["t_s"] + np.linspace(-0.012, 0.012, 7)
+        fine = best.candidate.shape_grid["t_s"] + np.linspace(-0.012, 0.012, 7)
         best = max(
-            [best, *_events_at(problem, problems.fit, i, candidate, about[(about > times.event_from) & (about < end)])],
+            [best, *_events_at(problem, problems.fit, i, candidate, fine[(fine > times.event_from) & (fine < end)])],
             key=gain_of,
         )
         return best if best.gain > least else None
 
-    def about_boundaries(task: tuple[int, tuple[str, Sequence[int], tuple[str, ...]]], gain: FloatArray) -> FloatArray:
-        inner = problems.by_recording[task[0]].trajectory.nodes[1:-1]
-        return np.concatenate([inner[j] + times.event_near * np.linspace(-1.0, 1.0, 13) for j in peaks(gain, 2)])
+    def about(instants: FloatArray, gain: FloatArray) -> FloatArray:
+        return np.concatenate([instants[j] + times.event_near * np.linspace(-1.0, 1.0, 13) for j in peaks(gain, 2)])
 
     tasks = [(i, kind) for i in problems.by_recording for kind in kinds]
     gains = mapped(scanned, tasks)
-    promising = [(t, g) for t, g in zip(tasks, gains, strict=True) if g.size and g.max() >= least - _SHORT_OF]
-    promising = sorted(promising, key=lambda item: -float(item[1].max()))[: DETECTORS.followed]
-    asked = [(task, about_boundaries(task, gain)) for task, gain in promising]
+    promising = [(t, *g) for t, g in zip(tasks, gains, strict=True) if g[1].size and g[1].max() >= least - _SHORT_OF]
+    promising = sorted(promising, key=lambda item: -float(item[2].max()))[: DETECTORS.followed]
+    asked = [(task, about(instants, gain)) for task, instants, gain in promising]
     pushed = [task for task in tasks if task[1][0] == _PUSH and not problems.has(_PUSH, task[0])]
     needles = [(task, *_needles(problems.by_recording[task[0]])) for task in pushed]
     felt = [(task, at, beyond) for task, at, beyond in needles if beyond.size and beyond.max() >= least - _SHORT_OF]
