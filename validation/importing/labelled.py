@@ -26,6 +26,7 @@ _THREE = re.compile(rf"{_NAME}\s*(?:[:=]\s*)?\[\s*({_NUMBER}(?:[\s,;]+{_NUMBER})
 _BARE_THREE = re.compile(rf"{_NAME}\s*[:=]\s*[(<]?\s*({_NUMBER}(?:\s*[,;\t ]\s*{_NUMBER}){{2}})\s*[)>]?{_END}")
 #: a word of its own before the first name ("Scaled. Acc (mg)")
 _WORD = re.compile(r"^[^\W\d]+\.\s+")
+_UNIT = re.compile(r" \([^()]*\)$")
 _AXIS = re.compile(r"(.*?)[\s_.]*\b([xyzXYZ])")
 
 
@@ -151,5 +152,8 @@ class RecordLines:
         return [(self._begun, record)], broken
 
     def _fits(self, pairs: Sequence[tuple[str, str]]) -> bool:
-        begun = len(self._cells)
-        return bool(pairs) and tuple(name for name, _ in pairs) == self._names[begun : begun + len(pairs)]
+        """Tell whether cells are the next ones of a record; the columns may leave out the units behind them."""
+        own = self._names[len(self._cells) :][: len(pairs)]
+        if not pairs or len(own) < len(pairs):
+            return False
+        return all(name in (written, _UNIT.sub("", written)) for name, (written, _) in zip(own, pairs, strict=True))

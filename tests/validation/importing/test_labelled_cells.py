@@ -105,3 +105,15 @@ def test_three_numbers_behind_one_name_are_its_axes(tmp_path, form):
     assert_allclose(whole.recordings[0].samples["gyroscope"].value, LOG.gyro, atol=1e-4)
     assert_allclose(whole.recordings[0].samples["accelerometer"].value, LOG.accel, atol=1e-4)
     assert len(whole.throws) == 1
+
+
+def test_a_map_may_name_cells_without_the_units_behind_them(tmp_path):
+    raw = tmp_path / "serial.txt"
+    raw.write_text("\n".join(line for both in zip(LOG.gyro, LOG.accel, strict=True) for line in block(*both)))
+    import_log(raw).report(tmp_path / "out")
+    written = (tmp_path / "out" / "map.toml").read_text()
+    short = written.replace(" (rad/s)", "").replace(" (m/s^2)", "").replace(" (degC)", "")
+    assert short != written
+    (tmp_path / "own.toml").write_text(short)
+    read = import_log(raw, map=str(tmp_path / "own.toml")).recordings[0].samples["gyroscope"]
+    assert_allclose(read.value, LOG.gyro, atol=0.006)
