@@ -65,12 +65,15 @@ def command(
     Example: discsim import my-log.csv --throw 1 --out throw-1
     or, with a map: discsim import 2025-08-31-001-rb.csv --map flatball --rows 1590:1830 --out throw-1
     """
+    from discsim.environment import Environment
     from discsim.validation.importing import find_map, parse_rows, read_map
     from discsim.validation.importing.imported_log import LogPart
     from discsim.validation.importing.sniffing import listed, opened, several_logs
+    from discsim.validation.reporting.options import at_place
 
     part = LogPart(None if rows is None else parse_rows(rows), throw, all_throws)
     part.check()
+    at_place(Environment(), place, date)  # what is wrong with them is said before a long log is read
     named = None if map_ in ("auto", "sniff") else read_map(find_map(map_))
     _leave_alone(raw, out)
     asked = _Asked(raw, map_, named, part, plant, write_map, place, date)

@@ -92,3 +92,16 @@ def test_a_mistake_is_told_as_the_page_says(mistake, monkeypatch, tmp_path, caps
     said = [line for line in (captured.err + captured.out).splitlines() if line.startswith(start)]
     assert said, captured.err
     assert said[0].endswith(end)
+
+
+def test_a_place_without_a_date_is_refused_before_the_log_is_read(monkeypatch, tmp_path, capsys):
+    """It was refused when all was read, with half a folder left behind."""
+    monkeypatch.chdir(tmp_path)
+    Path("my-log.csv").write_text("no log at all\n")
+    argv = ["discsim", "import", "my-log.csv", "--place", "37.57,126.98", "--out", "throw"]
+    monkeypatch.setattr(sys, "argv", argv)
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert stop.value.code == 2
+    assert "--place LAT,LON and --date YYYY-MM-DD belong together" in capsys.readouterr().err
+    assert not Path("throw").exists()
