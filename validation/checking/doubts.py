@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from discsim.recording import Recording
 from discsim.validation.checking.readings import path_findings
 from discsim.validation.checking.statements import statement_findings
-from discsim.validation.diagnosis.setup import find_setup_faults, suspected_fault
+from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
 
 __all__ = ["mended_flights"]
 
@@ -20,9 +20,7 @@ def mended_flights(
     ``done`` says what is done with the readings (``"fitted"``); findings whose ids are ``passed`` are not told.
     """
     setup = find_setup_faults(recordings)
-    notes = [f"{fault.sentence}; {done} are the readings so corrected" for fault in setup.faults]
-    if (perhaps := suspected_fault(setup)) is not None:
-        notes.append(f"{perhaps.sentence}; {done} are the readings as written")
+    notes = setup_notes(setup, f"{done} are")
     told: dict[str, list[str]] = {}
     for one in setup.recordings:
         for finding in (*statement_findings(one), *path_findings(one)):
@@ -32,7 +30,6 @@ def mended_flights(
     return tuple(setup.recordings), tuple(notes)
 
 
-def _named(names: Iterable[str], count: int) -> str:
+def _named(names: Sequence[str], count: int) -> str:
     """Return the names of recordings before a sentence about them; empty where it is about all that there are."""
-    named = list(names)
-    return "" if len(named) == count else f"{', '.join(named)}: "
+    return "" if len(names) == count else f"{', '.join(names)}: "

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Literal
 
-__all__ = ["SEVERITIES", "Finding", "Severity"]
+__all__ = ["SEVERITIES", "Finding", "Severity", "doubts_of"]
 
 #: an error makes results wrong, a warning may, a note does not
 Severity = Literal["error", "warning", "note"]
@@ -45,3 +46,8 @@ class Finding:
     def to_json(self) -> dict[str, str]:
         """Return the JSON object."""
         return {**asdict(self), "sentence": self.sentence}
+
+
+def doubts_of(findings: Iterable[Finding]) -> list[str]:
+    """Return the sentences of findings that are more than notes: what makes results wrong, or may."""
+    return [finding.sentence for finding in findings if finding.severity != "note"]

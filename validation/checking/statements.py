@@ -11,7 +11,7 @@ from discsim.disc import Aero, Disc, Release
 from discsim.environment import Environment
 from discsim.glitches import FASTEST_SPIN
 from discsim.recording import Recording
-from discsim.validation.checking.finding import Finding, Severity
+from discsim.validation.checking.finding import Finding, Severity, doubts_of
 
 __all__ = ["FIELD", "statement_findings", "unlikely_flight"]
 
@@ -52,7 +52,7 @@ def unlikely_flight(disc: Disc | None, environment: Environment, *releases: Rele
         found += _disc(disc, thrown=True)
     for release in releases:
         found += _release(release)
-    return list(dict.fromkeys(finding.sentence for finding in found if finding.severity != "note"))
+    return list(dict.fromkeys(doubts_of(found)))
 
 
 def _outside(value: float, limits: tuple[float, float]) -> bool:

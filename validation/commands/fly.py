@@ -101,6 +101,7 @@ def command(
     from discsim.recording import write_recording
     from discsim.sensors import Instruments, record
     from discsim.shipped import load_throw
+    from discsim.validation.checking.finding import doubts_of
     from discsim.validation.checking.statements import statement_findings
     from discsim.validation.reporting.run import start_run
     from discsim.validation.reporting.truth import write_flight_truth
@@ -125,8 +126,7 @@ def command(
         recording = record(motion, instruments, run.rng, plant="flight", name=out.resolve().name, disc=body)
         write_recording(recording, out)
         write_flight_truth(out / "truth.csv", motion)
-    unlikely = [found.sentence for found in statement_findings(replace(recording, release=release))
-                if found.severity != "note"]  # fmt: skip
+    unlikely = doubts_of(statement_findings(replace(recording, release=release)))
     for note in (*notes, *passed, *unlikely, f"{out}: {_end(motion)}"):
         typer.echo(note)
 

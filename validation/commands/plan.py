@@ -100,24 +100,21 @@ def _doubts(
     asked: Sequence[Plan] | Sequence[Recording] | int, plant: Plant, flown: tuple[Disc, Environment, Release] | None
 ) -> list[str]:
     """Return what cannot be, or is unlikely, about the hardware (None: not stated here) and what is planned of it."""
-    import numpy as np
-
     from discsim.disc import Release
+    from discsim.rate_tables import RateTable
     from discsim.validation.checking.statements import unlikely_flight
     from discsim.validation.identification.plants import PLANTS
     from discsim.validation.identification.plants.plan import Plan
-    from discsim.validation.scenarios.profile_files import fastest_shipped
+    from discsim.validation.scenarios.profile_files import Profile, speed_note
 
     plans = [] if isinstance(asked, int) else [one for one in asked if isinstance(one, Plan)]
     if plant == "rate_table":
-        fastest = fastest_shipped()
-        asks = {one.text: float(np.abs(one.command.value).max()) for one in plans if one.command is not None}
-        return [
-            f"'{text}' asks for {np.degrees(rate):.6g} deg/s, and the fastest table shipped turns "
-            f"{np.degrees(fastest):.6g} deg/s; were deg/s meant under rate_rad_s?"
-            for text, rate in asks.items()
-            if rate > fastest * (1.0 + 1e-9)
-        ]
+        asks = {
+            one.text: speed_note(Profile(one.command, in_radians=False), RateTable(), f"'{one.text}'")
+            for one in plans
+            if one.command is not None
+        }
+        return [f"{note}; were deg/s meant under rate_rad_s?" for note in asks.values() if note is not None]
     if flown is None or plant == "spin_down":
         return []
     body, place, throw = flown

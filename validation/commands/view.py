@@ -119,8 +119,9 @@ def _replay(recording: Path | None, disc: str | None, model: Path | None, throw:
     from discsim.validation.viewing.replay import replay_motion, replay_recording
 
     if recording is not None:
-        replay = replay_recording(recording)
-        for found in path_findings(read_recording(recording)):
+        read = read_recording(recording)
+        replay = replay_recording(read)
+        for found in path_findings(read):
             typer.echo(found.sentence)
         return replay
     body, environment, stated = disc_to_fly(disc, model, load_user_effects(own))

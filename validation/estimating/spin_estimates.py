@@ -30,7 +30,7 @@ from discsim.files import write_pieces, write_text
 from discsim.recording import Recording
 from discsim.result import Result
 from discsim.threads import one_thread
-from discsim.validation.diagnosis.setup import find_setup_faults, suspected_fault
+from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
 from discsim.validation.estimating.page import write_estimate_page
 from discsim.validation.reporting.figures import draw_differences, draw_rates, new_figure, save_figure
 from discsim.validation.reporting.run import json_text
@@ -138,10 +138,7 @@ def estimate_spin(
     setup = find_setup_faults(given)
     data = setup.recordings[0]
     rates, left_out = estimate_all(data, method, options or Options(), progress)
-    notes = [f"{fault.sentence}; the estimates are of the readings so corrected" for fault in setup.faults]
-    if (perhaps := suspected_fault(setup)) is not None:
-        notes.append(f"{perhaps.sentence}; the estimates are of the readings as written")
-    notes += all_notes(data)
+    notes = [*setup_notes(setup, "the estimates are of"), *all_notes(data)]
     return SpinEstimates(data, method, tuple(rates), left_out, tuple(disagreements(rates)), tuple(notes))
 
 

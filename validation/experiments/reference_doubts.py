@@ -14,7 +14,7 @@ from discsim.recording import Recording, Samples
 from discsim.validation.estimating.scored import multiple_of
 from discsim.validation.scenarios.rate_table import papers_rates
 
-__all__ = ["reference_notes", "refuse_wrong_reference"]
+__all__ = ["rates_beside_reference", "reference_notes"]
 
 #: sensors that show a spin
 _SHOWING = ("magnetometer", "accelerometer", "gyroscope")
@@ -33,10 +33,11 @@ _LEFT, _SHORTEST = 0.2, 0.5
 _VALUES = 4000
 
 
-def refuse_wrong_reference(recording: Recording, profile: Samples) -> None:
-    """Raise `InputError` where a recording shows no spin, or its reference has another unit of time or of rate.
+def rates_beside_reference(recording: Recording, profile: Samples) -> dict[str, YawRate]:
+    """Return the rates that a recording's sensors give by the paper's methods, whose truth its reference can be.
 
-    ``profile`` is the reference, t (n,) s and rate (n,) rad/s.
+    ``profile`` is the reference, t (n,) s and rate (n,) rad/s. Raises `InputError` where the recording shows no spin,
+    or the reference has another unit of time or of rate.
     """
     where = recording.path or recording.name
     ends = [float(recording.need(name).t[-1]) for name in _SHOWING if name in recording]
@@ -49,7 +50,8 @@ def refuse_wrong_reference(recording: Recording, profile: Samples) -> None:
             f"{where}: rate_reference.csv ends at {lasts:.6g} s, the sensors at {shorter:.6g} s; expected one clock, "
             "in seconds (are the times of one of them milliseconds?)"
         )
-    beside = dict(_beside(papers_rates(recording), profile))
+    rates = papers_rates(recording)
+    beside = dict(_beside(rates, profile))
     units = {name: _UNITS.get(multiple_of(*both) or 0.0) for name, both in beside.items()}
     saying = [name for name, unit in units.items() if unit is not None]
     if saying and not any(_agree(*both) for both in beside.values()):
@@ -57,6 +59,7 @@ def refuse_wrong_reference(recording: Recording, profile: Samples) -> None:
             f"{where}: rate_reference.csv is in {units[saying[0]]}, by {', '.join(saying)}; expected rad/s under the "
             "name rate_rad_s"
         )
+    return rates
 
 
 def reference_notes(rates: Mapping[str, YawRate], profile: Samples) -> list[str]:

@@ -18,9 +18,10 @@ from discsim.recording import Recording, Samples, read_recording, write_recordin
 from discsim.rig import measured_profile
 from discsim.sensors import Accelerometer, Gyroscope, Instruments, Magnetometer, RateReference, Sensor
 from discsim.sensors.sampling import Noise, Sampling
+from discsim.validation.checking.finding import doubts_of
 from discsim.validation.checking.statements import statement_findings
 from discsim.validation.diagnosis.setup import find_setup_faults
-from discsim.validation.experiments.reference_doubts import reference_notes, refuse_wrong_reference
+from discsim.validation.experiments.reference_doubts import rates_beside_reference, reference_notes
 from discsim.validation.reporting.figures import colour, new_figure, save_figure, symmetric_log
 from discsim.validation.reporting.markdown import literal
 from discsim.validation.scenarios.rate_table import (
@@ -83,13 +84,15 @@ def read_run(folder: Path) -> MeasuredRun:
     recording = read_recording(folder)
     if recording.plant != "rate_table":
         raise InputError(f"{folder}: plant is {recording.plant}; expected rate_table")
-    refuse_wrong_reference(recording, measured_profile(recording))
+    rates = rates_beside_reference(recording, measured_profile(recording))
     setup = find_setup_faults([recording])
     data = setup.recordings[0]
     notes = [f"{fault.sentence}; scored are the readings so corrected" for fault in setup.faults]
-    notes += [found.sentence for found in statement_findings(data) if found.severity != "note"]
+    notes += doubts_of(statement_findings(data))
     profile = measured_profile(data)
-    return MeasuredRun(data, (*notes, *reference_notes(papers_rates(data), profile)), profile)
+    if data is not recording:
+        rates = papers_rates(data)
+    return MeasuredRun(data, (*notes, *reference_notes(rates, profile)), profile)
 
 
 def _sensor(name: str, recording: Recording) -> Sensor | None:

@@ -84,7 +84,7 @@ class Sampled:
         late = delay(values, self.sensor, self.written)
         if self.lost is not None and self.lost.size == late.size:
             late = late - self.lost / self.rate_hz
-        return np.resize(late, self.instants.size) if self.tau > 0 else late
+        return np.tile(late, self.instants.size // late.size) if self.tau > 0 and late.size else late
 
     def time_slope(
         self, runner: Runner, flat: FloatArray, own: FloatArray, values: Values, current: Trajectory

@@ -124,32 +124,32 @@ class RecordLines:
         self._begun = 0
         self._several = False
 
-    def add(self, number: int, line: str) -> tuple[list[tuple[int, list[str]]], list[tuple[int, int]]]:
-        """Take a line; return the record that it ends, and what is broken off, each with its first line's number.
+    def add(self, number: int, line: str) -> tuple[tuple[int, list[str]] | None, list[tuple[int, int]]]:
+        """Take a line; return the record that it ends, if any, and what is broken off.
 
-        Of a record the cells come with it, of what is broken off their count. Between the lines of records over
-        several there may be any others, as blank ones and headings.
+        A record's first line comes with its cells, that of what is broken off with their count. Between the lines of
+        records over several there may be any others, as blank ones and headings.
         """
         pairs = labelled_cells(line)
         if not pairs and (self._several or self._cells):
-            return [], []
+            return None, []
         broken = []
         if self._cells:
-            more = pairs[1:] if self._names[0] == "time" and pairs[:1] and pairs[0][0] == "time" else pairs
+            more = pairs[1:] if pairs[0][0] == "time" else pairs
             if self._fits(more):
                 pairs, self._several = more, True
             else:
                 broken.append((self._begun, len(self._cells)))
                 self._cells = []
         if not self._fits(pairs):
-            return [], [*broken, (number, len(pairs))] if line.strip() else broken
+            return None, [*broken, (number, len(pairs))] if line.strip() else broken
         if not self._cells:
             self._begun = number
         self._cells += [cell for _, cell in pairs]
         if len(self._cells) < len(self._names):
-            return [], broken
+            return None, broken
         record, self._cells = self._cells, []
-        return [(self._begun, record)], broken
+        return (self._begun, record), broken
 
     def _fits(self, pairs: Sequence[tuple[str, str]]) -> bool:
         """Tell whether cells are the next ones of a record; the columns may leave out the units behind them."""

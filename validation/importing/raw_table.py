@@ -243,49 +243,41 @@ class _Rows:
 
     def _one_by_one(self, lines: list[str], first: int) -> tuple[IntArray, IntArray, list[list[str]]]:
         """Return numbers, lines and cells of the sound rows; what is damaged is listed."""
-        numbers: list[int] = []
-        places: list[int] = []
-        rows: list[list[str]] = []
-        for line, whole in enumerate(lines, start=first):
-            if self.records is not None:
-                self._labelled(line, whole, self.records, numbers, places, rows)
-                continue
-            self._tell_blank(line)
-            text = _without_comment(self.path, line, whole, self.layout, self.repairs)
-            if not text.strip():
-                self.blank = line if not whole.strip() else None
-                continue
-            cells = self.layout.cells(text)
-            if len(cells) == self.width:
+        numbers, places, rows = [], [], []
+        for line, text in enumerate(lines, start=first):
+            sound = self._alone(line, text) if self.records is None else self._ended(line, text, self.records)
+            if sound is not None:
                 numbers.append(self.total)
-                places.append(line)
-                rows.append(cells)
-            else:
-                what = f"data row {self.total} has {len(cells)} cells, expected {self.width}"
-                self.repairs.add("width", self.path, line, what, "row left out")
-            self.total += 1
+                places.append(sound[0])
+                rows.append(sound[1])
+                self.total += 1
         return np.array(numbers, dtype=np.int64), np.array(places, dtype=np.int64), rows
 
-    def _labelled(
-        self,
-        line: int,
-        text: str,
-        records: RecordLines,
-        numbers: list[int],
-        places: list[int],
-        rows: list[list[str]],
-    ) -> None:
-        """Add the record that a line of names and numbers ends to the rows; what breaks off is listed."""
+    def _alone(self, line: int, whole: str) -> tuple[int, list[str]] | None:
+        """Return the line and cells of a row in a line of its own; None for what is none, or damaged."""
+        self._tell_blank(line)
+        text = _without_comment(self.path, line, whole, self.layout, self.repairs)
+        if not text.strip():
+            self.blank = line if not whole.strip() else None
+            return None
+        cells = self.layout.cells(text)
+        if len(cells) == self.width:
+            return line, cells
+        self._leave_out(line, f"{len(cells)} cells")
+        return None
+
+    def _ended(self, line: int, text: str, records: RecordLines) -> tuple[int, list[str]] | None:
+        """Return the first line and the cells of the row that a line of names and numbers ends; None if none."""
         ended, broken = records.add(line, text)
         for place, count in broken:
-            what = f"data row {self.total} has {count} cells under names of its columns, expected {self.width}"
-            self.repairs.add("width", self.path, place, what, "row left out")
-            self.total += 1
-        for place, cells in ended:
-            numbers.append(self.total)
-            places.append(place)
-            rows.append(cells)
-            self.total += 1
+            self._leave_out(place, f"{count} cells under names of its columns")
+        return ended
+
+    def _leave_out(self, line: int, has: str) -> None:
+        """List a row that is left out, which keeps its number."""
+        what = f"data row {self.total} has {has}, expected {self.width}"
+        self.repairs.add("width", self.path, line, what, "row left out")
+        self.total += 1
 
     def _tell_blank(self, line: int | None) -> None:
         """List the blank line before this one: the file's last line may be blank."""

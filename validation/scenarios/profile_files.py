@@ -66,9 +66,8 @@ def _knots(path: Path, told: Told) -> Samples:
 def speed_note(profile: Profile, table: RateTable, name: str = "--profile") -> str | None:
     """Return what to say of a profile that asks for more than the table gives, and None where it does not.
 
-    ``name`` is what the profile is called.
-
-    Of a table whose fastest rate is not stated the fastest of the shipped ones is taken (``models/tables``).
+    ``name`` is what the profile is called. Of a table whose fastest rate is not stated the fastest of the shipped ones
+    is taken (``models/tables``).
     """
     asked = float(np.max(np.abs(profile.knots.value)))
     own = table.drive.largest_rate

@@ -286,10 +286,11 @@ def read_plan(path: Path, *, count: int | None = None, seed: int | None = None) 
     stated_seed = _whole(top, "seed", 0, default=0)
     drawn = top.flag("drawn")
     fft_step = _whole(top, "fft_step", 1, default=16)
-    plant, profile, duration = _read_truth(_need(top, "truth"))
+    plant, stated, duration = _read_truth(_need(top, "truth"))
+    profile = stated
     files: dict[str, str] = {}
     axes = _read_axes(top.table("axes"), plant, path.parent, files)
-    named, top_states_rates = {axis.name for axis in axes}, profile is not None
+    named = {axis.name for axis in axes}
     if len(named & {"magnet_m", "magnet_A_m2"}) == 1:
         raise top.error("axes", "a magnet needs both axes.magnet_m (its distance) and axes.magnet_A_m2 (its moment)")
     if "profile" in named:
@@ -308,7 +309,6 @@ def read_plan(path: Path, *, count: int | None = None, seed: int | None = None) 
     if profile is not None and not _level(profile):
         raise InputError.at(path, None, "truth: no plateau is long enough to be scored; expected hold_s above 1.4")
     seed = stated_seed if seed is None else seed
-    stated = profile if top_states_rates else None
     notes = plan_notes(axes, stated, path.parent)
     plan = Plan(name, plant, axes, mounts, estimators, seed, drawn, fft_step, profile, duration, files, notes)
     for case in plan.cases:

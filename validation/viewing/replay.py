@@ -15,7 +15,7 @@ from discsim.errors import InputError
 from discsim.estimators.methods import best
 from discsim.frames import body_to_ned, conjugate, multiply, rotation_vector, turn
 from discsim.motion import Motion
-from discsim.recording import COMMAND_HEADER, Recording, Samples, read_csv, read_recording
+from discsim.recording import COMMAND_HEADER, Recording, Samples, read_csv
 from discsim.validation.reporting.truth import FLIGHT_HEADER
 
 __all__ = ["Replay", "replay_motion", "replay_recording"]
@@ -108,17 +108,16 @@ def replay_motion(motion: Motion, diameter: float, note: str) -> Replay:
     return Replay("disc.xml", motion.t, position, motion.attitude, motion.rate[:, 2], diameter, (note,))
 
 
-def replay_recording(folder: Path) -> Replay:
+def replay_recording(recording: Recording) -> Replay:
     """Return what a recording tells of its motion: the truth beside it, else what its sensors saw.
 
     ``truth.csv`` gives a flight whole and a rig's rate, which is integrated. Without it a rig turns by its
     rate_reference, its command, or its estimated rate; a flight moves along its track or gps, drawn level because
     attitude is unknown, and turns by its estimated rate. Raises `InputError` where nothing tells the motion.
     """
-    recording = read_recording(folder)
-    truth = folder / "truth.csv"
+    truth = None if recording.path is None else recording.path / "truth.csv"
     rig = recording.plant in ("rate_table", "spin_down")
-    if truth.exists():
+    if truth is not None and truth.exists():
         return _true_rig(truth) if rig else _true_flight(truth, _diameter(recording))
     return _measured_rig(recording) if rig else _measured_flight(recording)
 

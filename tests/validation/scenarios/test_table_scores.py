@@ -23,7 +23,7 @@ from discsim.recording import Samples, read_recording, write_recording
 from discsim.rig import read_profile, turn_table
 from discsim.sensors import Instruments, record
 from discsim.validation.cli import main
-from discsim.validation.experiments.reference_doubts import refuse_wrong_reference
+from discsim.validation.experiments.reference_doubts import rates_beside_reference
 from discsim.validation.experiments.table_recording import compare, differences, lines_through, read_run
 from discsim.validation.scenarios.rate_table import Bench, plateaus, rate_table_checks, run_rate_table, with_all_methods
 from discsim.validation.scenarios.table_scores import delay_of, score_rates
@@ -226,7 +226,7 @@ class TestMeasuredRun:
         whole = read_recording(measured)
         alone = replace(whole, samples={"rate_reference": whole.need("rate_reference")})
         with pytest.raises(InputError, match="no sensor that shows a spin"):
-            refuse_wrong_reference(alone, whole.need("rate_reference"))
+            rates_beside_reference(alone, whole.need("rate_reference"))
 
     def test_lines_through_a_log_leave_no_more_than_its_scatter(self, measured):
         log = read_run(measured).profile

@@ -23,7 +23,7 @@ from discsim.errors import InputError
 from discsim.estimators.rate import YawRate
 from discsim.files import model_file
 from discsim.frames import body_to_ned, flip_yz, rotation_error, rotation_vector, turn
-from discsim.recording import Recording, Samples, SensorSheet, write_recording
+from discsim.recording import Recording, Samples, SensorSheet, read_recording, write_recording
 from discsim.rig import turn_table
 from discsim.shipped import load_disc, load_throw
 from discsim.validation.cli import main
@@ -47,6 +47,11 @@ from discsim.validation.viewing.scene import (
 DRIVER, FIELD = load_disc("driver")
 ULTRASTAR, _ = load_disc("ultrastar")
 Z = np.array([0.0, 0.0, 1.0])
+
+
+def replayed(folder: Path) -> Replay:
+    """Return what the recording in a folder tells of its motion."""
+    return replay_recording(read_recording(folder))
 
 
 def level(rate: float = 10.0, heading: float = 0.0, speed: float = 20.0, duration: float = 2.0) -> Replay:
@@ -97,7 +102,7 @@ def test_a_truth_file_brings_back_position_and_attitude_between_its_rows(tmp_pat
     """Rows are 1 ms apart: linear in position errs by a dt^2/8, some 4e-6 m at 30 m/s^2, attitude by less than that."""
     folder = write(tmp_path / "throw", "flight", {"gyroscope": Samples(flight.t, flight.rate)})
     write_flight_truth(folder / "truth.csv", flight)
-    replay = replay_recording(folder)
+    replay = replayed(folder)
     t = np.linspace(0.0101, 0.3997, 97)
     truth = flight.at(t)
     np.testing.assert_allclose(replay.position_at(t), truth.position, atol=1e-5)
@@ -120,7 +125,7 @@ def test_a_rig_s_true_rate_is_integrated_to_its_angle(tmp_path):
     motion = turn_table(knots, Environment())
     folder = write(tmp_path / "table", "rate_table", {"rate_reference": Samples(motion.t, motion.rate[:, 2])}, knots)
     write_rate_truth(folder / "truth.csv", motion)
-    replay = replay_recording(folder)
+    replay = replayed(folder)
     t = np.array([0.1, 0.5, 0.93])
     expected = turn(np.where(t < 0.2, 100 * t**2, 4 + 40 * (t - 0.2))[:, None] * Z)
     # the table follows its ramps without error; trapezoids of 1 ms rows resampled each 2 ms leave 1e-4 rad at knots
@@ -132,9 +137,9 @@ def test_without_truth_a_rig_turns_by_its_read_out_and_only_then_by_its_command(
     t = np.linspace(0.0, 1.0, 101)
     command = Samples(np.array([0.0, 1.0]), np.array([5.0, 5.0]))
     gaps = np.where((t > 0.3) & (t < 0.4), np.nan, 6.0)
-    read = replay_recording(write(tmp_path / "a", "rate_table", {"rate_reference": Samples(t, gaps)}, command))
+    read = replayed(write(tmp_path / "a", "rate_table", {"rate_reference": Samples(t, gaps)}, command))
     accelerometer = {"accelerometer": Samples(t, np.zeros((t.size, 3)))}
-    told = replay_recording(write(tmp_path / "b", "rate_table", accelerometer, command))
+    told = replayed(write(tmp_path / "b", "rate_table", accelerometer, command))
     np.testing.assert_allclose(rotation_vector(read.attitude_at(np.array([0.5])))[0], 3.0 * Z, atol=1e-9)
     np.testing.assert_allclose(rotation_vector(told.attitude_at(np.array([0.5])))[0], 2.5 * Z, atol=1e-9)
     assert read.notes[0].startswith("rate_reference of a")
@@ -150,7 +155,7 @@ def test_a_measured_flight_is_drawn_level_on_its_track_and_says_what_is_unknown(
     alive = 1e-10 * np.sin(np.arange(201.0))
     gyroscope = Samples(np.linspace(0.0, 2.0, 201), np.tile([0.0, 0.0, -12.0], (201, 1)) + alive[:, None])
     samples = {"gps": Samples(t, gps), "track": Samples(t, track), "gyroscope": gyroscope}
-    replay = replay_recording(write(tmp_path / "seen", "flight", samples))
+    replay = replayed(write(tmp_path / "seen", "flight", samples))
     np.testing.assert_allclose(replay.position_at(np.array([0.35, 1.0])), [[3.5, 0, -2.35], [10, 0, -3]], atol=1e-9)
     z_ned = body_to_ned(replay.attitude_at(t))[:, :, 2]
     np.testing.assert_allclose(z_ned, np.tile(Z, (t.size, 1)), atol=1e-12)
@@ -163,7 +168,7 @@ def test_a_spin_without_direction_or_with_gaps_says_so(tmp_path, monkeypatch):
     rate = np.where((t > 0.395) & (t < 0.495), np.nan, 60.0)
     monkeypatch.setattr(replays, "best", lambda recording: YawRate("accelerometer", t, rate, rate / 100))
     gyroscope = {"gyroscope": Samples(t, np.zeros((101, 3)))}
-    replay = replay_recording(write(tmp_path / "blind", "free_spin", gyroscope))
+    replay = replayed(write(tmp_path / "blind", "free_spin", gyroscope))
     np.testing.assert_allclose(replay.rate_at(t), 60.0, rtol=1e-9)
     assert not replay.travels
     assert replay.notes[0] == "position unknown: drawn in one place"
@@ -173,7 +178,7 @@ def test_a_spin_without_direction_or_with_gaps_says_so(tmp_path, monkeypatch):
 def test_a_track_alone_is_shown_without_spin(tmp_path):
     t = np.linspace(0.0, 1.0, 11)
     track = {"track": Samples(t, np.column_stack((9 * t, 0 * t, 0 * t - 2)))}
-    replay = replay_recording(write(tmp_path / "far", "flight", track))
+    replay = replayed(write(tmp_path / "far", "flight", track))
     assert np.all(np.isnan(replay.rate))
     assert replay.notes[2] == "spin unknown: not drawn"
     assert "deg/s" not in Scene(replay).caption(0.5)
@@ -182,7 +187,7 @@ def test_a_track_alone_is_shown_without_spin(tmp_path):
 def test_a_recording_that_tells_no_motion_is_refused(tmp_path):
     nothing = {"track": Samples(np.array([0.0, 1.0]), np.full((2, 3), np.nan))}
     with pytest.raises(InputError, match="nothing tells the motion; expected track or gps"):
-        replay_recording(write(tmp_path / "dark", "flight", nothing))
+        replayed(write(tmp_path / "dark", "flight", nothing))
 
 
 def test_a_span_starts_and_ends_where_it_was_asked_to():

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import catalogued
+from discsim.effects.catalogue import Row, catalogued
 from discsim.effects.events import EVENT_WIDTH_S, Impulse, SpinStep
 from discsim.validation.diagnosis.detectors.local_problem import LocalProblem, LocalProblems, gain_of, peaks
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, detected
@@ -36,6 +36,13 @@ _MOVES: Mapping[type[Any], Callable[[Layout], slice | int | None]] = {
     Impulse: lambda layout: layout.velocity,
     SpinStep: lambda layout: layout.spin,
 }
+#: and what of it that leads on, in time; a spin turns a body about its last axis
+_LEADS: Mapping[type[Any], Callable[[Layout], slice | int | None]] = {
+    Impulse: lambda layout: layout.position,
+    SpinStep: lambda layout: layout.attitude if layout.yaw is None else layout.yaw,
+}
+#: a recording, and what event is asked for in it
+_Task: TypeAlias = tuple[int, Row]
 
 
 def _jumps(problem: LocalProblem, kind: type[Any], parts: int) -> tuple[FloatArray, FloatArray]:
@@ -76,9 +83,8 @@ def _jump(layout: Layout, kind: type[Any], since: float) -> FloatArray:
     assert places is not None
     directions = layout.directions_of(places)
     change = np.eye(layout.directions)[:, list(directions)]
-    leads = layout.position if kind is Impulse else layout.attitude if layout.yaw is None else layout.yaw
+    leads = _LEADS[kind](layout)
     if leads is not None:
-        # a spin turns about the body's last axis
         led = layout.directions_of(leads)[-len(directions) :]
         change[list(led), range(len(directions))] -= since
     return change
@@ -128,22 +134,20 @@ def events(problems: LocalProblems, least: float = DETECTORS.least) -> list[Scre
     """
     recordings = [trajectory.recording for trajectory in problems.fit.trajectories]
     layout, times = problems.fit.plant.layout, problems.fit.plant.durations
-    kinds: list[tuple[str, type[Any], tuple[str, ...]]] = [
-        (row.id, row.type, tuple(name for name in row.parameters if name != "t_s"))
-        for row in detected(recordings, "events")
-        if _MOVES[row.type](layout) is not None
-    ]
+    kinds = [row for row in detected(recordings, "events") if _MOVES[row.type](layout) is not None]
     # where motion may wander from segment to segment, a jump between two of them is nothing new
     parts = _PARTS if np.any(problems.fit.defects.allowed) else 1
 
-    def scanned(task: tuple[int, tuple[str, type[Any], tuple[str, ...]]]) -> tuple[FloatArray, FloatArray]:
-        i, (id, kind, _) = task
-        return (np.zeros(0), np.zeros(0)) if problems.has(id, i) else _jumps(problems.by_recording[i], kind, parts)
+    def scanned(task: _Task) -> tuple[FloatArray, FloatArray]:
+        i, row = task
+        if problems.has(row.id, i):
+            return np.zeros(0), np.zeros(0)
+        return _jumps(problems.by_recording[i], row.type, parts)
 
-    def one(task: tuple[int, tuple[str, type[Any], tuple[str, ...]]], instants: FloatArray) -> ScreenedCandidate | None:
-        i, (id, _, names) = task
+    def one(task: _Task, instants: FloatArray) -> ScreenedCandidate | None:
+        i, row = task
         problem = problems.by_recording[i]
-        candidate = CandidateEffect(id, tuple(Column(id, name, 0.02) for name in names))
+        candidate = CandidateEffect(row.id, tuple(Column(row.id, n, 0.02) for n in row.parameters if n != "t_s"))
         end = float(problem.trajectory.nodes[-1])
         near = np.unique(instants.round(4))
         near = near[(near > max(0.01, times.event_from)) & (near < end)]
@@ -160,12 +164,12 @@ def events(problems: LocalProblems, least: float = DETECTORS.least) -> list[Scre
     def about(instants: FloatArray, gain: FloatArray) -> FloatArray:
         return np.concatenate([instants[j] + times.event_near * np.linspace(-1.0, 1.0, 13) for j in peaks(gain, 2)])
 
-    tasks = [(i, kind) for i in problems.by_recording for kind in kinds]
+    tasks = [(i, row) for i in problems.by_recording for row in kinds]
     gains = mapped(scanned, tasks)
     promising = [(t, *g) for t, g in zip(tasks, gains, strict=True) if g[1].size and g[1].max() >= least - _SHORT_OF]
     promising = sorted(promising, key=lambda item: -float(item[2].max()))[: DETECTORS.followed]
     asked = [(task, about(instants, gain)) for task, instants, gain in promising]
-    pushed = [task for task in tasks if task[1][0] == _PUSH and not problems.has(_PUSH, task[0])]
+    pushed = [task for task in tasks if task[1].id == _PUSH and not problems.has(_PUSH, task[0])]
     needles = [(task, *_needles(problems.by_recording[task[0]])) for task in pushed]
     felt = [(task, at, beyond) for task, at, beyond in needles if beyond.size and beyond.max() >= least - _SHORT_OF]
     for task, at, beyond in sorted(felt, key=lambda item: -float(item[2].max()))[: DETECTORS.followed]:
@@ -173,7 +177,7 @@ def events(problems: LocalProblems, least: float = DETECTORS.least) -> list[Scre
         asked.append((task, sharp.ravel()))
     found: dict[tuple[str, int], ScreenedCandidate] = {}
     for (task, _), event in zip(asked, mapped(one, *zip(*asked, strict=True)) if asked else [], strict=True):
-        place = task[1][0], task[0]
+        place = task[1].id, task[0]
         if event is not None and (place not in found or event.gain > found[place].gain):
             found[place] = event
     return sorted(found.values(), key=gain_of, reverse=True)

@@ -32,6 +32,7 @@ __all__ = [
     "find_setup_faults",
     "may_be_physics",
     "said",
+    "setup_notes",
     "suspected_fault",
     "with_likeliest_fault",
     "with_turned_board",
@@ -159,6 +160,17 @@ def suspected_fault(findings: SetupFindings) -> SuspectedFault | None:
         return None
     likeliest = _fault(ranking.as_written, tuple(item for item in found if item.kind != "rival"), recordings)
     return SuspectedFault(likeliest.effect, likeliest.gain, likeliest.heldout_gain, likeliest.twins)
+
+
+def setup_notes(findings: SetupFindings, done: str) -> list[str]:
+    """Return what a reader must know of the faults, a line each: of those mended, and of one that is suspected.
+
+    ``done`` says what is done with the readings (``"the estimates are of"``).
+    """
+    notes = [f"{fault.sentence}; {done} the readings so corrected" for fault in findings.faults]
+    if (perhaps := suspected_fault(findings)) is not None:
+        notes.append(f"{perhaps.sentence}; {done} the readings as written")
+    return notes
 
 
 def with_likeliest_fault(findings: SetupFindings) -> SetupFindings | None:
