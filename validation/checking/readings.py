@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from discsim.glitches import FASTEST_SPIN, beyond_spin, glitches
 from discsim.recording import SENSORS, Recording, Samples
 from discsim.validation.checking.finding import Finding
 from discsim.validation.checking.statements import FIELD
+from discsim.validation.diagnosis.setup.reference import reference_doubts
 
 __all__ = ["at_rest", "path_findings", "reading_findings"]
 
@@ -54,7 +55,11 @@ def reading_findings(recording: Recording) -> Iterator[Finding]:
     """Yield what the readings of a recording show that cannot be, or is unlikely."""
     yield from _force(recording)
     yield from _field(recording)
-    yield from _rate(recording)
+    doubts = list(reference_doubts(recording))
+    for doubt in doubts:
+        where = doubt.file.removesuffix(".csv")
+        yield Finding(f"{where}.{doubt.kind}", "error", where, f"it {doubt.what}", doubt.expected, doubt.remedy)
+    yield from _rate(recording, ("gyroscope",) if doubts else ("gyroscope", "rate_reference"))
     yield from path_findings(recording)
 
 
@@ -174,8 +179,8 @@ def _field(recording: Recording) -> Iterator[Finding]:
         )
 
 
-def _rate(recording: Recording) -> Iterator[Finding]:
-    for sensor in ("gyroscope", "rate_reference"):
+def _rate(recording: Recording, sensors: Sequence[str]) -> Iterator[Finding]:
+    for sensor in sensors:
         samples = recording.get(sensor)
         if samples is None:
             continue

@@ -130,7 +130,8 @@ def diagnose_recordings(
     Raises
     ------
     InputError
-        For recordings of different plants, and for a magnetometer in a field that is not stated.
+        For recordings of different plants, for a magnetometer in a field that is not stated, and for a rate reference
+        or a command that the sensors beside it contradict (its unit, its sign, its clock).
     """
     if name is None:
         name = Path(recordings).resolve().name if isinstance(recordings, Path | str) else "recordings"

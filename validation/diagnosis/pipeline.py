@@ -9,6 +9,7 @@ import numpy as np
 from discsim.effects.own import UserEffect
 from discsim.effects.sensors import DroppedSamples
 from discsim.effects.setup import TimeOffset
+from discsim.errors import InputError
 from discsim.recording import Recording
 from discsim.validation.diagnosis.assemble import outcome_of
 from discsim.validation.diagnosis.consistency.early_verdict import contradiction_after, contradiction_in
@@ -77,9 +78,11 @@ def _prepared_first(question: Question) -> Prepared:
     """Return recordings as they were meant by the faults of their setup.
 
     Where rows must be counted no relation tells that a board is turned: it is where its spin is seen aslant and rows
-    are counted along its axes.
+    are counted along its axes. Raises `InputError` for a rate reference that the sensors beside it contradict.
     """
     setup = find_setup_faults(question.recordings)
+    if setup.doubts:
+        raise InputError(setup.doubts[0])
     turned = with_turned_board(setup)
     ready = None if turned is None else prepared_under(turned, question)
     return prepared_under(setup, question) if ready is None or ready.rows is None else ready

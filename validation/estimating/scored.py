@@ -18,7 +18,7 @@ from discsim.validation.reporting.html import Section, Tone, write_report
 from discsim.validation.reporting.run import json_text
 from discsim.validation.reporting.scores import Score, at_most, score
 
-__all__ = ["FIGURES", "RateErrors", "ScoredRates", "multiple_of", "score_rates"]
+__all__ = ["FIGURES", "RateErrors", "ScoredRates", "score_rates"]
 
 
 class RateErrors(NamedTuple):
@@ -273,7 +273,7 @@ _MISTAKEN: Mapping[float, str] = {
 _MULTIPLE = 0.02
 
 
-def multiple_of(measured: FloatArray, actual: FloatArray) -> float | None:
+def _multiple_of(measured: FloatArray, actual: FloatArray) -> float | None:
     """Return which multiple of a truth (n,) rates (n,) are by a wrong unit or sign; None where they are none."""
     of_truth = float(actual @ actual)
     ratio = float(measured @ actual) / of_truth if of_truth > 0.0 else 1.0
@@ -286,7 +286,7 @@ def multiple_of(measured: FloatArray, actual: FloatArray) -> float | None:
 
 def _note(measured: FloatArray, actual: FloatArray, outside: int, values: int) -> str:
     """Return what looks wrong in how rates (n,) beside a truth (n,) are written; empty where nothing does."""
-    if (multiple := multiple_of(measured, actual)) is not None:
+    if (multiple := _multiple_of(measured, actual)) is not None:
         return f"the rates are {_MISTAKEN[multiple]}"
     if 2 * outside > values:
         return f"{outside} of {values} values lie outside the truth's time and are not scored"

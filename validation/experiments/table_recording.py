@@ -20,8 +20,8 @@ from discsim.sensors import Accelerometer, Gyroscope, Instruments, Magnetometer,
 from discsim.sensors.sampling import Noise, Sampling
 from discsim.validation.checking.finding import doubts_of
 from discsim.validation.checking.statements import statement_findings
-from discsim.validation.diagnosis.setup import find_setup_faults
-from discsim.validation.experiments.reference_doubts import rates_beside_reference, reference_notes
+from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
+from discsim.validation.diagnosis.setup.reference import reference_doubts
 from discsim.validation.reporting.figures import colour, new_figure, save_figure, symmetric_log
 from discsim.validation.reporting.markdown import literal
 from discsim.validation.scenarios.rate_table import (
@@ -36,6 +36,8 @@ from discsim.validation.scenarios.table_scores import Band, TableScores, score_r
 
 __all__ = ["Comparison", "MeasuredRun", "compare", "differences", "draw_comparison", "lines_through", "read_run"]
 
+#: sensors that show a spin
+_SHOWING = ("magnetometer", "accelerometer", "gyroscope")
 #: estimates this far apart share no data, s: the window of the paper's method
 _APART = 1.28
 #: a difference of two biases by this many of its standard deviations is told: sound runs have it once in 370 bands
@@ -84,15 +86,15 @@ def read_run(folder: Path) -> MeasuredRun:
     recording = read_recording(folder)
     if recording.plant != "rate_table":
         raise InputError(f"{folder}: plant is {recording.plant}; expected rate_table")
-    rates = rates_beside_reference(recording, measured_profile(recording))
+    if not any(name in recording for name in _SHOWING):
+        raise InputError(f"{folder}: no sensor that shows a spin; expected some of {', '.join(_SHOWING)}")
+    for doubt in reference_doubts(recording):
+        if doubt.kind in ("units", "clock"):
+            raise InputError(f"{folder}: {doubt.sentence}")
     setup = find_setup_faults([recording])
     data = setup.recordings[0]
-    notes = [f"{fault.sentence}; scored are the readings so corrected" for fault in setup.faults]
-    notes += doubts_of(statement_findings(data))
-    profile = measured_profile(data)
-    if data is not recording:
-        rates = papers_rates(data)
-    return MeasuredRun(data, (*notes, *reference_notes(rates, profile)), profile)
+    notes = (*setup_notes(setup, "scored are"), *doubts_of(statement_findings(data)))
+    return MeasuredRun(data, notes, measured_profile(data))
 
 
 def _sensor(name: str, recording: Recording) -> Sensor | None:

@@ -23,7 +23,6 @@ from discsim.recording import Samples, read_recording, write_recording
 from discsim.rig import read_profile, turn_table
 from discsim.sensors import Instruments, record
 from discsim.validation.cli import main
-from discsim.validation.experiments.reference_doubts import rates_beside_reference
 from discsim.validation.experiments.table_recording import compare, differences, lines_through, read_run
 from discsim.validation.scenarios.rate_table import Bench, plateaus, rate_table_checks, run_rate_table, with_all_methods
 from discsim.validation.scenarios.table_scores import delay_of, score_rates
@@ -206,7 +205,7 @@ class TestMeasuredRun:
     )
     def test_a_reference_in_another_unit_is_refused_by_what_the_sensors_read(self, measured, tmp_path, factor, unit):
         """Scores were written beside it, of thousands of deg/s, and the sensors were to be diagnosed."""
-        with pytest.raises(InputError, match=rf"rate_reference.csv is in {unit}, by fft.*expected rad/s"):
+        with pytest.raises(InputError, match=rf"rate_reference.csv is in {unit}, by magnetometer.*expected rad/s"):
             read_run(with_reference(measured, tmp_path, lambda t, rate: (t, factor * rate)))
 
     def test_a_reference_in_milliseconds_is_refused(self, measured, tmp_path):
@@ -217,16 +216,17 @@ class TestMeasuredRun:
     @pytest.mark.parametrize(("late", "way"), [(1.7, "1.70 s late"), (-0.9, "0.90 s early")])
     def test_a_reference_on_a_clock_of_its_own_is_noted(self, measured, tmp_path, late, way):
         (note,) = read_run(with_reference(measured, tmp_path, lambda t, rate: (t + late, rate))).notes
-        assert note.startswith(f"the rate reference is {way} beside")
+        assert f"rate_reference.csv is {way} beside" in note
 
     def test_a_sound_reference_is_believed_without_a_word(self, measured):
         assert read_run(measured).notes == ()
 
-    def test_a_reference_alone_is_refused(self, measured):
+    def test_a_reference_alone_is_refused(self, measured, tmp_path):
         whole = read_recording(measured)
         alone = replace(whole, samples={"rate_reference": whole.need("rate_reference")})
+        write_recording(alone, tmp_path / "alone")
         with pytest.raises(InputError, match="no sensor that shows a spin"):
-            rates_beside_reference(alone, whole.need("rate_reference"))
+            read_run(tmp_path / "alone")
 
     def test_lines_through_a_log_leave_no_more_than_its_scatter(self, measured):
         log = read_run(measured).profile

@@ -20,6 +20,7 @@ from discsim.effects.setup import Axes, BoardRotation, ClockUnit, GpsAxes, SiteF
 from discsim.recording import Recording, Samples
 from discsim.validation.diagnosis.setup.hypotheses import Hypothesis, Ranking, board_effect, chosen, hypotheses, pairs
 from discsim.validation.diagnosis.setup.proof import left_by_short_fit
+from discsim.validation.diagnosis.setup.reference import reference_doubts
 from discsim.validation.diagnosis.setup.remedy import MapAxes, remedy
 from discsim.validation.diagnosis.setup.rotation import board_turns, spin_axis
 from discsim.validation.diagnosis.setup.units import clock_unit, sensor_units
@@ -108,6 +109,8 @@ class SetupFindings:
     recordings: tuple[Recording, ...]
     #: physics that would make the sensors agree where no fault does: a lag, a clock, iron, of about this size
     hints: tuple[Effect, ...] = ()
+    #: what is wrong with rate references, by which nothing else is then judged
+    doubts: tuple[str, ...] = ()
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -129,28 +132,34 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
         current = tuple(corrected(one, [unit]) for one in current)
     for one in current:
         require_seconds(one)
-    if not all(_judgeable(one).samples for one in current):
+    doubts = [[doubt.sentence for doubt in reference_doubts(one)] for one in current]
+
+    def judged() -> list[Recording]:
+        return [_judgeable(one, reference=not own) for one, own in zip(current, doubts, strict=True)]
+
+    if not all(one.samples for one in judged()):
         return SetupFindings(tuple(faults), current)
-    for unit in sensor_units([_judgeable(one) for one in current]):
+    for unit in sensor_units(judged()):
         faults.append(SetupFault(unit, float("inf"), None))
         current = tuple(corrected(one, [unit]) for one in current)
     hints: tuple[Effect, ...] = ()
     for _ in range(MOST):
-        found, hints = _next([_judgeable(one) for one in current])
+        found, hints = _next(judged())
         if not found:
             break
         faults += found
         current = tuple(corrected(one, [fault.effect for fault in found]) for one in current)
-    return SetupFindings(tuple(faults), current, hints)
+    doubted = [f"{one.name}: {sentence}" for one, own in zip(current, doubts, strict=True) for sentence in own]
+    return SetupFindings(tuple(faults), current, hints, tuple(doubted))
 
 
 def suspected_fault(findings: SetupFindings) -> SuspectedFault | None:
     """Return the fault that makes sensors agree and gains too little to be named, as of one short throw; None if none.
 
-    Where some fault was found already, nothing more is suspected.
+    Where some fault was found already, or a rate reference is doubted, nothing more is suspected.
     """
     recordings = [_judgeable(one) for one in findings.recordings]
-    if findings.faults or findings.hints or not all(one.samples for one in recordings):
+    if findings.faults or findings.hints or findings.doubts or not all(one.samples for one in recordings):
         return None
     ranking = hypotheses(recordings, _SUSPECT)
     found = ranking.found
@@ -167,7 +176,8 @@ def setup_notes(findings: SetupFindings, done: str) -> list[str]:
 
     ``done`` says what is done with the readings (``"the estimates are of"``).
     """
-    notes = [f"{fault.sentence}; {done} the readings so corrected" for fault in findings.faults]
+    notes = [*findings.doubts]
+    notes += [f"{fault.sentence}; {done} the readings so corrected" for fault in findings.faults]
     if (perhaps := suspected_fault(findings)) is not None:
         notes.append(f"{perhaps.sentence}; {done} the readings as written")
     return notes
@@ -220,15 +230,18 @@ def _angle(one: FloatArray | None, other: FloatArray | None) -> float:
     return float(np.arccos(np.clip(abs(float(one @ other)), 0.0, 1.0)))
 
 
-def _judgeable(recording: Recording) -> Recording:
+def _judgeable(recording: Recording, *, reference: bool = True) -> Recording:
     """Return the part of a recording that is judged: where it turns most, if it is long.
 
-    Without its magnetometer where the field is not stated: nothing tells what it should read. Without a sensor of the
-    board of which an axis was never read, or every reading is the same: what is dead agrees with any order of axes.
+    Without a rate ``reference`` that is not believed, and without its magnetometer where the field is not stated:
+    nothing tells what it should read. Without a sensor of the board of which an axis was never read, or every reading
+    is the same: what is dead agrees with any order of axes.
     """
     kept = {name: own for name, own in recording.samples.items() if name not in BOARD or _alive(own)}
     if not recording.environment.field_known:
         kept.pop("magnetometer", None)
+    if not reference:
+        kept.pop("rate_reference", None)
     busiest = _busiest(kept, plant_of(recording).durations.setup)
     if busiest is not None:
         kept = {name: samples.between(*busiest) for name, samples in kept.items()}
