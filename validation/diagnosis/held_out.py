@@ -29,7 +29,10 @@ Choice: TypeAlias = Mapping[str, CandidateEffect | None]
 
 
 def choices_without_each(found: Search, less: Mapping[str, ContinuousFit]) -> list[Choice]:
-    """Return for each recording what the others choose; ``less`` are fits without each named effect, by its name."""
+    """Return for each recording what the others choose; ``less`` are fits without each named effect, by its name.
+
+    An effect without such a fit is not asked about: it is chosen.
+    """
     final, count = found.final, len(found.recordings)
     choices: list[dict[str, CandidateEffect | None]] = [
         {t.name: t for t in final.hypothesis.candidates} for _ in range(count)
@@ -38,7 +41,7 @@ def choices_without_each(found: Search, less: Mapping[str, ContinuousFit]) -> li
         return list(choices)
     here = _scores_without_each(final) if final.hypothesis.candidates else np.zeros(count)
     for candidate in final.hypothesis.candidates:
-        if not _by_others(candidate):
+        if candidate.name not in less or not _by_others(candidate):
             continue
         gain = _scores_without_each(less[candidate.name]) - here
         rivals = [rival for rival in found.rivals.get(candidate.name, ()) if possible(rival.fitted)]

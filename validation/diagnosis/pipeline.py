@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from discsim.validation.diagnosis.datasets import recording_names
 from discsim.validation.diagnosis.detectors.row_times import row_times
 from discsim.validation.diagnosis.inertia import with_inertia
 from discsim.validation.diagnosis.prepared import prepared
+from discsim.validation.diagnosis.refuted import without_refuted
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.result import Outcome
 from discsim.validation.diagnosis.selection.refits import told_to
@@ -66,6 +68,8 @@ def diagnose(
             if supposed is not None:
                 again = tried_under(supposed, question)
                 tried = again if stands(again) else tried
+        if tried.found is not None:
+            tried = replace(tried, found=without_refuted(tried.found))
         return outcome_of(judged(tried, progress), question)
 
 

@@ -30,7 +30,7 @@ from discsim.validation.diagnosis.result import (
     Verdict,
 )
 from discsim.validation.diagnosis.settings import SELECTION
-from discsim.validation.diagnosis.setup import SetupFault, SetupFindings, said
+from discsim.validation.diagnosis.setup import SetupFault, SetupFindings, said, with_fault
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.parameters import Parameter
 from discsim.written import corrected
@@ -80,7 +80,8 @@ def with_reversed_axes(findings: SetupFindings, fit: Fit) -> SetupFindings | Non
         if any(signs):
             axes = effect_of(Axes(" ".join(map("".join, zip(signs, "xyz", strict=True)))), sensor)
             meant = tuple(corrected(one, [axes]) for one in findings.recordings)
-            return SetupFindings((*findings.faults, SetupFault(axes, float("inf"), None)), meant, findings.hints)
+            faults = with_fault(findings.faults, SetupFault(axes, float("inf"), None))
+            return SetupFindings(tuple(faults), meant, findings.hints)
     return None
 
 

@@ -99,9 +99,11 @@ def tried_without(found: Search, candidate: CandidateEffect) -> ContinuousFit:
     for step in found.steps:
         if set(step.hypothesis.candidates) == set(rest.candidates):
             return step
-    return continuous_fit(
+    less = continuous_fit(
         found.relaxed_fit, rest, found.own, found.relaxed_noise, values_of_fit(final), iterations=5, polish=1
     )
+    # choosing what was found in the readings themselves cost the fit with it, and none without
+    return less if candidate.fixed_values else replace(less, score=less.score + found.cost)
 
 
 def without_superfluous(found: Search) -> Search:

@@ -7,6 +7,7 @@ from discsim.validation.diagnosis.setup.find import (
     said,
     setup_notes,
     suspected_fault,
+    with_fault,
     with_likeliest_fault,
     with_turned_board,
 )
@@ -18,6 +19,7 @@ __all__ = [
     "said",
     "setup_notes",
     "suspected_fault",
+    "with_fault",
     "with_likeliest_fault",
     "with_turned_board",
 ]

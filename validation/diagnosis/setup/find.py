@@ -16,7 +16,7 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.kind import BOARD
 from discsim.effects.sensors import ClockRate, HardIron, Lag
-from discsim.effects.setup import Axes, BoardRotation, ClockUnit, GpsAxes, SiteField, TimeOffset, axes_of
+from discsim.effects.setup import Axes, BoardRotation, ClockUnit, GpsAxes, SiteField, TimeOffset, axes_of, permutation
 from discsim.recording import Recording, Samples
 from discsim.validation.diagnosis.setup.hypotheses import Hypothesis, Ranking, board_effect, chosen, hypotheses, pairs
 from discsim.validation.diagnosis.setup.proof import left_by_short_fit
@@ -35,6 +35,7 @@ __all__ = [
     "said",
     "setup_notes",
     "suspected_fault",
+    "with_fault",
     "with_likeliest_fault",
     "with_turned_board",
 ]
@@ -79,6 +80,11 @@ class SetupFault:
     def id(self) -> str:
         """The effect's id."""
         return self.effect.id
+
+    @property
+    def of_axes(self) -> bool:
+        """Whether it is a sensor whose columns hold other axes than they say."""
+        return isinstance(self.effect.value, Axes)
 
     @property
     def sentence(self) -> str:
@@ -145,12 +151,29 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
     hints: tuple[Effect, ...] = ()
     for _ in range(MOST):
         found, hints = _next(judged())
-        if not found:
+        if not found or any(one.id == other.id and not other.of_axes for one in faults for other in found):
             break
-        faults += found
+        for fault in found:
+            faults = with_fault(faults, fault)
         current = tuple(corrected(one, [fault.effect for fault in found]) for one in current)
     doubted = [f"{one.name}: {sentence}" for one, own in zip(current, doubts, strict=True) for sentence in own]
     return SetupFindings(tuple(faults), current, hints, tuple(doubted))
+
+
+def with_fault(faults: Sequence[SetupFault], further: SetupFault) -> list[SetupFault]:
+    """Return faults with one more, found in readings that are corrected for them: axes of one sensor become one fault.
+
+    None is left where the second puts back what the first has taken.
+    """
+    before = next((one for one in faults if one.id == further.id), None)
+    if before is None or not further.of_axes:
+        return [*faults, further]
+    both = permutation(before.effect.value) @ permutation(further.effect.value)
+    rest = [one for one in faults if one is not before]
+    if np.array_equal(both, np.eye(3)):
+        return rest
+    effect = effect_of(Axes(axes_of(both)), further.effect.row.acts_on)
+    return [*rest, replace(further, effect=effect, gain=max(before.gain, further.gain), twins=())]
 
 
 def suspected_fault(findings: SetupFindings) -> SuspectedFault | None:
@@ -198,7 +221,7 @@ def with_likeliest_fault(findings: SetupFindings) -> SetupFindings | None:
         return None
     fault = _fault(ranking.as_written, tuple(item for item in found if item.kind != "rival"), recordings)
     current = tuple(corrected(one, [fault.effect]) for one in findings.recordings)
-    return SetupFindings((*findings.faults, fault), current)
+    return SetupFindings(tuple(with_fault(findings.faults, fault)), current)
 
 
 def with_turned_board(findings: SetupFindings) -> SetupFindings | None:

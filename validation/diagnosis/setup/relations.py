@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discsim.arrays import ComplexArray, FloatArray
-from discsim.validation.diagnosis.setup.spin_signals import STEP, Locked, SpinSignals
+from discsim.validation.diagnosis.setup.spin_signals import STEP, STILL, Locked, SpinSignals
 from discsim.validation.identification.ordinary_errors import ordinary_sigma
 from discsim.validation.identification.plants import plant_of
 
@@ -34,6 +34,8 @@ __all__ = ["Columns", "Misfit", "misfit", "misfits", "wanted_force"]
 
 #: neighbours within the averaging share their errors: so many instants of the grid are one independent statement
 _TOGETHER = 6.0
+#: the same of what is averaged as standing still in the body: 2 sqrt(pi) of its sigma, in steps of the grid
+_OF_STILL = 2.0 * np.sqrt(np.pi) * STILL / STEP
 #: what ordinary errors leave: field along the axis uT; spin rad/s and share; f . m in m/s^2 times |B|; |f| m/s^2; share
 #: of the pull and of the lever arm, m/s^2; height m; release m/s
 _ALONG, _ALONG_SHARE = 0.4, 0.12
@@ -321,6 +323,7 @@ def _of_ramps(signals: SpinSignals, pull: ComplexArray, rate: FloatArray) -> lis
     A = np.column_stack([np.ones(along.size), rate**2, change])[good]
     x, *_ = np.linalg.lstsq(A, along[good], rcond=None)
     left = along[good] - A @ x
-    error = float(np.sqrt(_TOGETHER * np.mean(left**2) * np.linalg.pinv(A.T @ A)[2, 2]))
-    ratio = (float(x[2]) - 1.0) ** 2 / (_RAMP**2 + error**2)
+    error = float(np.sqrt(_OF_STILL * np.mean(left**2) * np.linalg.pinv(A.T @ A)[2, 2]))
+    # the weight is of what is sure: a slope that noise leaves unknown says no more than its error lets it
+    ratio = (float(x[2]) - 1.0) ** 2 / (_RAMP**2 + _RAMP_WEIGHT * error**2)
     return [Misfit("ramps", ("accelerometer",), ratio, _RAMP_WEIGHT)]

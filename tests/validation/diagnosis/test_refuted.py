@@ -1,0 +1,55 @@
+"""An effect that gains little and loses on recordings set aside is left out, unless more than noise is left then."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import pytest
+from support.made import FIELD as SITE
+from support.made import RIG, coasting
+
+from discsim.effects import effect
+from discsim.rig import spin_down
+from discsim.validation.diagnosis import refuted
+from discsim.validation.diagnosis.refuted import without_refuted
+from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
+from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
+from discsim.validation.diagnosis.selection.stepwise import screened
+
+BIAS = "accel.bias"
+
+
+@cache
+def with_bias(*biases: float) -> Search:
+    """A search that stands at one bias of the accelerometer for run-downs that have each its own, m/s^2 along z."""
+    runs = []
+    for k, bias in enumerate(biases):
+        motion = spin_down(RIG, SITE, 40.0 + 5.0 * k, 4.0, yaw=0.5 + k)
+        runs.append(coasting(motion, RIG, k, [effect(BIAS, bx_m_s2=0.0, by_m_s2=0.0, bz_m_s2=bias)]))
+    found = screened(runs)
+    bias = next(c for c in found.candidates if c.id == BIAS and c.recordings is None)
+    final = continuous_fit(
+        found.base.fit, Hypothesis((bias,)), found.own, found.base.fit.noise, values_of_fit(found.base)
+    )
+    return replace(found.with_step(final), final=final).about(final.fit)
+
+
+def named(found: Search) -> list[str]:
+    return [candidate.id for candidate in found.final.hypothesis.candidates]
+
+
+def test_what_two_recordings_say_and_the_third_denies_is_left_out(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(refuted, "leaves_more_than_noise", lambda found: False)
+    assert named(without_refuted(with_bias(0.03, 0.03, -0.03))) == []
+
+
+def test_what_all_recordings_say_stays(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(refuted, "leaves_more_than_noise", lambda found: False)
+    assert named(without_refuted(with_bias(0.03, 0.03, 0.03))) == [BIAS]
+
+
+def test_it_stays_where_more_than_noise_is_left_without_it(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(refuted, "leaves_more_than_noise", lambda found: not found.final.hypothesis.candidates)
+    assert named(without_refuted(with_bias(0.03, 0.03, -0.03))) == [BIAS]

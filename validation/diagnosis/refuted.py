@@ -1,0 +1,47 @@
+"""Effects that recordings set aside speak against.
+
+Takes what a search found; gives it without those that gain little on all recordings, and lose on those held out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from discsim.validation.diagnosis.held_out import choices_without_each, heldout_gain
+from discsim.validation.diagnosis.selection.all_at_once import worth_of_each
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.selection.evidence import price
+from discsim.validation.diagnosis.selection.exchange import rivals_of, tried_without
+from discsim.validation.diagnosis.selection.search_state import Search
+from discsim.validation.diagnosis.settings import SELECTION
+from discsim.validation.diagnosis.verdict import leaves_more_than_noise
+
+__all__ = ["without_refuted"]
+
+
+def without_refuted(found: Search) -> Search:
+    """Return a search without the effects of little gain that recordings set aside speak against.
+
+    Such an effect has a number of its own in each recording, and the others' makes each worse: it stands for something
+    else, or for nothing. It stays where without it more than noise is left.
+    """
+    while (less := _refuted(found)) is not None:
+        bare = replace(found.with_step(less), final=less).about(less.fit)
+        if leaves_more_than_noise(bare):
+            break
+        found = replace(bare, rivals=rivals_of(bare))
+    return found
+
+
+def _refuted(found: Search) -> ContinuousFit | None:
+    """Return the fit without the effect of little gain that loses most on recordings set aside; None for none."""
+    candidates = found.final.hypothesis.candidates
+    if found.at_once or len(found.recordings) < 2 or leaves_more_than_noise(found):
+        return None
+    worth = worth_of_each(found.equations, candidates, found.own)
+    of_little = [t for t in candidates if not t.fixed_values and worth[t.name] < SELECTION.refuted * price(t)]
+    less = {t.name: tried_without(found, t) for t in of_little}
+    choices = choices_without_each(found, less)
+    gains = {t.name: heldout_gain(found, t, choices) for t in of_little}
+    against = {name: gain for name, gain in gains.items() if gain is not None and gain < 0.0}
+    return less[min(against, key=lambda name: against[name])] if against else None
