@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 from scipy.stats import chi2 as chi2_law
@@ -18,7 +19,7 @@ from discsim.validation.diagnosis.consistency.driven import turning_of
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
 from discsim.validation.diagnosis.contradicted import contradicted_outcome
 from discsim.validation.diagnosis.design.next_recording import advise, confusions, in_words
-from discsim.validation.diagnosis.detectors.even_losses import lost_as_well
+from discsim.validation.diagnosis.detectors.even_losses import lost_as_well, rather_lost
 from discsim.validation.diagnosis.held_out import Choice, choices_without_each, heldout_chi2, heldout_gain
 from discsim.validation.diagnosis.leftovers import pure_noise
 from discsim.validation.diagnosis.localisation import located_effect, located_unmodelled
@@ -113,7 +114,18 @@ def _named(
         id, share, sd = lost
         confused.append(Confusion(id, bic, _COUNT_THEM, parameters={"fraction": ParameterValue(share, sd)}))
     where = None if candidate.recordings is None else tuple(names[i] for i in sorted(candidate.recordings))
+    if (instead := rather_lost(final.fit, candidate)) is not None:
+        id, share, sd = instead
+        clock = Confusion(candidate.id, bic, _COUNT_THEM, parameters=values)
+        rest = (one for one in confused if one.id != id)
+        return NamedEffect(id, {"fraction": ParameterValue(share, sd)}, Evidence(bic, held, p), where, (clock, *rest))
     return NamedEffect(candidate.id, values, Evidence(bic, held, p), where, tuple(confused))
+
+
+def _told_as(fit: Fit, candidate: CandidateEffect) -> str:
+    """Return the id under which an effect of a fit is told: of a clock that stands for lost samples, theirs."""
+    instead = rather_lost(fit, candidate)
+    return candidate.id if instead is None else instead[0]
 
 
 def _of_regular(final: ContinuousFit, candidate: CandidateEffect) -> dict[str, ParameterValue]:
@@ -250,7 +262,7 @@ def _figures(
             new = max(heldout_chi2(found, final.hypothesis, i, choices[i]), 0.0)
         old = chi_squared(found.base.fit.linears[i], reference, found.base.residuals[i])
         before, after = before + old, after + new
-        chosen = tuple(candidate.id for candidate in choices[i].values() if candidate is not None)
+        chosen = tuple(_told_as(final.fit, candidate) for candidate in choices[i].values() if candidate is not None)
         held.append(HeldOut(str(i), old / rows, new / rows, 0.5 * (old - new), chosen))
     return FitFigures(base, before / n), FitFigures(last, after / n), tuple(held)
 
@@ -335,8 +347,15 @@ def _next_recordings(found: Search, unexplained: bool, effects: Sequence[NamedEf
     return tuple(dict.fromkeys(told))
 
 
-def reason_for(considered: Considered, named: Sequence[CandidateEffect]) -> str:
-    """Return why a candidate that was refitted is ``named``, or is not."""
+def reason_for(
+    considered: Considered, named: Sequence[CandidateEffect], told: Mapping[str, str] = MappingProxyType({})
+) -> str:
+    """Return why a candidate that was refitted is ``named``, or is not; ``told`` are the ids under which some are."""
+    id = considered.candidate.id
+    if (instead := told.get(id, id)) != id:
+        return f"named as {instead}"
+    if id in told.values():
+        return "named"
     if any(considered.candidate.id == candidate.id for candidate in named):
         return "named"
     return "worth less than its price" if considered.gain <= price(considered.candidate) else "another explains more"
@@ -350,7 +369,7 @@ def _candidates(found: Search, named: Sequence[CandidateEffect], names: Sequence
             float(c.gain),
             c.values,
             None if c.candidate.recordings is None else tuple(names[i] for i in sorted(c.candidate.recordings)),
-            reason_for(c, named),
+            reason_for(c, named, {t.id: _told_as(found.final.fit, t) for t in named}),
         )
         for c in sorted(found.considered, key=lambda c: -c.gain)
         if np.isfinite(c.gain) and all(np.isfinite(v) for v in c.values.values())

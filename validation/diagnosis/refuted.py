@@ -1,12 +1,13 @@
-"""Effects that recordings set aside speak against.
+"""Effects that stand for nothing: what recordings set aside speak against, and what lost samples leave of a clock.
 
-Takes what a search found; gives it without those that gain little on all recordings, and lose on those held out.
+Takes what a search found; gives it without those that gain little, where no more than noise is left without them.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+from discsim.validation.diagnosis.detectors.even_losses import rather_lost
 from discsim.validation.diagnosis.held_out import choices_without_each, heldout_gain
 from discsim.validation.diagnosis.selection.all_at_once import worth_of_each
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
@@ -23,14 +24,37 @@ def without_refuted(found: Search) -> Search:
     """Return a search without the effects of little gain that recordings set aside speak against.
 
     Such an effect has a number of its own in each recording, and the others' makes each worse: it stands for something
-    else, or for nothing. It stays where without it more than noise is left.
+    else, or for nothing. Nor has it those of a sensor whose samples were lost, with a slow clock in their place: these
+    come at random, and what the clock leaves of them asks for more. Both stay where without them more than noise is
+    left.
     """
-    while (less := _refuted(found)) is not None:
-        bare = replace(found.with_step(less), final=less).about(less.fit)
-        if leaves_more_than_noise(bare):
-            break
-        found = replace(bare, rivals=rivals_of(bare))
+    for refuted in (_refuted, _left_by_losses):
+        while (less := refuted(found)) is not None:
+            bare = replace(found.with_step(less), final=less).about(less.fit)
+            if leaves_more_than_noise(bare):
+                break
+            found = replace(bare, rivals=rivals_of(bare))
     return found
+
+
+def _left_by_losses(found: Search) -> ContinuousFit | None:
+    """Return the fit without the effect that gains least of a sensor that lost samples; None for none of little gain.
+
+    A walk of random losses wanders about the line of a clock, and what that leaves may pass for a bias or a drift.
+    """
+    final = found.final
+    losing = {t.row.acts_on for t in final.hypothesis.candidates if rather_lost(final.fit, t) is not None}
+    if found.at_once or not losing:
+        return None
+    others = [
+        t
+        for t in final.hypothesis.candidates
+        if t.row.acts_on in losing and not t.fixed_values and rather_lost(final.fit, t) is None
+    ]
+    less = {t.name: tried_without(found, t) for t in others}
+    gains = {t.name: less[t.name].score - final.score for t in others}
+    little = [t.name for t in others if gains[t.name] < SELECTION.refuted * price(t)]
+    return less[min(little, key=lambda name: gains[name])] if little else None
 
 
 def _refuted(found: Search) -> ContinuousFit | None:

@@ -38,3 +38,10 @@ def test_how_a_part_is_made_in_one_recording_alone_is_dear(id: str):
 
 def test_what_is_named_has_no_reason_against_it():
     assert reason_for(considered(BIAS, 100.0), [BIAS]) == "named"
+
+
+def test_a_clock_that_stands_for_lost_samples_says_so_and_these_are_named():
+    clock, lost = CandidateEffect("accel.clock_rate", ()), CandidateEffect("accel.dropped_samples", ())
+    told = {clock.id: lost.id}
+    assert reason_for(considered(clock, 100.0), [clock], told) == "named as accel.dropped_samples"
+    assert reason_for(considered(lost, 1.0), [clock], told) == "named"
