@@ -95,5 +95,5 @@ def test_lost_samples_of_run_downs_are_named_with_their_share_and_the_clock_besi
     (clock,) = [twin for twin in named.confused_with if twin.id == "accel.clock_rate"]
     assert clock.parameters["ratio"].value == pytest.approx(1.0 - share.value)
     assert [item.effect.id for item in outcome.model.effects] == ["accel.dropped_samples"]
-    reasons = {one.id: one.reason for one in outcome.candidates}
+    reasons = {one.id: one.note for one in outcome.candidates}
     assert reasons["accel.clock_rate"] == "named as accel.dropped_samples"
