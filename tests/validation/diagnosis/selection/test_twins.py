@@ -91,7 +91,9 @@ def test_of_two_that_readings_do_not_tell_apart_the_one_is_named_whose_size_a_pa
     (named,) = final.hypothesis.candidates
     (late,) = (one for one in coasted().rivals[named.name] if one.candidate.id == "gyro.time_offset")
     assert final.prior_penalty == pytest.approx((0.003 / 0.05) ** 2, rel=0.05)
-    assert late.fitted.prior_penalty == 0.0  # how wrong times may be nobody has written down
+    shift = dict(zip((q.key for q in late.fitted.fit.parameters), late.fitted.fit.at.tolist(), strict=True))
+    late_s = shift["gyro.time_offset", "offset_s"]
+    assert late.fitted.prior_penalty == pytest.approx((late_s / 0.1) ** 2)  # 0.1 s, as a radio link hands on
     assert not takes_its_place(late.worse, late, named, final)
     at = final.fit.at.copy()
     at[[q.key for q in final.fit.parameters].index(("gyro.scale", "sz"))] = -0.5
