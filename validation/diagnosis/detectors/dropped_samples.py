@@ -243,17 +243,20 @@ def dropped_accelerometer(fit: Fit, noise: NoiseModel, least: float = DETECTORS.
     return [Shifted(ScreenedCandidate(candidate, gain, {}), whole.trajectories, cost)]
 
 
-def recounted(fit: Fit) -> tuple[Shifted, float] | None:
-    """Return the losses of an accelerometer by the motion of a fit that has some; None where they are as before.
+def recounted(fit: Fit, sensor: str) -> tuple[Shifted, float] | None:
+    """Return the losses of a sensor by the motion of a fit that has some; None where they are as before.
 
-    Beside them stands by how much their price grows. What was missing when they were counted had bent the motion.
+    Beside them stands by how much their price grows. What was missing when they were counted had bent the motion, or
+    segments that followed the sensor had taken a loss for a turn.
     """
-    sensor = "accelerometer"
     if all(sensor not in trajectory.lost for trajectory in fit.trajectories):
         return None
-    whole, gain, _ = _counted_in_own_noise(fit, sensor, fit.noise)
+    if sensor == "magnetometer":
+        whole, gain = _counted(fit, sensor, _stated_sd(fit, sensor, fit.noise)), 0.0
+    else:
+        whole, gain, _ = _counted_in_own_noise(fit, sensor, fit.noise)
     counts = [[t.lost[sensor] for t in some.trajectories if sensor in t.lost] for some in (fit, whole)]
-    if all(np.array_equal(a, b) for a, b in zip(*counts, strict=True)):
+    if len(counts[0]) == len(counts[1]) and all(np.array_equal(a, b) for a, b in zip(*counts, strict=True)):
         return None
     _, was = _losses(_id_of(sensor), fit.trajectories, sensor)
     candidate, cost = _losses(_id_of(sensor), whole.trajectories, sensor)

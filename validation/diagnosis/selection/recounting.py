@@ -1,4 +1,4 @@
-"""Counts of lost samples and the motion better one another: a fit whose accelerometer lost some, counted once more.
+"""Counts of lost samples and the motion better one another: a fit of which a sensor lost some, counted once more.
 
 Takes a search and its fit; gives both with the counts that the motion tells since an effect was added.
 """
@@ -16,22 +16,29 @@ from discsim.validation.diagnosis.selection.search_state import Search, values_o
 
 __all__ = ["with_losses_recounted"]
 
-_LOST = catalogued(DroppedSamples, "accelerometer").id
+#: the effect of lost samples of each sensor that is counted by the motion
+_LOST = {sensor: catalogued(DroppedSamples, sensor).id for sensor in ("magnetometer", "accelerometer")}
 #: most rounds in which counts of lost samples and the motion better one another
 _RECOUNTS = 6
 
 
 def with_losses_recounted(found: Search, current: ContinuousFit) -> tuple[Search, ContinuousFit]:
-    """Return a search and its fit with an accelerometer's losses counted anew by the motion that it tells."""
-    if all(candidate.id != _LOST for candidate in current.hypothesis.candidates):
-        return found, current
+    """Return a search and its fit with the losses of its sensors counted anew by the motion that it tells."""
+    for sensor, id in _LOST.items():
+        if any(candidate.id == id for candidate in current.hypothesis.candidates):
+            found, current = _recounted(found, current, sensor)
+    return found, current
+
+
+def _recounted(found: Search, current: ContinuousFit, sensor: str) -> tuple[Search, ContinuousFit]:
+    """Return a search and its fit with the losses of one sensor counted anew as long as that is better."""
     for _ in range(_RECOUNTS):
-        again = recounted(current.fit)
+        again = recounted(current.fit, sensor)
         if again is None:
             break
         shifted, dearer = again
         candidates = current.hypothesis.candidates
-        hypothesis = Hypothesis(tuple(shifted.screened.candidate if c.id == _LOST else c for c in candidates))
+        hypothesis = Hypothesis(tuple(shifted.screened.candidate if c.id == _LOST[sensor] else c for c in candidates))
         start = replace(current.fit, trajectories=shifted.trajectories)
         fitted = continuous_fit(start, hypothesis, found.own, current.fit.noise, values_of_fit(current))
         fitted = replace(fitted, score=fitted.score + found.cost + dearer)

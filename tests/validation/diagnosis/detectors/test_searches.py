@@ -17,7 +17,11 @@ from discsim.rig import turn_table
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
 from discsim.validation.diagnosis.detectors import dropped_samples
-from discsim.validation.diagnosis.detectors.dropped_samples import dropped_accelerometer, recounted
+from discsim.validation.diagnosis.detectors.dropped_samples import (
+    dropped_accelerometer,
+    dropped_magnetometer,
+    recounted,
+)
 from discsim.validation.diagnosis.detectors.events import events
 from discsim.validation.diagnosis.detectors.gusts import gusts
 from discsim.validation.diagnosis.detectors.local_problem import LocalProblems, local_problems
@@ -34,10 +38,11 @@ from discsim.validation.diagnosis.relaxed_fit import first_trajectory, relaxed
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.identification.clipping import clipping_level_of, equal_beyond_chance
-from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.gauss_newton import Fit, refit
 from discsim.validation.identification.noise import estimate_noise
 from discsim.validation.identification.plants.rate_table import RATE_TABLE
 from discsim.validation.identification.prediction import shown
+from discsim.validation.identification.stated_parameters import stated_parameters
 
 DRIVER, FIELD = load_disc("driver")
 MODULE = Instruments.from_parts("mpu9250", "neo_m8n")
@@ -209,12 +214,30 @@ def test_counts_that_are_right_stay_and_others_are_mended_by_the_motion() -> Non
         replace(one, lost={"accelerometer": np.minimum(one.lost["accelerometer"] + 1.0, one.lost["accelerometer"][-1])})
         for one in found.trajectories
     )
-    anew = recounted(replace(right, trajectories=early))
+    anew = recounted(replace(right, trajectories=early), "accelerometer")
     assert anew is not None
     for trajectory, own, wrong in zip(anew[0].trajectories, found.trajectories, early, strict=True):
         counts, truth, bent = (one.lost["accelerometer"] for one in (trajectory, own, wrong))
         assert np.mean(counts != truth) < 0.1 * np.mean(bent != truth)
-    assert recounted(relaxed_fit()) is None
+    assert recounted(relaxed_fit(), "accelerometer") is None
+
+
+def test_counts_of_a_magnetometer_are_mended_by_the_motion_too() -> None:
+    """Where the gyroscope clips, segments that follow the field take a loss for a turn: 2 of 240 blind cases."""
+    fit = relaxed_fit((), (effect("mag.dropped_samples", fraction=0.03),))
+    (found,) = dropped_magnetometer(fit, stated_parameters(throws()))
+    late = tuple(
+        replace(one, lost={"magnetometer": np.maximum(one.lost["magnetometer"] - 1.0, 0.0)})
+        for one in found.trajectories
+    )
+    followed = refit(replace(fit, trajectories=found.trajectories), iterations=6)
+    wrong = tuple(replace(one, lost=other.lost) for one, other in zip(followed.trajectories, late, strict=True))
+    anew = recounted(replace(followed, trajectories=wrong), "magnetometer")
+    assert anew is not None
+    for trajectory, own, bent in zip(anew[0].trajectories, found.trajectories, late, strict=True):
+        counts, truth, mistaken = (one.lost["magnetometer"] for one in (trajectory, own, bent))
+        assert np.mean(counts != truth) < 0.1 * np.mean(mistaken != truth)
+    assert recounted(relaxed_fit(), "magnetometer") is None
 
 
 def test_a_motion_that_is_known_to_a_line_tells_what_was_lost_and_the_noise() -> None:
