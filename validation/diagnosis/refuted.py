@@ -21,12 +21,11 @@ __all__ = ["without_refuted"]
 
 
 def without_refuted(found: Search) -> Search:
-    """Return a search without the effects of little gain that recordings set aside speak against.
+    """Return a search without its effects of little gain that stand for nothing.
 
-    Such an effect has a number of its own in each recording, and the others' makes each worse: it stands for something
-    else, or for nothing. Nor has it those of a sensor whose samples were lost, with a slow clock in their place: these
-    come at random, and what the clock leaves of them asks for more. Both stay where without them more than noise is
-    left.
+    Recordings set aside speak against one: each wants another number of it, and the others' makes it worse. Or it is of
+    a sensor whose samples were lost, told as a slow clock: losses come at random, and it takes up what the clock
+    leaves of them. It stays where more than noise is left without it.
     """
     for refuted in (_refuted, _left_by_losses):
         while (less := refuted(found)) is not None:
