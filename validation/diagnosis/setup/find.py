@@ -156,7 +156,8 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
         for fault in found:
             faults = with_fault(faults, fault)
         current = tuple(corrected(one, [fault.effect for fault in found]) for one in current)
-    doubted = [f"{one.path or one.name}: {sentence}" for one, own in zip(current, doubts, strict=True) for sentence in own]
+    told = zip(current, doubts, strict=True)
+    doubted = [f"{one.path or one.name}: {sentence}" for one, own in told for sentence in own]
     return SetupFindings(tuple(faults), current, hints, tuple(doubted))
 
 
