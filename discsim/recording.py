@@ -284,7 +284,8 @@ def read_dataset(folder: Path | str) -> list[Recording]:
     except OSError as error:
         raise InputError.at(folder, None, f"cannot be read ({error.strerror}); expected recordings") from None
     if not members:
-        raise InputError.at(folder, None, "no recording in it; expected sub-folders with a recording.toml")
+        expected = "no recording in it; expected sub-folders with a recording.toml"
+        raise InputError.at(folder, None, expected + _what_else(folder))
     return [read_recording(member) for member in members]
 
 
@@ -296,6 +297,16 @@ def _refuse_file(path: Path) -> None:
     if path.name == "recording.toml":
         raise InputError.at(path, None, f"{folder}: {path.parent}")
     raise InputError.at(path, None, f"{folder}: bring it in first, discsim import {path} --out DIR")
+
+
+def _what_else(folder: Path) -> str:
+    """Return what to do with the files of a folder that holds no recording; empty where nothing in it is a log."""
+    files = sorted(path.name for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
+    known = [name for name in files if name.removesuffix(".csv") in SENSORS]
+    if known:
+        return f"; {', '.join(known)} without the recording.toml that states plant, place and parts"
+    logs = [name for name in files if Path(name).suffix.lower() in _OF_LOGS]
+    return f"; a raw log is brought in first, discsim import {folder} --out DIR" if logs else ""
 
 
 def _there(file: Path) -> bool:
@@ -336,6 +347,8 @@ def read_sheet(table: TomlTable, sensor: str, *, strict: bool, rate_required: bo
     return sheet
 
 
+#: how names of loggers' files end
+_OF_LOGS = (".csv", ".txt", ".tsv", ".log", ".json", ".jsonl", ".bin", ".mat", ".xlsx")
 _EMPTY_CELL = re.compile(r"(?<=,)[ \t]*(?=,|$)", re.MULTILINE)
 _CELL = re.compile(r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan)", re.ASCII | re.IGNORECASE)
 BLOCK = 1 << 22  # bytes parsed at a time

@@ -283,6 +283,20 @@ def test_a_data_set_without_recordings_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("file", "words"),
+    [
+        ("throw.TXT", "; a raw log is brought in first, discsim import .* --out DIR$"),
+        ("gyroscope.csv", r"; gyroscope.csv without the recording\.toml that states plant, place and parts$"),
+        ("photo.jpg", r"sub-folders with a recording\.toml$"),
+    ],
+)
+def test_what_else_lies_in_a_folder_without_a_recording_is_said(tmp_path, file, words):
+    (tmp_path / file).write_text("")
+    with pytest.raises(InputError, match=words):
+        read_dataset(tmp_path)
+
+
+@pytest.mark.parametrize(
     ("name", "words"),
     [("nowhere", "no such folder; expected a recording or a data set"), ("file", "this is a file; .* discsim import")],
 )
