@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -58,7 +59,10 @@ def heard_anywhere() -> Iterator[None]:
 
     def told(error: sys.UnraisableHookArgs) -> None:
         if isinstance(error.exc_value, KeyboardInterrupt):
-            threading.Timer(_AGAIN_S, _thread.interrupt_main).start()  # raised here it would be dropped as well
+            # raised here it would be dropped as well: not before this has returned, however busy the machine is
+            returned = threading.Event()
+            threading.Thread(target=_again, args=(returned,), daemon=True).start()
+            returned.set()
         else:
             before(error)
 
@@ -67,6 +71,13 @@ def heard_anywhere() -> Iterator[None]:
         yield
     finally:
         sys.unraisablehook = before
+
+
+def _again(returned: threading.Event) -> None:
+    """Interrupt the main thread a moment after it has ``returned`` from where errors are dropped."""
+    returned.wait()
+    time.sleep(_AGAIN_S)
+    _thread.interrupt_main()
 
 
 def _end(*_: object) -> None:
