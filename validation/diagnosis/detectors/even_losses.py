@@ -63,9 +63,10 @@ def _of_walk(shown_by: Sequence[FloatArray]) -> float:
     ``shown_by`` is the chi-squared that one sample makes at each reading (n,), by recording. A clock weighs the counts
     J_k there by k; the share is the last count over all samples.
     """
-    total = sum(float(np.sum(w * np.arange(1, w.size + 1) ** 2)) for w in shown_by)
     each = 1.0 / sum(w.size for w in shown_by)
-    weights = [np.cumsum((w * np.arange(1, w.size + 1))[::-1])[::-1] / max(total, 1e-300) for w in shown_by]
+    moments = [w * np.arange(1, w.size + 1) for w in shown_by]
+    total = sum(float(moment @ np.arange(1, moment.size + 1)) for moment in moments)
+    weights = [np.cumsum(moment[::-1])[::-1] / max(total, 1e-300) for moment in moments]
     return sum(float(np.sum((weight - each) ** 2)) for weight in weights)
 
 

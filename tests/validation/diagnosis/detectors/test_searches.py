@@ -42,6 +42,7 @@ from discsim.validation.identification.gauss_newton import Fit, refit
 from discsim.validation.identification.noise import estimate_noise
 from discsim.validation.identification.plants.rate_table import RATE_TABLE
 from discsim.validation.identification.prediction import shown
+from discsim.validation.identification.segments import Trajectory
 from discsim.validation.identification.stated_parameters import stated_parameters
 
 DRIVER, FIELD = load_disc("driver")
@@ -207,6 +208,19 @@ def test_lost_samples_are_counted_where_the_air_is_thinner_than_stated() -> None
         assert trajectory.lost["accelerometer"][-1] == pytest.approx(missing, abs=1)
 
 
+def assert_mended(
+    anew: tuple[dropped_samples.Shifted, float] | None,
+    right: tuple[Trajectory, ...],
+    wrong: tuple[Trajectory, ...],
+    sensor: str,
+) -> None:
+    """Fail unless a sensor's losses were counted anew, and nine in ten of the wrong counts are right."""
+    assert anew is not None
+    for trajectory, own, bent in zip(anew[0].trajectories, right, wrong, strict=True):
+        counts, truth, mistaken = (one.lost[sensor] for one in (trajectory, own, bent))
+        assert np.mean(counts != truth) < 0.1 * np.mean(mistaken != truth)
+
+
 def test_counts_that_are_right_stay_and_others_are_mended_by_the_motion() -> None:
     fit, (found,) = lost_in_other_air()
     right = replace(fit, trajectories=found.trajectories)
@@ -215,10 +229,7 @@ def test_counts_that_are_right_stay_and_others_are_mended_by_the_motion() -> Non
         for one in found.trajectories
     )
     anew = recounted(replace(right, trajectories=early), "accelerometer")
-    assert anew is not None
-    for trajectory, own, wrong in zip(anew[0].trajectories, found.trajectories, early, strict=True):
-        counts, truth, bent = (one.lost["accelerometer"] for one in (trajectory, own, wrong))
-        assert np.mean(counts != truth) < 0.1 * np.mean(bent != truth)
+    assert_mended(anew, found.trajectories, early, "accelerometer")
     assert recounted(relaxed_fit(), "accelerometer") is None
 
 
@@ -233,10 +244,7 @@ def test_counts_of_a_magnetometer_are_mended_by_the_motion_too() -> None:
     followed = refit(replace(fit, trajectories=found.trajectories), iterations=6)
     wrong = tuple(replace(one, lost=other.lost) for one, other in zip(followed.trajectories, late, strict=True))
     anew = recounted(replace(followed, trajectories=wrong), "magnetometer")
-    assert anew is not None
-    for trajectory, own, bent in zip(anew[0].trajectories, found.trajectories, late, strict=True):
-        counts, truth, mistaken = (one.lost["magnetometer"] for one in (trajectory, own, bent))
-        assert np.mean(counts != truth) < 0.1 * np.mean(mistaken != truth)
+    assert_mended(anew, found.trajectories, late, "magnetometer")
     assert recounted(relaxed_fit(), "magnetometer") is None
 
 
