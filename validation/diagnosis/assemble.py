@@ -110,15 +110,16 @@ def _named(
         rival_bic = gain - rival.worse - len(parameters_of(rival.candidate)) * float(np.log(max(final.fit.count, 2)))
         told = advice.get((candidate.name, rival.candidate.name))
         confused.append(Confusion(rival.candidate.id, float(rival_bic), in_words(candidate.id, told), told))
-    if (lost := lost_as_well(final.fit, candidate)) is not None:
+    instead = rather_lost(final.fit, candidate)
+    if instead is None and (lost := lost_as_well(final.fit, candidate)) is not None:
         id, share, sd = lost
         confused.append(Confusion(id, bic, _COUNT_THEM, parameters={"fraction": ParameterValue(share, sd)}))
     where = None if candidate.recordings is None else tuple(names[i] for i in sorted(candidate.recordings))
-    if (instead := rather_lost(final.fit, candidate)) is not None:
+    if instead is not None:
         id, share, sd = instead
         clock = Confusion(candidate.id, bic, _COUNT_THEM, parameters=values)
-        rest = (one for one in confused if one.id != id)
-        return NamedEffect(id, {"fraction": ParameterValue(share, sd)}, Evidence(bic, held, p), where, (clock, *rest))
+        sizes = {"fraction": ParameterValue(share, sd)}
+        return NamedEffect(id, sizes, Evidence(bic, held, p), where, (clock, *confused))
     return NamedEffect(candidate.id, values, Evidence(bic, held, p), where, tuple(confused))
 
 
