@@ -186,11 +186,11 @@ def _left(found: Search) -> dict[str, float]:
     base = found.base
     least = replace(RESIDUAL_TESTS, band_z=-np.inf, band_share=-1.0, window_z=-np.inf, course_gain=0.0, loud=0.0)
     reached: dict[str, float] = {}
-    for item in unmodelled_residuals(base.fit.linears, base.residuals, base.fit.noise, least):
+    settled = found.relaxed_fit.plant.durations.settled
+    for item in unmodelled_residuals(base.fit.linears, base.residuals, base.fit.noise, least, settled):
         kind = {"course": "course", "window": "window", "swallowed": "loudness"}.get(item.kind, "band")
         size = item.z**2 if kind == "course" else item.z
-        if kind != "window" or item.from_s > found.relaxed_fit.plant.durations.settled:
-            reached[kind] = max(reached.get(kind, -np.inf), size)
+        reached[kind] = max(reached.get(kind, -np.inf), size)
     reached["far"] = chi2_in(base, found.relaxed_noise) / base.fit.count
     noise = stated_noise(found.relaxed_fit.linears)
     reached["astray"] = max(

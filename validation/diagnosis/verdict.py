@@ -88,8 +88,7 @@ def judged(tried: Tried, progress: Progress) -> Judged:
 def leaves_more_than_noise(found: Search) -> bool:
     """Tell whether what was found leaves residuals that no noise has, or is far from data that a motion follows."""
     final, settled = found.final, found.relaxed_fit.plant.durations.settled
-    left = unmodelled_residuals(final.fit.linears, final.residuals, final.fit.noise)
-    left = [item for item in left if not (item.kind == "window" and item.from_s <= settled)]
+    left = unmodelled_residuals(final.fit.linears, final.residuals, final.fit.noise, settled=settled)
     left = [item for item in left if not may_be_the_air(item, final.fit)]
     return bool(left) or misses(found, final)
 

@@ -96,15 +96,19 @@ def unmodelled_residuals(
     residuals: Sequence[FloatArray],
     noise: NoiseModel,
     limits: ResidualTests = RESIDUAL_TESTS,
+    settled: float = -np.inf,
 ) -> list[UnmodelledResidual]:
-    """Return what the residuals (n,) of each recording hold beside noise, strongest first."""
+    """Return what the residuals (n,) of each recording hold beside noise, strongest first.
+
+    Bands and windows are asked of what comes after the instant ``settled``, s.
+    """
     white = [
         whitened(linear, noise, residual[:, None])[:, 0] for linear, residual in zip(linears, residuals, strict=True)
     ]
     return sorted(
         [
-            *_bands(linears, white, limits),
-            *_windows(linears, white, limits),
+            *_bands(linears, white, limits, settled),
+            *_windows(linears, white, limits, settled),
             *_common_trends(linears, residuals, noise, limits),
             *_absorbed_by_noise(linears, noise, limits),
         ],
@@ -112,15 +116,18 @@ def unmodelled_residuals(
     )
 
 
-def _bands(linears: Sequence[Linear], white: Sequence[FloatArray], limits: ResidualTests) -> list[UnmodelledResidual]:
+def _bands(
+    linears: Sequence[Linear], white: Sequence[FloatArray], limits: ResidualTests, settled: float
+) -> list[UnmodelledResidual]:
     """Test the flatness of each group's spectrum, pooled over axes and recordings."""
     sums: dict[str, FloatArray] = {}
     counts: dict[str, FloatArray] = {}
     ends: dict[str, float] = {}
     for linear, x in zip(linears, white, strict=True):
         for channel in linear.channels:
-            y = x[channel.rows]
-            if y.size < 4 * limits.bands or channel.index.size < 0.8 * (channel.index[-1] - channel.index[0] + 1):
+            late = linear.t[channel.rows] > settled
+            y, index = x[channel.rows][late], channel.index[late]
+            if y.size < 4 * limits.bands or index.size < 0.8 * (index[-1] - index[0] + 1):
                 continue
             y = y - y.mean()
             power = np.abs(np.fft.rfft(y)) ** 2 / y.size
@@ -143,19 +150,21 @@ def _bands(linears: Sequence[Linear], white: Sequence[FloatArray], limits: Resid
     return found
 
 
-def _windows(linears: Sequence[Linear], white: Sequence[FloatArray], limits: ResidualTests) -> list[UnmodelledResidual]:
+def _windows(
+    linears: Sequence[Linear], white: Sequence[FloatArray], limits: ResidualTests, settled: float
+) -> list[UnmodelledResidual]:
     """Test that the level is the same at all times."""
     found = []
     for index, (linear, x) in enumerate(zip(linears, white, strict=True)):
         for channel in linear.channels:
-            y = np.minimum(x[channel.rows] ** 2, limits.wild)
+            t = linear.t[channel.rows]
+            t, y = t[t > settled], np.minimum(x[channel.rows][t > settled] ** 2, limits.wild)
             if y.size < 2 * limits.window:
                 continue
             total = np.convolve(y, np.ones(limits.window), mode="valid")
             z = (total - limits.window) / np.sqrt(2.0 * limits.window)
             worst = int(np.argmax(z))
             if z[worst] > limits.window_z:
-                t = linear.t[channel.rows]
                 found.append(
                     UnmodelledResidual(
                         channel.group,

@@ -33,6 +33,21 @@ def test_noise_of_any_level_and_memory_is_noise(phi: float):
         assert left(noise(seed, 0.37, phi)) == []
 
 
+def test_a_transient_before_the_instant_asked_is_neither_a_band_nor_a_window():
+    """What a wobble just after release leaves stands in a window and in a band; later it is told in both."""
+    burst = np.where(np.arange(N) < 40, 8.0 * np.sin(0.8 * np.arange(N)), 0.0)
+    linears = [rows(*[("gyroscope", N)] * AXES) for _ in range(RECORDINGS)]
+    residuals = [e + np.tile(burst, AXES) for e in noise(3)]
+    level = estimate_noise(linears, noise(3))
+    end = float(linears[0].t[40])
+    kinds = {item.kind.split()[0] for item in unmodelled_residuals(linears, residuals, level)}
+    assert kinds == {"band", "window"}
+    assert unmodelled_residuals(linears, residuals, level, settled=end) == []
+    late = [e + np.tile(burst[::-1], AXES) for e in noise(3)]
+    kinds = {item.kind.split()[0] for item in unmodelled_residuals(linears, late, level, settled=end)}
+    assert kinds == {"band", "window"}
+
+
 def test_rounding_is_noise():
     assert left([np.round(e / 1.5) * 1.5 for e in noise(1)]) == []
 
