@@ -11,7 +11,7 @@ from discsim.effects.catalogue import CATALOGUE, Row
 from discsim.errors import InputError
 from discsim.files import model_file, model_names, read_text
 
-__all__ = ["KINDS", "listed", "shown"]
+__all__ = ["KINDS", "listed", "namesakes", "shown"]
 
 #: kind -> folder in ``models``; effects are rows of the catalogue
 KINDS = {
@@ -37,19 +37,25 @@ def listed(kind: str) -> dict[str, str]:
 
 
 def shown(name: str) -> str:
-    """Return all that is shipped by a name: files as they are, an effect as its row tells.
+    """Return what is shipped by a name: a file as it is, an effect as its row tells.
 
-    A disc and a throw may share a name: ``discs/driver`` is the disc alone. Raises `InputError` for an unknown name,
-    with the nearest ones.
+    A disc and a throw may share a name, which is the disc's: ``throws/driver`` is the throw (`namesakes`). Raises
+    `InputError` for an unknown name, with the nearest ones.
     """
     kind, _, own = name.rpartition("/")
     kinds = [kind] if kind else list(KINDS)
-    parts = [_one(each, own) for each in kinds if own in listed(each)]
-    if not parts:
+    found = next((each for each in kinds if own in listed(each)), None)
+    if found is None:
         known = [other for each in kinds for other in listed(each)]
         near = ", ".join(get_close_matches(own, known, n=3)) or "what `discsim list` gives"
         raise InputError(f"nothing is called '{name}'; expected {near}")
-    return "\n".join(parts)
+    return _one(found, own)
+
+
+def namesakes(name: str) -> list[str]:
+    """Return what else is shipped by a name, each with its kind before it."""
+    kind, _, own = name.rpartition("/")
+    return [] if kind else [f"{each}/{own}" for each in KINDS if own in listed(each)][1:]
 
 
 def _one(kind: str, name: str) -> str:

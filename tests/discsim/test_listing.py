@@ -7,7 +7,8 @@ import pytest
 from discsim.effects import CATALOGUE
 from discsim.errors import InputError
 from discsim.files import model_file, model_names
-from discsim.listing import KINDS, listed, shown
+from discsim.listing import KINDS, listed, namesakes, shown
+from discsim.shipped import load_disc
 
 
 @pytest.mark.parametrize("kind", list(KINDS))
@@ -18,10 +19,18 @@ def test_each_kind_is_listed_whole_with_a_line_on_each(kind):
     assert all(5 < len(line) <= 100 for line in found.values())
 
 
-def test_a_name_of_two_kinds_shows_both_and_a_kind_before_it_one():
+def test_a_name_of_two_kinds_shows_the_disc_and_tells_the_throw():
     disc, throw = (model_file(f"{kind}/driver.toml").read_text(encoding="utf-8") for kind in ("discs", "throws"))
-    assert shown("driver") == f"# discs/driver\n{disc}\n# throws/driver\n{throw}"
+    assert shown("driver") == f"# discs/driver\n{disc}"
+    assert namesakes("driver") == ["throws/driver"]
     assert shown("throws/driver") == f"# throws/driver\n{throw}"
+    assert namesakes("throws/driver") == namesakes("mpu9250") == []
+
+
+def test_what_is_shown_can_be_kept_and_flown(tmp_path):
+    mine = tmp_path / "mine.toml"
+    mine.write_text(shown("driver"), encoding="utf-8")
+    assert load_disc(str(mine))[0].mass == load_disc("driver")[0].mass
 
 
 def test_an_effect_is_shown_with_its_parameters_and_an_example_that_can_be_typed():

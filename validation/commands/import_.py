@@ -140,13 +140,14 @@ def _import(asked: _Asked, logged: Path, name: str, out: Path, said: list[str]) 
     with start_run(out, None, [asked.raw, *([known.path] if known else [])]) as run:
         _tell(run, said)
         decisions = proposal.all_decisions if proposal else []
+        doubt = proposal.place.doubt(place) if proposal and proposal.place and place else None
         import_map = known or _proposed(run, proposal, asked.write_map or out / "map.toml")
         proposal = None  # its table is as large as the one that is read now
         import_map = replace(import_map, environment=at_place(import_map.environment, place, date))
         found = take(logged, name, import_map, asked.part, decisions)
         found.report(out)
         dip = dip_at_rest(found.read.readings, import_map.environment.gravity)
-        _tell(run, [*found.remarks, *filter(None, [swapped_place(place, date, found.recordings, dip)])])
+        _tell(run, [*found.remarks, *filter(None, [doubt, swapped_place(place, date, found.recordings, dip)])])
     for line in found.lines:
         typer.echo(line)
 

@@ -18,6 +18,13 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
+#: plants of which no throw is made -> what a file says of each recording
+_KEYS = {
+    "free_spin": "body_rate_rad_s and duration_s",
+    "spin_down": "rate_rad_s and duration_s",
+    "rate_table": "time_s and rate_rad_s, lists of knots,",
+}
+
 
 def command(
     plan: Annotated[
@@ -67,6 +74,11 @@ def command(
     if like is not None and plan is not None:
         raise InputError(f"{plan} and --like {like} both say what is recorded; expected one of them")
     kind = known_plant(plant)
+    if plan is None and like is None and kind != "flight":
+        raise InputError(
+            f"--plant {kind}: --throws plans flights alone; expected recordings in hand as --like DATASET, or a TOML "
+            f"file with {_KEYS[kind]} in each [[recording]]"
+        )
     rig = rig_of(model, kind)
     body, place, _ = disc_to_fly(disc, None if rig is not None else model)
     named = [Path(name) for name in (disc or "", throw, *parts.split(",")) if name.endswith(".toml")]

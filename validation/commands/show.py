@@ -10,12 +10,18 @@ __all__ = ["command"]
 
 
 def command(
-    name: Annotated[str, typer.Argument(help="A name of `discsim list`; discs/driver is the disc of that name alone.")],
+    name: Annotated[
+        str, typer.Argument(help="A name of `discsim list`; throws/driver is the throw that shares it with a disc.")
+    ],
 ) -> None:
     """Show what is shipped: a disc, part, throw, map or effect.
 
+    What else has that name is told on standard error, so that `discsim show driver > mine.toml` writes a disc.
+
     Example: discsim show driver
     """
-    from discsim.listing import shown
+    from discsim.listing import namesakes, shown
 
     typer.echo(shown(name), nl=False)
+    for other in namesakes(name):
+        typer.echo(f"{name} is the name of {other}, too: discsim show {other}", err=True)

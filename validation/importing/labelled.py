@@ -9,6 +9,8 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
+from discsim.validation.importing.vectornav import BEGINS, sentence_cells
+
 __all__ = ["MONITOR", "RecordLines", "labelled_cells", "names_of_records"]
 
 #: What Arduino's serial monitor puts before a line.
@@ -43,6 +45,8 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
     >>> labelled_cells("Mag (uT) [ 1, 2, 3 ]")
     [('Mag (uT) x', '1'), ('Mag (uT) y', '2'), ('Mag (uT) z', '3')]
     """
+    if line.startswith(BEGINS):
+        return sentence_cells(line)
     monitor = MONITOR.match(line)
     found = [] if monitor is None else [("time", monitor[1])]
     text = _WORD.sub("", (line if monitor is None else line[monitor.end() :]).strip())

@@ -47,6 +47,8 @@ _SHORT: Mapping[str, tuple[str, ...]] = {"wind": ("wind_north", "wind_east"), "w
 _FITTED_AS = {"alpha0_rad": "alpha0", "environment.air_density": "air_density", "disc.mass": "mass"} | {
     f"{group}.{name}": name for group in ("disc", "environment") for name in ("Ixx", "Izz", "wind_north", "wind_east")
 }
+#: numbers above zero. An sd of more than twice such a number is one in another unit: 3 of 10 draws would be below zero
+_POSITIVE, _MOST_OF_IT = frozenset({"speed", "height", "air_density", "mass", "Ixx", "Izz"}), 2.0
 #: draws that no throw can have are drawn again, at most so often
 _TRIES = 100
 
@@ -216,7 +218,7 @@ def inputs_of(
                 raise InputError(f"--sd {given}={size:g}: expected a standard deviation, zero or more")
             items[name] = items[name]._replace(sd=float(size), source="given")
             blocks = {pair: value for pair, value in blocks.items() if name not in pair}
-    kept = [item for item in items.values() if item.sd > 0.0]
+    kept = [_in_its_unit(item) for item in items.values() if item.sd > 0.0]
     if not kept:
         raise InputError(
             "nothing is uncertain: expected sigmas in the throw, the disc or the model, --fit, or --sd such as "
@@ -227,6 +229,17 @@ def inputs_of(
         for j, other in enumerate(kept):
             covariance[i, j] = blocks.get((one.name, other.name), covariance[i, j])
     return Inputs(tuple(kept), covariance, replace(release, sigma={}), flat)
+
+
+def _in_its_unit(item: Input) -> Input:
+    """Return an input; raises `InputError` for an sd beside which a number above zero might as well be below."""
+    if item.name in _POSITIVE and item.sd > _MOST_OF_IT * abs(item.mean):
+        word = f"--sd {item.name}={item.sd:g}" if item.source == "given" else f"{item.name}: the sd {item.sd:g}"
+        raise InputError(
+            f"{word} is {item.sd / abs(item.mean):.0f} times the {item.mean:.3g} {item.unit} that it is about; "
+            f"expected a standard deviation in {item.unit}"
+        )
+    return item
 
 
 def _component(held: float | FloatArray, name: str) -> float:

@@ -42,11 +42,13 @@ def command(
     """
     if out is None and not masks:
         raise InputError("nothing to write; expected the folder of a challenge, or --masks")
-    text = read_text(page)
     plain: Result | None = None
-    read: list[Result] = []
+    read = [] if out is None else [read_result(place) for place in (out, *(more or ()))]
+    if not page.is_file():
+        raise InputError(f"{page}: no such page; expected one with the page's marks, as in a checkout, with --page")
+    text = read_text(page)
     if out is not None:
-        first, *others = read = [read_result(place) for place in (out, *(more or ()))]
+        first, *others = read
         if first.mask is not None:
             raise InputError(f"{out}: was made under the mask {first.mask}; expected it under --masks")
         plain = first.pooled(*others)

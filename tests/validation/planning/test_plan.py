@@ -190,7 +190,9 @@ def test_a_throw_from_the_ground_is_no_recording():
     ("words", "said"),
     [
         (["--plant", "sailing"], "--plant sailing: unknown"),
-        (["--plant", "spin_down"], "needs a rig"),
+        (["--plant", "spin_down", "plan.toml"], "needs a rig"),
+        (["--plant", "rate_table"], "with time_s and rate_rad_s, lists of knots, in each [[recording]]"),
+        (["--plant", "free_spin"], "expected recordings in hand as --like DATASET, or a TOML file"),
         (["plan.toml", "--like", "set"], "both say what is recorded"),
         (["--parts", "neo_m8n", "--plant", "rate_table", "plan.toml"], "no sensor of these works"),
     ],

@@ -135,7 +135,12 @@ def test_draws_that_are_no_disc_are_drawn_again_and_counted():
 
 @pytest.mark.parametrize(
     ("sd", "said"),
-    [({}, "nothing is uncertain"), ({"sped": 1.0}, "--sd sped: unknown"), ({"speed": -1.0}, "zero or more")],
+    [
+        ({}, "nothing is uncertain"),
+        ({"sped": 1.0}, "--sd sped: unknown"),
+        ({"speed": -1.0}, "zero or more"),
+        ({"mass": 2.0}, r"--sd mass=2 is 1. times the 0.\d+ kg that it is about; expected a standard deviation in kg"),
+    ],
 )
 def test_what_cannot_be_drawn_is_refused_in_a_sentence(sd, said):
     with pytest.raises(InputError, match=said):

@@ -24,8 +24,9 @@ __all__ = ["SENTENCES", "begins", "read", "read_sentences"]
 SENTENCES = ("GGA", "RMC", "VTG")
 KNOT = 1852.0 / 3600.0
 DAY = 86400.0
-#: A sentence: what the checksum is of, and the checksum, which one that breaks off has not.
-_SENTENCE = re.compile(rb"\$((?:P[A-Z]{3}|[A-Z]{2}[A-Z0-9]{3}),[ -#%-)+-~]*)(?:\*([0-9A-Fa-f]{2}))?")
+#: A sentence: what the checksum is of, and the checksum, which one that breaks off has not. Those of VectorNav's units
+#: (VN) are no receiver's.
+_SENTENCE = re.compile(rb"\$((?!VN)(?:P[A-Z]{3}|[A-Z]{2}[A-Z0-9]{3}),[ -#%-)+-~]*)(?:\*([0-9A-Fa-f]{2}))?")
 #: Lines of a file's beginning that are looked at.
 _LINES = 50
 

@@ -16,6 +16,7 @@ from discsim.validation.importing.sniffing.clock import Clock
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.groups import Numbers, Triple
 from discsim.validation.importing.sniffing.magnitudes import Unit
+from discsim.validation.importing.sniffing.own_place import OwnPlace
 
 __all__ = ["Proposal", "ProposedSensor", "map_text"]
 
@@ -39,7 +40,8 @@ class ProposedSensor:
 class Proposal:
     """A proposed map; ``decisions`` are those on the whole (axes), ``notes`` what else a user should know.
 
-    ``positions`` is the table with a gps's columns, None where there is none.
+    ``positions`` is the table with a gps's columns and ``place`` where the log says that it was made, None where there
+    is none.
     """
 
     name: str
@@ -51,6 +53,7 @@ class Proposal:
     decisions: tuple[Decision, ...]
     notes: tuple[str, ...] = field(default=())
     positions: Numbers | None = None
+    place: OwnPlace | None = None
 
     @property
     def all_decisions(self) -> list[Decision]:
@@ -102,7 +105,7 @@ def map_text(proposal: Proposal) -> str:
         "",
         "[environment]",
         "gravity_m_s2 = 9.80665 # standard gravity",
-        "# The field of the place is not known: add latitude_deg, longitude_deg and date, or magnetic_field_ned_uT.",
+        *_place(proposal.place),
     ]
     for sensor in proposal.sensors:
         lines += _sensor(proposal, sensor)
@@ -110,6 +113,19 @@ def map_text(proposal: Proposal) -> str:
         lines += ["", "[sensors.gps]", *_file(proposal, proposal.positions)]
         lines += [_remark(_POSITIONS), f"columns = {_texts(SENSORS['gps'].columns)}"]
     return "\n".join([*lines, ""])
+
+
+def _place(place: OwnPlace | None) -> list[str]:
+    if place is None:
+        return [
+            "# The field of the place is not known: add latitude_deg, longitude_deg and date, or magnetic_field_ned_uT."
+        ]
+    return [
+        "# By its own columns the log was made at the place below; with the date it tells the field.",
+        f"# latitude_deg = {place.latitude:.5f}",
+        f"# longitude_deg = {place.longitude:.5f}",
+        "# date = YYYY-MM-DD",
+    ]
 
 
 def _layout(layout: Layout) -> list[str]:

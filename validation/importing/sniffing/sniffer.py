@@ -36,6 +36,7 @@ from discsim.validation.importing.sniffing.magnitudes import (
 )
 from discsim.validation.importing.sniffing.names import is_time_name, sensor_of, timeless
 from discsim.validation.importing.sniffing.own_clock import OwnClocks, own_clocks
+from discsim.validation.importing.sniffing.own_place import own_place
 from discsim.validation.importing.sniffing.preamble import stated_rate, stated_worths
 from discsim.validation.importing.sniffing.proposal import Proposal, ProposedSensor
 from discsim.validation.importing.sniffing.pull import arm, doubted, unit_by_pull
@@ -90,11 +91,13 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     found, exchanges = _turned_about(clock, found, exchanges)
     others = _others(found, left)
     own = own_clocks(clock, {sensor: triple for sensor, (triple, _) in found.items()})
-    notes = [*exchanges, *notes, *(note for _, note in others), *own.notes]
+    tables = [file.numbers for file in files]
+    place = own_place(tables)
+    notes = [*exchanges, *notes, *(note for _, note in others), *own.notes, *([place.note] if place else [])]
     proposal = _proposal(raw, plant, layout, clock, own, found, notes)
-    proposal = replace(proposal, positions=fixes[0] if fixes else None)
+    proposal = replace(proposal, positions=fixes[0] if fixes else None, place=place)
     named = [*(triple for triple, _ in found.values()), *(triple for triple, _ in others)]
-    return _with_unused(proposal, [file.numbers for file in files], named, own)
+    return _with_unused(proposal, tables, named, own)
 
 
 # --------------------------------------------------------------------------------------------------- reading

@@ -1,0 +1,82 @@
+"""Where a log says that it was made. Takes the tables; gives latitude and longitude, and what to say of them.
+
+The magnetic field of a place is asked for (``--place``), and a log with a receiver's columns knows the place itself.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from math import cos, hypot, radians
+from typing import NamedTuple
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.validation.importing.sniffing.groups import Numbers
+from discsim.validation.importing.sniffing.names import read_name
+
+__all__ = ["OwnPlace", "own_place"]
+
+_LATITUDE, _LONGITUDE = {"lat", "latitude"}, {"lon", "lng", "long", "longitude"}
+#: whole numbers as receivers of u-blox give them: of 1e-7 degrees
+_COUNTS = 1e-7
+#: km in a degree of latitude (a quarter of the meridian is 10 002 km), and how far apart is another place: over 20 km a
+#: component of the field changes by up to 0.32 uT, twice its model's error (the same model, from 60 deg S to 60 deg N)
+_DEGREE_KM, _APART_KM = 111.1, 20.0
+
+
+class OwnPlace(NamedTuple):
+    """Latitude and longitude, degrees north and east, and the names of their columns."""
+
+    latitude: float
+    longitude: float
+    names: tuple[str, str]
+
+    @property
+    def text(self) -> str:
+        """The place as ``--place`` takes it."""
+        return f"{self.latitude:.4f},{self.longitude:.4f}"
+
+    @property
+    def note(self) -> str:
+        """Where the log was made, in a sentence."""
+        return f"made at {self.text} (degrees north, east) by its own '{self.names[0]}', '{self.names[1]}'"
+
+    def doubt(self, place: str) -> str | None:
+        """Return what to say of a ``--place`` that is well formed and another one; None where it is this."""
+        latitude, longitude = (float(part) for part in place.split(","))
+        east = cos(radians(self.latitude)) * ((longitude - self.longitude + 180.0) % 360.0 - 180.0)
+        apart = _DEGREE_KM * hypot(latitude - self.latitude, east)
+        if apart < _APART_KM:
+            return None
+        return f"warning: --place {place} is {apart:.0f} km from where the log says that it was made, {self.text}"
+
+
+def own_place(tables: Sequence[Numbers]) -> OwnPlace | None:
+    """Return where the first table with a latitude and a longitude says that it was made, by their medians."""
+    for numbers in tables:
+        columns = [_word(name) for name in numbers.names]
+        latitude, longitude = (
+            next((k for k, word in enumerate(columns) if word in words), None) for words in (_LATITUDE, _LONGITUDE)
+        )
+        if latitude is None or longitude is None:
+            continue
+        both = numbers.values[:, [latitude, longitude]]
+        both = both[np.all(np.isfinite(both), axis=1) & np.any(both != 0.0, axis=1)]  # zeros: no fix yet
+        if not both.size:
+            continue
+        north, east = _degrees(np.median(both, axis=0))
+        if abs(north) <= 90.0 and abs(east) <= 180.0:
+            return OwnPlace(north, east, (numbers.table.columns[latitude], numbers.table.columns[longitude]))
+    return None
+
+
+def _word(name: str) -> str:
+    """Return the last word of a name without its unit: ``gps_lat [deg]`` is ``lat``."""
+    return re.split(r"[\s_.\-:/]+", read_name(name).base.strip().lower())[-1].removeprefix("gps")
+
+
+def _degrees(place: FloatArray) -> tuple[float, float]:
+    scale = _COUNTS if np.all(place == np.round(place)) and np.max(np.abs(place)) > 180.0 else 1.0
+    return float(scale * place[0]), float(scale * place[1])
