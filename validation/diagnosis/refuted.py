@@ -1,4 +1,4 @@
-"""Effects that stand for nothing: what recordings set aside speak against, and what lost samples leave of a clock.
+"""Effects that stand for nothing: those that recordings disagree about, and what lost samples leave of a clock.
 
 Takes what a search found; gives it without those that gain little, where no more than noise is left without them.
 """
@@ -8,8 +8,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from discsim.validation.diagnosis.detectors.even_losses import rather_lost
-from discsim.validation.diagnosis.held_out import choices_without_each, heldout_gain
+from discsim.validation.diagnosis.held_out import chance_of_sizes, choices_without_each, heldout_gain
 from discsim.validation.diagnosis.selection.all_at_once import worth_of_each
+from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
 from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.exchange import rivals_of, tried_without
@@ -23,11 +24,11 @@ __all__ = ["without_refuted"]
 def without_refuted(found: Search) -> Search:
     """Return a search without its effects of little gain that stand for nothing.
 
-    Recordings set aside speak against one: each wants another number of it, and the others' makes it worse. Or it is of
-    a sensor whose samples were lost, told as a slow clock: losses come at random, and it takes up what the clock
-    leaves of them. It stays where more than noise is left without it.
+    Recordings set aside speak against one: each wants another number of it, and the others' makes it worse. Or each
+    wants another by more than its error. Or it is of a sensor whose samples were lost, told as a slow clock: losses
+    come at random, and it takes up what the clock leaves of them. It stays where more than noise is left without it.
     """
-    for refuted in (_refuted, _left_by_losses):
+    for refuted in (_refuted, _of_many_sizes, _left_by_losses):
         while (less := refuted(found)) is not None:
             bare = replace(found.with_step(less), final=less).about(less.fit)
             if leaves_more_than_noise(bare):
@@ -58,13 +59,31 @@ def _left_by_losses(found: Search) -> ContinuousFit | None:
 
 def _refuted(found: Search) -> ContinuousFit | None:
     """Return the fit without the effect of little gain that loses most on recordings set aside; None for none."""
-    candidates = found.final.hypothesis.candidates
-    if found.at_once or len(found.recordings) < 2 or leaves_more_than_noise(found):
+    of_little = _of_little_gain(found)
+    if not of_little:
         return None
-    worth = worth_of_each(found.equations, candidates, found.own)
-    of_little = [t for t in candidates if not t.fixed_values and worth[t.name] < SELECTION.refuted * price(t)]
     less = {t.name: tried_without(found, t) for t in of_little}
     choices = choices_without_each(found, less)
     gains = {t.name: heldout_gain(found, t, choices) for t in of_little}
     against = {name: gain for name, gain in gains.items() if gain is not None and gain < 0.0}
     return less[min(against, key=lambda name: against[name])] if against else None
+
+
+def _of_many_sizes(found: Search) -> ContinuousFit | None:
+    """Return the fit without the effect of little gain whose size differs most between recordings; None for none.
+
+    What a part or a disc has it has in all: what each recording asks for in another size stands for something else, as
+    for what a wobble across a corner of the air's moments leaves of them.
+    """
+    chances = [(chance_of_sizes(found, t), t) for t in _of_little_gain(found) if t.recordings is None]
+    unlike = [(chance, t) for chance, t in chances if chance < SELECTION.unlike]
+    return tried_without(found, min(unlike, key=lambda item: item[0])[1]) if unlike else None
+
+
+def _of_little_gain(found: Search) -> list[CandidateEffect]:
+    """Return the effects of little gain, where recordings can disagree and no more than noise is left."""
+    candidates = found.final.hypothesis.candidates
+    if found.at_once or len(found.recordings) < 2 or leaves_more_than_noise(found):
+        return []
+    worth = worth_of_each(found.equations, candidates, found.own)
+    return [t for t in candidates if not t.fixed_values and worth[t.name] < SELECTION.refuted * price(t)]

@@ -12,11 +12,13 @@ from support.made import RIG, coasting
 from discsim.effects import effect
 from discsim.rig import spin_down
 from discsim.validation.diagnosis import refuted
+from discsim.validation.diagnosis.held_out import chance_of_sizes
 from discsim.validation.diagnosis.refuted import without_refuted
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.diagnosis.selection.stepwise import screened
+from discsim.validation.diagnosis.settings import SELECTION
 
 BIAS = "accel.bias"
 
@@ -47,6 +49,22 @@ def test_what_two_recordings_say_and_the_third_denies_is_left_out(monkeypatch: p
 
 def test_what_all_recordings_say_stays(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(refuted, "leaves_more_than_noise", lambda found: False)
+    assert named(without_refuted(with_bias(0.03, 0.03, 0.03))) == [BIAS]
+
+
+def test_sizes_that_agree_are_likely_and_such_as_do_not_are_none():
+    """Three biases of 0.03 m/s^2, of which readings tell each to a tenth: as alike as noise makes them, or not."""
+    for biases, agree in (((0.03, 0.03, 0.03), True), ((0.03, 0.03, -0.03), False), ((0.01, 0.03, 0.05), False)):
+        found = with_bias(*biases)
+        chance = chance_of_sizes(found, found.final.hypothesis.candidates[0])
+        assert (chance > 0.01) == agree == (chance > SELECTION.unlike)
+
+
+def test_what_each_recording_wants_in_another_size_is_left_out(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(refuted, "leaves_more_than_noise", lambda found: False)
+    monkeypatch.setattr(refuted, "heldout_gain", lambda found, candidate, choices: 1.0)
+    monkeypatch.setattr(refuted, "worth_of_each", lambda equations, candidates, own: {t.name: 40.0 for t in candidates})
+    assert named(without_refuted(with_bias(0.01, 0.03, 0.05))) == []
     assert named(without_refuted(with_bias(0.03, 0.03, 0.03))) == [BIAS]
 
 
