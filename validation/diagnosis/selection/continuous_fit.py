@@ -15,6 +15,7 @@ from discsim.arrays import FloatArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import ClockRate, Lag
 from discsim.validation.diagnosis.relaxed_fit import beginning
+from discsim.validation.diagnosis.selection.begun_anew import begun_anew
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from discsim.validation.diagnosis.selection.evidence import BOUNDS, charge
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
@@ -140,6 +141,7 @@ def continuous_fit(
         effects = {candidate.id for candidate in hypothesis.candidates}
         plain = np.array([v if q.group in effects else q.stated for q, v in zip(parameters, at, strict=True)])
         fit = refit(replace(begun, at=plain), iterations=iterations, bounds=BOUNDS, bars=bars)
+    fit = begun_anew(fit, begun.trajectories)
     for _ in range(polish if fit.merit < min(bars) else 0):
         # a sensor of which a lag or an offset has left no reading keeps the noise that it had: it may come back
         fit = replace(fit, noise={**noise, **noise_of(fit)})

@@ -1,0 +1,110 @@
+"""Motions that a fit left beside their optimum, begun anew by themselves.
+
+Takes a fit and the trajectories that it began with; gives it with the motion of each recording that stands out begun
+from several starts, where one ends lower. How the wobble of a free spin dies and turns is told by little: a fit of all
+recordings may end where one of them turns by tens of rad/s too fast at first and too slowly later, and what that leaves
+looks like physics. One recording alone takes a second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.diagnosis.selection.evidence import BOUNDS
+from discsim.validation.identification.gauss_newton import Fit, discontinuous, merit_of, refit
+from discsim.validation.identification.noise import chi_squared
+from discsim.validation.identification.segments import Trajectory
+
+__all__ = ["begun_anew"]
+
+#: chi-squared per reading beyond which a recording stands out, as a multiple of the others' median; where the same
+#: noise is in all it scatters by the root of 2/n, a thirtieth for a throw. Time alone: what ends no lower is forgotten
+_STANDS_OUT = 1.15
+#: what an end must be lower by: so many numbers has a wobble, and each takes one of noise alone
+_LOWER = 10.0
+#: steps of a recording alone, and of all with it
+_STEPS, _STEPS_OF_ALL = 16, 8
+
+
+# far from the data a motion may run beyond all numbers: such a step is not finite, and is not taken
+@np.errstate(over="ignore", invalid="ignore")
+def begun_anew(fit: Fit, first: Sequence[Trajectory]) -> Fit:
+    """Return a fit whose recordings that stand out were begun anew, where that ends lower; ``first`` are its starts."""
+    if not fit.plant.weakly_identified or len(fit.trajectories) < 2 or not np.isfinite(fit.merit):
+        return fit
+    left = np.array([chi_squared(one, fit.noise, one.residual) / max(one.residual.size, 1) for one in fit.linears])
+    better = dict[int, Fit]()
+    for i in np.argsort(left)[::-1].tolist():
+        level = _STANDS_OUT * float(np.median(np.delete(left, i)))
+        if left[i] > level and (lower := _lower(fit, i, first[i], level)) is not None:
+            better[i] = lower
+    if not better:
+        return fit
+    trajectories = [better[i].trajectories[0] if i in better else one for i, one in enumerate(fit.trajectories)]
+    at = [
+        next((v for i in better if q.acts_in(i) for v in _own_value(better[i], q.key)), known)
+        for q, known in zip(fit.parameters, fit.at.tolist(), strict=True)
+    ]
+    again = refit(
+        replace(fit, trajectories=tuple(trajectories), at=np.array(at)), iterations=_STEPS_OF_ALL, bounds=BOUNDS
+    )
+    return again if again.merit < fit.merit else fit
+
+
+def _own_value(alone: Fit, key: tuple[str, str]) -> list[float]:
+    """Return the value of a recording's own number in its fit, none for what is shared."""
+    return [float(v) for q, v in zip(alone.parameters, alone.at, strict=True) if q.key == key]
+
+
+def _lower(fit: Fit, i: int, first: Trajectory, level: float) -> Fit | None:
+    """Return the fit of one recording, what is shared held, from the first start that ends below a ``level``.
+
+    It is the lowest where none does; None where none ends lower than the recording stands.
+    """
+    stands = _alone(fit, i)
+    bar = merit_of(stands, (fit.linears[i],)) - _LOWER
+    best: Fit | None = None
+    for start in _starts(fit, i, first):
+        found = refit(start, iterations=_STEPS, bounds=BOUNDS)
+        if found.merit < bar and not discontinuous(found):
+            best, bar = found, found.merit
+            if found.merit < level * found.count:
+                break
+    return best
+
+
+def _alone(fit: Fit, i: int) -> Fit:
+    """Return the fit of one recording where it stands: what is shared is held."""
+    keys = fit.plant.own_keys
+    own = [(q, v) for q, v in zip(fit.parameters, fit.at, strict=True) if q.key in keys and q.acts_in(i)]
+    return Fit(
+        (fit.trajectories[i],),
+        tuple(replace(q, recordings=frozenset([0])) for q, _ in own),
+        np.array([v for _, v in own]),
+        fit.defects,
+        fit.noise,
+        {key: value for key, value in fit.values(i).items() if key not in keys},
+    )
+
+
+def _starts(fit: Fit, i: int, first: Trajectory) -> Iterator[Fit]:
+    """Yield starts of one recording: its first trajectory and that of the data, wobbles of the others and none."""
+    stands, motion = _alone(fit, i), fit.plant.motion_keys
+    others = {
+        key: float(
+            np.median([v for q, v in zip(fit.parameters, fit.at, strict=True) if q.key == key and not q.acts_in(i)])
+        )
+        for key in motion
+    }
+    none = dict.fromkeys(motion, 0.0)
+    data = replace(first, states=first_trajectory(first.recording, nodes=first.nodes).states)
+    for trajectory, wobble in ((first, others), (data, none), (first, none)):
+        at: FloatArray = np.array(
+            [wobble.get(q.key, v) for q, v in zip(stands.parameters, stands.at.tolist(), strict=True)]
+        )
+        yield replace(stands, trajectories=(trajectory,), at=at)
