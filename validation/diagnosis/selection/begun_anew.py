@@ -16,6 +16,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.validation.diagnosis.relaxed_fit import first_trajectory
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
+from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Fit, discontinuous, merit_of, refit
 from discsim.validation.identification.noise import chi_squared
 from discsim.validation.identification.segments import Trajectory
@@ -34,14 +35,18 @@ _STEPS, _STEPS_OF_ALL = 16, 8
 # far from the data a motion may run beyond all numbers: such a step is not finite, and is not taken
 @np.errstate(over="ignore", invalid="ignore")
 def begun_anew(fit: Fit, first: Sequence[Trajectory]) -> Fit:
-    """Return a fit whose recordings that stand out were begun anew, where that ends lower; ``first`` are its starts."""
+    """Return a fit whose recordings that stand out were begun anew, where that ends lower; ``first`` are its starts.
+
+    Where the others are far from their data, too, something else is missing, and the fit is returned as it is.
+    """
     if not fit.plant.weakly_identified or len(fit.trajectories) < 2 or not np.isfinite(fit.merit):
         return fit
     left = np.array([chi_squared(one, fit.noise, one.residual) / max(one.residual.size, 1) for one in fit.linears])
     better = dict[int, Fit]()
     for i in np.argsort(left)[::-1].tolist():
-        level = _STANDS_OUT * float(np.median(np.delete(left, i)))
-        if left[i] > level and (lower := _lower(fit, i, first[i], level)) is not None:
+        others = float(np.median(np.delete(left, i)))
+        level = _STANDS_OUT * others
+        if others < SELECTION.far and left[i] > level and (lower := _lower(fit, i, first[i], level)) is not None:
             better[i] = lower
     if not better:
         return fit
