@@ -17,13 +17,13 @@ from discsim.recording import PLANTS, SENSORS, Samples, read_dataset
 from discsim.rig import spin_down
 from discsim.sensors import Noise
 from discsim.validation.challenge.cases.case import MASKS, Case, Coast, Turning
-from discsim.validation.challenge.cases.conceal import Answer, conceal, read_answer, recordings
+from discsim.validation.challenge.cases.conceal import Answer, conceal, read_answer, recordings, run_time
 from discsim.validation.challenge.cases.detection_limit import sizes
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.challenge.cases.hidden_physics import coast
 from discsim.validation.challenge.cases.hiding import possible
 from discsim.validation.challenge.cases.off_catalogue import OFF_CATALOGUE
-from discsim.validation.challenge.cases.sizes import HIDING, conceivable, draw_effect, scaled
+from discsim.validation.challenge.cases.sizes import HIDING, LATEST, conceivable, draw_effect, scaled
 from discsim.validation.experiments.concealed import FULL_CASES, QUICK_CASES
 
 #: which plant each effect is tried on here: the first of its own
@@ -248,6 +248,15 @@ def test_a_mask_makes_the_same_case_harder(mask):
 def test_a_flight_that_is_cut_short_is_recorded_no_longer():
     case = draw_case(2, "flight", mask="short")
     assert recordings(replace(case, runs=case.runs[:1], stated_releases=()))[0].end <= 1.5
+
+
+def test_an_event_happens_before_the_throw_is_over():
+    """A throw of 2.07 s had an impulse after 2.18 s: an answer that no recording knew anything of."""
+    for seed in (*range(20), 585025):
+        case = draw_case(seed, "flight", ("event.impulse",), "one")
+        (item,) = case.concealed
+        assert item.recording is not None
+        assert item.effect.sizes["t_s"] <= LATEST * run_time(case, item.recording)
 
 
 def test_sizes_near_the_limit_are_those_of_the_case_itself():

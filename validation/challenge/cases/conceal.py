@@ -28,7 +28,7 @@ from discsim.validation.challenge.cases.hidden_physics import HiddenDisc, coast,
 from discsim.validation.challenge.cases.like_real import cut_in_flight
 from discsim.validation.challenge.cases.setups import equivalents
 
-__all__ = ["Answer", "conceal", "read_answer", "recordings", "write_recordings"]
+__all__ = ["Answer", "conceal", "read_answer", "recordings", "run_time", "write_recordings"]
 
 
 @dataclass(frozen=True)
@@ -188,6 +188,11 @@ def _stated_disc(case: Case) -> Any:
             case.stated_disc, aero=None, aero_table=None, yaw_damping_table=None, rolling_table=None, sigma={}
         )
     return case.stated_disc
+
+
+def run_time(case: Case, number: int) -> float:
+    """Return how long a run lasts when nothing is concealed, s."""
+    return _motion(case, case.runs[number], [], number).end
 
 
 def _motion(case: Case, run: Run, effects: Sequence[Effect], number: int) -> Motion:

@@ -8,12 +8,20 @@ from types import MappingProxyType
 
 import numpy as np
 
-from discsim.effects.catalogue import row
+from discsim.effects.catalogue import Effect, row
 from discsim.errors import InputError
 from discsim.validation.challenge.cases.case import Case, Concealed
+from discsim.validation.challenge.cases.conceal import run_time
 from discsim.validation.challenge.cases.off_catalogue import OFF_CATALOGUE, OffCatalogue
 from discsim.validation.challenge.cases.setups import draw_fault, possible_faults
-from discsim.validation.challenge.cases.sizes import ON_REQUEST, conceivable, draw_effect, ordinary
+from discsim.validation.challenge.cases.sizes import (
+    LATEST,
+    ON_REQUEST,
+    conceivable,
+    draw_effect,
+    earlier,
+    ordinary,
+)
 
 __all__ = ["can_act", "choose", "choose_secret", "hide", "possible"]
 
@@ -83,7 +91,15 @@ def choose(
         while id is None or not _place_known(id, case):
             id = str(rng.choice(fit))
     only = int(rng.integers(len(case.runs))) if row(id).event else None
-    return Concealed(draw_effect(id, case.plant, rng, case.recorded, largest=largest), only)
+    drawn = draw_effect(id, case.plant, rng, case.recorded, largest=largest)
+    return Concealed(drawn if only is None else _in_its_run(drawn, case, only), only)
+
+
+def _in_its_run(event: Effect, case: Case, number: int) -> Effect:
+    """Return an event as late in a run as it is drawn in an ordinary one, where it would come when that is over."""
+    lasts = run_time(case, number)
+    late = event.value._asdict()["t_s"] > LATEST * lasts
+    return earlier(event, lasts / case.recorded) if late else event
 
 
 def choose_secret(case: Case, rng: np.random.Generator, name: str | None = None) -> OffCatalogue:

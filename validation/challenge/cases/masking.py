@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from discsim.effects.catalogue import effect, row
+from discsim.effects.catalogue import row
 from discsim.errors import InputError
 from discsim.sensors import Instruments
 from discsim.shipped import load_disc
@@ -19,7 +19,7 @@ from discsim.validation.challenge.cases.detection_limit import sizes
 from discsim.validation.challenge.cases.hiding import can_act, choose, choose_secret, possible
 from discsim.validation.challenge.cases.off_catalogue import log_uniform
 from discsim.validation.challenge.cases.sensor_kits import module
-from discsim.validation.challenge.cases.sizes import scaled
+from discsim.validation.challenge.cases.sizes import earlier, scaled
 from discsim.validation.challenge.cases.stating import noisy, with_sigmas
 
 __all__ = ["masked"]
@@ -91,12 +91,7 @@ def _shortened(case: Case) -> Case:
     runs = [replace(run, duration=SHORT_RUN_S) if isinstance(run, Coast) else run for run in case.runs]
     shorter = replace(case, runs=tuple(runs), longest=SHORT_FLIGHT_S)
     share = shorter.recorded / case.recorded
-    concealed = []
-    for item in case.concealed:
-        values = item.effect.value._asdict()
-        if "t_s" in values:
-            values["t_s"] = float(f"{share * values['t_s']:.7g}")
-        concealed.append(replace(item, effect=effect(item.effect.id, **values)))
+    concealed = [replace(item, effect=earlier(item.effect, share)) for item in case.concealed]
     return replace(shorter, concealed=tuple(concealed))
 
 

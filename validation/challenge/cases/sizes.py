@@ -16,7 +16,21 @@ import numpy as np
 from discsim.effects.catalogue import CATALOGUE, Effect, effect
 from discsim.recording import Plant
 
-__all__ = ["HIDING", "ON_REQUEST", "Hiding", "conceivable", "draw_effect", "hiding_of", "ordinary", "scaled"]
+__all__ = [
+    "HIDING",
+    "LATEST",
+    "ON_REQUEST",
+    "Hiding",
+    "conceivable",
+    "draw_effect",
+    "earlier",
+    "hiding_of",
+    "ordinary",
+    "scaled",
+]
+
+#: the latest that an event falls into a run, as a share of its time
+LATEST = 0.8
 
 
 @dataclass(frozen=True)
@@ -99,14 +113,14 @@ HIDING: Mapping[str, Hiding] = MappingProxyType(
             by_plant={"free_spin": (3e-6, 3e-5)},
         ),
         "event.impulse": Hiding(
-            ("dv_north_m_s", "dv_east_m_s", "dv_down_m_s"), 0.01, 2.0, "a leaf to a hand", {"t_s": (0.15, 0.8)}
+            ("dv_north_m_s", "dv_east_m_s", "dv_down_m_s"), 0.01, 2.0, "a leaf to a hand", {"t_s": (0.15, LATEST)}
         ),
         "event.spin_step": Hiding(
             ("dr_rad_s",),
             0.01,
             6.0,
             "a brush to a knock; a rig's encoder sees far less",
-            {"t_s": (0.15, 0.8)},
+            {"t_s": (0.15, LATEST)},
             by_plant={"spin_down": (0.0003, 3.0)},
         ),
         "rig.coulomb_friction": Hiding(("torque_N_m",), 1e-8, 3e-4, "to a tenth of the viscous torque", positive=True),
@@ -324,6 +338,14 @@ def ordinary(item: Effect, plant: Plant) -> bool:
     size = float(np.linalg.norm([item.sizes[name] - hiding.about for name in hiding.sized]))
     middle = float(np.sqrt(low * high))
     return size <= middle if item.id == "accel.saturation" else size >= middle
+
+
+def earlier(item: Effect, share: float) -> Effect:
+    """Return an event at a share of its instant; what is no event as it is."""
+    values = item.value._asdict()
+    if "t_s" not in values:
+        return item
+    return effect(item.id, **{**values, "t_s": float(f"{share * values['t_s']:.7g}")})
 
 
 def scaled(item: Effect, factor: float, plant: Plant) -> Effect:
