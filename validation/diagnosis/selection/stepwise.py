@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import zip_longest
 from typing import TypeAlias
 
 import numpy as np
@@ -32,7 +31,7 @@ from discsim.validation.diagnosis.selection.candidates import (
 )
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.event_instants import with_best_instant
-from discsim.validation.diagnosis.selection.evidence import ONE_SIDED, TURNED, charge, price
+from discsim.validation.diagnosis.selection.evidence import ONE_SIDED, TURNED, price
 from discsim.validation.diagnosis.selection.exchange import (
     eliminated_backward,
     exchanged,
@@ -41,6 +40,7 @@ from discsim.validation.diagnosis.selection.exchange import (
     without_superfluous,
 )
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
+from discsim.validation.diagnosis.selection.offers import Offer, in_chi2, in_turn
 from discsim.validation.diagnosis.selection.recounting import with_losses_recounted
 from discsim.validation.diagnosis.selection.refits import refitting
 from discsim.validation.diagnosis.selection.score_tests import (
@@ -79,8 +79,6 @@ from discsim.validation.identification.stated_parameters import stated_parameter
 __all__ = ["joined", "past_hope", "screened", "search", "settled", "without_swallowed"]
 
 Report: TypeAlias = Callable[[str, int, int], None]
-#: what is proposed, the fit whose motion a fit of it starts from, and what choosing lost samples costs
-Offer: TypeAlias = tuple[ScreenedCandidate, Fit, float]
 
 #: the lag that holds what was there before a recording began
 _HELD = catalogued(Lag, "accelerometer").id
@@ -363,34 +361,34 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
             )
         ]
     found = _with_lost_samples(found, current)
+    shown: list[Offer] = []
     for item in searched(found.relaxed_fit, current, found.own, steady_noise(found), found.lost_samples.found):
         if isinstance(item, Shifted):
-            there.append((item.screened, replace(found.relaxed_fit, trajectories=item.trajectories), item.cost))
+            shown.append((item.screened, replace(found.relaxed_fit, trajectories=item.trajectories), item.cost))
         elif current.hypothesis.candidates:
             here.append((item, found.relaxed_fit if distant else current.fit, 0.0))
         else:
-            there.append((item, found.relaxed_fit, 0.0))
+            shown.append((item, found.relaxed_fit, 0.0))
     if not distant:
         # no more can be gained than is left: about segments that one recording has wrong algebra promises anything.
         # A limit at which readings stand moves nothing in a fit, and these readings are no part of what is left
         left = chi2_in(current, found.relaxed_noise)
-        there = [offer for offer in there if _in_chi2(offer) < left]
+        there, shown = ([offer for offer in some if in_chi2(offer) < left] for some in (there, shown))
     # what the two promise does not compare: far from the data they are asked in different noise, and near them the
     # segments of a fit that follows may promise much of a sensor that has nothing to gain
-    there, here = ([offer for offer in some if on_the_disc(found, offer[0].start)] for some in (there, here))
-    worth = in_turn(there, here)
+    there, shown, here = (
+        [offer for offer in some if on_the_disc(found, offer[0].start)] for some in (there, shown, here)
+    )
+    # beside the data, where the slopes at hand promise nothing its price, what readings show comes before what other
+    # slopes promise
+    first = not distant and not in_turn(here)
+    worth = in_turn(shown, there, here) if first else in_turn([*there, *shown], here)
     present = {candidate.id for candidate in current.hypothesis.candidates}
     told = [hint for hint in found.hints if hint.candidate.id not in present]
     # what a lag holds dies away too fast for slopes at no lag to tell
     told = [hint for hint in told if distant or hint.candidate.id == _HELD or _swallowed(current, hint)]
     worth = [*((hint, found.relaxed_fit, 0.0) for hint in told), *worth]
     return found, worth
-
-
-def _in_chi2(offer: Offer) -> float:
-    """Return what an offer promises of the readings that a fit counts: nothing where it explains why some are out."""
-    screened, _, cost = offer
-    return 0.0 if cost > 0.0 or screened.candidate.row.hides_readings else screened.gain
 
 
 def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Search, ContinuousFit | None]:
@@ -508,17 +506,6 @@ def _begun_again(found: Search, current: ContinuousFit, screened: ScreenedCandid
     return continuous_fit(
         current.fit, current.hypothesis.plus(screened.candidate), found.own, current.fit.noise, start, bars=Bars(bar)
     )
-
-
-def in_turn(*offers: Sequence[Offer]) -> list[Offer]:
-    """Return offers that may be worth their price, from each list the best in turn."""
-
-    def later(offer: Offer) -> tuple[bool, float]:
-        # lost samples first: they bend what algebra says of everything else
-        return offer[2] <= 0.0, charge(offer[0].candidate) - offer[0].gain
-
-    worth = [sorted((o for o in some if o[0].gain > 0.5 * price(o[0].candidate)), key=later) for some in offers]
-    return [offer for turn in zip_longest(*worth) for offer in turn if offer is not None]
 
 
 def _considering(

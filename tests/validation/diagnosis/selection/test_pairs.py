@@ -17,6 +17,7 @@ from discsim.validation.diagnosis.selection.candidates import CandidateEffect, c
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
 from discsim.validation.diagnosis.selection.exchange import exchanged, rivals_of
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
+from discsim.validation.diagnosis.selection.offers import in_turn
 from discsim.validation.diagnosis.selection.score_tests import Pair, ScreenedCandidate, pairs
 from discsim.validation.diagnosis.selection.screening import normal_equations_of
 from discsim.validation.diagnosis.selection.search_state import Rival, possible
@@ -165,5 +166,5 @@ def test_offers_from_two_fits_come_in_turn_and_lost_samples_first():
         (ScreenedCandidate(small, 5e3, {}), windy().relaxed_fit, 0.0),
         (ScreenedCandidate(big, 1e4, {}), windy().relaxed_fit, 30.0),
     ]
-    gains = [offer[0].gain for offer in searching.in_turn(there, here)]
+    gains = [offer[0].gain for offer in in_turn(there, here)]
     assert gains == [1e6, 1e4, 9e5, 5e3]
