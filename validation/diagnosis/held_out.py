@@ -6,11 +6,9 @@ Takes what a search found; gives gains and chi-squared of each recording set asi
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
-from scipy.stats import chi2
 
 from discsim.arrays import FloatArray
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
@@ -24,7 +22,7 @@ from discsim.validation.identification.gauss_newton import reduced_each
 from discsim.validation.identification.noise import chi_squared, log_likelihood
 from discsim.validation.identification.normal_equations import common_step
 
-__all__ = ["Choice", "chance_of_sizes", "choices_without_each", "heldout_chi2", "heldout_gain"]
+__all__ = ["Choice", "choices_without_each", "heldout_chi2", "heldout_gain"]
 
 #: what the other recordings choose in the place of each named effect, by its name: itself, a rival or nothing
 Choice: TypeAlias = Mapping[str, CandidateEffect | None]
@@ -95,26 +93,6 @@ def heldout_gain(found: Search, candidate: CandidateEffect, choices: Sequence[Ch
     return 0.5 * total
 
 
-def chance_of_sizes(found: Search, candidate: CandidateEffect) -> float:
-    """Return with what chance recordings that share an effect's size ask for sizes as unlike as these do.
-
-    By how much chi-squared falls where each has its own is chi-squared distributed, with as many degrees of freedom as
-    sizes are free then (W. Cochran, Biometrics 10, 1954, p. 101).
-    """
-    final, board = found.final, found.equations
-    own = board.columns_of(fitted_parameters(final.hypothesis, found.own))
-    mine = {(column, q.recordings) for column, q in free_columns(candidate)}
-    each = [
-        (column, replace(q, recordings=frozenset([i])))
-        for column, q in own
-        if (column, q.recordings) in mine
-        for i in range(board.recordings)
-    ]
-    rest = [(column, q) for column, q in own if (column, q.recordings) not in mine]
-    freed = len(each) - (len(own) - len(rest))
-    return float(chi2.sf(board.solve(own).chi2 - board.solve([*rest, *each]).chi2, max(freed, 1)))
-
-
 def heldout_chi2(found: Search, hypothesis: Hypothesis, i: int, choice: Choice | None = None) -> float:
     """Return chi-squared of a recording with the shared parameters as the other recordings have them.
 
@@ -142,12 +120,12 @@ def heldout_chi2(found: Search, hypothesis: Hypothesis, i: int, choice: Choice |
     at = np.array([place for place, _ in fixed], dtype=int)
     v = np.array([value for _, value in fixed])
     e = G[:, -1].copy()
-    left = float(G[-1, -1])
+    chi2 = float(G[-1, -1])
     if at.size:
-        left += float(-2.0 * v @ e[at] + v @ G[np.ix_(at, at)] @ v)
+        chi2 += float(-2.0 * v @ e[at] + v @ G[np.ix_(at, at)] @ v)
         e[:-1] -= G[:-1][:, at] @ v
     if alone:
         free = np.array([board.place[column] for column, _ in alone])
         H = G[np.ix_(free, free)] + np.diag([q.precision for _, q in alone])
-        left -= float(e[free] @ np.linalg.solve(H + 1e-12 * np.diag(np.diag(H)), e[free]))
-    return left
+        chi2 -= float(e[free] @ np.linalg.solve(H + 1e-12 * np.diag(np.diag(H)), e[free]))
+    return chi2

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from discsim.validation.diagnosis.detectors.even_losses import rather_lost
-from discsim.validation.diagnosis.held_out import chance_of_sizes, choices_without_each, heldout_gain
+from discsim.validation.diagnosis.detectors.even_losses import lost_as_well, rather_lost
+from discsim.validation.diagnosis.held_out import choices_without_each, heldout_gain
 from discsim.validation.diagnosis.selection.all_at_once import worth_of_each
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
 from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.exchange import rivals_of, tried_without
+from discsim.validation.diagnosis.selection.own_sizes import own_sizes
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.diagnosis.verdict import leaves_more_than_noise
@@ -38,23 +39,30 @@ def without_refuted(found: Search) -> Search:
 
 
 def _left_by_losses(found: Search) -> ContinuousFit | None:
-    """Return the fit without the effect that gains least of a sensor that lost samples; None for none of little gain.
+    """Return the fit without an effect of a sensor that lost samples, told as a slow clock; None for none.
 
-    A walk of random losses wanders about the line of a clock, and what that leaves may pass for a bias or a drift.
+    A walk of random losses wanders about the line of a clock, and what that leaves may pass for a bias or a drift: one
+    of little gain, or of no more than is gained where each recording has a clock of its own.
     """
     final = found.final
-    losing = {t.row.acts_on for t in final.hypothesis.candidates if rather_lost(final.fit, t) is not None}
-    if found.at_once or not losing:
-        return None
-    others = [
-        t
-        for t in final.hypothesis.candidates
-        if t.row.acts_on in losing and not t.fixed_values and rather_lost(final.fit, t) is None
-    ]
-    less = {t.name: tried_without(found, t) for t in others}
-    gains = {t.name: less[t.name].score - final.score for t in others}
-    little = [t.name for t in others if gains[t.name] < SELECTION.refuted * price(t)]
-    return less[min(little, key=lambda name: gains[name])] if little else None
+    slow = [] if found.at_once else [t for t in final.hypothesis.candidates if lost_as_well(final.fit, t) is not None]
+    best: tuple[float, ContinuousFit] | None = None
+    for clock in slow:
+        lossy = rather_lost(final.fit, clock) is not None
+        for t in final.hypothesis.candidates:
+            if t.row.acts_on != clock.row.acts_on or t in slow or t.fixed_values:
+                continue
+            less = tried_without(found, t)
+            gain = less.score - final.score
+            if (lossy and gain < SELECTION.refuted * price(t)) or _walks(less, clock, gain):
+                best = min((gain, less), best or (gain, less), key=lambda item: item[0])
+    return None if best is None else best[1]
+
+
+def _walks(fitted: ContinuousFit, clock: CandidateEffect, gain: float) -> bool:
+    """Tell whether recordings with clocks of their own gain most of a ``gain``, as losses at random make them."""
+    sizes = own_sizes(fitted.fit, clock)
+    return sizes.chance < SELECTION.unlike and sizes.gain > SELECTION.borne_out * gain
 
 
 def _refuted(found: Search) -> ContinuousFit | None:
@@ -75,7 +83,7 @@ def _of_many_sizes(found: Search) -> ContinuousFit | None:
     What a part or a disc has it has in all: what each recording asks for in another size stands for something else, as
     for what a wobble across a corner of the air's moments leaves of them.
     """
-    chances = [(chance_of_sizes(found, t), t) for t in _of_little_gain(found) if t.recordings is None]
+    chances = [(own_sizes(found.final.fit, t).chance, t) for t in _of_little_gain(found) if t.recordings is None]
     unlike = [(chance, t) for chance, t in chances if chance < SELECTION.unlike]
     return tried_without(found, min(unlike, key=lambda item: item[0])[1]) if unlike else None
 

@@ -12,10 +12,10 @@ from support.made import RIG, coasting
 from discsim.effects import effect
 from discsim.rig import spin_down
 from discsim.validation.diagnosis import refuted
-from discsim.validation.diagnosis.held_out import chance_of_sizes
 from discsim.validation.diagnosis.refuted import without_refuted
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.own_sizes import own_sizes
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.diagnosis.selection.stepwise import screened
 from discsim.validation.diagnosis.settings import SELECTION
@@ -56,7 +56,7 @@ def test_sizes_that_agree_are_likely_and_such_as_do_not_are_none():
     """Three biases of 0.03 m/s^2, of which readings tell each to a tenth: as alike as noise makes them, or not."""
     for biases, agree in (((0.03, 0.03, 0.03), True), ((0.03, 0.03, -0.03), False), ((0.01, 0.03, 0.05), False)):
         found = with_bias(*biases)
-        chance = chance_of_sizes(found, found.final.hypothesis.candidates[0])
+        chance = own_sizes(found.final.fit, found.final.hypothesis.candidates[0]).chance
         assert (chance > 0.01) == agree == (chance > SELECTION.unlike)
 
 

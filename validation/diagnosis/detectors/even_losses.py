@@ -16,6 +16,8 @@ from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.sensors import ClockRate, DroppedSamples
 from discsim.validation.diagnosis.detectors.dropped_samples import price_of_places
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect
+from discsim.validation.diagnosis.selection.own_sizes import own_sizes
+from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.prediction import shown
 from discsim.validation.identification.readings import Readings, group_of
@@ -73,10 +75,13 @@ def _of_walk(shown_by: Sequence[FloatArray]) -> float:
 def rather_lost(fit: Fit, candidate: CandidateEffect) -> tuple[str, float, float | None] | None:
     """Return lost samples as `lost_as_well` does where they are likelier than a clock of a fit, else None.
 
-    Where no reading tells the two apart, what a part may be tells: a clock of all recordings is within its tolerance.
+    Where no reading tells the two apart, what a part may be tells: a clock of all recordings is within its tolerance,
+    and the same in all. Losses come at random, and each recording has had its own.
     """
     lost = lost_as_well(fit, candidate) if candidate.recordings is None else None
-    return lost if lost is not None and lost[1] > _OUT_OF_TOLERANCE else None
+    if lost is None or (lost[1] <= _OUT_OF_TOLERANCE and own_sizes(fit, candidate).chance > SELECTION.unlike):
+        return None
+    return lost
 
 
 def _of_one_sample(fit: Fit, recording: int, readings: Readings) -> FloatArray:
