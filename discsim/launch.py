@@ -62,7 +62,10 @@ def released(words: Launch, like: Release | None = None) -> Release:
 
     Raises `InputError` for what nobody throws: no speed, no height, or a spin above `FASTEST_SPIN`.
     """
-    if not (np.all(np.isfinite(words)) and words.speed > 0.0 and words.height > 0.0):
+    for name, value in words._asdict().items():
+        if not np.isfinite(value):
+            raise InputError(f"a throw whose {name} is {value:g}; expected a finite number")
+    if not (words.speed > 0.0 and words.height > 0.0):
         raise InputError(
             f"a throw at {words.speed:g} m/s from {words.height:g} m above the ground; expected both above zero"
         )

@@ -10,7 +10,7 @@ __all__ = ["command"]
 
 
 def command(
-    kind: Annotated[str, typer.Argument(help="discs, parts, throws, sites, maps, sweeps or effects.")],
+    kind: Annotated[str, typer.Argument(help="discs, parts, throws, sites, tables, maps, sweeps or effects.")],
 ) -> None:
     """List what is shipped: discs, parts, throws, effects and more.
 

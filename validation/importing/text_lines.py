@@ -23,6 +23,14 @@ PIECE = 1 << 20
 _HEAD = 2048
 
 
+#: what spreadsheets and web pages print -> what it is in a table of numbers: a minus, and a mark between thousands
+_TYPESET = str.maketrans({"\N{MINUS SIGN}": "-", "\N{RIGHT SINGLE QUOTATION MARK}": "'"})
+
+
+def _plain(text: str) -> str:
+    return text if text.isascii() else text.translate(_TYPESET)
+
+
 class TextLines:
     """Lines of a text file; ends of lines may be LF, CR LF or CR.
 
@@ -44,11 +52,11 @@ class TextLines:
         left = ""
         try:
             with self._opened() as stream:
-                left = stream.read(PIECE).removeprefix("\ufeff")
+                left = _plain(stream.read(PIECE)).removeprefix("\ufeff")
                 *whole, left = left.split("\n")
                 yield whole
                 while piece := stream.read(PIECE):
-                    *whole, left = (left + piece).split("\n")
+                    *whole, left = (left + _plain(piece)).split("\n")
                     if whole:
                         yield whole
         except UnicodeError as error:  # of a whole text, such as one in UTF-16 that does not say in which order

@@ -156,6 +156,11 @@ def test_the_same_seed_gives_the_same_bytes_and_another_one_does_not(monkeypatch
     assert first != other
 
 
+def test_an_effect_without_a_size_is_refused_with_an_example(monkeypatch, tmp_path, capsys):
+    assert run(monkeypatch, "fly", "--out", str(tmp_path), "--effect", "air.wind") == 2
+    assert "does nothing without a size; expected air.wind:w_north_m_s=0.1" in capsys.readouterr().err
+
+
 def test_an_effect_on_the_command_line_reaches_flight_and_sensors(monkeypatch, tmp_path):
     for name, effects in (
         ("plain", []),

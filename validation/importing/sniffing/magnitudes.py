@@ -187,6 +187,9 @@ def magnetometer_unit(value: FloatArray, stated: Reading | None, *, counts: bool
     if fits and not counted and not (_whole(value) and (counts or fits[0] == "nT")):
         why = f"{size:.4g} ({what}) is the earth's field"
         return Unit(fits[0], 1.0, _said(name, fits[0], "likely", why))
+    if fits == ["nT"] and not counted and not _parts_of(size):
+        why = f"{size:.4g} ({what}) is the earth's field, and no part counts so finely"
+        return Unit("nT", 1.0, _said(name, "nT", "likely", why))
     if _whole(value):
         return _magnetometer_counts(size, what)
     unit = min(factors, key=lambda unit: abs(np.log(max(size, 1e-12) * factors[unit] / MIDDLE)))
@@ -194,8 +197,13 @@ def magnetometer_unit(value: FloatArray, stated: Reading | None, *, counts: bool
     return Unit(unit, 1.0, _said(name, unit, "guess", why))
 
 
+def _parts_of(size: float) -> dict[str, float]:
+    """Return the parts of which so many counts are the earth's field, with their counts per uT."""
+    return {part: per for part, per in PER_UT.items() if FIELD[0] <= size / per <= FIELD[1]}
+
+
 def _magnetometer_counts(size: float, what: str) -> Unit:
-    fits = {part: per for part, per in PER_UT.items() if FIELD[0] <= size / per <= FIELD[1]}
+    fits = _parts_of(size)
     part = min(fits or PER_UT, key=lambda part: abs(np.log(size / PER_UT[part] / MIDDLE)))
     per = PER_UT[part]
     others = ", ".join(other for other in fits if other != part)
