@@ -99,14 +99,13 @@ def _alone(fit: Fit, i: int) -> Fit:
 
 def _starts(fit: Fit, i: int, first: Trajectory) -> Iterator[Fit]:
     """Yield starts of one recording: its first trajectory and that of the data, wobbles of the others and none."""
-    stands, motion = _alone(fit, i), fit.plant.motion_keys
-    others = {
-        key: float(
-            np.median([v for q, v in zip(fit.parameters, fit.at, strict=True) if q.key == key and not q.acts_in(i)])
-        )
-        for key in motion
+    stands = _alone(fit, i)
+    none = dict.fromkeys(fit.plant.motion_keys, 0.0)
+    known = {
+        key: [v for q, v in zip(fit.parameters, fit.at, strict=True) if q.key == key and not q.acts_in(i)]
+        for key in none
     }
-    none = dict.fromkeys(motion, 0.0)
+    others = {key: float(np.median(values)) for key, values in known.items() if values}
     data = replace(first, states=first_trajectory(first.recording, nodes=first.nodes).states)
     for trajectory, wobble in ((first, others), (data, none), (first, none)):
         at: FloatArray = np.array(
