@@ -65,15 +65,14 @@ def _one(kind: str, name: str) -> str:
 
 
 def _effect(row: Row) -> str:
-    example = ",".join(f"{name}={size:g}" for name, size in zip(row.parameters, row.scale, strict=False))
     lines = [f"# effects/{row.id}", row.title]
     lines += [f"  {label}: {text}" for label, text in (("grows with", row.grows_with), ("seen as", row.trace)) if text]
     lines.append(f"  acts on: {row.acts_on}, in {', '.join(row.plants)}")
     for name in row.parameters:
         lines.append(f"  parameter: {name}" + (f", {row.units[name]}" if name in row.units else ""))
     lines += [f"  setting: {name}" for name in row.settings]
-    if example and not row.settings:
-        lines.append(f"  example: --effect {row.id}:{example}")
+    if row.example and not row.settings:
+        lines.append(f"  example: --effect {row.id}:{row.example}")
     return "\n".join(lines) + "\n"
 
 

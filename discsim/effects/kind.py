@@ -120,6 +120,11 @@ class Row(NamedTuple):
         return tuple(name for name, none in self.baseline._asdict().items() if isinstance(none, str))
 
     @property
+    def example(self) -> str:
+        """Its parameters at a small but visible size, as ``--effect`` takes them behind the id and a colon."""
+        return ",".join(f"{name}={size:g}" for name, size in zip(self.parameters, self.scale, strict=False))
+
+    @property
     def brief(self) -> bool:
         """Whether it is an event of a length that is known: a blow, not a gust."""
         return self.event and not isinstance(self.lasts, str)

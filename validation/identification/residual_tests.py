@@ -158,7 +158,8 @@ def _windows(
     for index, (linear, x) in enumerate(zip(linears, white, strict=True)):
         for channel in linear.channels:
             t = linear.t[channel.rows]
-            t, y = t[t > settled], np.minimum(x[channel.rows][t > settled] ** 2, limits.wild)
+            late = t > settled
+            t, y = t[late], np.minimum(x[channel.rows][late] ** 2, limits.wild)
             if y.size < 2 * limits.window:
                 continue
             total = np.convolve(y, np.ones(limits.window), mode="valid")

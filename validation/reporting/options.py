@@ -13,7 +13,7 @@ import typer
 
 from discsim.arrays import FloatArray, readonly
 from discsim.disc import Disc, Release, Rig
-from discsim.effects.catalogue import Effect, Row, by_id, effect, row
+from discsim.effects.catalogue import Effect, by_id, effect, row
 from discsim.effects.own import UserEffect
 from discsim.environment import FIELD_MODEL_SIGMA, Environment, world_magnetic_field
 from discsim.errors import InputError
@@ -288,15 +288,11 @@ def parse_effects(
                 raise InputError(f"--effect {text}: '{item}', {beyond}")
         given = effect(id.strip(), **sizes, **setting) if mine is None else mine.sized(sizes)
         if mine is None and not sizes and not setting and given.value == kind.baseline:
-            raise InputError(f"--effect {text}: does nothing without a size; expected {id.strip()}:{_example(kind)}")
+            raise InputError(f"--effect {text}: does nothing without a size; expected {id.strip()}:{kind.example}")
         if problem := _cannot_act(given, plant, sensors):
             raise InputError(f"--effect {given.id}: {problem}")
         effects.append(given)
     return effects
-
-
-def _example(kind: Row) -> str:
-    return ",".join(f"{name}={size:g}" for name, size in zip(kind.parameters, kind.scale, strict=False))
 
 
 def parse_module(text: str) -> Module:

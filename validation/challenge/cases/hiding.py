@@ -98,7 +98,7 @@ def choose(
 def _in_its_run(event: Effect, case: Case, number: int) -> Effect:
     """Return an event as late in a run as it is drawn in an ordinary one, where it would come when that is over."""
     lasts = run_time(case, number)
-    late = event.value._asdict()["t_s"] > LATEST * lasts
+    late = event.sizes["t_s"] > LATEST * lasts
     return earlier(event, lasts / case.recorded) if late else event
 
 

@@ -8,12 +8,11 @@ looks like physics. One recording alone takes a second.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from discsim.arrays import FloatArray
 from discsim.validation.diagnosis.relaxed_fit import first_trajectory
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.settings import SELECTION
@@ -51,19 +50,14 @@ def begun_anew(fit: Fit, first: Sequence[Trajectory]) -> Fit:
     if not better:
         return fit
     trajectories = [better[i].trajectories[0] if i in better else one for i, one in enumerate(fit.trajectories)]
-    at = [
-        next((v for i in better if q.acts_in(i) for v in _own_value(better[i], q.key)), known)
-        for q, known in zip(fit.parameters, fit.at.tolist(), strict=True)
-    ]
+    own = dict[tuple[tuple[str, str], frozenset[int] | None], float]()
+    for i, alone in better.items():
+        own |= {(q.key, frozenset([i])): float(v) for q, v in zip(alone.parameters, alone.at, strict=True)}
+    at = [own.get((q.key, q.recordings), v) for q, v in zip(fit.parameters, fit.at, strict=True)]
     again = refit(
         replace(fit, trajectories=tuple(trajectories), at=np.array(at)), iterations=_STEPS_OF_ALL, bounds=BOUNDS
     )
     return again if again.merit < fit.merit else fit
-
-
-def _own_value(alone: Fit, key: tuple[str, str]) -> list[float]:
-    """Return the value of a recording's own number in its fit, none for what is shared."""
-    return [float(v) for q, v in zip(alone.parameters, alone.at, strict=True) if q.key == key]
 
 
 def _lower(fit: Fit, i: int, first: Trajectory, level: float) -> Fit | None:
@@ -74,7 +68,7 @@ def _lower(fit: Fit, i: int, first: Trajectory, level: float) -> Fit | None:
     stands = _alone(fit, i)
     bar = merit_of(stands, (fit.linears[i],)) - _LOWER
     best: Fit | None = None
-    for start in _starts(fit, i, first):
+    for start in _starts(fit, i, stands, first):
         found = refit(start, iterations=_STEPS, bounds=BOUNDS)
         if found.merit < bar and not discontinuous(found):
             best, bar = found, found.merit
@@ -97,18 +91,19 @@ def _alone(fit: Fit, i: int) -> Fit:
     )
 
 
-def _starts(fit: Fit, i: int, first: Trajectory) -> Iterator[Fit]:
+def _starts(fit: Fit, i: int, stands: Fit, first: Trajectory) -> Iterator[Fit]:
     """Yield starts of one recording: its first trajectory and that of the data, wobbles of the others and none."""
-    stands = _alone(fit, i)
     none = dict.fromkeys(fit.plant.motion_keys, 0.0)
     known = {
         key: [v for q, v in zip(fit.parameters, fit.at, strict=True) if q.key == key and not q.acts_in(i)]
         for key in none
     }
     others = {key: float(np.median(values)) for key, values in known.items() if values}
-    data = replace(first, states=first_trajectory(first.recording, nodes=first.nodes).states)
-    for trajectory, wobble in ((first, others), (data, none), (first, none)):
-        at: FloatArray = np.array(
-            [wobble.get(q.key, v) for q, v in zip(stands.parameters, stands.at.tolist(), strict=True)]
-        )
-        yield replace(stands, trajectories=(trajectory,), at=at)
+
+    def begun(trajectory: Trajectory, wobble: Mapping[tuple[str, str], float]) -> Fit:
+        at = [wobble.get(q.key, v) for q, v in zip(stands.parameters, stands.at.tolist(), strict=True)]
+        return replace(stands, trajectories=(trajectory,), at=np.array(at))
+
+    yield begun(first, others)
+    yield begun(replace(first, states=first_trajectory(first.recording, nodes=first.nodes).states), none)
+    yield begun(first, none)
