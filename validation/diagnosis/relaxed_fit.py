@@ -41,11 +41,15 @@ __all__ = [
     "first_trajectory",
     "from_other_initial_states",
     "relaxed",
+    "time_ratio",
+    "trajectory_in_true_time",
     "without_outliers",
 ]
 
 #: the clock of all sensors
 _CLOCK = (catalogued(ClockRate, "clock").id, "ratio")
+#: clocks by which the motion of a relaxed fit goes: it follows the magnetometer's phase
+_LEADING = (_CLOCK, (catalogued(ClockRate, "magnetometer").id, "ratio"))
 #: times of one sensor that are off by as much all along
 _OFFSETS = frozenset(row.id for row in CATALOGUE.values() if row.type is TimeOffset)
 
@@ -54,6 +58,11 @@ def nodes_of(recording: Recording) -> FloatArray:
     """Return the nodes of a recording's segments, s."""
     plant = plant_of(recording)
     return plant.nodes(recording, plant.durations.segment)
+
+
+def time_ratio(values: Values) -> float:
+    """Return what the times by which a motion is followed are written as, in true ones, by a recording's values."""
+    return float(np.prod([values.get(key, 1.0) for key in _LEADING]))
 
 
 def trajectory_in_true_time(recording: Recording, ratio: float) -> Trajectory:

@@ -202,6 +202,20 @@ def test_lost_magnetometer_readings_make_no_spin():
     assert errors_of(starts, motion)["rate"] < RATE
 
 
+def test_a_field_along_the_spin_axis_for_a_while_makes_no_other_spin():
+    """Nothing of the field is left in the disc's plane then, and the gyroscope is at its limit all along."""
+    motion = flight()
+    along = body_to_ned(motion.attitude[np.searchsorted(motion.t, 2.5)])[:, 2]
+    field = replace(motion.environment, magnetic_field=50.0 * along)
+    module = MODULE.fitted("gyroscope", range=np.radians(2000.0))
+    thrown = replace(motion, environment=field)
+    throw = record(thrown, module, np.random.default_rng(3), plant="flight", name="throw", disc=DRIVER)
+    across = np.hypot(*throw.samples["magnetometer"].value[:, :2].T)
+    assert np.min(across) < 0.5 < np.median(across)
+    found = errors_of(flight_initial_states(throw, instants(motion)), motion)
+    assert found["rate"] < 0.1
+
+
 def test_late_fixes_move_the_path_and_leave_the_attitude():
     motion = flight()
     starts = flight_initial_states(measured(motion, effect("gps.latency", delay_s=0.2)), instants(motion))

@@ -3,7 +3,8 @@
 Takes a fit and the trajectories that it began with; gives it with the motion of each recording that stands out begun
 from several starts, where one ends lower. How the wobble of a free spin dies and turns is told by little: a fit of all
 recordings may end where one of them turns by tens of rad/s too fast at first and too slowly later, and what that leaves
-looks like physics. One recording alone takes a second.
+looks like physics. So may a flight whose start was made in the time of a clock that is wrong by percents. One recording
+alone takes a second.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.diagnosis.relaxed_fit import first_trajectory, time_ratio, trajectory_in_true_time
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Fit, discontinuous, merit_of, refit
@@ -38,7 +39,9 @@ def begun_anew(fit: Fit, first: Sequence[Trajectory]) -> Fit:
 
     Where the others are far from their data, too, something else is missing, and the fit is returned as it is.
     """
-    if not fit.plant.weakly_identified or len(fit.trajectories) < 2 or not np.isfinite(fit.merit):
+    other_time = fit.plant.airborne and any(time_ratio(fit.values(i)) != 1.0 for i in range(len(fit.trajectories)))
+    in_doubt = fit.plant.weakly_identified or (other_time and not fit.from_release)
+    if not in_doubt or len(fit.trajectories) < 2 or not np.isfinite(fit.merit):
         return fit
     left = np.array([chi_squared(one, fit.noise, one.residual) / max(one.residual.size, 1) for one in fit.linears])
     better = dict[int, Fit]()
@@ -92,7 +95,10 @@ def _alone(fit: Fit, i: int) -> Fit:
 
 
 def _starts(fit: Fit, i: int, stands: Fit, first: Trajectory) -> Iterator[Fit]:
-    """Yield starts of one recording: its first trajectory and that of the data, wobbles of the others and none."""
+    """Yield starts of one recording: its first trajectory and that of the data, wobbles of the others and none.
+
+    That of the data stands in the time that the fit means.
+    """
     none = dict.fromkeys(fit.plant.motion_keys, 0.0)
     known = {
         key: [v for q, v in zip(fit.parameters, fit.at, strict=True) if q.key == key and not q.acts_in(i)]
@@ -105,5 +111,10 @@ def _starts(fit: Fit, i: int, stands: Fit, first: Trajectory) -> Iterator[Fit]:
         return replace(stands, trajectories=(trajectory,), at=np.array(at))
 
     yield begun(first, others)
-    yield begun(replace(first, states=first_trajectory(first.recording, nodes=first.nodes).states), none)
-    yield begun(first, none)
+    ratio = time_ratio(fit.values(i))
+    if ratio != 1.0:
+        yield begun(trajectory_in_true_time(first.recording, ratio), others)
+    else:
+        yield begun(replace(first, states=first_trajectory(first.recording, nodes=first.nodes).states), none)
+    if none:
+        yield begun(first, none)

@@ -12,9 +12,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.effects.catalogue import catalogued
-from discsim.effects.sensors import ClockRate, Lag
-from discsim.validation.diagnosis.relaxed_fit import beginning
+from discsim.effects.sensors import Lag
+from discsim.validation.diagnosis.relaxed_fit import beginning, time_ratio
 from discsim.validation.diagnosis.selection.begun_anew import begun_anew
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from discsim.validation.diagnosis.selection.evidence import BOUNDS, charge
@@ -169,18 +168,12 @@ def _begun(relaxed_fit: Fit, parameters: Sequence[Parameter], own: Sequence[Para
     return np.array([relaxed.get((q.key, q.recordings), v) for q, v in zip(parameters, offered, strict=True)])
 
 
-#: clocks by which the motion of a relaxed fit goes: it follows the magnetometer's phase
-_LEADING = tuple((catalogued(ClockRate, whose).id, "ratio") for whose in ("clock", "magnetometer"))
-
-
 def _retimed(relaxed_fit: Fit, parameters: Sequence[Parameter], at: FloatArray) -> tuple[Trajectory, ...]:
     """Return the trajectories of a fit with their motion moved to the times that other clocks mean."""
     trajectories = []
     for i, trajectory in enumerate(relaxed_fit.trajectories):
         before, after = relaxed_fit.values(i), values_of(parameters, at, i, {})
-        ratio = 1.0
-        for key in _LEADING:
-            ratio *= after.get(key, 1.0) / before.get(key, 1.0)
+        ratio = time_ratio(after) / time_ratio(before)
         if abs(ratio - 1.0) > 1e-5 and 0.5 < ratio < 2.0:
             trajectory = replace(trajectory, nodes=trajectory.nodes / ratio)
         trajectories.append(trajectory)

@@ -17,7 +17,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import solveh_banded
 from scipy.ndimage import median_filter
 
-from discsim.arrays import ComplexArray, FloatArray
+from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.recording import Recording
 from discsim.validation.identification.initial.smoothing import (
     FEWEST,
@@ -46,6 +46,13 @@ PHASE_SIGMA = 0.05
 
 #: of the smoothing of the spin rate given, s: lost readings make steps of phase that are no rate
 RATE_SIGMA = 0.15
+
+#: standard deviations of its noise below which a vector's phase says nothing: it is known to a third of a radian there
+_TELLS = 3.0
+#: standard deviation of a phase's step beyond which it is no rate, rad: one in ten is off by a radian
+_STEPS_TELL = 0.6
+#: median length of a pair of normal deviates, in standard deviations of one: sqrt(2 ln 2)
+_MEDIAN = 1.18
 
 
 class Spin(NamedTuple):
@@ -231,6 +238,9 @@ def phase_spin(
     else:
         plane = _less_what_stands(t, z)
     rate = rough if expected is not None else _rough_rate(grid, t, plane, step)
+    may_vanish = sensor == "magnetometer" and not steady
+    if may_vanish and expected is None:
+        rate = _bridged(grid, rate, _noise_of_steps(grid, rate, t, plane, step) < _STEPS_TELL)
     # the rate's course where another reading shows it better than the phase of a force that may vanish
     shape = rough if expected is not None and sensor == "accelerometer" else None
     if expected is None and (centripetal := centripetal_rate(recording)) is not None:
@@ -252,7 +262,11 @@ def phase_spin(
         turned = cumulative_trapezoid(rate, dx=step, initial=0)
         base = plane * np.exp(-1j * _curve(grid, turned, rate, t))
         smooth, weight = _spread(grid, t, base**order, max(sigma * PHASE_SIGMA, 1.5 * step))
-        delta = np.unwrap(np.angle(np.where(np.abs(smooth) > 0, smooth, 1.0))) / order
+        delta = np.angle(np.where(np.abs(smooth) > 0, smooth, 1.0))
+        delta = (
+            _bridged(grid, delta, _tells(grid, smooth, weight, t, base), np.unwrap) if may_vanish else np.unwrap(delta)
+        )
+        delta = delta / order
         phase = turned + delta
         rate = rate + np.gradient(delta, step)
     amplitude = (np.abs(smooth) / np.maximum(weight, 1e-9)) ** (1 / order)
@@ -261,7 +275,47 @@ def phase_spin(
         turned = cumulative_trapezoid(rate, dx=step, initial=0)
         phase = turned + _weighted_median(phase - turned, amplitude)
         return Spin(grid, phase, rate, rate, amplitude, t, plane)
-    return Spin(grid, phase, rate, _without_steps(grid, rate, t, plane, step), amplitude, t, plane)
+    noise = _noise_of_steps(grid, rate, t, plane, step) if may_vanish else np.zeros(grid.size)
+    turning = _without_steps(grid, rate, t, plane, step, noise)
+    # where steps tell no rate, what the phase turned by in the meantime does
+    turning = np.where(noise < _STEPS_TELL, turning, np.gradient(_bridged(grid, phase, noise < _STEPS_TELL), step))
+    return Spin(grid, phase, rate, turning, amplitude, t, plane)
+
+
+def _tells(grid: FloatArray, smooth: ComplexArray, weight: FloatArray, t: FloatArray, base: ComplexArray) -> BoolArray:
+    """Tell where (n,) a vector that turns no more, ``base`` (m,), is above its noise: its sums are ``smooth`` (n,).
+
+    A field along the spin's axis leaves nothing in the disc's plane, and the phase of noise there.
+    """
+    mean = smooth / np.maximum(weight, 1e-9)
+    noise = median_of(base - np.interp(t, grid, mean.real) - 1j * np.interp(t, grid, mean.imag)) / _MEDIAN
+    # a Gaussian's square is a Gaussian narrower by the root of two
+    return np.abs(smooth) > _TELLS * noise * np.sqrt(weight / sqrt(2.0))
+
+
+def _noise_of_steps(grid: FloatArray, rate: FloatArray, t: FloatArray, z: ComplexArray, step: float) -> FloatArray:
+    """Return the standard deviation (n,) rad that noise gives the phase from one reading to the next.
+
+    Of a vector z (m,) that turns at a rate (n,); infinite where its length is nothing but noise.
+    """
+    gap = np.diff(t)
+    turned = np.exp(1j * np.interp(0.5 * (t[1:] + t[:-1]), grid, rate) * gap)
+    variance = 0.5 * (median_of((z[1:] - z[:-1] * turned)[gap < 1.5 * step]) / _MEDIAN) ** 2
+    squares, weight = _spread(grid, t, np.abs(z) ** 2 + 0j, RATE_SIGMA)
+    length = np.maximum(squares.real / np.maximum(weight, 1e-9) - 2.0 * variance, 0.0)
+    return np.asarray(np.sqrt(np.divide(2.0 * variance, length, out=np.full(grid.size, np.inf), where=length > 0.0)))
+
+
+def _bridged(
+    grid: FloatArray,
+    value: FloatArray,
+    told: BoolArray,
+    joined: Callable[[FloatArray], FloatArray] = lambda known: known,
+) -> FloatArray:
+    """Return values (n,), with straight lines across what is not ``told`` (n,), where that is not most of it."""
+    if 2 * np.count_nonzero(told) < told.size or np.all(told):
+        return joined(value)
+    return np.asarray(np.interp(grid, grid[told], joined(value[told])))
 
 
 def _less_what_stands(t: FloatArray, z: ComplexArray) -> ComplexArray:
@@ -277,13 +331,23 @@ def _weighted_median(value: FloatArray, weight: FloatArray) -> float:
     return float(value[order[min(int(np.searchsorted(heavy, 0.5 * heavy[-1])), value.size - 1)]])
 
 
-def _without_steps(grid: FloatArray, rate: FloatArray, t: FloatArray, z: ComplexArray, step: float) -> FloatArray:
-    """Return the turning rate (n,) less the steps of phase where readings were lost and the clock did not show it."""
-    gap = np.diff(t)
-    middle = 0.5 * (t[1:] + t[:-1])
-    usual = median_filter(np.angle(z[1:] * np.conj(z[:-1])) / gap, size=41, mode="nearest")
-    odd = np.angle(z[1:] * np.conj(z[:-1]) * np.exp(-1j * usual * gap))
-    lost = np.abs(odd) > np.maximum(0.5 * np.abs(usual) * step, 8 * median_of(odd) + 1e-9)
+def _without_steps(
+    grid: FloatArray, rate: FloatArray, t: FloatArray, z: ComplexArray, step: float, noise: FloatArray
+) -> FloatArray:
+    """Return the turning rate (n,) less the steps of phase where readings were lost and the clock did not show it.
+
+    ``noise`` (n,) rad is a step's standard deviation: steps within it are none, and where it is large all are noise.
+    """
+    gap, middle, turned = np.diff(t), 0.5 * (t[1:] + t[:-1]), z[1:] * np.conj(z[:-1])
+    own = noise[np.clip(np.rint((middle - grid[0]) / step).astype(int), 0, grid.size - 1)]
+    known = own < _STEPS_TELL
+    if 2 * np.count_nonzero(known) > known.size:
+        gap, middle, turned, own = gap[known], middle[known], turned[known], own[known]
+    else:
+        own = np.zeros(own.size)
+    usual = median_filter(np.angle(turned) / gap, size=41, mode="nearest")
+    odd = np.angle(turned * np.exp(-1j * usual * gap))
+    lost = np.abs(odd) > np.maximum(np.maximum(0.5 * np.abs(usual) * step, 8 * median_of(odd) + 1e-9), _TELLS * own)
     if np.count_nonzero(lost) < 0.005 * lost.size or median_of(rate) * step < 0.15:
         return rate
     return smoothed(middle[~lost], (usual + odd / gap)[~lost], grid, RATE_SIGMA)

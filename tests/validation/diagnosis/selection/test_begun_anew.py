@@ -10,12 +10,14 @@ from numpy.testing import assert_array_equal
 from support.made import MODULE
 
 from discsim.disc import Release
+from discsim.effects.catalogue import effect
 from discsim.engine import fly
 from discsim.sensors import record
 from discsim.shipped import load_disc
 from discsim.validation.diagnosis.relaxed_fit import relaxed, unknowns
 from discsim.validation.diagnosis.selection.begun_anew import begun_anew
 from discsim.validation.identification.gauss_newton import Fit, refit
+from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.plants.free_spin import FREE_SPIN
 
 BLIND = MODULE.without("gps").fitted("gyroscope", range=104.72)
@@ -75,3 +77,33 @@ def test_a_motion_that_readings_tell_is_not_begun_anew():
     first, fit = settled()
     alone = replace(fit, trajectories=fit.trajectories[:1], linears=fit.linears[:1])
     assert begun_anew(alone, first.trajectories) is alone
+
+
+def flights(ratio: float) -> tuple[Fit, Fit]:
+    """The relaxed fit of three flights whose magnetometer's clock is wrong, and the fit that knows it."""
+    disc, field = load_disc("cd1")
+    module = MODULE.with_effects([effect("mag.clock_rate", ratio=ratio)])
+    throws = []
+    for k, (north, east, roll, pitch, spin) in enumerate(THROWS):
+        release = Release(
+            np.array([0.0, 0.0, -1.3]), np.array([north, east, -4.0]), roll, pitch, np.arctan2(east, north),
+            np.array([0.3, 0.3, spin]),
+        )  # fmt: skip
+        motion = fly(disc, field, release, duration=2.0)
+        throws.append(record(motion, module, np.random.default_rng(k), plant="flight", name=f"{k + 1:02d}", disc=disc))
+    first = relaxed(throws)
+    clock = Parameter("mag.clock_rate", "ratio", 1.0, 1e-6, 0.03)
+    fit = Fit(first.trajectories, (clock,), np.array([ratio]), first.continuous_defects, first.noise)
+    return first, refit(fit, iterations=12)
+
+
+def test_a_flight_begun_in_the_time_of_a_wrong_clock_is_brought_to_its_data():
+    """Its spin is at half of what it is for a while: so a start may end that knows nothing of a clock 2 % slow."""
+    first, fit = flights(0.98)
+    states = first.trajectories[1].states.copy()
+    states[2:, -1] *= 0.5
+    astray = replace(first.trajectories[1], states=states)
+    begun = (first.trajectories[0], astray, first.trajectories[2])
+    stuck = refit(replace(fit, trajectories=(fit.trajectories[0], astray, fit.trajectories[2])), iterations=1)
+    assert stuck.merit > 10.0 * fit.merit
+    assert begun_anew(stuck, begun).merit < 1.01 * fit.merit
