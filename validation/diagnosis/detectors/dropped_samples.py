@@ -18,6 +18,7 @@ from discsim.validation.diagnosis.detectors.sample_alignment import (
     alignment_of,
     first_yaw,
     lost_along,
+    lost_and_turned,
     lost_in_own_noise,
     phase_counts,
     repaired,
@@ -303,13 +304,22 @@ def _stated_sd(fit: Fit, sensor: str, noise: NoiseModel) -> FloatArray:
 
 
 def _counted(fit: Fit, sensor: str, sd: FloatArray) -> Fit:
-    """Return a fit whose trajectories hold the likeliest losses of a sensor by its motion in a noise ``sd`` (k,)."""
+    """Return a fit whose trajectories hold the likeliest losses of a sensor by its motion in a noise ``sd`` (k,).
+
+    The yaw of a rig, which no other sensor tells, is where the magnetometer is nearest to it.
+    """
+    yaw = fit.plant.layout.yaw if sensor == "magnetometer" else None
 
     def one(i: int) -> Trajectory:
         trajectory = fit.trajectories[i]
-        if all(r.sensor != sensor for r in trajectory.readings):
+        readings = next((r for r in trajectory.readings if r.sensor == sensor), None)
+        if readings is None:
             return trajectory
-        counts = lost_along(trajectory, fit.values(i), sensor, sd).counts
-        return replace(trajectory, lost={**trajectory.lost, sensor: counts})
+        own = alignment_of(trajectory, fit.values(i), readings, trajectory.recording.sheets[sensor].rate_hz)
+        losses, turn = (lost_along(own, sd), 0.0) if yaw is None else lost_and_turned(own, sd)
+        states = trajectory.states.copy()
+        if yaw is not None:
+            states[:, yaw] += turn
+        return replace(trajectory, states=states, lost={**trajectory.lost, sensor: losses.counts})
 
     return replace(fit, trajectories=tuple(mapped(one, range(len(fit.trajectories)))))

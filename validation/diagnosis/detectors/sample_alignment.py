@@ -24,6 +24,7 @@ __all__ = [
     "circle_through",
     "first_yaw",
     "lost_along",
+    "lost_and_turned",
     "lost_in_own_noise",
     "phase_counts",
     "repaired",
@@ -54,6 +55,8 @@ _QUIETEST = 1e-3
 _LEVELS, _SETTLED = 8, 0.95
 #: rounds in which samples far off a line lose their weight, and how far that is, in what half of them leave
 _TRIMMED, _FAR_OFF = 3, 4.0
+#: losses that a fit may have overlooked by turning all, and rounds in which counts and the turn follow from one another
+_OVERLOOKED, _TURNS = (0.0, 1.0, -1.0, 2.0, -2.0), 4
 #: share of a motion's end at which samples do not count where it ends before they do: as many may be lost
 _ROOM = 0.1
 
@@ -206,6 +209,11 @@ class Alignment:
         off = (self.measured[:, None, :] - expected[self.place[:, None] + counts]) / sd
         return _limited(off)
 
+    def turned(self, turn: float) -> Alignment:
+        """Return the alignment with a motion whose yaw is larger by a turn, rad, of a sensor that turns with it."""
+        z = (self.shown[:, 0] + 1j * self.shown[:, 1]) * np.exp(-1j * turn)
+        return replace(self, shown=np.column_stack([z.real, z.imag, self.shown[:, 2:]]))
+
     def misfit(self, counts: IntArray, line: FloatArray, sd: FloatArray) -> float:
         """Return what all samples at their counts (n,) say against a line (2, k) in a noise (k,), each as `price`."""
         return float(_limited(self.left(counts, line) / sd).sum())
@@ -271,13 +279,36 @@ def _likeliest(own: Alignment, line: FloatArray, sd: FloatArray) -> tuple[IntArr
     return path, float(cost[:, 0].sum()) - least
 
 
-def lost_along(current: Trajectory, values: Values, sensor: str, sd: FloatArray) -> Losses:
-    """Return the likeliest losses of a sensor by a trajectory's motion in a noise of its axes, ``sd`` (k,)."""
-    readings = next(r for r in current.readings if r.sensor == sensor)
-    own = alignment_of(current, values, readings, current.recording.sheets[sensor].rate_hz)
+def lost_along(own: Alignment, sd: FloatArray) -> Losses:
+    """Return the likeliest losses of a sensor by a motion as it is, in a noise of its axes, ``sd`` (k,)."""
     plain = np.stack([np.ones_like(sd), np.zeros_like(sd)])
     path, gain = _likeliest(own, plain, _MARGIN * sd)
     return Losses(path.astype(float), gain, sd)
+
+
+def lost_and_turned(own: Alignment, sd: FloatArray) -> tuple[Losses, float]:
+    """Return the likeliest losses of a magnetometer in a noise (k,) and by how much the motion's yaw must grow, rad.
+
+    Nothing but the magnetometer tells a rig's yaw. Where a loss was overlooked, a fit turns all by half of its step,
+    and by that motion it would be overlooked again.
+    """
+    plain = np.stack([np.ones_like(sd), np.zeros_like(sd)])
+    z = own.shown[:, 0] + 1j * own.shown[:, 1]
+    step = float(np.median(np.angle(z[1:] * np.conj(z[:-1]))))
+    best: tuple[float, Losses, float] | None = None
+    for begun in _OVERLOOKED:
+        turn = begun * step
+        for _ in range(_TURNS):
+            turned = own.turned(turn)
+            path, gain = _likeliest(turned, plain, _MARGIN * sd)
+            price = turned.misfit(path, plain, _MARGIN * sd) + _COST * float(path[-1])
+            if best is None or price < best[0]:
+                best = price, Losses(path.astype(float), gain, sd), turn
+            shown = turned.shown[turned.place + path]
+            ahead = (shown[:, 0] + 1j * shown[:, 1]) * np.conj(own.measured[:, 0] + 1j * own.measured[:, 1])
+            turn += float(np.nanmedian(np.angle(ahead)))
+    assert best is not None
+    return best[1], best[2]
 
 
 def lost_in_own_noise(own: Alignment, stated: FloatArray, loudest: FloatArray) -> Losses:

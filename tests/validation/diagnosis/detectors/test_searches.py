@@ -27,6 +27,8 @@ from discsim.validation.diagnosis.detectors.gusts import gusts
 from discsim.validation.diagnosis.detectors.local_problem import LocalProblems, local_problems
 from discsim.validation.diagnosis.detectors.sample_alignment import (
     Alignment,
+    lost_along,
+    lost_and_turned,
     lost_in_own_noise,
     phase_counts,
     viterbi_counts,
@@ -263,6 +265,22 @@ def test_a_motion_that_is_known_to_a_line_tells_what_was_lost_and_the_noise() ->
     sound = lost_in_own_noise(replace(own, measured=measured[:60], place=place[:60]), np.full(3, 0.02), np.full(3, 2.0))
     assert sound.counts[-1] == 0.0
     assert sound.gain == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_loss_that_a_fit_overlooked_by_turning_all_is_found_by_turning_back() -> None:
+    """A disc that runs down; a fit without the first loss has turned the yaw of all by what it makes on average."""
+    rng = np.random.default_rng(6)
+    yaw = 0.66 * 2000.0 * (1.0 - np.exp(-np.arange(2040.0) / 2000.0))
+    motion = np.column_stack([22.0 * np.cos(yaw), -22.0 * np.sin(yaw), np.full(yaw.size, 39.0)])
+    lost = np.repeat([0, 1, 2, 3], [170, 330, 700, 800])
+    place = np.arange(lost.size)
+    measured = motion[place + lost] + 0.8 * rng.standard_normal((lost.size, 3))
+    sd = np.full(3, 0.8)
+    own = Alignment(measured, motion, place, most=8, missing=range(3, 4)).turned(0.4)
+    assert np.count_nonzero(lost_along(own, sd).counts != lost) > 100
+    found, turn = lost_and_turned(own, sd)
+    assert np.count_nonzero(found.counts != lost) <= 3
+    assert turn == pytest.approx(-0.4, abs=0.01)
 
 
 @pytest.mark.parametrize("ratio", [1.015, 0.985])
