@@ -41,7 +41,7 @@ UNITS: Mapping[str, Mapping[str, float]] = MappingProxyType(
         "": {"SI": 1.0},
     }
 )
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "iso": 1.0}
+TIME_UNITS = {"min": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "iso": 1.0}
 BODY_SENSORS = ("magnetometer", "accelerometer", "gyroscope")
 
 
@@ -235,7 +235,7 @@ def _time_base(table: TomlTable) -> TimeBase:
     if (column is None) == (step is None):
         raise table.error(None, "expected either 'column' (of time stamps) or 'step_s' (of rows at one rate) in [time]")
     if spacings and (column is None or unit == "iso"):
-        raise table.error("spacings", "'spacings' is true, expected a 'column' of numbers in s, ms, us or ns with it")
+        raise table.error("spacings", "'spacings' is true, expected a 'column' of numbers in s, ms, us, ns or min")
     table.finish()
     sigma = table.sigma.get("step_s")
     off = None if sigma is None else float(np.max(sigma))

@@ -19,15 +19,19 @@ from discsim.validation.importing.sniffing.names import is_spacing_name, is_time
 from discsim.validation.importing.sniffing.preamble import stated_rate
 from discsim.validation.importing.sniffing.units import readings_of, split_unit
 
-__all__ = ["Clock", "clocks_of", "seconds"]
+__all__ = ["Clock", "clocks_of", "counter_note", "seconds"]
 
 SCALES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+#: A unit that is taken where the header states it, and never guessed.
+STATED_SCALES = {**SCALES, "min": 60.0}
 #: Time since 1970 in 2001 to 2065, in seconds: a stamp of 1e9 to 3e9 s (or as many ms, us, ns) is the time of day.
 EPOCH = (1e9, 3e9)
 #: Logs of motion are written at 2 Hz to 20 kHz; outside that no unit is believed.
 SPACING = (5e-5, 0.5)
 #: ... and fixes of a satellite receiver come twenty times a second to once a minute.
 SLOWEST_FIX = 60.0
+#: Few loggers of motion write more than 1000 rows a second: a unit by which one does is a guess.
+FASTEST_USUAL = 1e-3
 #: Loggers without time stamps write 100 rows a second more often than any other number; all rates scale with it.
 STEP = 0.01
 #: Steps that differ by no more than this share are the usual one, rounded; the mean is of these.
@@ -42,6 +46,8 @@ LEAST_EVEN = 100
 #: What a step without stamps may be off by: a guess by a factor of two either way (loggers write 25 to 400 rows a
 #: second), a stated rate by what oscillators in sensors are (1 % to several per cent over parts and temperature).
 OFF_GUESSED, OFF_STATED = 0.7, 0.03
+#: What is said of a counter under a name of time.
+COUNTING = "goes up by one a row: it counts the rows and tells no time"
 
 
 @dataclass(frozen=True)
@@ -90,7 +96,17 @@ def seconds(clock: Clock, numbers: Numbers) -> FloatArray:
     if clock.unit == "iso":
         return _stamps(numbers.cells(k))
     value = numbers.values[:, k]
-    return (added_up(value, numbers.table.number) if clock.spacings else value) * SCALES[clock.unit]
+    return (added_up(value, numbers.table.number) if clock.spacings else value) * STATED_SCALES[clock.unit]
+
+
+def counter_note(clock: Clock) -> str | None:
+    """Return a warning where the time of a row rests on a counter under a name of time, and nothing states a rate."""
+    if clock.counter is None or not is_time_name(clock.counter) or clock.off <= OFF_STATED:
+        return None
+    return (
+        f"WARNING: '{clock.counter}' {COUNTING}; {clock.step:g} s a row is taken: write the rate above the header "
+        f"(# Sampling rate: 200 Hz) or step_s into the map; where it is in ms, call it '{clock.counter}_ms'"
+    )
 
 
 def _rank(numbers: Numbers, k: int, clock: Clock) -> int:
@@ -163,31 +179,38 @@ def _unit(value: FloatArray, name: str, slowest: float) -> tuple[str | None, Sur
     fits = [unit for unit, scale in SCALES.items() if SPACING[0] <= step * scale <= slowest]
     written = _written(name)
     if written is not None:
-        if written in fits:
-            return written, "certain", f"the header says so, and a row every {step * SCALES[written] * 1e3:.3g} ms fits"
+        spacing = step * STATED_SCALES[written]
+        if SPACING[0] <= spacing <= slowest:
+            return written, "certain", f"the header says so, and a row every {spacing * 1e3:.3g} ms fits"
         for unit, scale in SCALES.items():
             if EPOCH[0] < largest * scale < EPOCH[1] and unit in fits:
                 return unit, "likely", f"the header says {written}, but only {unit} since 1970 fit {largest:.4g}"
         if fits:
             unit = fits[0]
-            why = f"the header says {written}, which is a row every {step * SCALES[written]:.3g} s; {unit} fits a log"
+            why = f"the header says {written}, which is a row every {spacing:.3g} s; {unit} fits a log"
             return unit, "guess", why
         return None, "guess", ""
     for unit, scale in SCALES.items():
         if EPOCH[0] < largest * scale < EPOCH[1] and unit in fits:
             return unit, "certain", f"stamps of {largest:.4g} are {unit} since 1970"
-    if not fits:
+    if not fits or _counts_rows(steps):
         return None, "guess", ""
     whole = bool(np.all(np.abs(steps - np.round(steps)) < 1e-9))
     if not whole and "s" in fits:
-        return "s", "likely", f"stamps with decimals, {1 / step:.4g} rows a second"
+        sure: Sureness = "likely" if step >= FASTEST_USUAL else "guess"
+        return "s", sure, f"stamps with decimals, {1 / step:.4g} rows a second"
     if whole and "s" in fits and len(fits) == 1:
         return None, "guess", ""  # a counter, or one row a second: no motion shows in that
     fits = [unit for unit in fits if not (whole and unit == "s")]
     # of several the one whose rate is nearest 100 Hz on a logarithmic scale, where loggers are
     unit = min(fits, key=lambda unit: abs(np.log(step * SCALES[unit] / STEP)))
-    sure: Sureness = "likely" if len(fits) == 1 or 1e-3 <= step * SCALES[unit] <= 0.1 else "guess"
+    sure = "likely" if len(fits) == 1 or FASTEST_USUAL <= step * SCALES[unit] <= 0.1 else "guess"
     return unit, sure, f"whole numbers {step:.4g} apart: {1 / (step * SCALES[unit]):.4g} rows a second"
+
+
+def _counts_rows(steps: FloatArray) -> bool:
+    """Tell a count of the rows by its steps (n,): one each, more where rows were lost. A clock repeats a stamp too."""
+    return steps.size > 1 and bool(np.mean(steps == 1) > ASCENDING and np.all(steps >= 1))
 
 
 def _written(name: str) -> str | None:
@@ -230,13 +253,7 @@ def _without(numbers: Numbers) -> Clock:
         k for k, name in enumerate(numbers.names) if is_time_name(name) and not np.all(numbers.cells(k).equal(""))
     ]
     if unread:
-        cell = next(cell for cell in numbers.cells(unread[0]) if cell)
-        steps = np.diff(numbers.values[:, unread[0]])
-        back = "; it runs BACKWARDS: turn the rows round, or all turns come in reversed" * bool(
-            np.mean(steps < 0) > ASCENDING
-        )
-        name = numbers.table.columns[unread[0]]
-        why = f"'{name}' tells no time here (its first cell is '{cell[:30]}'{back}); {why[16:]}"
+        why = f"'{numbers.table.columns[unread[0]]}' {_no_time(numbers, unread[0])}; {why[16:]}"
     stated = stated_rate((*numbers.dialect.preamble, numbers.path.stem))
     if stated is not None and SPACING[0] <= 1 / stated[0] <= SPACING[1]:
         off, step, sure = OFF_STATED, float(f"{1 / stated[0]:.12g}"), _sure("likely")
@@ -249,9 +266,22 @@ def _without(numbers: Numbers) -> Clock:
         value = numbers.values[:, k]
         steps = np.diff(value[np.isfinite(value)])
         if steps.size > 1 and np.mean(steps == 1) > ASCENDING and np.nanmax(value) < 1e9:
-            why = f"{why}; '{name}' counts the rows"
+            why += f"; '{name}' counts the rows" * (COUNTING not in why)
             return Clock(None, "s", name, step, Decision("time", f"{step} s a row", sure, why), off)
     return Clock(None, "s", None, step, Decision("time", f"{step} s a row", sure, why), off)
+
+
+def _no_time(numbers: Numbers, k: int) -> str:
+    """Return why a column that is called after time tells none."""
+    value = numbers.values[:, k]
+    steps = np.diff(value)
+    if _counts_rows(steps[np.isfinite(steps)]):
+        return COUNTING
+    cell = next(cell for cell in numbers.cells(k) if cell)
+    back = "; it runs BACKWARDS: turn the rows round, or all turns come in reversed" * bool(
+        np.mean(steps < 0) > ASCENDING
+    )
+    return f"tells no time here (its first cell is '{cell[:30]}'{back})"
 
 
 def _coarse(numbers: Numbers) -> tuple[str, Counted] | None:

@@ -53,6 +53,8 @@ PER_UT = {
 }
 #: No rate gyroscope that a log of motion holds shows more than 100 rad/s (5730 deg/s; the widest common part has 4000).
 LARGEST_RAD_S = 100.0
+#: What headers state in each other's place: most drivers give one of them, and an example of the other is copied.
+MISTAKEN = {"deg/s", "rad/s"}
 _RAD = np.pi / 180
 
 
@@ -214,11 +216,20 @@ def _magnetometer_counts(size: float, what: str) -> Unit:
     return Unit("uT", 1 / per, _said("magnetometer", text, sure, why))
 
 
-def gyroscope_unit(value: FloatArray, stated: Reading | None, turned: float | None, by: str = "the field") -> Unit:
+def gyroscope_unit(
+    value: FloatArray,
+    stated: Reading | None,
+    turned: float | None,
+    by: str = "the field",
+    *,
+    clock: Sureness = "certain",
+) -> Unit:
     """Return a gyroscope's unit.
 
     ``turned`` is how many rad/s one of its readings is worth by the turning of ``by`` (the field, gravity) in the same
-    log, None where that does not tell. A header's unit stands against all but that; without one, size and steps decide.
+    log, None where that does not tell. A header's unit stands against all but that, and against that as well where the
+    ``clock`` by which it turns is a guess, or a likely one and the unit is none that headers are wrong by (`MISTAKEN`);
+    without one, size and steps decide.
     """
     name = "gyroscope"
     peak = float(np.nanmax(np.linalg.norm(value, axis=1)))
@@ -234,7 +245,8 @@ def gyroscope_unit(value: FloatArray, stated: Reading | None, turned: float | No
         if near == stated.unit:
             why = f"the header says so, and {by} turns as fast"
             return Unit(stated.unit, stated.scale, _said(name, stated.unit, "certain", why))
-        if near is not None:
+        mistaken = clock == "likely" and {near, stated.unit} == MISTAKEN
+        if near is not None and (clock == "certain" or mistaken):
             why = f"{by} turns as fast as {near} would, although the header says {stated.unit}"
             return Unit(near, 1.0, _said(name, near, "likely", why))
         if peak * worth > LARGEST_RAD_S and peak * _RAD < LARGEST_RAD_S and stated.unit == "rad/s":

@@ -29,6 +29,8 @@ POWER = 1.3
 #: Rows a second that are stated, and those of the stamps, contradict from this factor on: an oscillator is off by some
 #: per cent, and a logger that loses a tenth of its rows is common.
 CONTRADICTS = 1.25
+#: ... and a gyroscope's unit from this one on: units lie a factor of 6 and more apart.
+CONTRADICTS_UNIT = 1.5
 
 
 class SeenTurns(NamedTuple):
@@ -90,7 +92,7 @@ def clock_note(clock: Clock, unit: Unit, turns: SeenTurns | None, pull: float | 
     ratio = turns.worth / unit.factor("rad_s")
     power = 10.0 ** round(float(np.log10(ratio)))
     if power == 1.0 or not 1 / POWER < ratio / power < POWER:
-        return None
+        return _uncertain_note(clock, unit, turns.by, ratio)
     rows = f"the rows are {power:g} times as far apart as '{clock.column}' in {clock.unit} says"
     scale = f"the gyroscope's readings are worth {power:g} times as much as {unit.unit}"
     why = "which of the two is open"
@@ -101,6 +103,17 @@ def clock_note(clock: Clock, unit: Unit, turns: SeenTurns | None, pull: float | 
     return (
         f"WARNING: {turns.by} turns {ratio:.3g} times as fast as the gyroscope says: {rows}, or {scale}; {why}: "
         "mend the column, or every rate from the field, or every time, is wrong by that"
+    )
+
+
+def _uncertain_note(clock: Clock, unit: Unit, by: str, ratio: float) -> str | None:
+    """Return a warning where a clock that is not certain and a gyroscope's unit contradict by no power of ten."""
+    if clock.decision.sure == "certain" or 1 / CONTRADICTS_UNIT < ratio < CONTRADICTS_UNIT:
+        return None
+    return (
+        f"WARNING: {by} turns {ratio:.3g} times as fast as the gyroscope says: the rows are {ratio:.3g} times as far "
+        f"apart as '{clock.column}' in {clock.unit} says, or the gyroscope is not in {unit.unit}; {unit.unit} is "
+        f"believed: state the unit of '{clock.column}' in its name or in the map"
     )
 
 

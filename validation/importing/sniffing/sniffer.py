@@ -18,7 +18,7 @@ from discsim.validation.importing.raw_table import REPAIRS, Layout, RepairList, 
 from discsim.validation.importing.sniffing.archive import MAX_FILES
 from discsim.validation.importing.sniffing.axes import body_axes
 from discsim.validation.importing.sniffing.behaviour import TELLING, WORTHS, by_behaviour
-from discsim.validation.importing.sniffing.clock import SPACING, Clock, clocks_of, seconds
+from discsim.validation.importing.sniffing.clock import SPACING, Clock, clocks_of, counter_note, seconds
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.dialect import dialect_of
 from discsim.validation.importing.sniffing.exchanged import exchanged
@@ -324,6 +324,7 @@ def _fitted(clock: Clock, fit: Fit | None, unit: Unit) -> tuple[Clock, float]:
     if not SPACING[0] <= step <= SPACING[1]:
         return clock, 1.0
     why = f"no time stamps; with this step the field turns as fast as the gyroscope says ({unit.unit})"
+    why += f"; '{clock.counter}' counts the rows" * (clock.counter is not None)
     told = Decision("time", f"{step} s a row", "likely", why)
     return clock.with_step(step, told, OFF_FITTED), step / clock.step
 
@@ -353,7 +354,8 @@ def _proposal(
         stated, above = _stated(sensor, triple, value)
         if sensor == "gyroscope":
             told = turns if clock.column is not None else None
-            units[sensor] = gyroscope_unit(value, stated, told and told.worth, told.by if told else "the field")
+            by = told.by if told else "the field"
+            units[sensor] = gyroscope_unit(value, stated, told and told.worth, by, clock=clock.decision.sure)
         elif sensor == "accelerometer":
             units[sensor] = accelerometer_unit(value, stated)
         else:
@@ -372,6 +374,7 @@ def _proposal(
     if clock.column is None and "gyroscope" in units:
         clock, slower = _fitted(clock, fit, units["gyroscope"])
         times = {sensor: slower * time for sensor, time in times.items()}
+        notes = [*filter(None, [counter_note(clock)]), *notes]
     readings = {sensor: _in_si(sensor, triple, times[sensor], units[sensor]) for sensor, (triple, _) in found.items()}
     axes = body_axes(readings)
     sensors = tuple(

@@ -46,10 +46,9 @@ _CASED = {
     "T": [Reading("magnetometer", "uT", 1e6)],
 }
 _COUNTS = "lsb raw count counts digit digits adc int16 bits"
-_OTHER = (
-    "deg rad degc c k v mv a ma m km cm mm m/s km/h ft pa hpa kpa mbar bar % db mah min h °c degrees utc v/v lx lux"
-)
+_OTHER = "deg rad degc c k v mv a ma m km cm mm m/s km/h ft pa hpa kpa mbar bar % db mah h °c degrees utc v/v lx lux"
 _TIME_SPELLINGS = {
+    "min": "min mins minute minutes minuten minuti minutos мин 分",
     "s": "s sec secs second seconds sekunde sekunden seconde secondes segundos secondi sekundy с сек 秒 초",
     "ms": "ms msec millis milli millisecond milliseconds millisekunden millisecondes мс 毫秒 밀리초",
     "us": "us usec micros microsecond microseconds mikrosekunden мкс 微秒",
