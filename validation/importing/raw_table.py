@@ -256,7 +256,7 @@ class _Rows:
     def _alone(self, line: int, whole: str) -> tuple[int, list[str]] | None:
         """Return the line and cells of a row in a line of its own; None for what is none, or damaged."""
         self._tell_blank(line)
-        text = _without_comment(self.path, line, whole, self.layout, self.repairs)
+        text = _without_comment(self.path, line, whole, self.layout, self.repairs, self.width)
         if not text.strip():
             self.blank = line if not whole.strip() else None
             return None
@@ -295,25 +295,37 @@ class _Rows:
         return RawTable(self.path, columns, header_line, number, line, tuple(texts), self.total)
 
 
-def _without_comment(path: Path, line: int, text: str, layout: Layout, repairs: RepairList) -> str:
+def _without_comment(
+    path: Path, line: int, text: str, layout: Layout, repairs: RepairList, width: int | None = None
+) -> str:
+    """Return a line without its comment, which is listed; records have ``width`` cells, None above the header."""
     if not layout.comment or layout.comment not in text:
         return text
     record, _, comment = text.partition(layout.comment)
     quoted = f"{layout.comment}{comment}"[:60]
     if record.strip():
         repairs.add("comment", path, line, f"comment glued to a record: {quoted}", "comment left out")
-    elif layout.separator in comment:
+    elif width is not None and _ends_in_record(comment, width, layout):
         repairs.add("comment", path, line, f"comment with a record glued to it: {quoted}", "both left out")
     else:
         repairs.add("comment", path, line, f"comment: {quoted}", "comment left out")
     return record
 
 
+def _ends_in_record(comment: str, width: int, layout: Layout) -> bool:
+    """Tell a comment that a record is glued to: numbers stand in the last cells, as many as the first leaves of one."""
+    cells = layout.cells(comment)
+    last = cells[len(cells) - width + 1 :]
+    return len(cells) >= width > 1 and all(cell and number(cell, layout.decimal) is not None for cell in last)
+
+
 def _header(
     path: Path, lines: TextLines, at: int, layout: Layout, repairs: RepairList
 ) -> tuple[int, int, tuple[str, ...]]:
     """Return the index of the first line after the header, the header's line (1-based) and its names."""
-    while (line := lines.find(at)) is not None and not _without_comment(path, at + 1, line, layout, repairs).strip():
+    while (line := lines.find(at)) is not None:
+        if _without_comment(path, at + 1, line, layout, repairs).strip():
+            break
         at += 1
     if line is None:
         raise InputError.at(path, None, "the file is empty; expected a header line")

@@ -137,6 +137,16 @@ def test_comments_alone_or_glued_are_left_out_and_a_record_glued_to_one_is_named
     ]
 
 
+def test_a_comment_with_commas_has_no_record_glued_to_it(tmp_path):
+    raw = "# Team A, spring 2025, 3\nidx,gx,gy,gz\n0,1,1,1\n# battery 3.7 V, 21 C, ok, yes\n1,2,2,2\n# x, 4\n2,3,3,3\n"
+    result = run(tmp_path, raw)
+    assert [(r.line, r.what, r.action) for r in result.repairs] == [
+        (1, "comment: # Team A, spring 2025, 3", "comment left out"),
+        (4, "comment: # battery 3.7 V, 21 C, ok, yes", "comment left out"),
+        (6, "comment: # x, 4", "comment left out"),
+    ]
+
+
 def test_a_byte_order_mark_and_blank_lines_are_listed_and_crlf_is_not(tmp_path):
     result = run(tmp_path, b"\xef\xbb\xbfidx,gx,gy,gz\r\n0,1,1,1\r\n\r\n1,2,2,2\r\n")
     assert len(result.recording.samples["gyroscope"]) == 2
