@@ -10,6 +10,7 @@ from discsim.arrays import BoolArray, FloatArray, IntArray
 from discsim.validation.importing.clock import Break, iso_seconds, mended
 from discsim.validation.importing.import_map import ImportMap, TimeBase
 from discsim.validation.importing.raw_table import RawTable, RepairList
+from discsim.validation.importing.unpadded import unpadded
 
 __all__ = ["RowClock", "added_up", "row_clock"]
 
@@ -104,6 +105,10 @@ def _times(table: RawTable, counters: FloatArray, base: TimeBase, decimal: str, 
     else:
         time, _ = column.numbers(decimal)
         time = added_up(time, table.number) if base.spacings else time
+    if (joined := unpadded(column, time)) is not None:
+        action = "read so from the first row on"
+        repairs.add("time", table.path, int(table.line[joined.row]), f"'{base.column}': {joined.text}", action)
+        time = joined.time
     counted = ~np.isnan(counters)
     with np.errstate(invalid="ignore"):
         sound = np.abs(time * base.scale) <= FURTHEST

@@ -18,6 +18,7 @@ from discsim.validation.importing.sniffing.groups import Numbers
 from discsim.validation.importing.sniffing.names import is_spacing_name, is_time_name, read_name, sensor_of, timeless
 from discsim.validation.importing.sniffing.preamble import stated_rate
 from discsim.validation.importing.sniffing.units import readings_of, split_unit
+from discsim.validation.importing.unpadded import unpadded
 
 __all__ = ["Clock", "clocks_of", "counter_note", "seconds"]
 
@@ -93,9 +94,9 @@ def seconds(clock: Clock, numbers: Numbers) -> FloatArray:
             count = numbers.values[:, numbers.table.columns.index(clock.counter)]
         return count * clock.step
     k = numbers.table.columns.index(clock.column)
+    value, _ = _as_meant(numbers, k, _stamps(numbers.cells(k)) if clock.unit == "iso" else numbers.values[:, k])
     if clock.unit == "iso":
-        return _stamps(numbers.cells(k))
-    value = numbers.values[:, k]
+        return value
     return (added_up(value, numbers.table.number) if clock.spacings else value) * STATED_SCALES[clock.unit]
 
 
@@ -109,6 +110,12 @@ def counter_note(clock: Clock) -> str | None:
     )
 
 
+def _as_meant(numbers: Numbers, k: int, value: FloatArray) -> tuple[FloatArray, str]:
+    """Return a column's times (n,) with parts of a second that are counted without leading zeros, and what to say."""
+    joined = unpadded(numbers.cells(k), value)
+    return (value, "") if joined is None else (joined.time, f"; {joined.text}")
+
+
 def _rank(numbers: Numbers, k: int, clock: Clock) -> int:
     named = is_time_name(numbers.names[k])
     return {"certain": 0, "likely": 1, "guess": 2}[clock.decision.sure] + (0 if named else 3)
@@ -117,10 +124,11 @@ def _rank(numbers: Numbers, k: int, clock: Clock) -> int:
 def _clock(numbers: Numbers, k: int, name: str) -> Clock | None:
     cells = numbers.cells(k)
     if _are_stamps(cells):
-        time = _stamps(cells)
-        why = Decision("time", f"'{name}', date and time", "certain", "its cells are dates with a time")
-        return Clock(name, "iso", None, None, why) if _ascends(time) else None
-    value = numbers.values[:, k]
+        time, joined = _as_meant(numbers, k, _stamps(cells))
+        why = f"its cells are dates with a time{joined}"
+        told = Decision("time", f"'{name}', date and time", "likely" if joined else "certain", why)
+        return Clock(name, "iso", None, None, told) if _ascends(time) else None
+    value, joined = _as_meant(numbers, k, numbers.values[:, k])
     spoken = numbers.names[k]
     named = is_time_name(spoken)
     # a slow sensor's own stamps stand on the rows of a fast one
@@ -133,7 +141,8 @@ def _clock(numbers: Numbers, k: int, name: str) -> Clock | None:
         return None
     if not named and numbers.dialect.has_header:
         sure, why_unit = "guess", f"its name says nothing known here, but it ascends as a clock does: {why_unit}"
-    said = Decision("time", f"'{name}' in {unit}", sure, why_unit)
+    sure = "likely" if joined and sure == "certain" else sure
+    said = Decision("time", f"'{name}' in {unit}", sure, f"{why_unit}{joined}")
     return Clock(name, unit, None, None, said)
 
 
