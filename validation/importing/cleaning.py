@@ -93,7 +93,12 @@ def cleaned(sensor: str, found: Readings, others: Mapping[str, Readings], stampe
             f"were interpolated; {total - len(found.time)} of {total} rows are left out"
         )
         rate = 1 / row_timing(found.time).interval
+    total = len(found.time)
     held = find_held(found.value)
+    if held is not None and (gap := np.all(np.isnan(found.value), axis=1)).any():
+        # a row without a reading is as one that was lost: what stood on it goes on behind it
+        found = found.select(~gap)
+        held = find_held(found.value)
     standing = 1.0 if held is None else held.rows_per_reading
     found, said = _thawed(sensor, found, others, standing)
     notes += said
@@ -104,12 +109,16 @@ def cleaned(sensor: str, found: Readings, others: Mapping[str, Readings], stampe
     is_fresh = fresh_rows(found.value, held)
     fresh = found.select(is_fresh)
     shown = np.flatnonzero(is_fresh)
-    period, time, one_clock = _own_times(fresh.time, np.diff(shown).astype(float), held.rows_per_reading, row)
+    stands = held.rows_per_reading
+    if before < total:
+        apart = np.diff(fresh.time) / row
+        stands = float(np.mean(apart[apart < 2 * np.median(apart)]))
+    period, time, one_clock = _own_times(fresh.time, np.diff(shown).astype(float), stands, row)
     even = "the even times of its own clock" if one_clock else "times as even as the rows allow"
     bear = f"what is left bears {even}, at most a row before the row at which it first shows"
     per_row = "" if stamped else f" (rows taken as {1 / row:.4g} Hz)"
     notes.append(
-        f"{sensor}: its readings stand on {held.rows_per_reading:.2f} rows each (sample and hold): it runs at "
+        f"{sensor}: its readings stand on {stands:.2f} rows each (sample and hold): it runs at "
         f"{1 / period:.4g} Hz in a log of {1 / row:.4g} Hz{per_row}; {before - len(fresh.time)} of {before} rows "
         f"repeat and are left out; {bear}"
     )

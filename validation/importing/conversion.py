@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from discsim.arrays import BoolArray, runs
 from discsim.clipping import clipping_notes
 from discsim.disc import Release
 from discsim.errors import InputError
@@ -19,6 +20,7 @@ from discsim.glitches import FASTEST_SPIN
 from discsim.limits import time_fault
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from discsim.validation.importing.cleaning import Readings, cleaned, without_glitches
+from discsim.validation.importing.failed import failed_at_once
 from discsim.validation.importing.import_map import ImportMap, SensorMap, TimeBase
 from discsim.validation.importing.overflow import without_overflow
 from discsim.validation.importing.raw_table import RawTable, Repair, RepairList, read_raw
@@ -98,6 +100,8 @@ def read_readings(raw: Path, import_map: ImportMap, rows: slice | None = None) -
     repairs = RepairList(import_map.repairs)
     tables = _read_tables(raw, import_map, repairs)
     readings, notes = _read_sensors(raw, tables, import_map, rows, repairs)
+    readings, said = _without_zeros(readings, tables, repairs)
+    notes += said
     readings, import_map, said = _over_the_ends(readings, import_map, tables, repairs)
     notes += said
     # what was read as numbers is no longer needed as text
@@ -223,6 +227,30 @@ def _read_sensors(
         raise InputError.at(
             raw, None, f"no sensor of the map '{import_map.name}' in it; expected {wanted}; {_there(tables, raw)}"
         )
+    return readings, notes
+
+
+def _without_zeros(
+    readings: dict[str, Readings], tables: dict[str, RawTable], repairs: RepairList
+) -> tuple[dict[str, Readings], list[str]]:
+    """Return readings with gaps where zeros stand for failed ones, and what to say."""
+    failed: dict[str, BoolArray] = {}
+    for path in {tables[sensor].path for sensor in readings}:
+        failed |= failed_at_once({s: found for s, found in readings.items() if tables[s].path == path})
+    notes = []
+    for sensor in [sensor for sensor in readings if sensor in failed]:
+        found, rows, table = readings[sensor], failed[sensor], tables[sensor]
+        first = int(found.number[np.argmax(rows)])
+        count = int(np.count_nonzero(rows))
+        notes.append(
+            f"{'WARNING: ' * (count > MUCH_LOST * rows.size)}{sensor}: exactly 0 on all axes in {count} of "
+            f"{rows.size} rows amid other readings, the first row {first}: readings that failed; they become gaps"
+        )
+        for start, stop in runs(rows):
+            line = int(table.line[np.searchsorted(table.number, found.number[start])])
+            what = f"{sensor}: exactly 0 on all axes in {stop - start} row{'s' * (stop - start > 1)}, a failed reading"
+            repairs.add(None, table.path, line, what, f"zeros of {sensor} made a gap")
+        readings = {**readings, sensor: found._replace(value=np.where(rows[:, None], np.nan, found.value))}
     return readings, notes
 
 

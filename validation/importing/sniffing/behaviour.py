@@ -119,7 +119,7 @@ def _alone(value: FloatArray) -> tuple[str, str]:
     if rest < STILL * peak:
         return "gyroscope", f"{rest:.3g} at rest, up to {peak:.3g}"
     size, what = field_size(sound)
-    steady = float(np.percentile(norm, 90) / np.percentile(norm, 10))
-    if steady < 3 and any(FIELD[0] <= size * factor <= FIELD[1] for factor in (1.0, 0.1, 100.0, 1e-3)):
+    steady = float(np.percentile(norm, 90)) < 3 * float(np.percentile(norm, 10))
+    if steady and any(FIELD[0] <= size * factor <= FIELD[1] for factor in (1.0, 0.1, 100.0, 1e-3)):
         return "magnetometer", f"{size:.4g} ({what}) is the earth's field, and its size hardly changes"
     return "", ""

@@ -13,6 +13,7 @@ import numpy as np
 from discsim.arrays import BoolArray, FloatArray
 from discsim.recording import SENSORS
 from discsim.validation.importing.cell_texts import CellTexts, number
+from discsim.validation.importing.failed import failed_rows
 from discsim.validation.importing.overflow import continued
 from discsim.validation.importing.raw_table import RawTable
 from discsim.validation.importing.sniffing.dialect import Dialect
@@ -116,9 +117,11 @@ class Triple:
 
     @cached_property
     def values(self) -> FloatArray:
-        """Its readings as written, (n, 3); a gyroscope's continued where its register overflowed."""
+        """Its readings as written, (n, 3): no zeros of failed ones, a gyroscope's continued where it overflowed."""
         value = np.asarray(self.numbers.values[:, list(self.columns)])
         value = value if self.where is None else value[self.rows]
+        failed = failed_rows(self.sensor, value)
+        value = np.where(failed[:, None], np.nan, value) if failed.any() else value
         if self.sensor != "gyroscope":
             return value
         whole = [continued(column) for column in value.T]

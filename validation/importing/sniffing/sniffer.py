@@ -168,8 +168,9 @@ def _assigned(files: Sequence[_File]) -> tuple[dict[str, tuple[Triple, Decision]
     """Return the best triple of each sensor by names, the rest, and a note where names are exchanged."""
     triples = [triple for file in files for triple in file.triples]
     named: dict[str, Triple] = {}
+    alive = [triple for triple in triples if not _dead(triple)]
     for sensor in ORDER:
-        mine = [t for t in triples if t.sensor == sensor and t.penalty < NO_READING]
+        mine = [t for t in alive or triples if t.sensor == sensor and t.penalty < NO_READING]
         if not mine:
             continue
         # of several the one with gravity in it, then the plainest name, then the first
@@ -217,6 +218,11 @@ def _keeps_axis(fit: Fit, triple: Triple) -> bool:
     return bool(abs(fit.axes[axis, axis]) > 0.5)
 
 
+def _dead(triple: Triple) -> bool:
+    """Tell a sensor that reads exactly zero throughout."""
+    return not np.any(np.nan_to_num(triple.values))
+
+
 def _weightless(triple: Triple) -> bool:
     """Tell an acceleration with gravity taken off: at rest it is nothing, below a fiftieth of its largest.
 
@@ -246,7 +252,9 @@ def _others(found: dict[str, tuple[Triple, Decision]], left: Sequence[Triple]) -
     for triple in left:
         if triple in chosen or triple.sensor not in SENSORS:
             continue
-        if triple.sensor == "accelerometer" and (triple.penalty >= NO_READING or _weightless(triple)):
+        if _dead(triple):
+            why = "all its rows are zero: it was not connected or not read"
+        elif triple.sensor == "accelerometer" and (triple.penalty >= NO_READING or _weightless(triple)):
             why = "worked out from other readings, or without gravity"
         else:
             why = "a second one" if triple.sensor in found else "worked out from other readings"

@@ -128,7 +128,7 @@ def _gyroscope_rate(read: RawReadings) -> _Rate | None:
         return None
     sound = np.isfinite(gyro.value).all(axis=1)
     t, value = gyro.time[sound], gyro.value[sound]
-    if t.size < 8:
+    if t.size < 8 or not value.any():
         return None
     rate = np.linalg.norm(value, axis=1)
     unit = value / np.maximum(rate, 1e-9)[:, None]
@@ -220,7 +220,11 @@ def _impacts(read: RawReadings, t: FloatArray) -> BoolArray:
         return hit
     sound = np.isfinite(accel.value).all(axis=1)
     time, force = accel.time[sound], accel.value[sound]
-    jump = np.linalg.norm(np.diff(force, axis=0), axis=1) * np.diff(time)
+    if time.size < 2:
+        return hit
+    # over a gap a disc has turned on, and the force with it
+    row = np.minimum(np.diff(time), 1.5 * float(np.median(np.diff(time))))
+    jump = np.linalg.norm(np.diff(force, axis=0), axis=1) * row
     for moment in time[1:][jump > IMPACT]:
         hit |= np.abs(t - moment) <= HALF
     return hit

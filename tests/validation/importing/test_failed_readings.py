@@ -1,0 +1,138 @@
+"""Readings that failed and were written as zeros become gaps, aloud; zeros of what rests or falls are readings."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from support.made_logs import DEG, G0, LANDING, RATE, RELEASE, made_log, three, write_table
+
+from discsim.validation.importing.cleaning import Readings, cleaned
+from discsim.validation.importing.failed import failed_at_once, failed_rows
+from discsim.validation.importing.imported_log import import_log
+
+LOG = made_log()
+ROWS = np.arange(LOG.t.size)
+SENSORS = {"gyroscope": LOG.gyro / DEG, "accelerometer": LOG.accel / G0, "magnetometer": LOG.mag}
+NAMES = {
+    "gyroscope": ["gx_dps", "gy_dps", "gz_dps"],
+    "accelerometer": ["ax", "ay", "az"],
+    "magnetometer": ["mx", "my", "mz"],
+}
+EVERY_7 = ROWS % 7 == 3
+APART = ROWS % 97 == 50
+FOR_LONG = (ROWS > 900) & (ROWS < 1000)  # 0.5 s in the flight
+AT_THE_START = ROWS < 300
+
+
+def log(path, failed):
+    """Write the log with zeros in the rows (n,) of each sensor named."""
+    columns = [("ms", np.round(1000 * LOG.t).astype(int))]
+    for sensor, value in SENSORS.items():
+        zeroed = np.where(failed.get(sensor, ROWS < 0)[:, None], 0.0, value)
+        columns += three(NAMES[sensor], zeroed)
+    return write_table(path, columns, digits=4)
+
+
+FAILURES = {
+    "a field every few rows": {"magnetometer": EVERY_7},
+    "a field not read at first": {"magnetometer": AT_THE_START},
+    "a field between its readings": {"magnetometer": ROWS % 4 > 0},
+    "an accelerometer": {"accelerometer": APART},
+    "a gyroscope in flight": {"gyroscope": APART & (LOG.t > RELEASE + 0.1) & (LOG.t < LANDING)},
+    "two sensors of one chip": {"accelerometer": EVERY_7, "gyroscope": EVERY_7},
+    "the bus": dict.fromkeys(SENSORS, APART),
+    "the bus for long": dict.fromkeys(SENSORS, FOR_LONG),
+    "one chip for long": {"accelerometer": FOR_LONG, "gyroscope": FOR_LONG},
+    "one chip to the end": {"accelerometer": ROWS > 1300, "gyroscope": ROWS > 1300},
+}
+
+
+@pytest.mark.parametrize("failure", FAILURES)
+def test_zeros_amid_readings_are_gaps_that_are_counted_and_the_throw_is_found(tmp_path, failure):
+    failed = FAILURES[failure]
+    found = import_log(log(tmp_path / "log.csv", failed))
+    said = found.summary()
+    for sensor, rows in failed.items():
+        first = int(np.argmax(rows))
+        counted = f"{sensor}: exactly 0 on all axes in {np.count_nonzero(rows)} of {rows.size} rows amid other readings"
+        assert f"{counted}, the first row {first}: readings that failed; they become gaps" in said
+        samples = found.recordings[0].samples[sensor]
+        gap = np.isnan(samples.value).all(axis=1)
+        assert_allclose(samples.t[gap], LOG.t[rows], atol=1e-6)
+        repairs = [one for one in found.imported[0].repairs if one.action == f"zeros of {sensor} made a gap"]
+        assert repairs[0].line == first + 2
+    (throw,) = found.throws
+    assert RELEASE <= throw.start < RELEASE + 0.2
+    assert LANDING - 0.6 < throw.end <= LANDING + 0.1
+    assert throw.spin == pytest.approx(32, rel=0.06)
+    assert "gyroscope unit: deg/s (certain: the header says so, and the field turns as fast)" in said
+    assert "accelerometer unit: g (certain" in said
+
+
+def test_a_held_magnetometer_keeps_its_clock_over_zeros():
+    """Read at half the log's rate, each reading stands on two rows; a zero hides one of them."""
+    value = LOG.mag[ROWS // 2 * 2]
+    gaps = Readings(ROWS, LOG.t, np.where(EVERY_7[:, None], np.nan, value))
+    whole = cleaned("magnetometer", Readings(ROWS, LOG.t, value), {"magnetometer": gaps}, True)
+    result = cleaned("magnetometer", gaps, {"magnetometer": gaps}, True)
+    assert result.rate_hz == pytest.approx(RATE / 2, rel=0.01)
+    assert "stand on 2.00 rows each" in result.notes[0]
+    assert len(result.readings.time) == len(whole.readings.time)
+    assert not np.isnan(result.readings.value).any()
+
+
+@pytest.mark.parametrize("sensor", SENSORS)
+def test_a_sensor_at_zero_throughout_is_left_out_by_name_and_hides_no_throw(tmp_path, sensor):
+    found = import_log(log(tmp_path / "log.csv", {sensor: ROWS >= 0}))
+    left = f"left out: {sensor} in {', '.join(NAMES[sensor])} of log.csv (all its rows are zero: it was not connected"
+    assert left in found.summary()
+    assert set(found.recordings[0].samples) == set(SENSORS) - {sensor}
+    (throw,) = found.throws
+    assert throw.spin == pytest.approx(32, rel=0.06)
+
+
+def test_of_two_sensors_of_a_kind_the_dead_one_is_not_taken(tmp_path):
+    columns = [("t_s", LOG.t), *three(["gx", "gy", "gz"], LOG.gyro), *three(["ax", "ay", "az"], 0 * LOG.accel)]
+    columns += three(["acc2_x", "acc2_y", "acc2_z"], LOG.accel)
+    found = import_log(write_table(tmp_path / "log.csv", columns))
+    assert "accelerometer: acc2_x, acc2_y, acc2_z" in found.summary()
+
+
+# ------------------------------------------------------------------------------------ zeros that are readings
+
+
+def test_a_gyroscope_that_rests_at_zero_has_not_failed():
+    """A dead band of 3 deg/s, as phones have; a spin that begins and ends within a row or two of it."""
+    value = np.where(np.abs(LOG.gyro) < 3 * DEG, 0.0, LOG.gyro)
+    assert not failed_rows("gyroscope", value).any()
+
+
+def test_a_table_that_stops_and_turns_back_in_an_ideal_log_has_not_failed():
+    rate = np.interp(ROWS, [0, 50, 100, 150, 400, 450, 900], [0, 30, 30, 0, 0, -30, 30])
+    value = np.column_stack([0 * rate, 0 * rate, np.round(rate)])
+    for held in (1, 3):
+        assert not failed_rows("gyroscope", value[ROWS // held * held]).any()
+
+
+def test_a_coarse_accelerometer_in_free_fall_has_not_failed():
+    """49 mg a step, as an ADXL375: at its place on the axis of a falling disc most readings are a step or none."""
+    rng = np.random.default_rng(2)
+    falling = (LOG.t > 2) & (LOG.t < 4)
+    value = np.where(falling[:, None], 0.0, [0.0, 0.0, 20.0]) + np.round(0.5 * rng.standard_normal(LOG.accel.shape))
+    assert np.any(np.all(value == 0, axis=1))
+    assert not failed_rows("accelerometer", 0.48 * value).any()
+    ideal = np.where(falling[:, None], 0.0, [0.0, 0.0, G0])
+    assert not failed_rows("accelerometer", ideal).any()
+
+
+def test_a_gyroscope_at_rest_has_not_failed_where_a_slow_magnetometer_is_filled_with_zeros():
+    gyro = np.where((LOG.t < 2)[:, None], 0.0, LOG.gyro)
+    field = np.where((ROWS % 4 > 0)[:, None], 0.0, LOG.mag)
+    both = {"gyroscope": Readings(ROWS, LOG.t, gyro), "magnetometer": Readings(ROWS, LOG.t, field)}
+    assert set(failed_at_once(both)) == {"magnetometer"}
+
+
+@pytest.mark.parametrize("value", [LOG.mag, 0 * LOG.mag, np.full_like(LOG.mag, np.nan), LOG.mag[:0]])
+def test_without_zeros_amid_readings_nothing_failed(value):
+    assert not failed_rows("magnetometer", value).any()
