@@ -20,7 +20,7 @@ from discsim.glitches import FASTEST_SPIN
 from discsim.limits import time_fault
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from discsim.validation.importing.cleaning import Readings, cleaned, without_glitches
-from discsim.validation.importing.failed import failed_at_once
+from discsim.validation.importing.failed import dead_axis, failed_at_once
 from discsim.validation.importing.import_map import ImportMap, SensorMap, TimeBase
 from discsim.validation.importing.overflow import without_overflow
 from discsim.validation.importing.raw_table import RawTable, Repair, RepairList, read_raw
@@ -251,6 +251,10 @@ def _without_zeros(
             what = f"{sensor}: exactly 0 on all axes in {stop - start} row{'s' * (stop - start > 1)}, a failed reading"
             repairs.add(None, table.path, line, what, f"zeros of {sensor} made a gap")
         readings = {**readings, sensor: found._replace(value=np.where(rows[:, None], np.nan, found.value))}
+    gyro = readings.get("gyroscope")
+    if gyro is not None and (axis := dead_axis(gyro.value)) is not None:
+        notes.append(f"WARNING: gyroscope {'xyz'[axis]}: 0 in every row while the other two turn: it was not read")
+        readings = {**readings, "gyroscope": gyro._replace(value=np.where(np.arange(3) == axis, np.nan, gyro.value))}
     return readings, notes
 
 

@@ -14,7 +14,7 @@ from discsim.arrays import BoolArray, FloatArray, runs
 from discsim.validation.importing.cleaning import FROZEN_ROWS, Readings
 from discsim.validation.importing.held import step_of
 
-__all__ = ["failed_at_once", "failed_rows"]
+__all__ = ["dead_axis", "failed_at_once", "failed_rows"]
 
 #: A reading beside is no small one: this share of the usual (median) size, and this many steps of resolution. One of a
 #: coarse accelerometer in free fall, a step or two beside zero, is.
@@ -55,6 +55,15 @@ def failed_at_once(readings: Mapping[str, Readings]) -> dict[str, BoolArray]:
             dead = accel.number[failed["accelerometer"]]
             failed["gyroscope"] |= zero["gyroscope"] & np.isin(readings["gyroscope"].number, dead)
     return {sensor: rows for sensor, rows in failed.items() if rows.any()}
+
+
+def dead_axis(value: FloatArray) -> int | None:
+    """Return the axis of a gyroscope's readings (n, 3) that is 0 in every row while both others change, or None."""
+    sound = value[np.isfinite(value).all(axis=1)]
+    if not len(sound):
+        return None
+    zero = np.flatnonzero(np.all(sound == 0, axis=0))
+    return int(zero[0]) if zero.size == 1 and np.count_nonzero(np.ptp(sound, axis=0)) == 2 else None
 
 
 def _amid(sensor: str | None, value: FloatArray) -> list[tuple[int, int]]:

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from support.made_logs import DEG, G0, LANDING, RATE, RELEASE, made_log, three, write_table
 
 from discsim.validation.importing.cleaning import Readings, cleaned
-from discsim.validation.importing.failed import failed_at_once, failed_rows
+from discsim.validation.importing.failed import dead_axis, failed_at_once, failed_rows
 from discsim.validation.importing.imported_log import import_log
 
 LOG = made_log()
@@ -99,7 +99,32 @@ def test_of_two_sensors_of_a_kind_the_dead_one_is_not_taken(tmp_path):
     assert "accelerometer: acc2_x, acc2_y, acc2_z" in found.summary()
 
 
+@pytest.mark.parametrize(("axis", "told_by"), [(0, "gyroscope"), (1, "gyroscope"), (2, "magnetometer")])
+def test_one_axis_of_a_gyroscope_at_zero_throughout_is_a_gap_aloud_and_the_spin_is_told(tmp_path, axis, told_by):
+    """Without the axis of the spin the field tells it; the gyroscope read nothing there, and no throw was found."""
+    columns = [("t_s", LOG.t)]
+    for sensor, value in SENSORS.items():
+        dead = np.where((np.arange(3) == axis) & (sensor == "gyroscope"), 0.0, value)
+        columns += three(NAMES[sensor], dead)
+    found = import_log(write_table(tmp_path / "log.csv", columns))
+    said = f"WARNING: gyroscope {'xyz'[axis]}: 0 in every row while the other two turn: it was not read"
+    assert said in found.summary()
+    assert np.isnan(found.recordings[0].samples["gyroscope"].value).all(axis=0).tolist() == [
+        k == axis for k in range(3)
+    ]
+    (throw,) = found.throws
+    assert throw.sensor == told_by
+    assert throw.spin == pytest.approx(32, rel=0.06)
+
+
 # ------------------------------------------------------------------------------------ zeros that are readings
+
+
+def test_an_ideal_spin_about_one_axis_has_no_dead_ones():
+    rate = np.linspace(0.0, 30.0, ROWS.size)
+    assert dead_axis(np.column_stack([0 * rate, 0 * rate, rate])) is None
+    assert dead_axis(LOG.gyro) is None
+    assert dead_axis(np.column_stack([0.1 * rate, 0 * rate, rate])) == 1
 
 
 def test_a_gyroscope_that_rests_at_zero_has_not_failed():

@@ -126,8 +126,11 @@ def _gyroscope_rate(read: RawReadings) -> _Rate | None:
     gyro = read.readings.get("gyroscope")
     if gyro is None:
         return None
-    sound = np.isfinite(gyro.value).all(axis=1)
-    t, value = gyro.time[sound], gyro.value[sound]
+    # a spin shows without an axis across it
+    hollow = np.all(np.isnan(gyro.value), axis=0) & np.array([True, True, False])
+    whole = np.where(hollow, 0.0, gyro.value)
+    sound = np.isfinite(whole).all(axis=1)
+    t, value = gyro.time[sound], whole[sound]
     if t.size < 8 or not value.any():
         return None
     rate = np.linalg.norm(value, axis=1)
