@@ -14,6 +14,7 @@ from discsim.validation.importing.cleaning import Readings
 from discsim.validation.importing.import_map import ImportMap, SensorMap
 from discsim.validation.importing.raw_table import RawTable, RepairList
 from discsim.validation.importing.row_clock import RowClock
+from discsim.validation.importing.unsigned import signed
 
 __all__ = ["chosen_rows", "sensor_rows"]
 
@@ -53,6 +54,11 @@ def sensor_rows(
         here &= clock.stretch == clock.longest(counted)
     rows = np.flatnonzero(here)
     value, sound = _values(table, rows, sensor, names, import_map, repairs)
+    if (meant := signed(value)) is not None:
+        line = int(table.line[rows[int(np.argmax(np.any(meant != value, axis=1)))]])
+        what = f"{sensor}: counts of 16 bits without their sign"
+        repairs.add(None, table.path, line, what, f"65536 taken off where {sensor} is above 32767")
+        value = meant
     kept = np.flatnonzero(sound)
     kept = kept[_ascending(table, rows[kept], clock.time[rows[kept]], repairs)]
     read = sensor_map.factor * value[kept]

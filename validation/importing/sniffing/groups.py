@@ -19,6 +19,7 @@ from discsim.validation.importing.raw_table import RawTable
 from discsim.validation.importing.sniffing.dialect import Dialect
 from discsim.validation.importing.sniffing.names import Name, penalty_of, read_name, says_nothing, sensor_of
 from discsim.validation.importing.sniffing.units import COUNTS, OTHER, Reading, readings_of
+from discsim.validation.importing.unsigned import signed
 
 __all__ = ["FEWEST_ROWS", "Numbers", "Triple", "triples_of"]
 
@@ -117,9 +118,11 @@ class Triple:
 
     @cached_property
     def values(self) -> FloatArray:
-        """Its readings as written, (n, 3): no zeros of failed ones, a gyroscope's continued where it overflowed."""
+        """Its readings as meant, (n, 3): with their sign, NaN for failed ones, continued where they overflowed."""
         value = np.asarray(self.numbers.values[:, list(self.columns)])
         value = value if self.where is None else value[self.rows]
+        meant = signed(value)
+        value = value if meant is None else meant
         failed = failed_rows(self.sensor, value)
         value = np.where(failed[:, None], np.nan, value) if failed.any() else value
         if self.sensor != "gyroscope":

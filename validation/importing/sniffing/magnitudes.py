@@ -55,6 +55,8 @@ PER_UT = {
 LARGEST_RAD_S = 100.0
 #: What headers state in each other's place: most drivers give one of them, and an example of the other is copied.
 MISTAKEN = {"deg/s", "rad/s"}
+#: What no gyroscope's driver gives unasked: without a header only a clock that is certain tells it.
+ASKED_FOR = {"rpm", "Hz"}
 _RAD = np.pi / 180
 
 
@@ -254,7 +256,7 @@ def gyroscope_unit(
             return Unit("deg/s", 1.0, _said(name, "deg/s", "likely", why))
         why = f"the header says so; up to {np.degrees(peak * worth):.0f} deg/s"
         return Unit(stated.unit, stated.scale, _said(name, stated.unit, "certain", why))
-    if near is not None and stated is None:
+    if near is not None and stated is None and (clock == "certain" or near not in ASKED_FOR):
         return Unit(near, 1.0, _said(name, near, "likely", f"{by} turns as fast in this unit"))
     if _whole(value) and (peak > 5000 or stated is not None):
         return _gyroscope_counts(turned, by)
