@@ -167,32 +167,60 @@ def _turning(rate: Samples, note: str) -> Replay:
 
 
 def _measured_flight(recording: Recording) -> Replay:
-    seen, where = None, "position unknown: drawn in one place"
-    for sensor in ("track", "gps"):
-        samples = recording.get(sensor)
-        if samples is None:
-            continue
-        whole = np.all(np.isfinite(samples.value[:, :3]), axis=1)
-        if np.count_nonzero(whole) >= 2:
-            seen = Samples(samples.t[whole], samples.value[whole, :3])
-            where = f"position: {sensor} of {recording.name}"
-            break
+    sensor = next((name for name in ("track", "gps") if _axes_seen(recording, name)), None)
     spin, how = _estimated_rate(recording)
-    if seen is None and spin is None:
+    if sensor is None and spin is None:
+        lacks = [_lack(recording, name) for name in ("track", "gps")]
         raise InputError(
-            f"{recording.path or recording.name}: nothing tells the motion; expected track or gps positions, or {how}"
+            f"{recording.path or recording.name}: nothing tells the motion ({', '.join(lacks)}); expected two "
+            f"points of an axis of a track or gps, or {how}"
         )
-    span = seen if seen is not None else spin
-    assert span is not None
-    t = _grid(float(span.t[0]), float(span.t[-1]))
-    position = np.tile([0.0, 0.0, -RELEASE_HEIGHT], (t.size, 1))
-    if seen is not None:
-        position = np.column_stack([np.interp(t, seen.t, axis) for axis in seen.value.T])
+    if sensor is None:
+        assert spin is not None
+        empty = [f" ({_lack(recording, name)})" for name in ("track", "gps") if name in recording]
+        where = f"position unknown: drawn in one place{''.join(empty)}"
+        t = _grid(float(spin.t[0]), float(spin.t[-1]))
+        position = np.tile([0.0, 0.0, -RELEASE_HEIGHT], (t.size, 1))
+    else:
+        t, position, where = _seen_path(recording, sensor)
     rate, attitude = np.full(t.size, np.nan), np.tile([1.0, 0.0, 0.0, 0.0], (t.size, 1))
     if spin is not None:
         rate, attitude = _integrated(spin, t)
     notes = (where, "attitude unknown: drawn level", how if spin is not None else "spin unknown: not drawn")
     return Replay("disc.xml", t, position, attitude, rate, _diameter(recording), notes)
+
+
+def _axes_seen(recording: Recording, sensor: str) -> list[int]:
+    """Return the axes north, east, down (0, 1, 2) of which a sensor has two readings or more."""
+    samples = recording.get(sensor)
+    if samples is None:
+        return []
+    return [axis for axis in range(3) if np.count_nonzero(np.isfinite(samples.value[:, axis])) >= 2]
+
+
+def _lack(recording: Recording, sensor: str) -> str:
+    """Return in words why a sensor shows no path."""
+    return f"no {sensor}" if sensor not in recording else f"no two numbers in a column of {sensor}.csv"
+
+
+def _seen_path(recording: Recording, sensor: str) -> tuple[FloatArray, FloatArray, str]:
+    """Return times (n,), positions (n, 3) m along the axes that a sensor has seen, and what of them is unknown.
+
+    Each axis runs straight over its own gaps. One that was not seen stays at zero, a height at that of a release.
+    """
+    samples, axes = recording.samples[sensor], _axes_seen(recording, sensor)
+    known = samples.t[np.any(np.isfinite(samples.value[:, axes]), axis=1)]
+    t = _grid(float(known[0]), float(known[-1]))
+    position = np.tile([0.0, 0.0, -RELEASE_HEIGHT], (t.size, 1))
+    for axis in axes:
+        there = np.isfinite(samples.value[:, axis])
+        position[:, axis] = np.interp(t, samples.t[there], samples.value[there, axis])
+    where = f"position: {sensor} of {recording.name}"
+    unseen = [name for axis, name in enumerate(("north", "east", "height")) if axis not in axes]
+    if not unseen:
+        return t, position, where
+    drawn = f"drawn {RELEASE_HEIGHT:g} m above ground" if unseen == ["height"] else "drawn at 0"
+    return t, position, f"{where}; {' and '.join(unseen)} not seen: {drawn}"
 
 
 def _estimated_rate(recording: Recording) -> tuple[Samples | None, str]:

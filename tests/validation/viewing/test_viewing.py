@@ -186,8 +186,27 @@ def test_a_track_alone_is_shown_without_spin(tmp_path):
 
 def test_a_recording_that_tells_no_motion_is_refused(tmp_path):
     nothing = {"track": Samples(np.array([0.0, 1.0]), np.full((2, 3), np.nan))}
-    with pytest.raises(InputError, match="nothing tells the motion; expected track or gps"):
+    with pytest.raises(InputError, match=r"motion \(no two numbers in a column of track.csv, no gps\); expected two"):
         replayed(write(tmp_path / "dark", "flight", nothing))
+
+
+@pytest.mark.parametrize(
+    ("seen", "words", "end"),
+    [
+        ((1, 0, 1), "; east not seen: drawn at 0", [18.0, 0.0, -4.0]),
+        ((1, 1, 0), "; height not seen: drawn 1.3 m above ground", [18.0, 2.0, -1.3]),
+        ((0, 0, 1), "; north and east not seen: drawn at 0", [0.0, 0.0, -4.0]),
+    ],
+)
+@pytest.mark.parametrize("sensor", ["track", "gps"])
+def test_a_path_that_is_seen_from_one_side_is_drawn_as_far_as_it_was_seen(tmp_path, seen, words, end, sensor):
+    t = np.linspace(0.0, 2.0, 21)
+    path = np.where(seen, np.column_stack((9 * t, t, -2 - t)), np.nan)
+    path[5, 2] = np.nan  # a gap of one axis is none of the others
+    path = path if sensor == "track" else np.column_stack((path, np.full((21, 3), np.nan)))
+    replay = replayed(write(tmp_path / "side", "flight", {sensor: Samples(t, path)}))
+    assert replay.notes[0] == f"position: {sensor} of side{words}"
+    np.testing.assert_allclose(replay.position_at(np.array([2.0]))[0], end, atol=1e-9)
 
 
 def test_a_span_starts_and_ends_where_it_was_asked_to():
