@@ -37,8 +37,8 @@ UNITS: Mapping[str, Mapping[str, float]] = MappingProxyType(
             **{"rad/s": 1.0, "deg/s": np.pi / 180, "mdeg/s": np.pi / 180e3, "mrad/s": 1e-3},
             **{"rpm": np.pi / 30, "Hz": 2 * np.pi},
         },
-        "m": {"m": 1.0},
-        "": {"SI": 1.0},
+        "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048},
+        "": {"SI": 1.0, "deg": 1.0},
     }
 )
 TIME_UNITS = {"min": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "iso": 1.0}
@@ -85,6 +85,8 @@ class SensorMap:
         The column of this sensor's own time stamps, in the unit of ``[time]``; None where it has the file's.
     sheet : SensorSheet
         What the data sheet states; a rate of NaN is taken from the time stamps.
+    degrees : bool
+        Whether a GPS's first columns are latitude and longitude in degrees and a height in m.
     """
 
     file: str | None
@@ -95,6 +97,7 @@ class SensorMap:
     optional: bool
     sheet: SensorSheet
     time: str | None = None
+    degrees: bool = False
 
 
 @dataclass(frozen=True)
@@ -305,7 +308,8 @@ def _sensor(table: TomlTable, sensor: str, *, strict: bool) -> SensorMap:
     file = table.text("file", required=False)
     columns = _columns(table, sensor)
     choices = UNITS[SENSORS[sensor].unit]
-    unit = table.text("unit", required=len(choices) > 1, choices=tuple(choices)) or next(iter(choices))
+    # a path without a unit is in metres
+    unit = table.text("unit", required=sensor not in ("track", "gps"), choices=tuple(choices)) or next(iter(choices))
     scale = table.number("scale", required=False)
     if scale == 0:
         raise table.error("scale", "'scale' is 0, expected the unit's worth of one count")
@@ -321,14 +325,16 @@ def _sensor(table: TomlTable, sensor: str, *, strict: bool) -> SensorMap:
     time = table.text("time", required=False)
     # a rate that the map does not state comes from the time stamps
     sheet = read_sheet(table, sensor, strict=strict, rate_required=False)
-    return SensorMap(file, columns, choices[unit] * (scale or 1.0), axes, chosen, optional, sheet, time)
+    return SensorMap(file, columns, choices[unit] * (scale or 1.0), axes, chosen, optional, sheet, time, unit == "deg")
 
 
 def _columns(table: TomlTable, sensor: str) -> tuple[tuple[str, ...], ...]:
     width = len(SENSORS[sensor].columns)
-    widths = (2, 3) if sensor == "track" else (width,)  # a plan view has no third coordinate
+    # a plan view has no third coordinate, and not every receiver writes velocities
+    widths = {"track": (2, 3), "gps": (3, 6)}.get(sensor, (width,))
     value = table.raw("columns")
     sets = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
+    expected = " or ".join(map(str, widths))
     for names in sets:
         if (
             not isinstance(names, list)
@@ -338,7 +344,7 @@ def _columns(table: TomlTable, sensor: str) -> tuple[tuple[str, ...], ...]:
         ):
             raise table.error(
                 "columns",
-                f"'{table.name}.columns' is {value!r}, expected {width} names of columns (or a list of such lists)",
+                f"'{table.name}.columns' is {value!r}, expected {expected} names of columns (or a list of such lists)",
             )
     return tuple(tuple(names) for names in sets)
 

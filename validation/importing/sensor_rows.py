@@ -12,6 +12,7 @@ from discsim.recording import SENSORS
 from discsim.validation.importing.cell_texts import CellTexts, number
 from discsim.validation.importing.cleaning import Readings
 from discsim.validation.importing.import_map import ImportMap, SensorMap
+from discsim.validation.importing.logs.tables import positions
 from discsim.validation.importing.raw_table import RawTable, RepairList
 from discsim.validation.importing.row_clock import RowClock
 from discsim.validation.importing.unsigned import signed
@@ -67,9 +68,23 @@ def sensor_rows(
         # + 0.0 turns the -0.0 of a reversed zero into 0.0
         columns = [unseen if axis is None else axis[1] * read[:, axis[0]] + 0.0 for axis in sensor_map.axes]
         read = np.column_stack(columns)
+    elif sensor == "gps":
+        read = _fixes(read, degrees=sensor_map.degrees)
     if kept.size == len(table):  # sensors of one table share what they have in common
         return Readings(table.number, clock.time, read)
     return Readings(table.number[rows[kept]], clock.time[rows[kept]], read)
+
+
+def _fixes(read: FloatArray, *, degrees: bool) -> FloatArray:
+    """Return positions and velocities (n, 6) of a GPS's columns (n, 3) or (n, 6), in North-East-Down, m and m/s.
+
+    Of degrees the place is that from the first fix; zeros in all of latitude, longitude and height are no fix.
+    """
+    fixes = np.column_stack([read, np.full((len(read), 6 - read.shape[1]), np.nan)])
+    if not degrees:
+        return np.asarray(fixes)
+    fixes[np.all(fixes[:, :2] == 0.0, axis=1)] = np.nan
+    return positions(fixes)
 
 
 def _values(
