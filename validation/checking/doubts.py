@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from discsim.recording import Recording
-from discsim.validation.checking.readings import path_findings
+from discsim.validation.checking.paths import path_findings
 from discsim.validation.checking.statements import statement_findings
 from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
 

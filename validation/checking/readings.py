@@ -6,17 +6,18 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import Scale
-from discsim.effects.setup import AccelerometerUnit, GpsAxes, GyroscopeUnit, MagnetometerUnit
+from discsim.effects.setup import AccelerometerUnit, GyroscopeUnit, MagnetometerUnit
 from discsim.glitches import FASTEST_SPIN, beyond_spin, glitches
 from discsim.recording import SENSORS, Recording, Samples
 from discsim.validation.checking.finding import Finding
+from discsim.validation.checking.paths import path_findings
 from discsim.validation.checking.statements import FIELD
 from discsim.validation.diagnosis.setup.reference import reference_doubts
 
-__all__ = ["at_rest", "path_findings", "reading_findings"]
+__all__ = ["at_rest", "reading_findings"]
 
 #: a body rests where it turns slower than this (rad/s: above a gyroscope's bias) ...
 TURNS = 0.25
@@ -33,22 +34,6 @@ IRON = 0.4
 FORCES = {"g": 1 / 9.80665, "mg": 1e3 / 9.80665, "cm/s^2": 100.0}
 #: what a field of uT reads in other units
 FIELDS = {"T": 1e-6, "mT": 1e-3, "gauss": 1e-2, "mG": 10.0, "nT": 1e3}
-
-#: change of a GPS's position over its velocity times the time, where one of them is in another unit
-_PATHS = {
-    1000.0: "the position in mm",
-    100.0: "the position in cm",
-    3.28: "the position in feet",
-    0.514: "the velocity in knots",
-    0.447: "the velocity in mph",
-    0.305: "the velocity in ft/s",
-    0.278: "the velocity in km/h",
-    0.01: "the velocity in cm/s",
-    0.001: "the velocity in mm/s, or the position in km",
-}
-#: that ratio is believed where position and velocity correlate so, and is of another unit beyond these: a velocity
-#: that a receiver smooths, or positions that are off by metres, move it by some per cent
-_GO_TOGETHER, _ONE = 0.9, (0.7, 1.4)
 
 
 def reading_findings(recording: Recording) -> Iterator[Finding]:
@@ -222,55 +207,3 @@ def _wild_rates(sensor: str, samples: Samples, alone: BoolArray) -> Iterator[Fin
             if single
             else "more than three rows on end are no glitch, and `estimate` uses them; make them gaps",
         )
-
-
-def path_findings(recording: Recording) -> Iterator[Finding]:
-    """Yield what a GPS's positions and velocities say against each other, and a velocity that no throw has."""
-    gps = recording.get("gps")
-    if gps is None or len(gps) < 6:
-        return
-    value = gps.value[np.all(np.isfinite(gps.value), axis=1)]
-    t = gps.t[np.all(np.isfinite(gps.value), axis=1)]
-    if len(value) < 6:
-        return
-    moved: FloatArray = value[2:, :3] - value[:-2, :3]
-    told = (value[2:, 3:] + value[1:-1, 3:] + value[:-2, 3:]) / 3 * (t[2:] - t[:-2])[:, None]
-    speed = float(np.max(np.linalg.norm(value[:, 3:], axis=1)))
-    if found := _path_unit(moved, told):
-        yield found
-    elif recording.plant == "flight" and speed > 60:
-        yield Finding("gps.speed", "warning", "gps", f"it goes at {speed:.3g} m/s", "up to 45 m/s", "in km/h?")
-    for axis, name in enumerate(("north", "east", "down")):
-        far = np.sum(moved[:, axis] ** 2) + np.sum(told[:, axis] ** 2)
-        # the share of its own motion that an axis's velocity explains: 1 where both agree, -1 where a sign is wrong
-        if far > 1.0 and 2 * float(moved[:, axis] @ told[:, axis]) / far < 0:
-            yield Finding(
-                catalogued(GpsAxes).id,
-                "warning",
-                "gps",
-                f"its {name} position and velocity go opposite ways",
-                "the velocity to be the position's change",
-                "is one of them written east-north-up?",
-            )
-
-
-def _path_unit(moved: FloatArray, told: FloatArray) -> Finding | None:
-    """Return that position and velocity are in units that do not belong together, None where they are not.
-
-    ``moved`` are changes of the position (n, 3), ``told`` the velocities times the time that they took.
-    """
-    squares, other, both = float(np.sum(told**2)), float(np.sum(moved**2)), float(np.sum(moved * told))
-    if squares * other == 0.0 or both < _GO_TOGETHER * np.sqrt(squares * other):
-        return None
-    ratio = both / squares
-    if _ONE[0] <= ratio <= _ONE[1]:
-        return None
-    near = min(_PATHS, key=lambda known: abs(np.log(ratio / known)))
-    return Finding(
-        "gps.unit",
-        "error",
-        "gps",
-        f"its position changes {ratio:.3g} times as fast as its velocity says",
-        "metres and m/s, once as fast",
-        f"{_PATHS[near]}?" if abs(np.log(ratio / near)) < np.log(1.1) else "one of the two is in another unit",
-    )

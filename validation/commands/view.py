@@ -114,7 +114,7 @@ def _replay(recording: Path | None, disc: str | None, model: Path | None, throw:
     from discsim.engine import fly
     from discsim.recording import read_recording
     from discsim.shipped import load_throw
-    from discsim.validation.checking.readings import path_findings
+    from discsim.validation.checking.paths import path_findings
     from discsim.validation.checking.statements import unlikely_flight
     from discsim.validation.viewing.replay import replay_motion, replay_recording
 

@@ -17,7 +17,7 @@ from scipy.integrate import cumulative_trapezoid
 from discsim.arrays import ComplexArray, FloatArray
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.phase_regression import rate_of
-from discsim.validation.identification.initial.path import local_cubics, path_fixes
+from discsim.validation.identification.initial.path import Fixes, local_cubics, path_fixes
 from discsim.validation.identification.initial.spin_phase import field_spin
 from discsim.validation.identification.plants import plant_of
 
@@ -106,6 +106,11 @@ def turning_axis(t: FloatArray, y: FloatArray) -> tuple[FloatArray, float] | Non
     return (total / size, size / whole) if size > 0.0 else None
 
 
+#: a path whose way is shorter than its velocities' by this factor is in degrees, or in km, and holds nothing against
+#: other sensors: what a receiver smooths, or a velocity in km/h, is within 4
+_UNIT = 10.0
+#: no path of a second is shorter, m
+_STANDS = 0.1
 #: a turning less pure than this has no axis worth the name; sound throws have 0.9 and more
 PURE = 0.4
 
@@ -256,9 +261,23 @@ def _phase(recording: Recording) -> tuple[str, Callable[[FloatArray], FloatArray
     return source, lambda at: -np.interp(at, t, psi), float(t[0]), float(t[-1])
 
 
+def _in_metres(fixes: Fixes) -> bool:
+    """Tell whether the plan's positions change by what the velocities say, within a factor of `_UNIT`.
+
+    Without velocities: whether they change at all, where they are not at the origin.
+    """
+    told = 0.5 * (fixes.velocity[1:, :2] + fixes.velocity[:-1, :2]) * np.diff(fixes.t)[:, None]
+    both = np.all(np.isfinite(told), axis=1)
+    way = float(np.sum(np.linalg.norm(told[both], axis=1)))
+    steps = np.linalg.norm(np.diff(fixes.position[:, :2], axis=0), axis=1)
+    if way < 1.0:
+        return bool(np.sum(steps) > _STANDS or np.max(np.abs(fixes.position[:, :2])) < 1.0)
+    return bool(np.sum(steps[both]) > way / _UNIT)
+
+
 def _path(recording: Recording, grid: FloatArray) -> FlightPath | None:
     fixes = path_fixes(recording)
-    if fixes is None or fixes.t[-1] - fixes.t[0] < 1.0:
+    if fixes is None or fixes.t[-1] - fixes.t[0] < 1.0 or not _in_metres(fixes):
         return None
     cubic = local_cubics(fixes, np.clip(grid, fixes.t[0] + 0.2, fixes.t[-1] - 0.2))
     return FlightPath(cubic[:, 2], cubic[:, 1], cubic[:, 0])
