@@ -12,7 +12,7 @@ from discsim.effects.sensors import Scale
 from discsim.effects.setup import AccelerometerUnit, GyroscopeUnit, MagnetometerUnit
 from discsim.glitches import FASTEST_SPIN, beyond_spin, glitches
 from discsim.recording import SENSORS, Recording, Samples
-from discsim.validation.checking.finding import Finding
+from discsim.validation.checking.finding import Finding, Severity
 from discsim.validation.checking.paths import path_findings
 from discsim.validation.checking.statements import FIELD
 from discsim.validation.diagnosis.setup.reference import reference_doubts
@@ -40,11 +40,13 @@ def reading_findings(recording: Recording) -> Iterator[Finding]:
     """Yield what the readings of a recording show that cannot be, or is unlikely."""
     yield from _force(recording)
     yield from _field(recording)
-    doubts = list(reference_doubts(recording))
-    for doubt in doubts:
+    doubted = []
+    for doubt in reference_doubts(recording):
         where = doubt.file.removesuffix(".csv")
-        yield Finding(f"{where}.{doubt.kind}", "error", where, f"it {doubt.what}", doubt.expected, doubt.remedy)
-    yield from _rate(recording, ("gyroscope",) if doubts else ("gyroscope", "rate_reference"))
+        severity: Severity = "error" if doubt.sure else "warning"
+        yield Finding(f"{where}.{doubt.kind}", severity, where, f"it {doubt.what}", doubt.expected, doubt.remedy)
+        doubted.append(where)
+    yield from _rate(recording, [name for name in ("gyroscope", "rate_reference") if name not in doubted])
     yield from path_findings(recording)
 
 

@@ -20,7 +20,7 @@ from discsim.effects.setup import Axes, BoardRotation, ClockUnit, GpsAxes, SiteF
 from discsim.recording import Recording, Samples
 from discsim.validation.diagnosis.setup.hypotheses import Hypothesis, Ranking, board_effect, chosen, hypotheses, pairs
 from discsim.validation.diagnosis.setup.proof import left_by_short_fit
-from discsim.validation.diagnosis.setup.reference import reference_doubts
+from discsim.validation.diagnosis.setup.reference import ReferenceDoubt, reference_doubts
 from discsim.validation.diagnosis.setup.remedy import MapAxes, remedy
 from discsim.validation.diagnosis.setup.rotation import board_turns, spin_axis
 from discsim.validation.diagnosis.setup.units import clock_unit, sensor_units
@@ -115,8 +115,10 @@ class SetupFindings:
     recordings: tuple[Recording, ...]
     #: physics that would make the sensors agree where no fault does: a lag, a clock, iron, of about this size
     hints: tuple[Effect, ...] = ()
-    #: what is wrong with rate references, by which nothing else is then judged
+    #: what is wrong with rate references and commands, by which nothing else is then judged
     doubts: tuple[str, ...] = ()
+    #: what contradicts a rate reference or a command, of which either may be wrong
+    contradictions: tuple[str, ...] = ()
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -138,10 +140,10 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
         current = tuple(corrected(one, [unit]) for one in current)
     for one in current:
         require_seconds(one)
-    doubts = [[doubt.sentence for doubt in reference_doubts(one)] for one in current]
+    doubts = [list(reference_doubts(one)) for one in current]
 
     def judged() -> list[Recording]:
-        return [_judgeable(one, reference=not own) for one, own in zip(current, doubts, strict=True)]
+        return [_judgeable(_believed(one, own)) for one, own in zip(current, doubts, strict=True)]
 
     if not all(one.samples for one in judged()):
         return SetupFindings(tuple(faults), current)
@@ -156,9 +158,12 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
         for fault in found:
             faults = with_fault(faults, fault)
         current = tuple(corrected(one, [fault.effect for fault in found]) for one in current)
-    told = zip(current, doubts, strict=True)
-    doubted = [f"{one.path or one.name}: {sentence}" for one, own in told for sentence in own]
-    return SetupFindings(tuple(faults), current, hints, tuple(doubted))
+    told = [(one, doubt) for one, own in zip(current, doubts, strict=True) for doubt in own]
+    sure, unsure = (
+        tuple(f"{one.path or one.name}: {doubt.sentence}" for one, doubt in told if doubt.sure is wanted)
+        for wanted in (True, False)
+    )
+    return SetupFindings(tuple(faults), current, hints, sure, unsure)
 
 
 def with_fault(faults: Sequence[SetupFault], further: SetupFault) -> list[SetupFault]:
@@ -200,7 +205,7 @@ def setup_notes(findings: SetupFindings, done: str) -> list[str]:
 
     ``done`` says what is done with the readings (``"the estimates are of"``).
     """
-    notes = [*findings.doubts]
+    notes = [*findings.doubts, *findings.contradictions]
     notes += [f"{fault.sentence}; {done} the readings so corrected" for fault in findings.faults]
     if (perhaps := suspected_fault(findings)) is not None:
         notes.append(f"{perhaps.sentence}; {done} the readings as written")
@@ -254,18 +259,22 @@ def _angle(one: FloatArray | None, other: FloatArray | None) -> float:
     return float(np.arccos(np.clip(abs(float(one @ other)), 0.0, 1.0)))
 
 
-def _judgeable(recording: Recording, *, reference: bool = True) -> Recording:
+def _believed(recording: Recording, doubts: Sequence[ReferenceDoubt]) -> Recording:
+    """Return a recording without the rate reference, and the command, that cannot be true."""
+    doubted = {doubt.file for doubt in doubts if doubt.sure}
+    kept = {name: own for name, own in recording.samples.items() if f"{name}.csv" not in doubted}
+    return replace(recording, samples=kept, command=None if "command.csv" in doubted else recording.command)
+
+
+def _judgeable(recording: Recording) -> Recording:
     """Return the part of a recording that is judged: where it turns most, if it is long.
 
-    Without a rate ``reference`` that is not believed, and without its magnetometer where the field is not stated:
-    nothing tells what it should read. Without a sensor of the board of which an axis was never read, or every reading
-    is the same: what is dead agrees with any order of axes.
+    Without its magnetometer where the field is not stated: nothing tells what it should read. Without a sensor of the
+    board of which an axis was never read, or every reading is the same: what is dead agrees with any order of axes.
     """
     kept = {name: own for name, own in recording.samples.items() if name not in BOARD or _alive(own)}
     if not recording.environment.field_known:
         kept.pop("magnetometer", None)
-    if not reference:
-        kept.pop("rate_reference", None)
     busiest = _busiest(kept, plant_of(recording).durations.setup)
     if busiest is not None:
         kept = {name: samples.between(*busiest) for name, samples in kept.items()}

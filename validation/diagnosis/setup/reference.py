@@ -1,4 +1,4 @@
-"""Whether a rate reference, or a command, can be the truth of the sensors beside it: its unit, sign, clock and time.
+"""Whether a rate reference, and a command, can be the truth of the sensors beside it: unit, sign, clock, time, factor.
 
 Every other relation of a rig starts from it, so a mistake there reads as a mistake of each sensor: a reversed encoder
 as three sensors with mixed-up axes. It is asked first, by the rates that the sensors show themselves.
@@ -15,7 +15,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.limits import time_fault
 from discsim.recording import Recording, Samples
-from discsim.validation.diagnosis.setup.spin_signals import FEWEST, spin_signals, usable
+from discsim.validation.diagnosis.setup.shown_rates import FEWEST_SLOTS, ShownRate, shown_rates
 from discsim.validation.identification.plants import plant_of
 
 __all__ = ["ReferenceDoubt", "reference_doubts"]
@@ -29,6 +29,8 @@ _UNITS: Mapping[float, str] = MappingProxyType(
 _NEAR = 0.15
 #: what is told that lasts so many times as long as the sensors, or as short, has another unit of time
 _LONGER = 100.0
+#: units in which a command's times may be written
+_CLOCKS: Mapping[str, float] = MappingProxyType({"milliseconds": 1e-3, "microseconds": 1e-6})
 #: lags that are tried, s, and the step between them
 _LAGS, _STEP = 10.0, 0.05
 #: a lag is told from this on, s, where it leaves less than this share of the rms without it in each of two sensors or
@@ -36,19 +38,36 @@ _LAGS, _STEP = 10.0, 0.05
 _SHORTEST, _LEFT, _ALIKE = 0.1, 0.25, 0.03
 #: readings by which a lag is looked for
 _VALUES = 4000
-#: pull towards the axis from which an accelerometer shows a rate, m/s^2; gravity that tells which way up a board is
-_PULL, _UPRIGHT = 5.0, 5.0
+#: gravity that tells which way up a board is, m/s^2
+_UPRIGHT = 5.0
+#: a rate is of another run where it leaves this share of itself (rms) beside what sensors show: what trails its command
+#: by `_SHORTEST` on ramps of a second leaves a tenth, a load that holds a table back may leave more
+_ANOTHER = 0.25
+#: causes of a factor that lie with a sensor and not with what is told
+_OWN_CAUSES: Mapping[str, str] = MappingProxyType(
+    {
+        "magnetometer": "the spacing of the magnetometer's rows, or rows that it lost",
+        "gyroscope": "the gyroscope's range setting or unit",
+        "accelerometer": "position_m or the unit of the accelerometer",
+        "rate_reference": "the rate reference",
+    }
+)
 
 
 @dataclass(frozen=True)
 class ReferenceDoubt:
-    """What cannot be true of a file of rates: its ``kind`` (units, clock, sign, late), and parts of a sentence."""
+    """What cannot be true of a file of rates: its ``kind``, and parts of a sentence.
+
+    Kinds are units, clock, sign, factor, late and another (of another run). Unless ``sure`` it contradicts what else
+    there is, and either may be wrong.
+    """
 
     kind: str
     file: str
     what: str
     expected: str
     remedy: str
+    sure: bool = True
 
     @property
     def sentence(self) -> str:
@@ -56,45 +75,65 @@ class ReferenceDoubt:
         return f"{self.file} {self.what}; expected {self.expected}; {self.remedy}"
 
 
-@dataclass(frozen=True)
-class _Shown:
-    """A rate that a sensor shows: times (n,) s, rates (n,) rad/s, whether their sign is known."""
-
-    t: FloatArray
-    rate: FloatArray
-    signed: bool
-
-    def beside(self, told: Samples) -> tuple[FloatArray, FloatArray]:
-        """Return the rates (m,) while something was told, and what was told then (m,)."""
-        inside = (self.t >= told.t[0]) & (self.t <= told.t[-1])
-        return self.rate[inside], np.interp(self.t[inside], told.t, told.value)
-
-
 def reference_doubts(recording: Recording) -> Iterator[ReferenceDoubt]:
-    """Yield what is wrong with a recording's rate reference, or with its command where it has none: at most one thing.
+    """Yield what is wrong with a recording's rate reference, and with its command: at most one thing of each.
 
-    A unit is told by any sensor of which no other disagrees, a sign by all of a rig that lies upright, a lag by two.
-    Nothing is told where times are none.
+    A unit is told by any sensor of which no other disagrees, a sign by all of a rig that lies upright, a lag by two, a
+    factor by two for sure. A reference that nothing contradicts tells of the command. Nothing is told where times are
+    none.
     """
     if any(len(one) and time_fault(one.t) is not None for one in recording.samples.values()):
         return
-    samples = recording.get("rate_reference")
-    file = "command.csv" if samples is None else "rate_reference.csv"
-    told = _known(samples if samples is not None else recording.command)
-    if told is None:
+    reference, command = _known(recording.get("rate_reference")), _known(recording.command)
+    if reference is None and command is None:
         return
-    ends = [float(one.t[-1]) for name, one in recording.samples.items() if name != "rate_reference" and len(one)]
-    if not ends:
+    shown = shown_rates(recording)
+    if reference is not None:
+        doubt = _ends_elsewhere(recording, reference) or _of_rates("rate_reference.csv", recording, shown, reference)
+        if doubt is None:
+            shown = {**shown, "rate_reference": ShownRate(reference.t, reference.value, signed=True)}
+        else:
+            yield doubt
+    if command is None:
         return
-    lasts, others = float(told.t[-1]), max(ends)
-    if samples is not None and not 1.0 / _LONGER < lasts / max(others, 1e-9) < _LONGER:
-        what = f"ends at {lasts:.6g} s, the sensors at {others:.6g} s"
-        yield ReferenceDoubt("clock", file, what, "one clock, in seconds", "are the times of one of them milliseconds?")
-        return
-    shown = _shown(recording)
-    doubt = _unit(file, shown, told) or _sign(file, recording, shown, told) or _late(file, recording, shown, told)
+    doubt = _command_clock(shown, command) or _of_rates("command.csv", recording, shown, command)
     if doubt is not None:
         yield doubt
+
+
+def _of_rates(file: str, recording: Recording, shown: Mapping[str, ShownRate], told: Samples) -> ReferenceDoubt | None:
+    """Return the first thing that is wrong with rates, by what sensors show."""
+    return (
+        _unit(file, shown, told)
+        or _sign(file, recording, shown, told)
+        or _late(file, recording, shown, told)
+        or _factor(file, recording, shown, told)
+        or _another(file, recording, shown, told)
+    )
+
+
+def _ends_elsewhere(recording: Recording, reference: Samples) -> ReferenceDoubt | None:
+    """Return that a reference's clock has another unit than the sensors', where it lasts so much longer or shorter."""
+    ends = [float(one.t[-1]) for name, one in recording.samples.items() if name != "rate_reference" and len(one)]
+    if not ends or 1.0 / _LONGER < (lasts := float(reference.t[-1])) / max(others := max(ends), 1e-9) < _LONGER:
+        return None
+    what = f"ends at {lasts:.6g} s, the sensors at {others:.6g} s"
+    remedy = "are the times of one of them milliseconds?"
+    return ReferenceDoubt("clock", "rate_reference.csv", what, "one clock, in seconds", remedy)
+
+
+def _command_clock(shown: Mapping[str, ShownRate], command: Samples) -> ReferenceDoubt | None:
+    """Return that a command's times are in another unit, where sensors turn by it in that unit and not as written."""
+    for name, factor in _CLOCKS.items():
+        meant = Samples(factor * command.t, command.value)
+        if time_fault(meant.t) is not None:
+            continue
+        written = {sensor: off for sensor, one in shown.items() if (off := _apart(one, command)) is not None}
+        right = [sensor for sensor, one in shown.items() if (off := _apart(one, meant)) is not None and off < _ANOTHER]
+        if right and all(written.get(sensor, 1.0) >= _ANOTHER for sensor in right):
+            what = f"is in {name}, by {_all(right)}"
+            return ReferenceDoubt("clock", "command.csv", what, "seconds", f"multiply its times by {factor:g}")
+    return None
 
 
 def _known(samples: Samples | None) -> Samples | None:
@@ -107,30 +146,9 @@ def _known(samples: Samples | None) -> Samples | None:
     return Samples(samples.t[known], samples.value[known])
 
 
-def _shown(recording: Recording) -> dict[str, _Shown]:
-    """Return the rates that sensors show by themselves, each while it does not clip."""
-    shown: dict[str, _Shown] = {}
-    signals = spin_signals(recording) if "magnetometer" in recording else None
-    if signals is not None and signals.measured:
-        shown["magnetometer"] = _Shown(signals.grid, signals.rate, signed=True)
-    if (found := usable(recording, "gyroscope")) is not None:
-        shown["gyroscope"] = _Shown(found[0], found[1][:, 2], signed=True)
-    place = recording.sheets["accelerometer"].position if "accelerometer" in recording else None
-    arm = 0.0 if place is None else float(np.hypot(place[0], place[1]))
-    if arm > 0.0 and (found := usable(recording, "accelerometer")) is not None:
-        pull = np.hypot(found[1][:, 0], found[1][:, 1])
-        shown["accelerometer"] = _Shown(found[0], np.sqrt(np.where(pull > _PULL, pull, np.nan) / arm), signed=False)
-    alive = {name: np.isfinite(one.rate) for name, one in shown.items()}
-    return {
-        name: _Shown(one.t[alive[name]], one.rate[alive[name]], one.signed)
-        for name, one in shown.items()
-        if np.count_nonzero(alive[name]) >= FEWEST
-    }
-
-
 def _all(names: Iterable[str]) -> str:
     """Return names as a sentence lists them."""
-    *first, last = names
+    *first, last = (name.replace("_", " ") for name in names)
     return f"{', '.join(first)} and {last}" if first else last
 
 
@@ -146,7 +164,7 @@ def _multiple(read: FloatArray, told: FloatArray, multiples: Sequence[float]) ->
     return None
 
 
-def _unit(file: str, shown: Mapping[str, _Shown], told: Samples) -> ReferenceDoubt | None:
+def _unit(file: str, shown: Mapping[str, ShownRate], told: Samples) -> ReferenceDoubt | None:
     """Return that rates are told in another unit, where some sensor says so and none that it is rad/s."""
     sizes = {name: [np.abs(side) for side in one.beside(told)] for name, one in shown.items()}
     multiples = {name: _multiple(read, said, (1.0, *_UNITS)) for name, (read, said) in sizes.items()}
@@ -159,7 +177,7 @@ def _unit(file: str, shown: Mapping[str, _Shown], told: Samples) -> ReferenceDou
     return ReferenceDoubt("units", file, what, "rad/s under the name rate_rad_s", f"multiply its rates by {factor:.6g}")
 
 
-def _sign(file: str, recording: Recording, shown: Mapping[str, _Shown], told: Samples) -> ReferenceDoubt | None:
+def _sign(file: str, recording: Recording, shown: Mapping[str, ShownRate], told: Samples) -> ReferenceDoubt | None:
     """Return that rates are told with the other sign, where a rig lies upright and every sensor with a sign says so.
 
     A board upside down turns the other way, too: its accelerometer tells.
@@ -172,30 +190,33 @@ def _sign(file: str, recording: Recording, shown: Mapping[str, _Shown], told: Sa
     signed = {name: _multiple(*one.beside(told), (1.0, -1.0)) for name, one in shown.items() if one.signed}
     if len(signed) < 2 or any(multiple != -1.0 for multiple in signed.values()):
         return None
-    what = f"turns the other way than {_all(signed)}, and the accelerometer shows the board the right way up"
+    what = f"turns the other way than the {_all(signed)}, and the accelerometer shows the board the right way up"
     return ReferenceDoubt(
         "sign", file, what, "rates positive about the body's z axis, which points down", "turn the sign of its rates"
     )
 
 
-def _late(file: str, recording: Recording, shown: Mapping[str, _Shown], told: Samples) -> ReferenceDoubt | None:
+def _late(file: str, recording: Recording, shown: Mapping[str, ShownRate], told: Samples) -> ReferenceDoubt | None:
     """Return that rates are told late or early beside two sensors, on a rig whose rate does not just run down.
 
-    Where it runs down by a share of itself a second, late is no other than a scale.
+    Where it runs down by a share of itself a second, late is no other than a scale. A table may trail its command.
     """
-    if plant_of(recording).airborne or not plant_of(recording).commanded or file == "command.csv":
+    if plant_of(recording).airborne or not plant_of(recording).commanded:
         return None
     # a place that is off reads as a scale, which moves the lag of an accelerometer by a tenth of a second
     lags = {name: lag for name, one in shown.items() if one.signed and (lag := _lag(one, told)) is not None}
     if len(lags) < 2 or float(np.ptp(list(lags.values()))) > _ALIKE:
         return None
     lag = float(np.mean(list(lags.values())))
-    what = f"is {abs(lag):.2f} s {'late' if lag > 0 else 'early'} beside {_all(lags)}"
+    what = f"is {abs(lag):.2f} s {'late' if lag > 0 else 'early'} beside the {_all(lags)}"
     remedy = f"subtract {lag:.3f} s from its times" if lag > 0 else f"add {-lag:.3f} s to its times"
+    if file == "command.csv":
+        remedy += "" if lag > 0.0 else ", unless the table trails it by so much"
+        return ReferenceDoubt("late", file, what, "one clock", remedy, sure=False)
     return ReferenceDoubt("late", file, what, "one clock", remedy)
 
 
-def _lag(one: _Shown, told: Samples) -> float | None:
+def _lag(one: ShownRate, told: Samples) -> float | None:
     """Return by how much what is told is late beside a sensor, s; None where no lag makes them agree."""
     few = slice(None, None, max(1, one.t.size // _VALUES))
     t, read = one.t[few], one.rate[few]
@@ -207,3 +228,81 @@ def _lag(one: _Shown, told: Samples) -> float | None:
     near = coarse[int(np.argmin([rms(lag) for lag in coarse]))]
     lag = min((near + np.linspace(-_STEP, _STEP, 41)).tolist(), key=rms)
     return lag if abs(lag) > _SHORTEST and rms(lag) < _LEFT * rms(0.0) else None
+
+
+def _factor(file: str, recording: Recording, shown: Mapping[str, ShownRate], told: Samples) -> ReferenceDoubt | None:
+    """Return that rates are told a factor too large or too small, where some sensor says so and none that they are not.
+
+    Two sensors that show one factor are sure of it: a field turns by the clock and a gyroscope by its scale, so that no
+    single fault of either does it to both. One alone contradicts what is told, and either may be wrong.
+    """
+    multiples = {name: found for name, one in shown.items() if (found := one.multiple(told)) is not None}
+    off = {name: one for name, one in multiples.items() if one.constant and not one.is_near(1.0)}
+    said = {name: [other for other, its in off.items() if its.is_near(one.factor)] for name, one in off.items()}
+    if not said:
+        return None
+    surest = max(said, key=lambda name: len(said[name]))
+    factor, saying = off[surest].factor, said[surest]
+    # against two that show it one must agree with what is told; one alone is not believed beside any that does not
+    against = [one for one in multiples.values() if not one.is_near(factor) and (len(saying) == 1 or one.is_near(1.0))]
+    if against:
+        return None
+    what = f"is {1.0 / factor:.3g} times the rate that the {_all(saying)} show{'s' if len(saying) == 1 else ''}"
+    cause = "a profile of another run, or a gear" if file == "command.csv" else "edges per turn, or a wheel's ratio"
+    cause += _late_for_a_factor(recording, told, factor)
+    if len(saying) > 1:
+        return ReferenceDoubt("factor", file, what, "one rate", f"multiply its rates by {factor:.4g} ({cause}?)")
+    remedy = f"wrong is either {file} ({cause}; then multiply its rates by {factor:.4g}) or {_OWN_CAUSES[surest]}"
+    return ReferenceDoubt("factor", file, what, "one rate", remedy, sure=False)
+
+
+def _late_for_a_factor(recording: Recording, told: Samples, factor: float) -> str:
+    """Say by how much a clock is off that reads as a factor where a rig runs down; empty where none would."""
+    if plant_of(recording).airborne or plant_of(recording).commanded or not np.all(told.value[[0, -1]]):
+        return ""
+    falls = float(np.log(abs(told.value[0] / told.value[-1]))) / float(told.t[-1] - told.t[0])
+    # r(t - lag) = r(t) exp(falls lag) is 1 / factor of what is shown
+    lag = -float(np.log(factor)) / falls if falls > 0.0 else np.inf
+    return f", or times {abs(lag):.2g} s {'late' if lag > 0.0 else 'early'}" if abs(lag) < _LAGS else ""
+
+
+def _apart(one: ShownRate, told: Samples) -> float | None:
+    """Return what is left between a rate that is shown and one that is told (rms of sizes) as a share of the larger.
+
+    None where both are there for too short a time.
+    """
+    read, said = one.means(told)
+    if read.size < FEWEST_SLOTS:
+        return None
+    size = max(float(np.mean(read**2)), float(np.mean(said**2)))
+    return float(np.sqrt(np.mean((read - said) ** 2) / size)) if size > 0.0 else None
+
+
+def _turn_alike(one: ShownRate, other: ShownRate) -> bool:
+    """Tell whether two sensors show one rate while both show any."""
+    off = _apart(one, Samples(other.t, other.rate))
+    return off is not None and off < _ANOTHER
+
+
+def _another(file: str, recording: Recording, shown: Mapping[str, ShownRate], told: Samples) -> ReferenceDoubt | None:
+    """Return that rates are of another run: no sensor turns by them, and two that do not turn alike.
+
+    A reference beside a command that no table followed is not doubted for it, nor is a command for sure.
+    """
+    if plant_of(recording).airborne:
+        return None
+    apart = {name: off for name, one in shown.items() if (off := _apart(one, told)) is not None}
+    far = [name for name, off in apart.items() if off > _ANOTHER]
+    if len(far) < len(apart):
+        return None
+    alike = {one: [other for other in far if other == one or _turn_alike(shown[one], shown[other])] for one in far}
+    saying = max(alike.values(), key=len, default=[])
+    command = file == "command.csv"
+    if len(saying) < 2 and not (command and "rate_reference" in saying):
+        return None
+    show = "show" if len(saying) > 1 else "shows"
+    what = f"is off what the {_all(saying)} {show} by {100 * apart[saying[0]]:.0f} % (rms) and follows no factor or lag"
+    if not command:
+        return ReferenceDoubt("another", file, what, "one rate", "is it the file of another run? leave it out")
+    remedy = "is it the profile of another run? If not, the table did not turn as it was asked to"
+    return ReferenceDoubt("another", file, what, "one rate", remedy, sure=False)

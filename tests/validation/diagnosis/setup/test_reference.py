@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -13,13 +14,16 @@ from discsim.arrays import FloatArray
 from discsim.effects import Effect, effect
 from discsim.errors import InputError
 from discsim.profiles import trapezoids
+from discsim.rate_tables import RateTable
 from discsim.recording import Recording, Samples
 from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, record
+from discsim.table_drive import TableDrive
 from discsim.validation.checking.checked import check
 from discsim.validation.diagnosis.diagnosed import diagnose_recordings
 from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
 from discsim.validation.diagnosis.setup.reference import reference_doubts
+from discsim.validation.estimating.spin_estimates import estimate_spin
 
 PROFILE = trapezoids(np.array([18.0, 32.0]), 3.0, 1.0)
 Change = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
@@ -32,6 +36,13 @@ def table(errors: tuple[Effect, ...] = (), *, command: bool = False) -> Recordin
     module = Instruments.from_parts(*parts).with_effects(errors)
     told = PROFILE if command else None
     return record(motion, module, np.random.default_rng(4), plant="rate_table", name="mine", command=told)
+
+
+def bench(drive: TableDrive | None = None) -> Recording:
+    """Return a run of a rate table with its reference and what was commanded."""
+    motion = RateTable(drive=drive or TableDrive()).run(PROFILE, FIELD, (), yaw=0.4)
+    module = Instruments.from_parts("mpu9250", "ac1120s")
+    return record(motion, module, np.random.default_rng(6), plant="rate_table", name="mine", command=PROFILE)
 
 
 def coast(errors: tuple[Effect, ...] = ()) -> Recording:
@@ -91,6 +102,9 @@ def test_another_zero_of_time_is_told_where_the_rate_changes(mistake):
         effect("accel.units", written_in="g"),
         effect("accel.position_offset", dx_m=0.003),
         effect("clock.units", written_in="us"),
+        effect("gyro.scale", sx=0.0, sy=0.0, sz=0.1),
+        effect("mag.clock_rate", ratio=0.9),
+        effect("clock.rate", ratio=1.02),
     ],
     ids=lambda error: error.id,
 )
@@ -125,3 +139,94 @@ def test_check_tells_it_as_an_error():
     assert error.id == "rate_reference.units"
     assert error.where == "rate_reference"
     assert "it is in rpm, by " in error.sentence
+
+
+@pytest.mark.parametrize("made", [table, coast])
+@pytest.mark.parametrize("times", [0.5, 2.0, 1.1, 0.25])
+@pytest.mark.parametrize("stated", [True, False], ids=["field stated", "field not stated"])
+def test_a_factor_that_is_no_unit_is_told_by_two_sensors_and_its_remedy_mends_it(made, times, stated):
+    """Edges per turn counted wrongly, or a wheel: such a reference was the best estimate of the spin without a word."""
+    wrong = changed(made(), lambda t, r: (t, times * r))
+    if not stated:
+        wrong = replace(wrong, environment=replace(wrong.environment, magnetic_field=np.zeros(3)))
+    (doubt,) = reference_doubts(wrong)
+    assert (doubt.kind, doubt.sure) == ("factor", True)
+    assert f"is {times:.3g} times the rate that the magnetometer" in doubt.sentence
+    found = re.search(r"multiply its rates by ([0-9.]+)", doubt.remedy)
+    assert found is not None
+    by = float(found[1])
+    assert by == pytest.approx(1.0 / times, rel=0.01)
+    assert list(reference_doubts(changed(wrong, lambda t, r: (t, by * r)))) == []
+
+
+def test_a_noisy_encoder_is_no_wrong_one():
+    """An edge more or less in 10 ms is a tenth of 60 edges a second; a factor of 1.1 still shows in the mean."""
+    noise = 3.0 * np.random.default_rng(8).standard_normal(100_000)
+    right = changed(coast(), lambda t, r: (t, r + noise[: t.size]))
+    assert list(reference_doubts(right)) == []
+    (doubt,) = reference_doubts(changed(right, lambda t, r: (t, 1.1 * r)))
+    assert doubt.kind == "factor"
+
+
+@pytest.mark.parametrize("sensor", ["magnetometer", "gyroscope"])
+def test_one_sensor_alone_contradicts_a_reference_and_either_may_be_wrong(sensor):
+    """Rows of half the spacing turn the field twice as fast, a gyroscope of half the range reads twice the rate."""
+    wrong = changed(coast(), lambda t, r: (t, 0.5 * r))
+    alone = replace(wrong, samples={name: wrong.samples[name] for name in (sensor, "rate_reference")})
+    (doubt,) = reference_doubts(alone)
+    assert (doubt.kind, doubt.sure) == ("factor", False)
+    assert "wrong is either rate_reference.csv" in doubt.sentence
+    found = find_setup_faults([alone])
+    assert found.doubts == ()
+    (note,) = setup_notes(found, "estimated are")
+    assert doubt.sentence in note
+    (checked,) = check([alone]).checks
+    assert [one.id for one in checked.of("warning")] == ["rate_reference.factor"]
+
+
+def test_a_reference_of_another_run_is_told():
+    other = trapezoids(np.array([35.0, 10.0]), 3.0, 1.0)
+    wrong = changed(table(), lambda t, r: (t, np.interp(t, other.t, other.value)))
+    (doubt,) = reference_doubts(wrong)
+    assert (doubt.kind, doubt.sure) == ("another", True)
+    assert "is it the file of another run?" in doubt.sentence
+
+
+COMMANDS: dict[str, tuple[Change, str]] = {
+    "units": (lambda t, r: (t, np.degrees(r)), "multiply its rates by 0.0174533"),
+    "clock": (lambda t, r: (1e3 * t, r), "multiply its times by 0.001"),
+    "factor": (lambda t, r: (t, 0.5 * r), "multiply its rates by 2 "),
+    "late": (lambda t, r: (t + 1.0, r), "subtract 1.0"),
+    "another": (lambda t, r: (t, r[::-1] ** 2 / 20.0), "is it the profile of another run?"),
+}
+
+
+@pytest.mark.parametrize("kind", COMMANDS)
+def test_a_wrong_command_is_told_beside_a_reference_that_is_right(kind):
+    """A command was held against the sensors only where there was no reference."""
+    right, (change, mended_by) = bench(), COMMANDS[kind]
+    wrong = replace(right, command=Samples(*change(PROFILE.t, PROFILE.value)))
+    (doubt,) = reference_doubts(wrong)
+    assert (doubt.file, doubt.kind) == ("command.csv", kind)
+    assert mended_by in doubt.sentence
+    (checked,) = check([wrong]).checks
+    assert f"command.{kind}" in [one.id for one in checked.findings]
+
+
+@pytest.mark.parametrize("drive", [TableDrive(), TableDrive(bandwidth_hz=4.0, overshoot=0.2)])
+def test_a_table_that_trails_its_command_a_little_is_no_wrong_command(drive):
+    assert list(reference_doubts(bench(drive))) == []
+
+
+def test_a_wrong_reference_does_not_put_its_mistake_on_a_right_command():
+    (doubt,) = reference_doubts(changed(bench(), lambda t, r: (t, 2.0 * r)))
+    assert (doubt.file, doubt.kind) == ("rate_reference.csv", "factor")
+
+
+def test_the_best_estimate_passes_over_a_reference_that_two_sensors_refute():
+    wrong = changed(coast(), lambda t, r: (t, 0.5 * r))
+    found = estimate_spin(wrong)
+    assert found.rates[0].method == "fusion"
+    assert "is 0.5 times the rate that the magnetometer" in found.left_out["rate_reference"]
+    assert estimate_spin(wrong, "rate_reference").rates[0].method == "rate_reference"
+    assert estimate_spin(coast()).rates[0].method == "rate_reference"
