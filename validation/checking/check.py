@@ -10,6 +10,7 @@ from discsim.recording import Recording
 from discsim.validation.checking.abilities import methods_that_run, not_told
 from discsim.validation.checking.finding import SEVERITIES, Finding
 from discsim.validation.checking.readings import reading_findings
+from discsim.validation.checking.run_down import run_down_findings
 from discsim.validation.checking.sensors import SensorCheck, check_sensor, sensor_findings
 from discsim.validation.checking.statements import statement_findings
 
@@ -85,6 +86,7 @@ def check_recording(recording: Recording, faults: Sequence[SetupFault] = ()) -> 
         *statement_findings(recording),
         *(finding for found in sensors for finding in sensor_findings(found)),
         *reading_findings(recording),
+        *run_down_findings(recording),
         # setup faults (axes, units, offsets in time) join here: anything with an id and a sentence
         *(Finding(fault.id, "warning", "setup", fault.sentence) for fault in faults),
     ]

@@ -72,6 +72,11 @@ class ShownRate:
         inside = (self.t >= told.t[0]) & (self.t <= told.t[-1])
         return self.rate[inside], np.interp(self.t[inside], told.t, told.value)
 
+    def slots(self) -> tuple[FloatArray, FloatArray]:
+        """Return the mean times (k,) s and the mean sizes (k,) of the rate over slots of time."""
+        _, place, count = np.unique(np.floor(self.t / _SLOT), return_inverse=True, return_counts=True)
+        return np.bincount(place, self.t) / count, np.bincount(place, np.abs(self.rate)) / count
+
     def means(self, told: Samples) -> tuple[FloatArray, FloatArray]:
         """Return the means (k,) of the sizes of both over slots of time, each while both are there."""
         inside = (self.t >= told.t[0]) & (self.t <= told.t[-1])
