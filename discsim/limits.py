@@ -129,6 +129,8 @@ LARGEST_READING = 1e9
 
 #: units in which a clock may have been written as if they were seconds
 _UNITS = (1e-3, 1e-6)
+#: a step of so many usual ones is a jump of the clock
+_A_JUMP = 10.0
 #: fewest rows whose spacing shows a unit: of two or three any time between them is one
 _SHOWS_ITS_UNIT = 10
 
@@ -156,8 +158,11 @@ def time_fault(t: FloatArray) -> tuple[int, str] | None:
             return row, f"time is {t[row]:.9g} s; expected seconds from the start of the recording, at most {LATEST:g}"
     span = float(t[-1] - t[0])
     if span > LONGEST_SPAN:
-        row = int(np.argmax(np.diff(t))) + 1
-        return row, f"the rows span {span:.6g} s; expected at most {LONGEST_SPAN:g} s (does the clock jump here?)"
+        steps = np.diff(t)
+        row = int(np.argmax(steps)) + 1
+        jumps = steps[row - 1] > _A_JUMP * np.median(steps)
+        cause = "does the clock jump here?" if jumps else "are the times in seconds?"
+        return row, f"the rows span {span:.6g} s; expected at most {LONGEST_SPAN:g} s ({cause})"
     if t.size < 2:
         return None
     steps = np.diff(t)

@@ -32,6 +32,8 @@ SAME_INSTANT = 1e-6
 #: Slowest sampling that shows a spin, s: the longest window of `likelihood` (10.24 s) needs 14 readings.
 SLOWEST = 0.7
 
+#: Rows this many times as far apart as the sheet says have times that are hardly seconds.
+_OTHER_CLOCK = 2.0
 
 R = TypeVar("R")
 P = ParamSpec("P")
@@ -84,7 +86,7 @@ def usable(recording: Recording) -> Usable:
             continue
         sound, said = _sound(sensor, samples)
         notes += said
-        reason = _useless(sensor, sound)
+        reason = _useless(sensor, sound, recording.sheets[sensor].rate_hz)
         if reason:
             gone[sensor] = reason
         else:
@@ -146,8 +148,8 @@ def _instants(t: FloatArray) -> NDArray[np.int64]:
     return np.asarray(np.unique(slot, return_index=True)[1])
 
 
-def _useless(sensor: str, samples: Samples) -> str:
-    """Return why nothing can be taken from a sensor; empty where something can."""
+def _useless(sensor: str, samples: Samples, stated_hz: float) -> str:
+    """Return why nothing can be taken from a sensor of a stated rate; empty where something can."""
     known = np.isfinite(samples.value)
     if not np.any(known):
         return "it has no reading"
@@ -157,5 +159,7 @@ def _useless(sensor: str, samples: Samples) -> str:
         axis = "xyz"[int(np.argmin(np.count_nonzero(known, axis=0)))]
         return f"no reading has all three axes (there is no {axis})"
     if sensor != "rate_reference" and len(samples) > 1 and samples.interval > SLOWEST:
-        return f"one reading in {samples.interval:.3g} s shows no spin; expected one in {SLOWEST} s at least"
+        slow = f"one reading in {samples.interval:.3g} s shows no spin; expected one in {SLOWEST} s at least"
+        off = samples.interval * stated_hz > _OTHER_CLOCK
+        return slow + (f" (rate_hz says {stated_hz:g} Hz: are its times in seconds?)" if off else "")
     return ""

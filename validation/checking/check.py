@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
+from discsim.effects.catalogue import catalogued
+from discsim.effects.setup import ClockUnit
 from discsim.recording import Recording
 from discsim.validation.checking.abilities import methods_that_run, not_told
 from discsim.validation.checking.finding import SEVERITIES, Finding
@@ -13,8 +15,12 @@ from discsim.validation.checking.readings import reading_findings
 from discsim.validation.checking.run_down import run_down_findings
 from discsim.validation.checking.sensors import SensorCheck, check_sensor, sensor_findings
 from discsim.validation.checking.statements import statement_findings
+from discsim.validation.diagnosis.setup.units import clock_doubts
 
 __all__ = ["Check", "SetupFault", "check_recording"]
+
+#: times that are no seconds
+_CLOCK = catalogued(ClockUnit).id
 
 
 class SetupFault(Protocol):
@@ -82,13 +88,16 @@ class Check:
 def check_recording(recording: Recording, faults: Sequence[SetupFault] = ()) -> Check:
     """Return what is to be said of a recording; ``faults`` are setup faults found in it, which join the findings."""
     sensors = tuple(check_sensor(recording, name) for name in recording.samples)
+    clocks = clock_doubts(recording)
+    clocked = {name for doubt in clocks for name in doubt.sensors}
     findings = [
         *statement_findings(recording),
-        *(finding for found in sensors for finding in sensor_findings(found)),
+        *(Finding(_CLOCK, "error", ", ".join(one.sensors), one.what, one.expected, one.remedy) for one in clocks),
+        *(finding for found in sensors for finding in sensor_findings(found, clocked=found.sensor in clocked)),
         *reading_findings(recording),
         *run_down_findings(recording),
         # setup faults (axes, units, offsets in time) join here: anything with an id and a sentence
-        *(Finding(fault.id, "warning", "setup", fault.sentence) for fault in faults),
+        *(Finding(fault.id, "error" if fault.id == _CLOCK else "warning", "setup", fault.sentence) for fault in faults),
     ]
     run, left_out = methods_that_run(recording)
     return Check(

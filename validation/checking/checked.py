@@ -10,6 +10,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.console import Console
 
+from discsim.effects.setup import ClockUnit
 from discsim.files import write_text
 from discsim.result import Result
 from discsim.threads import one_thread
@@ -19,6 +20,7 @@ from discsim.validation.diagnosis.setup import find_setup_faults, suspected_faul
 from discsim.validation.reporting.figures import COLOURS, new_figure
 from discsim.validation.reporting.run import json_text
 from discsim.validation.running.given import Given, given_recordings
+from discsim.written import corrected
 
 __all__ = ["Checked", "check"]
 
@@ -92,4 +94,6 @@ def check(recordings: Given) -> Checked:
     found = given_recordings(recordings)
     setup = find_setup_faults(found)
     faults = [*setup.faults, *filter(None, [suspected_fault(setup)])]
-    return Checked(tuple(check_recording(recording, faults) for recording in found))
+    # in another unit of time every rate, path and noise looks wrong as well
+    clock = [fault.effect for fault in setup.faults if isinstance(fault.effect.value, ClockUnit)]
+    return Checked(tuple(check_recording(corrected(recording, clock), faults) for recording in found))

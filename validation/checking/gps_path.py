@@ -83,7 +83,11 @@ def gps_findings(recording: Recording) -> Iterator[Finding]:
     if degrees := _in_degrees(t, value, flies=recording.plant == "flight"):
         yield degrees
         return
-    unit = _path_unit(*_changes(t, value))
+    moved, told = _changes(t, value)
+    unit = _path_unit(moved, told)
+    if unit is not None and _path_unit(moved, told / (gps.interval * recording.sheets["gps"].rate_hz)) is None:
+        # a clock that is off by the same factor, by the rate that is stated, is told itself
+        return
     if unit is not None:
         yield unit
     yield from _position_and_velocity(t, value, flies=recording.plant == "flight" and unit is None)

@@ -127,7 +127,7 @@ def _left(t: FloatArray, rate: FloatArray, low: float, high: float, stated: floa
     Dry friction and drag are in proportion to what is ``stated``, 1/s. ``r(0) - r(t)`` is the integral of
     ``viscous r + dry + drag r^2``, linear in the three and in r(0).
     """
-    angle, square = (cumulative_trapezoid(rate**power, t, initial=0.0) for power in (1, 2))
+    angle, square = (cumulative_trapezoid(rate**power, t, initial=0) for power in (1, 2))
     columns = np.column_stack([np.ones(t.size), -angle, -(t - t[0]), -square])
     least, most = np.array([-np.inf, low, 0.0, 0.0]), np.array([np.inf, high, _DRY * stated, _DRAG * stated])
     size = np.linalg.norm(columns, axis=0)

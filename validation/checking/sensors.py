@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from discsim.arrays import BoolArray
-from discsim.effects.catalogue import catalogued
-from discsim.effects.setup import ClockUnit
 from discsim.glitches import glitches
 from discsim.recording import SENSORS, Recording
 from discsim.validation.checking.finding import Finding
@@ -161,10 +159,10 @@ def _dead(recording: Recording, sensor: str) -> tuple[str, ...]:
 # ------------------------------------------------------------------------------------------------------ findings
 
 
-def sensor_findings(found: SensorCheck) -> Iterator[Finding]:
-    """Yield what is worth a word about the file of a sensor."""
+def sensor_findings(found: SensorCheck, *, clocked: bool = False) -> Iterator[Finding]:
+    """Yield what is worth a word about the file of a sensor; nothing of its rate where its clock is told already."""
     where = found.sensor
-    yield from _rate_findings(found)
+    yield from _rate_findings(found, clocked=clocked)
     if found.held:
         yield Finding(
             f"{where}.held",
@@ -207,18 +205,17 @@ def sensor_findings(found: SensorCheck) -> Iterator[Finding]:
     yield from _quality_findings(found)
 
 
-def _rate_findings(found: SensorCheck) -> Iterator[Finding]:
+def _rate_findings(found: SensorCheck, *, clocked: bool) -> Iterator[Finding]:
     where = found.sensor
     off = found.rate_hz / found.stated_rate_hz - 1
-    if abs(off) > RATE_TOLERANCE and not found.held:
-        guess = _units_of_time(found)
+    if abs(off) > RATE_TOLERANCE and not found.held and not clocked:
         yield Finding(
-            f"{where}.rate" if not guess else catalogued(ClockUnit).id,
-            "error" if guess else "warning",
+            f"{where}.rate",
+            "warning",
             where,
             f"time stamps say {found.rate_hz:.4g} Hz, rate_hz is {found.stated_rate_hz:.4g} Hz",
             "the same within 1 %",
-            guess or "the stamps are used; correct rate_hz, or the clock",
+            "the stamps are used; correct rate_hz, or the clock",
         )
     if found.late > SHARE * found.rows:
         yield Finding(
@@ -251,14 +248,6 @@ def _rate_findings(found: SensorCheck) -> Iterator[Finding]:
         )
     if found.gaps > SHARE * found.rows and not found.dead_axes:
         yield Finding(f"{where}.gaps", "note", where, f"{found.gaps} cells are empty in {found.rows} rows")
-
-
-def _units_of_time(found: SensorCheck) -> str:
-    """Say which unit the stamps seem to have been written in; empty where the rate is off by no such factor."""
-    for factor, unit in ((1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds"), (1e3, "kiloseconds")):
-        if abs(found.rate_hz / found.stated_rate_hz / factor - 1) < 0.2:
-            return f"are the stamps {unit}, not seconds?"
-    return ""
 
 
 def _quality_findings(found: SensorCheck) -> Iterator[Finding]:

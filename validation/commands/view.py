@@ -116,12 +116,17 @@ def _replay(recording: Path | None, disc: str | None, model: Path | None, throw:
     from discsim.shipped import load_throw
     from discsim.validation.checking.paths import path_findings
     from discsim.validation.checking.statements import unlikely_flight
+    from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
+    from discsim.validation.diagnosis.setup.reference import believed, reference_doubts
     from discsim.validation.viewing.replay import replay_motion, replay_recording
 
     if recording is not None:
-        read = read_recording(recording)
-        replay = replay_recording(read)
-        for found in path_findings(read):
+        setup = find_setup_faults([read_recording(recording)])
+        for note in setup_notes(setup, "drawn are"):
+            typer.echo(note)
+        (meant,) = setup.recordings
+        replay = replay_recording(believed(meant, reference_doubts(meant)))
+        for found in path_findings(meant):
             typer.echo(found.sentence)
         return replay
     body, environment, stated = disc_to_fly(disc, model, load_user_effects(own))

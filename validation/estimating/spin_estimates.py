@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,7 @@ from discsim.recording import Recording
 from discsim.result import Result
 from discsim.threads import one_thread
 from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
-from discsim.validation.diagnosis.setup.reference import reference_doubts
+from discsim.validation.diagnosis.setup.reference import believed, reference_doubts
 from discsim.validation.estimating.page import write_estimate_page
 from discsim.validation.reporting.figures import draw_differences, draw_rates, new_figure, save_figure
 from discsim.validation.reporting.run import json_text
@@ -139,21 +139,11 @@ def estimate_spin(
         raise InputError(f"{len(given)} recordings; expected one (take them one after the other)")
     setup = find_setup_faults(given)
     data = setup.recordings[0]
-    believed, doubted = _believed(data) if method == "best" else (data, {})
-    rates, left_out = estimate_all(believed, method, options or Options(), progress)
-    left_out |= doubted
+    doubts = list(reference_doubts(data)) if method == "best" else []
+    rates, left_out = estimate_all(believed(data, doubts), method, options or Options(), progress)
+    left_out.update(("rate_reference", f"it {one.what}") for one in doubts if one.sure and one.about_reference)
     notes = [*setup_notes(setup, "the estimates are of"), *all_notes(data)]
     return SpinEstimates(data, method, tuple(rates), left_out, tuple(disagreements(rates)), tuple(notes))
-
-
-def _believed(recording: Recording) -> tuple[Recording, dict[str, str]]:
-    """Return a recording without a rate reference that the sensors beside it refute, and by what it was left out."""
-    doubts = (doubt for doubt in reference_doubts(recording) if doubt.sure and doubt.file == "rate_reference.csv")
-    doubt = next(doubts, None)
-    if doubt is None:
-        return recording, {}
-    samples = {name: own for name, own in recording.samples.items() if name != "rate_reference"}
-    return replace(recording, samples=samples), {"rate_reference": f"it {doubt.what}"}
 
 
 def draw_estimates(rates: Sequence[YawRate], name: str, path: Path | None = None) -> Figure:

@@ -91,7 +91,7 @@ def read_run(folder: Path) -> MeasuredRun:
     if not any(name in recording for name in _SHOWING):
         raise InputError(f"{folder}: no sensor that shows a spin; expected some of {', '.join(_SHOWING)}")
     for doubt in reference_doubts(recording):
-        if doubt.file == "rate_reference.csv" and doubt.sure and doubt.kind in _NO_TRUTH:
+        if doubt.about_reference and doubt.sure and doubt.kind in _NO_TRUTH:
             raise InputError(f"{folder}: {doubt.sentence}")
     setup = find_setup_faults([recording])
     data = setup.recordings[0]

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rich.console import Console
+from support.made import throws
 from support.places import PRACTICE
 
 from discsim.disc import Disc, Release
@@ -18,6 +19,7 @@ from discsim.files import model_names
 from discsim.recording import Recording, Samples, SensorSheet, read_dataset, write_recording
 from discsim.shipped import load_disc
 from discsim.validation.checking import Check, check_recording
+from discsim.validation.checking.checked import check as checked
 from discsim.validation.checking.noise import noise_of
 from discsim.validation.checking.table import print_checks
 from discsim.validation.commands.check import command
@@ -269,8 +271,39 @@ def test_milliseconds_written_as_seconds_are_an_error():
     recording = rolled()
     slow = {name: Samples(1000 * one.t, one.value) for name, one in recording.samples.items()}
     check = check_recording(replace(recording, samples=slow))
-    assert ids(check, "error") == ["clock.units"] * 3
-    assert "are the stamps milliseconds, not seconds?" in sentence(check, "clock.units")
+    assert ids(check, "error") == ["clock.units"]
+    assert "they are milliseconds: multiply time_s of every file by 0.001" in sentence(check, "clock.units")
+
+
+def test_one_sensor_in_milliseconds_is_told_by_its_file():
+    recording = rolled()
+    own = recording.samples["gyroscope"]
+    slow = {**recording.samples, "gyroscope": Samples(1000 * own.t, own.value)}
+    check = check_recording(replace(recording, samples=slow))
+    assert ids(check, "error") == ["clock.units"]
+    assert "multiply time_s of gyroscope.csv by 0.001" in sentence(check, "clock.units")
+    assert [id for id in ids(check, "warning") if id.endswith(".rate")] == []
+
+
+def test_ticks_of_a_timer_in_the_place_of_seconds_are_one_error():
+    """Each sensor had a warning that its rate was another than rate_hz, and nothing said that a clock was at fault."""
+    recording = rolled()
+    ticks = {name: Samples(200 * one.t, one.value) for name, one in recording.samples.items()}
+    check = check_recording(replace(recording, samples=ticks))
+    assert ids(check, "error") == ["clock.units"]
+    assert "are they ticks of 0.005 s? Then multiply time_s of every file by 0.005" in sentence(check, "clock.units")
+    assert [id for id in ids(check, "warning") if id.endswith(".rate")] == []
+
+
+def test_a_flight_in_milliseconds_has_one_error_and_no_path_in_kilometres():
+    """Positions over such times were a velocity in mm/s, or a position in km."""
+    throw = throws(seconds=2.5)[0]
+    slow = replace(throw, samples={name: Samples(1000 * one.t, one.value) for name, one in throw.samples.items()})
+    (found,) = checked([slow]).checks
+    assert ids(found, "error") == ["clock.units"]
+    assert found.duration == pytest.approx(throw.end)
+    alone = {**throw.samples, "gps": slow.samples["gps"]}
+    assert ids(check_recording(replace(throw, samples=alone)), "error") == ["clock.units"]
 
 
 def test_a_frozen_magnetometer_and_a_dead_axis_are_said_and_a_clipped_one_is_not_called_dead():

@@ -25,8 +25,10 @@ from discsim.files import model_file
 from discsim.frames import body_to_ned, flip_yz, rotation_error, rotation_vector, turn
 from discsim.recording import Recording, Samples, SensorSheet, read_recording, write_recording
 from discsim.rig import turn_table
+from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc, load_throw
 from discsim.validation.cli import main
+from discsim.validation.diagnosis.setup.reference import believed, reference_doubts
 from discsim.validation.reporting.truth import write_flight_truth, write_rate_truth
 from discsim.validation.viewing import offscreen
 from discsim.validation.viewing import replay as replays
@@ -182,6 +184,40 @@ def test_a_track_alone_is_shown_without_spin(tmp_path):
     assert np.all(np.isnan(replay.rate))
     assert replay.notes[2] == "spin unknown: not drawn"
     assert "deg/s" not in Scene(replay).caption(0.5)
+
+
+def beyond_its_end(monkeypatch, folder: Path) -> None:
+    """View a recording's folder over a span that no motion has: all is said and nothing drawn."""
+    monkeypatch.setattr(sys, "argv", ["discsim", "view", str(folder), "--span", "0:2000"])
+    with pytest.raises(SystemExit):
+        main()
+
+
+def test_times_in_milliseconds_are_mended_aloud_before_anything_is_drawn(monkeypatch, tmp_path, capsys):
+    """Three seconds at a table were drawn as an hour in which it turned at random."""
+    profile = Samples(np.array([0.0, 1.0, 3.0]), np.array([0.0, 30.0, 30.0]))
+    parts = Instruments.from_parts("mpu9250", "ac1120s")
+    run = record(turn_table(profile, FIELD), parts, np.random.default_rng(3), plant="rate_table", name="slow")
+    slow = {name: Samples(1000 * one.t, one.value) for name, one in run.samples.items()}
+    write_recording(dataclasses.replace(run, samples=slow), tmp_path / "slow")
+    beyond_its_end(monkeypatch, tmp_path / "slow")
+    said = capsys.readouterr()
+    assert "the times of all sensors are in ms" in said.out
+    assert "expected a span in 0:3" in said.err or "expected a span in 0:2.99" in said.err
+
+
+def test_a_reference_that_its_sensors_refute_is_not_drawn(monkeypatch, tmp_path, capsys):
+    profile = Samples(np.array([0.0, 1.0, 6.0]), np.array([20.0, 30.0, 30.0]))
+    parts = Instruments.from_parts("mpu9250", "ac1120s")
+    run = record(turn_table(profile, FIELD), parts, np.random.default_rng(3), plant="rate_table", name="mine")
+    told = run.need("rate_reference")
+    wrong = {**run.samples, "rate_reference": Samples(told.t, 0.5 * told.value)}
+    write_recording(dataclasses.replace(run, samples=wrong), tmp_path / "wrong")
+    beyond_its_end(monkeypatch, tmp_path / "wrong")
+    assert "rate_reference.csv is 0.5 times the rate" in capsys.readouterr().out
+    read = read_recording(tmp_path / "wrong")
+    shown = replay_recording(believed(read, reference_doubts(read)))
+    assert shown.rate_at(np.array([4.0])) == pytest.approx([30.0], rel=0.01)
 
 
 def test_a_recording_that_tells_no_motion_is_refused(tmp_path):

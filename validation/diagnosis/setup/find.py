@@ -20,10 +20,10 @@ from discsim.effects.setup import Axes, BoardRotation, ClockUnit, GpsAxes, SiteF
 from discsim.recording import Recording, Samples
 from discsim.validation.diagnosis.setup.hypotheses import Hypothesis, Ranking, board_effect, chosen, hypotheses, pairs
 from discsim.validation.diagnosis.setup.proof import left_by_short_fit
-from discsim.validation.diagnosis.setup.reference import ReferenceDoubt, reference_doubts
+from discsim.validation.diagnosis.setup.reference import believed, reference_doubts
 from discsim.validation.diagnosis.setup.remedy import MapAxes, remedy
 from discsim.validation.diagnosis.setup.rotation import board_turns, spin_axis
-from discsim.validation.diagnosis.setup.units import clock_unit, sensor_units
+from discsim.validation.diagnosis.setup.units import clock_doubts, clock_unit, sensor_units
 from discsim.validation.identification.plants import Plant, plant_of
 from discsim.written import corrected, require_seconds
 
@@ -117,7 +117,7 @@ class SetupFindings:
     hints: tuple[Effect, ...] = ()
     #: what is wrong with rate references and commands, by which nothing else is then judged
     doubts: tuple[str, ...] = ()
-    #: what contradicts a rate reference or a command, of which either may be wrong
+    #: what contradicts a rate reference, a command, or a clock by the stated rates, of which either may be wrong
     contradictions: tuple[str, ...] = ()
 
     @property
@@ -140,13 +140,14 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
         current = tuple(corrected(one, [unit]) for one in current)
     for one in current:
         require_seconds(one)
+    clocks = tuple(f"{one.path or one.name}: {doubt.sentence}" for one in current for doubt in clock_doubts(one))
     doubts = [list(reference_doubts(one)) for one in current]
 
     def judged() -> list[Recording]:
-        return [_judgeable(_believed(one, own)) for one, own in zip(current, doubts, strict=True)]
+        return [_judgeable(believed(one, own)) for one, own in zip(current, doubts, strict=True)]
 
     if not all(one.samples for one in judged()):
-        return SetupFindings(tuple(faults), current)
+        return SetupFindings(tuple(faults), current, contradictions=clocks)
     for unit in sensor_units(judged()):
         faults.append(SetupFault(unit, float("inf"), None))
         current = tuple(corrected(one, [unit]) for one in current)
@@ -163,7 +164,7 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
         tuple(f"{one.path or one.name}: {doubt.sentence}" for one, doubt in told if doubt.sure is wanted)
         for wanted in (True, False)
     )
-    return SetupFindings(tuple(faults), current, hints, sure, unsure)
+    return SetupFindings(tuple(faults), current, hints, sure, (*clocks, *unsure))
 
 
 def with_fault(faults: Sequence[SetupFault], further: SetupFault) -> list[SetupFault]:
@@ -257,13 +258,6 @@ def _angle(one: FloatArray | None, other: FloatArray | None) -> float:
     assert one is not None
     assert other is not None
     return float(np.arccos(np.clip(abs(float(one @ other)), 0.0, 1.0)))
-
-
-def _believed(recording: Recording, doubts: Sequence[ReferenceDoubt]) -> Recording:
-    """Return a recording without the rate reference, and the command, that cannot be true."""
-    doubted = {doubt.file for doubt in doubts if doubt.sure}
-    kept = {name: own for name, own in recording.samples.items() if f"{name}.csv" not in doubted}
-    return replace(recording, samples=kept, command=None if "command.csv" in doubted else recording.command)
 
 
 def _judgeable(recording: Recording) -> Recording:

@@ -7,7 +7,7 @@ as three sensors with mixed-up axes. It is asked first, by the rates that the se
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -18,8 +18,10 @@ from discsim.recording import Recording, Samples
 from discsim.validation.diagnosis.setup.shown_rates import FEWEST_SLOTS, ShownRate, shown_rates
 from discsim.validation.identification.plants import plant_of
 
-__all__ = ["ReferenceDoubt", "reference_doubts"]
+__all__ = ["ReferenceDoubt", "believed", "reference_doubts"]
 
+#: files of rates
+_REFERENCE, _COMMAND = "rate_reference.csv", "command.csv"
 #: what sensors show of a rate that is told in another unit than rad/s
 _UNITS: Mapping[float, str] = MappingProxyType(
     {np.pi / 180.0: "deg/s", np.pi / 30.0: "rpm", 2.0 * np.pi: "turns per second"}
@@ -70,6 +72,11 @@ class ReferenceDoubt:
     sure: bool = True
 
     @property
+    def about_reference(self) -> bool:
+        """Whether it is about the rate reference, and not the command."""
+        return self.file == _REFERENCE
+
+    @property
     def sentence(self) -> str:
         """The doubt in one line."""
         return f"{self.file} {self.what}; expected {self.expected}; {self.remedy}"
@@ -89,16 +96,23 @@ def reference_doubts(recording: Recording) -> Iterator[ReferenceDoubt]:
         return
     shown = shown_rates(recording)
     if reference is not None:
-        doubt = _ends_elsewhere(recording, reference) or _of_rates("rate_reference.csv", recording, shown, reference)
+        doubt = _ends_elsewhere(recording, reference) or _of_rates(_REFERENCE, recording, shown, reference)
         if doubt is None:
             shown = {**shown, "rate_reference": ShownRate(reference.t, reference.value, signed=True)}
         else:
             yield doubt
     if command is None:
         return
-    doubt = _command_clock(shown, command) or _of_rates("command.csv", recording, shown, command)
+    doubt = _command_clock(shown, command) or _of_rates(_COMMAND, recording, shown, command)
     if doubt is not None:
         yield doubt
+
+
+def believed(recording: Recording, doubts: Iterable[ReferenceDoubt]) -> Recording:
+    """Return a recording without the rate reference, and the command, that cannot be true by doubts of it."""
+    doubted = {doubt.file for doubt in doubts if doubt.sure}
+    kept = {name: own for name, own in recording.samples.items() if f"{name}.csv" not in doubted}
+    return replace(recording, samples=kept, command=None if _COMMAND in doubted else recording.command)
 
 
 def _of_rates(file: str, recording: Recording, shown: Mapping[str, ShownRate], told: Samples) -> ReferenceDoubt | None:
@@ -119,7 +133,7 @@ def _ends_elsewhere(recording: Recording, reference: Samples) -> ReferenceDoubt 
         return None
     what = f"ends at {lasts:.6g} s, the sensors at {others:.6g} s"
     remedy = "are the times of one of them milliseconds?"
-    return ReferenceDoubt("clock", "rate_reference.csv", what, "one clock, in seconds", remedy)
+    return ReferenceDoubt("clock", _REFERENCE, what, "one clock, in seconds", remedy)
 
 
 def _command_clock(shown: Mapping[str, ShownRate], command: Samples) -> ReferenceDoubt | None:
@@ -132,7 +146,7 @@ def _command_clock(shown: Mapping[str, ShownRate], command: Samples) -> Referenc
         right = [sensor for sensor, one in shown.items() if (off := _apart(one, meant)) is not None and off < _ANOTHER]
         if right and all(written.get(sensor, 1.0) >= _ANOTHER for sensor in right):
             what = f"is in {name}, by {_all(right)}"
-            return ReferenceDoubt("clock", "command.csv", what, "seconds", f"multiply its times by {factor:g}")
+            return ReferenceDoubt("clock", _COMMAND, what, "seconds", f"multiply its times by {factor:g}")
     return None
 
 
@@ -210,7 +224,7 @@ def _late(file: str, recording: Recording, shown: Mapping[str, ShownRate], told:
     lag = float(np.mean(list(lags.values())))
     what = f"is {abs(lag):.2f} s {'late' if lag > 0 else 'early'} beside the {_all(lags)}"
     remedy = f"subtract {lag:.3f} s from its times" if lag > 0 else f"add {-lag:.3f} s to its times"
-    if file == "command.csv":
+    if file == _COMMAND:
         remedy += "" if lag > 0.0 else ", unless the table trails it by so much"
         return ReferenceDoubt("late", file, what, "one clock", remedy, sure=False)
     return ReferenceDoubt("late", file, what, "one clock", remedy)
@@ -248,7 +262,7 @@ def _factor(file: str, recording: Recording, shown: Mapping[str, ShownRate], tol
     if against:
         return None
     what = f"is {1.0 / factor:.3g} times the rate that the {_all(saying)} show{'s' if len(saying) == 1 else ''}"
-    cause = "a profile of another run, or a gear" if file == "command.csv" else "edges per turn, or a wheel's ratio"
+    cause = "a profile of another run, or a gear" if file == _COMMAND else "edges per turn, or a wheel's ratio"
     cause += _late_for_a_factor(recording, told, factor)
     if len(saying) > 1:
         return ReferenceDoubt("factor", file, what, "one rate", f"multiply its rates by {factor:.4g} ({cause}?)")
@@ -297,7 +311,7 @@ def _another(file: str, recording: Recording, shown: Mapping[str, ShownRate], to
         return None
     alike = {one: [other for other in far if other == one or _turn_alike(shown[one], shown[other])] for one in far}
     saying = max(alike.values(), key=len, default=[])
-    command = file == "command.csv"
+    command = file == _COMMAND
     if len(saying) < 2 and not (command and "rate_reference" in saying):
         return None
     show = "show" if len(saying) > 1 else "shows"

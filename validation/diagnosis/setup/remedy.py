@@ -35,7 +35,11 @@ def remedy(fault: Effect, axes: Mapping[str, MapAxes] | None = None) -> str:
     if isinstance(value, setup.Axes):
         return f"to mend it, write into the import map: {_axes_line(sensor, setup.permutation(value).T, axes)}"
     if isinstance(value, setup.ClockUnit):
-        return f'to mend it, write into the import map: [time] unit = "{value.written_in}"'
+        seconds = 1.0 / setup.written_per_si(value)
+        return (
+            f'to mend it, write into the import map: [time] unit = "{value.written_in}"; without a map multiply time_s '
+            f"of every file by {seconds:g}"
+        )
     if type(value) in setup.UNITS:
         unit = _MAP_UNITS.get(value.written_in, value.written_in)
         return f'to mend it, write into the import map: [sensors.{sensor}] unit = "{unit}"'

@@ -8,8 +8,9 @@ none: where it is near one, or near no unit's factor, nothing is said.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from discsim.effects.setup import UNITS, AccelerometerUnit, ClockUnit, Gyroscope
 from discsim.recording import Recording, Samples
 from discsim.validation.diagnosis.setup.spin_signals import FEWEST, PURE, turning_axis
 
-__all__ = ["clock_unit", "sensor_units"]
+__all__ = ["ClockDoubt", "clock_doubts", "clock_unit", "sensor_units"]
 
 #: a magnitude within this factor of another unit's is taken for it, and within it of the right one for right; half way
 #: between the nearest units (rpm and deg/s are 6 apart, s and ms 1000) is 2.4
@@ -29,6 +30,47 @@ NEAR = 2.2
 _SWING = 1.6
 #: stamps that are the units' whole factor away from the stated rate, within this share, are in that unit
 _STAMPS = 0.3
+#: what one sensor's times may be in; a rate that is stated so many times too high by mistake is hardly met
+_TIMES = MappingProxyType({1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"})
+#: times of all sensors that are off by one factor, alike within this share, are ticks of one clock
+_ONE_CLOCK = 0.05
+
+
+@dataclass(frozen=True)
+class ClockDoubt:
+    """Times of some ``sensors`` that lie a ``factor`` further apart than the stated rates say.
+
+    ``unit`` is empty where the factor is none's; ``what``, ``expected`` and ``remedy`` are parts of a sentence.
+    """
+
+    sensors: tuple[str, ...]
+    factor: float
+    unit: str
+
+    @property
+    def what(self) -> str:
+        """What contradicts what."""
+        of = "its" if len(self.sensors) == 1 else "all"
+        return f"{of} times lie {self.factor:.4g} times as far apart as rate_hz says"
+
+    @property
+    def expected(self) -> str:
+        """What a file's times are in."""
+        return "seconds"
+
+    @property
+    def remedy(self) -> str:
+        """What mends it."""
+        which = f"{self.sensors[0]}.csv" if len(self.sensors) == 1 else "every file"
+        seconds = f"multiply time_s of {which} by {1.0 / self.factor:.4g}"
+        if self.unit:
+            return f"they are {self.unit}: {seconds}"
+        return f"are they ticks of {1.0 / self.factor:.4g} s? Then {seconds}; else correct rate_hz"
+
+    @property
+    def sentence(self) -> str:
+        """The doubt in one line."""
+        return f"{', '.join(self.sensors)}: {self.what}; expected {self.expected}; {self.remedy}"
 
 
 def clock_unit(recordings: Sequence[Recording]) -> Effect | None:
@@ -50,6 +92,27 @@ def clock_unit(recordings: Sequence[Recording]) -> Effect | None:
         if factor > 1.0 and ((by_path and (by_stamps or usual)) if taken else (by_stamps and bool(spacing))):
             return effect_of(ClockUnit(unit))
     return None
+
+
+def clock_doubts(recording: Recording) -> tuple[ClockDoubt, ...]:
+    """Return which sensors' times are in another unit than seconds by the rates that are stated for them.
+
+    Of one sensor the usual units are told, of all of them any factor that they share, as of a timer's ticks.
+    """
+    spacing = {
+        name: samples.interval * recording.sheets[name].rate_hz
+        for name, samples in recording.samples.items()
+        if len(samples) > FEWEST
+    }
+    doubts = []
+    for factor, unit in _TIMES.items():
+        own = tuple(name for name, one in spacing.items() if abs(one / factor - 1.0) < _STAMPS)
+        doubts += [ClockDoubt(own, factor, unit)] if own else []
+    middle = float(np.median([*spacing.values()])) if spacing else 1.0
+    if not doubts and len(spacing) > 1 and middle > NEAR:
+        alike = all(abs(one / middle - 1.0) < _ONE_CLOCK for one in spacing.values())
+        doubts += [ClockDoubt(tuple(spacing), middle, "")] if alike else []
+    return tuple(doubts)
 
 
 def _path_ratio(recording: Recording) -> float | None:
