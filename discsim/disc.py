@@ -41,6 +41,19 @@ class Aero(NamedTuple):
 STATIC = ("CL0", "CLa", "CD0", "CDa", "alpha0", "CM0", "CMa")
 
 
+def _require_radians(alpha: FloatArray, what: str) -> None:
+    """Raise ValueError for angles of attack (n,) rad that no flow has: it comes from pi at the most, from behind.
+
+    The margin is for a half turn rounded to four digits, 3.142.
+    """
+    if np.any(np.abs(alpha) > np.pi * (1 + 1e-3)):
+        least, most = float(np.min(alpha)), float(np.max(alpha))
+        raise ValueError(
+            f"{what}: alpha_rad runs from {least:g} to {most:g}, expected angles of attack in radians, within +-pi; "
+            f"of degrees multiply each by pi/180 = 0.0174533: {np.radians(least):.4g} to {np.radians(most):.4g}"
+        )
+
+
 @dataclass(frozen=True)
 class AeroTable:
     """C_L, C_D, C_M at nodes of alpha (rad, ascending): linear between them, constant outside; all (n,)."""
@@ -60,6 +73,7 @@ class AeroTable:
             raise ValueError(f"coefficient table: columns of one length, at least 2, expected; got {sizes}")
         if np.any(np.diff(self.alpha) <= 0):
             raise ValueError("coefficient table: expected alpha_rad to ascend")
+        _require_radians(self.alpha, "coefficient table")
 
 
 @dataclass(frozen=True)
@@ -85,6 +99,7 @@ class RollingTable:
                 raise ValueError(f"CR table: {name} has a number that is not finite, expected finite ones")
         if self.alpha.size < 2 or np.any(np.diff(self.alpha) <= 0):
             raise ValueError("CR table: expected alpha_rad to ascend, at least 2 of them")
+        _require_radians(self.alpha, "CR table")
         if (self.advance_ratio is None) != (self.CR is None):
             raise ValueError("CR table: expected advance_ratio and CR, both or neither")
         if self.CR is None and self.CRp is None:

@@ -244,6 +244,24 @@ def test_a_table_of_coefficients_replaces_lift_drag_and_pitch(tmp_path):
     assert disc.aero.CMq == -0.15
 
 
+def test_a_table_of_coefficients_in_degrees_is_refused_with_its_angles_in_radians(tmp_path):
+    degrees = AERO_TABLE.replace("[-0.1, 0.0, 0.1]", "[-10.0, 0.0, 90.0]") + "CM = [-0.02, -0.012, 0.0]\n"
+    text = TOML + degrees
+    message = refusal(make(tmp_path / "flight", text))
+    assert message.startswith(f"recording.toml:{line_of(text, '[disc.aero_table]')}: ")
+    assert "alpha_rad runs from -10 to 90, expected angles of attack in radians" in message
+    assert message.endswith("multiply each by pi/180 = 0.0174533: -0.1745 to 1.571")
+
+
+def test_a_table_of_coefficients_may_go_all_around(tmp_path):
+    """A half turn is rounded to four digits, as people write it."""
+    around = AERO_TABLE.replace("[-0.1, 0.0, 0.1]", "[-3.142, 0.0, 3.142]") + "CM = [-0.02, -0.012, 0.0]\n"
+    disc = read_recording(make(tmp_path / "flight", TOML + around)).disc
+    assert disc is not None
+    assert disc.aero_table is not None
+    assert disc.aero_table.alpha[0] == -3.142
+
+
 def test_a_table_of_CNr_may_stand_on_several_lines(tmp_path):
     text = TOML.replace("CNr = -0.0045\n", "") + CNR_TABLE.replace("], ", "],\n  ").replace("[[", "[\n  [")
     disc = read_recording(make(tmp_path / "flight", text)).disc

@@ -75,13 +75,17 @@ def maybe_sigma(draw: st.DrawFn, keys: dict[str, bool]) -> dict[str, object]:
     return {key: draw(sigma_values if keys[key] else sizes("any")) for key in chosen}
 
 
+#: nodes of a table, ascending once they are sorted
+angles = npst.arrays(np.float64, st.integers(2, 5), elements=st.floats(-np.pi, np.pi), unique=True)
+
+
 @st.composite
 def discs(draw: st.DrawFn) -> Disc:
     Ixx = draw(st.floats(1e-11, 1e3))
     aero = Aero(*(draw(reals(aero_key(name))) for name in Aero._fields))
     table = None
     if draw(st.booleans()):
-        alpha = np.sort(draw(npst.arrays(np.float64, st.integers(2, 5), elements=reals("alpha_rad"), unique=True)))
+        alpha = np.sort(draw(angles))
         table = AeroTable(alpha, *(draw(npst.arrays(np.float64, alpha.size, elements=reals("CL"))) for _ in range(3)))
     damping = None
     if draw(st.booleans()):
@@ -104,7 +108,7 @@ def discs(draw: st.DrawFn) -> Disc:
 
 @st.composite
 def rolling_tables(draw: st.DrawFn) -> RollingTable:
-    alpha = np.sort(draw(npst.arrays(np.float64, st.integers(2, 5), elements=reals("alpha_rad"), unique=True)))
+    alpha = np.sort(draw(angles))
     ratio = np.cumsum(draw(npst.arrays(np.float64, st.integers(1, 4), elements=st.floats(0.01, 1.0))))
     CR = draw(st.none() | npst.arrays(np.float64, (alpha.size, ratio.size), elements=reals("CR")))
     columns = npst.arrays(np.float64, alpha.size, elements=reals("CRp"))
