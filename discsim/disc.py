@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray, readonly
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.frames import attitude_matrix
 from discsim.limits import ANY_NUMBER
 from discsim.toml_table import TomlTable
@@ -352,6 +352,11 @@ class Release:
             raise InputError(f"release position is {-position[2]:g} m high, expected above the ground (down < 0)")
         C_NB = attitude_matrix(self.roll or 0.0, self.pitch or 0.0, self.yaw or 0.0).T
         return position, self.velocity, C_NB, self.body_rate
+
+    @staticmethod
+    def require(release: object) -> None:
+        """Raise `InputError` for what is no release."""
+        require_type(release, Release, "release", "a Release: load_throw(NAME), or Release(velocity=V, body_rate=W)")
 
     @classmethod
     def from_toml(cls, table: TomlTable) -> Release:

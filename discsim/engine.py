@@ -176,6 +176,7 @@ class FlyingDisc:
 
         Attitude defaults to level, position to `RELEASE_HEIGHT` above the origin.
         """
+        Release.require(release)
         position, velocity, C_NB, body_rate = release.start()
         q = quaternion_from_matrix(C_NB)
         mujoco.mj_resetData(self.model, self.data)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["InputError", "printable"]
+__all__ = ["InputError", "printable", "require_type"]
 
 #: characters of a message that are shown: a file may have names of thousands, and what was expected stands at the end
 _HEAD, _TAIL = 800, 300
@@ -29,3 +29,11 @@ class InputError(ValueError):
         if len(message) > _HEAD + _TAIL:
             message = f"{message[:_HEAD]} ... {message[-_TAIL:]}"
         return cls(f"{printable(where)}: {message}")
+
+
+def require_type(value: object, kind: type | tuple[type, ...], name: str, expected: str) -> None:
+    """Raise `InputError` for an argument of another type; ``expected`` says what it is and how to come by one."""
+    if not isinstance(value, kind):
+        shown = repr(value)
+        shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
+        raise InputError(f"{name} is {printable(shown)}, of type {type(value).__name__}; expected {expected}")

@@ -17,7 +17,7 @@ from discsim.arrays import FloatArray, IntArray
 from discsim.disc import Aero, Disc, Rig
 from discsim.effects.catalogue import CATALOGUE, Effect, by_id
 from discsim.environment import Environment
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.law import LAW_WIDTH, MOTION_TARGETS, Law
 
 __all__ = ["PARAMETERS", "AngleTables", "Tables", "flight_parameters", "parameter_index", "parameters", "tables"]
@@ -96,6 +96,8 @@ def parameters(
 
 def flight_parameters(disc: Disc, environment: Environment, effects: Sequence[Effect] = ()) -> FloatArray:
     """Return the flat array of a flight; raises `InputError` where the disc has no coefficients or the place no air."""
+    require_type(disc, Disc, "disc", "a Disc: load_disc(NAME) returns a disc and its environment, a pair")
+    require_type(environment, Environment, "environment", "an Environment, the second of what load_disc(NAME) returns")
     if disc.aero is None:
         raise InputError("a flight needs the disc's aerodynamic coefficients; expected [disc.aero]")
     if environment.air_density is None:

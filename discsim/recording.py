@@ -11,13 +11,13 @@ import io
 import re
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple, cast
+from typing import Literal, NamedTuple, cast
 
 import numpy as np
 
@@ -25,12 +25,12 @@ from discsim.arrays import BoolArray, FloatArray, readonly, sealed
 from discsim.clipping import at_range, clipped
 from discsim.disc import Disc, Release, Rig
 from discsim.environment import Environment
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.files import beside, named_in_errors, read_pieces, replacing, write_pieces
 from discsim.limits import MOST_ROWS, reading_fault, written_time_fault
 from discsim.recorded import Recorded
-from discsim.toml_table import TomlTable, obeyed_by_terminals, read_toml
-from discsim.toml_text import disc_toml, environment_toml, release_toml, rig_toml, toml_table, toml_value
+from discsim.toml_table import TomlTable, obeyed_by_terminals, parse_toml, read_toml
+from discsim.toml_text import disc_toml, environment_toml, release_toml, rig_toml, sheet_toml, toml_value
 
 __all__ = [
     "FORMAT",
@@ -42,6 +42,7 @@ __all__ = [
     "SensorSheet",
     "read_dataset",
     "read_recording",
+    "require_kind",
     "write_recording",
 ]
 
@@ -148,6 +149,13 @@ class SensorSheet:
         return at_range(value, self.range, self.resolution or 0.0)
 
 
+def require_kind(plant: str, name: str) -> None:
+    """Raise `InputError` for a plant that is none, and a name that is no text."""
+    if plant not in PLANTS:
+        raise InputError(f"plant is {plant!r}, expected one of {', '.join(map(repr, PLANTS))}")
+    require_type(name, str, "name", "a text")
+
+
 @dataclass(frozen=True)
 class Recording(Recorded):
     """One recording: what is stated about it and a `Samples` per sensor; it never carries the truth."""
@@ -166,9 +174,10 @@ class Recording(Recorded):
     averaged: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        require_kind(self.plant, self.name)
+        if unknown := sorted({*self.samples, *self.sheets} - SENSORS.keys()):
+            raise ValueError(f"unknown sensor {unknown[0]!r}; expected one of {', '.join(SENSORS)}")
         for sensor, samples in self.samples.items():
-            if sensor not in SENSORS:
-                raise ValueError(f"unknown sensor {sensor!r}; expected one of {', '.join(SENSORS)}")
             if sensor not in self.sheets:
                 raise ValueError(f"{sensor} has samples but no sheet that states its rate")
             width = len(SENSORS[sensor].columns)
@@ -221,27 +230,8 @@ def _read_folder(folder: Path) -> Recording:
         raise InputError.at(folder, None, "no such folder; expected a recording (a folder with recording.toml)")
     if not _there(folder / "recording.toml") and (members := sorted(folder.glob("*/recording.toml"))):
         raise InputError.at(folder, None, f"is a data set; expected one of its recordings, such as {members[0].parent}")
-    top = read_toml(folder / "recording.toml")
-    top.text("format", choices=(FORMAT,))
-    plant = cast(Plant, top.text("plant", choices=PLANTS))
-    name = top.text("name")
-    assert name is not None
-    strict = plant != "free_spin"
-    flying = plant == "flight"
-    environment_table = top.table("environment", required=True)
-    assert environment_table is not None
-    environment = Environment.from_toml(environment_table, air_required=flying)
-    disc_table = top.table("disc", required=flying)
-    disc = Disc.from_toml(disc_table, aero_required=flying) if disc_table is not None else None
-    release_table = top.table("release")
-    release = Release.from_toml(release_table) if release_table is not None else None
-    rig_table = top.table("rig", required=plant == "spin_down")
-    if rig_table is not None and plant != "spin_down":
-        raise rig_table.error(None, f"[rig] in a {plant} recording; expected it in spin_down only")
-    rig = Rig.from_toml(rig_table) if rig_table is not None else None
-    sheets = _read_sheets(top.table("sensors", required=True), strict=strict)
-    top.finish()
-
+    stated = _stated(read_toml(folder / "recording.toml"))
+    sheets, plant = stated.sheets, stated.plant
     samples: dict[str, Samples] = {}
     for sensor, kind in SENSORS.items():
         file = folder / f"{sensor}.csv"
@@ -263,7 +253,31 @@ def _read_folder(folder: Path) -> Recording:
         raise InputError.at(
             folder, None, f"no sensor file; expected at least one of {', '.join(f'{s}.csv' for s in SENSORS)}"
         )
-    return Recording(plant, name, environment, disc, rig, release, sheets, samples, knots, folder)
+    return replace(stated, samples=samples, command=knots, path=folder)
+
+
+def _stated(top: TomlTable) -> Recording:
+    """Return what ``recording.toml`` states: a recording without samples."""
+    top.text("format", choices=(FORMAT,))
+    plant = cast(Plant, top.text("plant", choices=PLANTS))
+    name = top.text("name")
+    assert name is not None
+    strict = plant != "free_spin"
+    flying = plant == "flight"
+    environment_table = top.table("environment", required=True)
+    assert environment_table is not None
+    environment = Environment.from_toml(environment_table, air_required=flying)
+    disc_table = top.table("disc", required=flying)
+    disc = Disc.from_toml(disc_table, aero_required=flying) if disc_table is not None else None
+    release_table = top.table("release")
+    release = Release.from_toml(release_table) if release_table is not None else None
+    rig_table = top.table("rig", required=plant == "spin_down")
+    if rig_table is not None and plant != "spin_down":
+        raise rig_table.error(None, f"[rig] in a {plant} recording; expected it in spin_down only")
+    rig = Rig.from_toml(rig_table) if rig_table is not None else None
+    sheets = _read_sheets(top.table("sensors", required=True), strict=strict)
+    top.finish()
+    return Recording(plant, name, environment, disc, rig, release, sheets)
 
 
 def read_dataset(folder: Path | str) -> list[Recording]:
@@ -471,7 +485,7 @@ def write_recording(recording: Recording, folder: Path | str) -> None:
 
     A new folder appears whole or not at all. In a folder that is there, the files of a recording are replaced one by
     one once all are written, ``recording.toml`` last: a folder that has it is complete. Other files stay.
-    Raises `InputError` for what the reader would refuse (a sensor without samples, an uncertainty of nothing, a name
+    Raises `InputError` for what the reader would refuse (a flight without a disc, a sensor without samples, a name
     with control characters), and for a folder with files by the names of the format that are no recording: they are
     somebody else's.
     """
@@ -524,7 +538,12 @@ def _texts(recording: Recording) -> dict[str, Iterable[str]]:
     """Return the text of every file of the folder by its name, in pieces."""
     if obeyed_by_terminals(recording.name):
         raise InputError(f"{recording.name!r}: a recording's name; expected a text without control characters")
-    texts: dict[str, Iterable[str]] = {"recording.toml": [recording_toml(recording)]}
+    stated = recording_toml(recording)
+    try:  # by the reader itself: what is written can be read
+        _stated(parse_toml(stated, Path("recording.toml")))
+    except InputError as error:
+        raise InputError(f"{recording.name}: cannot be written, no reader would take its {error}") from None
+    texts: dict[str, Iterable[str]] = {"recording.toml": [stated]}
     for sensor, samples in recording.samples.items():
         if len(samples) == 0:
             raise InputError(f"{recording.name}: {sensor} has no samples; expected some, or the sensor left out")
@@ -532,6 +551,8 @@ def _texts(recording: Recording) -> dict[str, Iterable[str]]:
     if not recording.samples:
         raise InputError(f"{recording.name}: no sensor has samples; expected at least one of {', '.join(SENSORS)}")
     if recording.command is not None:
+        if recording.plant != "rate_table":
+            raise InputError(f"{recording.name}: a command in a {recording.plant}; expected it in rate_table only")
         if len(recording.command) == 0 or recording.command.gaps:
             raise InputError(f"{recording.name}: the command has no knots or a gap; expected numbers throughout")
         texts["command.csv"] = _within(recording, "command", recording.command, COMMAND_HEADER)
@@ -574,22 +595,5 @@ def recording_toml(recording: Recording) -> str:
         lines += release_toml(recording.release)
     lines += ["", "[sensors]"]
     for sensor, sheet in recording.sheets.items():
-        lines += toml_table(f"sensors.{sensor}", _sheet_keys(sensor, sheet), sheet.sigma)
+        lines += sheet_toml(sensor, sheet, SENSORS[sensor].unit)
     return "\n".join([*lines, ""])
-
-
-def _sheet_keys(sensor: str, sheet: SensorSheet) -> dict[str, Any]:
-    if sensor == "gps":
-        return {
-            "rate_hz": sheet.rate_hz,
-            "position_noise_rms_m": sheet.noise_rms,
-            "velocity_noise_rms_m_s": sheet.velocity_noise_rms,
-        }
-    unit = SENSORS[sensor].unit
-    return {
-        "rate_hz": sheet.rate_hz,
-        f"noise_rms_{unit}": sheet.noise_rms,
-        f"resolution_{unit}": sheet.resolution,
-        f"range_{unit}": sheet.range,
-        "position_m": sheet.position,
-    }

@@ -20,7 +20,7 @@ from discsim.errors import InputError
 from discsim.files import read_text
 from discsim.limits import ANY_NUMBER, Limit, limit_of
 
-__all__ = ["TomlTable", "obeyed_by_terminals", "read_toml"]
+__all__ = ["TomlTable", "obeyed_by_terminals", "parse_toml", "read_toml"]
 
 # a table's name, not a row of a matrix that is written over several lines
 _HEADER = re.compile(r"""^\s*\[+\s*(["'A-Za-z_][\w\-.\s"']*?)\s*\]+\s*(?:#.*)?$""")
@@ -84,7 +84,11 @@ def _too_long(content: Mapping[str, Any]) -> tuple[str, int] | None:
 
 def read_toml(path: Path) -> TomlTable:
     """Read a TOML file (UTF-8); raises `InputError` where it is absent or is no TOML."""
-    text = read_text(path)
+    return parse_toml(read_text(path), path)
+
+
+def parse_toml(text: str, path: Path) -> TomlTable:
+    """Read TOML that stands, or will stand, in a file; raises `InputError` with its line where it is no TOML."""
     try:
         content = tomllib.loads(text)
     except RecursionError:

@@ -7,7 +7,7 @@ vector of three is one thing to a reader; that is why no library writes them (to
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,11 +16,15 @@ from discsim.disc import Aero, Disc, Release, Rig, aero_key
 from discsim.environment import Environment
 from discsim.errors import InputError
 
+if TYPE_CHECKING:
+    from discsim.recording import SensorSheet
+
 __all__ = [
     "disc_toml",
     "environment_toml",
     "release_toml",
     "rig_toml",
+    "sheet_toml",
     "sigma_key",
     "toml_lines",
     "toml_table",
@@ -78,6 +82,21 @@ def disc_toml(disc: Disc) -> list[str]:
 def rig_toml(rig: Rig) -> list[str]:
     """Return the lines of a ``[rig]`` table."""
     return toml_table("rig", {"Izz_kg_m2": rig.Izz, "viscous_N_m_s": rig.viscous}, rig.sigma)
+
+
+def sheet_toml(sensor: str, sheet: SensorSheet, unit: str) -> list[str]:
+    """Return the lines of a ``[sensors.NAME]`` table; ``unit`` is the sensor's, which its keys end with."""
+    stated: dict[str, Any] = {"rate_hz": sheet.rate_hz}
+    if sensor == "gps":
+        stated |= {"position_noise_rms_m": sheet.noise_rms, "velocity_noise_rms_m_s": sheet.velocity_noise_rms}
+    else:
+        stated |= {
+            f"noise_rms_{unit}": sheet.noise_rms,
+            f"resolution_{unit}": sheet.resolution,
+            f"range_{unit}": sheet.range,
+            "position_m": sheet.position,
+        }
+    return toml_table(f"sensors.{sensor}", stated, sheet.sigma)
 
 
 def release_toml(release: Release, name: str = "release") -> list[str]:

@@ -162,6 +162,7 @@ def integrate(
 
 def release_state(release: Release) -> FloatArray:
     """Return the state (14,) of a release; S and B coincide there. Raises `InputError` where something is unknown."""
+    Release.require(release)
     position, velocity, C_NB, rate = release.start()
     return np.concatenate([position, velocity, quaternion_from_matrix(C_NB), rate, [0.0]])
 

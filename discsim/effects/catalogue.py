@@ -8,7 +8,7 @@ in ``_rows``: a new effect is one such file (docs/architecture.md). docs/effects
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from math import isfinite
@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from discsim.effects import setup
 from discsim.effects.applied import Applied, applied_row
 from discsim.effects.kind import Row
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 
 if TYPE_CHECKING:
     from discsim.effects.own import UserEffect
@@ -156,8 +156,10 @@ def effect_of(value: Any, acts_on: str | None = None) -> Effect:
 
 def by_id(effects: Sequence[Effect]) -> dict[str, Any]:
     """Return the values by id; raises `InputError` where one id appears twice."""
+    require_type(effects, Iterable, "effects", 'a list of effects: [effect("air.density", ratio=1.1)]')
     values: dict[str, Any] = {}
     for item in effects:
+        require_type(item, Effect, "one of effects", 'an effect as effect("air.density", ratio=1.1) makes it')
         if item.id in values:
             raise InputError(f"effect '{item.id}' is given twice; expected each at most once in one recording")
         values[item.id] = item.value

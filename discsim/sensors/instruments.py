@@ -16,11 +16,11 @@ from discsim.effects.catalogue import CATALOGUE, Effect, by_id
 from discsim.effects.kind import BOARD
 from discsim.effects.sensors import AccelerometerBias, ClockRate, CrossAxis, GSensitivity, GyroscopeBias, Scale
 from discsim.effects.timing_rows import ImuClock, LateRows, LostRows
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.files import model_file
 from discsim.law import Law
 from discsim.motion import Motion
-from discsim.recording import SENSORS, Plant, Recording, Samples
+from discsim.recording import SENSORS, Plant, Recording, Samples, require_kind
 from discsim.sensors.accelerometer import Accelerometer
 from discsim.sensors.additions import Addition, by_effect, by_law
 from discsim.sensors.gyroscope import Gyroscope
@@ -130,6 +130,7 @@ class Instruments:
 
     def drawn(self, rng: np.random.Generator) -> Instruments:
         """Return one specimen: part-to-part errors drawn evenly within what the data sheets allow."""
+        _require_generator(rng)
         module = self
         for name, worst in self.worst_case.items():
             if name in module.sensors:
@@ -190,6 +191,11 @@ class Instruments:
         return self.fitted(sensor, additions=(*self.sensors[sensor].additions, addition))
 
 
+def _require_generator(rng: object) -> None:
+    seed = rng if isinstance(rng, int) else 0
+    require_type(rng, np.random.Generator, "rng", f"a generator of random numbers: np.random.default_rng({seed})")
+
+
 def record(
     motion: Motion,
     instruments: Instruments,
@@ -204,7 +210,13 @@ def record(
     """Let the instruments measure a motion, and write it as their logger does.
 
     Each sensor draws from a random stream of its own. ``dataclasses.replace`` adds what is stated besides, a release.
+    A recording that is to be written states what its plant needs: a flight its disc, a spin-down its rig. Raises
+    `InputError` for an argument of another type and a plant that is none.
     """
+    require_type(motion, Motion, "motion", "a Motion: fly(...) returns one, and so does predict(...).motion()")
+    require_type(instruments, Instruments, "instruments", 'sensors: Instruments.from_parts("mpu9250")')
+    _require_generator(rng)
+    require_kind(plant, name)
     streams = dict(zip(SENSORS, rng.spawn(len(SENSORS)), strict=True))
     samples, sheets = {}, {}
     seed = int(rng.spawn(1)[0].integers(2**32))  # of the pattern of rows, which is one for all

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -330,6 +331,26 @@ class TestRecord:
         got = recorded(MODULE)
         assert (got.plant, got.name, got.disc, got.rig, got.release) == ("flight", "test", DRIVER, None, None)
         assert got.environment is FLIGHT.environment
+
+    @pytest.mark.parametrize(
+        ("given", "says"),
+        [
+            ({"rng": 7}, "rng is 7, of type int; expected a generator of random numbers: np.random.default_rng(7)"),
+            ({"rng": None}, "rng is None, of type NoneType; expected a generator"),
+            ({"motion": "driver"}, "motion is 'driver', of type str; expected a Motion: fly(...) returns one"),
+            ({"instruments": "mpu9250"}, 'expected sensors: Instruments.from_parts("mpu9250")'),
+            ({"plant": "Flight"}, "plant is 'Flight', expected one of 'flight', "),
+            ({"name": None}, "name is None, of type NoneType; expected a text"),
+        ],
+    )
+    def test_what_it_cannot_use_is_refused_at_the_door(self, given, says):
+        arguments = {"motion": FLIGHT, "instruments": MODULE, "rng": np.random.default_rng(0), "plant": "flight"}
+        with pytest.raises(InputError, match=re.escape(says)):
+            record(**({**arguments, "name": "x"} | given))
+
+    def test_a_seed_is_no_generator_of_specimens(self):
+        with pytest.raises(InputError, match=r"expected a generator of random numbers: np\.random\.default_rng\(3\)"):
+            MODULE.drawn(3)  # type: ignore[arg-type]
 
     def test_a_sensor_that_saw_nothing_is_left_out(self):
         late = recorded(MODULE, effects=(effect("gps.latency", delay_s=2.0),))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support.recording_folder import AERO_TABLE, CNR_TABLE, CSV, RATE_TABLE, SPIN_DOWN, TOML, line_of, make, refusal
 
-from discsim.disc import Aero
+from discsim.disc import Aero, Rig
 from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.recording import (
@@ -362,7 +363,42 @@ def test_a_recording_has_known_sensors_with_sheets_and_the_right_width():
     t, sheets = np.array([0.0]), {"magnetometer": SensorSheet(100.0)}
     with pytest.raises(ValueError, match="unknown sensor 'compass'"):
         Recording("flight", "x", Environment(), samples={"compass": Samples(t, t)})
+    with pytest.raises(ValueError, match="unknown sensor 'compass'"):
+        Recording("flight", "x", Environment(), sheets={"compass": SensorSheet(100.0)})
     with pytest.raises(ValueError, match="gyroscope has samples but no sheet"):
         Recording("flight", "x", Environment(), sheets=sheets, samples={"gyroscope": Samples(t, np.zeros((1, 3)))})
     with pytest.raises(ValueError, match="magnetometer: got values \\(1, 2\\)"):
         Recording("flight", "x", Environment(), sheets=sheets, samples={"magnetometer": Samples(t, np.zeros((1, 2)))})
+
+
+@pytest.mark.parametrize(
+    ("plant", "name", "says"),
+    [
+        ("Flight", "x", "plant is 'Flight', expected one of 'flight', 'rate_table', 'spin_down', 'free_spin'"),
+        (None, "x", "plant is None, expected one of 'flight'"),
+        ("flight", 7, "name is 7, of type int; expected a text"),
+    ],
+)
+def test_a_recording_has_a_plant_of_the_format_and_a_name(plant, name, says):
+    with pytest.raises(InputError, match=re.escape(says)):
+        Recording(plant, name, Environment())
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"disc": None}, "missing key 'disc'"),
+        ({"environment": Environment(air_density=None)}, "missing key 'air_density_kg_m3'"),
+        ({"plant": "spin_down"}, "missing key 'rig'"),
+        ({"rig": Rig(1e-3, 1e-5)}, "[rig] in a flight recording; expected it in spin_down only"),
+        ({"command": Samples([0.0, 1.0], [0.0, 1.0])}, "a command in a flight; expected it in rate_table only"),
+        ({"sheets": {"magnetometer": SensorSheet(-1.0)}}, "'sensors.magnetometer.rate_hz' is -1.0"),
+        ({"sheets": {"magnetometer": SensorSheet(float("nan"))}}, "'sensors.magnetometer.rate_hz' is nan"),
+    ],
+)
+def test_what_no_reader_takes_is_not_written(flight, tmp_path, changes, says):
+    whole = read_recording(flight)
+    sound = replace(whole, samples={"magnetometer": whole.samples["magnetometer"]})
+    with pytest.raises(InputError, match=re.escape(says)):
+        write_recording(replace(sound, **changes), tmp_path / "out")
+    assert not (tmp_path / "out").exists()

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import re
 
 import numpy as np
 import pytest
@@ -319,3 +320,24 @@ class TestRefusals:
     def test_a_throw_needs_velocity_and_spin(self):
         with pytest.raises(InputError, match="a throw needs velocity"):
             predict(DRIVER, FIELD, dataclasses.replace(throw(), velocity=None))
+
+
+@pytest.mark.parametrize("engine", [fly, predict])
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"disc": "driver"}, "disc is 'driver', of type str; expected a Disc: load_disc(NAME)"),
+        (
+            {"disc": (DRIVER, FIELD)},
+            "of type tuple; expected a Disc: load_disc(NAME) returns a disc and",
+        ),
+        ({"environment": DRIVER}, "of type Disc; expected an Environment"),
+        ({"release": "driver"}, "release is 'driver', of type str; expected a Release: load_throw(NAME)"),
+        ({"effects": effect("air.density", ratio=1.1)}, "of type Effect; expected a list of effects"),
+        ({"effects": ["air.density"]}, "one of effects is 'air.density', of type str; expected an effect as effect("),
+    ],
+)
+def test_an_argument_of_another_type_is_refused_with_what_makes_a_right_one(engine, change, says):
+    given = {"disc": DRIVER, "environment": FIELD, "release": throw()} | change
+    with pytest.raises(InputError, match=re.escape(says)):
+        engine(**given)
