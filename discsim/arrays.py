@@ -14,6 +14,7 @@ __all__ = [
     "FloatArray",
     "IntArray",
     "readonly",
+    "real",
     "runs",
     "sd_by_median",
     "sealed",
@@ -36,6 +37,17 @@ def readonly(values: ArrayLike) -> FloatArray:
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
     return array
+
+
+def real(values: ArrayLike) -> FloatArray:
+    """Return real numbers as float64; raises ValueError for complex ones, and for dates, whose unit would be lost."""
+    array = np.asarray(values)
+    if array.dtype.kind in "mM":
+        how = "t" if array.dtype.kind == "m" else "(t - t[0])"
+        raise ValueError(f"got {array.dtype}, expected numbers; of times in seconds: {how} / np.timedelta64(1, 's')")
+    if array.dtype.kind == "c":
+        raise ValueError("got complex numbers, expected real ones")
+    return np.asarray(array, dtype=np.float64)
 
 
 def sealed(array: FloatArray) -> FloatArray:

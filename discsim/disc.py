@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 from math import pi
-from types import MappingProxyType
+from types import MappingProxyType, NoneType
 from typing import NamedTuple
 
 import numpy as np
 
 from discsim.arrays import FloatArray, readonly
-from discsim.errors import InputError, require_type
+from discsim.errors import InputError, require_number, require_type
 from discsim.frames import attitude_matrix
 from discsim.limits import ANY_NUMBER
 from discsim.toml_table import TomlTable
@@ -161,9 +161,8 @@ class Disc:
 
     def __post_init__(self) -> None:
         for name in ("mass", "diameter", "Ixx", "Izz"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"disc {name}: got {value!r}, expected a positive number in SI units")
+            require_number(getattr(self, name), f"disc {name}", "SI", positive=True)
+        require_type(self.aero, (Aero, NoneType), "disc aero", "Aero(CL0=..., CLa=..., ...)")
         if self.Izz > 2 * self.Ixx * (1 + 1e-9):
             raise ValueError(
                 f"disc: Izz = {self.Izz:g} exceeds Ixx + Iyy = {2 * self.Ixx:g} kg m^2, expected at most that"
@@ -334,6 +333,9 @@ class Release:
                 if array.shape != (3,) or not np.all(np.isfinite(array)):
                     raise InputError(f"release {name}: got {value!r}, expected three finite numbers")
                 object.__setattr__(self, name, array)
+        for name in ("roll", "pitch", "yaw"):
+            if getattr(self, name) is not None:
+                require_number(getattr(self, name), f"release {name}", "rad")
         object.__setattr__(self, "sigma", MappingProxyType(dict(self.sigma)))
 
     def start(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -22,7 +22,7 @@ from discsim.disc import RELEASE_HEIGHT, Disc, Release
 from discsim.effects.body import centre_of_mass, transverse_inertia
 from discsim.effects.catalogue import Effect
 from discsim.environment import Environment
-from discsim.errors import InputError
+from discsim.errors import InputError, require_number
 from discsim.files import model_file
 from discsim.flight_force import LOST, native_force
 from discsim.frames import body_to_ned, flip_yz, quaternion_from_matrix
@@ -246,6 +246,10 @@ def fly(
     (s). With ``ground="skip"`` the rim has contact and friction with the ground, and the disc skips and slides on
     until it rests or ``duration`` ends. Raises `InputError` where it turns by more than `LARGEST_TURN` in a step.
     """
+    if ground not in ("stop", "skip"):
+        raise InputError(f"ground is {ground!r}, expected 'stop' or 'skip'")
+    require_number(timestep, "timestep", "s", positive=True)
+    require_number(duration, "duration", "s", positive=True)
     flying = FlyingDisc(disc, environment, effects, timestep=timestep, contacts=ground == "skip", law=law)
     return follow(flying, release, duration=duration, ground=ground)
 

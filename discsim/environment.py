@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from discsim.arrays import FloatArray, readonly, vector3
-from discsim.errors import InputError
+from discsim.errors import InputError, require_number
 from discsim.toml_table import TomlTable
 
 __all__ = ["FIELD_MODEL_SIGMA", "Environment", "world_magnetic_field"]
@@ -44,6 +44,9 @@ class Environment:
     sigma: Mapping[str, float | FloatArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        for name, unit in (("gravity", "m/s^2"), ("air_density", "kg/m^3")):
+            if (value := getattr(self, name)) is not None:
+                require_number(value, name, unit, minimum=0.0)
         object.__setattr__(self, "magnetic_field", vector3(self.magnetic_field, "magnetic field (uT)"))
         object.__setattr__(self, "wind", vector3(self.wind, "wind (m/s)"))
         object.__setattr__(self, "sigma", MappingProxyType(dict(self.sigma)))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from math import isfinite
+from numbers import Real
 from pathlib import Path
 
-__all__ = ["InputError", "printable", "require_type"]
+__all__ = ["InputError", "printable", "require_number", "require_type"]
 
 #: characters of a message that are shown: a file may have names of thousands, and what was expected stands at the end
 _HEAD, _TAIL = 800, 300
@@ -29,6 +31,18 @@ class InputError(ValueError):
         if len(message) > _HEAD + _TAIL:
             message = f"{message[:_HEAD]} ... {message[-_TAIL:]}"
         return cls(f"{printable(where)}: {message}")
+
+
+def require_number(
+    value: object, name: str, unit: str, *, positive: bool = False, minimum: float | None = None
+) -> None:
+    """Raise `InputError` for what is no finite number, or not above zero, or below a minimum."""
+    least = "" if minimum is None else f", at least {minimum:g}"
+    expected = f"a finite number{' above zero' if positive else least} ({unit})"
+    require_type(value, Real, name, expected)
+    number = float(value)  # type: ignore[arg-type]
+    if not isfinite(number) or (positive and number <= 0) or (minimum is not None and number < minimum):
+        raise InputError(f"{name} is {number:g}; expected {expected}")
 
 
 def require_type(value: object, kind: type | tuple[type, ...], name: str, expected: str) -> None:

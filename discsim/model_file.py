@@ -18,7 +18,7 @@ from discsim.disc import Disc, Rig
 from discsim.effects.catalogue import Effect, Row, effect, row
 from discsim.effects.own import UserEffect
 from discsim.environment import Environment
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.files import write_text
 from discsim.law import Law
 from discsim.limits import ANY_NUMBER
@@ -156,6 +156,7 @@ def _numbers(table: TomlTable | None) -> dict[str, float]:
 
 def write_model(model: Model, path: Path) -> None:
     """Write a model file, whole or not at all; what is read back is equal to the last bit."""
+    require_type(model, Model, "model", "a Model, as read_model(FILE) returns it")
     lines = [f'format = "{MODEL_FORMAT}"', *environment_toml(model.environment)]
     if model.disc is not None:
         lines += disc_toml(model.disc)

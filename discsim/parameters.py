@@ -161,6 +161,8 @@ def tables(disc: Disc | None, law: Law | Sequence[Law] | None = None, effects: S
         along_both = CubicSpline(speed, along_rate, axis=2).c  # (4, nv - 1, 4, nr - 1)
         spline = np.ascontiguousarray(np.transpose(along_both, (3, 1, 2, 0)))
     laws = [law] if isinstance(law, Law) else law or ()
+    for each in laws:
+        require_type(each, Law, "law", "a Law(text, target, coefficients), or a list of them")
     if disc is not None and any(each.about_a_rig for each in laws):
         raise InputError("law: yaw is the angle of a rig; expected none of it in a law upon a disc in the air")
     rows = np.concatenate([np.empty((0, LAW_WIDTH)), *(each.rows for each in laws if each.target in MOTION_TARGETS)])

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from discsim.arrays import real
 from discsim.disc import Disc
 from discsim.environment import Environment
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.recording import SENSORS, Plant, Recording, Samples, SensorSheet
 
 __all__ = ["recording_from_arrays"]
@@ -58,13 +59,17 @@ def recording_from_arrays(
     >>> recording_from_arrays({"magnetometer": (t, field)})
     <Recording 'arrays': free_spin, 1.99 s, magnetometer 200 rows>
     """
+    require_type(readings, Mapping, "readings", '{SENSOR: (t, values)}, such as {"magnetometer": (t, xyz)}')
     stated = dict(sheets or {})
     samples = {}
-    for sensor, (t, value) in readings.items():
+    for sensor, pair in readings.items():
+        if not isinstance(pair, Sequence) or len(pair) != 2:
+            raise InputError(f"readings of {sensor} are of type {type(pair).__name__}; expected a pair (t, values)")
+        t, value = pair
         if sensor not in SENSORS:
             raise InputError(f"unknown sensor '{sensor}'; expected one of {', '.join(SENSORS)}")
         try:
-            samples[sensor] = Samples(np.asarray(t, dtype=np.float64), np.asarray(value, dtype=np.float64))
+            samples[sensor] = Samples(real(t), real(value))
         except (ValueError, TypeError) as error:
             raise InputError(f"{sensor}: {error}") from None
         sheet = stated.get(sensor, SensorSheet(float("nan")))

@@ -16,7 +16,7 @@ from difflib import get_close_matches
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, NoneType
 from typing import Literal, NamedTuple, cast
 
 import numpy as np
@@ -175,16 +175,17 @@ class Recording(Recorded):
 
     def __post_init__(self) -> None:
         require_kind(self.plant, self.name)
+        require_type(self.environment, Environment, "environment", "Environment(...)")
+        require_type(self.disc, (Disc, NoneType), "disc", "a Disc: load_disc(NAME) returns one with its environment")
         if unknown := sorted({*self.samples, *self.sheets} - SENSORS.keys()):
             raise ValueError(f"unknown sensor {unknown[0]!r}; expected one of {', '.join(SENSORS)}")
         for sensor, samples in self.samples.items():
             if sensor not in self.sheets:
                 raise ValueError(f"{sensor} has samples but no sheet that states its rate")
-            width = len(SENSORS[sensor].columns)
-            if samples.value.shape[1:] != ((width,) if width > 1 else ()):
-                raise ValueError(
-                    f"{sensor}: got values {samples.value.shape}, expected (n{f', {width}' * (width > 1)})"
-                )
+            require_type(samples, Samples, sensor, "Samples(t, value)")
+            width, got = len(SENSORS[sensor].columns), samples.value.shape
+            if got[1:] != ((width,) if width > 1 else ()):
+                raise ValueError(f"{sensor}: got values {got}, expected (n{f', {width}' * (width > 1)})")
         object.__setattr__(self, "sheets", MappingProxyType(dict(self.sheets)))
         object.__setattr__(self, "samples", MappingProxyType(dict(self.samples)))
 
@@ -238,9 +239,8 @@ def _read_folder(folder: Path) -> Recording:
         if not _there(file):
             continue
         if sensor not in sheets:
-            raise InputError.at(
-                file, None, f"a sensor file without its table; expected [sensors.{sensor}] in recording.toml"
-            )
+            expected = f"expected [sensors.{sensor}] in recording.toml"
+            raise InputError.at(file, None, f"a sensor file without its table; {expected}")
         found = read_csv(file, kind.header)
         # sensors of one log have one time: it is held once
         same = next((one.t for one in samples.values() if np.array_equal(one.t, found.t)), found.t)
@@ -250,9 +250,8 @@ def _read_folder(folder: Path) -> Recording:
     if knots is not None and plant != "rate_table":
         raise InputError.at(command, None, f"a command in a {plant} recording; expected it in rate_table only")
     if not samples:
-        raise InputError.at(
-            folder, None, f"no sensor file; expected at least one of {', '.join(f'{s}.csv' for s in SENSORS)}"
-        )
+        names = ", ".join(f"{sensor}.csv" for sensor in SENSORS)
+        raise InputError.at(folder, None, f"no sensor file; expected at least one of {names}")
     return replace(stated, samples=samples, command=knots, path=folder)
 
 
@@ -489,6 +488,7 @@ def write_recording(recording: Recording, folder: Path | str) -> None:
     with control characters), and for a folder with files by the names of the format that are no recording: they are
     somebody else's.
     """
+    require_type(recording, Recording, "recording", "a Recording; write_recording(recording, folder)")
     folder = Path(folder)
     texts = _texts(recording)
     if folder.exists() and not folder.is_dir():

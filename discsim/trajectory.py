@@ -24,7 +24,7 @@ from discsim.dormand_prince import EXTENDED, POWER, STAGES, evaluate, interpolan
 from discsim.effects.body import centre_of_mass
 from discsim.effects.catalogue import Effect
 from discsim.environment import Environment
-from discsim.errors import InputError
+from discsim.errors import InputError, require_number
 from discsim.flight_equations import WIDTH, copied, derivative, in_body, incidence
 from discsim.frames import euler_angles, quaternion_from_matrix
 from discsim.law import Law
@@ -258,6 +258,8 @@ def predict(
     rtol is of the size of velocity, attitude and rates, atol in SI units: estimated errors of one step. Raises
     `InputError` for a release that lacks something, where a C_Nr table does not reach, and above `FASTEST_SPIN`.
     """
+    for name, value, unit in (("rtol", rtol, "relative"), ("atol", atol, "SI"), ("duration", duration, "s")):
+        require_number(value, name, unit, positive=True)
     flat, lookup = flight_parameters(disc, environment, effects), tables(disc, law, effects)
     state = release_state(release)
     ended, t, states, dense = integrate(flat, lookup, state, 0.0, float(duration), rtol, atol, True)

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from math import isfinite
+from numbers import Real
 from pkgutil import iter_modules
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -131,14 +132,14 @@ def effect(id: str, **given: float | str) -> Effect:
     >>> effect("mag.axes", axes="x -y z").value
     Axes(axes='x -y z')
     """
+    require_type(id, str, "an effect's id", "a text such as 'air.wind'")
     kind = row(id)
     for name, value in given.items():
         if name not in (*kind.parameters, *kind.settings):
             what = "parameter" if kind.parameters else "setting"
             raise InputError(f"{id}: unknown {what} '{name}'; expected {', '.join((*kind.parameters, *kind.settings))}")
-        if isinstance(value, str) != (name in kind.settings):
-            expected = "a text" if name in kind.settings else "a number"
-            raise InputError(f"{id}: {name} is {value!r}, expected {expected}")
+        allowed, expected = (str, "a text") if name in kind.settings else (Real, "a number")
+        require_type(value, allowed, f"{id}: {name}", expected)
     return Effect(
         id, kind.type(**{name: value if isinstance(value, str) else float(value) for name, value in given.items()})
     )

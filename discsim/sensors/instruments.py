@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from os import PathLike, fspath
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeAlias
@@ -107,9 +108,11 @@ class Instruments:
     written: tuple[Effect, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in self.sensors:
+        require_type(self.sensors, Mapping, "sensors", 'them by name, or Instruments.from_parts("mpu9250")')
+        for name, sensor in self.sensors.items():
             if name not in SENSORS:
                 raise InputError(f"unknown sensor '{name}'; expected one of {', '.join(SENSORS)}")
+            require_type(sensor, KINDS[name], name, f"a {KINDS[name].__name__}(...) of discsim.sensors")
         sensors = dict(self.sensors)
         accelerometer, gyroscope = sensors.get("accelerometer"), sensors.get("gyroscope")
         if isinstance(accelerometer, Accelerometer) and isinstance(gyroscope, Gyroscope):
@@ -118,11 +121,12 @@ class Instruments:
         object.__setattr__(self, "sensors", MappingProxyType(sensors))
 
     @classmethod
-    def from_parts(cls, *names: str) -> Instruments:
+    def from_parts(cls, *names: str | PathLike[str]) -> Instruments:
         """Put together shipped parts or part files; of two that have the same sensor the later one counts."""
         sensors: dict[str, Sensor] = {}
         worst: dict[str, WorstCase] = {}
         for name in names:
+            require_type(name, (str, PathLike), "a part", 'names one by one, from_parts("mpu9250", "neo_m8n")')
             part = read_part(name)
             sensors.update(part.sensors)
             worst.update(part.worst_case)
@@ -236,8 +240,9 @@ def record(
 # ------------------------------------------------------------------------------------------------ part files
 
 
-def read_part(name: str) -> Instruments:
+def read_part(name: str | PathLike[str]) -> Instruments:
     """Read a part: the name of a shipped one (``mpu9250``) or a TOML file."""
+    name = fspath(name)
     path = Path(name) if name.endswith(".toml") else model_file(f"parts/{name}.toml")
     top = read_toml(path)
     top.text("name")
