@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
+from types import NoneType
+
 from numpy.typing import ArrayLike
 
-from discsim.errors import InputError
+from discsim.arrays import real
+from discsim.errors import InputError, require_type
 from discsim.estimators import fft as of_samples
 from discsim.estimators.fft import FftSettings
 from discsim.estimators.rate import YawRate
@@ -45,8 +47,9 @@ def fft(t: ArrayLike, xyz: ArrayLike, settings: FftSettings | None = None) -> Ya
     >>> round(float(np.median(fft(t, field).rate)))
     30
     """
+    require_type(settings, (FftSettings, NoneType), "settings", "FftSettings(...), or nothing for the paper's")
     try:
-        samples = Samples(np.asarray(t, dtype=np.float64), np.asarray(xyz, dtype=np.float64))
+        samples = Samples(real(t), real(xyz))
     except (ValueError, TypeError) as error:
         raise InputError(f"fft: {error}") from None
     if samples.value.shape[1:] != (3,):

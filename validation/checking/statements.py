@@ -7,7 +7,7 @@ from math import pi
 
 import numpy as np
 
-from discsim.disc import Aero, Disc, Release
+from discsim.disc import Aero, AeroTable, Disc, Release
 from discsim.environment import Environment
 from discsim.glitches import FASTEST_SPIN
 from discsim.recording import Recording
@@ -31,6 +31,13 @@ HEIGHT = 1 / 6
 FASTEST = 45.0
 #: angle of attack of the least drag, rad: published ones are -0.17 (-CL0/CLa of Hummel, 2003) to 0.07
 ZERO_LIFT = 0.3
+#: slopes of lift and pitching moment, per rad, and of drag, per rad^2, that are published of discs (docs/physics.md),
+#: from Hummel (2003) and the papers that she compares to Crowther and Potts (2007)
+SLOPES = {"CLa": (1.9, 3.1), "CDa": (0.7, 3.3), "CMa": (0.057, 0.43)}
+#: a disc may leave these by half; degrees would by a factor of 57
+WITHIN = 1.5
+#: the lift of a table is a line this far from zero, rad: 6 deg, where discs fly
+NEAR = 0.1
 #: a storm, m/s
 WIND = 30.0
 
@@ -146,6 +153,7 @@ def _disc(disc: Disc, *, thrown: bool) -> Iterator[Finding]:
         yield from _inertia(disc, unusual, remedy)
     if disc.aero is not None:
         yield from _aero(disc.aero)
+        yield from _slopes(disc.aero, disc.aero_table)
 
 
 def _aero(aero: Aero) -> Iterator[Finding]:
@@ -166,8 +174,55 @@ def _aero(aero: Aero) -> Iterator[Finding]:
             "[disc.aero]",
             f"alpha0_rad is {aero.alpha0:g}",
             f"within +-{ZERO_LIFT} rad",
-            "in degrees?",
+            f"in degrees? write {np.radians(aero.alpha0):.4g}",
         )
+
+
+def _slopes(aero: Aero, table: AeroTable | None) -> Iterator[Finding]:
+    """Yield slopes that are per degree, or times the factor of degrees, and a table whose angles are degrees.
+
+    A lift slope is never small by a factor of 57: that is an error. A drag slope is only likely wrong then, and a
+    pitching moment's may be small, as it is of a disc that is nearly neutral: it is doubted beside a lift slope alone.
+    """
+    stated = {"CLa": aero.CLa} if table is not None else {"CLa": aero.CLa, "CDa": aero.CDa, "CMa": aero.CMa}
+    factors = {name: _degrees_in(name, value) for name, value in stated.items()}
+    for name, factor in factors.items():
+        if factor == 1.0 or (name == "CMa" and factor > 1.0 and factors["CLa"] <= 1.0):
+            continue
+        low, high = SLOPES[name]
+        unit, times = "per rad^2" if name == "CDa" else "per rad", f"{max(factor, 1 / factor):.4g}"
+        yield Finding(
+            f"disc.{name}",
+            "error" if name == "CLa" else "warning",
+            "[disc.aero]",
+            f"{name} is {stated[name]:g}, {times} times too {'small' if factor > 1 else 'large'} for a disc",
+            f"{low} to {high} {unit}",
+            f"{'per degree' if factor > 1 else 'multiplied by 180/pi'}? write {stated[name] * factor:.4g}",
+        )
+    if table is not None:
+        near = NEAR * np.array([-1.0, 1.0])
+        slope = float(np.diff(np.interp(near, table.alpha, table.CL))[0] / np.diff(near)[0])
+        if _degrees_in("CLa", slope) > 1.0:
+            low, high = (float(np.radians(table.alpha[end])) for end in (0, -1))
+            yield Finding(
+                "disc.alpha",
+                "error",
+                "[disc.aero_table]",
+                f"CL rises by {slope:.3g} per rad about alpha_rad = 0, 57.3 times too little for a disc",
+                "{} to {} per rad".format(*SLOPES["CLa"]),
+                f"is alpha_rad in degrees? Multiply by 0.0174533: {low:.4g} to {high:.4g}",
+            )
+
+
+def _degrees_in(name: str, slope: float) -> float:
+    """Return the factor of degrees that brings a slope to what discs have; 1 where it needs none or none does.
+
+    Drag grows with the square of the angle: its factor may be that of one angle or of two.
+    """
+    low, high = SLOPES[name][0] / WITHIN, SLOPES[name][1] * WITHIN
+    one = float(np.degrees(1.0))
+    powers = (1, -1, 2, -2) if name == "CDa" else (1, -1)
+    return next((one**power for power in powers if low <= slope * one**power <= high), 1.0)
 
 
 def _inertia(disc: Disc, unusual: Severity, remedy: str) -> Iterator[Finding]:
