@@ -28,9 +28,11 @@ def command(
     """
     from discsim.validation.checking.checked import check
     from discsim.validation.checking.table import print_checks
+    from discsim.validation.reporting.options import say_note
     from discsim.validation.reporting.run import start_run
+    from discsim.validation.running.given import read_given
 
-    found = check(recordings)
+    found = check(read_given(recordings, say_note))
     if out is not None:
         with start_run(out, inputs=[recordings]):
             found.report(out)

@@ -50,14 +50,14 @@ def command(
     from discsim.validation.diagnosis.datasets import need_field, read_datasets
     from discsim.validation.diagnosis.design.plans import read_plans
     from discsim.validation.diagnosis.diagnosed import diagnose_named
-    from discsim.validation.reporting.options import at_place
+    from discsim.validation.reporting.options import at_place, say_note
     from discsim.validation.reporting.progress import shown
     from discsim.validation.reporting.run import start_run
     from discsim.validation.reporting.time_left import TimeLeft
 
     files = user_effects or []
     effects = load_user_effects(files)
-    recordings, names = read_datasets(datasets)
+    recordings, names = read_datasets(datasets, say_note)
     recordings = [
         [replace(one, environment=at_place(one.environment, place, date)) for one in set_] for set_ in recordings
     ]

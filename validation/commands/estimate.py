@@ -55,18 +55,18 @@ def command(
     from discsim.estimators.accelerometer import AccelerometerErrors
     from discsim.estimators.fft import FftSettings
     from discsim.estimators.methods import Options
-    from discsim.recording import read_dataset
     from discsim.validation.estimating.spin_estimates import estimate_spin
-    from discsim.validation.reporting.options import at_place
+    from discsim.validation.reporting.options import at_place, say_note
     from discsim.validation.reporting.place import swapped_place
     from discsim.validation.reporting.run import Run, start_run
+    from discsim.validation.running.given import read_given
 
     zeros = max(0, 2**14 - window) if pad is None else pad
     options = Options(
         FftSettings(window, zeros, float(np.radians(threshold)), step, stamp, remove_mean),
         AccelerometerErrors(mount=mount_error / 1000),
     )
-    given = read_dataset(recording)
+    given = read_given(recording, say_note)
     placed = [replace(one, environment=at_place(one.environment, place, date)) for one in given]
     shown = Run(out, [], None)  # what fails leaves no folder behind
     if doubt := swapped_place(place, date, given):

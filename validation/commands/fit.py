@@ -33,12 +33,13 @@ def command(
 
     Example: discsim fit practice/calm-evening --out calm-evening-fit
     """
-    from discsim.recording import read_dataset
+    from discsim.validation.reporting.options import say_note
     from discsim.validation.reporting.run import start_run
+    from discsim.validation.running.given import read_given
     from discsim.validation.yaw_damping.fitted import check_method, fit_recordings
 
     check_method(method)
-    recordings = read_dataset(dataset)
+    recordings = read_given(dataset, say_note)
     with start_run(out, inputs=[dataset]) as run:
         found = fit_recordings(recordings, method, compare=compare, progress=run.progress, say=run.step)
         found.report(out)

@@ -62,12 +62,12 @@ def command(
     Example: discsim plan --throws 6 --disc driver --parts mpu9250,neo_m8n --out plan
     """
     from discsim.errors import InputError
-    from discsim.recording import read_dataset
     from discsim.shipped import load_throw
     from discsim.validation.diagnosis.design.plans import read_plans
     from discsim.validation.planning.planned import plan as tell
-    from discsim.validation.reporting.options import disc_to_fly, known_plant, rig_of
+    from discsim.validation.reporting.options import disc_to_fly, known_plant, rig_of, say_note
     from discsim.validation.reporting.run import start_run
+    from discsim.validation.running.given import read_given
 
     if plan is not None and plan.is_dir():
         raise InputError(f"{plan}: is a folder; expected a TOML file of recordings, or a data set as --like {plan}")
@@ -84,7 +84,7 @@ def command(
     named = [Path(name) for name in (disc or "", throw, *parts.split(",")) if name.endswith(".toml")]
     asked: Sequence[Plan] | Sequence[Recording] | int = throws if plan is None else read_plans(plan, plant)
     if like is not None:
-        asked, named = read_dataset(like), [*named, like]
+        asked, named = read_given(like, say_note), [*named, like]
     further = None if candidates is None else read_plans(candidates, plant)
     release = load_throw(throw)
     for note in _doubts(asked, kind, (body, place, release) if rig is None and like is None else None):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from discsim.errors import InputError
-from discsim.validation.reporting.options import ModelOption, OutOption, SeedOption, disc_to_fly, given_files
+from discsim.validation.reporting.options import ModelOption, OutOption, SeedOption, disc_to_fly, given_files, say_note
 
 if TYPE_CHECKING:
     from discsim.validation.experiments.subject import Subject
@@ -72,18 +72,18 @@ def command(
     Example: discsim validate --quick --junit scores.xml --out validation-report
     or: discsim validate --disc mine.toml --throws mine-1.toml,mine-2.toml --limits limits.toml --against last-report
     """
-    from discsim.recording import read_dataset
     from discsim.validation.experiments.subject import stated_subject
     from discsim.validation.experiments.validation_run import Judging, validate
     from discsim.validation.reporting.limits import shipped_limits
     from discsim.validation.reporting.run import start_run
+    from discsim.validation.running.given import read_given
 
     _check_places({"--junit": junit, "--summary": summary, "--record-limits": record_limits})
     body, surroundings, stated = disc_to_fly(disc, model)
     names = [part.split(",") if part else [] for part in (parts, throws)]
     flown = None if disc is None and model is None else (body, surroundings)
     subject = stated_subject(quick, disc=flown, parts=names[0], throws=names[1], profile=profile)
-    mine = [] if recordings is None else read_dataset(recordings)
+    mine = [] if recordings is None else read_given(recordings, say_note)
     # with a disc, parts, throws or profile of one's own the scores scatter otherwise
     shipped = {} if any((disc, model, *names, profile)) else shipped_limits(quick)
     judging = replace(Judging.read(shipped, limits, against), **_recorded(record_limits, repeat, margin))

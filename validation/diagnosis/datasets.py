@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from discsim.errors import InputError
-from discsim.recording import Recording, read_dataset
+from discsim.recording import Recording
+from discsim.validation.running.given import read_given
 
 __all__ = ["dataset_names", "need_field", "read_datasets", "recording_names"]
 
 
-def read_datasets(folders: Sequence[Path]) -> tuple[list[list[Recording]], list[str]]:
-    """Return the recordings of each data set, and the names of the sets.
+def read_datasets(
+    folders: Sequence[Path], say: Callable[[str], None] = lambda text: None
+) -> tuple[list[list[Recording]], list[str]]:
+    """Return the recordings of each data set, and the names of the sets; ``say`` as `read_given` has it.
 
     Raises `InputError` where a folder cannot be read, is given twice, or holds another plant than the others.
     """
     names = dataset_names(folders)
-    datasets = [read_dataset(folder) for folder in folders]
+    datasets = [read_given(folder, say) for folder in folders]
     first = datasets[0][0]
     for recording in (recording for dataset in datasets for recording in dataset):
         if recording.plant != first.plant:

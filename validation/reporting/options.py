@@ -48,6 +48,7 @@ __all__ = [
     "parse_sizes",
     "parse_vector",
     "rig_of",
+    "say_note",
     "throw_as_said",
 ]
 
@@ -105,6 +106,11 @@ WithOption: TypeAlias = Annotated[
     list[Path] | None,
     typer.Option("--with", help="A Python file with an effect of your own that --model or --effect names; may repeat."),
 ]
+
+
+def say_note(text: str) -> None:
+    """Say what a reader must know of the input, where results do not go: on the standard error."""
+    typer.echo(f"note: {text}", err=True)
 
 
 def disc_to_fly(
