@@ -63,15 +63,7 @@ def recording_from_arrays(
     stated = dict(sheets or {})
     samples = {}
     for sensor, pair in readings.items():
-        if not isinstance(pair, Sequence) or len(pair) != 2:
-            raise InputError(f"readings of {sensor} are of type {type(pair).__name__}; expected a pair (t, values)")
-        t, value = pair
-        if sensor not in SENSORS:
-            raise InputError(f"unknown sensor '{sensor}'; expected one of {', '.join(SENSORS)}")
-        try:
-            samples[sensor] = Samples(real(t), real(value))
-        except (ValueError, TypeError) as error:
-            raise InputError(f"{sensor}: {error}") from None
+        samples[sensor] = _samples(sensor, pair)
         sheet = stated.get(sensor, SensorSheet(float("nan")))
         if np.isnan(sheet.rate_hz):
             if len(samples[sensor]) < 2:
@@ -82,3 +74,15 @@ def recording_from_arrays(
         return Recording(plant, name, environment, disc, sheets=stated, samples=samples)
     except ValueError as error:
         raise InputError(f"{name}: {error}") from None
+
+
+def _samples(sensor: str, pair: tuple[ArrayLike, ArrayLike]) -> Samples:
+    """Return one sensor's readings; raises `InputError` for what is no pair of arrays that belong together."""
+    if sensor not in SENSORS:
+        raise InputError(f"unknown sensor '{sensor}'; expected one of {', '.join(SENSORS)}")
+    if not isinstance(pair, Sequence) or len(pair) != 2:
+        raise InputError(f"readings of {sensor} are of type {type(pair).__name__}; expected a pair (t, values)")
+    try:
+        return Samples(real(pair[0]), real(pair[1]))
+    except (ValueError, TypeError) as error:
+        raise InputError(f"{sensor}: {error}") from None
