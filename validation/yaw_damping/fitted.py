@@ -197,7 +197,7 @@ def cnr_json(fit: Fit, found: Sequence[Compared]) -> dict[str, Any]:
 
 
 def notes(fit: Fit) -> list[str]:
-    """Say where the residuals contradict what the recordings state."""
+    """Say where the residuals contradict what the recordings state, and where these do not tell C_Nr."""
     found = []
     for what, scale, white in (
         ("spin", fit.spin_scale, fit.spin_whiteness.p),
@@ -209,4 +209,9 @@ def notes(fit: Fit) -> list[str]:
             found.append(f"residuals of the {what} are not white (Ljung and Box: p = {white:.1g})")
     if found:
         found.append("the model lacks something, wind perhaps: CNr may be off by more than its sd says")
+    if abs(fit.CNr) < 2.0 * fit.sd:  # 95 % of a Gaussian lie within two standard deviations
+        found.append(
+            "CNr is within two standard deviations of zero: these recordings do not tell it; expected readings of the "
+            "whole throw, or more throws"
+        )
     return found

@@ -226,8 +226,10 @@ def _first_state(throw: Throw, CNr: float) -> FloatArray:
         if least < _NEAR**2 * fit.count:
             break
     if best is None:
+        span = float(throw.spin_t[-1] - throw.spin_t[0])
         raise InputError(
-            f"{throw.recording.name}: no flight from where it seems released; expected a disc that can fly"
+            f"{throw.recording.name}: no flight from where it seems released, by a spin known at {throw.spin_t.size} "
+            f"instants over {span:.3g} s; expected a disc that can fly, and readings of the whole throw"
         )
     return best
 

@@ -99,6 +99,12 @@ class TestOutputError:
         assert 1.0 <= fit.path_scale < 1.1
         assert notes(fit) == []
 
+    def test_a_log_of_five_rows_does_not_tell_CNr_and_the_answer_says_so(self, recordings):
+        first = {name: own.between(own.t[0], own.t[4]) for name, own in recordings[0].samples.items()}
+        found = fit_recordings(replace(recordings[0], samples=first))
+        assert found.sd > 0.5 * abs(found.CNr)
+        assert [note for note in found.notes if "these recordings do not tell it; expected readings of the" in note]
+
     def test_the_paper_s_method_blames_nobody_for_sound_data(self, recordings):
         """Its error is precession for the most part, up to 3 of the deviations that leave it out: "wind perhaps"."""
         fit = fit_yaw_damping([observe(recording, "fft") for recording in recordings])
