@@ -139,7 +139,8 @@ def effect(id: str, **given: float | str) -> Effect:
             what = "parameter" if kind.parameters else "setting"
             raise InputError(f"{id}: unknown {what} '{name}'; expected {', '.join((*kind.parameters, *kind.settings))}")
         allowed, expected = (str, "a text") if name in kind.settings else (Real, "a number")
-        require_type(value, allowed, f"{id}: {name}", expected)
+        if not isinstance(value, allowed):
+            raise InputError(f"{id}: {name} is {value!r}, expected {expected}")
     return Effect(
         id, kind.type(**{name: value if isinstance(value, str) else float(value) for name, value in given.items()})
     )
