@@ -342,8 +342,16 @@ class Release:
         """Return position, velocity (3,), C_NB (3, 3) and body rate (3,) of a throw.
 
         Position defaults to `RELEASE_HEIGHT` above the origin, attitude to level. Raises `InputError` where velocity
-        or body rate is unknown, and for a position that is not above the ground.
+        or body rate is unknown, for a position that is not above the ground, and for a roll or pitch of more than a
+        whole turn: no hand gives one, and 8 or -12 are what people write of degrees.
         """
+        for name in ("roll", "pitch"):
+            angle = getattr(self, name) or 0.0
+            if abs(angle) > 2 * pi:
+                raise InputError(
+                    f"release {name} is {angle:g} rad, more than a whole turn; expected radians: of {angle:g} degrees "
+                    f"{np.radians(angle):.4g}"
+                )
         for name, key in (("velocity", "velocity_ned_m_s"), ("body_rate", "body_rate_rad_s")):
             if getattr(self, name) is None:
                 raise InputError(f"a throw needs {key}; expected three numbers")

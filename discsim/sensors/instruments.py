@@ -149,6 +149,10 @@ class Instruments:
         """Return the module with fields of one sensor changed (``fitted("accelerometer", position=...)``)."""
         if name not in self.sensors:
             raise InputError(f"no {name} in this module; it has {', '.join(self.sensors) or 'no sensor'}")
+        known = [item.name for item in fields(self.sensors[name])]
+        if unknown := [change for change in changes if change not in known]:
+            rate = "; a rate is that of sampling=Sampling(rate_hz)" if unknown[0].startswith("rate") else ""
+            raise InputError(f"{name} has no '{unknown[0]}'; expected one of {', '.join(known)}{rate}")
         return replace(self, sensors={**self.sensors, name: replace(self.sensors[name], **changes)})
 
     def with_effects(self, effects: Sequence[Effect]) -> Instruments:

@@ -12,9 +12,17 @@ from support.flights import DRIVER, FIELD, throw
 import discsim as ds
 from discsim.disc import Aero
 from discsim.errors import require_number, require_type
+from discsim.sensors.sampling import Sampling
 
 T = np.arange(0.0, 3.0, 0.01)
 XYZ = 40.0 * np.column_stack([np.cos(30.0 * T), -np.sin(30.0 * T), 0.0 * T])
+
+
+BOARD = ds.Instruments.from_parts("mpu9250")
+
+
+def tilted(roll: float) -> ds.Release:
+    return ds.Release(velocity=np.array([24.0, 0.0, -4.0]), body_rate=np.array([0.0, 0.0, 70.0]), roll=roll)
 
 
 def arrays(readings: object) -> ds.Recording:
@@ -34,14 +42,21 @@ def arrays(readings: object) -> ds.Recording:
         (lambda: ds.Instruments(["mpu9250"]), "of type list; expected them by name, or Instruments.from_parts("),
         (lambda: ds.Instruments({"gyroscope": "mpu9250"}), "expected a Gyroscope(...) of discsim.sensors"),
         (lambda: ds.Instruments.from_parts(["mpu9250", "neo_m8n"]), "of type list; expected names one by one"),
+        (lambda: BOARD.fitted("magnetometer", rate_hz=50), "magnetometer has no 'rate_hz'; expected one of sampling, "),
+        (lambda: BOARD.fitted("magnetometer", rate_hz=50), "a rate is that of sampling=Sampling(rate_hz)"),
+        (
+            lambda: ds.fly(DRIVER, FIELD, tilted(-12.0)),
+            "release roll is -12 rad, more than a whole turn; expected radi",
+        ),
+        (lambda: ds.predict(DRIVER, FIELD, tilted(-12.0)), "radians: of -12 degrees -0.2094"),
         (lambda: ds.effect(None), "an effect's id is None"),
         (
             lambda: ds.effect("air.wind", w_north_m_s=[1, 2]),
-            "air.wind: w_north_m_s is [1, 2], of type list; expected a",
+            "air.wind: w_north_m_s is [1, 2], expected a number",
         ),
         (
             lambda: ds.effect("air.wind", w_north_m_s="1"),
-            "air.wind: w_north_m_s is '1', of type str; expected a number",
+            "air.wind: w_north_m_s is '1', expected a number",
         ),
         (lambda: ds.fly(DRIVER, FIELD, throw(), ground="bounce"), "ground is 'bounce', expected 'stop' or 'skip'"),
         (
@@ -73,6 +88,11 @@ def arrays(readings: object) -> ds.Recording:
 def test_an_argument_that_is_none_of_its_kind_is_refused_by_name(call: Callable[[], object], says: str):
     with pytest.raises(ds.InputError, match=re.escape(says)):
         call()
+
+
+def test_the_remedies_of_a_rate_and_of_a_tilt_work():
+    assert BOARD.fitted("magnetometer", sampling=Sampling(50.0)).sensors["magnetometer"].sheet.rate_hz == 50.0
+    assert ds.predict(DRIVER, FIELD, tilted(-0.2094)).touched_down
 
 
 @pytest.mark.parametrize("number", [1, 1.0, np.float64(1.0), np.float32(1.0), np.int64(1), True])
