@@ -248,25 +248,16 @@ def phase_spin(
         if sensor == "magnetometer":
             rate = _unfolded(rate, own, step)
         else:
-            # the specific force across the axis may vanish: the shape of the rate is the centripetal one's
-            ratio = rate / np.maximum(own, 1e-3)
-            sign = np.sign(np.median(ratio)) or 1.0
-            rate = own * sign * float(np.clip(np.median(np.abs(ratio)), 0.8, 1.25))
-            shape = rate
-    smooth = np.zeros(grid.size, dtype=complex)
-    phase = np.zeros(grid.size)
-    weight = np.ones(grid.size)
+            rate = shape = _shaped(rate, own)
+    smooth, phase, weight = np.zeros(grid.size, dtype=complex), np.zeros(grid.size), np.ones(grid.size)
     # a force across the axis passes through zero and points the other way after: its square has no sign
     order, sigmas = (1, (3.0, 1.0, 1.0)) if sensor == "magnetometer" else (2, (2.0, 4.0, 6.0))
     for sigma in sigmas:
         turned = cumulative_trapezoid(rate, dx=step, initial=0)
         base = plane * np.exp(-1j * _curve(grid, turned, rate, t))
         smooth, weight = _spread(grid, t, base**order, max(sigma * PHASE_SIGMA, 1.5 * step))
-        delta = np.angle(np.where(np.abs(smooth) > 0, smooth, 1.0))
-        delta = (
-            _bridged(grid, delta, _tells(grid, smooth, weight, t, base), np.unwrap) if may_vanish else np.unwrap(delta)
-        )
-        delta = delta / order
+        told = _tells(grid, smooth, weight, t, base) if may_vanish else np.full(grid.size, fill_value=True)
+        delta = _bridged(grid, np.angle(np.where(np.abs(smooth) > 0, smooth, 1.0)), told, np.unwrap) / order
         phase = turned + delta
         rate = rate + np.gradient(delta, step)
     amplitude = (np.abs(smooth) / np.maximum(weight, 1e-9)) ** (1 / order)
@@ -275,11 +266,28 @@ def phase_spin(
         turned = cumulative_trapezoid(rate, dx=step, initial=0)
         phase = turned + _weighted_median(phase - turned, amplitude)
         return Spin(grid, phase, rate, rate, amplitude, t, plane)
-    noise = _noise_of_steps(grid, rate, t, plane, step) if may_vanish else np.zeros(grid.size)
-    turning = _without_steps(grid, rate, t, plane, step, noise)
-    # where steps tell no rate, what the phase turned by in the meantime does
-    turning = np.where(noise < _STEPS_TELL, turning, np.gradient(_bridged(grid, phase, noise < _STEPS_TELL), step))
+    turning = _turning(grid, phase, rate, t, plane, step) if may_vanish else _without_steps(grid, rate, t, plane, step)
     return Spin(grid, phase, rate, turning, amplitude, t, plane)
+
+
+def _turning(
+    grid: FloatArray, phase: FloatArray, rate: FloatArray, t: FloatArray, z: ComplexArray, step: float
+) -> FloatArray:
+    """Return the rate (n,) between readings that were not lost, of a vector z (m,) that may vanish for a while.
+
+    Where steps tell no rate, what the phase turned by in the meantime does.
+    """
+    noise = _noise_of_steps(grid, rate, t, z, step)
+    told = noise < _STEPS_TELL
+    between = np.gradient(_bridged(grid, phase, told), step)
+    return np.where(told, _without_steps(grid, rate, t, z, step, noise), between)
+
+
+def _shaped(rate: FloatArray, own: FloatArray) -> FloatArray:
+    """Return the course of the centripetal rate (n,), as fast as one of a force that may vanish across the axis."""
+    ratio = rate / np.maximum(own, 1e-3)
+    sign = np.sign(np.median(ratio)) or 1.0
+    return np.asarray(own * sign * float(np.clip(np.median(np.abs(ratio)), 0.8, 1.25)))
 
 
 def _tells(grid: FloatArray, smooth: ComplexArray, weight: FloatArray, t: FloatArray, base: ComplexArray) -> BoolArray:
@@ -332,13 +340,14 @@ def _weighted_median(value: FloatArray, weight: FloatArray) -> float:
 
 
 def _without_steps(
-    grid: FloatArray, rate: FloatArray, t: FloatArray, z: ComplexArray, step: float, noise: FloatArray
+    grid: FloatArray, rate: FloatArray, t: FloatArray, z: ComplexArray, step: float, noise: FloatArray | None = None
 ) -> FloatArray:
     """Return the turning rate (n,) less the steps of phase where readings were lost and the clock did not show it.
 
     ``noise`` (n,) rad is a step's standard deviation: steps within it are none, and where it is large all are noise.
     """
     gap, middle, turned = np.diff(t), 0.5 * (t[1:] + t[:-1]), z[1:] * np.conj(z[:-1])
+    noise = np.zeros(grid.size) if noise is None else noise
     own = noise[np.clip(np.rint((middle - grid[0]) / step).astype(int), 0, grid.size - 1)]
     known = own < _STEPS_TELL
     if 2 * np.count_nonzero(known) > known.size:
