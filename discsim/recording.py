@@ -174,7 +174,7 @@ class Recording(Recorded):
     averaged: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        require_kind(self.plant, self.name)
+        require_type(self.name, str, "name", "a text")
         require_type(self.environment, Environment, "environment", "Environment(...)")
         require_type(self.disc, (Disc, NoneType), "disc", "a Disc: load_disc(NAME) returns one with its environment")
         if unknown := sorted({*self.samples, *self.sheets} - SENSORS.keys()):

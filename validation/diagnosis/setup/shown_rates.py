@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discsim.arrays import FloatArray, sd_by_median
+from discsim.effects.catalogue import catalogued
+from discsim.effects.sensors import PositionOffset, Scale
 from discsim.errors import InputError
 from discsim.estimators.tracking import tracking
 from discsim.recording import Recording, Samples
@@ -20,6 +22,8 @@ from discsim.validation.identification.ordinary_errors import ordinary_errors
 
 __all__ = ["FEWEST_SLOTS", "Multiple", "ShownRate", "shown_rates"]
 
+#: ordinary errors by which an accelerometer's pull tells a rate wrongly
+_PLACE, _SCALE = catalogued(PositionOffset).id, catalogued(Scale, "accelerometer").id
 #: pull towards the axis from which an accelerometer shows a rate, m/s^2
 _PULL = 5.0
 #: how much of a run a magnetometer is followed through where the place's field is not stated, s
@@ -158,5 +162,5 @@ def _off_its_place(arm: float) -> float:
     sigmas: Mapping[tuple[str, str], float] = {
         (error.effect, error.name): error.sigma for error in ordinary_errors("relaxed fit")
     }
-    place, scale = sigmas["accel.position_offset", "dx_m"] / arm, sigmas["accel.scale", "sx"]
+    place, scale = sigmas[_PLACE, "dx_m"] / arm, sigmas[_SCALE, "sx"]
     return _SIGMAS * 0.5 * float(np.hypot(place, scale))
