@@ -42,7 +42,7 @@ __all__ = [
     "SensorSheet",
     "read_dataset",
     "read_recording",
-    "require_kind",
+    "require_plant",
     "write_recording",
 ]
 
@@ -149,11 +149,10 @@ class SensorSheet:
         return at_range(value, self.range, self.resolution or 0.0)
 
 
-def require_kind(plant: str, name: str) -> None:
-    """Raise `InputError` for a plant that is none, and a name that is no text."""
+def require_plant(plant: str) -> None:
+    """Raise `InputError` for a plant that the format has not."""
     if plant not in PLANTS:
         raise InputError(f"plant is {plant!r}, expected one of {', '.join(map(repr, PLANTS))}")
-    require_type(name, str, "name", "a text")
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from discsim.errors import InputError, require_type
 from discsim.files import model_file
 from discsim.law import Law
 from discsim.motion import Motion
-from discsim.recording import SENSORS, Plant, Recording, Samples, require_kind
+from discsim.recording import SENSORS, Plant, Recording, Samples, require_plant
 from discsim.sensors.accelerometer import Accelerometer
 from discsim.sensors.additions import Addition, by_effect, by_law
 from discsim.sensors.gyroscope import Gyroscope
@@ -224,7 +224,7 @@ def record(
     require_type(motion, Motion, "motion", "a Motion: fly(...) returns one, and so does predict(...).motion()")
     require_type(instruments, Instruments, "instruments", 'sensors: Instruments.from_parts("mpu9250")')
     _require_generator(rng)
-    require_kind(plant, name)
+    require_plant(plant)
     streams = dict(zip(SENSORS, rng.spawn(len(SENSORS)), strict=True))
     samples, sheets = {}, {}
     seed = int(rng.spawn(1)[0].integers(2**32))  # of the pattern of rows, which is one for all

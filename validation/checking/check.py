@@ -15,6 +15,7 @@ from discsim.validation.checking.readings import reading_findings
 from discsim.validation.checking.run_down import run_down_findings
 from discsim.validation.checking.sensors import SensorCheck, check_sensor, sensor_findings
 from discsim.validation.checking.statements import statement_findings
+from discsim.validation.diagnosis.setup.reference import believed, reference_doubts
 from discsim.validation.diagnosis.setup.units import clock_doubts
 
 __all__ = ["Check", "SetupFault", "check_recording"]
@@ -88,14 +89,14 @@ class Check:
 def check_recording(recording: Recording, faults: Sequence[SetupFault] = ()) -> Check:
     """Return what is to be said of a recording; ``faults`` are setup faults found in it, which join the findings."""
     sensors = tuple(check_sensor(recording, name) for name in recording.samples)
-    clocks = clock_doubts(recording)
+    clocks, doubts = clock_doubts(recording), list(reference_doubts(recording))
     clocked = {name for doubt in clocks for name in doubt.sensors}
     findings = [
         *statement_findings(recording),
         *(Finding(_CLOCK, "error", ", ".join(one.sensors), one.what, one.expected, one.remedy) for one in clocks),
         *(finding for found in sensors for finding in sensor_findings(found, clocked=found.sensor in clocked)),
-        *reading_findings(recording),
-        *run_down_findings(recording),
+        *reading_findings(recording, doubts),
+        *run_down_findings(believed(recording, doubts)),
         # setup faults (axes, units, offsets in time) join here: anything with an id and a sentence
         *(Finding(fault.id, "error" if fault.id == _CLOCK else "warning", "setup", fault.sentence) for fault in faults),
     ]

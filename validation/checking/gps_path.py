@@ -11,8 +11,9 @@ from discsim.effects.catalogue import catalogued
 from discsim.effects.setup import GpsAxes
 from discsim.recording import Recording
 from discsim.validation.checking.finding import Finding
-from discsim.validation.checking.path_points import out_of_reach, rows_in_words, runs_of, scatter_of, standing
+from discsim.validation.checking.path_points import out_of_reach, rows_in_words, standing
 from discsim.validation.checking.statements import FASTEST
+from discsim.validation.diagnosis.track_ends import scatter_of
 from discsim.validation.importing.held import find_held
 
 __all__ = ["FARTHEST", "elsewhere", "gps_findings"]
@@ -65,12 +66,11 @@ def gps_findings(recording: Recording) -> Iterator[Finding]:
     sound = ~no_fix
     if recording.plant == "flight":
         if np.any(no_fix):
-            runs = runs_of(no_fix)
             yield Finding(
                 "gps.no_fix",
                 "error",
                 "gps",
-                f"rows hold 0, 0, 0 ({np.count_nonzero(no_fix)} of {len(value)}): at {rows_in_words(t, runs)}",
+                f"rows hold 0, 0, 0 ({np.count_nonzero(no_fix)} of {len(value)}): at {rows_in_words(t, no_fix)}",
                 "the place where the disc is",
                 f"zeros stand where the receiver had no fix; {_AS_GAPS}",
             )
@@ -80,17 +80,17 @@ def gps_findings(recording: Recording) -> Iterator[Finding]:
     if np.count_nonzero(sound) < 6:
         return
     t, value = t[sound], value[sound]
-    if degrees := _in_degrees(t, value, flies=recording.plant == "flight"):
+    moved, told = _changes(t, value)
+    if degrees := _in_degrees(value, moved, told, flies=recording.plant == "flight"):
         yield degrees
         return
-    moved, told = _changes(t, value)
     unit = _path_unit(moved, told)
     if unit is not None and _path_unit(moved, told / (gps.interval * recording.sheets["gps"].rate_hz)) is None:
         # a clock that is off by the same factor, by the rate that is stated, is told itself
         return
     if unit is not None:
         yield unit
-    yield from _position_and_velocity(t, value, flies=recording.plant == "flight" and unit is None)
+    yield from _position_and_velocity(value, moved, told, flies=recording.plant == "flight" and unit is None)
     if recording.plant == "flight" and unit is None:
         noise = max(recording.sheets["gps"].noise_rms or 0.0, scatter_of(np.nan_to_num(value[:, :3])))
         yield from _leaps(t, value, noise)
@@ -117,15 +117,15 @@ def _held(t: FloatArray, value: FloatArray, sound: BoolArray) -> Iterator[tuple[
     rows = np.flatnonzero(sound)
     if rows.size < 6 or find_held(value[rows]) is not None:
         return
-    for run in standing(t[rows], np.nan_to_num(value[rows, :3])):
+    for first, after in standing(t[rows], np.nan_to_num(value[rows, :3])):
         repeats = np.zeros(t.size, dtype=np.bool_)
-        repeats[rows[run.first + 1 : run.last + 1]] = True
+        repeats[rows[first + 1 : after]] = True
         yield (
             Finding(
                 "gps.frozen",
                 "error",
                 "gps",
-                f"it shows one place in {run.rows} rows, from {t[rows[run.first]]:.3f} to {t[rows[run.last]]:.3f} s",
+                f"it shows one place in {after - first} rows, from {t[rows[first]]:.3f} to {t[rows[after - 1]]:.3f} s",
                 "a place that changes while the disc flies",
                 "an old fix is repeated, or the disc lies: leave these rows out, they are no fixes of a flight",
             ),
@@ -141,12 +141,11 @@ def _changes(t: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.where(both, moved, 0.0), np.where(both, told, 0.0)
 
 
-def _in_degrees(t: FloatArray, value: FloatArray, *, flies: bool) -> Finding | None:
+def _in_degrees(value: FloatArray, moved: FloatArray, told: FloatArray, *, flies: bool) -> Finding | None:
     """Return that north and east are a latitude and a longitude, None where they are not.
 
     Velocities tell the unit where there are any; without them that nothing which flies covers so little, far from 0.
     """
-    moved, told = _changes(t, value)
     middle = np.median(value[:, :2], axis=0)
     spans = np.ptp(value[:, :2], axis=0)
     on_earth = abs(middle[0]) <= 90.0 and abs(middle[1]) <= 180.0
@@ -175,9 +174,8 @@ def _in_degrees(t: FloatArray, value: FloatArray, *, flies: bool) -> Finding | N
     )
 
 
-def _position_and_velocity(t: FloatArray, value: FloatArray, *, flies: bool) -> Iterator[Finding]:
+def _position_and_velocity(value: FloatArray, moved: FloatArray, told: FloatArray, *, flies: bool) -> Iterator[Finding]:
     """Yield an axis that is reversed in position or velocity, and a speed that is no throw's."""
-    moved, told = _changes(t, value)
     speed = float(np.nanmax(np.linalg.norm(np.nan_to_num(value[:, 3:]), axis=1)))
     if flies and speed > 60:
         yield Finding(
@@ -228,7 +226,7 @@ def _leaps(t: FloatArray, value: FloatArray, noise: float) -> Iterator[Finding]:
             "gps.leap",
             "warning",
             "gps",
-            f"fixes leap ({np.count_nonzero(out)} of {t.size}): at {rows_in_words(t, runs_of(out))}",
+            f"fixes leap ({np.count_nonzero(out)} of {t.size}): at {rows_in_words(t, out)}",
             f"a path that is nowhere faster than {FASTEST:g} m/s",
             _AS_GAPS,
         )

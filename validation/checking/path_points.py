@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray
+from discsim.arrays import BoolArray, FloatArray, runs
 from discsim.validation.checking.statements import FASTEST
 
-__all__ = ["Run", "out_of_reach", "rows_in_words", "runs_of", "scatter_of", "standing"]
+__all__ = ["out_of_reach", "rows_in_words", "standing"]
 
 #: beyond so many rows a course is followed across the last of them alone: all pairs would take minutes
 _ALL, _LAST = 3000, 300
@@ -20,38 +18,12 @@ _STANDS, _STANDS_S = 5, 0.25
 _LONGER = 3.0
 
 
-class Run(NamedTuple):
-    """Rows from ``first`` to ``last``, both among them."""
-
-    first: int
-    last: int
-
-    @property
-    def rows(self) -> int:
-        """How many rows."""
-        return self.last - self.first + 1
-
-
-def runs_of(chosen: BoolArray) -> list[Run]:
-    """Return the runs of rows on end that are chosen (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
-    return [Run(int(first), int(after) - 1) for first, after in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def rows_in_words(t: FloatArray, runs: list[Run]) -> str:
-    """Return where runs of rows are, by their times t (n,) s: the first three, and how many more there are."""
-    spans = [f"{t[run.first]:.3f} s" + f" to {t[run.last]:.3f} s" * (run.rows > 1) for run in runs[:3]]
-    more = f" and {len(runs) - 3} times more" * (len(runs) > 3)
+def rows_in_words(t: FloatArray, chosen: BoolArray) -> str:
+    """Return where chosen rows (n,) are, by their times t (n,) s: the first three runs, and how many more there are."""
+    found = runs(chosen)
+    spans = [f"{t[first]:.3f} s" + f" to {t[after - 1]:.3f} s" * (after - first > 1) for first, after in found[:3]]
+    more = f" and {len(found) - 3} times more" * (len(found) > 3)
     return ", ".join(spans) + more
-
-
-def scatter_of(position: FloatArray) -> float:
-    """Return the scatter of single points (n, k) m by third differences, robustly; 0 of fewer than four.
-
-    Third differences of white noise have 20 times its variance.
-    """
-    third = np.diff(position, 3, axis=0)
-    return float(np.median(np.abs(third)) / 0.6745 / np.sqrt(20.0)) if third.size else 0.0
 
 
 def out_of_reach(t: FloatArray, position: FloatArray, slack: float) -> BoolArray:
@@ -77,14 +49,16 @@ def out_of_reach(t: FloatArray, position: FloatArray, slack: float) -> BoolArray
     return out
 
 
-def standing(t: FloatArray, position: FloatArray) -> list[Run]:
+def standing(t: FloatArray, position: FloatArray) -> list[tuple[int, int]]:
     """Return the runs of rows in which a position (n, k) repeats to the last digit, longer than any receiver's usual.
 
-    Empty where nothing moves at all.
+    The first row of each and the one after its last; none where nothing moves at all.
     """
     same = np.all(position[1:] == position[:-1], axis=1)
     edges = np.flatnonzero(~np.concatenate([[False], same, [False]]))
     lengths = np.diff(edges)
     fewest = max(_STANDS, _LONGER * float(np.median(lengths))) if lengths.size > 1 else np.inf
-    found = [Run(int(first), int(first + length) - 1) for first, length in zip(edges, lengths, strict=False)]
-    return [run for run in found if run.rows >= fewest and t[run.last] - t[run.first] >= _STANDS_S]
+    found = [(int(first), int(first + length)) for first, length in zip(edges, lengths, strict=False)]
+    return [
+        (first, after) for first, after in found if after - first >= fewest and t[after - 1] - t[first] >= _STANDS_S
+    ]

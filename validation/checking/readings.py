@@ -15,7 +15,7 @@ from discsim.recording import SENSORS, Recording, Samples
 from discsim.validation.checking.finding import Finding, Severity
 from discsim.validation.checking.paths import path_findings
 from discsim.validation.checking.statements import FIELD
-from discsim.validation.diagnosis.setup.reference import reference_doubts
+from discsim.validation.diagnosis.setup.reference import ReferenceDoubt
 
 __all__ = ["at_rest", "reading_findings"]
 
@@ -36,12 +36,12 @@ FORCES = {"g": 1 / 9.80665, "mg": 1e3 / 9.80665, "cm/s^2": 100.0}
 FIELDS = {"T": 1e-6, "mT": 1e-3, "gauss": 1e-2, "mG": 10.0, "nT": 1e3}
 
 
-def reading_findings(recording: Recording) -> Iterator[Finding]:
-    """Yield what the readings of a recording show that cannot be, or is unlikely."""
+def reading_findings(recording: Recording, doubts: Sequence[ReferenceDoubt]) -> Iterator[Finding]:
+    """Yield what the readings of a recording show that cannot be, or is unlikely; ``doubts`` are of its told rates."""
     yield from _force(recording)
     yield from _field(recording)
     doubted = []
-    for doubt in reference_doubts(recording):
+    for doubt in doubts:
         where = doubt.file.removesuffix(".csv")
         severity: Severity = "error" if doubt.sure else "warning"
         yield Finding(f"{where}.{doubt.kind}", severity, where, f"it {doubt.what}", doubt.expected, doubt.remedy)

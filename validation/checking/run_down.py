@@ -18,7 +18,6 @@ from discsim.disc import Rig
 from discsim.limits import time_fault
 from discsim.recording import Recording
 from discsim.validation.checking.finding import Finding
-from discsim.validation.diagnosis.setup.reference import reference_doubts
 from discsim.validation.diagnosis.setup.shown_rates import ShownRate, shown_rates
 
 __all__ = ["run_down_findings"]
@@ -55,7 +54,10 @@ _NEAR = 2.0
 
 
 def run_down_findings(recording: Recording) -> Iterator[Finding]:
-    """Yield that a rig's stated friction or inertia cannot be, by how its rate falls."""
+    """Yield that a rig's stated friction or inertia cannot be, by how its rate falls.
+
+    A rate reference is believed: one that is refuted is to be left out before (`reference.believed`).
+    """
     rig, shown = recording.rig, _falling(recording)
     if rig is None or shown is None or not rig.viscous > 0.0:
         return
@@ -93,18 +95,19 @@ def _remedy(falls: float, stated: float) -> str:
 def _falling(recording: Recording) -> tuple[FloatArray, FloatArray] | None:
     """Return means of the rate's size while a rig runs down: times (n,) s and rates (n,) rad/s; None for too few.
 
-    By the rate reference, or by the first sensor that shows a rate where there is none or it is refuted.
+    By the rate reference, or by the first sensor that shows a rate where there is none.
     """
     if recording.rig is None or any(len(one) and time_fault(one.t) for one in recording.samples.values()):
         return None
-    rates: dict[str, ShownRate] = shown_rates(recording)
-    samples = recording.get("rate_reference")
-    if samples is not None and not any(doubt.sure for doubt in reference_doubts(recording)):
+    shown: ShownRate | None
+    if (samples := recording.get("rate_reference")) is not None:
         known = np.isfinite(samples.value)
-        rates = {"rate_reference": ShownRate(samples.t[known], samples.value[known], signed=True)}
-    if not rates:
+        shown = ShownRate(samples.t[known], samples.value[known], signed=True)
+    else:
+        shown = next(iter(shown_rates(recording).values()), None)
+    if shown is None:
         return None
-    t, rate = next(iter(rates.values())).slots()
+    t, rate = shown.slots()
     if t.size < _FEWEST:
         return None
     first = int(np.argmax(rate))

@@ -12,8 +12,9 @@ from discsim.disc import Release
 from discsim.recording import SENSORS, Recording, Samples
 from discsim.validation.checking.finding import Finding
 from discsim.validation.checking.gps_path import elsewhere
-from discsim.validation.checking.path_points import Run, out_of_reach, rows_in_words, runs_of, scatter_of, standing
+from discsim.validation.checking.path_points import out_of_reach, rows_in_words, standing
 from discsim.validation.checking.statements import FASTEST
+from discsim.validation.diagnosis.track_ends import scatter_of
 
 __all__ = ["track_findings"]
 
@@ -107,33 +108,33 @@ def _whole(samples: Samples, noise: float | None, rate_hz: float) -> _Track | No
 def _moving(track: _Track) -> _Track | None:
     """Return a track with one row of each stretch that stands; None if nothing moves."""
     keep = np.ones(track.t.size, dtype=np.bool_)
-    for run in _standing(track):
-        keep[run.first + 1 : run.last + 1] = False
-        if run.first == 0:
+    for first, after in _standing(track):
+        keep[first + 1 : after] = False
+        if first == 0:
             keep[0] = False
-            keep[run.last] = True
+            keep[after - 1] = True
     if np.count_nonzero(keep) < 6 or not np.any(np.ptp(track.position[keep][:, track.seen], axis=0)):
         return None
     return track._replace(t=track.t[keep], position=track.position[keep])
 
 
-def _standing(track: _Track) -> list[Run]:
+def _standing(track: _Track) -> list[tuple[int, int]]:
     return standing(track.t, track.position[:, track.seen])
 
 
 def _still(track: _Track) -> Iterator[Finding]:
     """Yield the stretches in which the track writes the same point again and again."""
-    for run in _standing(track):
-        at = "before the throw" if run.first == 0 else ""
-        at = "the disc lies, or the tracker has lost it" if run.last == track.t.size - 1 else at
+    for first, after in _standing(track):
+        at = "before the throw" if first == 0 else ""
+        at = "the disc lies, or the tracker has lost it" if after == track.t.size else at
         yield Finding(
             "track.still",
             "warning",
             "track",
-            f"it shows one point in {run.rows} rows, from {track.t[run.first]:.3f} to {track.t[run.last]:.3f} s",
+            f"it shows one point in {after - first} rows, from {track.t[first]:.3f} to {track.t[after - 1]:.3f} s",
             "a point that moves while the disc flies",
             f"{at or 'the tracker has lost the disc'}: leave these rows out"
-            + ("; time counts from the release" if run.first == 0 else ""),
+            + ("; time counts from the release" if first == 0 else ""),
         )
 
 
@@ -302,12 +303,11 @@ def _leaps(track: _Track) -> Iterator[Finding]:
     """Yield points that no throw could reach from those before and after."""
     out = out_of_reach(track.t, track.position[:, track.seen], _ELSEWHERE + 6.0 * track.noise)
     if np.any(out):
-        runs = runs_of(out)
         yield Finding(
             "track.leap",
             "warning",
             "track",
-            f"points leap ({np.count_nonzero(out)} of {out.size}): at {rows_in_words(track.t, runs)}",
+            f"points leap ({np.count_nonzero(out)} of {out.size}): at {rows_in_words(track.t, out)}",
             f"a path that is nowhere faster than {FASTEST:g} m/s",
             "the tracker took something else for the disc: make these cells empty",
         )

@@ -13,7 +13,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.recording import Samples
 
-__all__ = ["TrackCut", "flight_of"]
+__all__ = ["TrackCut", "flight_of", "scatter_of"]
 
 #: share of the speed of the half second beside it below which a track's end, or beginning, is no flight: the drag of a
 #: driver (C_D of 0.3 at 20 m/s, 0.18 kg) takes 30 % of the speed in a second, 10 % between the middles of the two
@@ -45,7 +45,7 @@ def flight_of(track: Samples, noise: float | None = None) -> TrackCut:
     if seen.size < 4 * _FEWEST:
         return TrackCut(track, 0.0, 0.0)
     t, plan = track.t[seen], track.value[seen, :2]
-    level = max(noise or 0.0, _scatter(plan))
+    level = max(noise or 0.0, scatter_of(plan))
     last = _flying(t, plan, level)
     first = t.size - 1 - _flying(-t[::-1], plan[::-1], level)
     if last <= first:
@@ -58,9 +58,13 @@ def flight_of(track: Samples, noise: float | None = None) -> TrackCut:
     return TrackCut(flight, before, after)
 
 
-def _scatter(plan: FloatArray) -> float:
-    """Return the scatter of single points (m) by third differences, robustly."""
-    return float(np.median(np.abs(np.diff(plan, 3, axis=0))) / 0.6745 / 20.0**0.5)
+def scatter_of(position: FloatArray) -> float:
+    """Return the scatter of single points (n, k) m by third differences, robustly; 0 of fewer than four.
+
+    Third differences of white noise have 20 times its variance.
+    """
+    third = np.diff(position, 3, axis=0)
+    return float(np.median(np.abs(third)) / 0.6745 / 20.0**0.5) if third.size else 0.0
 
 
 def _flying(t: FloatArray, plan: FloatArray, noise: float) -> int:

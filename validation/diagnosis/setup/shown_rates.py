@@ -78,15 +78,13 @@ class ShownRate:
 
     def slots(self) -> tuple[FloatArray, FloatArray]:
         """Return the mean times (k,) s and the mean sizes (k,) of the rate over slots of time."""
-        _, place, count = np.unique(np.floor(self.t / _SLOT), return_inverse=True, return_counts=True)
-        return np.bincount(place, self.t) / count, np.bincount(place, np.abs(self.rate)) / count
+        return _over_slots(self.t, self.t, np.abs(self.rate))
 
     def means(self, told: Samples) -> tuple[FloatArray, FloatArray]:
         """Return the means (k,) of the sizes of both over slots of time, each while both are there."""
         inside = (self.t >= told.t[0]) & (self.t <= told.t[-1])
         read, said = self.beside(told)
-        _, place, count = np.unique(np.floor(self.t[inside] / _SLOT), return_inverse=True, return_counts=True)
-        return np.bincount(place, np.abs(read)) / count, np.bincount(place, np.abs(said)) / count
+        return _over_slots(self.t[inside], np.abs(read), np.abs(said))
 
     def multiple(self, told: Samples) -> Multiple | None:
         """Return by what factor the rate that is shown is another than the one told; None where too little turns."""
@@ -102,6 +100,12 @@ class ShownRate:
         # of a median, whose variance is pi / 2 of a mean's
         sd = float(np.sqrt(np.pi / 2.0 / ratios.size)) * scatter / factor
         return Multiple(factor, max(self.ordinary, _SIGMAS * sd), scatter <= _STEADY * abs(factor - 1.0))
+
+
+def _over_slots(t: FloatArray, one: FloatArray, other: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the means (k,) of two series (n,) at times t (n,) s over slots of time."""
+    _, place, count = np.unique(np.floor(t / _SLOT), return_inverse=True, return_counts=True)
+    return np.bincount(place, one) / count, np.bincount(place, other) / count
 
 
 def shown_rates(recording: Recording) -> dict[str, ShownRate]:

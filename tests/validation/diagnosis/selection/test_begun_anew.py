@@ -9,10 +9,12 @@ import numpy as np
 from numpy.testing import assert_array_equal
 from support.made import MODULE
 
-from discsim.disc import Release
+from discsim.disc import Disc, Release
 from discsim.effects.catalogue import effect
 from discsim.engine import fly
-from discsim.sensors import record
+from discsim.environment import Environment
+from discsim.recording import Plant, Recording
+from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
 from discsim.validation.diagnosis.relaxed_fit import relaxed, unknowns
 from discsim.validation.diagnosis.selection.begun_anew import begun_anew
@@ -27,20 +29,25 @@ THROWS = ((-15.9, -18.5, 0.12, 0.02, 69.0), (19.5, -5.6, -0.08, 0.17, 73.8), (-1
 BESIDE = {"turn_1_s": -5.0, "turn_1_s2": 43.0, "along_1_s": 4.8, "along_1_s2": -38.0, "turn_1_s3": -36.0}
 
 
-@cache
-def settled() -> tuple[Fit, Fit]:
-    """The relaxed fit of three free spins of a disc with tables, and the fit with continuous segments."""
-    disc, field = load_disc("cd1")
-    bare = replace(disc, aero=None, aero_table=None, yaw_damping_table=None, sigma={})
-    spins = []
+def recorded(disc: Disc, field: Environment, module: Instruments, plant: Plant, stated: Disc) -> list[Recording]:
+    """The three throws of a disc as a module measures them, in recordings that state a disc."""
+    found = []
     for k, (north, east, roll, pitch, spin) in enumerate(THROWS):
         release = Release(
             np.array([0.0, 0.0, -1.3]), np.array([north, east, -4.0]), roll, pitch, np.arctan2(east, north),
             np.array([0.3, 0.3, spin]),
         )  # fmt: skip
-        motion = fly(disc, field, release, duration=2.0)
-        rng = np.random.default_rng(k)
-        spins.append(record(motion, BLIND, rng, plant="free_spin", name=f"{k + 1:02d}", disc=bare))
+        motion, rng = fly(disc, field, release, duration=2.0), np.random.default_rng(k)
+        found.append(record(motion, module, rng, plant=plant, name=f"{k + 1:02d}", disc=stated))
+    return found
+
+
+@cache
+def settled() -> tuple[Fit, Fit]:
+    """The relaxed fit of three free spins of a disc with tables, and the fit with continuous segments."""
+    disc, field = load_disc("cd1")
+    bare = replace(disc, aero=None, aero_table=None, yaw_damping_table=None, sigma={})
+    spins = recorded(disc, field, BLIND, "free_spin", bare)
     first = relaxed(spins)
     own = unknowns(spins)
     fit = Fit(first.trajectories, own, np.zeros(len(own)), first.continuous_defects, first.noise)
@@ -83,14 +90,7 @@ def flights(ratio: float) -> tuple[Fit, Fit]:
     """The relaxed fit of three flights whose magnetometer's clock is wrong, and the fit that knows it."""
     disc, field = load_disc("cd1")
     module = MODULE.with_effects([effect("mag.clock_rate", ratio=ratio)])
-    throws = []
-    for k, (north, east, roll, pitch, spin) in enumerate(THROWS):
-        release = Release(
-            np.array([0.0, 0.0, -1.3]), np.array([north, east, -4.0]), roll, pitch, np.arctan2(east, north),
-            np.array([0.3, 0.3, spin]),
-        )  # fmt: skip
-        motion = fly(disc, field, release, duration=2.0)
-        throws.append(record(motion, module, np.random.default_rng(k), plant="flight", name=f"{k + 1:02d}", disc=disc))
+    throws = recorded(disc, field, module, "flight", disc)
     first = relaxed(throws)
     clock = Parameter("mag.clock_rate", "ratio", 1.0, 1e-6, 0.03)
     fit = Fit(first.trajectories, (clock,), np.array([ratio]), first.continuous_defects, first.noise)
