@@ -13,6 +13,7 @@ from discsim.effects.setup import TimeOffset
 from discsim.errors import InputError
 from discsim.recording import Recording
 from discsim.validation.diagnosis.assemble import outcome_of
+from discsim.validation.diagnosis.bent_segments import with_bends_followed
 from discsim.validation.diagnosis.consistency.early_verdict import contradiction_after, contradiction_in
 from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of, compared
 from discsim.validation.diagnosis.datasets import recording_names
@@ -23,6 +24,7 @@ from discsim.validation.diagnosis.refuted import without_refuted
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.result import Outcome
 from discsim.validation.diagnosis.selection.refits import told_to
+from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault, with_turned_board
 from discsim.validation.diagnosis.setup_effects import (
@@ -110,7 +112,26 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
         return Tried(ready, contradiction)
     hints = (*ready.supposed, *setup.hints)
     found = search(ready.fitted, progress, ready.meant, followed, free, hints, question.effects)
+    for _ in range(_BENDS):
+        if not followed.plant.weakly_identified or not _in_doubt(found):
+            break
+        bent = with_bends_followed(found, followed)
+        if bent is None:
+            break
+        again = search(ready.fitted, progress, ready.meant, bent, free, hints, question.effects)
+        if leaves_more_than_noise(again) and not leaves_more_than_noise(found):
+            break
+        followed, found = bent, again
     return Tried(ready, None, found)
+
+
+#: times that segments are halved where the air's moment bends within them
+_BENDS = 2
+
+
+def _in_doubt(found: Search) -> bool:
+    """Tell whether a search names effects or leaves more than noise."""
+    return bool(found.final.hypothesis.candidates) or leaves_more_than_noise(found)
 
 
 def prepared_under(setup: SetupFindings, question: Question) -> Prepared:

@@ -16,6 +16,7 @@ from discsim.effects.own import UserEffect
 from discsim.recording import Recording
 from discsim.validation.identification.competing_effects import CATALOGUED, Competing
 from discsim.validation.identification.parameters import Parameter
+from discsim.validation.identification.plants import PLANTS
 from discsim.validation.identification.propagation import Column
 
 __all__ = ["CandidateEffect", "candidates_for", "free_candidate", "in_parameters", "parameters_of"]
@@ -26,7 +27,7 @@ class CandidateEffect:
     """An effect as a hypothesis: free columns, and the recordings it acts in (None: all).
 
     ``fixed_values`` are parameters (name, value, sd) that a search has found and that no fit moves; ``user`` is an
-    effect of the user's own, None for one of the catalogue.
+    effect of the user's own, None for one of the catalogue. ``told_by_one`` is whether one recording alone may tell it.
     """
 
     id: str
@@ -34,6 +35,7 @@ class CandidateEffect:
     recordings: frozenset[int] | None = None
     fixed_values: tuple[tuple[str, float, float], ...] = ()
     user: UserEffect | None = field(default=None, compare=False, repr=False)
+    told_by_one: bool = field(default=True, compare=False, repr=False)
 
     @property
     def row(self) -> Row:
@@ -110,12 +112,19 @@ def free_candidate(
 ) -> CandidateEffect:
     """Return the candidate of an effect in all recordings with every parameter free but those of its ``shape``.
 
-    Nor are those free that no reading of its ``plant`` tells.
+    Nor are those free that no reading of its ``plant`` tells. Where nobody knows the air's moments, what they do to one
+    throw may look like another disc: then only all throws together tell one.
     """
     row = CATALOGUE[id] if user is None else user.row
+    air_unknown = plant in PLANTS and PLANTS[plant].weakly_identified
     held = {name for name, _ in shape}.union(row.untold.get(plant, ()))
     free = [name for name in row.fitted if name not in held]
-    return CandidateEffect(id, tuple(Column(id, name, _step(row, name), shape) for name in free), user=user)
+    return CandidateEffect(
+        id,
+        tuple(Column(id, name, _step(row, name), shape) for name in free),
+        user=user,
+        told_by_one=not (air_unknown and row.in_all and row.acts_on == "motion"),
+    )
 
 
 def parameters_of(candidate: CandidateEffect, *, shaped: bool = True) -> tuple[Parameter, ...]:

@@ -48,7 +48,7 @@ def screened_candidates(
     present = {(candidate.id, candidate.recordings) for candidate in hypothesis.candidates}
     for candidate in candidates:
         scopes: list[frozenset[int] | None] = [None]
-        if equations.recordings > 1:
+        if equations.recordings > 1 and candidate.told_by_one:
             scopes += [frozenset([i]) for i in range(equations.recordings)]
         best: ScreenedCandidate | None = None
         for scope in scopes:

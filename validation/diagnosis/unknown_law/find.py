@@ -24,6 +24,7 @@ from discsim.validation.diagnosis.unknown_law.formula import as_laws, as_sensor_
 from discsim.validation.diagnosis.unknown_law.motion_law import candidate_laws, fitted_law, reference_of, state_of
 from discsim.validation.diagnosis.unknown_law.sensor_law import (
     asked_of_sensors,
+    coefficients_of,
     fitted_sensor_law,
     further_sensor_terms,
     sensor_library,
@@ -172,7 +173,7 @@ def find_law(
     ranked: list[tuple[float, float, Term | SensorTerm]] = []
     if motion:
         ranked += candidate_laws(start, own, motion, at)
-    ranked += [(gain, 0.0, term) for gain, term in zip(asked_of_sensors(start, own, about), about, strict=True)]
+    ranked += _worth(start, about, asked_of_sensors(start, own, about))
     ranked.sort(key=lambda item: -item[0])
     found: tuple[ContinuousFit, Term | SensorTerm] | None = None
     for _, coefficient, term in _spread(ranked):
@@ -254,8 +255,7 @@ def _more_sensor_terms(
         return fitted, terms
     settled = settled_terms(fitted, terms)
     others = further_sensor_terms(library, settled)
-    gains = asked_of_sensors(start, own, others, settled)
-    ranked = sorted(((gain, 0.0, term) for gain, term in zip(gains, others, strict=True)), key=lambda item: -item[0])
+    ranked = sorted(_worth(start, others, asked_of_sensors(start, own, others, settled)), key=lambda item: -item[0])
     best = fitted
     for _, _, term in _spread(ranked):
         assert isinstance(term, SensorTerm)
@@ -267,6 +267,16 @@ def _more_sensor_terms(
         if _holds(gained, two):
             best, terms = both, two
     return best, terms
+
+
+def _worth(
+    start: Fit, terms: Sequence[SensorTerm], gains: Sequence[float]
+) -> list[tuple[float, float, Term | SensorTerm]]:
+    """Return sensor terms with what they gain less what their coefficients cost: a swing has many of its own."""
+    return [
+        (gain - SELECTION.per_parameter * coefficients_of(start.trajectories, term), 0.0, term)
+        for gain, term in zip(gains, terms, strict=True)
+    ]
 
 
 def _holds(heldout: Mapping[int, float], terms: Sequence[Term | SensorTerm] = ()) -> bool:

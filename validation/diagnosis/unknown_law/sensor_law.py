@@ -15,6 +15,7 @@ from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.screening import NormalEquations, column_of
 from discsim.validation.diagnosis.selection.to_stated import to_baseline
 from discsim.validation.diagnosis.unknown_law.terms import SENSORS, SHAPES, SensorTerm
+from discsim.validation.identification.dynamics import FASTEST
 from discsim.validation.identification.gauss_newton import Fit, linearised, mapped, whole_step
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.noise import chi_squared
@@ -26,6 +27,7 @@ from discsim.validation.identification.segments import Trajectory
 __all__ = [
     "SettledTerm",
     "asked_of_sensors",
+    "coefficients_of",
     "fitted_sensor_law",
     "further_sensor_terms",
     "sensor_library",
@@ -62,7 +64,7 @@ _SAME_SWING = 1.0
 
 #: slower swings than so many in a recording are its drifts; a peak stands out from the median power by this factor,
 #: where the highest of noise, of five lines in each of three recordings, by 2.5; a channel needs so many readings
-_LONGEST_SWINGS, _STANDS_OUT, _FEWEST = 10.0, 5.0, 50
+_LONGEST_SWINGS, _STANDS_OUT, _FEWEST = 0.5, 5.0, 50
 
 
 #: orders of the spin nearer than this are one
@@ -161,6 +163,7 @@ def orders(fit: Fit, sensor: str) -> list[float]:
     """Return the orders of the spin at which a sensor's residuals of a relaxed fit have their highest lines."""
     length = 0.0
     parts = []
+    most = FASTEST * max(float(trajectory.nodes[-1]) for trajectory in fit.trajectories)
     for linear, trajectory in zip(fit.linears, fit.trajectories, strict=True):
         spin = turned(trajectory)
         for channel in linear.channels:
@@ -169,8 +172,8 @@ def orders(fit: Fit, sensor: str) -> list[float]:
                 e = linear.residual[channel.rows]
                 parts.append((psi, e - e.mean()))
                 length = max(length, float(np.ptp(psi)))
-    if length < 20.0:
-        return []
+    if not 20.0 < length < most:
+        return []  # hardly a turn, or a motion that has run beyond all numbers
     step = 1.0 / length
     tried = np.arange(_ORDERS[0], _ORDERS[1], step)
     return _peaks(tried, _spectrum(parts, tried, step), 12.0 * step)
@@ -223,7 +226,8 @@ def swings(fit: Fit, sensor: str) -> list[float]:
     if not parts:
         return []
     step = 0.5 * np.pi / length
-    tried = np.arange(_LONGEST_SWINGS * 2.0 * np.pi / length, fastest, step)
+    # at half the rate of the readings itself a sine is nothing at every reading
+    tried = np.arange(_LONGEST_SWINGS * 2.0 * np.pi / length, fastest - 0.5 * step, step)
     if not tried.size:
         return []
     power = _spectrum(parts, tried, step)
@@ -281,7 +285,7 @@ def _coefficients(trajectories: Sequence[Trajectory], term: SensorTerm, number: 
     ]
 
 
-def _width(trajectories: Sequence[Trajectory], term: SensorTerm) -> int:
+def coefficients_of(trajectories: Sequence[Trajectory], term: SensorTerm) -> int:
     """Return the number of a term's coefficients."""
     return len(_coefficients(trajectories, term))
 
@@ -309,12 +313,12 @@ def asked_of_sensors(
     if not terms:
         return []
     defects, p = fit.defects, len(fit.parameters)
-    known = [_width(fit.trajectories, one.term) for one in settled]
+    known = [coefficients_of(fit.trajectories, one.term) for one in settled]
     wide: list[Linear] = []
     places, at = [], p + sum(known) + len(settled)
     first = at
     for term in terms:
-        width = _width(fit.trajectories, term)
+        width = coefficients_of(fit.trajectories, term)
         places.append(range(at, at + width))
         at += width
     for i, (bare, trajectory) in enumerate(zip(linearised(fit), fit.trajectories, strict=True)):

@@ -134,6 +134,22 @@ def test_a_field_that_alternates_outside_is_a_law_of_its_frequency_in_any_phase(
     assert all(gain > 50.0 for gain in found.heldout.values())
 
 
+@pytest.mark.parametrize(("frequency", "line"), [(49.97, 49.97), (99.7, 0.3)])
+def test_a_field_that_seems_to_stand_still_or_to_change_sign_at_every_reading_is_a_law(frequency: float, line: float):
+    found = law_of(coasting([MainsField(4.0, frequency, (0.6, -0.64, 0.48))] * 3, 8.0))
+    assert found is not None
+    assert within(found, "w", 2.0 * np.pi * line)
+
+
+def test_a_magnetometer_that_warms_up_is_no_field_that_swings_slowly():
+    """A swing has eighteen coefficients in each run and follows any drift; what it gains by them it must pay for."""
+    secret = Warming("magnetometer", (3.0, -2.0, 4.0), 2.5)
+    found = law_of(coasting([secret] * 3))
+    assert found is not None
+    assert found.law.text == "c - c * exp(-t/tau)"
+    assert within(found, "tau", 2.5)
+
+
 def test_fields_that_alternate_at_other_frequencies_are_no_law():
     secrets = [MainsField(4.0, frequency, (0.6, -0.64, 0.48)) for frequency in (50.1, 43.0, 37.0)]
     assert law_of(coasting(secrets)) is None

@@ -1,0 +1,53 @@
+"""Segments of a free spin are halved where the moment of the air bends within them, and nowhere else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from support.made import MODULE, throws
+
+from discsim.disc import Release
+from discsim.engine import fly
+from discsim.recording import Recording
+from discsim.sensors import record
+from discsim.shipped import load_disc
+from discsim.validation.diagnosis.bent_segments import with_bends_followed
+from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.selection import stepwise
+from discsim.validation.identification.plants.free_spin import FREE_SPIN
+
+BLIND = MODULE.without("gps").fitted("gyroscope", range=104.72)
+
+#: the angle of attack goes from -4 to 8 degrees, and a wobble of half a degree over corners of a table at every other
+ACROSS = Release(
+    np.array([0.0, 0.0, -1.4]), np.array([-7.2, 12.2, -3.2]), -0.02, -0.124, 2.1, np.array([0.8, 0.5, 32.5])
+)
+
+
+def spinning(name: str, seconds: float) -> Recording:
+    """Return a free spin of a disc whose moments are a table."""
+    disc, field = load_disc(name)
+    motion = fly(disc, field, ACROSS, duration=seconds)
+    bare = replace(disc, aero=None, aero_table=None, yaw_damping_table=None, sigma={})
+    return record(motion, BLIND, np.random.default_rng(3), plant="free_spin", name=name, disc=bare)
+
+
+def test_a_segment_with_a_corner_is_halved_and_its_fit_is_the_better_for_it():
+    recordings = [spinning("dd2", 1.8)]
+    followed = relaxed(recordings)
+    found = stepwise.screened(recordings, followed=followed)
+    fit = with_bends_followed(found, followed)
+    assert fit is not None
+    before, after = followed.trajectories[0].nodes, fit.trajectories[0].nodes
+    new = np.setdiff1d(after, before)
+    assert 0 < new.size < before.size - 1
+    np.testing.assert_allclose(new, [0.5 * (before[k - 1] + before[k]) for k in np.searchsorted(before, new)])
+    again = stepwise.screened(recordings, followed=fit)
+    assert again.base.score < found.base.score - 20.0 * new.size
+
+
+def test_where_no_moment_bends_no_segment_is_halved():
+    recordings = throws(module=BLIND, plant=FREE_SPIN.name)
+    followed = relaxed(recordings)
+    assert with_bends_followed(stepwise.screened(recordings, followed=followed), followed) is None
