@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +25,8 @@ from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.result import Outcome
 from discsim.validation.diagnosis.selection.refits import told_to
 from discsim.validation.diagnosis.selection.search_state import Search
-from discsim.validation.diagnosis.selection.stepwise import search
+from discsim.validation.diagnosis.selection.stepwise import screened, search
+from discsim.validation.diagnosis.settings import UNKNOWN_LAW
 from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault, with_turned_board
 from discsim.validation.diagnosis.setup_effects import (
     free_parameters,
@@ -34,9 +35,12 @@ from discsim.validation.diagnosis.setup_effects import (
     without_offsets,
 )
 from discsim.validation.diagnosis.stages import Prepared, Progress, Question, Tried, silent
+from discsim.validation.diagnosis.unknown_law.find import find_law
 from discsim.validation.diagnosis.verdict import judged, leaves_more_than_noise
 from discsim.validation.identification.competing_effects import Competing
+from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.plants.plan import Plan
+from discsim.validation.identification.residual_tests import unmodelled_residuals
 from discsim.validation.identification.stated_parameters import stated_parameters
 
 __all__ = ["diagnose"]
@@ -70,7 +74,8 @@ def diagnose(
             if supposed is not None:
                 again = tried_under(supposed, question)
                 tried = again if stands(again) else tried
-        if tried.found is not None:
+        tried = _with_law_of_one(tried, question)
+        if tried.found is not None and tried.law is None:
             tried = replace(tried, found=without_refuted(tried.found))
         return outcome_of(judged(tried, progress), question)
 
@@ -78,6 +83,26 @@ def diagnose(
 def tried_under(setup: SetupFindings, question: Question) -> Tried:
     """Follow recordings as a setup says that they were meant and search effects, unless their sensors contradict."""
     return tried_with(prepared_under(setup, question), question)
+
+
+def _with_law_of_one(tried: Tried, question: Question) -> Tried:
+    """Return what was tried with a law where that is all by which one sensor contradicts the others.
+
+    A strong magnet that turns, or the field of a mains cable, is many times a magnetometer's noise; a wrong column, or
+    a sensor of another throw, follows no formula.
+    """
+    contradiction, ready = tried.contradiction, tried.prepared
+    if contradiction is None or contradiction.lost or len(contradiction.against) != 1:
+        return tried
+    question.progress("looking for a law", 4, 5)
+    free = free_parameters(ready.setup)
+    begun = screened(ready.fitted, as_stated=ready.meant, free=free, effects=question.effects)
+    law = find_law(begun.relaxed_fit, begun.base, begun.own, begun.relaxed_noise, ready.fitted)
+    if law is None or law.law.target.partition(".")[0] not in contradiction.against:
+        return tried
+    fit, residuals = law.fitted.fit, law.fitted.residuals
+    alone = law.share > UNKNOWN_LAW.all and not unmodelled_residuals(fit.linears, residuals, fit.noise)
+    return Tried(ready, None, begun, law) if alone else tried
 
 
 def _prepared_first(question: Question) -> Prepared:
@@ -111,17 +136,13 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
     if contradiction is not None:
         return Tried(ready, contradiction)
     hints = (*ready.supposed, *setup.hints)
-    found = search(ready.fitted, progress, ready.meant, followed, free, hints, question.effects)
-    for _ in range(_BENDS):
-        if not followed.plant.weakly_identified or not _in_doubt(found):
-            break
-        bent = with_bends_followed(found, followed)
-        if bent is None:
-            break
-        again = search(ready.fitted, progress, ready.meant, bent, free, hints, question.effects)
-        if leaves_more_than_noise(again) and not leaves_more_than_noise(found):
-            break
-        followed, found = bent, again
+
+    def searched(followed: Fit) -> Search:
+        return search(ready.fitted, progress, ready.meant, followed, free, hints, question.effects)
+
+    found = searched(followed)
+    if followed.plant.weakly_identified:
+        found = _with_bends(found, followed, searched)
     return Tried(ready, None, found)
 
 
@@ -129,9 +150,23 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
 _BENDS = 2
 
 
-def _in_doubt(found: Search) -> bool:
-    """Tell whether a search names effects or leaves more than noise."""
-    return bool(found.final.hypothesis.candidates) or leaves_more_than_noise(found)
+def _with_bends(found: Search, followed: Fit, searched: Callable[[Fit], Search]) -> Search:
+    """Return the search of free spins with segments halved that bend, where one names effects or leaves too much.
+
+    ``searched`` is a search from a relaxed fit. Bends may stand in for what a search named, or hide one thing more:
+    a stack of effects beside them copies what nobody knows.
+    """
+    for _ in range(_BENDS):
+        left, count = leaves_more_than_noise(found), len(found.final.hypothesis.candidates)
+        bent = with_bends_followed(found, followed) if left or count else None
+        if bent is None:
+            break
+        again = searched(bent)
+        still = leaves_more_than_noise(again)
+        if (still and not left) or len(again.final.hypothesis.candidates) > (1 if left else count):
+            break
+        followed, found = bent, again
+    return found
 
 
 def prepared_under(setup: SetupFindings, question: Question) -> Prepared:

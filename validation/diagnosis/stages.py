@@ -76,11 +76,15 @@ class Prepared:
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """A setup put to the proof: either sensors contradict one another under it, or effects were searched."""
+    """A setup put to the proof: either sensors contradict one another under it, or effects were searched.
+
+    ``law`` is that by which one sensor alone contradicts all others.
+    """
 
     prepared: Prepared
     contradiction: Contradiction | None = None
     found: Search | None = None
+    law: FoundLaw | None = None
 
     @property
     def fit(self) -> Fit | None:

@@ -55,8 +55,8 @@ def judged(tried: Tried, progress: Progress) -> Judged:
     pure error, or not.
     """
     found, law = tried.found, None
-    if found is None:
-        return Judged(tried, "unexplained")
+    if found is None or tried.law is not None:
+        return Judged(tried, "unexplained", tried.law)
     rows, agreement = tried.prepared.rows, tried.prepared.agreement
     set_aside: tuple[Fit, ...] = ()
     leftovers: tuple[Leftover, ...] = ()
