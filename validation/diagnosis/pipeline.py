@@ -141,7 +141,7 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
         return search(ready.fitted, progress, ready.meant, followed, free, hints, question.effects)
 
     found = searched(followed)
-    if followed.plant.weakly_identified:
+    if followed.plant.weakly_identified and ready.rows is None:  # else pieces may part, and what is left is known
         found = _with_bends(found, followed, searched)
     return Tried(ready, None, found)
 
