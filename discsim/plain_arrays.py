@@ -65,6 +65,7 @@ def recording_from_arrays(
     for sensor, pair in readings.items():
         samples[sensor] = _samples(sensor, pair)
         sheet = stated.get(sensor, SensorSheet(float("nan")))
+        require_type(sheet, SensorSheet, f"the sheet of {sensor}", "a SensorSheet, such as SensorSheet(100.0)")
         if np.isnan(sheet.rate_hz):
             if len(samples[sensor]) < 2:
                 raise InputError(f"{sensor}: {len(samples[sensor])} rows tell no sampling rate; expected two or more")

@@ -21,14 +21,14 @@ from typing import Literal, NamedTuple, cast
 
 import numpy as np
 
-from discsim.arrays import BoolArray, FloatArray, readonly, sealed
-from discsim.clipping import at_range, clipped
+from discsim.arrays import FloatArray, readonly, sealed
 from discsim.disc import Disc, Release, Rig
 from discsim.environment import Environment
 from discsim.errors import InputError, require_type
 from discsim.files import beside, named_in_errors, read_pieces, replacing, write_pieces
 from discsim.limits import MOST_ROWS, reading_fault, written_time_fault
 from discsim.recorded import Recorded
+from discsim.sensor_sheet import SensorSheet
 from discsim.toml_table import TomlTable, obeyed_by_terminals, parse_toml, read_toml
 from discsim.toml_text import disc_toml, environment_toml, release_toml, rig_toml, sheet_toml, toml_value
 
@@ -117,36 +117,6 @@ class Samples:
         """Return the samples with start <= t <= stop."""
         chosen = (self.t >= start) & (self.t <= stop)
         return Samples(self.t[chosen], self.value[chosen])
-
-
-@dataclass(frozen=True)
-class SensorSheet:
-    """What a sensor's data sheet states, in the sensor's unit; None where it states nothing.
-
-    ``noise_rms`` for gps is that of position (m), ``velocity_noise_rms`` that of velocity (m/s). ``position`` is
-    the accelerometer's place in the body frame, (3,) m.
-    """
-
-    rate_hz: float
-    noise_rms: float | None = None
-    resolution: float | None = None
-    range: float | None = None
-    velocity_noise_rms: float | None = None
-    position: FloatArray | None = None
-    sigma: Mapping[str, float | FloatArray] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        if self.position is not None:
-            object.__setattr__(self, "position", readonly(self.position))
-        object.__setattr__(self, "sigma", MappingProxyType(dict(self.sigma)))
-
-    def clipped(self, value: FloatArray) -> BoolArray:
-        """Tell which of the sensor's readings, (n, k) or (n,), stand at a limit, stated or found in them."""
-        return clipped(value, self.range, self.resolution)
-
-    def at_range(self, value: FloatArray) -> BoolArray:
-        """Tell which readings stand at the stated range."""
-        return at_range(value, self.range, self.resolution or 0.0)
 
 
 def require_plant(plant: str) -> None:

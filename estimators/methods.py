@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray, sd_by_median
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.estimators.accelerometer import STANDARD_GRAVITY, AccelerometerErrors, accelerometer
 from discsim.estimators.fft import FftSettings, fft
 from discsim.estimators.fusion import accelerometer_calibrated, compare_sensors, contradictions, fusion
@@ -178,6 +178,7 @@ def estimate(recording: Recording, name: str, options: Options | None = None) ->
     What no estimator may use is taken out first (`discsim.estimators.usable`). Raises `InputError` for an unknown name
     (listing those there are), a missing sensor, or what the method raises.
     """
+    require_type(name, str, "name", f"the name of a method: best, {', '.join(METHODS)}")
     options = options or Options()
     if name == "best":
         return best(recording, options)

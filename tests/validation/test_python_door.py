@@ -108,6 +108,41 @@ def test_arrays_that_are_no_recording_are_refused_in_a_sentence(readings, said):
         discsim.recording_from_arrays(readings)
 
 
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: SensorSheet("100"), "rate_hz is '100', of type str; expected a number, Hz"),
+        (
+            lambda: SensorSheet(100.0, noise_rms="low"),
+            "noise_rms is 'low', of type str; expected a number in the sensor",
+        ),
+        (
+            lambda: SensorSheet(100.0, position="here"),
+            "position is 'here'; expected three numbers in the body frame, m",
+        ),
+        (lambda: SensorSheet(100.0, position=[0.1, 0.0]), r"position is \[0.1, 0.0\]; expected three numbers"),
+        (lambda: SensorSheet(100.0, sigma=3), "sigma is 3, of type int; expected a mapping from a field's name"),
+        (lambda: discsim.challenge("two"), "cases is 'two', of type str; expected a whole number"),
+        (lambda: discsim.challenge(2, seed=0.5), "seed is 0.5, of type float; expected a whole number"),
+        (
+            lambda: discsim.recording_from_arrays({"magnetometer": field_of(RATE)}, sheets={"magnetometer": 100.0}),
+            "the sheet of magnetometer is 100.0, of type float; expected a SensorSheet",
+        ),
+    ],
+)
+def test_an_argument_of_another_type_is_refused_in_a_sentence(call, said):
+    """They ended deep inside as Python's own errors, or went unsaid."""
+    with pytest.raises(InputError, match=said):
+        call()
+
+
+def test_a_list_of_methods_is_refused_in_a_sentence(recording):
+    with pytest.raises(InputError, match=r"method is \['fft'\], of type list; expected the name of one: best, all, "):
+        discsim.estimate(recording, ["fft"])
+    with pytest.raises(InputError, match=r"name is \['fft'\], of type list; expected the name of a method: best, "):
+        estimate(recording, ["fft"])
+
+
 def test_plain_arrays_of_another_shape_are_refused_in_a_sentence():
     t, field = field_of(RATE)
     with pytest.raises(discsim.InputError, match=r"got readings \(300, 2\), expected \(n, 3\)"):

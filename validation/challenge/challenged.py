@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Integral
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from matplotlib.figure import Figure
 
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.recording import Plant
 from discsim.result import Result
 from discsim.validation.challenge.blind import Request
@@ -128,6 +129,8 @@ def blind_test(
     InputError
         For what does not go together, such as an effect that a plant does not have, and for no case at all.
     """
+    for value, name in ((cases, "cases"), (seed, "seed")):
+        require_type(value, Integral, name, "a whole number")
     if cases < 1:
         raise InputError(f"{cases} cases; expected at least one")
     requests = [Request(number, plant, tuple(effects), kind, mask) for number in range(seed, seed + cases)]

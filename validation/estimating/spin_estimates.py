@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.estimators.fusion import contradictions
 from discsim.estimators.methods import (
     METHODS,
@@ -134,6 +134,7 @@ def estimate_spin(
     without. ``best`` passes over a rate reference that the sensors beside it refute. Raises `InputError` for an unknown
     method, more than one recording, or where nothing can be estimated.
     """
+    require_type(method, str, "method", f"the name of one: best, all, {', '.join(METHODS)}")
     given = given_recordings(recording)
     if len(given) != 1:
         raise InputError(f"{len(given)} recordings; expected one (take them one after the other)")

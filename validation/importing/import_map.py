@@ -323,6 +323,12 @@ def _sensor(table: TomlTable, sensor: str, *, strict: bool) -> SensorMap:
         chosen = (keys[0], cast(str, where.text(keys[0])))
     optional = table.flag("optional")
     time = table.text("time", required=False)
+    if strict and sensor == "accelerometer" and "position_m" not in table:
+        raise table.error(
+            None,
+            "missing key 'position_m' in [sensors.accelerometer]; expected where it sits in the body frame, m from the "
+            "axis of the spin: write position_m = [x, y, z] there, and import with this map (--map FILE)",
+        )
     # a rate that the map does not state comes from the time stamps
     sheet = read_sheet(table, sensor, strict=strict, rate_required=False)
     return SensorMap(file, columns, choices[unit] * (scale or 1.0), axes, chosen, optional, sheet, time, unit == "deg")

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.made_logs import made_log, three, write_table
 from support.places import ROOT
 
 from discsim.errors import InputError
@@ -15,6 +17,7 @@ from discsim.files import model_names
 from discsim.recording import read_recording, write_recording
 from discsim.validation.commands.import_ import command
 from discsim.validation.importing import Imported, find_map, import_recording, parse_rows, read_map, repairs_csv
+from discsim.validation.importing.imported_log import import_log
 
 G0 = 9.80665
 DEG = np.pi / 180
@@ -474,3 +477,16 @@ def test_a_raw_file_that_is_not_there_writes_nothing(tmp_path):
     with pytest.raises(InputError, match=r"nothing.csv: no such file or folder"):
         command(tmp_path / "nothing.csv", "csv", rows=None, out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_log_of_a_rate_table_without_the_accelerometers_place_is_refused_with_the_line_to_write(tmp_path):
+    """The map that the import had written itself was refused as one that lacks a key."""
+    log = made_log()
+    columns = [("t_s", log.t), *three(["ax", "ay", "az"], log.accel), *three(["gx", "gy", "gz"], log.gyro)]
+    raw = write_table(tmp_path / "log.csv", columns)
+    with pytest.raises(InputError, match=r"write position_m = \[x, y, z\] there, and import with this map"):
+        import_log(raw, plant="rate_table")
+    text = import_log(raw).map_text.replace('"free_spin"', '"rate_table"')
+    mended = re.sub(r"# position_m = \[[^]]*\]", "position_m = [-0.0161, 0.0, 0.0]", text)
+    (tmp_path / "map.toml").write_text(mended)
+    assert import_log(raw, str(tmp_path / "map.toml")).recordings[0].plant == "rate_table"
