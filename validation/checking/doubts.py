@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from discsim.recording import Recording
+from discsim.validation.checking.finding import doubts_of
 from discsim.validation.checking.paths import path_findings
 from discsim.validation.checking.statements import statement_findings
 from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
+from discsim.validation.diagnosis.setup.units import clock_unit
+from discsim.written import corrected
 
-__all__ = ["mended_flights"]
+__all__ = ["mended_flights", "path_doubts"]
 
 
 def mended_flights(
@@ -21,13 +24,31 @@ def mended_flights(
     """
     setup = find_setup_faults(recordings)
     notes = setup_notes(setup, f"{done} are")
-    told: dict[str, list[str]] = {}
-    for one in setup.recordings:
-        for finding in (*statement_findings(one), *path_findings(one)):
-            if finding.severity != "note" and finding.id not in passed:
-                told.setdefault(finding.sentence, []).append(one.name)
-    notes += [f"{_named(names, len(recordings))}{sentence}" for sentence, names in told.items()]
+    found = [
+        [finding for finding in (*statement_findings(one), *path_findings(one)) if finding.id not in passed]
+        for one in setup.recordings
+    ]
+    notes += _told_once([doubts_of(own) for own in found], [one.name for one in setup.recordings])
     return tuple(setup.recordings), tuple(notes)
+
+
+def path_doubts(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
+    """Return what is doubtful about the positions of recordings (called ``names``), a line each, as `check` says it.
+
+    Seconds are what their clock's unit makes of the times: in another unit every path looks wrong.
+    """
+    unit = clock_unit(recordings)
+    meant = [corrected(one, [] if unit is None else [unit]) for one in recordings]
+    return tuple(_told_once([doubts_of(path_findings(one)) for one in meant], names))
+
+
+def _told_once(sentences: Sequence[Sequence[str]], names: Sequence[str]) -> list[str]:
+    """Return the sentences about recordings, each once with the names of those that it is about."""
+    told: dict[str, list[str]] = {}
+    for own, name in zip(sentences, names, strict=True):
+        for sentence in own:
+            told.setdefault(sentence, []).append(name)
+    return [f"{_named(about, len(names))}{sentence}" for sentence, about in told.items()]
 
 
 def _named(names: Sequence[str], count: int) -> str:

@@ -68,5 +68,7 @@ def command(
         with shown(TimeLeft(table=recordings[0][0].plant == "rate_table")) as progress:
             found = diagnose_named(named, progress=progress, seed=seed, user_effects=effects, plans=plans)
         found.report(out, command=f"discsim {' '.join(run.command)}")
+    for doubt in found.doubts:
+        say_note(doubt)
     typer.echo(found.summary())
     typer.echo(f"read {out / 'report.html'}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,8 @@ from discsim.model_file import Model
 from discsim.recording import Recording
 from discsim.result import Result
 from discsim.threads import one_thread
-from discsim.validation.diagnosis.datasets import need_field
+from discsim.validation.checking.doubts import path_doubts
+from discsim.validation.diagnosis.datasets import need_field, recording_names
 from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.report.figures import draw_overview
 from discsim.validation.diagnosis.report.files import write_outcome
@@ -38,10 +39,13 @@ class Diagnosed(Result):
         Everything: the answer, the improved model, residuals and candidates (`discsim.validation.diagnosis.result`).
     counts : mapping
         Number of recordings by the name of their data set.
+    doubts : tuple of str
+        What is doubtful about their positions before anything is fitted, as `check` says it; it is among the warnings.
     """
 
     outcome: Outcome
     counts: Mapping[str, int]
+    doubts: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         effects = ", ".join(effect.id for effect in self.effects) or "no effect named"
@@ -155,5 +159,9 @@ def diagnose_named(
     if len(plants) != 1:
         raise InputError(f"recordings of {', '.join(sorted(plants)) or 'nothing'}; expected recordings of one plant")
     need_field(sets)
+    called = [name for group in recording_names(sets, list(datasets)) for name in group]
+    doubts = path_doubts([recording for one in sets for recording in one], called)
     outcome = diagnose(sets, list(datasets), progress=progress, seed=seed, user_effects=user_effects, plans=plans)
-    return Diagnosed(outcome, {name: len(one) for name, one in datasets.items()})
+    answer = replace(outcome.diagnosis, warnings=(*doubts, *outcome.diagnosis.warnings))
+    counts = {name: len(one) for name, one in datasets.items()}
+    return Diagnosed(replace(outcome, diagnosis=answer), counts, doubts)
