@@ -179,13 +179,14 @@ def time_fault(t: FloatArray) -> tuple[int, str] | None:
     return None
 
 
-def written_time_fault(t: FloatArray) -> tuple[int, str] | None:
+def written_time_fault(t: FloatArray, *, among_others: bool = False) -> tuple[int, str] | None:
     """As `time_fault`, of times as they stand in a file: milliseconds or microseconds written as seconds are let pass.
 
-    That is a fault of the setup (clock.units), which is found and said where a recording is used.
+    That is a fault of the setup (clock.units), which is found and said where a recording is used. A few rows show no
+    unit, unless what stands beside them (``among_others``) does.
     """
     fault = time_fault(t)
-    if fault is None or t.size < _SHOWS_ITS_UNIT:
+    if fault is None or (t.size < _SHOWS_ITS_UNIT and not among_others):
         return fault
     return None if any(time_fault(unit * t) is None for unit in _UNITS) else fault
 

@@ -378,7 +378,8 @@ def read_csv(path: Path, header: str, *, gaps_allowed: bool = True) -> Samples:
 
 def _beyond(samples: Samples, header: str) -> tuple[int, str] | None:
     """Return the row (from 0) at which samples leave the limits (`discsim.limits`), and what is wrong there."""
-    found = written_time_fault(samples.t)
+    # the sensors beside it tell the unit of a command, though it be of two knots
+    found = written_time_fault(samples.t, among_others=header == COMMAND_HEADER)
     if found is None and (wild := reading_fault(samples.value.reshape(len(samples), -1))):
         row, column, message = wild
         found = row, f"{header.split(',')[1 + column]} {message}"

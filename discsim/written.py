@@ -56,7 +56,8 @@ def as_written(recording: Recording, effects: Sequence[Effect]) -> Recording:
 def corrected(recording: Recording, effects: Sequence[Effect]) -> Recording:
     """Return what a recording with the setup faults among the effects was meant to say; `as_written`'s inverse.
 
-    Other effects are passed over. With site.field the environment's field becomes the one that is there. Where a
+    Other effects are passed over. With site.field the environment's field becomes the one that is there. A command has
+    the sensors' unit of time where it would else last far longer than they do: a drive has a clock of its own. Where a
     clipped reading, or a gap, of a turned board takes part in another axis, that axis has a gap.
 
     Raises `InputError` where an effect is given twice.
@@ -71,7 +72,20 @@ def corrected(recording: Recording, effects: Sequence[Effect]) -> Recording:
     if "site.field" in values:
         there = setup.field_there(values["site.field"], environment.magnetic_field)
         environment = replace(environment, magnetic_field=there)
-    return replace(recording, samples=samples, environment=environment)
+    command = _command_in_seconds(recording.command, samples, _ticks(values))
+    return replace(recording, samples=samples, environment=environment, command=command)
+
+
+def _command_in_seconds(command: Samples | None, meant: Mapping[str, Samples], ticks: float) -> Samples | None:
+    """Return a command's knots in seconds, where sensors' times, now as they were ``meant``, were in ticks a second.
+
+    Written in ticks as well it lasts so many times longer than they do, in seconds about as long: half way between, as
+    factors go, is the root.
+    """
+    end = max((float(one.t[-1]) for one in meant.values() if len(one)), default=0.0)
+    if command is None or ticks <= 1.0 or not len(command) or command.t[-1] < np.sqrt(ticks) * end:
+        return command
+    return Samples(command.t / ticks, command.value)
 
 
 def _offset(sensor: str, values: _Values) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.flights import FIELD
@@ -241,3 +243,18 @@ def test_vectors_on_a_turned_board_turn_back_by_its_axes():
     fault = effect("board.rotation", rx_rad=1.0, ry_rad=2.0, rz_rad=-0.5).value
     vector = RNG.standard_normal((5, 3))
     np.testing.assert_allclose(on_board(fault, vector) @ board_axes(fault).T, vector, atol=1e-14)
+
+
+@pytest.mark.parametrize(("unit", "ticks"), [("ms", 1e3), ("us", 1e6)])
+def test_a_command_in_the_unit_of_the_sensors_is_mended_with_them_and_one_in_seconds_stays(unit, ticks):
+    """A drive has a clock of its own: its profile may be in seconds where the logger's times are not."""
+    fault = [effect("clock.units", written_in=unit)]
+    right = sound()
+    end = max(one.t[-1] for one in right.samples.values())
+    knots = Samples(np.array([0.0, 0.4, 1.0]) * end, np.array([18.0, 18.0, 32.0]))
+    written = as_written(replace(right, command=knots), fault)
+    as_well = replace(written, command=Samples(ticks * knots.t, knots.value))
+    for one in (written, as_well):
+        command = corrected(one, fault).command
+        assert command is not None
+        np.testing.assert_allclose(command.t, knots.t, rtol=1e-12)

@@ -16,6 +16,7 @@ from discsim.arrays import FloatArray
 from discsim.limits import time_fault
 from discsim.recording import Recording, Samples
 from discsim.validation.diagnosis.setup.shown_rates import FEWEST_SLOTS, ShownRate, shown_rates
+from discsim.validation.diagnosis.setup.units import NEAR
 from discsim.validation.identification.plants import plant_of
 
 __all__ = ["ReferenceDoubt", "believed", "reference_doubts"]
@@ -31,7 +32,7 @@ _UNITS: Mapping[float, str] = MappingProxyType(
 _NEAR = 0.15
 #: what is told that lasts so many times as long as the sensors, or as short, has another unit of time
 _LONGER = 100.0
-#: units in which a command's times may be written
+#: units in which a command's times may be written; it ends with the sensors within `NEAR`
 _CLOCKS: Mapping[str, float] = MappingProxyType({"milliseconds": 1e-3, "microseconds": 1e-6})
 #: lags that are tried, s, and the step between them
 _LAGS, _STEP = 10.0, 0.05
@@ -42,6 +43,11 @@ _SHORTEST, _LEFT, _ALIKE = 0.1, 0.25, 0.03
 _VALUES = 4000
 #: gravity that tells which way up a board is, m/s^2
 _UPRIGHT = 5.0
+#: a table stands that turns slower than this, rad/s: above any gyroscope's bias, as where a log is imported
+#: (`MOVES` of discsim.validation.importing.cleaning)
+_TURNS = 0.5
+#: sensors that show a rate in each reading, by themselves
+_BY_THEMSELVES = ("gyroscope", "rate_reference")
 #: a rate is of another run where it leaves this share of itself (rms) beside what sensors show: what trails its command
 #: by `_SHORTEST` on ramps of a second leaves a tenth, a load that holds a table back may leave more
 _ANOTHER = 0.25
@@ -60,8 +66,8 @@ _OWN_CAUSES: Mapping[str, str] = MappingProxyType(
 class ReferenceDoubt:
     """What cannot be true of a file of rates: its ``kind``, and parts of a sentence.
 
-    Kinds are units, clock, sign, factor, late and another (of another run). Unless ``sure`` it contradicts what else
-    there is, and either may be wrong.
+    Kinds are units, clock, sign, factor, late, another (of another run) and still (zero throughout). Unless ``sure``
+    it contradicts what else there is, and either may be wrong.
     """
 
     kind: str
@@ -91,19 +97,23 @@ def reference_doubts(recording: Recording) -> Iterator[ReferenceDoubt]:
     """
     if any(len(one) and time_fault(one.t) is not None for one in recording.samples.values()):
         return
-    reference, command = _known(recording.get("rate_reference")), _known(recording.command)
-    if reference is None and command is None:
+    told = {_REFERENCE: recording.get("rate_reference"), _COMMAND: recording.command}
+    known = {file: one for file, samples in told.items() if (one := _known(samples)) is not None}
+    if not known:
         return
     shown = shown_rates(recording)
+    still = {file: one for file, one in known.items() if not np.any(one.value)}
+    reference, command = (None if file in still else known.get(file) for file in (_REFERENCE, _COMMAND))
     if reference is not None:
         doubt = _ends_elsewhere(recording, reference) or _of_rates(_REFERENCE, recording, shown, reference)
         if doubt is None:
             shown = {**shown, "rate_reference": ShownRate(reference.t, reference.value, signed=True)}
         else:
             yield doubt
+    yield from filter(None, (_stands(file, shown, one) for file, one in still.items()))
     if command is None:
         return
-    doubt = _command_clock(shown, command) or _of_rates(_COMMAND, recording, shown, command)
+    doubt = _command_clock(recording, shown, command) or _of_rates(_COMMAND, recording, shown, command)
     if doubt is not None:
         yield doubt
 
@@ -136,8 +146,11 @@ def _ends_elsewhere(recording: Recording, reference: Samples) -> ReferenceDoubt 
     return ReferenceDoubt("clock", _REFERENCE, what, "one clock, in seconds", remedy)
 
 
-def _command_clock(shown: Mapping[str, ShownRate], command: Samples) -> ReferenceDoubt | None:
-    """Return that a command's times are in another unit, where sensors turn by it in that unit and not as written."""
+def _command_clock(recording: Recording, shown: Mapping[str, ShownRate], command: Samples) -> ReferenceDoubt | None:
+    """Return that a command's times are in another unit, where sensors turn by it in that unit and not as written.
+
+    Where its rates are too even to tell, its end does.
+    """
     for name, factor in _CLOCKS.items():
         meant = Samples(factor * command.t, command.value)
         if time_fault(meant.t) is not None:
@@ -147,17 +160,66 @@ def _command_clock(shown: Mapping[str, ShownRate], command: Samples) -> Referenc
         if right and all(written.get(sensor, 1.0) >= _ANOTHER for sensor in right):
             what = f"is in {name}, by {_all(right)}"
             return ReferenceDoubt("clock", _COMMAND, what, "seconds", f"multiply its times by {factor:g}")
-    return None
+    return _command_ends(recording, shown, command)
+
+
+def _command_ends(recording: Recording, shown: Mapping[str, ShownRate], command: Samples) -> ReferenceDoubt | None:
+    """Return that a command lasts as the sensors do in another unit of time, or longer than any run.
+
+    Unless no run is that long, it may be one of which a short part was recorded: then sensors turn by it as written
+    more nearly than in the other unit, and it is not doubted.
+    """
+    lasts = float(command.t[-1])
+    others = max((float(one.t[-1]) for one in recording.samples.values() if len(one)), default=0.0)
+    fault = time_fault(command.t)
+    if fault is None and lasts < _LONGER * others:
+        return None
+    alike = [name for name, factor in _CLOCKS.items() if 1.0 / NEAR < factor * lasts / max(others, 1e-9) < NEAR]
+    if fault is None and not (alike and _nearer(shown, command, _CLOCKS[alike[0]])):
+        return None
+    what = f"ends at {lasts:.6g} s, the sensors at {others:.6g} s"
+    remedy = "multiply its times by what makes them seconds"
+    if alike:
+        remedy = f"is it in {alike[0]}? then multiply its times by {_CLOCKS[alike[0]]:g}"
+    return ReferenceDoubt("clock", _COMMAND, what, "one clock, in seconds", remedy, sure=fault is not None)
+
+
+def _nearer(shown: Mapping[str, ShownRate], command: Samples, factor: float) -> bool:
+    """Tell whether all sensors turn more nearly by a command whose times are multiplied by a factor than as written."""
+    meant = Samples(factor * command.t, command.value)
+    off = [(_apart(one, meant), _apart(one, command)) for one in shown.values()]
+    known = [(one, other) for one, other in off if one is not None and other is not None]
+    return bool(known) and all(one < other for one, other in known)
+
+
+def _stands(file: str, shown: Mapping[str, ShownRate], told: Samples) -> ReferenceDoubt | None:
+    """Return that nothing turns by rates that are zero throughout, while sensors turn.
+
+    Two sensors that turn alike are sure of it. One alone is heard where it shows a rate without following a phase, for
+    noise has one, too.
+    """
+    sizes = {name: one.means(told)[0] for name, one in shown.items()}
+    turning = [name for name, size in sizes.items() if np.count_nonzero(size > _TURNS) >= FEWEST_SLOTS]
+    alike = [[other for other in turning if other == one or _turn_alike(shown[one], shown[other])] for one in turning]
+    saying = max(alike, key=len, default=[])
+    if len(saying) < 2 and not (saying := [name for name in turning if name in _BY_THEMSELVES]):
+        return None
+    fastest = max(float(np.max(sizes[name])) for name in saying)
+    shows = "show" if len(saying) > 1 else "shows"
+    what = f"is 0 throughout while the {_all(saying)} {shows} up to {fastest:.3g} rad/s"
+    if file == _REFERENCE:
+        expected, remedy = "the rate that is there", "was it connected? leave it out"
+    else:
+        expected, remedy = "the rate that was asked for", "write its knots: the times and the rates of the profile"
+    return ReferenceDoubt("still", file, what, expected, remedy, sure=len(saying) > 1)
 
 
 def _known(samples: Samples | None) -> Samples | None:
-    """Return the readings that were taken; None where there are too few, or nothing turns by them."""
+    """Return the readings that were taken; None where there are too few."""
     if samples is None:
         return None
     known = np.isfinite(samples.value)
-    if np.count_nonzero(known) < 2 or not np.any(samples.value[known]):
-        return None
-    return Samples(samples.t[known], samples.value[known])
+    return Samples(samples.t[known], samples.value[known]) if np.count_nonzero(known) >= 2 else None
 
 
 def _all(names: Iterable[str]) -> str:

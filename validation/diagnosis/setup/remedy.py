@@ -38,7 +38,7 @@ def remedy(fault: Effect, axes: Mapping[str, MapAxes] | None = None) -> str:
         seconds = 1.0 / setup.written_per_si(value)
         return (
             f'to mend it, write into the import map: [time] unit = "{value.written_in}"; without a map multiply time_s '
-            f"of every file by {seconds:g}"
+            f"of every sensor's file by {seconds:g}, and of a command.csv that is in {value.written_in}"
         )
     if type(value) in setup.UNITS:
         unit = _MAP_UNITS.get(value.written_in, value.written_in)

@@ -137,7 +137,8 @@ def _turning_field(recording: Recording) -> ShownRate | None:
     # half the sampling rate, less what the phase is smoothed over
     limit = 0.9 * np.pi / field.interval
     if recording.environment.field_known:
-        signals = spin_signals(recording)
+        # the field turns by itself; a command whose times are none would be summed over weeks
+        signals = spin_signals(replace(recording, command=None))
         known = signals is not None and signals.measured
         return ShownRate(signals.grid, signals.rate, signed=True, limit=limit) if signals and known else None
     own = {"magnetometer": _most_turning(field)}

@@ -15,7 +15,7 @@ from discsim.effects import Effect, effect
 from discsim.errors import InputError
 from discsim.profiles import trapezoids
 from discsim.rate_tables import RateTable
-from discsim.recording import Recording, Samples
+from discsim.recording import Recording, Samples, read_recording, write_recording
 from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, record
 from discsim.table_drive import TableDrive
@@ -230,3 +230,84 @@ def test_the_best_estimate_passes_over_a_reference_that_two_sensors_refute():
     assert "is 0.5 times the rate that the magnetometer" in found.left_out["rate_reference"]
     assert estimate_spin(wrong, "rate_reference").rates[0].method == "rate_reference"
     assert estimate_spin(coast()).rates[0].method == "rate_reference"
+
+
+# ------------------------------------------------------------------------------------ zeros, and the clock of a command
+
+
+def at_zero(recording: Recording, file: str) -> Recording:
+    """Return a recording whose command, or reference, is zero throughout."""
+    if file == "command.csv":
+        return replace(recording, command=Samples(PROFILE.t, 0.0 * PROFILE.value))
+    return changed(recording, lambda t, r: (t, 0.0 * r))
+
+
+@pytest.mark.parametrize(
+    ("file", "mended_by"), [("command.csv", "write its knots"), ("rate_reference.csv", "leave it out")]
+)
+def test_a_rate_of_zero_while_two_sensors_turn_is_told_and_refused(file, mended_by):
+    """Nothing was said: a file of zeros was taken for one that tells nothing."""
+    wrong = at_zero(bench(), file)
+    (doubt,) = reference_doubts(wrong)
+    assert (doubt.file, doubt.kind, doubt.sure) == (file, "still", True)
+    assert "is 0 throughout while the magnetometer, gyroscope" in doubt.sentence
+    assert mended_by in doubt.sentence
+    (checked,) = check([wrong]).checks
+    assert [one.id for one in checked.of("error")] == [f"{file.removesuffix('.csv')}.still"]
+    with pytest.raises(InputError, match="is 0 throughout while the magnetometer"):
+        diagnose_recordings([wrong])
+
+
+def test_an_encoder_that_was_not_connected_is_not_the_best_estimate():
+    found = estimate_spin(at_zero(bench(), "rate_reference.csv"))
+    assert found.rates[0].method == "fusion"
+    assert "is 0 throughout" in found.left_out["rate_reference"]
+
+
+@pytest.mark.parametrize(("sensor", "kinds"), [("gyroscope", ["still"]), ("magnetometer", []), ("accelerometer", [])])
+def test_a_gyroscope_alone_contradicts_a_command_of_zeros_and_a_phase_or_a_pull_does_not(sensor, kinds):
+    wrong = at_zero(table(command=True), "command.csv")
+    alone = replace(wrong, samples={sensor: wrong.samples[sensor]})
+    doubts = list(reference_doubts(alone))
+    assert [doubt.kind for doubt in doubts] == kinds
+    assert not any(doubt.sure for doubt in doubts)
+
+
+@pytest.mark.parametrize("bias", [0.0, 0.3])
+def test_a_table_that_stands_as_it_was_asked_to_is_not_doubted(bias):
+    still = Samples(PROFILE.t, 0.0 * PROFILE.value)
+    module = Instruments.from_parts("mpu9250").with_effects(
+        [effect("gyro.bias", bx_rad_s=0.0, by_rad_s=0.0, bz_rad_s=bias)]
+    )
+    motion = turn_table(still, FIELD, yaw=0.4)
+    run = record(motion, module, np.random.default_rng(4), plant="rate_table", name="mine", command=still)
+    assert list(reference_doubts(run)) == []
+
+
+EVEN = trapezoids(np.array([18.0, 20.0]), 9.0, 1.0)
+
+
+@pytest.mark.parametrize(("factor", "name"), [(1e3, "milliseconds"), (1e6, "microseconds")])
+def test_a_command_of_a_few_knots_in_another_unit_is_read_and_told_by_its_end_where_its_rate_is_even(
+    tmp_path, factor, name
+):
+    """A file of knots beyond any time was refused without a word on its unit; another passed for a steady rate."""
+    motion = turn_table(EVEN, FIELD, yaw=0.4)
+    module = Instruments.from_parts("mpu9250")
+    right = record(motion, module, np.random.default_rng(4), plant="rate_table", name="mine", command=EVEN)
+    assert list(reference_doubts(right)) == []
+    write_recording(right, tmp_path)
+    rows = [f"{factor * t!r},{rate!r}" for t, rate in zip(EVEN.t.tolist(), EVEN.value.tolist(), strict=True)]
+    (tmp_path / "command.csv").write_text("\n".join(["time_s,rate_rad_s", *rows]) + "\n")
+    (doubt,) = reference_doubts(read_recording(tmp_path))
+    assert (doubt.file, doubt.kind) == ("command.csv", "clock")
+    found = re.search(r"multiply its times by ([0-9.e-]+)", doubt.remedy)
+    assert found is not None
+    assert float(found[1]) * factor == pytest.approx(1.0)
+    assert name in doubt.sentence
+
+
+def test_a_long_command_of_which_a_part_was_recorded_is_not_doubted():
+    run = table(command=True)
+    hour = Samples(np.append(PROFILE.t, 3600.0), np.append(PROFILE.value, 0.0))
+    assert not [doubt for doubt in reference_doubts(replace(run, command=hour)) if doubt.kind == "clock"]
