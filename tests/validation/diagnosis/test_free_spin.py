@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support.made import DRIVER, FIELD, MODULE, flight, noiseless, release_of, rows_of, throws
+from support.made import DRIVER, FIELD, MODULE, flight, release_of, rows_of, throws
 
 from discsim.arrays import FloatArray
 from discsim.disc import Release
@@ -93,24 +93,6 @@ def test_air_that_is_stiffer_at_some_angles_of_attack_leaves_noise_alone(monkeyp
                 replace(FREE_SPIN, sizes=replace(FREE_SPIN.sizes, continuous=AllowedDefects(held))),
             )
             assert left_by(fit) > 3.0
-
-
-def test_what_the_air_does_at_release_is_in_no_mean_over_turns():
-    """The lift of a disc thrown nose down changes within a turn: the first mean was 3 to 8 of its noise off."""
-    disc, field = load_disc("cd1")
-    release = replace(NOSE_DOWN, velocity=np.array([0.0, -15.0, -2.5]), body_rate=np.array([0.0, 0.4, -38.0]))
-    motion = fly(disc, field, release, duration=1.5)
-    module = noiseless(BLIND)
-    recording = record(motion, module, np.random.default_rng(3), plant="free_spin", name="nose down", disc=disc)
-    (means,) = (r for r in first_trajectory(recording).readings if r.sensor == "accelerometer")
-    assert means.taken is not None
-    assert means.weights is not None
-    x = module.sensors["accelerometer"].position
-    at = motion.at(means.taken.ravel())
-    turning = np.cross(at.angular_acceleration, x) + np.cross(at.rate, np.cross(at.rate, x))
-    expected = np.einsum("wn,wnk->nk", means.weights, turning.reshape(*means.taken.shape, 3))
-    sd = 0.04 / np.sqrt(means.worth)  # of an accelerometer that is ordinary at its rate
-    np.testing.assert_allclose(means.value[:, :2], expected[:, :2], atol=0.5 * sd)
 
 
 def test_a_gyroscope_that_feels_force_feels_all_of_it_where_the_path_is_unknown():

@@ -128,11 +128,6 @@ def _observed(recording: Recording, readings: Readings) -> Sequence[Readings]:
 #: turns once per turn is not seen, nor its slope, nor its curvature
 _TURNS = 3.0
 
-#: no mean begins earlier after the first reading, s: until then the lift of a disc that was just released changes
-#: within a turn, and what is left of it in a mean that begins with it is 3 to 8 times the mean's noise at worst; later
-#: 0.4 times (35 simulated throws each)
-_RELEASED = 0.15
-
 
 def _over_turns(recording: Recording, one: Readings) -> list[Readings]:
     """Return the means over turns of an accelerometer on a disc whose path is unknown.
@@ -143,8 +138,7 @@ def _over_turns(recording: Recording, one: Readings) -> list[Readings]:
     rate = spin_initial_states(recording, grid).rate[:, 2]
     phase = np.interp(one.t, grid, cumulative_trapezoid(rate, grid, initial=0))
     phase = np.abs(phase) / (2.0 * np.pi)
-    from_phase = float(np.interp(one.t[0] + _RELEASED, one.t, phase))
-    centres = np.arange(from_phase + _TURNS / 2, phase[-1] - _TURNS / 2, _TURNS / 2)
+    centres = np.arange(phase[0] + _TURNS / 2, phase[-1] - _TURNS / 2, _TURNS / 2)
     first, last = np.searchsorted(phase, centres - _TURNS / 2), np.searchsorted(phase, centres + _TURNS / 2)
     if centres.size < 4 or np.any(np.diff(phase) < 0) or np.min(last - first) < 8:
         return []
