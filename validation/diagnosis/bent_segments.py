@@ -7,15 +7,12 @@ it wobbles, and what a segment then leaves passes for an error of a sensor or fo
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import BoolArray, FloatArray
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.identification.gauss_newton import Fit, refit
-from discsim.validation.identification.segments import resegmented
 
 __all__ = ["with_bends_followed"]
 
@@ -31,38 +28,25 @@ _STEPS = 8
 def with_bends_followed(found: Search, followed: Fit) -> Fit | None:
     """Return a relaxed fit with segments halved where the search's best fit gains by it; None where none does."""
     final = found.final.fit
-    halved = tuple(np.union1d(one.nodes, _middles(one.nodes)) for one in final.trajectories)
-    whole = tuple(
-        resegmented(one, final.values(i), nodes)
-        for i, (one, nodes) in enumerate(zip(final.trajectories, halved, strict=True))
-    )
-    fine = refit(replace(final, trajectories=whole), iterations=_STEPS, bounds=BOUNDS)
+    halved = final.cut_at([np.union1d(one.nodes, _middles(one.nodes)) for one in final.trajectories])
+    fine = refit(halved, iterations=_STEPS, bounds=BOUNDS)
     if not np.isfinite(fine.merit):
         return None
-    gains = [_gains(final, fine, i) for i in range(len(final.trajectories))]
-    if not any(np.any(gain > _BENT) for gain in gains):
+    bent = [_gains(final, fine, i) > _BENT for i in range(len(final.trajectories))]
+    if not any(np.any(some) for some in bent):
         return None
-    trajectories = tuple(
-        resegmented(one, followed.values(i), np.union1d(one.nodes, _within(halved[i], final, i, gains[i])))
-        for i, one in enumerate(followed.trajectories)
+    new = [_middles(one.nodes, some) for one, some in zip(final.trajectories, bent, strict=True)]
+    again = followed.cut_at(
+        [np.union1d(one.nodes, nodes) for one, nodes in zip(followed.trajectories, new, strict=True)]
     )
-    again = replace(followed, trajectories=trajectories)
-    return refit(again, iterations=_STEPS, tolerance=1e-4 * sum(r.good.sum() for t in trajectories for r in t.readings))
+    count = sum(r.good.sum() for one in again.trajectories for r in one.readings)
+    return refit(again, iterations=_STEPS, tolerance=1e-4 * count)
 
 
-def _middles(nodes: FloatArray) -> FloatArray:
-    """Return the middles of the segments that may be halved."""
-    long = np.diff(nodes) > _SHORTEST
-    middles: FloatArray = 0.5 * (nodes[1:] + nodes[:-1])[long]
-    return middles
-
-
-def _within(halved: FloatArray, final: Fit, recording: int, gains: FloatArray) -> FloatArray:
-    """Return the middles of a recording's segments that are bent."""
-    nodes = final.trajectories[recording].nodes
-    bent = gains > _BENT
-    new = np.setdiff1d(halved, nodes)
-    return new[bent[np.searchsorted(nodes, new) - 1]]
+def _middles(nodes: FloatArray, some: BoolArray | bool = True) -> FloatArray:
+    """Return the middles of some of the segments between nodes (k + 1,), by default of all, but of no short ones."""
+    middles = 0.5 * (nodes[1:] + nodes[:-1])
+    return np.asarray(middles[some & (np.diff(nodes) > _SHORTEST)])
 
 
 def _gains(final: Fit, fine: Fit, recording: int) -> FloatArray:

@@ -33,7 +33,7 @@ from discsim.validation.identification.parameters import AllowedDefects, Paramet
 from discsim.validation.identification.plants import Plant
 from discsim.validation.identification.propagation import Column
 from discsim.validation.identification.release_prior import release_rows
-from discsim.validation.identification.segments import Trajectory, stepped
+from discsim.validation.identification.segments import Trajectory, resegmented, stepped
 
 __all__ = ["NO_BARS", "Bars", "Fit", "linearised_columns", "linearised_in", "refit"]
 
@@ -75,6 +75,11 @@ class Fit:
     def values(self, recording: int) -> dict[tuple[str, str], float]:
         """Return the values that hold in a recording."""
         return values_of(self.parameters, self.at, recording, self.fixed)
+
+    def cut_at(self, nodes: Sequence[FloatArray]) -> Fit:
+        """Return the fit with each trajectory cut at other edges (k + 1,), where its motion was."""
+        pairs = enumerate(zip(self.trajectories, nodes, strict=True))
+        return replace(self, trajectories=tuple(resegmented(one, self.values(i), edges) for i, (one, edges) in pairs))
 
     @property
     def plant(self) -> Plant:

@@ -31,7 +31,7 @@ from discsim.validation.identification.gauss_newton import Fit, mapped, refit
 from discsim.validation.identification.noise import NoiseModel
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.readings import Readings
-from discsim.validation.identification.segments import Trajectory, resegmented
+from discsim.validation.identification.segments import Trajectory
 from discsim.validation.identification.sensor_model import Values
 
 __all__ = [
@@ -143,11 +143,8 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = DE
             _begun(replace(c, nodes=c.nodes[[0, -1]], states=c.states[:1]), anew, i) for i, c in enumerate(new)
         )
         counted = _counted(replace(found, trajectories=whole), sensor, _stated_sd(found, sensor, anew.noise))
-        standing = tuple(
-            resegmented(one, found.values(i), trajectory.nodes)
-            for i, (one, trajectory) in enumerate(zip(whole, new, strict=True))
-        )
-        found = _with_losses(replace(found, trajectories=standing), counted, sensor)
+        standing = replace(found, trajectories=whole).cut_at([one.nodes for one in new])
+        found = _with_losses(standing, counted, sensor)
     for _ in range(2):
         fitted = refit(replace(found, defects=plant.sizes.continuous), iterations=4)
         counted = _counted(fitted, sensor, _stated_sd(found, sensor, anew.noise))

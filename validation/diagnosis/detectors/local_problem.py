@@ -22,7 +22,7 @@ from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.noise import NoiseModel, whitened
 from discsim.validation.identification.normal_equations import inverse_of, known_directions, reduce, unknown_prior
 from discsim.validation.identification.parameters import Parameter
-from discsim.validation.identification.segments import Trajectory, resegmented
+from discsim.validation.identification.segments import Trajectory
 
 __all__ = ["WIND", "LocalProblem", "LocalProblems", "gain_of", "local_problems", "peaks"]
 
@@ -117,11 +117,7 @@ def local_problems(fit: Fit, noise: NoiseModel, own: Sequence[Parameter], hypoth
     at = np.array([place.get((q.key, q.recordings), q.stated) for q in every])
     fitted = replace(fit, parameters=every, at=at, defects=plant.sizes.continuous, noise=noise)
     if not np.any(plant.sizes.continuous.allowed):  # else segments are short, and what is not modelled wanders by them
-        trajectories = tuple(
-            resegmented(trajectory, fitted.values(i), _fine_nodes(trajectory))
-            for i, trajectory in enumerate(fitted.trajectories)
-        )
-        fitted = replace(fitted, trajectories=trajectories)
+        fitted = fitted.cut_at([_fine_nodes(trajectory) for trajectory in fitted.trajectories])
     return LocalProblems(fitted, hypothesis.candidates, _by_recording(fitted, len(free)), wind)
 
 
