@@ -16,6 +16,8 @@ from discsim.engine import fly
 from discsim.recording import Recording
 from discsim.sensors import record
 from discsim.shipped import load_disc
+from discsim.validation.challenge.cases.conceal import recordings
+from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.diagnosis.detectors.dropped_samples import dropped_magnetometer
 from discsim.validation.diagnosis.detectors.events import events
 from discsim.validation.diagnosis.detectors.local_problem import local_problems
@@ -210,7 +212,9 @@ def test_a_fit_goes_on_from_segments_that_a_whole_step_would_part():
 def test_what_gained_only_by_where_the_fit_before_it_stood_is_named_no_more(monkeypatch):
     monkeypatch.setattr(stepwise, "rivals_of", lambda _: {})
     final = fitted_with("gyro.bias", "accel.bias")
-    (left,) = stepwise.settled(replace(biased(), final=final)).final.hypothesis.candidates
+    # steps that lead astray are refused by what they leave, as in a search
+    with np.errstate(over="ignore", invalid="ignore"):
+        (left,) = stepwise.settled(replace(biased(), final=final)).final.hypothesis.candidates
     assert left.id == "gyro.bias"
 
 
@@ -247,3 +251,9 @@ def test_a_kick_between_the_boundaries_of_a_wandering_motion_is_found_at_its_ins
     start = {key[1]: value for (key, _), value in found[0].start.items()}
     assert start["t_s"] == pytest.approx(instant, abs=0.03)
     assert start["dr_rad_s"] == pytest.approx(size, rel=0.4)
+
+
+def test_lift_that_changes_within_the_first_turn_moves_no_accelerometer():
+    """It left five times the noise in the first mean of one throw: a place of 0.1 mm was named."""
+    case = draw_case(597283, "free_spin", (), "nothing")
+    assert stepwise.search(recordings(case)).final.hypothesis.candidates == ()
