@@ -31,6 +31,7 @@ from discsim.validation.identification.initial.spin_phase import (
     RATE_SIGMA,
     Spin,
     centripetal_rate,
+    direction_of_spin,
     expected_rate,
     gaussian_kernel,
     phase_spin,
@@ -131,7 +132,7 @@ def frame_of(recording: Recording) -> Attitude:
     if spin is None:
         r = np.zeros(grid.size) if expected is None else expected(grid)
         if expected is None and (centripetal := centripetal_rate(recording)) is not None:
-            r = _sign(recording) * centripetal(grid)
+            r = direction_of_spin(recording) * centripetal(grid)
         psi = cumulative_trapezoid(r, grid, initial=0)
     else:
         psi, r = -spin.phase_at(grid), -np.interp(grid, spin.grid, spin.turning)
@@ -191,16 +192,6 @@ def _despun(grid: FloatArray, psi: FloatArray, w: ComplexArray) -> FloatArray:
     W = w * np.exp(1j * psi)
     middle = 0.5 * (W[1:] + W[:-1]) * np.diff(grid)
     return _composed(np.column_stack([middle.real, middle.imag, np.zeros(middle.size)]))
-
-
-def _sign(recording: Recording) -> float:
-    """Return the direction of spin: of the gyroscope's clipped z, or of the stated release."""
-    gyroscope = recording.get("gyroscope")
-    if gyroscope is not None and np.any(np.isfinite(gyroscope.value[:, 2])):
-        return 1.0 if float(np.nanmedian(gyroscope.value[:, 2])) >= 0 else -1.0
-    if recording.release is not None and recording.release.body_rate is not None:
-        return 1.0 if recording.release.body_rate[2] >= 0 else -1.0
-    return 1.0
 
 
 def _without_precession(

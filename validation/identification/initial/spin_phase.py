@@ -16,6 +16,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import solveh_banded
 from scipy.ndimage import median_filter
+from scipy.signal import hilbert
 
 from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.recording import Recording
@@ -31,6 +32,7 @@ from discsim.validation.identification.ordinary_errors import ordinary_sigma
 __all__ = [
     "Spin",
     "centripetal_rate",
+    "direction_of_spin",
     "expected_rate",
     "field_spin",
     "gaussian_kernel",
@@ -40,6 +42,8 @@ __all__ = [
 
 #: prior of the centre of the circle that the field runs, uT
 _IRON = ordinary_sigma("circle of the field")
+#: a sensor of whose readings fewer than this share are whole tells no course of the spin
+_MOST = 0.9
 #: of the smoothing of the spin's phase, s (one sigma)
 PHASE_SIGMA = 0.05
 
@@ -117,7 +121,7 @@ def expected_rate(recording: Recording) -> Callable[[FloatArray], FloatArray] | 
     for sensor, column in (("rate_reference", 0), ("gyroscope", 2)):
         samples = recording.get(sensor)
         readings = readings_for(recording, sensor, column)
-        if samples is None or readings is None or readings.t.size < 0.9 * len(samples):
+        if samples is None or readings is None or readings.t.size < _MOST * len(samples):
             continue
         return _line(readings.t, readings.value)
     if recording.command is not None:
@@ -221,10 +225,10 @@ def phase_spin(
 
     ``steady`` tells that the axis stands still, so that the vector's length across it is constant.
     """
-    readings = readings_for(recording, sensor, slice(0, 2))
-    if readings is None or readings.t[-1] <= readings.t[0]:
+    vector = _across_axis(recording, sensor)
+    if vector is None or vector[0][-1] <= vector[0][0]:
         return None
-    t, z = readings.t, readings.value[:, 0] + 1j * readings.value[:, 1]
+    t, z, lone = vector
     step = float(np.median(np.diff(t)))
     grid = t[0] + step * np.arange(int(np.ceil((t[-1] - t[0]) / step - 1e-6)) + 1)
     if grid.size < FEWEST:
@@ -243,15 +247,43 @@ def phase_spin(
         rate = _bridged(grid, rate, _noise_of_steps(grid, rate, t, plane, step) < _STEPS_TELL)
     # the rate's course where another reading shows it better than the phase of a force that may vanish
     shape = rough if expected is not None and sensor == "accelerometer" else None
-    if expected is None and (centripetal := centripetal_rate(recording)) is not None:
+    if expected is None and not lone and (centripetal := centripetal_rate(recording)) is not None:
         own = centripetal(grid)
         if sensor == "magnetometer":
             rate = _unfolded(rate, own, step)
         else:
             rate = shape = _shaped(rate, own)
-    smooth, phase, weight = np.zeros(grid.size, dtype=complex), np.zeros(grid.size), np.ones(grid.size)
     # a force across the axis passes through zero and points the other way after: its square has no sign
     order, sigmas = (1, (3.0, 1.0, 1.0)) if sensor == "magnetometer" else (2, (2.0, 4.0, 6.0))
+    phase, rate, amplitude = _followed(grid, rate, t, plane, order, sigmas, may_vanish)
+    if lone and expected is None:
+        # where the force vanishes, the phase of one axis is another's
+        shape = np.polyval(np.polyfit(grid, rate, 2, w=amplitude), grid)
+    if shape is not None and np.all(np.abs(shape) > SLOW):
+        rate = shape * _weighted_median(rate / shape, amplitude)
+        turned = cumulative_trapezoid(rate, dx=step, initial=0)
+        phase = turned + _weighted_median(phase - turned, amplitude)
+        return Spin(grid, phase, rate, rate, amplitude, t, plane)
+    turning = _turning(grid, phase, rate, t, plane, step) if may_vanish else _without_steps(grid, rate, t, plane, step)
+    return Spin(grid, phase, rate, turning, amplitude, t, plane)
+
+
+def _followed(
+    grid: FloatArray,
+    rate: FloatArray,
+    t: FloatArray,
+    plane: ComplexArray,
+    order: int,
+    sigmas: tuple[float, ...],
+    may_vanish: bool,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return phase, rate and length (n,) of a vector ``plane`` (m,) at t (m,), from a rough rate (n,).
+
+    It is turned back, averaged over ``sigmas`` times `PHASE_SIGMA` in turn, and what it turns by still is added; of its
+    power ``order``.
+    """
+    step = float(grid[1] - grid[0])
+    smooth, phase, weight = np.zeros(grid.size, dtype=complex), np.zeros(grid.size), np.ones(grid.size)
     for sigma in sigmas:
         turned = cumulative_trapezoid(rate, dx=step, initial=0)
         base = plane * np.exp(-1j * _curve(grid, turned, rate, t))
@@ -260,14 +292,44 @@ def phase_spin(
         delta = _bridged(grid, np.angle(np.where(np.abs(smooth) > 0, smooth, 1.0)), told, np.unwrap) / order
         phase = turned + delta
         rate = rate + np.gradient(delta, step)
-    amplitude = (np.abs(smooth) / np.maximum(weight, 1e-9)) ** (1 / order)
-    if shape is not None and np.all(np.abs(shape) > SLOW):
-        rate = shape * _weighted_median(rate / shape, amplitude)
-        turned = cumulative_trapezoid(rate, dx=step, initial=0)
-        phase = turned + _weighted_median(phase - turned, amplitude)
-        return Spin(grid, phase, rate, rate, amplitude, t, plane)
-    turning = _turning(grid, phase, rate, t, plane, step) if may_vanish else _without_steps(grid, rate, t, plane, step)
-    return Spin(grid, phase, rate, turning, amplitude, t, plane)
+    return phase, rate, (np.abs(smooth) / np.maximum(weight, 1e-9)) ** (1 / order)
+
+
+def _across_axis(recording: Recording, sensor: str) -> tuple[FloatArray, ComplexArray, bool] | None:
+    """Return times (n,) and x + i y (n,) of a sensor, and if one axis alone tells them; None where none does."""
+    readings = readings_for(recording, sensor, slice(0, 2))
+    alone = _one_axis(recording) if sensor == "accelerometer" else None
+    if alone is not None and (readings is None or readings.t.size < _MOST * alone[0].size):
+        return (*alone, True)
+    return None if readings is None else (readings.t, readings.value[:, 0] + 1j * readings.value[:, 1], False)
+
+
+def _one_axis(recording: Recording) -> tuple[FloatArray, ComplexArray] | None:
+    """Return times (n,) and x + i y (n,) of an accelerometer from the axis that has more readings; None without.
+
+    The pull to the axis may clip the other all along. A force that is slow in N turns once per turn, the way that the
+    disc spins, so the swing of one axis tells both.
+    """
+    axes = [(readings_for(recording, "accelerometer", axis), factor) for axis, factor in ((0, 1.0), (1, 1j))]
+    there = [(readings, factor) for readings, factor in axes if readings is not None]
+    if not there:
+        return None
+    (times, value), factor = max(there, key=lambda one: one[0].t.size)
+    t = np.linspace(times[0], times[-1], times.size)
+    swings = _less_what_stands(t, np.asarray(np.interp(t, times, value), dtype=np.complex128)).real
+    swing = np.asarray(hilbert(swings), dtype=np.complex128)
+    # seen from the disc the force turns against the spin
+    return t, np.asarray(factor * (swing if direction_of_spin(recording) < 0 else np.conj(swing)))
+
+
+def direction_of_spin(recording: Recording) -> float:
+    """Return the sign of the spin: of the gyroscope's clipped z, or of the stated release."""
+    gyroscope = recording.get("gyroscope")
+    if gyroscope is not None and np.any(np.isfinite(gyroscope.value[:, 2])):
+        return 1.0 if float(np.nanmedian(gyroscope.value[:, 2])) >= 0 else -1.0
+    if recording.release is not None and recording.release.body_rate is not None:
+        return 1.0 if recording.release.body_rate[2] >= 0 else -1.0
+    return 1.0
 
 
 def _turning(

@@ -56,8 +56,10 @@ _POSITION, _VELOCITY, _ATTITUDE, _RATE, _SPIN = slice(0, 3), slice(3, 6), slice(
 _STEP, _NUTATION = 0.01, 1.2
 #: and where an uneven body makes the motion follow the spin
 _UNEVEN = 0.6
-#: and where coefficients come from a table, whose corners a step may not leap over
-_CORNERED = 0.5
+#: and where coefficients come from a table, whose corners a step may not leap over; and in s, for a disc that spins
+#: slowly wobbles across many of them: 0.9 rad/s at 31 rad/s left up to 5.5 mrad/s of rate with steps of 8 ms, twice the
+#: noise of a gyroscope, and 0.5 with these
+_CORNERED, _CORNER_STEP = 0.5, 0.004
 
 
 def _longest_step(given: Given, state: FloatArray, start: float, stop: float) -> float:
@@ -66,10 +68,12 @@ def _longest_step(given: Given, state: FloatArray, start: float, stop: float) ->
     assert disc is not None
     spin = min(abs(float(state[_SPIN])), FASTEST)
     nutation = max(spin * disc.Izz / disc.Ixx, spin, 1.0)
-    largest = _CORNERED if disc.aero_table is not None else _UNEVEN if given.uneven else _NUTATION
     # a path shows no nutation: 0.04 mm off after 2.5 s at 138 rad/s, by tables and with a wobble of 2 rad/s
-    largest = _NUTATION if BOARD.isdisjoint(given.recording.samples) else largest
-    return min(_STEP, largest / nutation)
+    if BOARD.isdisjoint(given.recording.samples):
+        return min(_STEP, _NUTATION / nutation)
+    if disc.aero_table is not None:
+        return min(_CORNER_STEP, _CORNERED / nutation)
+    return min(_STEP, (_UNEVEN if given.uneven else _NUTATION) / nutation)
 
 
 @compiled_nogil
