@@ -130,15 +130,16 @@ def _ordinal(number: int) -> str:
 
 
 def nothing_in(sensor: str, found: Readings, others: Mapping[str, Readings]) -> str | None:
-    """Return why a sensor is left out of the recording: no number, zeros, one value while the body moves."""
+    """Return why a sensor is left out of the recording: no number, one on all axes, one value while the body moves."""
     value = found.value
     rows = len(value)
     if np.all(np.isnan(value)):
         return f"no {sensor}: none of its {rows} rows holds a number; it is left out"
     if sensor not in MOVES or rows < CONSTANT or not np.all((value == value[0]) | np.isnan(value)):
         return None
-    if np.all((value == 0) | np.isnan(value)):
-        return f"no {sensor}: all its {rows} rows are zero, so it was not connected or not read; it is left out"
+    if np.ptp(np.abs(value[np.isfinite(value)])) == 0:
+        shown = "are one number on all axes" if np.nanmax(np.abs(value)) else "are zero"
+        return f"no {sensor}: all its {rows} rows {shown}, so it was not connected or not read; it is left out"
     moving = [other for other in MOVES if other != sensor and other in others and body_moves(other, others[other])]
     if sensor == "magnetometer" and moving:
         return (

@@ -20,7 +20,7 @@ from discsim.glitches import FASTEST_SPIN
 from discsim.limits import time_fault
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from discsim.validation.importing.cleaning import Readings, cleaned, without_glitches
-from discsim.validation.importing.failed import dead_axis, failed_at_once
+from discsim.validation.importing.failed import dead_axis, failed_at_once, on_all_axes
 from discsim.validation.importing.import_map import ImportMap, SensorMap, TimeBase
 from discsim.validation.importing.overflow import without_overflow
 from discsim.validation.importing.raw_table import RawTable, Repair, RepairList, read_raw
@@ -100,7 +100,9 @@ def read_readings(raw: Path, import_map: ImportMap, rows: slice | None = None) -
     repairs = RepairList(import_map.repairs)
     tables = _read_tables(raw, import_map, repairs)
     readings, notes = _read_sensors(raw, tables, import_map, rows, repairs)
-    readings, said = _without_zeros(readings, tables, repairs)
+    readings, said = _without_failed(readings, import_map, tables, repairs)
+    notes += said
+    readings, said = _without_glitches(readings, tables, repairs)
     notes += said
     readings, import_map, said = _over_the_ends(readings, import_map, tables, repairs)
     notes += said
@@ -216,12 +218,7 @@ def _read_sensors(
                 else "is this the right map?"
             )
             notes.append(f"WARNING: {lost} of the {sensor}'s {chosen} rows were left out; {why}")
-        readings[sensor], glitching, said = without_glitches(sensor, found)
-        notes += said
-        for row in glitching:
-            line = int(table.line[np.searchsorted(table.number, row)])
-            what = f"{sensor}: a single reading beyond {FASTEST_SPIN:g} rad/s"
-            repairs.add(None, table.path, line, what, f"glitch of {sensor} made a gap")
+        readings[sensor] = found
     if not readings:
         wanted = "; or ".join(_quoted(sensor_map.columns[0]) for sensor_map in import_map.sensors.values())
         raise InputError.at(
@@ -230,32 +227,60 @@ def _read_sensors(
     return readings, notes
 
 
-def _without_zeros(
-    readings: dict[str, Readings], tables: dict[str, RawTable], repairs: RepairList
+def _without_failed(
+    readings: dict[str, Readings], import_map: ImportMap, tables: dict[str, RawTable], repairs: RepairList
 ) -> tuple[dict[str, Readings], list[str]]:
-    """Return readings with gaps where zeros stand for failed ones, and what to say."""
+    """Return readings with gaps where a number stands for failed ones, and what to say."""
+    written = {
+        sensor: found._replace(value=import_map.sensors[sensor].written(found.value))
+        for sensor, found in readings.items()
+        if found.value.shape[1] == 3
+    }
     failed: dict[str, BoolArray] = {}
     for path in {tables[sensor].path for sensor in readings}:
-        failed |= failed_at_once({s: found for s, found in readings.items() if tables[s].path == path})
+        failed |= failed_at_once({s: found for s, found in written.items() if tables[s].path == path})
     notes = []
     for sensor in [sensor for sensor in readings if sensor in failed]:
-        found, rows, table = readings[sensor], failed[sensor], tables[sensor]
-        first = int(found.number[np.argmax(rows)])
-        count = int(np.count_nonzero(rows))
-        notes.append(
-            f"{'WARNING: ' * (count > MUCH_LOST * rows.size)}{sensor}: exactly 0 on all axes in {count} of "
-            f"{rows.size} rows amid other readings, the first row {first}: readings that failed; they become gaps"
-        )
-        for start, stop in runs(rows):
-            line = int(table.line[np.searchsorted(table.number, found.number[start])])
-            what = f"{sensor}: exactly 0 on all axes in {stop - start} row{'s' * (stop - start > 1)}, a failed reading"
-            repairs.add(None, table.path, line, what, f"zeros of {sensor} made a gap")
+        found, rows, common = readings[sensor], failed[sensor], on_all_axes(written[sensor].value)
+        for number in np.unique(common[rows]):
+            notes.append(_failed(sensor, found, rows & (common == number), number, tables[sensor], repairs))
         readings = {**readings, sensor: found._replace(value=np.where(rows[:, None], np.nan, found.value))}
     gyro = readings.get("gyroscope")
     if gyro is not None and (axis := dead_axis(gyro.value)) is not None:
         notes.append(f"WARNING: gyroscope {'xyz'[axis]}: 0 in every row while the other two turn: it was not read")
         readings = {**readings, "gyroscope": gyro._replace(value=np.where(np.arange(3) == axis, np.nan, gyro.value))}
     return readings, notes
+
+
+def _failed(sensor: str, found: Readings, rows: BoolArray, number: float, table: RawTable, repairs: RepairList) -> str:
+    """List the rows (n,) of a sensor in which ``number``, as written, stands for a failed reading, and say so."""
+    count, first = int(np.count_nonzero(rows)), int(found.number[np.argmax(rows)])
+    what = f"{sensor}: {f'{number:.9g}' if number else 'exactly 0'} on all axes in"
+    for start, stop in runs(rows):
+        line = int(table.line[np.searchsorted(table.number, found.number[start])])
+        listed = f"{what} {stop - start} row{'s' * (stop - start > 1)}, a failed reading"
+        action = f"{f'{number:.9g}' if number else 'zeros'} of {sensor} made a gap"
+        repairs.add(None, table.path, line, listed, action)
+    return (
+        f"{'WARNING: ' * (count > MUCH_LOST * rows.size)}{what} {count} of {rows.size} rows amid other readings, the "
+        f"first row {first}: readings that failed; they become gaps"
+    )
+
+
+def _without_glitches(
+    readings: dict[str, Readings], tables: dict[str, RawTable], repairs: RepairList
+) -> tuple[dict[str, Readings], list[str]]:
+    """Return readings with gaps for those apart that no throw has, and what to say."""
+    notes: list[str] = []
+    mended = {}
+    for sensor, found in readings.items():
+        mended[sensor], glitching, said = without_glitches(sensor, found)
+        notes += said
+        for row in glitching:
+            line = int(tables[sensor].line[np.searchsorted(tables[sensor].number, row)])
+            what = f"{sensor}: a single reading beyond {FASTEST_SPIN:g} rad/s"
+            repairs.add(None, tables[sensor].path, line, what, f"glitch of {sensor} made a gap")
+    return mended, notes
 
 
 def _over_the_ends(

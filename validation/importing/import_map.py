@@ -15,7 +15,7 @@ from typing import cast
 
 import numpy as np
 
-from discsim.arrays import readonly
+from discsim.arrays import FloatArray, readonly
 from discsim.disc import Disc, Release
 from discsim.environment import FIELD_MODEL_SIGMA, Environment, world_magnetic_field
 from discsim.errors import InputError
@@ -98,6 +98,11 @@ class SensorMap:
     sheet: SensorSheet
     time: str | None = None
     degrees: bool = False
+
+    def written(self, value: FloatArray) -> FloatArray:
+        """Return readings (n, 3) of a recording as the log has them, but for the order of the axes."""
+        signs = np.array([1.0 if axis is None else axis[1] for axis in self.axes])
+        return np.asarray(value / (self.factor * signs))
 
 
 @dataclass(frozen=True)

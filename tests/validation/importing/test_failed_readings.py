@@ -1,4 +1,4 @@
-"""Readings that failed and were written as zeros become gaps, aloud; zeros of what rests or falls are readings."""
+"""Readings that failed and were written as a number become gaps, aloud; what rests, falls or clips is a reading."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ FOR_LONG = (ROWS > 900) & (ROWS < 1000)  # 0.5 s in the flight
 AT_THE_START = ROWS < 300
 
 
-def log(path, failed):
-    """Write the log with zeros in the rows (n,) of each sensor named."""
+def log(path, failed, number=0.0):
+    """Write the log with a number on all axes in the rows (n,) of each sensor named."""
     columns = [("ms", np.round(1000 * LOG.t).astype(int))]
     for sensor, value in SENSORS.items():
-        zeroed = np.where(failed.get(sensor, ROWS < 0)[:, None], 0.0, value)
-        columns += three(NAMES[sensor], zeroed)
+        filled = np.where(failed.get(sensor, ROWS < 0)[:, None], number, value)
+        columns += three(NAMES[sensor], filled)
     return write_table(path, columns, digits=4)
 
 
@@ -68,6 +68,63 @@ def test_zeros_amid_readings_are_gaps_that_are_counted_and_the_throw_is_found(tm
     assert throw.spin == pytest.approx(32, rel=0.06)
     assert "gyroscope unit: deg/s (certain: the header says so, and the field turns as fast)" in said
     assert "accelerometer unit: g (certain" in said
+
+
+OTHERS = {
+    "a field every few rows": ({"magnetometer": EVERY_7}, (-1, -999, 65535, 32767)),
+    "a field not read at first": ({"magnetometer": AT_THE_START}, (-1, -9999, -32768)),
+    "a field that failed once": ({"magnetometer": ROWS == 900}, (-1, -999)),
+    "an accelerometer": ({"accelerometer": APART}, (-1, -999, 999.99, 65535, 32767)),
+    "an accelerometer once": ({"accelerometer": ROWS == 900}, (-999, 65535)),
+    "a gyroscope": ({"gyroscope": APART & (LOG.t > RELEASE)}, (-1, -999, -9999, 65535, 32767, -32768)),
+    "a gyroscope in flight": ({"gyroscope": FOR_LONG}, (-1, -999, 32767)),
+    "the bus": (dict.fromkeys(SENSORS, APART), (-1, -999)),
+}
+
+
+@pytest.mark.parametrize(
+    ("failure", "number"), [(key, number) for key, (_, numbers) in OTHERS.items() for number in numbers]
+)
+def test_another_number_on_all_axes_amid_readings_is_a_failed_one(tmp_path, failure, number):
+    """-1, -999, the ends of 16 bits: they cut throws or hid them, and were called clipped or a lost decimal point."""
+    failed, _ = OTHERS[failure]
+    found = import_log(log(tmp_path / "log.csv", failed, number))
+    said = found.summary()
+    for sensor, rows in failed.items():
+        assert f"{sensor}: {number} on all axes in {np.count_nonzero(rows)} of {rows.size} rows amid other" in said
+        samples = found.recordings[0].samples[sensor]
+        gap = np.isnan(samples.value).all(axis=1)
+        assert_allclose(samples.t[gap], LOG.t[rows], atol=1e-6)
+        repairs = [one for one in found.imported[0].repairs if one.action == f"{number} of {sensor} made a gap"]
+        assert repairs[0].line == np.argmax(rows) + 2
+    assert "clipped" not in said
+    assert "glitches" not in said
+    (throw,) = found.throws
+    assert throw.spin == pytest.approx(32, rel=0.06)
+    assert "gyroscope unit: deg/s (certain: the header says so, and the field turns as fast)" in said
+    assert "accelerometer unit: g (certain" in said
+
+
+def test_a_map_of_reversed_axes_names_the_number_as_written(tmp_path):
+    path = log(tmp_path / "log.csv", {"accelerometer": APART}, -999)
+    text = import_log(path).map_text
+    (tmp_path / "mine.toml").write_text(text.replace('axes = ["x", "y", "z"]', 'axes = ["x", "-y", "-z"]'))
+    assert "accelerometer: -999 on all axes in" in import_log(path, str(tmp_path / "mine.toml")).summary()
+
+
+@pytest.mark.parametrize("sensor", SENSORS)
+def test_a_sensor_of_one_number_throughout_is_left_out_by_name(tmp_path, sensor):
+    """The import ended with "one sample and no rate_hz in the map"."""
+    path = log(tmp_path / "log.csv", {sensor: ROWS >= 0}, -1)
+    found = import_log(path)
+    assert (
+        f"left out: {sensor} in {', '.join(NAMES[sensor])} of log.csv (all its rows are -1: it was" in found.summary()
+    )
+    assert set(found.recordings[0].samples) == set(SENSORS) - {sensor}
+    text = import_log(log(tmp_path / "other.csv", {})).map_text
+    (tmp_path / "mine.toml").write_text(text)
+    said = import_log(path, str(tmp_path / "mine.toml")).summary()
+    assert f"no {sensor}: all its 2000 rows are one number on all axes, so it was not connected or not read" in said
 
 
 def test_a_held_magnetometer_keeps_its_clock_over_zeros():
@@ -161,3 +218,36 @@ def test_a_gyroscope_at_rest_has_not_failed_where_a_slow_magnetometer_is_filled_
 @pytest.mark.parametrize("value", [LOG.mag, 0 * LOG.mag, np.full_like(LOG.mag, np.nan), LOG.mag[:0]])
 def test_without_zeros_amid_readings_nothing_failed(value):
     assert not failed_rows("magnetometer", value).any()
+
+
+# ------------------------------------------------------------------------- other numbers that are readings
+
+
+def test_an_impact_that_clips_an_accelerometer_on_all_axes_at_once_has_not_failed():
+    """Three throws end on the ground, where all axes stand at 16 g for a row, and single ones before or after."""
+    value = np.clip(LOG.accel, -16 * G0, 16 * G0)
+    for row in (500, 900, 1300):
+        value[row : row + 3] = np.array([[16.0, 3.0, -9.0], [16.0, 16.0, 16.0], [-4.0, 16.0, 2.0]]) * G0
+    assert not failed_rows("accelerometer", value).any()
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.6])
+@pytest.mark.parametrize("sensor", SENSORS)
+def test_a_sensor_of_a_small_range_has_not_failed(sensor, share):
+    largest = share * np.abs(SENSORS[sensor]).max()
+    assert not failed_rows(sensor, np.clip(SENSORS[sensor], -largest, largest)).any()
+
+
+@pytest.mark.parametrize("steps", [10, 30, 100])
+@pytest.mark.parametrize("sensor", SENSORS)
+def test_coarse_readings_that_are_equal_by_chance_have_not_failed(sensor, steps):
+    value = np.round(SENSORS[sensor] * steps / np.abs(SENSORS[sensor]).max())
+    failed = failed_rows(sensor, value)
+    assert not np.any(failed & (value != 0).any(axis=1))
+
+
+def test_a_gyroscope_that_rests_at_minus_one_has_not_failed_there():
+    """Counts of a degree a second and a bias of -0.8: at rest -1 on all axes comes by chance, again and again."""
+    value = np.round(LOG.gyro / DEG + np.random.default_rng(3).normal(-0.8, 0.6, LOG.gyro.shape))
+    assert np.count_nonzero(np.all(value == -1, axis=1)) > 10
+    assert not failed_rows("gyroscope", value).any()

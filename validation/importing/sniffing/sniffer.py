@@ -219,8 +219,9 @@ def _keeps_axis(fit: Fit, triple: Triple) -> bool:
 
 
 def _dead(triple: Triple) -> bool:
-    """Tell a sensor that reads exactly zero throughout."""
-    return not np.any(np.nan_to_num(triple.values))
+    """Tell a sensor that reads exactly zero, or another number on all axes, throughout."""
+    value = triple.values[np.isfinite(triple.values)]
+    return value.size == 0 or bool(np.ptp(value) == 0)
 
 
 def _weightless(triple: Triple) -> bool:
@@ -253,7 +254,8 @@ def _others(found: dict[str, tuple[Triple, Decision]], left: Sequence[Triple]) -
         if triple in chosen or triple.sensor not in SENSORS:
             continue
         if _dead(triple):
-            why = "all its rows are zero: it was not connected or not read"
+            number = float(np.nanmax(triple.values, initial=-np.inf))
+            why = f"all its rows are {f'{number:.9g}' if number else 'zero'}: it was not connected or not read"
         elif triple.sensor == "accelerometer" and (triple.penalty >= NO_READING or _weightless(triple)):
             why = "worked out from other readings, or without gravity"
         else:
