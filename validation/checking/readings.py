@@ -7,15 +7,16 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from discsim.arrays import BoolArray
-from discsim.effects.catalogue import catalogued
+from discsim.effects.catalogue import catalogued, effect_of
 from discsim.effects.sensors import Scale
-from discsim.effects.setup import AccelerometerUnit, GyroscopeUnit, MagnetometerUnit
+from discsim.effects.setup import AccelerometerUnit, Axes, GyroscopeUnit, MagnetometerUnit, axes_of
 from discsim.glitches import FASTEST_SPIN, beyond_spin, glitches
 from discsim.recording import SENSORS, Recording, Samples
 from discsim.validation.checking.finding import Finding, Severity
 from discsim.validation.checking.paths import path_findings
 from discsim.validation.checking.statements import FIELD
 from discsim.validation.diagnosis.setup.reference import ReferenceDoubt
+from discsim.validation.diagnosis.setup.remedy import remedy
 
 __all__ = ["at_rest", "reading_findings"]
 
@@ -26,6 +27,9 @@ STANDS = 0.03
 STRETCH = 0.5
 #: the field of a body at rest scatters by less than this (uT): the noise of the cheapest parts is 1 per axis
 STILL_FIELD = 2.0
+#: a body spins where it turns faster than this (rad/s: a turn a second), about an axis that has this share of the
+#: rate's square: of one that is tilted by 25 degrees it is 0.82
+SPINS, ONE_AXIS = 2 * np.pi, 0.8
 #: |f| at rest may be off by this share: zero-g offsets of cheap parts are 0.08 g, scales 3 %
 REST = 0.12
 #: |m| may be off by this share of the field for want of calibration; more is iron on board
@@ -40,6 +44,7 @@ def reading_findings(recording: Recording, doubts: Sequence[ReferenceDoubt]) -> 
     """Yield what the readings of a recording show that cannot be, or is unlikely; ``doubts`` are of its told rates."""
     yield from _force(recording)
     yield from _field(recording)
+    yield from _spin(recording)
     doubted = []
     for doubt in doubts:
         where = doubt.file.removesuffix(".csv")
@@ -119,6 +124,35 @@ def _force(recording: Recording) -> Iterator[Finding]:
             f"{-g:.3g} m/s^2 with z down",
             'if z points up, import with axes = ["x", "-y", "-z"] for all sensors: the spin changes sign',
         )
+
+
+def _spin(recording: Recording) -> Iterator[Finding]:
+    """Yield a gyroscope that spins about x or y, where no magnetometer tells how its axes lie (a setup fault then)."""
+    if "gyroscope" not in recording or "magnetometer" in recording:
+        return
+    rate = np.nan_to_num(recording.samples["gyroscope"].value)
+    square = rate**2
+    fast = square[np.sum(square, axis=1) > SPINS**2]
+    if len(fast) < 10:
+        return
+    share = np.sum(fast, axis=0) / np.sum(fast)
+    axis = int(np.argmax(share))
+    if axis == 2 or share[axis] < ONE_AXIS:
+        return
+    swapped = np.eye(3)
+    swapped[[axis, 2]] = swapped[[2, axis]]
+    effect = effect_of(Axes(axes_of(swapped)), "gyroscope")
+    turned = ["xyz"[(axis + 1 + body) % 3] for body in range(3)]
+    yield Finding(
+        effect.id,
+        "warning",
+        "gyroscope",
+        f"{100 * share[axis]:.0f} % of the rate's square is on {'xyz'[axis]}: it spins about that axis",
+        "a spin about z, the axis of disc, rig and table",
+        f"{remedy(effect)}, or swap these columns of gyroscope.csv; where the whole board lies so, give every sensor "
+        + f"axes = {turned}".replace("'", '"')
+        + f"; in a map that has axes there, exchange those of body {'xyz'[axis]} and z",
+    )
 
 
 def _field(recording: Recording) -> Iterator[Finding]:

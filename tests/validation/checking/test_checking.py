@@ -15,7 +15,7 @@ from support.places import PRACTICE
 from discsim.disc import Disc, Release
 from discsim.environment import Environment
 from discsim.estimators.methods import all_methods
-from discsim.files import model_names
+from discsim.files import model_file, model_names
 from discsim.recording import Recording, Samples, SensorSheet, read_dataset, write_recording
 from discsim.shipped import load_disc
 from discsim.validation.checking import Check, check_recording
@@ -24,6 +24,7 @@ from discsim.validation.checking.noise import noise_of
 from discsim.validation.checking.table import print_checks
 from discsim.validation.commands.check import command
 from discsim.validation.diagnosis.setup import find_setup_faults
+from discsim.validation.importing.imported_log import import_log
 
 practice = pytest.mark.skipif(not PRACTICE.is_dir(), reason="no practice sets here (DISCSIM_RECORDINGS)")
 
@@ -434,3 +435,49 @@ def test_the_shortest_and_the_emptiest_recordings_are_checked_without_a_fault(ro
     json.dumps(check.to_json())
     assert ids(check, "error") == []
     assert ("magnetometer.dead" in ids(check, "warning")) is gap
+
+
+# --------------------------------------------------------------------------------------- the axis of the spin
+
+
+def without_field(axes: tuple[int, int, int]) -> Recording:
+    """The disc without its magnetometer, and the columns of its gyroscope in this order."""
+    spun = rolled()
+    samples = {name: own for name, own in spun.samples.items() if name != "magnetometer"}
+    sheets = {name: own for name, own in spun.sheets.items() if name != "magnetometer"}
+    gyro = samples["gyroscope"]
+    samples["gyroscope"] = Samples(gyro.t, gyro.value[:, list(axes)])
+    return replace(spun, samples=samples, sheets=sheets)
+
+
+@pytest.mark.parametrize(
+    ("axes", "seen", "swapped", "turned"),
+    [((2, 1, 0), "x", '["z", "y", "x"]', '["y", "z", "x"]'), ((0, 2, 1), "y", '["x", "z", "y"]', '["z", "x", "y"]')],
+)
+def test_a_spin_about_x_or_y_is_told_without_a_magnetometer_and_the_remedies_mend_it(
+    tmp_path, axes, seen, swapped, turned
+):
+    wrong = without_field(axes)
+    (said,) = [one for one in check_recording(wrong).findings if one.id == "gyro.axes"]
+    assert f"100 % of the rate's square is on {seen}" in said.what
+    line = f"axes = {swapped} and mirrored = true"
+    assert f"[sensors.gyroscope] {line}" in said.remedy
+    assert f"give every sensor axes = {turned}" in said.remedy
+    write_recording(wrong, tmp_path / "raw")
+    (tmp_path / "raw" / "recording.toml").unlink()
+    plain = model_file("imports/csv.toml").read_text()
+    for written in (line.replace(" and ", "\n"), f"axes = {turned}"):
+        mended = plain.replace('unit = "rad/s"', f'unit = "rad/s"\n{written}', 1)
+        (tmp_path / "mine.toml").write_text(mended)
+        recording = import_log(tmp_path / "raw", str(tmp_path / "mine.toml")).recordings[0]
+        assert not [one for one in check_recording(recording).findings if one.id == "gyro.axes"]
+        assert np.median(recording.samples["gyroscope"].value[-200:, 2]) == pytest.approx(np.radians(1500), rel=0.01)
+
+
+def test_a_spin_about_z_or_about_no_one_axis_is_not_told():
+    assert not [one for one in check_recording(without_field((0, 1, 2))).findings if one.id == "gyro.axes"]
+    tumbling = without_field((2, 1, 0))
+    gyro = tumbling.samples["gyroscope"]
+    turned = gyro.value @ np.array([[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]).T
+    tumbling = replace(tumbling, samples={**tumbling.samples, "gyroscope": Samples(gyro.t, turned)})
+    assert not [one for one in check_recording(tumbling).findings if one.id == "gyro.axes"]

@@ -26,6 +26,11 @@ ONE_AXIS = 0.8
 MOST_LIFT = 2 * G0
 #: The field stands still along an axis where it moves this many times as much along both others (power).
 STILL, CLEARLY_STILL = 4.0, 10.0
+#: Said where two sensors have different axes and no third one tells which is right.
+_OPEN = (
+    "the axes of gyroscope or accelerometer are swapped, and which is open; look at their columns and at how the chips "
+    "lie, and state the axes in a map"
+)
 
 
 @dataclass(frozen=True)
@@ -111,11 +116,11 @@ def odd_one(sensors: Mapping[str, Reading3]) -> Odd | None:
         return None
     pull = abs(along_spin(turns, sensors))
     if pull <= MOST_LIFT:
-        return Odd(None, lies, turns, f"{said}: it rests on its rim, or the accelerometer's axes are swapped")
+        return Odd(None, lies, turns, f"{said}: it rests on its rim, or {_OPEN}")
     said += f", but {pull:.2g} m/s^2 along {'xyz'[turns]} are no lift"
     if stands is not None:
         return Odd("accelerometer", lies, turns, _swap("accelerometer", lies, turns, said))
-    return Odd(None, lies, turns, f"{said}: the axes of gyroscope or accelerometer are swapped; which is open")
+    return Odd(None, lies, turns, f"{said}: {_OPEN}")
 
 
 def _swap(sensor: str, axis: int, others: int, said: str) -> str:
