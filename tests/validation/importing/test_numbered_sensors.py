@@ -1,10 +1,11 @@
-"""A long table whose rows are numbered by sensor (`sensor` of 1, 2, 3): each is told by its readings, none mixed."""
+"""A long table whose rows are each of one sensor, by number or name: each is told by its readings, none mixed."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
-from support.made_logs import DEG, G0, made_log, three, write_table
+from support.made_logs import DEG, G0, RELEASE, made_log, three, write_table
 
 from discsim.validation.importing.imported_log import import_log
 
@@ -19,3 +20,20 @@ def test_sensors_that_are_numbers_are_not_mixed(tmp_path):
     assert_allclose(np.abs(read["gyroscope"].value), np.abs(LOG.gyro), atol=1e-5)
     assert_allclose(np.abs(read["accelerometer"].value), np.abs(LOG.accel), atol=1e-4)
     assert_allclose(np.abs(read["magnetometer"].value), np.abs(LOG.mag), atol=1e-4)
+
+
+@pytest.mark.parametrize("name", ["t_us", "time"])
+def test_rows_of_two_sensors_may_be_microseconds_apart(tmp_path, name):
+    """40 us from a row to the next were taken for ms, against the header, and no throw was found."""
+    made = made_log()
+    lines = [f"sensor,{name},x,y,z"]
+    for k, stamp in enumerate(np.round(1e6 * made.t).astype(int)):
+        rows = [("ACC", made.accel[k] / G0), ("GYRO", made.gyro[k] / DEG)] + [("MAG", made.mag[k])] * (k % 2 == 0)
+        for j, (sensor, value) in enumerate(rows):
+            lines.append(f"{sensor},{stamp + 40 * j}," + ",".join(f"{one:.4f}" for one in value))
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    found = import_log(tmp_path / "log.csv")
+    assert f"time: '{name}' in us (" in found.summary()
+    (throw,) = found.throws
+    assert RELEASE <= throw.start < RELEASE + 0.2
+    assert throw.spin == pytest.approx(32, rel=0.06)

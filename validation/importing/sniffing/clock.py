@@ -136,7 +136,8 @@ def _clock(numbers: Numbers, k: int, name: str) -> Clock | None:
         return None
     if not named and (k > 1 or (numbers.dialect.has_header and not _evenly(value, spoken))):
         return None  # what has another name is another thing; else the first two columns are tried
-    unit, sure, why_unit = _unit(value, spoken, SLOWEST_FIX if numbers.tells_positions else SPACING[1])
+    slowest = SLOWEST_FIX if numbers.tells_positions else SPACING[1]
+    unit, sure, why_unit = _unit(value, spoken, slowest, _of_one_sensor(numbers, value))
     if unit is None:
         return None
     if not named and numbers.dialect.has_header:
@@ -179,11 +180,30 @@ def _evenly(value: FloatArray, name: str) -> bool:
     return bool(low > 0 and usual != 1 and high - low < 0.5 * usual)
 
 
-def _unit(value: FloatArray, name: str, slowest: float) -> tuple[str | None, Sureness, str]:
-    """Return the unit of time stamps, how sure that is, and why; rows are at most ``slowest`` s apart."""
+def _of_one_sensor(numbers: Numbers, value: FloatArray) -> FloatArray:
+    """Return the times of the sensor with most rows, where a column says whose row each is; else all.
+
+    Rows of two sensors may be microseconds apart.
+    """
+    if numbers.ids is None:
+        return value
+    cells = numbers.cells(numbers.ids[0])
+    own = [value[cells.equal(text) & np.isfinite(value)] for text in numbers.ids[1]]
+    longest = max(own, key=len)
+    return longest if np.any(np.diff(longest) > 0) else value
+
+
+def _unit(
+    value: FloatArray, name: str, slowest: float, own: FloatArray | None = None
+) -> tuple[str | None, Sureness, str]:
+    """Return the unit of time stamps, how sure that is, and why; rows are at most ``slowest`` s apart.
+
+    ``own`` are the stamps of one sensor's rows, by whose spacing the unit is judged.
+    """
     steps = np.diff(value[np.isfinite(value)])
-    usual = float(np.median(steps[steps > 0]))
-    step = float(np.mean(steps[np.abs(steps / usual - 1) <= ROUNDED]))  # whole milliseconds at 80 Hz are 12 or 13 apart
+    apart = steps if own is None else np.diff(own[np.isfinite(own)])
+    usual = float(np.median(apart[apart > 0]))
+    step = float(np.mean(apart[np.abs(apart / usual - 1) <= ROUNDED]))  # whole milliseconds at 80 Hz are 12 or 13 apart
     largest = float(np.nanmax(value))
     fits = [unit for unit, scale in SCALES.items() if SPACING[0] <= step * scale <= slowest]
     written = _written(name)
