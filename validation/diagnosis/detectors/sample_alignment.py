@@ -316,34 +316,54 @@ def lost_in_own_noise(own: Alignment, stated: FloatArray, loudest: FloatArray) -
 
     Air and place of a sensor are known to a few parts in a hundred: of what a motion shows of each axis a factor and an
     offset are free. What it does not tell yet is noise, which lies between a ``stated`` and a ``loudest`` one (k,) and
-    follows from the counts as they do from it. Of the noises to start from, that whose counts leave least holds.
+    follows from the counts as they do from it. Of the noises and lines to start from, that whose counts leave least
+    holds.
     """
-    none = np.zeros(len(own.measured), dtype=np.int64)
     stated = np.maximum(stated, _QUIETEST * loudest)
-    # about none the factor of an axis that turns with the disc would vanish where samples slip
-    plain = np.stack([np.ones_like(stated), np.zeros_like(stated)])
-    plain[1] = [np.median(x[np.isfinite(x)]) if np.isfinite(x).any() else 0.0 for x in own.left(none, plain).T]
     found: Losses | None = None
-    start = np.maximum(loudest, stated)
-    while True:
-        path, level, line = none, start, plain
-        for _ in range(_LEVELS):
-            path, _ = _likeliest(own, line, _MARGIN * level)
-            line = own.line(path)
-            lower = np.clip(_robust(own.left(path, line)), stated, np.maximum(loudest, stated))
-            settled = bool(np.all((lower > _SETTLED * level) & (level > _SETTLED * lower)))
-            level = lower
-            if settled:
+    for line in _first_lines(own, stated):
+        start = np.maximum(loudest, stated)
+        while True:
+            losses = _settled_losses(own, line, start, stated, loudest)
+            if found is None or np.sum(np.log(losses.noise)) < np.sum(np.log(found.noise)):
+                found = losses
+            if np.all(start <= stated):
                 break
-        line = own.line(path)
+            start = np.maximum(start / _QUIETER, stated)
+    assert found is not None
+    return found
+
+
+def _first_lines(own: Alignment, sd: FloatArray) -> list[FloatArray]:
+    """Return the lines (2, k) that counts start about: past the median of what none lost leaves, and the motion itself.
+
+    About none lost the factor of an axis that turns with the disc would vanish where samples slip, so it is one. What
+    dies away slips to one side, and that median is no offset then. Within the noise ``sd`` (k,) both are one.
+    """
+    itself = np.stack([np.ones_like(sd), np.zeros_like(sd)])
+    left = own.left(np.zeros(len(own.measured), dtype=np.int64), itself)
+    median = np.array([np.median(x[np.isfinite(x)]) if np.isfinite(x).any() else 0.0 for x in left.T])
+    beside = np.stack([itself[0], median])
+    return [beside, itself] if np.any(np.abs(median) > sd) else [beside]
+
+
+def _settled_losses(
+    own: Alignment, line: FloatArray, start: FloatArray, stated: FloatArray, loudest: FloatArray
+) -> Losses:
+    """Return the losses whose noise and line follow from them, from a line (2, k) and a noise ``start`` (k,) on."""
+    none = np.zeros(len(own.measured), dtype=np.int64)
+    level = start
+    for _ in range(_LEVELS):
         path, _ = _likeliest(own, line, _MARGIN * level)
-        gain = own.misfit(none, own.line(none), _MARGIN * level) - own.misfit(path, line, _MARGIN * level)
-        losses = Losses(path.astype(float), gain - _COST * float(path[-1]), level)
-        if found is None or np.sum(np.log(losses.noise)) < np.sum(np.log(found.noise)):
-            found = losses
-        if np.all(start <= stated):
-            return found
-        start = np.maximum(start / _QUIETER, stated)
+        line = own.line(path)
+        lower = np.clip(_robust(own.left(path, line)), stated, np.maximum(loudest, stated))
+        settled = bool(np.all((lower > _SETTLED * level) & (level > _SETTLED * lower)))
+        level = lower
+        if settled:
+            break
+    path, _ = _likeliest(own, line, _MARGIN * level)
+    gain = own.misfit(none, own.line(none), _MARGIN * level) - own.misfit(path, line, _MARGIN * level)
+    return Losses(path.astype(float), gain - _COST * float(path[-1]), level)
 
 
 def _robust(left: FloatArray) -> FloatArray:
