@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.disc import aero_key
 from discsim.effects.catalogue import CATALOGUE
+from discsim.effects.kind import BOARD
 from discsim.validation.diagnosis.answer.leftover import Leftover
 from discsim.validation.diagnosis.leftovers import heldout_fits, leftovers_of, nothing_but_pure_error
 from discsim.validation.diagnosis.result import (
@@ -109,9 +112,16 @@ def may_be_the_air(item: UnmodelledResidual, fit: Fit) -> bool:
 
 
 def _stacked(found: Search) -> bool:
-    """Tell whether several effects on the motion were found, so that one law is worth comparing with them."""
-    rows = [candidate.row for candidate in found.final.hypothesis.candidates]
-    return sum(row.acts_on == "motion" and not row.brief for row in rows) >= UNKNOWN_LAW.stack
+    """Tell whether several effects on the motion, or on one sensor, were found, so that one law is worth comparing.
+
+    A bias that settles passes for a bias beside a sensitivity to what dies away, too. Where all ordinary errors are
+    fitted at once, several of a sensor are no stack.
+    """
+    lasting = [candidate.row for candidate in found.final.hypothesis.candidates if not candidate.row.brief]
+    acted_on = Counter(
+        row.acts_on for row in lasting if row.acts_on == "motion" or (row.acts_on in BOARD and not found.at_once)
+    )
+    return max(acted_on.values(), default=0) >= UNKNOWN_LAW.stack
 
 
 def recalibrations(found: Search) -> dict[str, Recalibration]:

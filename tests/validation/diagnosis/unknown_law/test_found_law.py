@@ -18,6 +18,8 @@ from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
 from discsim.threads import limited
+from discsim.validation.challenge.blind import Request
+from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.hidden_physics import HiddenDisc, coast, haunted
 from discsim.validation.challenge.cases.off_catalogue import (
     Cogging,
@@ -29,6 +31,7 @@ from discsim.validation.challenge.cases.off_catalogue import (
     SensorHysteresis,
     Warming,
 )
+from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
@@ -312,3 +315,12 @@ def test_a_side_force_in_flight_is_found_with_its_target_and_powers():
     np.testing.assert_allclose(found.law.for_model().evaluate(state), 3e-4 * V**2.5, rtol=0.1)
     # one path alone takes any law, and nothing could bear it out
     assert law_of([replace(recordings[0], samples={"gps": recordings[0].samples["gps"]})]) is None
+
+
+def test_a_bias_that_settles_in_a_throw_is_no_bias_beside_a_sensitivity_to_force():
+    """Their sum leaves noise with the memory of what settles; the law alone leaves that of the sheet."""
+    found = diagnose([recordings(Request(615099).draw())], ["throws"]).diagnosis
+    assert found.verdict == "unexplained"
+    assert found.law is not None
+    assert found.law.text == "c - c * exp(-t/tau)"
+    assert found.law.coefficients["tau"].value == pytest.approx(0.683, abs=2.0 * found.law.coefficients["tau"].sd)
