@@ -114,13 +114,13 @@ def may_be_the_air(item: UnmodelledResidual, fit: Fit) -> bool:
 def _stacked(found: Search) -> bool:
     """Tell whether several effects on the motion, or on one sensor, were found, so that one law is worth comparing.
 
-    A bias that settles passes for a bias beside a sensitivity to what dies away, too. Where all ordinary errors are
-    fitted at once, several of a sensor are no stack.
+    Those on a sensor count in a free spin, where much that nobody knows stands in for what a wrong effect leaves: a
+    bias that settles passes for a bias beside a sensitivity to what dies away, too. Where all ordinary errors are
+    fitted at once, several of a sensor are no stack; nor are lost samples, without which no law would be fitted.
     """
-    lasting = [candidate.row for candidate in found.final.hypothesis.candidates if not candidate.row.brief]
-    acted_on = Counter(
-        row.acts_on for row in lasting if row.acts_on == "motion" or (row.acts_on in BOARD and not found.at_once)
-    )
+    lasting = [c.row for c in found.final.hypothesis.candidates if not c.row.brief and not c.fixed_values]
+    sensors = BOARD if found.relaxed_fit.plant.weakly_identified and not found.at_once else frozenset()
+    acted_on = Counter(row.acts_on for row in lasting if row.acts_on == "motion" or row.acts_on in sensors)
     return max(acted_on.values(), default=0) >= UNKNOWN_LAW.stack
 
 

@@ -137,8 +137,10 @@ def nothing_in(sensor: str, found: Readings, others: Mapping[str, Readings]) -> 
         return f"no {sensor}: none of its {rows} rows holds a number; it is left out"
     if sensor not in MOVES or rows < CONSTANT or not np.all((value == value[0]) | np.isnan(value)):
         return None
-    if np.ptp(np.abs(value[np.isfinite(value)])) == 0:
-        shown = "are one number on all axes" if np.nanmax(np.abs(value)) else "are zero"
+    zero = np.all((value == 0) | np.isnan(value))
+    # a field may stand still on three axes alike; neither gravity nor the noise of a gyroscope does
+    if zero or (sensor != "magnetometer" and np.ptp(np.abs(value[np.isfinite(value)])) == 0):
+        shown = "are zero" if zero else "are one number on all axes"
         return f"no {sensor}: all its {rows} rows {shown}, so it was not connected or not read; it is left out"
     moving = [other for other in MOVES if other != sensor and other in others and body_moves(other, others[other])]
     if sensor == "magnetometer" and moving:
