@@ -257,7 +257,7 @@ def _failed(sensor: str, found: Readings, rows: BoolArray, number: float, table:
     count, first = int(np.count_nonzero(rows)), int(found.number[np.argmax(rows)])
     what = f"{sensor}: {f'{number:.9g}' if number else 'exactly 0'} on all axes in"
     for start, stop in runs(rows):
-        line = int(table.line[np.searchsorted(table.number, found.number[start])])
+        line = table.line_of(found.number[start])
         listed = f"{what} {stop - start} row{'s' * (stop - start > 1)}, a failed reading"
         action = f"{f'{number:.9g}' if number else 'zeros'} of {sensor} made a gap"
         repairs.add(None, table.path, line, listed, action)
@@ -277,7 +277,7 @@ def _without_glitches(
         mended[sensor], glitching, said = without_glitches(sensor, found)
         notes += said
         for row in glitching:
-            line = int(tables[sensor].line[np.searchsorted(tables[sensor].number, row)])
+            line = tables[sensor].line_of(row)
             what = f"{sensor}: a single reading beyond {FASTEST_SPIN:g} rad/s"
             repairs.add(None, tables[sensor].path, line, what, f"glitch of {sensor} made a gap")
     return mended, notes
@@ -297,7 +297,7 @@ def _over_the_ends(
     if not said:
         return readings, import_map, []
     table = tables["gyroscope"]
-    line = int(table.line[np.searchsorted(table.number, gyro.number[np.argmax(beyond)])])
+    line = table.line_of(gyro.number[np.argmax(beyond)])
     became = "continued" if np.array_equal(np.isnan(found.value), np.isnan(gyro.value)) else "made gaps"
     action = f"{np.count_nonzero(beyond)} rows of gyroscope {became}, the first here"
     repairs.add(None, table.path, line, "gyroscope: its register overflows", action)
@@ -345,7 +345,7 @@ def _fresh(
         kept = np.isin(found.number, [] if result.readings is None else result.readings.number)
         if not np.all(kept):
             table = tables[sensor]
-            line = int(table.line[np.searchsorted(table.number, found.number[~kept][0])])
+            line = table.line_of(found.number[~kept][0])
             what = f"{sensor}: {result.notes[0].removeprefix(f'{sensor}: ')}"
             action = f"{np.count_nonzero(~kept)} rows left out of {sensor}, the first here"
             repairs.add(None, tables[sensor].path, line, what, action)

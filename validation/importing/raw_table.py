@@ -142,6 +142,10 @@ class RawTable:
     def __len__(self) -> int:
         return self.number.size
 
+    def line_of(self, number: int) -> int:
+        """Return the line in the file of a row, by its number among the data rows."""
+        return int(self.line[np.searchsorted(self.number, number)])
+
     def column(self, name: str) -> CellTexts:
         """Return the cells (n,) of the first column of a name."""
         return self.texts[self.columns.index(name)]

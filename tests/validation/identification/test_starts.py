@@ -40,9 +40,9 @@ MODULE = Instruments.from_parts("mpu9250", "neo_m8n")
 
 # what a fit of segments of 0.5 s converges from: well inside a third of a turn, and of the order of a throw's own
 # change
+ATTITUDE_RAD, RATE, TRANSVERSE_RAD_S, VELOCITY_M_S, POSITION_M = np.radians(10.0), 0.01, 0.3, 1.5, 1.0
 # one axis tells a parabola, which lies 2 % off the decay of a spin at its ends
 ONE_AXIS_RATE = 0.03
-ATTITUDE_RAD, RATE, TRANSVERSE_RAD_S, VELOCITY_M_S, POSITION_M = np.radians(10.0), 0.01, 0.3, 1.5, 1.0
 
 
 @cache

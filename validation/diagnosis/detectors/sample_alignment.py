@@ -320,9 +320,10 @@ def lost_in_own_noise(own: Alignment, stated: FloatArray, loudest: FloatArray) -
     holds.
     """
     stated = np.maximum(stated, _QUIETEST * loudest)
+    loudest = np.maximum(loudest, stated)
     found: Losses | None = None
     for line in _first_lines(own, stated):
-        start = np.maximum(loudest, stated)
+        start = loudest
         while True:
             losses = _settled_losses(own, line, start, stated, loudest)
             if found is None or np.sum(np.log(losses.noise)) < np.sum(np.log(found.noise)):
@@ -356,7 +357,7 @@ def _settled_losses(
     for _ in range(_LEVELS):
         path, _ = _likeliest(own, line, _MARGIN * level)
         line = own.line(path)
-        lower = np.clip(_robust(own.left(path, line)), stated, np.maximum(loudest, stated))
+        lower = np.clip(_robust(own.left(path, line)), stated, loudest)
         settled = bool(np.all((lower > _SETTLED * level) & (level > _SETTLED * lower)))
         level = lower
         if settled:

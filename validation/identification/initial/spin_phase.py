@@ -23,6 +23,7 @@ from discsim.recording import Recording
 from discsim.validation.identification.initial.smoothing import (
     FEWEST,
     SLOW,
+    Readings,
     median_of,
     readings_for,
     smoothed,
@@ -298,28 +299,25 @@ def _followed(
 def _across_axis(recording: Recording, sensor: str) -> tuple[FloatArray, ComplexArray, bool] | None:
     """Return times (n,) and x + i y (n,) of a sensor, and if one axis alone tells them; None where none does."""
     readings = readings_for(recording, sensor, slice(0, 2))
-    alone = _one_axis(recording) if sensor == "accelerometer" else None
-    if alone is not None and (readings is None or readings.t.size < _MOST * alone[0].size):
-        return (*alone, True)
+    if sensor == "accelerometer":
+        axes = [(alone, k) for k in (0, 1) if (alone := readings_for(recording, sensor, k)) is not None]
+        alone, k = max(axes, key=lambda one: one[0].t.size, default=(None, 0))
+        if alone is not None and (readings is None or readings.t.size < _MOST * alone.t.size):
+            return (*_by_one_axis(alone, k, direction_of_spin(recording)), True)
     return None if readings is None else (readings.t, readings.value[:, 0] + 1j * readings.value[:, 1], False)
 
 
-def _one_axis(recording: Recording) -> tuple[FloatArray, ComplexArray] | None:
-    """Return times (n,) and x + i y (n,) of an accelerometer from the axis that has more readings; None without.
+def _by_one_axis(alone: Readings, axis: int, direction: float) -> tuple[FloatArray, ComplexArray]:
+    """Return times (n,) and x + i y (n,) of an accelerometer from its x (``axis`` 0) or y, and the sign of the spin.
 
     The pull to the axis may clip the other all along. A force that is slow in N turns once per turn, the way that the
     disc spins, so the swing of one axis tells both.
     """
-    axes = [(readings_for(recording, "accelerometer", axis), factor) for axis, factor in ((0, 1.0), (1, 1j))]
-    there = [(readings, factor) for readings, factor in axes if readings is not None]
-    if not there:
-        return None
-    (times, value), factor = max(there, key=lambda one: one[0].t.size)
-    t = np.linspace(times[0], times[-1], times.size)
-    swings = _less_what_stands(t, np.asarray(np.interp(t, times, value), dtype=np.complex128)).real
+    t = np.linspace(alone.t[0], alone.t[-1], alone.t.size)
+    swings = _less_what_stands(t, np.asarray(np.interp(t, alone.t, alone.value), dtype=np.complex128)).real
     swing = np.asarray(hilbert(swings), dtype=np.complex128)
     # seen from the disc the force turns against the spin
-    return t, np.asarray(factor * (swing if direction_of_spin(recording) < 0 else np.conj(swing)))
+    return t, np.asarray(1j**axis * (swing if direction < 0 else np.conj(swing)))
 
 
 def direction_of_spin(recording: Recording) -> float:
