@@ -29,7 +29,7 @@ from discsim.effects.aero import (
 from discsim.effects.air import ground_effect, gust, wind_shear
 from discsim.errors import InputError
 from discsim.frames import heading_angles, norm3
-from discsim.law import law_wrench
+from discsim.law import law_wind, law_wrench
 from discsim.own_wrench import own_wrench
 from discsim.parameters import Tables
 
@@ -46,13 +46,17 @@ def advance_ratio(d: float, r: float, V: float) -> float:
 
 
 @compiled
-def wind(p: Any, t: float, h: float) -> tuple[float, float, float]:
-    """Wind in N (m/s) at time t and height h: the known one, and what a baseline leaves out of it."""
+def wind(p: Any, tables: Tables, t: float, north: float, east: float, h: float) -> tuple[float, float, float]:
+    """Wind in N (m/s) at time t s, a place and height h, m: the known one, and what a baseline leaves out of it."""
     shear, peak = wind_shear(p.air_wind_shear, h), gust(p.air_gust, t)
-    north = p.air_wind.w_north_m_s + shear * p.air_wind_shear.w_north_m_s + peak * p.air_gust.w_north_m_s
-    east = p.air_wind.w_east_m_s + shear * p.air_wind_shear.w_east_m_s + peak * p.air_gust.w_east_m_s
+    wn = p.air_wind.w_north_m_s + shear * p.air_wind_shear.w_north_m_s + peak * p.air_gust.w_north_m_s
+    we = p.air_wind.w_east_m_s + shear * p.air_wind_shear.w_east_m_s + peak * p.air_gust.w_east_m_s
     e = p.environment
-    return e.wind_north + north, e.wind_east + east, e.wind_down
+    wn, we, wd = e.wind_north + wn, e.wind_east + we, e.wind_down
+    if tables.law.shape[0] > 0:
+        ln, le, ld = law_wind(tables.law, t, h, north, east)
+        wn, we, wd = wn + ln, we + le, wd + ld
+    return wn, we, wd
 
 
 @compiled

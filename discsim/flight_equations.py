@@ -55,7 +55,7 @@ def derivative(p: Any, tables: Tables, t: float, y: FloatArray, dy: FloatArray) 
         c, s = cos(y[13]), sin(y[13])
 
     h = -y[2]
-    wn, we, wd = wind(p, t, h)
+    wn, we, wd = wind(p, tables, t, y[0], y[1], h)
     u, v, w = rotate_by_quaternion(qw, -qx, -qy, -qz, y[3] - wn, y[4] - we, y[5] - wd)
     Fx, Fy, Fz, Mx, My, Mz = total_wrench(p, tables, t, h, u, v, w, P, Q, r)
 
@@ -124,8 +124,8 @@ def in_body(flat: FloatArray, tables: Tables, t: FloatArray, states: FloatArray)
 
 
 @compiled
-def incidence(p: Any, t: float, y: FloatArray) -> float:
+def incidence(p: Any, tables: Tables, t: float, y: FloatArray) -> float:
     """Angle of attack at a state (14,), rad."""
-    wn, we, wd = wind(p, t, -y[2])
+    wn, we, wd = wind(p, tables, t, y[0], y[1], -y[2])
     u, v, w = rotate_by_quaternion(y[6], -y[7], -y[8], -y[9], y[3] - wn, y[4] - we, y[5] - wd)
     return float(heading_angles(u, v, w)[2])

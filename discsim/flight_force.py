@@ -28,25 +28,25 @@ _WIDTH = PARAMETERS.itemsize // 8
 
 @inlined
 def _flow(
-    p: Any, t: float, qpos: FloatArray, qvel: FloatArray
+    p: Any, tables: Tables, t: float, qpos: FloatArray, qvel: FloatArray
 ) -> tuple[float, float, float, float, float, float, float]:
     """Height of the centre of mass, its velocity relative to the air in B, and the body rates, of a free joint."""
     # MuJoCo's axes to N and B: (x, y, z) -> (x, -y, -z)
     qw, qx, qy, qz = qpos[3], qpos[4], -qpos[5], -qpos[6]
     P, Q, r = qvel[3], -qvel[4], -qvel[5]
     ex, ey, ez = centre_of_mass(p.body_mass_imbalance)
-    _, _, centre_down = rotate_by_quaternion(qw, qx, qy, qz, ex, ey, ez)
-    h = qpos[2] - centre_down
+    cn, ce, cd = rotate_by_quaternion(qw, qx, qy, qz, ex, ey, ez)
+    h = qpos[2] - cd
     sn, se, sd = rotate_by_quaternion(qw, qx, qy, qz, Q * ez - r * ey, r * ex - P * ez, P * ey - Q * ex)
-    wn, we, wd = wind(p, t, h)
+    wn, we, wd = wind(p, tables, t, qpos[0] + cn, -qpos[1] + ce, h)
     u, v, w = rotate_by_quaternion(qw, -qx, -qy, -qz, qvel[0] + sn - wn, -qvel[1] + se - we, -qvel[2] + sd - wd)
     return h, u, v, w, P, Q, r
 
 
 @compiled
-def airspeed(flat: FloatArray, t: float, qpos: FloatArray, qvel: FloatArray) -> float:
+def airspeed(flat: FloatArray, tables: Tables, t: float, qpos: FloatArray, qvel: FloatArray) -> float:
     """Speed of the centre of mass through the air, m/s."""
-    _, u, v, w, _, _, _ = _flow(flat.view(PARAMETERS)[0], t, qpos, qvel)
+    _, u, v, w, _, _, _ = _flow(flat.view(PARAMETERS)[0], tables, t, qpos, qvel)
     return float(norm3(u, v, w))
 
 
@@ -56,7 +56,7 @@ def flight_force(
 ) -> bool:
     """Add the air and the events to a free joint's forces (6,); return False where a C_Nr table does not reach."""
     p = flat.view(PARAMETERS)[0]
-    h, u, v, w, P, Q, r = _flow(p, t, qpos, qvel)
+    h, u, v, w, P, Q, r = _flow(p, tables, t, qpos, qvel)
     Fx, Fy, Fz, Mx, My, Mz = total_wrench(p, tables, t, h, u, v, w, P, Q, r)
 
     # a push through the centre of mass; about the geometric centre it has a moment
@@ -110,7 +110,7 @@ def _force(record: int, t: float, qpos: int, qvel: int, qfrc: int) -> int:
         return 1
     lost = carray(at(word[_LOST]), (LOST,), np.float64)
     if lost[0] == 0.0:
-        lost[0], lost[1], lost[2], lost[3] = 1.0, t, speed[5], airspeed(flat, t, pose, speed)
+        lost[0], lost[1], lost[2], lost[3] = 1.0, t, speed[5], airspeed(flat, tables, t, pose, speed)
     return 0
 
 

@@ -7,7 +7,8 @@ the factor ``exp(-t/tau)``; what swings in time, ``cos(w t + phase)`` or ``sin(w
 ``cos(k psi + w t + phase)``, psi being the angle turned since the recording began: it stands only in a law about a
 sensor. In one about the axis of a rig ``yaw`` stands in its place, the angle of the rig itself. Only in a law about a
 sensor does ``play(x, w)`` stand, what a reading x shows behind a play of +-w: Prandtl's operator, the simplest
-hysteresis.
+hysteresis. A law about the wind holds of the symbols only t and h, and may have the factor
+``exp(-((north - a)^2 + (east - b)^2) / (2 s^2))``: air that moves about a place in the field, within s metres of it.
 """
 
 from __future__ import annotations
@@ -28,7 +29,18 @@ from discsim.errors import InputError, printable
 from discsim.frames import heading_angles, norm3
 from discsim.recording import SENSORS
 
-__all__ = ["AIR_SHARE", "LAW_WIDTH", "MOTION_TARGETS", "SYMBOLS", "WRENCH_TARGETS", "Law", "behind_play", "law_wrench"]
+__all__ = [
+    "AIR_SHARE",
+    "LAW_WIDTH",
+    "MOTION_TARGETS",
+    "SYMBOLS",
+    "WIND_TARGETS",
+    "WRENCH_TARGETS",
+    "Law",
+    "behind_play",
+    "law_wind",
+    "law_wrench",
+]
 
 #: symbols that a law may hold: time s, height m, airspeed m/s, angle of attack rad, rates in the H frame and spin
 #: rad/s; x, y, z are a sensor's own reading before noise, in its unit, and stand only in a law about that sensor
@@ -37,18 +49,25 @@ SYMBOLS = ("t", "h", "V", "alpha", "p_H", "q_H", "r", "x", "y", "z")
 AIR_SHARE = "air_share"
 #: what a law about motion may give: force and moment of the H frame, whose z axis is that of the body
 WRENCH_TARGETS = ("force_x_N", "force_y_N", "force_z_N", "moment_x_N_m", "moment_y_N_m", "moment_z_N_m")
+#: how much faster than known the air moves to the north, to the east and upwards
+WIND_TARGETS = ("wind_north_m_s", "wind_east_m_s", "wind_up_m_s")
 #: and all that it may be about
-MOTION_TARGETS = (*WRENCH_TARGETS, AIR_SHARE)
+MOTION_TARGETS = (*WRENCH_TARGETS, AIR_SHARE, *WIND_TARGETS)
 _FUNCTIONS = ("sign", "exp", "cos", "sin", "play")
 _READINGS = ("x", "y", "z")
+#: what stands in a law as an angle or a place
+_PLACES = ("psi", "yaw", "north", "east")
 _COUNT = len(SYMBOLS)
+#: symbols that a law about the wind may hold, and where its targets begin
+_OF_WIND, _FIRST_WIND = 2, MOTION_TARGETS.index(WIND_TARGETS[0])
 #: characters of a law's text: the longest law that a diagnosis writes has some two hundred
 _LONGEST = 5000
 #: size of an exponent: r^30 is 1e111 at the fastest spin, and no force grows so
 _STEEPEST = 30.0
 #: a row of a law's numbers: place of its target, coefficient, of each symbol the power of its magnitude and its sign
-#: to a power, decay in 1/s, order of the angle, phase, play of its sensor's reading, rad/s of what swings
-_DECAY, _ORDER, _PHASE, _PLAY, _SWING, LAW_WIDTH = (2 + 2 * _COUNT + k for k in range(6))
+#: to a power, decay in 1/s, order of the angle, phase, play of its sensor's reading, rad/s of what swings, north and
+#: east of a place and the size of what is about it, all three in m, a size of zero being none
+_DECAY, _ORDER, _PHASE, _PLAY, _SWING, _NORTH, _EAST, _SIZE, LAW_WIDTH = (2 + 2 * _COUNT + k for k in range(9))
 _TOKEN = re.compile(r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*·/^|(),]))")
 
 
@@ -76,7 +95,7 @@ class Law:
                 "such as magnetometer.x_uT"
             )
         for name, value in self.coefficients.items():
-            if not re.fullmatch(r"[A-Za-z_]\w*", name) or name in (*SYMBOLS, *_FUNCTIONS, "psi", "yaw"):
+            if not re.fullmatch(r"[A-Za-z_]\w*", name) or name in (*SYMBOLS, *_FUNCTIONS, *_PLACES):
                 raise InputError(
                     f"law: a coefficient is called '{name}'; expected a name that is no symbol of the state"
                 )
@@ -93,6 +112,11 @@ class Law:
                 raise InputError("law: psi is the angle turned; expected it only in a law about a sensor")
         if "yaw" in self._angles and self.target != "moment_z_N_m":
             raise InputError("law: yaw is the angle of a rig; expected it only in a law about moment_z_N_m")
+        if self.target not in WIND_TARGETS:
+            if np.any(rows[:, _SIZE]):
+                raise InputError("law: north and east are a place; expected them only in a law about the wind")
+        elif np.any(rows[:, 2 + _OF_WIND : 2 + _COUNT]) or np.any(rows[:, 2 + _COUNT + _OF_WIND : 2 + 2 * _COUNT]):
+            raise InputError("law: a wind is the same for every disc; expected only t, h, north and east in its law")
 
     @cached_property
     def rows(self) -> FloatArray:
@@ -111,7 +135,9 @@ class Law:
         return "yaw" in self._angles
 
     def evaluate(self, state: Mapping[str, ArrayLike]) -> FloatArray:
-        """Return the law at states given by symbol (psi or yaw, too), each a number or (n,), in the order of time.
+        """Return the law at states given by symbol (psi, yaw, north and east, too), in the order of time.
+
+        Each is a number or (n,), a place in m.
 
         Raises KeyError where one is missing.
         """
@@ -133,6 +159,9 @@ class Law:
                     if factor:
                         angle = angle + factor * np.asarray(state[symbol], dtype=np.float64)
                 term = term * np.cos(angle)
+            if row[_SIZE]:
+                north, east = (np.asarray(state[way], dtype=np.float64) for way in ("north", "east"))
+                term = term * np.exp(-0.5 * ((north - row[_NORTH]) ** 2 + (east - row[_EAST]) ** 2) / row[_SIZE] ** 2)
             total = total + term
         return total
 
@@ -187,10 +216,14 @@ class _Parser:
     def _product(self, sign: float) -> list[float]:
         coefficient, powers, odd = sign, [0.0] * _COUNT, [0.0] * _COUNT
         decay, order, phase, width, swing = 0.0, 0.0, 0.0, 0.0, 0.0
+        about = [0.0, 0.0, 0.0]
         inverse = 1.0
         while True:
             if self._peek() == "exp":
-                decay += inverse * self._decay()
+                rate, found = self._exponential()
+                if any(found) and (any(about) or inverse < 0.0):
+                    raise self._error("a second place in one product, or one below a stroke")
+                decay, about = decay + inverse * rate, found if any(found) else about
             elif self._peek() in ("cos", "sin"):
                 if order or swing or inverse < 0.0:
                     raise self._error("a second cos or sin in one product, or one below a stroke")
@@ -211,7 +244,7 @@ class _Parser:
                     powers[place] += inverse * power
                     odd[place] = (odd[place] + is_odd) % 2.0
             if self._peek() in ("", "+", "-"):
-                row = [float(coefficient), *powers, *odd, decay, order, phase, width, swing]
+                row = [float(coefficient), *powers, *odd, decay, order, phase, width, swing, *about]
                 if width and sum(map(abs, powers[-len(_READINGS) :])) != 1.0:
                     raise self._error("a play times a reading")
                 if not all(map(isfinite, row)) or max(map(abs, powers)) > _STEEPEST:
@@ -227,15 +260,45 @@ class _Parser:
         except (OverflowError, ValueError):  # too large for a number; zero to a negative power
             raise self._error(f"{value:g} to the power {exponent:g}") from None
 
-    def _decay(self) -> float:
-        """Read ``exp(-t/tau)``; return 1/tau."""
-        for token in ("exp", "(", "-", "t", "/"):
-            self._take(token)
-        tau = self._number(self._take())
+    def _exponential(self) -> tuple[float, list[float]]:
+        """Read ``exp(-t/tau)`` or ``exp(-((north - a)^2 + (east - b)^2) / (2 s^2))``.
+
+        Returns 1/tau, and a, b and s; zeros for those of the other.
+        """
+        self._expect("exp", "(", "-")
+        if not self._skip("("):
+            self._expect("t", "/")
+            tau = self._number(self._take())
+            self._take(")")
+            if not tau:
+                raise self._error("a time constant of zero")
+            return 1.0 / tau, [0.0, 0.0, 0.0]
+        north = self._squared_distance("north")
+        self._take("+")
+        east = self._squared_distance("east")
+        self._expect(")", "/", "(", "2")
+        self._skip("*", "·")
+        size = self._number(self._take())
+        self._take("^", "**")
+        self._expect("2", ")", ")")
+        if not size > 0.0:
+            raise self._error(f"a place {size:g} m wide, which must be positive")
+        return 0.0, [north, east, size]
+
+    def _squared_distance(self, way: str) -> float:
+        """Read ``(north - a)^2`` or that of the east; return a."""
+        self._expect("(", way)
+        sign = {"-": 1.0, "+": -1.0}[self._take("-", "+")]
+        middle = sign * self._number(self._take())
         self._take(")")
-        if not tau:
-            raise self._error("a time constant of zero")
-        return 1.0 / tau
+        self._take("^", "**")
+        self._take("2")
+        return middle
+
+    def _expect(self, *tokens: str) -> None:
+        """Step over tokens that must follow one another."""
+        for token in tokens:
+            self._take(token)
 
     def _turn(self) -> tuple[float, float, float]:
         """Read ``cos(k psi + w t + phase)`` or the sine; return k, w and the phase of the cosine."""
@@ -255,8 +318,7 @@ class _Parser:
 
     def _play(self) -> tuple[int, float]:
         """Read ``play(x, w)``; return the place of the reading and w."""
-        self._take("play")
-        self._take("(")
+        self._expect("play", "(")
         place = SYMBOLS.index(self._take(*_READINGS))
         self._take(",")
         width = self._number(self._take())
@@ -336,6 +398,8 @@ def law_wrench(
     state = (t, h, V, alpha, cos_beta * P + sin_beta * Q, cos_beta * Q - sin_beta * P, r)
     out = np.zeros(7)
     for i in range(rows.shape[0]):
+        if rows[i, 0] >= _FIRST_WIND:
+            continue
         term = rows[i, 1]
         for k in range(len(state)):
             power, odd = rows[i, 2 + k], rows[i, 2 + _COUNT + k]
@@ -357,3 +421,34 @@ def law_wrench(
         out[5],
         out[6],
     )
+
+
+@compiled
+def law_wind(rows: FloatArray, t: float, h: float, north: float, east: float) -> tuple[float, float, float]:
+    """Wind in N (m/s) of a law's rows at time t s and a place, m, to be added to the one that is known."""
+    state = (t, h)
+    wn, we, up = 0.0, 0.0, 0.0
+    for i in range(rows.shape[0]):
+        if rows[i, 0] < _FIRST_WIND:
+            continue
+        term = rows[i, 1]
+        for k in range(_OF_WIND):
+            power, odd = rows[i, 2 + k], rows[i, 2 + _COUNT + k]
+            if power != 0.0:
+                term *= abs(state[k]) ** power
+            if odd != 0.0:
+                term *= np.sign(state[k])
+        if rows[i, _DECAY] != 0.0:
+            term *= exp(-rows[i, _DECAY] * t)
+        if rows[i, _SWING] != 0.0:
+            term *= cos(rows[i, _SWING] * t + rows[i, _PHASE])
+        if rows[i, _SIZE] != 0.0:
+            away = (north - rows[i, _NORTH]) ** 2 + (east - rows[i, _EAST]) ** 2
+            term *= exp(-0.5 * away / rows[i, _SIZE] ** 2)
+        if rows[i, 0] == _FIRST_WIND:
+            wn += term
+        elif rows[i, 0] == _FIRST_WIND + 1:
+            we += term
+        else:
+            up += term
+    return wn, we, -up

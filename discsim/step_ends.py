@@ -93,17 +93,18 @@ def _kink(p: Any, tables: Tables, start: float, end: float) -> float:
 
 @compiled
 def _incidence_within(
-    p: Any, t: float, y: FloatArray, h: float, F: FloatArray, share: float, work: FloatArray
+    p: Any, tables: Tables, t: float, y: FloatArray, h: float, F: FloatArray, share: float, work: FloatArray
 ) -> float:
     """Angle of attack at a share of a step by its dense output, rad."""
-    for i in range(2, 10):
+    for i in range(10):
         work[i] = within(F, y, share, i)
-    return incidence(p, t + share * h, work)
+    return incidence(p, tables, t + share * h, work)
 
 
 @compiled
 def _share_up_to(
     p: Any,
+    tables: Tables,
     t: float,
     y: FloatArray,
     h: float,
@@ -123,7 +124,7 @@ def _share_up_to(
     share, side = high, 0
     for _ in range(30):
         share = (low * above - high * below) / (above - below)
-        miss = _incidence_within(p, t, y, h, F, share, work) - node
+        miss = _incidence_within(p, tables, t, y, h, F, share, work) - node
         if abs(miss) < 0.1 * AT_NODE:
             break
         if (miss > 0.0) == (above > 0.0):
@@ -148,22 +149,22 @@ def share_to_kink(
     """
     n = KINK_SAMPLES
     low, lower, before = 0.0, start, start
-    here = _incidence_within(p, t, y, h, F, 1.0 / n, work)
+    here = _incidence_within(p, tables, t, y, h, F, 1.0 / n, work)
     for k in range(1, n + 1):
         after = end
         if k < n - 1:
-            after = _incidence_within(p, t, y, h, F, (k + 1.0) / n, work)
+            after = _incidence_within(p, tables, t, y, h, F, (k + 1.0) / n, work)
         if k < n and (here - before) * (after - here) < 0.0:
             top = (k + 0.5 * (before - after) / (before - 2.0 * here + after)) / n
-            extreme = _incidence_within(p, t, y, h, F, top, work)
+            extreme = _incidence_within(p, tables, t, y, h, F, top, work)
             node = _kink(p, tables, lower, extreme)
             if np.isfinite(node):
-                return _share_up_to(p, t, y, h, F, node, low, lower, top, extreme, work)
+                return _share_up_to(p, tables, t, y, h, F, node, low, lower, top, extreme, work)
             low, lower = top, extreme
         elif k == n:
             node = _kink(p, tables, lower, end)
             if np.isfinite(node):
-                return _share_up_to(p, t, y, h, F, node, low, lower, 1.0, end, work)
+                return _share_up_to(p, tables, t, y, h, F, node, low, lower, 1.0, end, work)
         before, here = here, after
     return 1.0
 

@@ -85,7 +85,7 @@ def integrate(
     copied(y, states[0])
     derivative(p, tables, t, y, K[0])
     if kinked:
-        alpha = incidence(p, t, y)
+        alpha = incidence(p, tables, t, y)
     wished = h
     while t < t_end:
         h = min(up_to_events(p, t, h), t_end - t)
@@ -100,7 +100,7 @@ def integrate(
             h = wished = max(0.2 * h, SHORTEST_STEP)
             continue
         if kinked:
-            alpha_new = incidence(p, t + h, new)
+            alpha_new = incidence(p, tables, t + h, new)
             if tries < KINK_TRIES and h > shortest:
                 interpolant(p, tables, t, y, h, K, new, F)
                 share = share_to_kink(p, tables, t, y, h, F, alpha, alpha_new, work)
@@ -275,7 +275,7 @@ def _lost(flat: FloatArray, lookup: Tables, t: float, state: FloatArray) -> Inpu
     """Return the error of a flight whose physics gave no finite number after time t."""
     if lookup.rate.size == 0:
         return InputError(f"at {t:.3f} s the motion is no longer finite; expected parameters of a disc that can fly")
-    w = wind(flat.view(PARAMETERS)[0], t, -float(state[2]))
+    w = wind(flat.view(PARAMETERS)[0], lookup, t, float(state[0]), float(state[1]), -float(state[2]))
     return outside_table(lookup, t, float(state[12]), float(np.linalg.norm(state[3:6] - w)))
 
 

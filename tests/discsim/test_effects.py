@@ -169,7 +169,7 @@ def test_density_scales_all_of_the_air():
 
 def wind_at(t: float, h: float, *effects: Effect) -> np.ndarray:
     p = parameters(in_wind(2.0, -1.0, 0.25), DRIVER, effects=effects).view(PARAMETERS)[0]
-    return np.array(wind(p, t, h))
+    return np.array(wind(p, tables(DRIVER), t, 0.0, 0.0, h))
 
 
 KNOWN = np.array([2.0, -1.0, 0.25])

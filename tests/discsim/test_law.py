@@ -13,7 +13,7 @@ from support.flights import DRIVER, FIELD, throw
 from discsim.aerodynamics import air_wrench, total_wrench
 from discsim.engine import fly
 from discsim.errors import InputError
-from discsim.law import SYMBOLS, WRENCH_TARGETS, Law, law_wrench
+from discsim.law import SYMBOLS, WIND_TARGETS, WRENCH_TARGETS, Law, law_wind, law_wrench
 from discsim.parameters import PARAMETERS, parameters, tables
 from discsim.trajectory import predict
 
@@ -134,6 +134,58 @@ def test_both_engines_fly_a_law():
     assert np.linalg.norm(flight.at(1.0).position - without.at(1.0).position) > 2.0
 
 
+PLACE = {"w": 1.5, "a": 12.0, "b": -3.0, "s": 8.0}
+RISING = "w * exp(-((north - a)^2 + (east - b)^2) / (2 s^2))"
+
+
+@pytest.mark.parametrize("text", [RISING, "w exp(-((north-12)**2+(east+3)**2)/(2*s^2))"])
+@pytest.mark.parametrize("target", WIND_TARGETS)
+def test_a_wind_may_blow_about_a_place(text, target):
+    law = Law(text, target, PLACE)
+    for north, east in ((12.0, -3.0), (0.0, 4.0), (20.0, -3.0)):
+        expected = 1.5 * exp(-((north - 12.0) ** 2 + (east + 3.0) ** 2) / 128.0)
+        assert float(law.evaluate({"north": north, "east": east})) == pytest.approx(expected, rel=1e-13)
+        blown = dict(zip(WIND_TARGETS, np.array(law_wind(law.rows, 0.0, 2.0, north, east)) * (1, 1, -1), strict=True))
+        assert blown.pop(target) == pytest.approx(expected, rel=1e-13)
+        assert set(blown.values()) == {0.0}
+    # it moves the air, and no force is added to what the air does
+    assert law_wrench(law.rows, 0.0, 2.0, 20.0, 1.0, 1.0, 0.0, 0.0, 60.0) == (0.0,) * 7
+
+
+def test_a_wind_may_change_with_time_and_height():
+    law = Law("w |h|^0.5 exp(-t/s) cos(2 t + 1) - 2 t sign(t)", "wind_east_m_s", PLACE)
+    expected = 1.5 * sqrt(4.0) * exp(-0.25) * cos(5.0) - 4.0
+    assert law_wind(law.rows, 2.0, 4.0, 0.0, 0.0)[1] == pytest.approx(expected, rel=1e-13)
+    assert float(law.evaluate({"t": 2.0, "h": 4.0})) == pytest.approx(expected, rel=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("text", "target", "expected"),
+    [
+        (RISING, "force_z_N", "only in a law about the wind"),
+        ("w V", "wind_up_m_s", "the same for every disc"),
+        ("w sign(r)", "wind_up_m_s", "the same for every disc"),
+        ("w exp(-((north - a)^2 + (east - b)^2) / (2 b^2))", "wind_up_m_s", "-3 m wide"),
+        ("w exp(-((east - a)^2 + (north - b)^2) / (2 s^2))", "wind_up_m_s", "where north belongs"),
+        ("w north", "wind_up_m_s", "unknown 'north'"),
+        (f"{RISING} exp(-((north - 1)^2 + (east - 1)^2) / (2 s^2))", "wind_up_m_s", "a second place"),
+    ],
+)
+def test_a_wind_that_is_none_is_refused(text, target, expected):
+    with pytest.raises(InputError, match=expected):
+        Law(text, target, PLACE)
+
+
+def test_both_engines_fly_through_air_that_rises_about_a_place():
+    """RK4 at 1 ms keeps to 1e-5 m of what the other engine says; the rising air lifts the disc by decimetres."""
+    law = Law(RISING, "wind_up_m_s", PLACE)
+    truth = fly(DRIVER, FIELD, throw(), duration=1.0, law=law)
+    flight = predict(DRIVER, FIELD, throw(), duration=1.0, law=law)
+    np.testing.assert_allclose(flight.at(1.0).position[0], truth.position[-1], atol=1e-5)
+    without = predict(DRIVER, FIELD, throw(), duration=1.0)
+    assert without.at(1.0).position[0, 2] - truth.position[-1, 2] > 0.2
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -200,7 +252,7 @@ def test_a_share_of_the_air_multiplies_what_it_does():
     np.testing.assert_allclose(total, air * (1.0 - 0.1 * exp(-1.0)), rtol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["r", "sign", "exp", "psi", "a b", "2"])
+@pytest.mark.parametrize("name", ["r", "sign", "exp", "psi", "north", "a b", "2"])
 def test_a_coefficient_may_not_be_called_as_something_else(name):
     with pytest.raises(InputError, match=r"a name that is no symbol"):
         Law("1.0 r", "moment_z_N_m", {name: 1.0})

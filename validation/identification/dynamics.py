@@ -33,6 +33,9 @@ LAW_PLACES = (
     "phase",
     "play",
     "swing",
+    "north",
+    "east",
+    "size",
     *(f"at_{symbol}" for symbol in SYMBOLS),
 )
 _PLACES, _COUNT = len(LAW_PLACES), len(SYMBOLS)

@@ -162,6 +162,9 @@ _TARGETS = MappingProxyType(
         "moment_x_N_m": "rolling moment (x of H), N m",
         "moment_y_N_m": "pitching moment (y of H), N m",
         "moment_z_N_m": "moment about the spin axis, N m",
+        "wind_north_m_s": "wind to the north beside the known one, m/s",
+        "wind_east_m_s": "wind to the east beside the known one, m/s",
+        "wind_up_m_s": "wind upwards beside the known one, m/s",
         "air_share": "share by which the air's force and moment are larger than modelled (or the disc lighter)",
     }
 )

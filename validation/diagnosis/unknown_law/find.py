@@ -168,15 +168,42 @@ def find_law(
     states = [state_of(trajectory, start.values(i)) for i, trajectory in enumerate(start.trajectories)]
     at = reference_of(states)
     # what a free spin does not model takes up any further moment
-    motion = () if plant.weakly_identified else plant.laws.terms
+    motion = () if plant.weakly_identified else (*plant.laws.terms, *plant.laws.places(states))
     about = sensor_library(start)
     ranked: list[tuple[float, float, Term | SensorTerm]] = []
     if motion:
         ranked += candidate_laws(start, own, motion, at)
     ranked += _worth(start, about, asked_of_sensors(start, own, about))
     ranked.sort(key=lambda item: -item[0])
+    found = _likeliest(start, own, own_at, base, ranked, at)
+    if found is None:
+        return None
+    fitted, term = found
+    if isinstance(term, SensorTerm):
+        law = _believed(*_more_sensor_terms(start, own, own_at, fitted, term, about), base, at, start.noise)
+    else:
+        law = _believed(*_more_terms(start, own, own_at, fitted, term, at), base, at, start.noise)
+    if law is None or (instead and _priced(law.fitted) + SELECTION.entry > best.score):
+        return None
+    return law
+
+
+def _likeliest(
+    start: Fit,
+    own: Sequence[Parameter],
+    own_at: FloatArray,
+    base: ContinuousFit,
+    ranked: Sequence[tuple[float, float, Term | SensorTerm]],
+    at: Mapping[str, float],
+) -> tuple[ContinuousFit, Term | SensorTerm] | None:
+    """Return the best fit of a law of one term, and the term.
+
+    The best of the ranking are fitted, then the best of each other family where they leave something to explain: what
+    a score test gains depends on how much of it the segments' jumps take up, and they take up less of a sensor's term.
+    """
     found: tuple[ContinuousFit, Term | SensorTerm] | None = None
-    for _, coefficient, term in _spread(ranked):
+    first = _spread(ranked)
+    for _, coefficient, term in [*first, *_of_other_families(ranked, first)]:
         fitted: ContinuousFit | None
         if isinstance(term, SensorTerm):
             fitted = fitted_sensor_law(start, own, own_at, [term])
@@ -188,16 +215,26 @@ def find_law(
             found = fitted, term
         if _share(base.fit, fitted.fit, start.noise) > UNKNOWN_LAW.all:
             break
-    if found is None:
-        return None
-    fitted, term = found
+    return found
+
+
+def _family(term: Term | SensorTerm) -> tuple[str, float]:
+    """Return what a term is of; of those about a place each width is one, for a fit finds the middle and not it."""
     if isinstance(term, SensorTerm):
-        law = _believed(*_more_sensor_terms(start, own, own_at, fitted, term, about), base, at, start.noise)
-    else:
-        law = _believed(*_more_terms(start, own, own_at, fitted, term, at), base, at, start.noise)
-    if law is None or (instead and _priced(law.fitted) + SELECTION.entry > best.score):
-        return None
-    return law
+        return "sensor", 0.0
+    return "motion", 0.0 if term.place is None else term.place[2]
+
+
+def _of_other_families(
+    ranked: Sequence[tuple[float, float, Term | SensorTerm]], taken: Sequence[tuple[float, float, Term | SensorTerm]]
+) -> list[tuple[float, float, Term | SensorTerm]]:
+    """Return the best of a ranking of each family that none of the taken is of, where it is worth its price."""
+    families = {_family(term) for _, _, term in taken}
+    best: dict[tuple[str, float], tuple[float, float, Term | SensorTerm]] = {}
+    for item in ranked:
+        if item[0] > SELECTION.entry and _family(item[2]) not in families:
+            best.setdefault(_family(item[2]), item)
+    return list(best.values())
 
 
 def _more_terms(
@@ -223,7 +260,8 @@ def _more_terms(
         return fitted, terms  # under this law no motion lasts: there is nothing beside it to ask
     coefficient = float(fitted.fit.at[[q.name for q in fitted.fit.parameters].index("0.coefficient")])
     powers = {q.name: float(v) for q, v in zip(fitted.fit.parameters, fitted.fit.at, strict=True) if q.group == "law"}
-    settled = replace(first, powers=tuple((s, powers.get(f"0.power_{s}", n)) for s, n in first.powers))
+    place = None if first.place is None else (powers["0.north"], powers["0.east"], powers["0.size"])
+    settled = replace(first, powers=tuple((s, powers.get(f"0.power_{s}", n)) for s, n in first.powers), place=place)
     others = [term for term in start.plant.laws.terms if _key(term) != _key(first)]
     best, chosen = fitted, terms
     for _, further, term in _spread(candidate_laws(beside, (*own, *held), others, at)):
@@ -292,7 +330,13 @@ def _holds(heldout: Mapping[int, float], terms: Sequence[Term | SensorTerm] = ()
 def _key(term: Term | SensorTerm) -> tuple[object, ...]:
     if isinstance(term, SensorTerm):
         return term.sensor, term.kind
-    return term.target, frozenset(symbol for symbol, _ in term.powers), bool(term.decay), bool(term.order)
+    return (
+        term.target,
+        frozenset(symbol for symbol, _ in term.powers),
+        bool(term.decay),
+        bool(term.order),
+        term.place is None,
+    )
 
 
 def _spread(ranked: Sequence[tuple[float, float, Term | SensorTerm]]) -> list[tuple[float, float, Term | SensorTerm]]:

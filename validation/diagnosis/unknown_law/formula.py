@@ -9,9 +9,10 @@ from math import exp, log
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.law import AIR_SHARE
+from discsim.law import AIR_SHARE, WIND_TARGETS
 from discsim.validation.diagnosis.result import Law, ParameterValue
 from discsim.validation.diagnosis.settings import SELECTION
+from discsim.validation.diagnosis.unknown_law.motion_law import PLACE
 from discsim.validation.diagnosis.unknown_law.terms import SIDES, SensorTerm
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.normal_equations import inverse_of
@@ -144,6 +145,8 @@ def _in_hertz(w: float, sd: float, fit: Fit, sensor: str) -> str:
 
 def _unit(target: str) -> str:
     """Return the unit of what a law about motion gives, after a blank."""
+    if target in WIND_TARGETS:
+        return " m/s"
     return "" if target == AIR_SHARE else " N" if target.endswith("_N") else " N m"
 
 
@@ -203,6 +206,14 @@ def _as_law(terms: Mapping[int, Term], fit: Fit, at: Mapping[str, float], heldou
             coefficients["phase" + mark] = ParameterValue(float(fit.at[phase]), float(np.sqrt(C[phase, phase])))
             factors.append(f"cos({term.order} * yaw + phase{mark})")
             where.append(f"{term.order} times in a turn")
+        if term.place is not None:
+            names = dict(zip(PLACE, (f"{name}{mark}" for name in ("a", "b", "s")), strict=True))
+            for key, name in names.items():
+                j_key = place[f"{i}.{key}"]
+                coefficients[name] = ParameterValue(float(fit.at[j_key]), float(np.sqrt(C[j_key, j_key])))
+            a, b, s = names.values()
+            factors.append(f"exp(-((north - {a})^2 + (east - {b})^2) / (2 {s}^2))")
+            where.append("the middle of its place")
         scale = exp(logarithm)
         sd = abs(c) * scale * float(np.sqrt(max(float(row @ C @ row), 0.0)))
         coefficients["c" + mark] = ParameterValue(c * scale, sd)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.law import MOTION_TARGETS
+from discsim.law import MOTION_TARGETS, WIND_TARGETS
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, noise_of, scored
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
@@ -23,10 +23,19 @@ from discsim.validation.identification.plants.law_terms import Term
 from discsim.validation.identification.propagation import Column
 from discsim.validation.identification.segments import Trajectory, resegmented
 
-__all__ = ["candidate_laws", "fitted_law"]
+__all__ = ["PLACE", "candidate_laws", "fitted_law"]
+
+#: names of the parameters of a place
+PLACE = ("north", "east", "size")
+
 
 #: half the difference in an exponent
 _POWER_STEP = 1e-3
+
+
+#: an ordinary wind about a place, m/s, as a light or gentle breeze (Beaufort 2 and 3 are 1.6 to 5.4): without it one
+#: whose outermost skirt alone meets a path, at tens of m/s, passes for what a throw starts with
+_WIND_SIGMA = 3.0
 
 
 #: an exponent is sought within this of where it starts
@@ -130,7 +139,8 @@ def _asked(
     for term in terms:
         mine = [next(places[term.order > 0]) for _ in range(2 if term.order else 1)]
         free = [Column("law", f"{j}.candidate", 1.0) for j in mine]
-        answer: ScoreTest = equations.solve([*taken, *((c, Parameter("law", c.name, 0.0, 1.0)) for c in free)])
+        sigma = _WIND_SIGMA if term.target in WIND_TARGETS else np.inf
+        answer: ScoreTest = equations.solve([*taken, *((c, Parameter("law", c.name, 0.0, 1.0, sigma)) for c in free)])
         if term.order:
             a, b = (float(x) for x in answer.value[-2:])
             yield base - answer.chi2, float(np.hypot(a, b)), replace(term, phase=float(np.arctan2(-b, a)))
@@ -156,6 +166,11 @@ def _parameters(
         if term.order:
             found.append(Parameter("law", f"{i}.phase", term.phase, 1e-3, np.pi))
             start.append(term.phase)
+        if term.place is not None:
+            width = term.place[2]
+            for name, value in zip(PLACE, term.place, strict=True):
+                found.append(Parameter("law", f"{i}.{name}", value, 0.01 * width, 2.0 * width))
+                start.append(value)
     return tuple(found), np.array(start)
 
 
@@ -195,6 +210,7 @@ def fitted_law(
     bounds = dict(BOUNDS)
     bounds |= {q.key: (-4.0, 8.0) for q in parameters if ".power_" in q.name}
     bounds |= {q.key: (0.01 * q.stated, 50.0 * q.stated) for q in parameters if q.name.endswith(".decay")}
+    bounds |= {q.key: (0.1 * q.stated, 10.0 * q.stated) for q in parameters if q.name.endswith(".size")}
     fit = refit(fit, iterations=iterations, bounds=bounds)
     for _ in range(2):
         fit = refit(replace(fit, noise=noise_of(fit)), iterations=3, bounds=bounds)

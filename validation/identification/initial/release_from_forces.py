@@ -72,7 +72,7 @@ def _costs(
         cost += ((np.arcsin(-down / speed) - _ELEVATION[0]) / _ELEVATION[1]) ** 2
         for j in range(attitude.shape[0]):
             A = attitude[j]
-            wn, we, wd = wind(p, 0.0, height)
+            wn, we, wd = wind(p, tables, 0.0, 0.0, 0.0, height)
             a, b, d = north - wn, east - we, down - wd
             u = A[0, 0] * a + A[1, 0] * b + A[2, 0] * d
             v = A[0, 1] * a + A[1, 1] * b + A[2, 1] * d

@@ -5,6 +5,7 @@ A state is position and velocity in N, attitude and body rates.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice, product
 from math import asin, atan2, cos, degrees, radians, sin
@@ -193,6 +194,28 @@ def _terms() -> tuple[Term, ...]:
     return tuple(terms)
 
 
+#: the wind of a place that is sought: one along the ground passes for what a throw starts with, which GPS alone tells
+_UPWARDS = "wind_up_m_s"
+#: widths (m) of air that moves about a place, between a hedge's lee and more than a throw crosses; middles are tried
+#: one width apart, as far from a path as its wind is still a third of that in the middle
+_WIDTHS, _FAR = (10.0, 20.0, 40.0), 1.5
+
+
+def _places(states: Sequence[Mapping[str, FloatArray]]) -> tuple[Term, ...]:
+    path = np.concatenate([np.column_stack([state["north"], state["east"]]) for state in states])
+    terms = []
+    for width in _WIDTHS:
+        ways = (
+            np.arange(np.floor(low / width) - 1.0, np.ceil(high / width) + 2.0)
+            for low, high in zip(path.min(axis=0), path.max(axis=0), strict=True)
+        )
+        for middle in product(*ways):
+            at = width * np.array(middle)
+            if np.min(np.linalg.norm(path - at, axis=1)) <= _FAR * width:
+                terms.append(Term(_UPWARDS, place=(float(at[0]), float(at[1]), width)))
+    return tuple(terms)
+
+
 #: an unknown steady wind
 _WIND = catalogued(Wind).id
 
@@ -203,6 +226,8 @@ def _symbols(recording: Recording, t: FloatArray, states: FloatArray, values: Va
     u, v, w = to_body(states[:, _ATTITUDE], states[:, _VELOCITY] - wind).T
     return {
         "t": t,
+        "north": states[:, _POSITION][:, 0],
+        "east": states[:, _POSITION][:, 1],
         "h": np.maximum(-states[:, _POSITION][:, 2], 0.02),
         "V": np.sqrt(u * u + v * v + w * w),
         "alpha": np.arctan2(w, np.hypot(u, v)),
@@ -322,7 +347,7 @@ FLIGHT = Plant(
     hardware=("disc", "aero"),
     lacks=_lacks,
     grows_with=_grows_with,
-    laws=MotionLaws(_terms(), _symbols, moment_step=2e-4),
+    laws=MotionLaws(_terms(), _symbols, moment_step=2e-4, places=_places),
     design=Design(_about, _read),
     nodes=_nodes,
     from_release=_from_release,

@@ -16,7 +16,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.frames import conjugate, multiply, rotation_vector, turn
-from discsim.law import AIR_SHARE
+from discsim.law import AIR_SHARE, WIND_TARGETS
 from discsim.parameters import Tables
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
@@ -279,27 +279,36 @@ def _time_alone(recording: Recording, t: FloatArray, states: FloatArray, values:
     return {"t": t}
 
 
-#: half the difference in a share of what the air does
-_SHARE_STEP = 1e-3
+def _nowhere(states: Sequence[Mapping[str, FloatArray]]) -> tuple[Term, ...]:
+    del states
+    return ()
+
+
+#: half the differences in a share of what the air does, and in a wind, m/s
+_SHARE_STEP, _WIND_STEP = 1e-3, 0.05
 
 
 @dataclass(frozen=True)
 class MotionLaws:
     """What an unknown law about the motion may be made of.
 
-    ``terms`` are asked for first; ``symbols`` gives what they are made of, each (k,), at instants (k,) s with states
-    (k, s); ``force_step`` and ``moment_step`` are half the differences in a force and a moment, N and N m.
+    ``terms`` are asked for first, and those that ``places`` makes of the symbols of all recordings, each (k,);
+    ``symbols`` gives what they are made of, each (k,), at instants (k,) s with states (k, s); ``force_step`` and
+    ``moment_step`` are half the differences in a force and a moment, N and N m.
     """
 
     terms: tuple[Term, ...] = ()
     symbols: Callable[[Recording, FloatArray, FloatArray, Values], dict[str, FloatArray]] = _time_alone
     force_step: float = 2e-2
     moment_step: float = 2e-5
+    places: Callable[[Sequence[Mapping[str, FloatArray]]], tuple[Term, ...]] = _nowhere
 
     def step(self, target: str) -> float:
-        """Return half the difference in a force or moment."""
+        """Return half the difference in a force, a moment, a share or a wind."""
         if target == AIR_SHARE:
             return _SHARE_STEP
+        if target in WIND_TARGETS:
+            return _WIND_STEP
         return self.force_step if target.endswith("_N") else self.moment_step
 
 

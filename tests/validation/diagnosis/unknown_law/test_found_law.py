@@ -29,6 +29,7 @@ from discsim.validation.challenge.cases.off_catalogue import (
     PowerLawTorque,
     RotatingMagnet,
     SensorHysteresis,
+    Thermal,
     Warming,
 )
 from discsim.validation.diagnosis.pipeline import diagnose
@@ -271,18 +272,22 @@ def test_a_gyroscope_that_warms_up_in_free_spin_is_a_law_of_time():
     assert within(found, "tau", 0.8)
 
 
-def flown(fly_one: Callable[[Disc, Environment, Release], Motion]) -> list[Recording]:
-    """Two throws with a module on board that tells the path."""
+def flown(
+    fly_one: Callable[[Disc, Environment, Release], Motion], headings: Sequence[float] = (0.0, 0.0)
+) -> list[Recording]:
+    """A throw for each heading (rad) with a module on board that tells the path."""
     driver, field = load_disc("driver")
     module = Instruments.from_parts("mpu9250", "neo_m8n")
     recordings = []
-    for number, (speed, spin) in enumerate(((24.0, 60.0), (18.0, 45.0))):
+    for number, heading in enumerate(headings):
+        speed, spin = ((24.0, 60.0), (18.0, 45.0), (21.0, 50.0))[number]
+        north, east = np.cos(heading), np.sin(heading)
         release = Release(
             position=np.array([0.0, 0.0, -1.5]),
-            velocity=np.array([speed, 1.0, -3.0]),
+            velocity=np.array([speed * north - east, speed * east + north, -3.0]),
             roll=-0.2,
             pitch=0.15,
-            yaw=0.4,
+            yaw=0.4 + heading,
             body_rate=np.array([0.5, -0.4, spin]),
         )
         motion = fly_one(driver, field, release)
@@ -302,6 +307,27 @@ def test_a_disc_that_dries_as_it_flies_is_a_share_of_what_the_air_does():
     # 1/(1 + 0.06) - 1 at first; of such a share the second order makes the time some per cent longer
     assert found.law.coefficients["c"].value == pytest.approx(-0.0566, abs=2e-3)
     assert found.law.coefficients["tau"].value == pytest.approx(0.6, rel=0.1)
+
+
+def test_air_that_rises_about_a_place_is_a_law_of_that_place():
+    """Seen as a sensor's term it explains less, though jumps between segments take up more of what the wind does."""
+    secret = Thermal(1.0, 14.0, 6.0, 20.0)
+    with np.errstate(all="ignore"):  # as a diagnosis runs: a start that is far off may take a motion beyond all numbers
+        found = law_of(
+            flown(
+                lambda disc, field, release: follow(HiddenDisc(disc, field, (), secret, 0), release, duration=2.5),
+                (0.0, 2.1, 4.2),
+            )
+        )
+    assert found is not None
+    assert found.law.text == "c * exp(-((north - a)^2 + (east - b)^2) / (2 s^2))"
+    assert found.law.target == "wind_up_m_s"
+    for name, truth in (("c", 1.0), ("a", 14.0), ("b", 6.0), ("s", 20.0)):
+        assert within(found, name, truth)
+    # and the law as a model file carries it is the wind
+    assert float(found.law.for_model().evaluate({"north": 10.0, "east": 0.0})) == pytest.approx(
+        secret.wind_up(10.0, 0.0), rel=0.03
+    )
 
 
 def test_a_side_force_in_flight_is_found_with_its_target_and_powers():
