@@ -112,18 +112,19 @@ class _Around:
         self.states = np.repeat(current.states[:, None], tangents.shape[0], axis=1)
         turned = np.flatnonzero(np.any(tangents != 0.0, axis=1))
         self.states[:, turned] = plant.layout.moved(current.states[:, None], tangents[turned])
-        #: rows of the neighbours that belong to a short event, and when it is, s
+        #: rows of the neighbours that belong to a short event, and when it is there and in the motion itself, s
         self._events = {
-            row: t
+            row: instants
             for row, column in enumerate([columns[j] for j in self.motion], 1 + d)
-            if (t := _instant(column, values)) is not None
+            if (instants := _instants(column, values))
         }
 
     def acting(self, start: float, stop: float) -> IntArray:
         """Return the neighbours (a,) that may part from the motion between two instants: an event moves no others."""
         if not self._events:
             return self.everyone
-        still = [row for row, t in self._events.items() if not start - EVENT_REACH < t < stop + EVENT_REACH]
+        first, last = start - EVENT_REACH, stop + EVENT_REACH
+        still = [row for row, instants in self._events.items() if not any(first < t < last for t in instants)]
         still += [row + self.half for row in still] if self.central else []
         return np.setdiff1d(self.everyone, still)
 
@@ -415,11 +416,11 @@ _ALSO_READ = {
 _LAGS = {row.id for row in CATALOGUE.values() if row.type is Lag}
 
 
-def _instant(column: Column, values: Values) -> float | None:
-    """Return when the event is that a column belongs to, s; None of what is no short event."""
+def _instants(column: Column, values: Values) -> tuple[float, ...]:
+    """Return when the event is that a column belongs to, as it is given and as it is, s; nothing of no short event."""
     if column.group not in EVENTS:
-        return None
-    return dict(column.given).get("t_s", values.get((column.group, "t_s")))
+        return ()
+    return tuple(t for t in (dict(column.given).get("t_s"), values.get((column.group, "t_s"))) if t is not None)
 
 
 def _moves(column: Column, plant: Plant, effects: Competing) -> bool:
