@@ -13,6 +13,7 @@ from discsim.validation.diagnosis.selection.candidates import CandidateEffect
 from discsim.validation.diagnosis.selection.hypothesis import fitted_parameters
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.uninflated_noise import uninflated_noise
+from discsim.validation.diagnosis.verdict import standard_errors
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.normal_equations import nuisance_step, reduce
 
@@ -84,6 +85,8 @@ def located_effect(found: Search, candidate: CandidateEffect, names: Sequence[st
         if event:
             instant = _instant(found, candidate)
             width = 2.0 * abs(_value(found, candidate, row.lasts)) if isinstance(row.lasts, str) else 3.0 * row.lasts
+            # a gust is as long as it is found to be; of what is brief the instant may be known to less than its length
+            width = max(width, 2.0 * _error(found, candidate, "t_s")) if row.brief else width
             start, stop = max(instant - width, 0.0), instant + width
         where = _where(candidate, names)
         said = f"{text} (at {_instant(found, candidate):.3f} s)" if event else text
@@ -110,6 +113,15 @@ def _value(found: Search, candidate: CandidateEffect, name: str) -> float:
         if q.key == (candidate.id, name) and q.recordings == candidate.recordings:
             return float(at)
     return float(candidate.shape_grid.get(name, 0.0))
+
+
+def _error(found: Search, candidate: CandidateEffect, name: str) -> float:
+    """Return the standard error of a parameter of an effect, zero where none is known."""
+    errors = standard_errors(found.final)
+    for q, error in zip(found.final.fit.parameters, errors.tolist(), strict=True):
+        if q.key == (candidate.id, name) and q.recordings == candidate.recordings and np.isfinite(error):
+            return float(error)
+    return 0.0
 
 
 def _instant(found: Search, candidate: CandidateEffect) -> float:

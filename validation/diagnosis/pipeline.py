@@ -23,6 +23,7 @@ from discsim.validation.diagnosis.prepared import prepared
 from discsim.validation.diagnosis.refuted import without_refuted
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.result import Outcome
+from discsim.validation.diagnosis.selection.event_instants import with_instants_weighed
 from discsim.validation.diagnosis.selection.refits import told_to
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.selection.stepwise import screened, search
@@ -76,7 +77,7 @@ def diagnose(
                 tried = again if stands(again) else tried
         tried = _with_law_of_one(tried, question)
         if tried.found is not None and tried.law is None:
-            tried = replace(tried, found=without_refuted(tried.found))
+            tried = replace(tried, found=with_instants_weighed(without_refuted(tried.found)))
         return outcome_of(judged(tried, progress), question)
 
 
