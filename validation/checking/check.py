@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol
 
 from discsim.effects.catalogue import catalogued
 from discsim.effects.setup import ClockUnit
 from discsim.recording import Recording
 from discsim.validation.checking.abilities import methods_that_run, not_told
+from discsim.validation.checking.failed_readings import failed_findings, without_failed
 from discsim.validation.checking.finding import SEVERITIES, Finding
 from discsim.validation.checking.readings import reading_findings
 from discsim.validation.checking.run_down import run_down_findings
@@ -88,13 +89,16 @@ class Check:
 
 def check_recording(recording: Recording, faults: Sequence[SetupFault] = ()) -> Check:
     """Return what is to be said of a recording; ``faults`` are setup faults found in it, which join the findings."""
-    sensors = tuple(check_sensor(recording, name) for name in recording.samples)
+    failed, written = tuple(failed_findings(recording)), recording.samples
+    recording = without_failed(recording)
+    sensors = tuple(replace(check_sensor(recording, name), gaps=samples.gaps) for name, samples in written.items())
     clocks, doubts = clock_doubts(recording), list(reference_doubts(recording))
     clocked = {name for doubt in clocks for name in doubt.sensors}
     findings = [
         *statement_findings(recording),
         *(Finding(_CLOCK, "error", ", ".join(one.sensors), one.what, one.expected, one.remedy) for one in clocks),
         *(finding for found in sensors for finding in sensor_findings(found, clocked=found.sensor in clocked)),
+        *failed,
         *reading_findings(recording, doubts),
         *run_down_findings(believed(recording, doubts)),
         # setup faults (axes, units, offsets in time) join here: anything with an id and a sentence

@@ -15,6 +15,7 @@ from discsim.files import write_text
 from discsim.result import Result
 from discsim.threads import one_thread
 from discsim.validation.checking.check import Check, check_recording
+from discsim.validation.checking.failed_readings import without_failed
 from discsim.validation.checking.table import print_checks
 from discsim.validation.diagnosis.setup import find_setup_faults, suspected_fault
 from discsim.validation.reporting.figures import COLOURS, new_figure
@@ -92,7 +93,7 @@ def check(recordings: Given) -> Checked:
     200
     """
     found = given_recordings(recordings)
-    setup = find_setup_faults(found)
+    setup = find_setup_faults([without_failed(recording) for recording in found])
     faults = [*setup.faults, *filter(None, [suspected_fault(setup)])]
     # in another unit of time every rate, path and noise looks wrong as well
     clock = [fault.effect for fault in setup.faults if isinstance(fault.effect.value, ClockUnit)]

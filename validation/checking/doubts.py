@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from discsim.recording import Recording
+from discsim.validation.checking.failed_readings import failed_findings
 from discsim.validation.checking.finding import doubts_of
 from discsim.validation.checking.paths import path_findings
 from discsim.validation.checking.statements import statement_findings
@@ -12,7 +13,7 @@ from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
 from discsim.validation.diagnosis.setup.units import clock_unit
 from discsim.written import corrected
 
-__all__ = ["mended_flights", "path_doubts"]
+__all__ = ["mended_flights", "reading_doubts"]
 
 
 def mended_flights(
@@ -25,21 +26,26 @@ def mended_flights(
     setup = find_setup_faults(recordings)
     notes = setup_notes(setup, f"{done} are")
     found = [
-        [finding for finding in (*statement_findings(one), *path_findings(one)) if finding.id not in passed]
+        [
+            finding
+            for finding in (*statement_findings(one), *failed_findings(one), *path_findings(one))
+            if finding.id not in passed
+        ]
         for one in setup.recordings
     ]
     notes += _told_once([doubts_of(own) for own in found], [one.name for one in setup.recordings])
     return tuple(setup.recordings), tuple(notes)
 
 
-def path_doubts(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
-    """Return what is doubtful about the positions of recordings (called ``names``), a line each, as `check` says it.
+def reading_doubts(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
+    """Return what is doubtful about positions and failed readings of recordings (called ``names``), as `check` says it.
 
-    Seconds are what their clock's unit makes of the times: in another unit every path looks wrong.
+    A line each. Seconds are what their clock's unit makes of the times: in another unit every path looks wrong.
     """
     unit = clock_unit(recordings)
     meant = [corrected(one, [] if unit is None else [unit]) for one in recordings]
-    return tuple(_told_once([doubts_of(path_findings(one)) for one in meant], names))
+    found = [(*failed_findings(one), *path_findings(one)) for one in meant]
+    return tuple(_told_once([doubts_of(own) for own in found], names))
 
 
 def _told_once(sentences: Sequence[Sequence[str]], names: Sequence[str]) -> list[str]:

@@ -150,8 +150,8 @@ def _dead(recording: Recording, sensor: str) -> tuple[str, ...]:
     for k, name in enumerate(SENSORS[sensor].columns):
         column = samples.value.reshape(len(samples), -1)[:, k]
         numbers = column[np.isfinite(column)]
-        constant = numbers.size >= CONSTANT and np.all(numbers == numbers[0]) and not np.all(at_end[:, k])
-        if numbers.size == 0 or constant:
+        constant = numbers.size >= CONSTANT and np.all(numbers == numbers[0])
+        if numbers.size == 0 or (constant and not np.all(at_end[np.isfinite(column), k])):
             names.append(name)
     return tuple(names)
 

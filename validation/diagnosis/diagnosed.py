@@ -15,7 +15,7 @@ from discsim.model_file import Model
 from discsim.recording import Recording
 from discsim.result import Result
 from discsim.threads import one_thread
-from discsim.validation.checking.doubts import path_doubts
+from discsim.validation.checking.doubts import reading_doubts
 from discsim.validation.diagnosis.datasets import need_field, recording_names
 from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.report.figures import draw_overview
@@ -40,7 +40,7 @@ class Diagnosed(Result):
     counts : mapping
         Number of recordings by the name of their data set.
     doubts : tuple of str
-        What is doubtful about their positions before anything is fitted, as `check` says it; it is among the warnings.
+        What is doubtful about positions, and readings that failed, as `check` says it; it is among the warnings.
     """
 
     outcome: Outcome
@@ -160,7 +160,7 @@ def diagnose_named(
         raise InputError(f"recordings of {', '.join(sorted(plants)) or 'nothing'}; expected recordings of one plant")
     need_field(sets)
     called = [name for group in recording_names(sets, list(datasets)) for name in group]
-    doubts = path_doubts([recording for one in sets for recording in one], called)
+    doubts = reading_doubts([recording for one in sets for recording in one], called)
     outcome = diagnose(sets, list(datasets), progress=progress, seed=seed, user_effects=user_effects, plans=plans)
     answer = replace(outcome.diagnosis, warnings=(*doubts, *outcome.diagnosis.warnings))
     counts = {name: len(one) for name, one in datasets.items()}

@@ -20,7 +20,7 @@ from discsim.glitches import FASTEST_SPIN
 from discsim.limits import time_fault
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from discsim.validation.importing.cleaning import Readings, cleaned, without_glitches
-from discsim.validation.importing.failed import dead_axis, failed_at_once, on_all_axes
+from discsim.validation.importing.failed import dead_axis, failed_at_once, failed_on_one_axis, on_all_axes
 from discsim.validation.importing.import_map import ImportMap, SensorMap, TimeBase
 from discsim.validation.importing.overflow import without_overflow
 from discsim.validation.importing.raw_table import RawTable, Repair, RepairList, read_raw
@@ -243,8 +243,19 @@ def _without_failed(
     for sensor in [sensor for sensor in readings if sensor in failed]:
         found, rows, common = readings[sensor], failed[sensor], on_all_axes(written[sensor].value)
         for number in np.unique(common[rows]):
-            notes.append(_failed(sensor, found, rows & (common == number), number, tables[sensor], repairs))
+            where = f"{sensor}: {f'{number:.9g}' if number else 'exactly 0'} on all axes"
+            action = f"{f'{number:.9g}' if number else 'zeros'} of {sensor} made a gap"
+            notes.append(_failed(where, action, found, rows & (common == number), tables[sensor], repairs))
         readings = {**readings, sensor: found._replace(value=np.where(rows[:, None], np.nan, found.value))}
+    for sensor in written:
+        found, value = readings[sensor], import_map.sensors[sensor].written(readings[sensor].value)
+        cells = failed_on_one_axis(value)
+        for name, column, failing in zip("xyz", value.T, cells.T, strict=True):
+            for number in np.unique(column[failing]):
+                where, action = f"{sensor} {name}: {number:.9g}", f"{number:.9g} of {sensor} made a gap"
+                rows = failing & (column == number)
+                notes.append(_failed(where, action, found, rows, tables[sensor], repairs))
+        readings = {**readings, sensor: found._replace(value=np.where(cells, np.nan, found.value))}
     gyro = readings.get("gyroscope")
     if gyro is not None and (axis := dead_axis(gyro.value)) is not None:
         notes.append(f"WARNING: gyroscope {'xyz'[axis]}: 0 in every row while the other two turn: it was not read")
@@ -252,18 +263,19 @@ def _without_failed(
     return readings, notes
 
 
-def _failed(sensor: str, found: Readings, rows: BoolArray, number: float, table: RawTable, repairs: RepairList) -> str:
-    """List the rows (n,) of a sensor in which ``number``, as written, stands for a failed reading, and say so."""
+def _failed(where: str, action: str, found: Readings, rows: BoolArray, table: RawTable, repairs: RepairList) -> str:
+    """List the rows (n,) of a sensor in which a number stands for a failed reading, and say so.
+
+    ``where`` names sensor and number, ``action`` what is done.
+    """
     count, first = int(np.count_nonzero(rows)), int(found.number[np.argmax(rows)])
-    what = f"{sensor}: {f'{number:.9g}' if number else 'exactly 0'} on all axes in"
     for start, stop in runs(rows):
         line = table.line_of(found.number[start])
-        listed = f"{what} {stop - start} row{'s' * (stop - start > 1)}, a failed reading"
-        action = f"{f'{number:.9g}' if number else 'zeros'} of {sensor} made a gap"
+        listed = f"{where} in {stop - start} row{'s' * (stop - start > 1)}, a failed reading"
         repairs.add(None, table.path, line, listed, action)
     return (
-        f"{'WARNING: ' * (count > MUCH_LOST * rows.size)}{what} {count} of {rows.size} rows amid other readings, the "
-        f"first row {first}: readings that failed; they become gaps"
+        f"{'WARNING: ' * (count > MUCH_LOST * rows.size)}{where} in {count} of {rows.size} rows amid other readings, "
+        f"the first row {first}: readings that failed; they become gaps"
     )
 
 

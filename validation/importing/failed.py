@@ -3,7 +3,8 @@
 A bus that does not answer leaves a driver's buffer as it was made, zeros, or reads ones: 65535, which is -1 with a
 sign. A program writes -1, -999 or the end of its type. No magnetometer on earth reads zeros; an accelerometer does in
 an ideal free fall, a gyroscope at an ideal rest, and these two last. Another number on all axes at once is a reading
-where others lie near it or lead to it. It is clipped where single axes stand at it, too, and do not fail with it.
+where others lie near it or lead to it. It is clipped where single axes stand at it, too, and do not fail with it. On a
+single axis only numbers that no part's range ends at tell a failure, and no other reading may come and go like them.
 """
 
 from __future__ import annotations
@@ -12,12 +13,13 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from discsim.arrays import BoolArray, FloatArray, runs
 from discsim.validation.importing.cleaning import FROZEN_ROWS, FROZEN_TIMES, Readings
 from discsim.validation.importing.held import step_of
 
-__all__ = ["dead_axis", "failed_at_once", "failed_rows", "on_all_axes"]
+__all__ = ["dead_axis", "failed_at_once", "failed_on_one_axis", "failed_rows", "on_all_axes"]
 
 #: A reading beside is no small one: this share of the usual (median) size, and this many steps of resolution. One of a
 #: coarse accelerometer in free fall, a step or two beside zero, is.
@@ -31,6 +33,15 @@ BESIDE = 5
 FEWEST = 3
 #: A range's end is met on a single axis to within this share: 16 bits end at 32767 and at -32768.
 END = 1e-3
+#: Numbers of a failed reading on one axis that one row tells where nothing is near: 65535 and nines (-999); and those
+#: that `FEWEST` rows tell: -1, and nines with decimals, which a body may read.
+SURELY = np.array([65535.0, *(sign * (10.0**digits - 1) for digits in (3, 4, 5, 6) for sign in (-1, 1))])
+PERHAPS = np.array(
+    [-1.0, *(sign * (10.0**k - 1) / 10**d for k in (2, 3, 4, 5) for d in (0, 1, 2) for sign in (-1, 1) if d or k == 2)]
+)
+ENDS = np.array([-32768.0, -32767.0, 32767.0])
+#: A number of a failed reading is met to within this share: files round it to seven digits.
+WRITTEN = 1e-6
 
 
 def on_all_axes(value: FloatArray) -> FloatArray:
@@ -90,6 +101,26 @@ def failed_at_once(readings: Mapping[str, Readings]) -> dict[str, BoolArray]:
     return {sensor: rows for sensor, rows in failed.items() if rows.any()}
 
 
+def failed_on_one_axis(value: FloatArray) -> BoolArray:
+    """Tell which cells (n, 3) of a sensor's readings as written (n, 3) hold a number of a failed reading, axis by axis.
+
+    Rows that failed as a whole are gaps in ``value``. A number counts where no other reading of the axis is near it, or
+    in rows in which it leaps there and back as no other reading does: of a body that is knocked readings of any size
+    do, and one at rest may read -1.
+    """
+    failed = np.zeros(value.shape, dtype=np.bool_)
+    for axis, column in enumerate(value.T):
+        there = np.flatnonzero(np.isfinite(column))
+        seen = np.array(column[there])
+        decimals = bool(np.any(seen % 1))
+        codes = np.concatenate([SURELY, ENDS, PERHAPS]) if decimals else np.concatenate([SURELY, PERHAPS])
+        for code in codes:
+            seen[np.abs(seen - code) <= WRITTEN * abs(code)] = code
+        for code in codes[np.isin(codes, seen)]:
+            failed[there[_of_no_reading(seen, float(code), codes)], axis] = True
+    return failed
+
+
 def dead_axis(value: FloatArray) -> int | None:
     """Return the axis of a gyroscope's readings (n, 3) that is 0 in every row while both others change, or None."""
     sound = value[np.isfinite(value).all(axis=1)]
@@ -97,6 +128,40 @@ def dead_axis(value: FloatArray) -> int | None:
         return None
     zero = np.flatnonzero(np.all(sound == 0, axis=0))
     return int(zero[0]) if zero.size == 1 and np.count_nonzero(np.ptp(sound, axis=0)) == 2 else None
+
+
+def _of_no_reading(seen: FloatArray, code: float, codes: FloatArray) -> BoolArray:
+    """Tell which readings (n,) of one axis are a number that stands for none; ``codes``: all that may."""
+    sound, same = seen[~np.isin(seen, codes)], np.asarray(seen == code)
+    if len(sound) < BESIDE:
+        return np.zeros_like(same)
+    # a run of the number counts once
+    first = ~same | np.concatenate([[True], ~same[:-1]])
+    shown, told = seen[first], same[first]
+    # beside zeros of one at rest, -1 is the step
+    graded = seen if code in PERHAPS else sound
+    step = max(step_of(graded) or 0.0, float(np.min(np.diff(np.unique(graded)), initial=np.inf)))
+    step = step if np.isfinite(step) else 0.0
+    far = np.min(np.abs(sound - code)) > max(SHARE * float(np.median(np.abs(sound))), STEPS * step)
+    if far and (code not in PERHAPS or np.count_nonzero(told) >= FEWEST):
+        return same
+    leaps = _leaps(shown, STEPS * step)
+    if 2 * np.count_nonzero(leaps & told) <= np.count_nonzero(leaps) or np.count_nonzero(leaps & told) < FEWEST:
+        return np.zeros_like(same)
+    return np.asarray(same & (leaps & told)[np.cumsum(first) - 1])
+
+
+def _leaps(shown: FloatArray, least: float) -> BoolArray:
+    """Tell which readings (n,) leap there and back: by more than ``least``, and than `LEAP` times the steps beside."""
+    leaps = np.zeros(shown.size, dtype=np.bool_)
+    if shown.size > 2:
+        steps = np.abs(np.diff(shown))
+        largest = sliding_window_view(np.pad(steps, BESIDE), BESIDE).max(axis=1)
+        # of reading k, steps k - 1 and k are to and from it; the windows end before the one and begin behind the other
+        before, after = largest[: shown.size - 2], largest[BESIDE + 2 : BESIDE + shown.size]
+        both = np.minimum(steps[1:], steps[:-1])
+        leaps[1:-1] = both > np.maximum(least, LEAP * np.maximum(before, after))
+    return leaps
 
 
 def _for_failed(number: float) -> bool:

@@ -13,7 +13,7 @@ from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc, load_throw
 from discsim.trajectory import predict
 from discsim.validation.checking import check_recording
-from discsim.validation.checking.doubts import mended_flights, path_doubts
+from discsim.validation.checking.doubts import mended_flights, reading_doubts
 from discsim.validation.diagnosis.diagnosed import diagnose_recordings
 from discsim.written import as_written
 
@@ -93,22 +93,22 @@ def test_a_stated_number_that_cannot_be_is_told_once_and_of_some_throws_with_the
 def test_a_diagnosis_says_of_a_path_what_a_check_says_once_for_all_recordings(throws):
     """A user who went straight to the diagnosis got no word of positions in another unit."""
     wrong = 2 * [with_path(throws[0], scaled(POSITION, 1 / 0.3048))]
-    (sentence,) = path_doubts(wrong, ["a", "b"])
+    (sentence,) = reading_doubts(wrong, ["a", "b"])
     assert "the position in feet?" in sentence
     assert sentence in [one.sentence for one in check_recording(wrong[0]).findings]
-    assert path_doubts([wrong[0], throws[1]], ["a", "b"]) == (f"a: {sentence}",)
-    assert path_doubts(throws, ["a", "b"]) == ()
+    assert reading_doubts([wrong[0], throws[1]], ["a", "b"]) == (f"a: {sentence}",)
+    assert reading_doubts(throws, ["a", "b"]) == ()
 
 
 def test_what_a_path_is_doubted_for_is_among_the_warnings_of_a_diagnosis(throws):
     short = {name: throws[0].need(name).between(0.0, 2.0) for name in ("gyroscope", "gps")}
     wrong = [with_path(replace(throws[0], samples=short), scaled(POSITION, 1 / 0.3048))]
     found = diagnose_recordings(wrong)
-    assert found.doubts == path_doubts(wrong, ["recordings"])
+    assert found.doubts == reading_doubts(wrong, ["recordings"])
     assert found.doubts
     assert found.diagnosis.warnings[: len(found.doubts)] == found.doubts
 
 
 def test_of_a_path_in_another_unit_of_time_its_times_alone_are_told(throws):
     late = [as_written(one, [effect("clock.units", written_in="ms")]) for one in throws]
-    assert path_doubts(late, ["a", "b"]) == ()
+    assert reading_doubts(late, ["a", "b"]) == ()

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from support.made_logs import DEG, G0, LANDING, RATE, RELEASE, made_log, three, write_table
 
 from discsim.validation.importing.cleaning import Readings, cleaned
-from discsim.validation.importing.failed import dead_axis, failed_at_once, failed_rows
+from discsim.validation.importing.failed import dead_axis, failed_at_once, failed_on_one_axis, failed_rows
 from discsim.validation.importing.imported_log import import_log
 
 LOG = made_log()
@@ -103,6 +103,55 @@ def test_another_number_on_all_axes_amid_readings_is_a_failed_one(tmp_path, fail
     assert throw.spin == pytest.approx(32, rel=0.06)
     assert "gyroscope unit: deg/s (certain: the header says so, and the field turns as fast)" in said
     assert "accelerometer unit: g (certain" in said
+
+
+ON_ONE_AXIS = {
+    "gyroscope": (-999, -9999, 65535, 32767),
+    "accelerometer": (-1, -999, 65535, -32768),
+    "magnetometer": (-1, -999, 999.9, 65535, 32767),
+}
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize(("sensor", "number"), [(s, number) for s, all_ in ON_ONE_AXIS.items() for number in all_])
+def test_such_a_number_on_one_axis_is_a_gap_there(tmp_path, sensor, axis, number):
+    """A line that breaks in the middle of a record, a chip that gives one register: the number entered as truth."""
+    values = {s: np.where(APART[:, None] & (np.arange(3) == axis) & (s == sensor), number, v)
+              for s, v in SENSORS.items()}  # fmt: skip
+    columns = [("ms", np.round(1000 * LOG.t).astype(int)), *(c for s in values for c in three(NAMES[s], values[s]))]
+    found = import_log(write_table(tmp_path / "log.csv", columns, digits=4))
+    assert f"{sensor} {'xyz'[axis]}: {number:g} in " in found.summary()
+    (throw,) = found.throws
+    assert throw.spin == pytest.approx(32, rel=0.06)
+    samples = found.recordings[0].samples[sensor]
+    gap = np.isnan(samples.value)
+    assert gap[:, axis].any()
+    assert not np.delete(gap, axis, axis=1).any()
+    assert_allclose(np.setdiff1d(np.round(samples.t[gap[:, axis]], 3), np.round(LOG.t[APART], 3)), [])
+
+
+def test_minus_one_that_is_read_on_one_axis_is_a_reading():
+    """Whole numbers of a gyroscope at rest and of a field that turns; tenths of g of a board that is knocked about."""
+    rng = np.random.default_rng(5)
+    knocked = rng.normal(0, 0.03, LOG.accel.shape)
+    knocked[rng.integers(0, ROWS.size, 200)] += rng.normal(0, 1.0, (200, 3))
+    for value in (
+        np.round(rng.normal(-0.6, 0.6, LOG.gyro.shape)),
+        np.where(rng.random(LOG.gyro.shape) < 0.01, -1.0, 0.0),
+        np.round(LOG.gyro / DEG),
+        np.round(LOG.mag),
+        np.round(LOG.mag, 1),
+        np.round(knocked, 1),
+        np.round(knocked, 2),
+    ):
+        assert not failed_on_one_axis(value).any()
+
+
+@pytest.mark.parametrize("number", [32767, -32768])
+def test_counts_at_the_end_of_their_range_on_one_axis_are_clipped(number):
+    value = np.round(LOG.accel / G0 * 2048)
+    value[900:1000:20, 0] = number
+    assert not failed_on_one_axis(value).any()
 
 
 def test_a_map_of_reversed_axes_names_the_number_as_written(tmp_path):

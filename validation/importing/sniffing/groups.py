@@ -13,7 +13,7 @@ import numpy as np
 from discsim.arrays import BoolArray, FloatArray
 from discsim.recording import SENSORS
 from discsim.validation.importing.cell_texts import CellTexts, number
-from discsim.validation.importing.failed import failed_rows
+from discsim.validation.importing.failed import failed_on_one_axis, failed_rows
 from discsim.validation.importing.overflow import continued
 from discsim.validation.importing.raw_table import RawTable
 from discsim.validation.importing.sniffing.dialect import Dialect
@@ -125,6 +125,8 @@ class Triple:
         value = value if meant is None else meant
         failed = failed_rows(self.sensor, value)
         value = np.where(failed[:, None], np.nan, value) if failed.any() else value
+        cells = failed_on_one_axis(value)
+        value = np.where(cells, np.nan, value) if cells.any() else value
         if self.sensor != "gyroscope":
             return value
         whole = [continued(column) for column in value.T]
