@@ -13,7 +13,7 @@ import numpy as np
 from discsim.arrays import FloatArray, readonly
 from discsim.errors import InputError, require_number, require_type
 from discsim.frames import attitude_matrix
-from discsim.limits import ANY_NUMBER
+from discsim.limits import ANY_NUMBER, limit_of
 from discsim.toml_table import TomlTable
 
 __all__ = ["RELEASE_HEIGHT", "Aero", "AeroTable", "Disc", "Release", "Rig", "RollingTable", "YawDampingTable"]
@@ -309,12 +309,24 @@ class Rig:
         return cls(Izz, viscous, table.sigma)
 
 
+#: what a release states, its key in a file, by which it is limited, and its unit
+_RELEASE_KEYS = (
+    ("position", "position_ned_m", "m"),
+    ("velocity", "velocity_ned_m_s", "m/s"),
+    ("body_rate", "body_rate_rad_s", "rad/s"),
+    ("roll", "roll_rad", "rad"),
+    ("pitch", "pitch_rad", "rad"),
+    ("yaw", "yaw_rad", "rad"),
+)
+
+
 @dataclass(frozen=True)
 class Release:
     """State at release, or what was measured of it; None where unknown.
 
     Position and velocity (3,) of the centre of mass in North-East-Down (m, m/s); roll, pitch, yaw in rad in the
-    order ``C_BN = C3(yaw) C2(pitch) C1(roll)`` (A1); body rate (3,) rad/s. ``sigma`` by the file's key.
+    order ``C_BN = C3(yaw) C2(pitch) C1(roll)`` (A1); body rate (3,) rad/s. ``sigma`` by the file's key. Raises
+    `InputError` for what a file's reader refuses: no finite numbers, or beyond `discsim.limits`.
     """
 
     position: FloatArray | None = None
@@ -336,6 +348,11 @@ class Release:
         for name in ("roll", "pitch", "yaw"):
             if getattr(self, name) is not None:
                 require_number(getattr(self, name), f"release {name}", "rad")
+        for name, key, unit in _RELEASE_KEYS:
+            value = getattr(self, name)
+            size = 0.0 if value is None else float(np.max(np.abs(value)))
+            if fault := limit_of(key).fault(size, divides=False):
+                raise InputError(f"release {name} is {size:g} {unit} in size; {fault} ({unit})")
         object.__setattr__(self, "sigma", MappingProxyType(dict(self.sigma)))
 
     def start(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from math import isfinite
 from numbers import Real
+from os import PathLike
 from pathlib import Path
 
-__all__ = ["InputError", "printable", "require_number", "require_type"]
+__all__ = ["InputError", "printable", "require_number", "require_path", "require_type"]
 
 #: characters of a message that are shown: a file may have names of thousands, and what was expected stands at the end
 _HEAD, _TAIL = 800, 300
@@ -51,3 +52,8 @@ def require_type(value: object, kind: type | tuple[type, ...], name: str, expect
         shown = repr(value)
         shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
         raise InputError(f"{name} is {printable(shown)}, of type {type(value).__name__}; expected {expected}")
+
+
+def require_path(value: object, name: str, expected: str) -> None:
+    """Raise `InputError` for what is neither a text nor a path; ``expected`` says what stands at the path."""
+    require_type(value, (str, PathLike), name, expected)

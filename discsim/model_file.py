@@ -18,7 +18,7 @@ from discsim.disc import Disc, Rig
 from discsim.effects.catalogue import Effect, Row, effect, row
 from discsim.effects.own import UserEffect
 from discsim.environment import Environment
-from discsim.errors import InputError, require_type
+from discsim.errors import InputError, require_path, require_type
 from discsim.files import write_text
 from discsim.law import Law
 from discsim.limits import ANY_NUMBER
@@ -69,6 +69,7 @@ def read_model(path: Path | str, own: Sequence[UserEffect] = ()) -> Model:
 
     ``own`` are the user's own effects that it may hold: a model never runs code that was not given with it.
     """
+    require_path(path, "path", "the path of a model file")
     top = read_toml(Path(path))
     top.text("format", choices=(MODEL_FORMAT,))
     disc_table, rig_table = top.table("disc"), top.table("rig")

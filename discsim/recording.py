@@ -24,7 +24,7 @@ import numpy as np
 from discsim.arrays import FloatArray, readonly, sealed
 from discsim.disc import Disc, Release, Rig
 from discsim.environment import Environment
-from discsim.errors import InputError, require_type
+from discsim.errors import InputError, require_path, require_type
 from discsim.files import beside, named_in_errors, read_pieces, replacing, write_pieces
 from discsim.limits import MOST_ROWS, reading_fault, written_time_fault
 from discsim.recorded import Recorded
@@ -187,6 +187,7 @@ class Recording(Recorded):
 
 def read_recording(folder: Path | str) -> Recording:
     """Read a recording folder; raises `InputError` naming file, line and what was expected."""
+    require_path(folder, "folder", "the path of a recording, one at a time; read_dataset reads all in a folder")
     folder = Path(folder)
     try:
         _refuse_file(folder)
@@ -250,6 +251,7 @@ def _stated(top: TomlTable) -> Recording:
 
 def read_dataset(folder: Path | str) -> list[Recording]:
     """Read a data set: its sub-folders with a ``recording.toml``, in name order (or one recording's own folder)."""
+    require_path(folder, "folder", "the path of a folder of recordings")
     folder = Path(folder)
     try:
         _refuse_file(folder)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from discsim.disc import Disc, Release
 from discsim.environment import Environment
-from discsim.errors import InputError
+from discsim.errors import InputError, require_path
 from discsim.files import model_file, model_names
 from discsim.toml_table import TomlTable, read_toml
 
@@ -81,6 +81,7 @@ def _need(table: TomlTable, name: str) -> TomlTable:
 
 def shipped_or_path(folder: str, name_or_path: str | PathLike[str]) -> Path:
     """Return the file of a shipped name in a folder of ``models``, or the path given; `InputError` where it is none."""
+    require_path(name_or_path, f"a {folder[:-1]}", "a shipped name, or the path of a TOML file")
     name = fspath(name_or_path)
     shipped = model_names(folder)
     if name in shipped:

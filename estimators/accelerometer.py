@@ -11,6 +11,7 @@ from discsim.arrays import FloatArray, vector3
 from discsim.clipping import step_of
 from discsim.errors import InputError
 from discsim.estimators.rate import YawRate
+from discsim.estimators.readings import require_readings, require_sheet
 from discsim.recording import Samples, SensorSheet
 
 __all__ = ["AccelerometerErrors", "accelerometer", "envelope", "rate_with_known_terms"]
@@ -69,6 +70,8 @@ def accelerometer(samples: Samples, sheet: SensorSheet, errors: AccelerometerErr
     counted as uniform in [-b, b], b / sqrt(3). A stated uncertainty of the position takes the place of the mount
     error. All but the noise are the same from sample to sample. The bounds ``lower`` and ``upper`` are `envelope`'s.
     """
+    require_readings(samples, "accelerometer")
+    require_sheet(sheet, "accelerometer")
     errors = errors or AccelerometerErrors()
     unknown = np.full(len(samples), np.nan)
     if sheet.position is None or not np.hypot(*sheet.position[:2]) > 0:
@@ -109,6 +112,7 @@ def rate_with_known_terms(
 
     Raises ValueError if the position is on the axis, or the terms leave no distance from it.
     """
+    require_readings(samples, "accelerometer")
     place = vector3(position, "position (m)")
     inward, _ = _inward(place)
     row = inward @ (np.eye(3) if sensitivity is None else np.asarray(sensitivity, dtype=float))
@@ -134,6 +138,7 @@ def envelope(
     A negative smallest square gives 0. Both are NaN where even the largest is negative or the sample is NaN; the upper
     bound is infinite where the errors may place the sensor on the axis.
     """
+    towards_axis = np.asarray(towards_axis, dtype=float)
     inward, distance = _inward(vector3(position, "position (m)"))
     diagonal, tangential, vertical = _sensitivity_bounds(inward, errors)
     count = np.abs(inward).sum()

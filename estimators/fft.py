@@ -14,6 +14,7 @@ from discsim.errors import InputError
 from discsim.estimators.fft_fast import dirichlet, highest, spectra, transform_at
 from discsim.estimators.precession import AxialField, axial_field
 from discsim.estimators.rate import YawRate
+from discsim.estimators.readings import require_readings
 from discsim.estimators.spin_spline import IndexArray
 from discsim.recording import Samples
 from discsim.threads import side_by_side
@@ -157,6 +158,7 @@ def fft(
 
 def _refuse(magnetometer: Samples, settings: FftSettings) -> None:
     """Refuse a recording that is shorter than a window, or sampled too slowly for the threshold."""
+    require_readings(magnetometer, "magnetometer")
     n, interval, t = settings.window, magnetometer.interval, magnetometer.t
     if t.size < n:
         have = f"{t.size} samples" + (f" ({t.size * interval:.2f} s)" if t.size > 1 else "")

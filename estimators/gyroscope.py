@@ -7,6 +7,7 @@ import numpy as np
 from discsim.arrays import BoolArray, FloatArray, sd_by_median
 from discsim.clipping import SAME, step_of
 from discsim.estimators.rate import YawRate
+from discsim.estimators.readings import require_readings, require_sheet
 from discsim.recording import Samples, SensorSheet
 
 __all__ = ["gyroscope", "rate_reference"]
@@ -20,6 +21,8 @@ def gyroscope(samples: Samples, sheet: SensorSheet) -> YawRate:
     resolution, stated or observed: scale and bias, which a data sheet gives as a spread over parts and which need a
     rate table to be known, are not in it.
     """
+    require_readings(samples, "gyroscope")
+    require_sheet(sheet, "gyroscope")
     return _measured("gyroscope", samples.t, samples.value[:, 2], sheet.clipped(samples.value)[:, 2], sheet)
 
 
@@ -28,6 +31,8 @@ def rate_reference(samples: Samples, sheet: SensorSheet) -> YawRate:
 
     NaN and standard deviation as in `gyroscope`.
     """
+    require_readings(samples, "rate_reference")
+    require_sheet(sheet, "rate_reference")
     return _measured("rate_reference", samples.t, samples.value, sheet.clipped(samples.value), sheet)
 
 

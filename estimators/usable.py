@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from discsim.arrays import FloatArray
 from discsim.clipping import clipping_notes, constant_axes, dead_axes
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.glitches import FASTEST_SPIN, glitches
 from discsim.recording import Recording, Samples
 
@@ -77,6 +77,7 @@ def usable(recording: Recording) -> Usable:
     that no throw has (`discsim.glitches`); and of readings of one instant all but the first. Clipped readings stay, for
     each method to judge: that there was much is all that they say. Raises `InputError` where nothing is left.
     """
+    require_type(recording, Recording, "recording", "one Recording: read_recording(FOLDER) returns one")
     kept: dict[str, Samples] = {}
     gone: dict[str, str] = {}
     notes: list[str] = []

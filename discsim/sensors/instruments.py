@@ -17,7 +17,7 @@ from discsim.effects.catalogue import CATALOGUE, Effect, by_id
 from discsim.effects.kind import BOARD
 from discsim.effects.sensors import AccelerometerBias, ClockRate, CrossAxis, GSensitivity, GyroscopeBias, Scale
 from discsim.effects.timing_rows import ImuClock, LateRows, LostRows
-from discsim.errors import InputError, require_type
+from discsim.errors import InputError, require_path, require_type
 from discsim.files import model_file
 from discsim.law import Law
 from discsim.motion import Motion
@@ -246,6 +246,7 @@ def record(
 
 def read_part(name: str | PathLike[str]) -> Instruments:
     """Read a part: the name of a shipped one (``mpu9250``) or a TOML file."""
+    require_path(name, "a part", 'a shipped name ("mpu9250"), or the path of a TOML file')
     name = fspath(name)
     path = Path(name) if name.endswith(".toml") else model_file(f"parts/{name}.toml")
     top = read_toml(path)

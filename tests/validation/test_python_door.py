@@ -15,12 +15,13 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import discsim
-from discsim import validation
+from discsim import estimators, validation
 from discsim.errors import InputError
 from discsim.estimators import estimate, fft
 from discsim.recording import Recording, SensorSheet
 from discsim.threads import limited, one_thread
 from discsim.validation.cli import main
+from discsim.validation.diagnosis import pipeline
 from discsim.validation.reporting.run import start_run
 from discsim.validation.running.tasks import Task, run_tasks
 from discsim.validation.studies.catalogue import STUDIES, run_study
@@ -134,6 +135,64 @@ def test_an_argument_of_another_type_is_refused_in_a_sentence(call, said):
     """They ended deep inside as Python's own errors, or went unsaid."""
     with pytest.raises(InputError, match=said):
         call()
+
+
+NO_ARGUMENTS = [[], [[]], (), None, 3, {}, np.zeros(3), b"x"]
+
+
+@pytest.mark.parametrize("given", NO_ARGUMENTS, ids=repr)
+def test_what_is_no_recording_and_no_path_is_refused_in_a_sentence(recording, given):
+    """Lists, numbers and a recording in the place of its path ended as Python's own errors from the inside."""
+    sheet = SensorSheet(100.0, position=[0.01, 0.0, 0.0])
+    calls = [
+        discsim.check, discsim.diagnose, discsim.fit, discsim.estimate,
+        discsim.read_recording, discsim.read_dataset, discsim.read_model, discsim.import_log,
+        discsim.load_disc, discsim.load_throw, discsim.load_site, discsim.load_part, discsim.sweep,
+        estimators.best, lambda one: estimate(one, "fft"), estimators.fft,
+        lambda one: estimators.gyroscope(one, sheet), lambda one: estimators.accelerometer(one, sheet),
+        lambda one: estimators.rate_reference(one, sheet),
+        lambda one: estimators.rate_with_known_terms(one, [0.01, 0.0, 0.0]),
+        lambda one: discsim.fit(recording, one), lambda one: validation.score_rates([one], estimate(recording, "fft")),
+    ]  # fmt: skip
+    for call in calls:
+        with pytest.raises(InputError, match="expected"):
+            call(given)
+
+
+def test_a_recording_or_a_list_in_the_place_of_another_is_refused_in_a_sentence(recording, tmp_path):
+    rate = estimate(recording, "fft")
+    field, sheet = recording.samples["magnetometer"], recording.sheets["magnetometer"]
+    for call, said in (
+        (lambda: discsim.read_recording([tmp_path]), "expected the path of a recording, one at a time"),
+        (lambda: estimators.best([recording]), "expected one Recording"),
+        (lambda: estimators.best(tmp_path), "expected one Recording"),
+        (lambda: estimators.gyroscope(recording, sheet), r"expected recording.samples\["),
+        (lambda: estimators.gyroscope(field, None), r"expected recording.sheets\["),
+        (lambda: estimators.rate_reference(field, sheet), r"of shape \(300, 3\); expected \(n,\) of a rate_reference"),
+        (lambda: validation.score_rates(rate, rate), "rates is .* expected a list of rates"),
+        (lambda: validation.score_rates([rate], recording), "truth is .* expected a YawRate"),
+        (lambda: discsim.plan(None), "plans is None, .* expected a number of throws"),
+        (lambda: pipeline.diagnose([[]], ["a"]), "no recordings were given; expected data sets"),
+        (lambda: pipeline.diagnose([], []), "no recordings were given; expected data sets"),
+        (lambda: pipeline.diagnose([recording], ["a"]), "one of the data sets is .* expected a list of recordings"),
+    ):
+        with pytest.raises(InputError, match=said):
+            call()
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"velocity": [2e4, 0.0, 0.0]}, r"release velocity is 20000 m/s in size; expected at most 10000 in size"),
+        ({"body_rate": [0.0, 0.0, 7200.0]}, r"release body_rate is 7200 rad/s in size; expected at most 5000"),
+        ({"position": [0.0, 0.0, -1e9]}, "release position is 1e"),
+        ({"yaw": 1e7}, "release yaw is 1e"),
+    ],
+)
+def test_a_release_from_python_has_the_limits_of_one_in_a_file(given, said):
+    """A velocity was refused as a spin of the disc that nobody had stated, or where a step failed."""
+    with pytest.raises(InputError, match=said):
+        discsim.Release(**given)
 
 
 def test_a_list_of_methods_is_refused_in_a_sentence(recording):

@@ -10,7 +10,7 @@ import numpy as np
 from discsim.effects.own import UserEffect
 from discsim.effects.sensors import DroppedSamples
 from discsim.effects.setup import TimeOffset
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.recording import Recording
 from discsim.validation.diagnosis.assemble import outcome_of
 from discsim.validation.diagnosis.bent_segments import with_bends_followed
@@ -64,7 +64,11 @@ def diagnose(
     called with a stage, steps done and steps in all. ``user_effects`` compete with the catalogue's. ``plans`` are the
     recordings that could be made where effects cannot be told apart, by default such as are made easily.
     """
+    for dataset in datasets:
+        require_type(dataset, Sequence, "one of the data sets", "a list of recordings")
     recordings = tuple(recording for dataset in datasets for recording in dataset)
+    if not recordings:
+        raise InputError("no recordings were given; expected data sets, each a list of recordings of one plant")
     called = tuple(name for group in recording_names(datasets, names) for name in group)
     question = Question(recordings, called, tuple(names), Competing(tuple(user_effects)), plans, seed, progress)
     with told_to(progress):

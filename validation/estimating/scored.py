@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.estimators.rate import YawRate
 from discsim.files import write_text
 from discsim.validation.reporting.figures import draw_differences, draw_rates, new_figure, save_figure
@@ -178,6 +178,11 @@ def score_rates(rates: Sequence[YawRate], truth: YawRate, limits: Mapping[str, f
     ``limits`` are by the names of `FIGURES`; each holds for every rate. Where a rate has no sign magnitudes are
     compared. Raises `InputError` for an unknown limit, and where a rate and the truth have no time in common.
     """
+    a_rate = "a YawRate, as estimate(recording, method) of discsim.estimators returns it"
+    require_type(rates, Sequence, "rates", f"a list of rates, each {a_rate}")
+    for rate in rates:
+        require_type(rate, YawRate, "one of rates", a_rate)
+    require_type(truth, YawRate, "truth", a_rate)
     for name in limits or {}:
         if name not in FIGURES:
             raise InputError(f"--limit {name}: unknown; expected some of {', '.join(FIGURES)}")

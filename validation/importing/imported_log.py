@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from matplotlib.figure import Figure
 
 from discsim.environment import Environment
-from discsim.errors import InputError
+from discsim.errors import InputError, require_path
 from discsim.files import write_text
 from discsim.recording import Recording, write_recording
 from discsim.result import Result
@@ -209,6 +209,7 @@ def import_log(
     InputError
         With the file, its line, and what was expected.
     """
+    require_path(raw, "raw", "the path of what a logger wrote; recording_from_arrays takes arrays")
     path, part = Path(raw), LogPart(rows, throw, every_throw)
     part.check()
     named = None if map in ("auto", "sniff") else read_map(find_map(map))

@@ -11,7 +11,7 @@ import numpy as np
 
 from discsim.disc import Disc, Release, Rig
 from discsim.environment import Environment
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.files import write_text
 from discsim.frames import quaternion_from_matrix
 from discsim.launch import launch_of, released
@@ -201,6 +201,7 @@ def plan(
     instead : sequence of parts
         Other sets of parts, to be compared with these.
     """
+    require_type(plans, (int, Sequence), "plans", "a number of throws, or a list of plans or of recordings")
     in_hand = [] if isinstance(plans, int) else [one for one in plans if isinstance(one, Recording)]
     if in_hand:
         bench, asked = Bench.like(in_hand[0]), plans_like(in_hand)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
+from os import PathLike, fspath
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, cast
@@ -17,7 +18,7 @@ from discsim.arrays import FloatArray, readonly
 from discsim.effects.catalogue import Effect, catalogued, effect, row
 from discsim.effects.sensors import HardIron, PositionOffset
 from discsim.environment import Environment
-from discsim.errors import InputError
+from discsim.errors import InputError, require_path
 from discsim.estimators.methods import METHODS
 from discsim.files import digest, model_file, model_names
 from discsim.limits import limit_of
@@ -265,14 +266,16 @@ _KINDS: Mapping[str, _Kind] = MappingProxyType(
 _FOLDERS = {"disc": "discs", "throw": "throws", "site": "sites", "parts": "parts"}
 
 
-def plan_file(name_or_path: str) -> Path:
+def plan_file(name_or_path: str | PathLike[str]) -> Path:
     """Return the file of a shipped plan's name, or the path given; raises `InputError` where it is neither."""
-    if name_or_path in model_names("sweeps"):
-        return model_file(f"sweeps/{name_or_path}.toml")
-    path = Path(name_or_path)
+    require_path(name_or_path, "a sweep", "a shipped plan's name, the path of a TOML plan, or a Plan")
+    name = fspath(name_or_path)
+    if name in model_names("sweeps"):
+        return model_file(f"sweeps/{name}.toml")
+    path = Path(name)
     if not path.is_file():
         shipped = ", ".join(model_names("sweeps"))
-        raise InputError(f"no sweep '{name_or_path}'; expected one of {shipped}, or the path of a TOML plan")
+        raise InputError(f"no sweep '{name}'; expected one of {shipped}, or the path of a TOML plan")
     return path
 
 

@@ -143,7 +143,7 @@ def sweep(
         installed.
     """
     require("xarray", "sweep", "tables")
-    asked = plan if isinstance(plan, Plan) else read_plan(plan_file(str(plan)))
+    asked = plan if isinstance(plan, Plan) else read_plan(plan_file(plan))
     identity = {**asked.identity, "versions": {"discsim": package_version(), "numpy": np.__version__}}
     with ExitStack() as stack:
         folder = checkpoints or Path(stack.enter_context(TemporaryDirectory()))

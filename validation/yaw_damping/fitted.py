@@ -9,7 +9,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.estimators.methods import METHODS
 from discsim.files import write_text
 from discsim.model_file import Model, write_model
@@ -131,6 +131,7 @@ class FittedYawDamping(Result):
 
 def check_method(method: str) -> None:
     """Raise `InputError` for a method that there is not."""
+    require_type(method, str, "method", f"the name of a method: best, {', '.join(METHODS)}")
     if method != "best" and method not in METHODS:
         raise InputError(f"--method {method}: unknown; expected one of best, {', '.join(METHODS)}")
 
