@@ -12,6 +12,7 @@ from discsim.effects.sensors import Scale
 from discsim.effects.setup import AccelerometerUnit, Axes, GyroscopeUnit, MagnetometerUnit, axes_of
 from discsim.glitches import FASTEST_SPIN, beyond_spin, glitches
 from discsim.recording import SENSORS, Recording, Samples
+from discsim.spin_axis import ONE_AXIS, axis_shares
 from discsim.validation.checking.finding import Finding, Severity
 from discsim.validation.checking.paths import path_findings
 from discsim.validation.checking.statements import FIELD
@@ -27,9 +28,6 @@ STANDS = 0.03
 STRETCH = 0.5
 #: the field of a body at rest scatters by less than this (uT): the noise of the cheapest parts is 1 per axis
 STILL_FIELD = 2.0
-#: a body spins where it turns faster than this (rad/s: a turn a second), about an axis that has this share of the
-#: rate's square: of one that is tilted by 25 degrees it is 0.82
-SPINS, ONE_AXIS = 2 * np.pi, 0.8
 #: |f| at rest may be off by this share: zero-g offsets of cheap parts are 0.08 g, scales 3 %
 REST = 0.12
 #: |m| may be off by this share of the field for want of calibration; more is iron on board
@@ -130,12 +128,9 @@ def _spin(recording: Recording) -> Iterator[Finding]:
     """Yield a gyroscope that spins about x or y, where no magnetometer tells how its axes lie (a setup fault then)."""
     if "gyroscope" not in recording or "magnetometer" in recording:
         return
-    rate = np.nan_to_num(recording.samples["gyroscope"].value)
-    square = rate**2
-    fast = square[np.sum(square, axis=1) > SPINS**2]
-    if len(fast) < 10:
+    share = axis_shares(recording.samples["gyroscope"].value)
+    if share is None:
         return
-    share = np.sum(fast, axis=0) / np.sum(fast)
     axis = int(np.argmax(share))
     if axis == 2 or share[axis] < ONE_AXIS:
         return

@@ -8,10 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.spin_axis import FAST
 from discsim.validation.importing.import_map import G0, UNITS
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.magnitudes import PER_G, Unit
-from discsim.validation.importing.sniffing.spin_axis import FAST, MOST_LIFT, Reading3
+from discsim.validation.importing.sniffing.spin_axis import MOST_LIFT, Reading3
 
 __all__ = ["along", "unit_by_lift"]
 

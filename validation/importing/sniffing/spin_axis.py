@@ -12,15 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray
+from discsim.spin_axis import ONE_AXIS, axis_shares, fast_rows
 from discsim.validation.importing.import_map import G0
 from discsim.validation.importing.sniffing.decision import Decision, Sureness
 
-__all__ = ["FAST", "Odd", "Reading3", "along_spin", "lying_axis", "odd_one", "resting", "spin_axis", "while_spinning"]
+__all__ = ["Odd", "Reading3", "along_spin", "lying_axis", "odd_one", "resting", "spin_axis", "while_spinning"]
 
-#: A turn a second: slower than any throw, faster than a hand turns a thing about one axis for long.
-FAST = 2 * np.pi
-#: Share of the rate's square on one axis that makes it the spin axis: an axis tilted by 25 degrees still has 0.82.
-ONE_AXIS = 0.8
 #: Largest specific force along the axis for most of a flight, m/s^2: at two g a disc would gain 10 m/s of climb in a
 #: second. What reads more is the pull away from the axis.
 MOST_LIFT = 2 * G0
@@ -132,7 +129,7 @@ def _swap(sensor: str, axis: int, others: int, said: str) -> str:
 
 def while_spinning(reading: Reading3, gyro: Reading3) -> Reading3:
     """Return the rows of a sensor at which the gyroscope shows the fast spin."""
-    fast = np.interp(reading.t, gyro.t, _fast(gyro.value).astype(float)) > 0.99
+    fast = np.interp(reading.t, gyro.t, fast_rows(gyro.value).astype(float)) > 0.99
     return Reading3(reading.t[fast], reading.value[fast])
 
 
@@ -157,11 +154,9 @@ def resting(accel: Reading3, gyro: Reading3 | None) -> BoolArray:
 
 def _turning_axis(gyro: Reading3) -> tuple[int | None, Decision]:
     """Return the axis that has most of the rate where the body spins fast."""
-    fast = _fast(gyro.value)
-    if fast.sum() < 5:
+    share = axis_shares(gyro.value)
+    if share is None:
         return _none("no spin of a turn a second in it")
-    share = np.nanmean(gyro.value[fast] ** 2, axis=0)
-    share = share / share.sum()
     axis = int(np.argmax(share))
     if share[axis] < ONE_AXIS:
         return _none(f"its fast motion has no one axis ({100 * share[axis]:.0f} % of the rate in the largest)")
@@ -187,14 +182,6 @@ def _still_axis(field: Reading3) -> tuple[int | None, Decision]:
         return _none(why)
     sure: Sureness = "likely" if others > CLEARLY_STILL * busy[axis] else "guess"
     return axis, _said(axis, sure, "the field goes round in the other two and moves least along it")
-
-
-def _fast(rate: FloatArray) -> BoolArray:
-    """Return the rows of at least half the largest rate that is kept for more than a few rows, (n,)."""
-    norm = np.linalg.norm(rate, axis=1)
-    norm = np.where(np.isfinite(norm), norm, 0.0)
-    top = np.partition(norm, place := -min(norm.size, max(5, norm.size // 200)))[place]
-    return np.asarray((norm >= 0.5 * top) & (norm > FAST))
 
 
 def _none(why: str) -> tuple[None, Decision]:

@@ -18,8 +18,8 @@ from scipy.signal import savgol_filter
 
 from discsim.arrays import BoolArray, ComplexArray, FloatArray, runs
 from discsim.clipping import clipped
+from discsim.spin_axis import FAST
 from discsim.validation.importing.conversion import RawReadings
-from discsim.validation.importing.sniffing.spin_axis import FAST
 
 __all__ = ["Stretch", "stretches"]
 
