@@ -43,3 +43,20 @@ def test_a_gyroscope_whose_z_was_not_read_is_not_said_to_spin_about_another_axis
     assert not [one for one in found if "spins about" in one.sentence]
     told = check_recording(recording_from_arrays({"gyroscope": (T, spinning(0))})).findings
     assert [one.where for one in told if "it spins about that axis" in one.sentence] == ["gyroscope"]
+
+
+@pytest.mark.parametrize("axis", range(2))
+def test_without_a_stated_field_a_magnetometer_that_turns_about_another_axis_is_told(axis):
+    """The setup compares axes in a stated field alone; the spin is seen by both sensors."""
+    rng = np.random.default_rng(0)
+    phase = 30 * np.maximum(T - 1, 0)
+    field = np.column_stack([30 * np.cos(phase), -30 * np.sin(phase), 0 * T + 39]) + rng.normal(0, 0.6, (T.size, 3))
+    swapped = [2, 1, 0] if axis == 0 else [0, 2, 1]
+    for columns, said in (([0, 1, 2], []), (swapped, ["magnetometer"])):
+        readings = {"gyroscope": (T, spinning(2)), "magnetometer": (T, field[:, columns])}
+        told = [
+            one for one in check_recording(recording_from_arrays(readings)).findings if "axis of disc" in one.expected
+        ]
+        assert [one.where for one in told] == said
+    assert f"the field stands still along {'xy'[axis]}" in told[0].sentence
+    assert "swap these columns of magnetometer.csv" in told[0].sentence

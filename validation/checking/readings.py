@@ -18,6 +18,7 @@ from discsim.validation.checking.paths import path_findings
 from discsim.validation.checking.statements import FIELD
 from discsim.validation.diagnosis.setup.reference import ReferenceDoubt
 from discsim.validation.diagnosis.setup.remedy import remedy
+from discsim.validation.importing.sniffing.spin_axis import Reading3, spin_axis, while_spinning
 
 __all__ = ["at_rest", "reading_findings"]
 
@@ -125,28 +126,43 @@ def _force(recording: Recording) -> Iterator[Finding]:
 
 
 def _spin(recording: Recording) -> Iterator[Finding]:
-    """Yield a gyroscope that spins about x or y, where no magnetometer tells how its axes lie (a setup fault then)."""
-    if "gyroscope" not in recording or "magnetometer" in recording:
+    """Yield a sensor whose axis of the spin is not z, where no stated field tells how axes lie (a setup fault then)."""
+    gyro, field = recording.get("gyroscope"), recording.get("magnetometer")
+    if gyro is None or (field is not None and np.any(recording.environment.magnetic_field)):
         return
-    share = axis_shares(recording.samples["gyroscope"].value)
-    if share is None:
+    share = axis_shares(gyro.value)
+    if share is None or np.max(share) < ONE_AXIS:
         return
     axis = int(np.argmax(share))
-    if axis == 2 or share[axis] < ONE_AXIS:
-        return
+    if axis != 2:
+        what = f"{100 * share[axis]:.0f} % of the rate's square is on {'xyz'[axis]}: it spins about that axis"
+        yield _swapped("gyroscope", axis, what)
+    elif field is not None:
+        turning = while_spinning(Reading3(field.t, field.value), Reading3(gyro.t, gyro.value))
+        still, decision = spin_axis({"magnetometer": turning})
+        if still not in (None, 2) and decision.sure != "guess":
+            what = (
+                f"the field stands still along {'xyz'[still]} and turns in the other two, the gyroscope turns about z"
+            )
+            yield _swapped("magnetometer", still, what)
+
+
+def _swapped(sensor: str, axis: int, what: str) -> Finding:
+    """Return what is said of a sensor that shows the spin about x or y (0 or 1)."""
     swapped = np.eye(3)
     swapped[[axis, 2]] = swapped[[2, axis]]
-    effect = effect_of(Axes(axes_of(swapped)), "gyroscope")
-    turned = ["xyz"[(axis + 1 + body) % 3] for body in range(3)]
-    yield Finding(
+    effect = effect_of(Axes(axes_of(swapped)), sensor)
+    mended = f"{remedy(effect)}, or swap these columns of {sensor}.csv"
+    if sensor == "gyroscope":
+        turned = ["xyz"[(axis + 1 + body) % 3] for body in range(3)]
+        mended += "; where the whole board lies so, give every sensor " + f"axes = {turned}".replace("'", '"')
+    return Finding(
         effect.id,
         "warning",
-        "gyroscope",
-        f"{100 * share[axis]:.0f} % of the rate's square is on {'xyz'[axis]}: it spins about that axis",
+        sensor,
+        what,
         "a spin about z, the axis of disc, rig and table",
-        f"{remedy(effect)}, or swap these columns of gyroscope.csv; where the whole board lies so, give every sensor "
-        + f"axes = {turned}".replace("'", '"')
-        + f"; in a map that has axes there, exchange those of body {'xyz'[axis]} and z",
+        f"{mended}; in a map that has axes there, exchange those of body {'xyz'[axis]} and z",
     )
 
 
