@@ -47,15 +47,25 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Shifted:
-    """A screened candidate that changes what the readings mean, and the trajectories to fit it from.
+    """A screened candidate that changes what the readings mean, and the fit to go on from.
 
+    The numbers of that fit go with its trajectories: where nobody knew of the losses a clock took them up.
     ``screened candidate.gain`` is in chi-squared where the search stood, less the price of each sample that it takes
     for lost. ``cost`` is that price: twice the logarithm of the ways to lose as many.
     """
 
     screened: ScreenedCandidate
-    trajectories: tuple[Trajectory, ...]
+    fit: Fit
     cost: float = 0.0
+
+    @property
+    def trajectories(self) -> tuple[Trajectory, ...]:
+        """The trajectories of its fit, which hold the losses."""
+        return self.fit.trajectories
+
+    def in_place_of(self, fit: Fit) -> Fit:
+        """Return a fit with the trajectories and the numbers of this one."""
+        return replace(fit, trajectories=self.fit.trajectories, parameters=self.fit.parameters, at=self.fit.at)
 
 
 def _id_of(sensor: str) -> str:
@@ -156,7 +166,7 @@ def dropped_magnetometer(fit: Fit, known: Sequence[Parameter], least: float = DE
         if same:
             break
     candidate, cost = _losses(id, found.trajectories, sensor)
-    return [Shifted(ScreenedCandidate(candidate, gain - cost, {}), found.trajectories, cost)]
+    return [Shifted(ScreenedCandidate(candidate, gain - cost, {}), found, cost)]
 
 
 def _begun(whole: Trajectory, fit: Fit, i: int) -> Trajectory:
@@ -238,7 +248,7 @@ def dropped_accelerometer(fit: Fit, noise: NoiseModel, least: float = DETECTORS.
     candidate, cost = _losses(id, whole.trajectories, sensor)
     if candidate.fixed_values[0][1] == 0.0:
         return []
-    return [Shifted(ScreenedCandidate(candidate, gain, {}), whole.trajectories, cost)]
+    return [Shifted(ScreenedCandidate(candidate, gain, {}), whole, cost)]
 
 
 def recounted(fit: Fit, sensor: str) -> tuple[Shifted, float] | None:
@@ -258,7 +268,7 @@ def recounted(fit: Fit, sensor: str) -> tuple[Shifted, float] | None:
         return None
     _, was = _losses(_id_of(sensor), fit.trajectories, sensor)
     candidate, cost = _losses(_id_of(sensor), whole.trajectories, sensor)
-    return Shifted(ScreenedCandidate(candidate, gain, {}), whole.trajectories, cost), cost - was
+    return Shifted(ScreenedCandidate(candidate, gain, {}), whole, cost), cost - was
 
 
 def _counted_in_own_noise(fit: Fit, sensor: str, noise: NoiseModel) -> tuple[Fit, float, float]:

@@ -364,7 +364,7 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
     shown: list[Offer] = []
     for item in searched(found.relaxed_fit, current, found.own, steady_noise(found), found.lost_samples.found):
         if isinstance(item, Shifted):
-            shown.append((item.screened, replace(found.relaxed_fit, trajectories=item.trajectories), item.cost))
+            shown.append((item.screened, item.in_place_of(found.relaxed_fit), item.cost))
         elif current.hypothesis.candidates:
             here.append((item, found.relaxed_fit if distant else current.fit, 0.0))
         else:
@@ -447,7 +447,7 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
     chosen = best_of(fits, distant, [far(found, one.fitted) for one in fits])
     best, fit, cost = chosen.fitted, chosen.about, chosen.cost
     if cost > 0:
-        found = replace(found, relaxed_fit=replace(found.relaxed_fit, trajectories=fit.trajectories))
+        found = replace(found, relaxed_fit=fit)
     return replace(found, cost=found.cost + cost), best
 
 

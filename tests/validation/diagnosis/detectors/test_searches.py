@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from discsim.disc import Release
-from discsim.effects.catalogue import Effect, effect
+from discsim.effects.catalogue import Effect, catalogued, effect
+from discsim.effects.sensors import ClockRate
 from discsim.engine import fly
 from discsim.motion import Motion
 from discsim.recording import Recording, Samples
@@ -41,7 +42,7 @@ from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.identification.clipping import clipping_level_of, equal_beyond_chance
 from discsim.validation.identification.gauss_newton import Fit, refit
-from discsim.validation.identification.noise import estimate_noise
+from discsim.validation.identification.noise import estimate_noise, stated_noise
 from discsim.validation.identification.plants.rate_table import RATE_TABLE
 from discsim.validation.identification.prediction import shown
 from discsim.validation.identification.segments import Trajectory
@@ -221,6 +222,23 @@ def assert_mended(
     for trajectory, own, bent in zip(anew[0].trajectories, right, wrong, strict=True):
         counts, truth, mistaken = (one.lost[sensor] for one in (trajectory, own, bent))
         assert np.mean(counts != truth) < 0.1 * np.mean(mistaken != truth)
+
+
+def test_a_fit_with_lost_samples_goes_on_in_the_time_in_which_they_were_counted() -> None:
+    """Before they were, a clock took them up; the motion with them is not one that this clock has stretched."""
+    module = MODULE.fitted("gyroscope", range=104.72).with_effects([effect("mag.dropped_samples", fraction=0.08)])
+    made = [
+        record(flight(heading=heading), module, np.random.default_rng(seed), plant="flight", name="throw", disc=DRIVER)
+        for seed, heading in enumerate((0.5, -0.8), 1)
+    ]
+    fit = relaxed(made)
+    clock = [q.group for q in fit.parameters].index(catalogued(ClockRate, "clock").id)
+    assert abs(float(fit.at[clock]) - 1.0) > 0.02
+    (found,) = dropped_magnetometer(fit, ())
+    start, hypothesis = found.in_place_of(fit), Hypothesis((found.screened.candidate,))
+    fitted = continuous_fit(start, hypothesis, (), shown_noise(fit), {})
+    stated = stated_noise(fitted.fit.linears)["magnetometer"].sd
+    assert fitted.fit.noise["magnetometer"].sd < 1.2 * stated
 
 
 def test_counts_that_are_right_stay_and_others_are_mended_by_the_motion() -> None:
