@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.recording import Recording
 from discsim.validation.running.given import read_given
 
-__all__ = ["dataset_names", "need_field", "read_datasets", "recording_names"]
+__all__ = ["dataset_names", "need_field", "read_datasets", "recording_names", "recordings_of"]
 
 
 def read_datasets(
@@ -54,6 +54,16 @@ def dataset_names(folders: Sequence[Path]) -> list[str]:
         depth += 1
         names = ["-".join(place.parts[1:][-depth:]) for place in places]
     return names
+
+
+def recordings_of(datasets: Sequence[Sequence[Recording]]) -> tuple[Recording, ...]:
+    """Return the recordings of all sets; raise `InputError` where there is none, or a set is no list."""
+    for dataset in datasets:
+        require_type(dataset, Sequence, "one of the data sets", "a list of recordings")
+    recordings = tuple(recording for dataset in datasets for recording in dataset)
+    if not recordings:
+        raise InputError("no recordings were given; expected data sets, each a list of recordings of one plant")
+    return recordings
 
 
 def recording_names(datasets: Sequence[Sequence[Recording]], names: Sequence[str]) -> list[list[str]]:

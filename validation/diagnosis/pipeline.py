@@ -10,13 +10,13 @@ import numpy as np
 from discsim.effects.own import UserEffect
 from discsim.effects.sensors import DroppedSamples
 from discsim.effects.setup import TimeOffset
-from discsim.errors import InputError, require_type
+from discsim.errors import InputError
 from discsim.recording import Recording
 from discsim.validation.diagnosis.assemble import outcome_of
 from discsim.validation.diagnosis.bent_segments import with_bends_followed
 from discsim.validation.diagnosis.consistency.early_verdict import contradiction_after, contradiction_in
 from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of, compared
-from discsim.validation.diagnosis.datasets import recording_names
+from discsim.validation.diagnosis.datasets import recording_names, recordings_of
 from discsim.validation.diagnosis.detectors.row_times import row_times
 from discsim.validation.diagnosis.inertia import with_inertia
 from discsim.validation.diagnosis.prepared import prepared
@@ -64,11 +64,7 @@ def diagnose(
     called with a stage, steps done and steps in all. ``user_effects`` compete with the catalogue's. ``plans`` are the
     recordings that could be made where effects cannot be told apart, by default such as are made easily.
     """
-    for dataset in datasets:
-        require_type(dataset, Sequence, "one of the data sets", "a list of recordings")
-    recordings = tuple(recording for dataset in datasets for recording in dataset)
-    if not recordings:
-        raise InputError("no recordings were given; expected data sets, each a list of recordings of one plant")
+    recordings = recordings_of(datasets)
     called = tuple(name for group in recording_names(datasets, names) for name in group)
     question = Question(recordings, called, tuple(names), Competing(tuple(user_effects)), plans, seed, progress)
     with told_to(progress):

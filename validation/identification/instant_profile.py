@@ -154,7 +154,8 @@ def _first_instants(fit: Fit, place: int) -> FloatArray:
     lasts, variance = CATALOGUE[fit.parameters[place].group].lasts, float(fit.covariance[place, place])
     assert not isinstance(lasts, str)
     sd = float(np.sqrt(variance))
-    widest = max(sd, _CHANGE_POINT * variance / (2.0 * lasts * float(np.sqrt(np.pi))))
+    # what a user's own event leaves has no known width: at once, or as smooth as its curvature says
+    widest = max(sd, _CHANGE_POINT * variance / (2.0 * lasts * float(np.sqrt(np.pi)))) if lasts else sd
     away = np.geomspace(0.5 * sd, _FARTHEST * widest, _EACH_SIDE)
     now, begin, end = float(fit.at[place]), fit.plant.durations.event_from, float(fit.trajectories[own].nodes[-1])
     # an event is in its recording, unless a fit has it elsewhere
