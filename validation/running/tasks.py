@@ -181,10 +181,12 @@ def _call(function: Callable[[Any, Any], Any], task: Task, shared: Any) -> tuple
 @contextmanager
 def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
     """Connect to a running scheduler, or start local processes for as long as the block lasts."""
+    from dask import config
     from distributed import Client, LocalCluster
 
     if scheduler is None:
-        with _deaf_children():
+        # a machine that slept, or a command that was stopped for a while, hears nothing of its processes for minutes
+        with _deaf_children(), config.set({"distributed.scheduler.worker-ttl": None}):
             cluster = LocalCluster(
                 n_workers=workers,
                 host="127.0.0.1",  # whoever reaches a scheduler runs what he likes

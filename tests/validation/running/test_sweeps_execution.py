@@ -12,7 +12,9 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Thread
 
+import dask
 import numpy as np
 import pytest
 
@@ -199,6 +201,34 @@ def test_local_processes_listen_on_this_machine_alone(tmp_path):
     told = run_tasks([Task("one", 1), Task("two", 2)], addresses, tmp_path, workers=2)
     assert len(told) == 2
     assert all(address.startswith("tcp://127.0.0.1:") for pair in told for address in pair)
+
+
+def sleeping(argument, shared):
+    """Stop this process, as a machine does that is put to sleep, until another one has it go on."""
+    if argument == 1:
+        (Path(shared) / "sleeps").write_text(str(os.getpid()))
+        os.kill(os.getpid(), signal.SIGSTOP)
+    return argument
+
+
+def test_processes_that_are_stopped_for_a_while_go_on(tmp_path):
+    """Longer than a worker may say nothing, here 2 s, by the scheduler's ordinary settings 5 minutes."""
+    note, woken = tmp_path / "sleeps", []
+
+    def wake() -> None:
+        for _ in range(int(PATIENCE / 0.1)):
+            time.sleep(0.1)
+            if note.exists() and note.read_text():
+                break
+        time.sleep(8.0)
+        woken.append(int(note.read_text()))
+        os.kill(woken[0], signal.SIGCONT)
+
+    Thread(target=wake, daemon=True).start()
+    with dask.config.set({"distributed.scheduler.worker-ttl": "2s"}):
+        told = run_tasks(tasks(6), sleeping, tmp_path / "kept", shared=str(tmp_path), workers=2)
+    assert told == [0, 1, 2, 3, 4, 5]
+    assert woken
 
 
 def spectrum(argument, shared):
