@@ -18,6 +18,7 @@ from discsim.validation.checking.paths import path_findings
 from discsim.validation.checking.statements import FIELD
 from discsim.validation.diagnosis.setup.reference import ReferenceDoubt
 from discsim.validation.diagnosis.setup.remedy import remedy
+from discsim.validation.importing.sniffing.full_scale import full_scale
 from discsim.validation.importing.sniffing.spin_axis import Reading3, spin_axis, while_spinning
 
 __all__ = ["at_rest", "reading_findings"]
@@ -44,6 +45,7 @@ def reading_findings(recording: Recording, doubts: Sequence[ReferenceDoubt]) -> 
     yield from _force(recording)
     yield from _field(recording)
     yield from _spin(recording)
+    yield from _full_scale(recording)
     doubted = []
     for doubt in doubts:
         where = doubt.file.removesuffix(".csv")
@@ -145,6 +147,28 @@ def _spin(recording: Recording) -> Iterator[Finding]:
                 f"the field stands still along {'xyz'[still]} and turns in the other two, the gyroscope turns about z"
             )
             yield _swapped("magnetometer", still, what)
+
+
+def _full_scale(recording: Recording) -> Iterator[Finding]:
+    """Yield that a gyroscope of no stated range stands at a full scale, where its noise does not show that it clips.
+
+    A table may be told to turn at just such a rate.
+    """
+    gyro = recording.get("gyroscope")
+    if gyro is None or recording.plant == "rate_table" or recording.sheets["gyroscope"].range is not None:
+        return
+    found = full_scale(Reading3(gyro.t, gyro.value))
+    if found is None or np.any(recording.sheets["gyroscope"].clipped(gyro.value)):
+        return
+    limit, told = found
+    yield Finding(
+        "gyroscope.range",
+        "warning",
+        "gyroscope",
+        f"{told.choice} is {told.why}: it is clipped, and the spin faster",
+        "a range that is stated, or a rate that changes",
+        f"write range_rad_s = {limit:.9g} below [sensors.gyroscope] of recording.toml, or of the map of the import",
+    )
 
 
 def _swapped(sensor: str, axis: int, what: str) -> Finding:

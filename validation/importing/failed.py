@@ -112,7 +112,8 @@ def failed_on_one_axis(value: FloatArray) -> BoolArray:
     for axis, column in enumerate(value.T):
         there = np.flatnonzero(np.isfinite(column))
         seen = np.array(column[there])
-        decimals = bool(np.any(seen % 1))
+        # counts that became SI and counts again are whole to within their last digits
+        decimals = bool(np.any(np.abs(seen - np.rint(seen)) > WRITTEN * np.abs(seen)))
         codes = np.concatenate([SURELY, ENDS, PERHAPS]) if decimals else np.concatenate([SURELY, PERHAPS])
         for code in codes:
             seen[np.abs(seen - code) <= WRITTEN * abs(code)] = code

@@ -26,7 +26,11 @@ MIRRORED = -0.5  # a signed permutation's determinant is 1 or -1
 
 @dataclass(frozen=True)
 class ProposedSensor:
-    """A sensor of a proposed map; ``clock`` is that of its own column of time, None where it has the file's."""
+    """A sensor of a proposed map.
+
+    ``clock`` is that of its own column of time, None where it has the file's; ``full_scale`` the range in SI that its
+    readings show, and why.
+    """
 
     sensor: str
     triple: Triple
@@ -34,6 +38,7 @@ class ProposedSensor:
     unit: Unit
     axes: FloatArray
     clock: Clock | None = None
+    full_scale: tuple[float, Decision] | None = None
 
 
 @dataclass(frozen=True)
@@ -61,6 +66,7 @@ class Proposal:
         found = [self.clock.decision]
         for sensor in self.sensors:
             found += [sensor.decision, sensor.unit.decision]
+            found += [sensor.full_scale[1]] if sensor.full_scale is not None else []
         return [*found, *self.decisions, *([_POSITIONS] if self.positions is not None else [])]
 
 
@@ -160,6 +166,9 @@ def _sensor(proposal: Proposal, sensor: ProposedSensor) -> list[str]:
         lines.append(f"time = {_text(sensor.clock.column)} # its own stamps, in the unit of [time]")
     lines += [_remark(unit.decision), f"unit = {_text(unit.unit)}"]
     lines += [f"scale = {unit.scale!r}"] * (unit.scale != 1.0)
+    if sensor.full_scale is not None:
+        limit, decision = sensor.full_scale
+        lines += [_remark(decision), f"range_{SENSORS[sensor.sensor].unit} = {limit:.9g} # {decision.choice}"]
     named = letters(sensor.axes)
     lines += [f"# {decision.text}" for decision in proposal.decisions if _about(decision, sensor.sensor)]
     lines.append(f"axes = {_texts(named)}")

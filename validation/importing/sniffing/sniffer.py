@@ -22,6 +22,7 @@ from discsim.validation.importing.sniffing.clock import SPACING, Clock, clocks_o
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.dialect import dialect_of
 from discsim.validation.importing.sniffing.exchanged import exchanged
+from discsim.validation.importing.sniffing.full_scale import full_scale
 from discsim.validation.importing.sniffing.groups import FEWEST_ROWS, Numbers, Triple, triples_of
 from discsim.validation.importing.sniffing.lift import along, unit_by_lift
 from discsim.validation.importing.sniffing.magnitudes import (
@@ -333,8 +334,10 @@ def _fitted(clock: Clock, fit: Fit | None, unit: Unit) -> tuple[Clock, float]:
     step = float(f"{clock.step * ratio:.3g}")
     if not SPACING[0] <= step <= SPACING[1]:
         return clock, 1.0
-    why = f"no time stamps; with this step the field turns as fast as the gyroscope says ({unit.unit})"
-    why += f"; '{clock.counter}' counts the rows" * (clock.counter is not None)
+    # a column of time that tells none is named still
+    none = clock.decision.why.partition("; rows taken as")[0]
+    why = f"{none}; with this step the field turns as fast as the gyroscope says ({unit.unit})"
+    why += f"; '{clock.counter}' counts the rows" * bool(clock.counter)
     told = Decision("time", f"{step} s a row", "likely", why)
     return clock.with_step(step, told, OFF_FITTED), step / clock.step
 
@@ -387,8 +390,12 @@ def _proposal(
         notes = [*filter(None, [counter_note(clock)]), *notes]
     readings = {sensor: _in_si(sensor, triple, times[sensor], units[sensor]) for sensor, (triple, _) in found.items()}
     axes = body_axes(readings)
+    # a table may be told to turn at just such a rate
+    limits = {"gyroscope": full_scale(readings["gyroscope"])} if "gyroscope" in found and plant != "rate_table" else {}
     sensors = tuple(
-        ProposedSensor(sensor, triple, decision, units[sensor], axes.matrix[sensor], own.clocks.get(sensor))
+        ProposedSensor(
+            sensor, triple, decision, units[sensor], axes.matrix[sensor], own.clocks.get(sensor), limits.get(sensor)
+        )
         for sensor, (triple, decision) in found.items()
     )
     name = re.sub(r"[^\w.-]+", "-", raw.resolve().stem).strip("-") or "log"
