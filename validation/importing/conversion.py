@@ -19,6 +19,7 @@ from discsim.errors import InputError
 from discsim.glitches import FASTEST_SPIN
 from discsim.limits import time_fault
 from discsim.recording import SENSORS, Recording, Samples, SensorSheet
+from discsim.validation.importing.apart import apart
 from discsim.validation.importing.cleaning import Readings, cleaned, without_glitches
 from discsim.validation.importing.failed import dead_axis, failed_at_once, failed_on_one_axis, on_all_axes
 from discsim.validation.importing.import_map import ImportMap, SensorMap, TimeBase
@@ -109,6 +110,7 @@ def read_readings(raw: Path, import_map: ImportMap, rows: slice | None = None) -
     # what was read as numbers is no longer needed as text
     emptied = {id(table): table.emptied() for table in tables.values()}
     tables = {sensor: emptied[id(table)] for sensor, table in tables.items()}
+    notes += apart(readings)
     main = tables[next(iter(readings))]
     return RawReadings(raw, import_map, tables, main, readings, tuple(repairs.listed()), tuple(notes))
 

@@ -41,7 +41,7 @@ UNITS: Mapping[str, Mapping[str, float]] = MappingProxyType(
         "": {"SI": 1.0, "deg": 1.0},
     }
 )
-TIME_UNITS = {"min": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "iso": 1.0}
+TIME_UNITS = {"d": 86400.0, "min": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "iso": 1.0}
 BODY_SENSORS = ("magnetometer", "accelerometer", "gyroscope")
 
 
@@ -86,7 +86,11 @@ class SensorMap:
     sheet : SensorSheet
         What the data sheet states; a rate of NaN is taken from the time stamps.
     degrees : bool
-        Whether a GPS's first columns are latitude and longitude in degrees and a height in m.
+        Whether a GPS's first columns are latitude and longitude in degrees and a height.
+    height : float or None
+        Metres in one of that height; None where the map does not state its unit (then m).
+    offset : float
+        What is added to the sensor's times, s: its clock is behind the main one's by so much.
     """
 
     file: str | None
@@ -98,6 +102,8 @@ class SensorMap:
     sheet: SensorSheet
     time: str | None = None
     degrees: bool = False
+    height: float | None = None
+    offset: float = 0.0
 
     def written(self, value: FloatArray) -> FloatArray:
         """Return readings (n, 3) of a recording as the log has them, but for the order of the axes."""
@@ -243,7 +249,7 @@ def _time_base(table: TomlTable) -> TimeBase:
     if (column is None) == (step is None):
         raise table.error(None, "expected either 'column' (of time stamps) or 'step_s' (of rows at one rate) in [time]")
     if spacings and (column is None or unit == "iso"):
-        raise table.error("spacings", "'spacings' is true, expected a 'column' of numbers in s, ms, us, ns or min")
+        raise table.error("spacings", "'spacings' is true, expected a 'column' of numbers in s, ms, us, ns, min or d")
     table.finish()
     sigma = table.sigma.get("step_s")
     off = None if sigma is None else float(np.max(sigma))
@@ -334,9 +340,15 @@ def _sensor(table: TomlTable, sensor: str, *, strict: bool) -> SensorMap:
             "missing key 'position_m' in [sensors.accelerometer]; expected where it sits in the body frame, m from the "
             "axis of the spin: write position_m = [x, y, z] there, and import with this map (--map FILE)",
         )
+    height = table.text("height_unit", required=False, choices=tuple(UNITS["m"]))
+    if height is not None and (sensor != "gps" or unit != "deg"):
+        raise table.error("height_unit", "'height_unit' is for a gps with unit = \"deg\"; expected it there alone")
+    metres = None if height is None else UNITS["m"][height]
+    offset = table.number("time_offset", "s", required=False) or 0.0
     # a rate that the map does not state comes from the time stamps
     sheet = read_sheet(table, sensor, strict=strict, rate_required=False)
-    return SensorMap(file, columns, choices[unit] * (scale or 1.0), axes, chosen, optional, sheet, time, unit == "deg")
+    factor, degrees = choices[unit] * (scale or 1.0), sensor == "gps" and unit == "deg"
+    return SensorMap(file, columns, factor, axes, chosen, optional, sheet, time, degrees, metres, offset)
 
 
 def _columns(table: TomlTable, sensor: str) -> tuple[tuple[str, ...], ...]:

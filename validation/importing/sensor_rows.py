@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_left
 
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray, IntArray
+from discsim.errors import InputError
 from discsim.limits import LARGEST_READING
 from discsim.recording import SENSORS
 from discsim.validation.importing.cell_texts import CellTexts, number
@@ -18,6 +20,9 @@ from discsim.validation.importing.row_clock import RowClock
 from discsim.validation.importing.unsigned import signed
 
 __all__ = ["chosen_rows", "sensor_rows"]
+
+#: A name that says feet: altitude (ft), alt_ft, GPS Alt [feet].
+_FEET = re.compile(r"(?<![a-z])(?:ft|feet|foot)(?![a-z])", re.IGNORECASE)
 
 
 def chosen_rows(table: RawTable, sensor_map: SensorMap) -> int:
@@ -69,20 +74,27 @@ def sensor_rows(
         columns = [unseen if axis is None else axis[1] * read[:, axis[0]] + 0.0 for axis in sensor_map.axes]
         read = np.column_stack(columns)
     elif sensor == "gps":
-        read = _fixes(read, degrees=sensor_map.degrees)
+        read = _fixes(read, sensor_map)
+        if sensor_map.degrees and sensor_map.height is None and _FEET.search(names[2]):
+            what = f"the height's column '{names[2]}' is in feet by its name, and the map takes it for m"
+            remedy = 'write height_unit = "ft" below [sensors.gps] of the map, or "m" where the name is wrong'
+            raise InputError.at(import_map.path, None, f"{what}; {remedy}")
+    if sensor_map.offset:
+        return Readings(table.number[rows[kept]], clock.time[rows[kept]] + sensor_map.offset, read)
     if kept.size == len(table):  # sensors of one table share what they have in common
         return Readings(table.number, clock.time, read)
     return Readings(table.number[rows[kept]], clock.time[rows[kept]], read)
 
 
-def _fixes(read: FloatArray, *, degrees: bool) -> FloatArray:
+def _fixes(read: FloatArray, sensor_map: SensorMap) -> FloatArray:
     """Return positions and velocities (n, 6) of a GPS's columns (n, 3) or (n, 6), in North-East-Down, m and m/s.
 
     Of degrees the place is that from the first fix; zeros in all of latitude, longitude and height are no fix.
     """
     fixes = np.column_stack([read, np.full((len(read), 6 - read.shape[1]), np.nan)])
-    if not degrees:
+    if not sensor_map.degrees:
         return np.asarray(fixes)
+    fixes[:, 2] *= sensor_map.height or 1.0
     fixes[np.all(fixes[:, :2] == 0.0, axis=1)] = np.nan
     return positions(fixes)
 
