@@ -51,6 +51,8 @@ _TIME_OF_DAY = re.compile(
 )
 #: Minutes and seconds, as spreadsheets shorten a time of day.
 _MINUTES = re.compile(r"(\d{1,3}):(\d{2})[.,](\d+)")
+#: Days and a time behind them, as pandas and Python write what went by: 0 days 00:00:05.25, 1 day, 0:00:05.
+_DAYS = re.compile(r"(\d+) days?,?\s+(\d.*)")
 #: A date as spreadsheets and phones write it, and the time behind it: 01.06.2025, 6/1/2025 or 2025/6/1.
 _DATE = re.compile(r"(?:(\d{4})[-./](\d{1,2})[-./](\d{1,2})|(\d{1,2})[-./](\d{1,2})[-./](\d{4}|\d{2}))[T,\s]\s*(\d.*)")
 
@@ -80,7 +82,8 @@ def iso_seconds(cell: str) -> float | None:
     """Return the seconds of a date and time since 2000 (UTC where no zone is given), or of a time of the day.
 
     Dates are ISO's or as spreadsheets write them. Of 01/06/2025 the day comes first, but for a time with AM or PM the
-    month; a number above twelve is the day. That matters where a log runs past midnight alone.
+    month; a number above twelve is the day. That matters where a log runs past midnight alone. What went by has days
+    before the time, as pandas writes it (``0 days 00:00:05.25``).
 
     >>> iso_seconds("2000-01-01T00:01:00.5Z"), iso_seconds("12:00:00.123"), iso_seconds("01/01/2000 12:01:00.5 AM")
     (60.5, 43200.123, 60.5)
@@ -90,6 +93,9 @@ def iso_seconds(cell: str) -> float | None:
         return _time_of_day(text)
     if minutes := _MINUTES.fullmatch(text):
         return 60.0 * int(minutes[1]) + float(f"{minutes[2]}.{minutes[3]}") if int(minutes[2]) < 60 else None
+    if days := _DAYS.fullmatch(text):
+        time = _time_of_day(days[2])
+        return None if time is None else 86400.0 * int(days[1]) + time
     # the fraction is taken by itself: datetime drops what is below a microsecond
     head, dot, tail = text.replace(",", ".").partition(".")
     digits = re.match(r"\d+", tail)

@@ -24,7 +24,9 @@ __all__ = ["Clock", "clocks_of", "counter_note", "seconds"]
 
 SCALES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 #: A unit that is taken where the header states it, and never guessed.
-STATED_SCALES = {**SCALES, "min": 60.0}
+STATED_SCALES = {**SCALES, "min": 60.0, "d": 86400.0}
+#: What a spreadsheet holds of a date is days since 1899-12-30 (here 2000 to 2099), and of a time a part of a day.
+SHEET_DAYS = ((36526.0, 73050.0), (0.0, 1.0))
 #: Time since 1970 in 2001 to 2065, in seconds: a stamp of 1e9 to 3e9 s (or as many ms, us, ns) is the time of day.
 EPOCH = (1e9, 3e9)
 #: Logs of motion are written at 2 Hz to 20 kHz; outside that no unit is believed.
@@ -222,6 +224,9 @@ def _unit(
     for unit, scale in SCALES.items():
         if EPOCH[0] < largest * scale < EPOCH[1] and unit in fits:
             return unit, "certain", f"stamps of {largest:.4g} are {unit} since 1970"
+    if not fits and _days(value, step):
+        why = f"a spreadsheet's count of days: a row every {step * STATED_SCALES['d'] * 1e3:.3g} ms; no other unit fits"
+        return "d", "likely", why
     if not fits or _counts_rows(steps):
         return None, "guess", ""
     whole = bool(np.all(np.abs(steps - np.round(steps)) < 1e-9))
@@ -235,6 +240,13 @@ def _unit(
     unit = min(fits, key=lambda unit: abs(np.log(step * SCALES[unit] / STEP)))
     sure = "likely" if len(fits) == 1 or FASTEST_USUAL <= step * SCALES[unit] <= 0.1 else "guess"
     return unit, sure, f"whole numbers {step:.4g} apart: {1 / (step * SCALES[unit]):.4g} rows a second"
+
+
+def _days(value: FloatArray, step: float) -> bool:
+    """Tell dates or times of day (n,) as a spreadsheet counts them, in days, by their size and their ``step``."""
+    low, high = float(np.nanmin(value)), float(np.nanmax(value))
+    within = any(first <= low and high <= last for first, last in SHEET_DAYS)
+    return within and SPACING[0] <= step * STATED_SCALES["d"] <= SPACING[1]
 
 
 def _counts_rows(steps: FloatArray) -> bool:
@@ -295,7 +307,9 @@ def _without(numbers: Numbers) -> Clock:
         value = numbers.values[:, k]
         steps = np.diff(value[np.isfinite(value)])
         if steps.size > 1 and np.mean(steps == 1) > ASCENDING and np.nanmax(value) < 1e9:
-            why += f"; '{name}' counts the rows" * (COUNTING not in why)
+            # an index that pandas wrote has no name
+            called = f"'{name}'" if name else f"column {k + 1} (no name)"
+            why += f"; {called} counts the rows" * (COUNTING not in why)
             return Clock(None, "s", name, step, Decision("time", f"{step} s a row", sure, why), off)
     return Clock(None, "s", None, step, Decision("time", f"{step} s a row", sure, why), off)
 

@@ -38,7 +38,7 @@ def unused_columns(tables: Sequence[Numbers], used: Collection[tuple[Path, str]]
     """Return a line for each table with the columns of numbers that are not ``used`` (file and name)."""
     notes = []
     for numbers in tables:
-        names = [_shown(numbers.table.columns[k]) for k in _left(numbers, used)]
+        names = [_shown(numbers.table.columns[k]) or f"column {k + 1} (no name)" for k in _left(numbers, used)]
         more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
         if names:
             notes.append(f"not used{_of(numbers, tables)}: {', '.join(names[:MOST_NAMES])}{more}")
