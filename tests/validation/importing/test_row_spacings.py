@@ -49,5 +49,7 @@ def test_a_map_refuses_spacings_of_dates(tmp_path):
     whole = import_log(log(tmp_path / "log.csv", "dt_us", np.full(LOG.t.size, 5000)))
     wrong = tmp_path / "wrong.toml"
     wrong.write_text(whole.map_text.replace('unit = "us"', 'unit = "iso"'))
-    with pytest.raises(InputError, match="'spacings' is true, expected a 'column' of numbers in s, ms, us, ns, min or d"):
+    with pytest.raises(
+        InputError, match="'spacings' is true, expected a 'column' of numbers in s, ms, us, ns, min or d"
+    ):
         read_map(wrong)

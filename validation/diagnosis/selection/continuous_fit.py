@@ -146,7 +146,9 @@ def continuous_fit(
         plain = np.array([v if q.group in effects else q.stated for q, v in zip(parameters, at, strict=True)])
         fit = refit(replace(begun, at=plain), iterations=iterations, bounds=BOUNDS, bars=bars)
     fit = begun_anew(fit, begun.trajectories)
-    for done in range(polish + _FURTHER if polish and fit.merit < min(bars) else 0):
+    # a free spin, whose readings say little of some numbers, strays on its way
+    further = 0 if plant.weakly_identified or not polish else _FURTHER
+    for done in range(polish + further if fit.merit < min(bars) else 0):
         # a sensor of which a lag or an offset has left no reading keeps the noise that it had: it may come back
         fit = replace(fit, noise={**noise, **noise_of(fit)})
         before, merit = fit, merit_of(fit, fit.linears)
