@@ -384,6 +384,23 @@ def behind_play(x: FloatArray, width: float) -> FloatArray:
 
 
 @compiled
+def _term(rows: FloatArray, i: int, state: tuple[float, ...], t: float, yaw: float) -> float:
+    """Return what the i-th row is at a state of the first symbols, time t and angle yaw, but for its place and play."""
+    term = rows[i, 1]
+    for k in range(len(state)):
+        power, odd = rows[i, 2 + k], rows[i, 2 + _COUNT + k]
+        if power != 0.0:
+            term *= abs(state[k]) ** power
+        if odd != 0.0:
+            term *= np.sign(state[k])
+    if rows[i, _DECAY] != 0.0:
+        term *= exp(-rows[i, _DECAY] * t)
+    if rows[i, _SWING] != 0.0 or rows[i, _ORDER] != 0.0:
+        term *= cos(rows[i, _ORDER] * yaw + rows[i, _SWING] * t + rows[i, _PHASE])
+    return float(term)
+
+
+@compiled
 def law_wrench(
     rows: FloatArray, t: float, h: float, u: float, v: float, w: float, P: float, Q: float, r: float, yaw: float = 0.0
 ) -> tuple[float, float, float, float, float, float, float]:
@@ -398,20 +415,8 @@ def law_wrench(
     state = (t, h, V, alpha, cos_beta * P + sin_beta * Q, cos_beta * Q - sin_beta * P, r)
     out = np.zeros(7)
     for i in range(rows.shape[0]):
-        if rows[i, 0] >= _FIRST_WIND:
-            continue
-        term = rows[i, 1]
-        for k in range(len(state)):
-            power, odd = rows[i, 2 + k], rows[i, 2 + _COUNT + k]
-            if power != 0.0:
-                term *= abs(state[k]) ** power
-            if odd != 0.0:
-                term *= np.sign(state[k])
-        if rows[i, _DECAY] != 0.0:
-            term *= exp(-rows[i, _DECAY] * t)
-        if rows[i, _SWING] != 0.0 or rows[i, _ORDER] != 0.0:
-            term *= cos(rows[i, _ORDER] * yaw + rows[i, _SWING] * t + rows[i, _PHASE])
-        out[int(rows[i, 0])] += term
+        if rows[i, 0] < _FIRST_WIND:
+            out[int(rows[i, 0])] += _term(rows, i, state, t, yaw)
     return (
         cos_beta * out[0] - sin_beta * out[1],
         sin_beta * out[0] + cos_beta * out[1],
@@ -431,17 +436,7 @@ def law_wind(rows: FloatArray, t: float, h: float, north: float, east: float) ->
     for i in range(rows.shape[0]):
         if rows[i, 0] < _FIRST_WIND:
             continue
-        term = rows[i, 1]
-        for k in range(_OF_WIND):
-            power, odd = rows[i, 2 + k], rows[i, 2 + _COUNT + k]
-            if power != 0.0:
-                term *= abs(state[k]) ** power
-            if odd != 0.0:
-                term *= np.sign(state[k])
-        if rows[i, _DECAY] != 0.0:
-            term *= exp(-rows[i, _DECAY] * t)
-        if rows[i, _SWING] != 0.0:
-            term *= cos(rows[i, _SWING] * t + rows[i, _PHASE])
+        term = _term(rows, i, state, t, 0.0)
         if rows[i, _SIZE] != 0.0:
             away = (north - rows[i, _NORTH]) ** 2 + (east - rows[i, _EAST]) ** 2
             term *= exp(-0.5 * away / rows[i, _SIZE] ** 2)

@@ -108,20 +108,24 @@ def _at_its_limit(found: Search, candidate: CandidateEffect, names: Sequence[str
     return Located(_where(candidate, names), row.acts_on, axis, 0.0, end, 1.0, row.trace, row.grows_with)
 
 
-def _value(found: Search, candidate: CandidateEffect, name: str) -> float:
-    for q, at in zip(found.final.fit.parameters, found.final.fit.at, strict=True):
+def _place(found: Search, candidate: CandidateEffect, name: str) -> int | None:
+    """Return the place of an effect's parameter among those of the fit; None of one that is not fitted."""
+    for j, q in enumerate(found.final.fit.parameters):
         if q.key == (candidate.id, name) and q.recordings == candidate.recordings:
-            return float(at)
-    return float(candidate.shape_grid.get(name, 0.0))
+            return j
+    return None
+
+
+def _value(found: Search, candidate: CandidateEffect, name: str) -> float:
+    place = _place(found, candidate, name)
+    return float(candidate.shape_grid.get(name, 0.0) if place is None else found.final.fit.at[place])
 
 
 def _error(found: Search, candidate: CandidateEffect, name: str) -> float:
     """Return the standard error of a parameter of an effect, zero where none is known."""
-    errors = standard_errors(found.final)
-    for q, error in zip(found.final.fit.parameters, errors.tolist(), strict=True):
-        if q.key == (candidate.id, name) and q.recordings == candidate.recordings and np.isfinite(error):
-            return float(error)
-    return 0.0
+    place = _place(found, candidate, name)
+    error = np.nan if place is None else float(standard_errors(found.final)[place])
+    return error if np.isfinite(error) else 0.0
 
 
 def _instant(found: Search, candidate: CandidateEffect) -> float:

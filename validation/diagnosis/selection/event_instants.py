@@ -45,7 +45,7 @@ def _in_the_deepest_dip(found: Search, current: ContinuousFit) -> ContinuousFit:
         if profile is None or np.min(profile.chi2) > -_GAIN:
             continue
         moved = profile.at_least()
-        start = {(q.key, q.recordings): float(v) for q, v in zip(moved.parameters, moved.at, strict=True)}
+        start = values_of_fit(replace(current, fit=moved))
         bars = Bars(merit_of(fit, fit.linears))
         fitted = continuous_fit(
             moved, current.hypothesis, found.own, fit.noise, start, iterations=_STEPS, polish=0, bars=bars
