@@ -168,14 +168,17 @@ def find_law(
     states = [state_of(trajectory, start.values(i)) for i, trajectory in enumerate(start.trajectories)]
     at = reference_of(states)
     # what a free spin does not model takes up any further moment
-    motion = () if plant.weakly_identified else (*plant.laws.terms, *plant.laws.places(states))
+    motion = () if plant.weakly_identified else plant.laws.terms
     about = sensor_library(start)
     ranked: list[tuple[float, float, Term | SensorTerm]] = []
     if motion:
         ranked += candidate_laws(start, own, motion, at)
     ranked += _worth(start, about, asked_of_sensors(start, own, about))
     ranked.sort(key=lambda item: -item[0])
-    found = _likeliest(start, own, own_at, base, ranked, at)
+    places = plant.laws.places(states)
+    # where a wind blows shows in what it does to all of a path after it, which jumps between segments would take up
+    widths = _best_of_widths(candidate_laws(replace(base.fit, noise=start.noise), own, places, at)) if places else []
+    found = _likeliest(start, own, own_at, base, [*_spread(ranked), *widths], at)
     if found is None:
         return None
     fitted, term = found
@@ -193,17 +196,12 @@ def _likeliest(
     own: Sequence[Parameter],
     own_at: FloatArray,
     base: ContinuousFit,
-    ranked: Sequence[tuple[float, float, Term | SensorTerm]],
+    chosen: Sequence[tuple[float, float, Term | SensorTerm]],
     at: Mapping[str, float],
 ) -> tuple[ContinuousFit, Term | SensorTerm] | None:
-    """Return the best fit of a law of one term, and the term.
-
-    The best of the ranking are fitted, then the best of each other family where they leave something to explain: what
-    a score test gains depends on how much of it the segments' jumps take up, and they take up less of a sensor's term.
-    """
+    """Return the best fit of a law of one term of those chosen, and the term; one that explains all ends the search."""
     found: tuple[ContinuousFit, Term | SensorTerm] | None = None
-    first = _spread(ranked)
-    for _, coefficient, term in [*first, *_of_other_families(ranked, first)]:
+    for _, coefficient, term in chosen:
         fitted: ContinuousFit | None
         if isinstance(term, SensorTerm):
             fitted = fitted_sensor_law(start, own, own_at, [term])
@@ -218,22 +216,12 @@ def _likeliest(
     return found
 
 
-def _family(term: Term | SensorTerm) -> tuple[str, float]:
-    """Return what a term is of; of those about a place each width is one, for a fit finds the middle and not it."""
-    if isinstance(term, SensorTerm):
-        return "sensor", 0.0
-    return "motion", 0.0 if term.place is None else term.place[2]
-
-
-def _of_other_families(
-    ranked: Sequence[tuple[float, float, Term | SensorTerm]], taken: Sequence[tuple[float, float, Term | SensorTerm]]
-) -> list[tuple[float, float, Term | SensorTerm]]:
-    """Return the best of a ranking of each family that none of the taken is of, where it is worth its price."""
-    families = {_family(term) for _, _, term in taken}
-    best: dict[tuple[str, float], tuple[float, float, Term | SensorTerm]] = {}
+def _best_of_widths(ranked: Sequence[tuple[float, float, Term]]) -> list[tuple[float, float, Term]]:
+    """Return the best place of each width where it is worth its price: a fit moves a middle further than a width."""
+    best: dict[float, tuple[float, float, Term]] = {}
     for item in ranked:
-        if item[0] > SELECTION.entry and _family(item[2]) not in families:
-            best.setdefault(_family(item[2]), item)
+        if item[0] > SELECTION.entry and item[2].place is not None:
+            best.setdefault(item[2].place[2], item)
     return list(best.values())
 
 
@@ -335,7 +323,6 @@ def _key(term: Term | SensorTerm) -> tuple[object, ...]:
         frozenset(symbol for symbol, _ in term.powers),
         bool(term.decay),
         bool(term.order),
-        term.place is None,
     )
 
 

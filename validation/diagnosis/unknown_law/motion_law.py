@@ -186,6 +186,26 @@ def _fixed(terms: Sequence[Term], at: Mapping[str, float]) -> dict[tuple[str, st
     return fixed
 
 
+def _with_places_held(fit: Fit, iterations: int) -> Fit:
+    """Return a fit where it comes to while the places that its terms are about are held; without such it stays.
+
+    While segments do not hang together yet, no step that moves the place of a wind at once makes the fit better.
+    """
+    held = np.array([q.group == "law" and q.name.endswith(PLACE) for q in fit.parameters])
+    if not np.any(held):
+        return fit
+    places = {q.key: float(v) for q, v, h in zip(fit.parameters, fit.at, held, strict=True) if h}
+    free = tuple(q for q, h in zip(fit.parameters, held, strict=True) if not h)
+    there = refit(
+        replace(fit, parameters=free, at=fit.at[~held], fixed={**fit.fixed, **places}),
+        iterations=iterations,
+        bounds=BOUNDS,
+    )
+    at = fit.at.copy()
+    at[~held] = there.at
+    return replace(fit, trajectories=there.trajectories, at=at)
+
+
 def fitted_law(
     start: Fit,
     own: Sequence[Parameter],
@@ -211,7 +231,7 @@ def fitted_law(
     bounds |= {q.key: (-4.0, 8.0) for q in parameters if ".power_" in q.name}
     bounds |= {q.key: (0.01 * q.stated, 50.0 * q.stated) for q in parameters if q.name.endswith(".decay")}
     bounds |= {q.key: (0.1 * q.stated, 10.0 * q.stated) for q in parameters if q.name.endswith(".size")}
-    fit = refit(fit, iterations=iterations, bounds=bounds)
+    fit = refit(_with_places_held(fit, iterations), iterations=iterations, bounds=bounds)
     for _ in range(2):
         fit = refit(replace(fit, noise=noise_of(fit)), iterations=3, bounds=bounds)
     return scored(Hypothesis(), fit)

@@ -309,9 +309,9 @@ def test_a_disc_that_dries_as_it_flies_is_a_share_of_what_the_air_does():
     assert found.law.coefficients["tau"].value == pytest.approx(0.6, rel=0.1)
 
 
-def test_air_that_rises_about_a_place_is_a_law_of_that_place():
-    """Seen as a sensor's term it explains less, though jumps between segments take up more of what the wind does."""
-    secret = Thermal(1.0, 14.0, 6.0, 20.0)
+@pytest.mark.parametrize("secret", [Thermal(1.0, 14.0, 6.0, 20.0), Thermal(3.0, 10.0, 40.0, 20.0)])
+def test_air_that_rises_about_a_place_is_a_law_of_that_place(secret: Thermal):
+    """Jumps between segments take up most of what a wind does: the second would be sought across the paths from it."""
     with np.errstate(all="ignore"):  # as a diagnosis runs: a start that is far off may take a motion beyond all numbers
         found = law_of(
             flown(
@@ -322,7 +322,7 @@ def test_air_that_rises_about_a_place_is_a_law_of_that_place():
     assert found is not None
     assert found.law.text == "c * exp(-((north - a)^2 + (east - b)^2) / (2 s^2))"
     assert found.law.target == "wind_up_m_s"
-    for name, truth in (("c", 1.0), ("a", 14.0), ("b", 6.0), ("s", 20.0)):
+    for name, truth in (("c", secret.speed), ("a", secret.north), ("b", secret.east), ("s", secret.size)):
         assert within(found, name, truth)
     # and the law as a model file carries it is the wind
     assert float(found.law.for_model().evaluate({"north": 10.0, "east": 0.0})) == pytest.approx(
