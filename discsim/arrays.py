@@ -8,6 +8,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from discsim.errors import InputError, shown
+
 __all__ = [
     "BoolArray",
     "ComplexArray",
@@ -15,6 +17,8 @@ __all__ = [
     "IntArray",
     "readonly",
     "real",
+    "require_array",
+    "require_reals",
     "runs",
     "sd_by_median",
     "sealed",
@@ -47,6 +51,8 @@ def real(values: ArrayLike) -> FloatArray:
         raise ValueError(f"got {array.dtype}, expected numbers; of times in seconds: {how} / np.timedelta64(1, 's')")
     if array.dtype.kind == "c":
         raise ValueError("got complex numbers, expected real ones")
+    if array.dtype.kind in "US":
+        raise ValueError("got texts, expected numbers")
     return np.asarray(array, dtype=np.float64)
 
 
@@ -71,8 +77,34 @@ def runs(chosen: BoolArray) -> list[tuple[int, int]]:
 
 
 def vector3(values: ArrayLike | Sequence[float], what: str) -> FloatArray:
-    """Return ``values`` as a read-only (3,) array, or raise ValueError naming ``what``."""
-    array = readonly(values)
+    """Return ``values`` as a read-only (3,) array, or raise `InputError` naming ``what``."""
+    array = readonly(require_reals(values, what, "three finite numbers"))
     if array.shape != (3,) or not np.all(np.isfinite(array)):
-        raise ValueError(f"{what}: got {values!r}, expected three finite numbers")
+        raise InputError(f"{what}: got {shown(values)}, expected three finite numbers")
+    return array
+
+
+def require_reals(values: ArrayLike, name: str, expected: str) -> FloatArray:
+    """Return real numbers of any shape as float64; raises `InputError` with the argument's name for what is none."""
+    try:
+        return real(values)
+    except (ValueError, TypeError):
+        raise InputError(f"{name} is {shown(values)}, of type {type(values).__name__}; expected {expected}") from None
+
+
+def require_array(values: ArrayLike, name: str, expected: str, *shapes: tuple[int | None, ...]) -> FloatArray:
+    """Return real numbers as float64 of one of some shapes, in which None is any length.
+
+    Raises `InputError` with the argument's ``name``, what it is and what was ``expected``.
+
+    >>> require_array([[1.0, 2.0]], "rates", "(n,) rad/s", (None,))
+    Traceback (most recent call last):
+    discsim.errors.InputError: rates has shape (1, 2); expected (n,) rad/s
+    """
+    array = require_reals(values, name, expected)
+    if not any(
+        len(shape) == array.ndim and all(length in (None, own) for length, own in zip(shape, array.shape, strict=True))
+        for shape in shapes
+    ):
+        raise InputError(f"{name} has shape {array.shape}; expected {expected}")
     return array

@@ -7,7 +7,7 @@ from numbers import Real
 from os import PathLike
 from pathlib import Path
 
-__all__ = ["InputError", "printable", "require_number", "require_path", "require_type"]
+__all__ = ["InputError", "printable", "require_number", "require_path", "require_type", "shown"]
 
 #: characters of a message that are shown: a file may have names of thousands, and what was expected stands at the end
 _HEAD, _TAIL = 800, 300
@@ -49,9 +49,13 @@ def require_number(
 def require_type(value: object, kind: type | tuple[type, ...], name: str, expected: str) -> None:
     """Raise `InputError` for an argument of another type; ``expected`` says what it is and how to come by one."""
     if not isinstance(value, kind):
-        shown = repr(value)
-        shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
-        raise InputError(f"{name} is {printable(shown)}, of type {type(value).__name__}; expected {expected}")
+        raise InputError(f"{name} is {shown(value)}, of type {type(value).__name__}; expected {expected}")
+
+
+def shown(value: object) -> str:
+    """Return how a value is shown in a message: its repr, cut off after 60 characters."""
+    text = repr(value)
+    return printable(text if len(text) <= 60 else f"{text[:57]}...")
 
 
 def require_path(value: object, name: str, expected: str) -> None:

@@ -21,7 +21,7 @@ from typing import Literal, NamedTuple, cast
 
 import numpy as np
 
-from discsim.arrays import FloatArray, readonly, sealed
+from discsim.arrays import FloatArray, readonly, require_reals, sealed
 from discsim.disc import Disc, Release, Rig
 from discsim.environment import Environment
 from discsim.errors import InputError, require_path, require_type
@@ -87,7 +87,10 @@ class Samples:
     value: FloatArray
 
     def __post_init__(self) -> None:
-        t, value = readonly(self.t), readonly(self.value)
+        t, value = (
+            readonly(require_reals(getattr(self, name), f"samples: {name}", expected))
+            for name, expected in (("t", "times (n,) in s"), ("value", "readings (n,) or (n, k)"))
+        )
         if t.ndim != 1 or value.ndim not in (1, 2) or value.shape[0] != t.size:
             raise ValueError(f"samples: got t {t.shape} and value {value.shape}, expected (n,) and (n,) or (n, k)")
         if not np.all(np.isfinite(t)):

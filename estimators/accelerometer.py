@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
+from types import NoneType
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from discsim.arrays import FloatArray, vector3
+from discsim.arrays import FloatArray, require_array, vector3
 from discsim.clipping import step_of
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.estimators.rate import YawRate
 from discsim.estimators.readings import require_readings, require_sheet
 from discsim.recording import Samples, SensorSheet
@@ -17,6 +19,7 @@ from discsim.recording import Samples, SensorSheet
 __all__ = ["AccelerometerErrors", "accelerometer", "envelope", "rate_with_known_terms"]
 
 STANDARD_GRAVITY = 9.80665  # m/s^2; data sheets state biases and noise in g
+_ERRORS = "AccelerometerErrors(...): without arguments the paper's"
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,7 @@ class AccelerometerErrors:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
+            require_type(value, Real, f"accelerometer {name}", "a number, zero or more")
             if not (np.isfinite(value) and value >= 0):
                 raise InputError(f"accelerometer {name}: got {value:g}, expected zero or more")
 
@@ -72,6 +76,7 @@ def accelerometer(samples: Samples, sheet: SensorSheet, errors: AccelerometerErr
     """
     require_readings(samples, "accelerometer")
     require_sheet(sheet, "accelerometer")
+    require_type(errors, (AccelerometerErrors, NoneType), "errors", _ERRORS)
     errors = errors or AccelerometerErrors()
     unknown = np.full(len(samples), np.nan)
     if sheet.position is None or not np.hypot(*sheet.position[:2]) > 0:
@@ -110,17 +115,20 @@ def rate_with_known_terms(
     its g is the reaction: specific force is R'' - g, (0, 0, -9.8) at rest. As in `accelerometer` the component towards
     the axis of spin stands for x. With every term left at its default this is (12). NaN where the square is negative.
 
-    Raises ValueError if the position is on the axis, or the terms leave no distance from it.
+    Raises `InputError` for other shapes, if the position is on the axis, or the terms leave no distance from it.
     """
     require_readings(samples, "accelerometer")
     place = vector3(position, "position (m)")
     inward, _ = _inward(place)
-    row = inward @ (np.eye(3) if sensitivity is None else np.asarray(sensitivity, dtype=float))
-    numerator = (samples.value - vector3(bias, "bias (m/s^2)")) @ inward - np.asarray(origin, dtype=float) @ row
+    matrix = np.eye(3) if sensitivity is None else require_array(sensitivity, "sensitivity", "(3, 3)", (3, 3))
+    row = inward @ matrix
+    n = len(samples)
+    force = require_array(origin, "origin", f"(3,) or ({n}, 3) m/s^2, a row for each of samples", (3,), (n, 3))
+    numerator = (samples.value - vector3(bias, "bias (m/s^2)")) @ inward - force @ row
     arm = place + vector3(offset, "offset (m)")
     denominator = -float(row[:2] @ arm[:2])  # the centripetal acceleration has no z
     if not denominator > 0:
-        raise ValueError(f"position {place} m with its known terms is {denominator:g} m from the axis; expected more")
+        raise InputError(f"position {place} m with its known terms is {denominator:g} m from the axis; expected more")
     return np.sqrt(np.where(numerator >= 0, numerator, np.nan) / denominator)
 
 
@@ -136,9 +144,10 @@ def envelope(
     (11).
 
     A negative smallest square gives 0. Both are NaN where even the largest is negative or the sample is NaN; the upper
-    bound is infinite where the errors may place the sensor on the axis.
+    bound is infinite where the errors may place the sensor on the axis. Raises `InputError` for other types or shapes.
     """
-    towards_axis = np.asarray(towards_axis, dtype=float)
+    towards_axis = require_array(towards_axis, "towards_axis", "(n,) m/s^2, one component of the readings", (None,))
+    require_type(errors, AccelerometerErrors, "errors", _ERRORS)
     inward, distance = _inward(vector3(position, "position (m)"))
     diagonal, tangential, vertical = _sensitivity_bounds(inward, errors)
     count = np.abs(inward).sum()
@@ -164,7 +173,7 @@ def _inward(position: FloatArray) -> tuple[FloatArray, float]:
     """Return the unit vector in the plane from the sensor to the axis of spin, (3,), and the distance, m."""
     distance = float(np.hypot(position[0], position[1]))
     if not distance > 0:
-        raise ValueError(f"accelerometer position {position} m is on the axis of spin; expected it off the axis")
+        raise InputError(f"accelerometer position {position} m is on the axis of spin; expected it off the axis")
     return np.array([-position[0] / distance, -position[1] / distance, 0.0]), distance
 
 

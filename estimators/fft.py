@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
+from types import NoneType
 from typing import Literal
 
 import numpy as np
@@ -10,7 +12,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from discsim.arrays import BoolArray, ComplexArray, FloatArray
 from discsim.compiled import compiled_nogil
-from discsim.errors import InputError
+from discsim.errors import InputError, require_type
 from discsim.estimators.fft_fast import dirichlet, highest, spectra, transform_at
 from discsim.estimators.precession import AxialField, axial_field
 from discsim.estimators.rate import YawRate
@@ -78,6 +80,10 @@ class FftSettings:
     precession_sd: float = 0.08
 
     def __post_init__(self) -> None:
+        for name in ("window", "pad", "step"):
+            require_type(getattr(self, name), (int, np.integer), f"fft {name}", "a whole number of samples")
+        for name in ("threshold", "false_alarm", "precession_sd"):
+            require_type(getattr(self, name), Real, f"fft {name}", "a number")
         if self.window < 8:
             raise InputError(f"fft window: got {self.window} samples, expected at least 8")
         if self.pad < 0:
@@ -139,6 +145,8 @@ def fft(
     InputError
         If the recording is shorter than one window, or the threshold is not below half the sampling rate.
     """
+    require_type(settings, (FftSettings, NoneType), "settings", "FftSettings(...), or nothing for the paper's")
+    require_type(strength, (Real, NoneType), "strength", "the field's strength, uT, or nothing where it is not known")
     settings = settings or FftSettings()
     _refuse(magnetometer, settings)
     n, t = settings.window, magnetometer.t

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
+from types import MappingProxyType, NoneType
 from typing import NamedTuple
 
 import numpy as np
@@ -85,6 +85,16 @@ class Options:
 
     fft: FftSettings = field(default_factory=FftSettings)
     accelerometer: AccelerometerErrors = field(default_factory=AccelerometerErrors)
+
+    def __post_init__(self) -> None:
+        require_type(self.fft, FftSettings, "options fft", "FftSettings(...)")
+        require_type(self.accelerometer, AccelerometerErrors, "options accelerometer", "AccelerometerErrors(...)")
+
+    @staticmethod
+    def of(options: Options | None) -> Options:
+        """Return the options, the paper's for none; raises `InputError` for another type."""
+        require_type(options, (Options, NoneType), "options", "Options(fft=..., accelerometer=...), or nothing")
+        return options or Options()
 
 
 class Method(NamedTuple):
@@ -179,7 +189,7 @@ def estimate(recording: Recording, name: str, options: Options | None = None) ->
     (listing those there are), a missing sensor, or what the method raises.
     """
     require_type(name, str, "name", f"the name of a method: best, {', '.join(METHODS)}")
-    options = options or Options()
+    options = Options.of(options)
     if name == "best":
         return best(recording, options)
     if name not in METHODS:
@@ -221,7 +231,7 @@ def all_methods(
     ``each`` passes the names of the methods through as they are tried, to show how far it is.
     Raises `InputError` where no method can be used.
     """
-    options, sound = options or Options(), usable(recording)
+    options, sound = Options.of(options), usable(recording)
     rates: list[YawRate] = []
     left_out: dict[str, str] = {}
     for name in each(METHODS):
@@ -255,7 +265,7 @@ def best(recording: Recording, options: Options | None = None) -> YawRate:
 @one_thread
 def best_of(recording: Recording, options: Options | None = None) -> tuple[YawRate, dict[str, str]]:
     """Return the rate of `best`, and why each method that it prefers to the one taken was passed over."""
-    options, sound = options or Options(), usable(recording)
+    options, sound = Options.of(options), usable(recording)
     reasons: dict[str, str] = {}
     candidates: list[tuple[float, YawRate]] = []
     for name in METHODS:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
-from discsim.arrays import FloatArray, readonly
+from discsim.arrays import FloatArray, readonly, require_array
+from discsim.errors import InputError
 from discsim.result import Result
 
 if TYPE_CHECKING:
@@ -64,12 +65,12 @@ class YawRate(Result):
             value = getattr(self, name)
             if value is None:
                 continue
-            array = readonly(value)
-            if array.shape != np.shape(self.t) or array.ndim != 1:
-                raise ValueError(f"{self.method}: {name} has shape {array.shape}, expected {np.shape(self.t)}")
+            size = np.size(self.t)
+            expected = "(n,) s" if name == "t" else f"({size},) rad/s, as many as t"
+            array = readonly(require_array(value, f"{self.method}: {name}", expected, (size,)))
             object.__setattr__(self, name, array)
         if np.any(np.isfinite(self.rate) != np.isfinite(self.sd)):
-            raise ValueError(f"{self.method}: rate and sd must be known (or NaN) together")
+            raise InputError(f"{self.method}: rate and sd must be known (or NaN) together")
 
     def __len__(self) -> int:
         return int(self.t.size)

@@ -30,6 +30,8 @@ from discsim.files import write_pieces, write_text
 from discsim.recording import Recording
 from discsim.result import Result
 from discsim.threads import one_thread
+from discsim.validation.checking.failed_readings import failed_findings, without_failed
+from discsim.validation.checking.finding import doubts_of
 from discsim.validation.diagnosis.setup import find_setup_faults, setup_notes
 from discsim.validation.diagnosis.setup.reference import believed, reference_doubts
 from discsim.validation.estimating.page import write_estimate_page
@@ -130,20 +132,25 @@ def estimate_spin(
 ) -> SpinEstimates:
     """Estimate the spin rate of one recording by a method, by the best that its sensors allow, or by all.
 
-    Setup faults (an axis, a unit, an offset in time) are mended first, and noted; `discsim.estimators.estimate` does
-    without. ``best`` passes over a rate reference that the sensors beside it refute. Raises `InputError` for an unknown
-    method, more than one recording, or where nothing can be estimated.
+    Readings that failed (-1, 65535) are left out, setup faults (an axis, a unit, an offset in time) mended, and noted;
+    `discsim.estimators.estimate` does without. ``best`` passes over a rate reference that the sensors beside it refute.
+    Raises `InputError` for an unknown method, more than one recording, or where nothing can be estimated.
     """
     require_type(method, str, "method", f"the name of one: best, all, {', '.join(METHODS)}")
     given = given_recordings(recording)
     if len(given) != 1:
         raise InputError(f"{len(given)} recordings; expected one (take them one after the other)")
-    setup = find_setup_faults(given)
+    failed = doubts_of(failed_findings(given[0]))
+    setup = find_setup_faults([without_failed(given[0])])
     data = setup.recordings[0]
     doubts = list(reference_doubts(data)) if method == "best" else []
     rates, left_out = estimate_all(believed(data, doubts), method, options or Options(), progress)
     left_out.update(("rate_reference", f"it {one.what}") for one in doubts if one.sure and one.about_reference)
-    notes = [*setup_notes(setup, "the estimates are of"), *all_notes(data)]
+    notes = [
+        *(f"{one}; the estimates are of the rest" for one in failed),
+        *setup_notes(setup, "the estimates are of"),
+        *all_notes(data),
+    ]
     return SpinEstimates(data, method, tuple(rates), left_out, tuple(disagreements(rates)), tuple(notes))
 
 

@@ -217,7 +217,7 @@ def _read_sensors(
                 f"the file has {times} different times in {stamps.size} rows: rows stand twice, or the stamps are "
                 "coarser than the rows (then take another column, or step_s)"
                 if coarse
-                else "is this the right map?"
+                else repairs.told(table.path, sensor)
             )
             notes.append(f"WARNING: {lost} of the {sensor}'s {chosen} rows were left out; {why}")
         readings[sensor] = found

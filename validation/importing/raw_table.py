@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discsim.arrays import BoolArray, IntArray
-from discsim.errors import InputError
+from discsim.errors import InputError, printable
 from discsim.validation.importing.cell_texts import CellTexts, number, packed
 from discsim.validation.importing.labelled import MONITOR, RecordLines, labelled_cells
 from discsim.validation.importing.text_lines import TextLines
@@ -42,6 +42,10 @@ class Repair(NamedTuple):
     action: str
 
 
+#: what is done with a row that cannot be read
+LEFT_OUT = "row left out"
+
+
 class RepairList:
     """Repairs in one import; refuses those that the map does not allow."""
 
@@ -54,6 +58,13 @@ class RepairList:
         if kind is not None and kind not in self._allowed:
             raise InputError.at(path, line, f"{what}; the map does not allow the repair '{kind}' ({REPAIRS[kind]})")
         self._found[Repair(path.name, line, what, action)] = None
+
+    def told(self, path: Path, sensor: str) -> str:
+        """Return why rows of a sensor were left out of a file: the first of them, and where all are listed."""
+        gone = (LEFT_OUT, f"{LEFT_OUT} of {sensor}")
+        mine = [repair for repair in self.listed() if repair.file == path.name and repair.action in gone]
+        first = f"the first at line {mine[0].line} ({printable(mine[0].what)}); " if mine else ""
+        return f"{first}repairs.csv lists them with the reasons"
 
     def listed(self) -> list[Repair]:
         """Return the repairs, each once, by file and line."""

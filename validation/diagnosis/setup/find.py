@@ -18,7 +18,16 @@ from discsim.effects.kind import BOARD
 from discsim.effects.sensors import ClockRate, HardIron, Lag
 from discsim.effects.setup import Axes, BoardRotation, ClockUnit, GpsAxes, SiteField, TimeOffset, axes_of, permutation
 from discsim.recording import Recording, Samples
-from discsim.validation.diagnosis.setup.hypotheses import Hypothesis, Ranking, board_effect, chosen, hypotheses, pairs
+from discsim.validation.diagnosis.setup.hypotheses import (
+    LATEST,
+    Hypothesis,
+    Ranking,
+    board_effect,
+    chosen,
+    hypotheses,
+    pairs,
+)
+from discsim.validation.diagnosis.setup.late_sensor import SHORTEST, LateSensor, late_sensor
 from discsim.validation.diagnosis.setup.proof import left_by_short_fit
 from discsim.validation.diagnosis.setup.reference import believed, reference_doubts
 from discsim.validation.diagnosis.setup.remedy import MapAxes, remedy
@@ -99,6 +108,18 @@ class SetupFault:
         return f"{text}; {remedy(self.effect, axes)}"
 
 
+@dataclass(frozen=True)
+class LateFault(SetupFault):
+    """A sensor whose clock is another's, told by the spin that both show and not by the phase."""
+
+    told: LateSensor | None = None
+
+    def advice(self, axes: Mapping[str, MapAxes] | None = None) -> str:
+        """Return the sentence with how sure the offset is."""
+        assert self.told is not None
+        return f"{self.told.what}: {self.told.why}; {remedy(self.effect, axes)}"
+
+
 class SuspectedFault(SetupFault):
     """A fault that would make the sensors agree and gains too little to be named."""
 
@@ -151,6 +172,11 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
     for unit in sensor_units(judged()):
         faults.append(SetupFault(unit, float("inf"), None))
         current = tuple(corrected(one, [unit]) for one in current)
+    late, unlike = _late([believed(one, own) for one, own in zip(current, doubts, strict=True)])
+    for fault in late:
+        faults.append(fault)
+        current = tuple(corrected(one, [fault.effect]) for one in current)
+    clocks = (*clocks, *unlike)
     hints: tuple[Effect, ...] = ()
     for _ in range(MOST):
         found, hints = _next(judged())
@@ -165,6 +191,37 @@ def find_setup_faults(recordings: Sequence[Recording]) -> SetupFindings:
         for wanted in (True, False)
     )
     return SetupFindings(tuple(faults), current, hints, sure, (*clocks, *unsure))
+
+
+def _late(recordings: Sequence[Recording]) -> tuple[list[SetupFault], list[str]]:
+    """Return the sensors whose clocks are another's in all recordings alike, and a sentence on each that is by itself.
+
+    A file that counts from its own start is off by another time in each recording.
+    """
+    faults: list[SetupFault] = []
+    for _ in ("magnetometer", "accelerometer"):  # each may be off by another time
+        # what the phase is asked about it tells more sharply
+        found = [late_sensor(one, LATEST if one.environment.field_known else SHORTEST) for one in recordings]
+        seen = [one for one in found if one is not None]
+        if not seen:
+            break
+        alike = len(seen) == len(found) and all(
+            one.sensor == seen[0].sensor and abs(one.late - seen[0].late) < SHORTEST for one in seen
+        )
+        if not alike or not all(one.alone for one in seen):
+            told = [(one, late) for one, late in zip(recordings, found, strict=True) if late is not None]
+            return faults, [
+                f"{one.path or one.name}: {late.what}: {late.why}; {remedy(_offset(late))}" for one, late in told
+            ]
+        effect = _offset(seen[0])
+        faults.append(LateFault(effect, sum(one.gain for one in seen), None, told=seen[0]))
+        recordings = [corrected(one, [effect]) for one in recordings]
+    return faults, []
+
+
+def _offset(late: LateSensor) -> Effect:
+    """Return the offset of a sensor's times as an effect."""
+    return effect_of(TimeOffset(late.late), late.sensor)
 
 
 def with_fault(faults: Sequence[SetupFault], further: SetupFault) -> list[SetupFault]:

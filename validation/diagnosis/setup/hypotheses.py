@@ -26,7 +26,7 @@ from discsim.validation.identification.ordinary_errors import ordinary_sigma
 from discsim.validation.identification.plants import plant_of
 from discsim.written import corrected
 
-__all__ = ["PERMUTATIONS", "Hypothesis", "Ranking", "board_effect", "chosen", "hypotheses", "pairs"]
+__all__ = ["LATEST", "PERMUTATIONS", "Hypothesis", "Ranking", "board_effect", "chosen", "hypotheses", "pairs"]
 
 #: sensors that sit on the board
 BOARD = ("magnetometer", "gyroscope", "accelerometer")

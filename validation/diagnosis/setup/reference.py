@@ -15,6 +15,7 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.limits import time_fault
 from discsim.recording import Recording, Samples
+from discsim.validation.diagnosis.setup.late_sensor import best_lag
 from discsim.validation.diagnosis.setup.shown_rates import FEWEST_SLOTS, ShownRate, shown_rates
 from discsim.validation.diagnosis.setup.units import NEAR
 from discsim.validation.identification.plants import plant_of
@@ -34,13 +35,9 @@ _NEAR = 0.15
 _LONGER = 100.0
 #: units in which a command's times may be written; it ends with the sensors within `NEAR`
 _CLOCKS: Mapping[str, float] = MappingProxyType({"milliseconds": 1e-3, "microseconds": 1e-6})
-#: lags that are tried, s, and the step between them
-_LAGS, _STEP = 10.0, 0.05
-#: a lag is told from this on, s, where it leaves less than this share of the rms without it in each of two sensors or
-#: more, whose lags are this alike, s: one sensor alone may itself be late
-_SHORTEST, _LEFT, _ALIKE = 0.1, 0.25, 0.03
-#: readings by which a lag is looked for
-_VALUES = 4000
+#: lags that are tried, s; a lag is told where those of two sensors or more are this alike, s: one sensor alone may
+#: itself be late
+_LAGS, _ALIKE = 10.0, 0.03
 #: gravity that tells which way up a board is, m/s^2
 _UPRIGHT = 5.0
 #: a table stands that turns slower than this, rad/s: above any gyroscope's bias, as where a log is imported
@@ -49,7 +46,7 @@ _TURNS = 0.5
 #: sensors that show a rate in each reading, by themselves
 _BY_THEMSELVES = ("gyroscope", "rate_reference")
 #: a rate is of another run where it leaves this share of itself (rms) beside what sensors show: what trails its command
-#: by `_SHORTEST` on ramps of a second leaves a tenth, a load that holds a table back may leave more
+#: by `SHORTEST` on ramps of a second leaves a tenth, a load that holds a table back may leave more
 _ANOTHER = 0.25
 #: causes of a factor that lie with a sensor and not with what is told
 _OWN_CAUSES: Mapping[str, str] = MappingProxyType(
@@ -294,16 +291,8 @@ def _late(file: str, recording: Recording, shown: Mapping[str, ShownRate], told:
 
 def _lag(one: ShownRate, told: Samples) -> float | None:
     """Return by how much what is told is late beside a sensor, s; None where no lag makes them agree."""
-    few = slice(None, None, max(1, one.t.size // _VALUES))
-    t, read = one.t[few], one.rate[few]
-
-    def rms(lag: float) -> float:
-        return float(np.sqrt(np.mean((read - np.interp(t + lag, told.t, told.value)) ** 2)))
-
-    coarse = np.arange(-_LAGS, _LAGS + _STEP / 2.0, _STEP)
-    near = coarse[int(np.argmin([rms(lag) for lag in coarse]))]
-    lag = min((near + np.linspace(-_STEP, _STEP, 41)).tolist(), key=rms)
-    return lag if abs(lag) > _SHORTEST and rms(lag) < _LEFT * rms(0.0) else None
+    found = best_lag(one, told, _LAGS)
+    return found.lag if found.told else None
 
 
 def _factor(file: str, recording: Recording, shown: Mapping[str, ShownRate], told: Samples) -> ReferenceDoubt | None:

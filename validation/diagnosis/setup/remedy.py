@@ -44,7 +44,11 @@ def remedy(fault: Effect, axes: Mapping[str, MapAxes] | None = None) -> str:
         unit = _MAP_UNITS.get(value.written_in, value.written_in)
         return f'to mend it, write into the import map: [sensors.{sensor}] unit = "{unit}"'
     if isinstance(value, setup.TimeOffset):
-        return f"to mend it, subtract {1e3 * value.offset_s:.1f} ms from the times of {sensor}.csv"
+        moved = f"{-value.offset_s:.4g}"
+        return (
+            f"to mend it, write into the import map: [sensors.{sensor}] time_offset_s = {moved} (or add that to what "
+            f"stands there); without a map add {moved} s to the times of {sensor}.csv"
+        )
     if isinstance(value, setup.BoardRotation):
         matrix = setup.board_axes(value)
         right = np.round(matrix)

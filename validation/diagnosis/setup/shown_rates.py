@@ -20,7 +20,7 @@ from discsim.recording import Recording, Samples
 from discsim.validation.diagnosis.setup.spin_signals import FEWEST, spin_signals, usable
 from discsim.validation.identification.ordinary_errors import ordinary_errors
 
-__all__ = ["FEWEST_SLOTS", "Multiple", "ShownRate", "shown_rates"]
+__all__ = ["FEWEST_SLOTS", "ORDINARY", "Multiple", "ShownRate", "shown_rates"]
 
 #: ordinary errors by which an accelerometer's pull tells a rate wrongly
 _PLACE, _SCALE = catalogued(PositionOffset).id, catalogued(Scale, "accelerometer").id
@@ -38,7 +38,7 @@ _STEADY = 1.0 / 3.0
 _SIGMAS = 3.0
 #: what a ratio may be off one without a word: above a gyroscope's scale (3 % over parts and temperature, as in
 #: discsim.estimators.methods) and the readings that a magnetometer loses unnoticed (5 %)
-_ORDINARY = 0.05
+ORDINARY = 0.05
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class ShownRate:
     t: FloatArray
     rate: FloatArray
     signed: bool
-    ordinary: float = _ORDINARY
+    ordinary: float = ORDINARY
     limit: float = np.inf
 
     def beside(self, told: Samples) -> tuple[FloatArray, FloatArray]:

@@ -29,7 +29,7 @@ class ProposedSensor:
     """A sensor of a proposed map.
 
     ``clock`` is that of its own column of time, None where it has the file's; ``full_scale`` the range in SI that its
-    readings show, and why.
+    readings show, and why; ``time_offset`` what is to be added to its times, s.
     """
 
     sensor: str
@@ -39,6 +39,7 @@ class ProposedSensor:
     axes: FloatArray
     clock: Clock | None = None
     full_scale: tuple[float, Decision] | None = None
+    time_offset: float | None = None
 
 
 @dataclass(frozen=True)
@@ -164,6 +165,8 @@ def _sensor(proposal: Proposal, sensor: ProposedSensor) -> list[str]:
         lines.append(f"where = {{ {_text(triple.where[0])} = {_text(triple.where[1])} }}")
     if sensor.clock is not None and sensor.clock.column is not None:
         lines.append(f"time = {_text(sensor.clock.column)} # its own stamps, in the unit of [time]")
+    if sensor.time_offset is not None:
+        lines.append(f"time_offset_s = {sensor.time_offset:g} # added to its times")
     lines += [_remark(unit.decision), f"unit = {_text(unit.unit)}"]
     lines += [f"scale = {unit.scale!r}"] * (unit.scale != 1.0)
     if sensor.full_scale is not None:

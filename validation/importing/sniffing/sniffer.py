@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from discsim.validation.importing.sniffing.dialect import dialect_of
 from discsim.validation.importing.sniffing.exchanged import exchanged
 from discsim.validation.importing.sniffing.full_scale import full_scale
 from discsim.validation.importing.sniffing.groups import FEWEST_ROWS, Numbers, Triple, triples_of
+from discsim.validation.importing.sniffing.late_clock import late_clock, moved
 from discsim.validation.importing.sniffing.lift import along, unit_by_lift
 from discsim.validation.importing.sniffing.magnitudes import (
     PER_G,
@@ -95,7 +96,7 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     tables = [file.numbers for file in files]
     place = own_place(tables)
     notes = [*exchanges, *notes, *(note for _, note in others), *own.notes, *([place.note] if place else [])]
-    proposal = _proposal(raw, plant, layout, clock, own, found, notes)
+    proposal = _on_one_clock(raw, plant, layout, clock, own, found, notes)
     proposal = replace(proposal, positions=fixes[0] if fixes else None, place=place)
     named = [*(triple for triple, _ in found.values()), *(triple for triple, _ in others)]
     return _with_unused(proposal, tables, named, own)
@@ -353,11 +354,10 @@ def _proposal(
     own: OwnClocks,
     found: dict[str, tuple[Triple, Decision]],
     notes: list[str],
+    offsets: Mapping[str, tuple[float, Decision]],
 ) -> Proposal:
-    times = {
-        sensor: seconds(own.clocks.get(sensor, clock), triple.numbers)[triple.rows]
-        for sensor, (triple, _) in found.items()
-    }
+    times = _times(clock, own, found)
+    times |= {sensor: times[sensor] + offset for sensor, (offset, _) in offsets.items()}
     fit = _turned(found, times)
     turns = seen_turns({sensor: triple for sensor, (triple, _) in found.items()}, times, fit)
     units: dict[str, Unit] = {}
@@ -392,15 +392,46 @@ def _proposal(
     axes = body_axes(readings)
     # a table may be told to turn at just such a rate
     limits = {"gyroscope": full_scale(readings["gyroscope"])} if "gyroscope" in found and plant != "rate_table" else {}
-    sensors = tuple(
-        ProposedSensor(
-            sensor, triple, decision, units[sensor], axes.matrix[sensor], own.clocks.get(sensor), limits.get(sensor)
-        )
-        for sensor, (triple, decision) in found.items()
-    )
+    sensors = [
+        ProposedSensor(s, triple, decision, units[s], axes.matrix[s], own.clocks.get(s), limits.get(s))
+        for s, (triple, decision) in found.items()
+    ]
+    sensors = [replace(one, time_offset=offsets[one.sensor][0]) if one.sensor in offsets else one for one in sensors]
     name = re.sub(r"[^\w.-]+", "-", raw.resolve().stem).strip("-") or "log"
-    decisions = (*own.decisions, *axes.decisions) if found else ()  # positions alone have no axes of a board
-    return Proposal(name, raw, plant, layout, clock, sensors, decisions, (*axes.notes, *notes))
+    decided = (*own.decisions, *(told for _, told in offsets.values()), *axes.decisions)
+    decisions = decided if found else ()  # positions alone have no axes of a board
+    return Proposal(name, raw, plant, layout, clock, tuple(sensors), decisions, (*axes.notes, *notes))
+
+
+def _on_one_clock(
+    raw: Path,
+    plant: Plant,
+    layout: Layout,
+    clock: Clock,
+    own: OwnClocks,
+    found: dict[str, tuple[Triple, Decision]],
+    notes: list[str],
+) -> Proposal:
+    """Return the proposal; where sensors in files or columns of time of their own are on clocks that differ, moved."""
+    proposal = _proposal(raw, plant, layout, clock, own, found, notes, {})
+    files = {sensor: triple.numbers.path for sensor, (triple, _) in found.items()}
+    if len(set(files.values())) == 1 and not own.clocks:
+        return proposal
+    times = _times(proposal.clock, own, found)
+    readings = {one.sensor: _in_si(one.sensor, one.triple, times[one.sensor], one.unit) for one in proposal.sensors}
+    late = late_clock(readings, {one.sensor: one.axes for one in proposal.sensors})
+    if late is None:
+        return proposal
+    offsets = {late.sensor: moved(late, {sensor: path.name for sensor, path in files.items()})}
+    return _proposal(raw, plant, layout, clock, own, found, notes, offsets)
+
+
+def _times(clock: Clock, own: OwnClocks, found: dict[str, tuple[Triple, Decision]]) -> dict[str, FloatArray]:
+    """Return the times (n,) of each sensor's rows, s."""
+    return {
+        sensor: seconds(own.clocks.get(sensor, clock), triple.numbers)[triple.rows]
+        for sensor, (triple, _) in found.items()
+    }
 
 
 def _in_si(sensor: str, triple: Triple, time: FloatArray, unit: Unit) -> Reading3:
