@@ -359,10 +359,10 @@ class Release:
         """Return position, velocity (3,), C_NB (3, 3) and body rate (3,) of a throw.
 
         Position defaults to `RELEASE_HEIGHT` above the origin, attitude to level. Raises `InputError` where velocity
-        or body rate is unknown, for a position that is not above the ground, and for a roll or pitch of more than a
-        whole turn: no hand gives one, and 8 or -12 are what people write of degrees.
+        or body rate is unknown, for a position that is not above the ground, and for an angle of more than a whole
+        turn: no hand gives one, and 90 or -12 are what people write of degrees.
         """
-        for name in ("roll", "pitch"):
+        for name in ("roll", "pitch", "yaw"):
             angle = getattr(self, name) or 0.0
             if abs(angle) > 2 * pi:
                 raise InputError(

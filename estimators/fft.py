@@ -145,9 +145,7 @@ def fft(
     InputError
         If the recording is shorter than one window, or the threshold is not below half the sampling rate.
     """
-    require_type(settings, (FftSettings, NoneType), "settings", "FftSettings(...), or nothing for the paper's")
-    require_type(strength, (Real, NoneType), "strength", "the field's strength, uT, or nothing where it is not known")
-    settings = settings or FftSettings()
+    settings = _settings(settings, strength)
     _refuse(magnetometer, settings)
     n, t = settings.window, magnetometer.t
     starts = np.arange(0, t.size - n + 1, settings.step)
@@ -162,6 +160,13 @@ def fft(
         precession = _precession(amplitude, axial, iron, strength) * settings.precession_sd
     when = centre if settings.stamp == "centre" else t[starts + n - 1]
     return YawRate("fft", when, rate, np.hypot(sd, precession), precession_sd=precession)
+
+
+def _settings(settings: FftSettings | None, strength: float | None) -> FftSettings:
+    """Return the settings, the paper's for none; raises `InputError` for these or a strength of another type."""
+    require_type(settings, (FftSettings, NoneType), "settings", "FftSettings(...), or nothing for the paper's")
+    require_type(strength, (Real, NoneType), "strength", "the field's strength, uT, or nothing where it is not known")
+    return settings or FftSettings()
 
 
 def _refuse(magnetometer: Samples, settings: FftSettings) -> None:

@@ -25,6 +25,11 @@ def tilted(roll: float) -> ds.Release:
     return ds.Release(velocity=np.array([24.0, 0.0, -4.0]), body_rate=np.array([0.0, 0.0, 70.0]), roll=roll)
 
 
+def headed(yaw: float) -> ds.Release:
+    """Return a throw whose yaw is given, rad."""
+    return ds.Release(velocity=[20.0, 0.0, 0.0], body_rate=[0.0, 0.0, 60.0], yaw=yaw)
+
+
 def arrays(readings: object) -> ds.Recording:
     return ds.recording_from_arrays(readings)  # type: ignore[arg-type]
 
@@ -49,6 +54,10 @@ def arrays(readings: object) -> ds.Recording:
             "release roll is -12 rad, more than a whole turn; expected radi",
         ),
         (lambda: ds.predict(DRIVER, FIELD, tilted(-12.0)), "radians: of -12 degrees -0.2094"),
+        (
+            lambda: ds.predict(DRIVER, FIELD, headed(90.0)),
+            "release yaw is 90 rad, more than a whole turn; expected radi",
+        ),
         (lambda: ds.effect(None), "an effect's id is None"),
         (
             lambda: ds.effect("air.wind", w_north_m_s=[1, 2]),
