@@ -94,11 +94,16 @@ def search(
     free: Sequence[Parameter] = (),
     hints: Sequence[Effect] = (),
     effects: Competing = CATALOGUED,
+    of_use: int | None = None,
 ) -> Search:
-    """Find the effects that explain recordings of one plant; what is given is that of `screened`."""
+    """Find the effects that explain recordings of one plant; what is given is that of `screened`.
+
+    A search that stands by two more than ``of_use`` effects is given up as it stands: who asked takes no such stack.
+    """
     found = screened(recordings, report, as_stated, followed, free, hints, effects)
     report("refitting candidates", 3, 4)
-    found = settled(_selected_forward(found))
+    found = _selected_forward(found, of_use)
+    found = found if _of_no_use(found, of_use) else settled(found)
     report("done", 4, 4)
     return found
 
@@ -187,7 +192,12 @@ def _baseline(
     return base
 
 
-def _selected_forward(found: Search) -> Search:
+def _of_no_use(found: Search, of_use: int | None) -> bool:
+    """Tell whether a search has come to more effects than elimination is likely to bring down to those of use."""
+    return of_use is not None and len(found.final.hypothesis.candidates) >= of_use + 2
+
+
+def _selected_forward(found: Search, of_use: int | None) -> Search:
     """Return the search with effects added as long as one is worth its price."""
     most = SELECTION.most_effects
     if (begun := all_at_once(found)) is not None:
@@ -200,7 +210,7 @@ def _selected_forward(found: Search) -> Search:
         most += len(found.final.hypothesis.candidates)
     for step in range(len(found.final.hypothesis.candidates), max(most, SELECTION.most_with_sensors)):
         current = found.final
-        if step >= _most(found, current, most):
+        if step >= _most(found, current, most) or _of_no_use(found, of_use):
             break
         found, better = next_effect(found, current, step)
         if better is None and (told := without_swallowed(found, current)) is not None and not far(found, current):

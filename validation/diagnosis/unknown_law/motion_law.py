@@ -9,6 +9,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.law import MOTION_TARGETS, WIND_TARGETS
+from discsim.validation.diagnosis.relaxed_fit import beginning
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, noise_of, scored
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
@@ -206,6 +207,37 @@ def _with_places_held(fit: Fit, iterations: int) -> Fit:
     return replace(fit, trajectories=there.trajectories, at=at)
 
 
+#: the beginning to which what repeats in a turn is fitted first, s: some turns of a rig; each next one is twice as long
+_FIRST_LOOK = 2.5
+
+
+def _longer_and_longer(fit: Fit, iterations: int, bounds: Mapping[tuple[str, str], tuple[float, float]]) -> Fit:
+    """Return a fit of a rig where fits to longer and longer beginnings come to, each carried on by what it found.
+
+    A torque that hangs on the rig's angle has neighbouring motions part from segment to segment as at random while
+    these do not hang together yet, and no step serves for long; along a motion of its own they part slowly.
+    """
+    longest = max(float(one.nodes[-1]) for one in fit.trajectories)
+    doublings = max(int(np.ceil(np.log2(longest / _FIRST_LOOK))), 0)
+    short: Fit | None = None
+    for look in (*(_FIRST_LOOK * 2.0 ** np.arange(doublings)).tolist(), longest):
+        some = [beginning(one, look) if look < one.nodes[-1] else one for one in fit.trajectories]
+        if short is not None:
+            known = zip(some, short.trajectories, strict=True)
+            some = [_carried_on(before, short.values(i), one) for i, (one, before) in enumerate(known)]
+        fit_of_some = replace(fit, trajectories=tuple(some), at=fit.at if short is None else short.at)
+        if look == longest:
+            return fit_of_some
+        short = refit(fit_of_some, iterations=iterations, bounds=bounds)
+    return fit
+
+
+def _carried_on(before: Trajectory, values: Mapping[tuple[str, str], float], longer: Trajectory) -> Trajectory:
+    """Return a longer trajectory of a recording along the motion that a shorter one leads to."""
+    known = replace(longer, nodes=before.nodes, states=before.states)
+    return replace(longer, states=resegmented(known, values, longer.nodes).states)
+
+
 def fitted_law(
     start: Fit,
     own: Sequence[Parameter],
@@ -231,6 +263,8 @@ def fitted_law(
     bounds |= {q.key: (-4.0, 8.0) for q in parameters if ".power_" in q.name}
     bounds |= {q.key: (0.01 * q.stated, 50.0 * q.stated) for q in parameters if q.name.endswith(".decay")}
     bounds |= {q.key: (0.1 * q.stated, 10.0 * q.stated) for q in parameters if q.name.endswith(".size")}
+    if not plant.airborne and any(term.order for term in terms):
+        fit = _longer_and_longer(fit, iterations, bounds)
     fit = refit(_with_places_held(fit, iterations), iterations=iterations, bounds=bounds)
     for _ in range(2):
         fit = refit(replace(fit, noise=noise_of(fit)), iterations=3, bounds=bounds)

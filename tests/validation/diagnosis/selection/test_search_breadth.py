@@ -328,3 +328,17 @@ def test_the_search_ends_where_all_further_effects_cannot_take_what_is_left(monk
 
     monkeypatch.setattr(searching, "chi2_in", chi2)
     assert searching.past_hope(found, before, after, further) is stops
+
+
+def test_a_search_that_comes_to_more_effects_than_are_of_use_is_given_up_as_it_stands():
+    """Rivals of a stack that nobody takes, and fits without each of it, are most of the time that it takes."""
+    errors = [
+        effect("accel.scale", sx=0.02, sy=0.02, sz=0.0),
+        effect("mag.hard_iron", bx_uT=2.0, by_uT=-1.0, bz_uT=0.0),
+    ]
+    recordings = coasts((), errors)
+    whole, given_up, of_use = (searching.search(recordings, of_use=most) for most in (None, 0, 1))
+    assert [len(found.final.hypothesis.candidates) for found in (whole, given_up, of_use)] == [2, 2, 2]
+    assert whole.rivals
+    assert of_use.rivals.keys() == whole.rivals.keys()
+    assert given_up.rivals == {}
