@@ -13,6 +13,8 @@ QUARTER = 900.0
 #: Two devices that were switched on for one throw began within this long of each other, s: a third of a quarter, so
 #: that the nearest quarter is the zone's.
 TOGETHER = 300.0
+#: The widest that two zones are apart, s: UTC-12 and UTC+14.
+WIDEST = 26 * 3600.0
 
 
 def apart(readings: Mapping[str, Readings]) -> list[str]:
@@ -27,7 +29,7 @@ def apart(readings: Mapping[str, Readings]) -> list[str]:
             continue
         when = f"{sensor} begins {abs(late):.9g} s {'after' if late > 0 else 'before'} the {name}"
         zones = QUARTER * round(late / QUARTER)
-        if zones and abs(late - zones) <= TOGETHER:
+        if 0 < abs(zones) <= WIDEST and abs(late - zones) <= TOGETHER:
             why = f"about {abs(zones) / 3600:g} h, as clocks of two time zones differ: state time_offset_s = {-zones:g}"
         else:
             why = "two clocks, or another log's file: state by how much its times are to be moved, as time_offset_s"

@@ -188,7 +188,7 @@ def _read_sensors(
     first: tuple[Path, str | None] | None = None
     for sensor, sensor_map in import_map.sensors.items():
         table = tables.get(sensor)
-        names = None if table is None else _columns(table, sensor_map, import_map)
+        names = None if table is None else _columns(table, sensor_map, import_map.time_of(sensor))
         if table is None or names is None:
             notes.append(f"no {sensor} in it")
             continue
@@ -457,13 +457,12 @@ def _file(raw: Path, sensor: str, sensor_map: SensorMap) -> Path | None:
     raise InputError.at(raw, None, f"{sensor}: expected one file {pattern}, there is {names}; name one file as RAW")
 
 
-def _columns(table: RawTable, sensor_map: SensorMap, import_map: ImportMap) -> list[str] | None:
+def _columns(table: RawTable, sensor_map: SensorMap, time: TimeBase) -> list[str] | None:
     """Return the sensor's column names in this file, or None for an optional sensor that is not there."""
     known = set(table.columns)
     here = next((names for names in sensor_map.columns if known.issuperset(names)), None)
     if here is None and sensor_map.optional:
         return None
-    time = import_map.time if sensor_map.time is None else replace(import_map.time, column=sensor_map.time)
     needed = list(here or min(sensor_map.columns, key=lambda names: len(set(names) - known)))
     needed += [name for name in (time.column, time.counter) if name is not None]
     needed += [sensor_map.where[0]] if sensor_map.where is not None else []

@@ -20,6 +20,7 @@ from discsim.disc import Disc, Release
 from discsim.environment import FIELD_MODEL_SIGMA, Environment, world_magnetic_field
 from discsim.errors import InputError
 from discsim.files import model_file
+from discsim.limits import Limit
 from discsim.recording import PLANTS, SENSORS, Plant, SensorSheet, read_sheet
 from discsim.shipped import load_disc, load_site
 from discsim.toml_table import TomlTable, read_toml
@@ -42,6 +43,8 @@ UNITS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     }
 )
 TIME_UNITS = {"d": 86400.0, "min": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "iso": 1.0}
+#: How far two devices' clocks are apart: one may count from its start, the other from 1900, as NTP's do.
+_OFFSET = Limit(1e-9, 5e9, "the finest unit of loggers' clocks; the seconds from 1900 to 2058")
 BODY_SENSORS = ("magnetometer", "accelerometer", "gyroscope")
 
 
@@ -83,6 +86,8 @@ class SensorMap:
         Whether the sensor may be absent.
     time : str or None
         The column of this sensor's own time stamps, in the unit of ``[time]``; None where it has the file's.
+    time_unit : str or None
+        The unit of that column, where it is another one.
     sheet : SensorSheet
         What the data sheet states; a rate of NaN is taken from the time stamps.
     degrees : bool
@@ -104,6 +109,7 @@ class SensorMap:
     degrees: bool = False
     height: float | None = None
     offset: float = 0.0
+    time_unit: str | None = None
 
     def written(self, value: FloatArray) -> FloatArray:
         """Return readings (n, 3) of a recording as the log has them, but for the order of the axes."""
@@ -134,8 +140,12 @@ class ImportMap:
 
     def time_of(self, sensor: str) -> TimeBase:
         """Return the clock of a sensor's rows: its own column of time stamps, or the file's."""
-        own = self.sensors[sensor].time
-        return self.time if own is None else replace(self.time, column=own)
+        own = self.sensors[sensor]
+        if own.time is None:
+            return self.time
+        if own.time_unit is None:
+            return replace(self.time, column=own.time)
+        return TimeBase(own.time, TIME_UNITS[own.time_unit], iso=own.time_unit == "iso")
 
 
 def find_map(name_or_path: str) -> Path:
@@ -334,6 +344,9 @@ def _sensor(table: TomlTable, sensor: str, *, strict: bool) -> SensorMap:
         chosen = (keys[0], cast(str, where.text(keys[0])))
     optional = table.flag("optional")
     time = table.text("time", required=False)
+    time_unit = table.text("time_unit", required=False, choices=tuple(TIME_UNITS))
+    if time_unit is not None and time is None:
+        raise table.error("time_unit", "'time_unit' is the unit of the sensor's own column; expected 'time' beside it")
     if strict and sensor == "accelerometer" and "position_m" not in table:
         raise table.error(
             None,
@@ -344,11 +357,11 @@ def _sensor(table: TomlTable, sensor: str, *, strict: bool) -> SensorMap:
     if height is not None and (sensor != "gps" or unit != "deg"):
         raise table.error("height_unit", "'height_unit' is for a gps with unit = \"deg\"; expected it there alone")
     metres = None if height is None else UNITS["m"][height]
-    offset = table.number("time_offset", "s", required=False) or 0.0
+    offset = table.number("time_offset", "s", required=False, limit=_OFFSET) or 0.0
     # a rate that the map does not state comes from the time stamps
     sheet = read_sheet(table, sensor, strict=strict, rate_required=False)
     factor, degrees = choices[unit] * (scale or 1.0), sensor == "gps" and unit == "deg"
-    return SensorMap(file, columns, factor, axes, chosen, optional, sheet, time, degrees, metres, offset)
+    return SensorMap(file, columns, factor, axes, chosen, optional, sheet, time, degrees, metres, offset, time_unit)
 
 
 def _columns(table: TomlTable, sensor: str) -> tuple[tuple[str, ...], ...]:

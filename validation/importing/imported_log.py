@@ -214,7 +214,8 @@ def import_log(
     part.check()
     named = None if map in ("auto", "sniff") else read_map(find_map(map))
     # a proposed map is a file as any other while the log is read: what is read of it is named and digested
-    with opened(path) as logged, TemporaryDirectory() as place:
+    said: list[str] = []
+    with opened(path, said.append) as logged, TemporaryDirectory() as place:
         if logs := several_logs(logged):
             what = f"{len(logs)} logs of the same columns in it ({listed(logs)})"
             raise InputError.at(
@@ -232,4 +233,4 @@ def import_log(
         if environment is not None:
             known = replace(known, environment=environment)
         found = take(logged, path.name, known, part, decisions)
-    return replace(found, map_text=text, notes=notes)
+    return replace(found, map_text=text, notes=(*said, *notes))

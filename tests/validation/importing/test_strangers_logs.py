@@ -289,7 +289,7 @@ def test_of_a_zip_with_several_folders_the_folders_are_named_and_not_where_it_wa
 REFUSED = {
     "lines.jsonl": ('{"t": 0.0, "gx": 1.0}\n{"t": 0.1, "gx": 1.0}\n', "is JSON; write it as CSV"),
     "list.json": ('[{"sensor":"Gyroscope","x":"0.1"}]', "is JSON; write it as CSV"),
-    "track.gpx": ('<?xml version="1.0"?>\n<gpx></gpx>\n', "is XML"),
+    "track.kml": ('<?xml version="1.0"?>\n<kml></kml>\n', "is XML"),
     "00000012.log": ("FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n" * 9, "is an ArduPilot text log"),
     "serial.txt": ("0 ms aX = 0.1 | aY = 0.2\n" * 9, "it begins '0 ms aX = 0.1 | aY = 0.2'"),
 }

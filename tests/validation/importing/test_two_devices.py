@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -43,7 +44,8 @@ def two_devices(folder, late):
 
 
 def with_gps(raw, path, *lines):
-    path.write_text("\n".join([import_log(raw).map_text + MAP, *lines, ""]))
+    text = re.sub(r"(?m)^(# )?\[sensors\.gps\]$(.*\n)*", "", import_log(raw).map_text)
+    path.write_text("\n".join([text + MAP, *lines, ""]))
     return str(path)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from discsim.errors import InputError
-from discsim.validation.importing.logs import dataflash, mavlink, mcap, nmea, ubx, ulog
+from discsim.validation.importing.logs import dataflash, gpx, mavlink, mcap, nmea, ubx, ulog
 from discsim.validation.importing.logs.tables import Log, write_table
 
 __all__ = ["Kind", "kind_of", "write_tables"]
@@ -21,13 +21,17 @@ HEAD = 1 << 16
 
 
 class Kind(NamedTuple):
-    """A kind of log: its name with its article, how its first bytes are told, its reader, and what it should hold."""
+    """A kind of log: its name with its article, how its first bytes are told, its reader, and what it should hold.
+
+    ``fixes``: it is a receiver's and holds positions alone, and so it may stand beside another log.
+    """
 
     name: str
     begins: Callable[[bytes], bool]
     read: Callable[[Path], Log]
     holds: str
     tool: str
+    fixes: bool = False
 
 
 #: UBX comes before NMEA: receivers mix both in one log.
@@ -37,7 +41,10 @@ KINDS = (
     Kind("an MCAP log", mcap.begins, mcap.read, f"sensor_msgs {', '.join(mcap.MESSAGES)}", "`mcap doctor`"),
     Kind("a MAVLink telemetry log", mavlink.begins, mavlink.read, ", ".join(mavlink.MESSAGES), "mavlogdump.py"),
     Kind("a u-blox UBX log", ubx.begins, ubx.read, "NAV-PVT, NAV-POSLLH or ESF-MEAS with times", "pyubx2"),
-    Kind("a log of NMEA sentences", nmea.begins, nmea.read, f"{', '.join(nmea.SENTENCES)} with a fix", "pynmeagps"),
+    Kind(
+        "a log of NMEA sentences", nmea.begins, nmea.read, f"{', '.join(nmea.SENTENCES)} with a fix", "pynmeagps", True
+    ),
+    Kind("a GPX track", gpx.begins, gpx.read, "points of a track with times", "a viewer of maps", True),
 )
 
 

@@ -18,7 +18,7 @@ from discsim.errors import InputError
 from discsim.files import endless
 from discsim.validation.importing.logs import kind_of, write_tables
 
-__all__ = ["MAX_BYTES", "MAX_FILES", "opened"]
+__all__ = ["BESIDE", "MAX_BYTES", "MAX_FILES", "opened"]
 
 #: A zip may hold this many files and bytes unpacked: ten hours of nine channels at 1 kHz as text are below 4 GB, and
 #: no reader of text could hold more than that; a phone's export has some ten files.
@@ -34,14 +34,15 @@ _DAMAGED = (
     *(LookupError, UnicodeError, struct.error, OverflowError),
 )
 #: What lies beside the folder of a log: words to read and pictures.
-_BESIDE = re.compile(r"^(readme|license|licence|notes?)\b|\.(md|pdf|png|jpe?g|html?)$", re.IGNORECASE)
+BESIDE = re.compile(r"^(readme|license|licence|notes?)\b|\.(md|pdf|png|jpe?g|html?)$", re.IGNORECASE)
 
 
 @contextmanager
 def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterator[Path]:
     """Give ``raw`` itself, or a folder of that name with the files of a zip or a log's tables, gone afterwards.
 
-    ``say`` is told what was left out of a log of messages. Raises `InputError` for no such file, a damaged zip, one
+    In a folder a receiver's track (NMEA, GPX) becomes a table under its own name beside the other files. ``say`` is
+    told what was left out of a log of messages. Raises `InputError` for no such file, a damaged zip, one
     with a password, one with paths that lead out of it or links, one above the limits, a log that cannot be read.
     """
     if not raw.exists():
@@ -62,10 +63,43 @@ def opened(raw: Path, say: Callable[[str], None] = lambda note: None) -> Iterato
             for note in write_tables(logged, kind, tables):
                 say(note)
             logged = tables
+        elif logged.is_dir():
+            logged = _with_tracks(logged, Path(place) / "beside" / (logged.resolve().name or "log"), say)
         try:
             yield logged
         except InputError as error:  # speaks of the archive that the user knows, not of where it was unpacked
             raise InputError(str(error).replace(str(logged), str(raw))) from None
+
+
+def _with_tracks(logged: Path, folder: Path, say: Callable[[str], None]) -> Path:
+    """Return the folder itself, or where receivers' tracks are in it ``folder``, with their tables and all else."""
+    children = [child for child in sorted(logged.iterdir())[:MAX_FILES] if child.is_file()]
+    tracks = {child: kind for child in children if (kind := kind_of(child)) is not None and kind.fixes}
+    if not tracks or len(children) == len(tracks):
+        return logged
+    folder.mkdir(parents=True)
+    for child in logged.iterdir():
+        if child not in tracks:
+            _linked(child, folder / child.name)
+    for child, kind in tracks.items():
+        tables = folder.parent / f"{child.name}-tables"
+        tables.mkdir()
+        try:
+            for note in write_tables(child, kind, tables):
+                say(note)
+        except InputError as error:
+            say(f"left out: {error}")
+            continue
+        (tables / "gps.csv").rename(folder / child.name)
+    return folder
+
+
+def _linked(source: Path, target: Path) -> None:
+    """Put a link to a file or folder, or a copy where the system lets none be made."""
+    try:
+        target.symlink_to(source.resolve(), target_is_directory=source.is_dir())
+    except OSError:
+        shutil.copytree(source, target) if source.is_dir() else shutil.copy2(source, target)
 
 
 def _unpack(raw: Path, folder: Path) -> None:
@@ -113,7 +147,7 @@ def _inner(folder: Path, raw: Path) -> Path:
     """Return the folder that holds the files: the only one inside, moved up under the archive's own name."""
     shutil.rmtree(folder / "__MACOSX", ignore_errors=True)
     children = [child for child in folder.iterdir() if not child.name.startswith(".")]
-    logged = [child for child in children if child.is_dir() or not _BESIDE.search(child.name)]
+    logged = [child for child in children if child.is_dir() or not BESIDE.search(child.name)]
     children = logged or children
     if len(children) == 1 and children[0].is_dir():
         inner = folder.parent / "inner" / folder.name

@@ -17,7 +17,7 @@ from discsim.validation.importing.failed import failed_on_one_axis, failed_rows
 from discsim.validation.importing.overflow import continued
 from discsim.validation.importing.raw_table import RawTable
 from discsim.validation.importing.sniffing.dialect import Dialect
-from discsim.validation.importing.sniffing.names import Name, penalty_of, read_name, says_nothing, sensor_of
+from discsim.validation.importing.sniffing.names import Name, last_word, penalty_of, read_name, says_nothing, sensor_of
 from discsim.validation.importing.sniffing.units import COUNTS, OTHER, Reading, readings_of
 from discsim.validation.importing.unsigned import signed
 
@@ -27,6 +27,7 @@ __all__ = ["FEWEST_ROWS", "Numbers", "Triple", "triples_of"]
 MAX_IDS = 20
 #: Rows without which a triple is no sensor: three say nothing of a unit or an axis, and a line of text may hold them.
 FEWEST_ROWS = 4
+_PLACE = ({"lat", "latitude"}, {"lon", "lng", "long", "longitude"})
 _ID_NAMES = ("id", "sensor", "sensorname", "sensor_name", "sensor_id", "sensorid", "type", "name", "source", "device",
              "kind", "topic", "imu")  # fmt: skip
 
@@ -46,8 +47,15 @@ class Numbers:
 
     @property
     def tells_positions(self) -> bool:
-        """Whether it has the columns of a recording's gps."""
-        return set(SENSORS["gps"].columns) <= set(self.table.columns)
+        """Whether it has the columns of a recording's gps, or a latitude and a longitude."""
+        return set(SENSORS["gps"].columns) <= set(self.table.columns) or self.degrees is not None
+
+    @cached_property
+    def degrees(self) -> tuple[int, int] | None:
+        """The columns that are called a latitude and a longitude; None where there are none."""
+        words = [last_word(name) for name in self.names]
+        latitude, longitude = (next((k for k, word in enumerate(words) if word in own), None) for own in _PLACE)
+        return None if latitude is None or longitude is None else (latitude, longitude)
 
     @cached_property
     def names(self) -> tuple[str, ...]:

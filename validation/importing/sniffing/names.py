@@ -13,11 +13,13 @@ __all__ = [
     "foreign_words",
     "is_spacing_name",
     "is_time_name",
+    "last_word",
     "penalty_of",
     "read_name",
     "says_nothing",
     "sensor_of",
     "timeless",
+    "words_of",
 ]
 
 
@@ -133,6 +135,28 @@ def read_name(name: str) -> Name:
         inner, unit = split_unit(base)  # acc_mg_x
         base, unit = (inner, unit) if readings_of(unit) and sensor_of(inner) else (base, "")
     return Name(base, axis, unit)
+
+
+def last_word(name: str) -> str:
+    """Return the last word of a name without its unit.
+
+    >>> last_word("gps_lat [deg]"), last_word("GPS Altitude (ft)"), last_word("gpsLon")
+    ('lat', 'altitude', 'lon')
+    """
+    return _split(read_name(name).base)[-1].removeprefix("gps")
+
+
+def words_of(name: str) -> set[str]:
+    """Return the words of a name.
+
+    >>> sorted(words_of("ground speed (m/s)"))
+    ['ground', 'm', 's', 'speed']
+    """
+    return {word.strip("()[]") for word in _split(name)} - {""}
+
+
+def _split(name: str) -> list[str]:
+    return re.split(r"[\s_.\-:/]+", name.strip().lower())
 
 
 def sensor_of(base: str) -> str | None:

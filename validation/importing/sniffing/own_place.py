@@ -5,7 +5,6 @@ The magnetic field of a place is asked for (``--place``), and a log with a recei
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from math import cos, hypot, radians
 from typing import NamedTuple
@@ -14,11 +13,9 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.validation.importing.sniffing.groups import Numbers
-from discsim.validation.importing.sniffing.names import read_name
 
 __all__ = ["OwnPlace", "own_place"]
 
-_LATITUDE, _LONGITUDE = {"lat", "latitude"}, {"lon", "lng", "long", "longitude"}
 #: whole numbers as receivers of u-blox give them: of 1e-7 degrees
 _COUNTS = 1e-7
 #: km in a degree of latitude (a quarter of the meridian is 10 002 km), and how far apart is another place: over 20 km a
@@ -56,12 +53,9 @@ class OwnPlace(NamedTuple):
 def own_place(tables: Sequence[Numbers]) -> OwnPlace | None:
     """Return where the first table with a latitude and a longitude says that it was made, by their medians."""
     for numbers in tables:
-        columns = [_word(name) for name in numbers.names]
-        latitude, longitude = (
-            next((k for k, word in enumerate(columns) if word in words), None) for words in (_LATITUDE, _LONGITUDE)
-        )
-        if latitude is None or longitude is None:
+        if numbers.degrees is None:
             continue
+        latitude, longitude = numbers.degrees
         both = numbers.values[:, [latitude, longitude]]
         both = both[np.all(np.isfinite(both), axis=1) & np.any(both != 0.0, axis=1)]  # zeros: no fix yet
         if not both.size:
@@ -70,11 +64,6 @@ def own_place(tables: Sequence[Numbers]) -> OwnPlace | None:
         if abs(north) <= 90.0 and abs(east) <= 180.0:
             return OwnPlace(north, east, (numbers.table.columns[latitude], numbers.table.columns[longitude]))
     return None
-
-
-def _word(name: str) -> str:
-    """Return the last word of a name without its unit: ``gps_lat [deg]`` is ``lat``."""
-    return re.split(r"[\s_.\-:/]+", read_name(name).base.strip().lower())[-1].removeprefix("gps")
 
 
 def _degrees(place: FloatArray) -> tuple[float, float]:

@@ -14,13 +14,13 @@ from discsim.validation.importing.raw_table import Layout
 from discsim.validation.importing.sniffing.axes import letters
 from discsim.validation.importing.sniffing.clock import Clock
 from discsim.validation.importing.sniffing.decision import Decision
+from discsim.validation.importing.sniffing.fixes import ProposedFixes
 from discsim.validation.importing.sniffing.groups import Numbers, Triple
 from discsim.validation.importing.sniffing.magnitudes import Unit
 from discsim.validation.importing.sniffing.own_place import OwnPlace
 
 __all__ = ["Proposal", "ProposedSensor", "map_text"]
 
-_POSITIONS = Decision("gps", ", ".join(SENSORS["gps"].columns), "certain", "its columns are called as in a recording")
 MIRRORED = -0.5  # a signed permutation's determinant is 1 or -1
 
 
@@ -46,7 +46,7 @@ class ProposedSensor:
 class Proposal:
     """A proposed map; ``decisions`` are those on the whole (axes), ``notes`` what else a user should know.
 
-    ``positions`` is the table with a gps's columns and ``place`` where the log says that it was made, None where there
+    ``fixes`` are a receiver's and ``place`` where the log says that it was made, None where there
     is none.
     """
 
@@ -58,7 +58,7 @@ class Proposal:
     sensors: tuple[ProposedSensor, ...]
     decisions: tuple[Decision, ...]
     notes: tuple[str, ...] = field(default=())
-    positions: Numbers | None = None
+    fixes: ProposedFixes | None = None
     place: OwnPlace | None = None
 
     @property
@@ -68,7 +68,11 @@ class Proposal:
         for sensor in self.sensors:
             found += [sensor.decision, sensor.unit.decision]
             found += [sensor.full_scale[1]] if sensor.full_scale is not None else []
-        return [*found, *self.decisions, *([_POSITIONS] if self.positions is not None else [])]
+        return [
+            *found,
+            *self.decisions,
+            *([self.fixes.decision] if self.fixes is not None and not self.fixes.apart else []),
+        ]
 
 
 def _text(value: str) -> str:
@@ -116,9 +120,8 @@ def map_text(proposal: Proposal) -> str:
     ]
     for sensor in proposal.sensors:
         lines += _sensor(proposal, sensor)
-    if proposal.positions is not None:
-        lines += ["", "[sensors.gps]", *_file(proposal, proposal.positions)]
-        lines += [_remark(_POSITIONS), f"columns = {_texts(SENSORS['gps'].columns)}"]
+    if proposal.fixes is not None:
+        lines += ["", *_fixes(proposal, proposal.fixes)]
     return "\n".join([*lines, ""])
 
 
@@ -180,6 +183,18 @@ def _sensor(proposal: Proposal, sensor: ProposedSensor) -> list[str]:
     if sensor.sensor == "accelerometer":
         lines.append("# position_m = [0.0, 0.0, 0.0] # where it sits in the disc: needed for a rate from it")
     return lines
+
+
+def _fixes(proposal: Proposal, fixes: ProposedFixes) -> list[str]:
+    lines = ["[sensors.gps]", *_file(proposal, fixes.numbers)]
+    lines += [_remark(fixes.decision), f"columns = {_texts(fixes.columns)}"]
+    lines += [f"unit = {_text(fixes.unit)}"] * bool(fixes.unit)
+    lines += [f"height_unit = {_text(fixes.height_unit)}"] * bool(fixes.height_unit)
+    if fixes.clock is not None and fixes.clock.column is not None:
+        lines += [f"time = {_text(fixes.clock.column)} # its own stamps", f"time_unit = {_text(fixes.clock.unit)}"]
+    if fixes.apart:
+        lines.append("time_offset_s = 0.0 # what is to be added to its times")
+    return [f"# {line}" for line in (fixes.apart, *lines)] if fixes.apart else lines
 
 
 def _about(decision: Decision, sensor: str) -> bool:

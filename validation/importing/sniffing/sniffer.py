@@ -15,13 +15,14 @@ from discsim.files import model_names
 from discsim.recording import SENSORS, Plant
 from discsim.validation.importing.import_map import G0
 from discsim.validation.importing.raw_table import REPAIRS, Layout, RepairList, read_raw
-from discsim.validation.importing.sniffing.archive import MAX_FILES
+from discsim.validation.importing.sniffing.archive import BESIDE, MAX_FILES
 from discsim.validation.importing.sniffing.axes import body_axes
 from discsim.validation.importing.sniffing.behaviour import TELLING, WORTHS, by_behaviour
 from discsim.validation.importing.sniffing.clock import SPACING, Clock, clocks_of, counter_note, seconds
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.dialect import dialect_of
 from discsim.validation.importing.sniffing.exchanged import exchanged
+from discsim.validation.importing.sniffing.fixes import fixes_of
 from discsim.validation.importing.sniffing.full_scale import full_scale
 from discsim.validation.importing.sniffing.groups import FEWEST_ROWS, Numbers, Triple, triples_of
 from discsim.validation.importing.sniffing.late_clock import late_clock, moved
@@ -60,6 +61,8 @@ OFF_FITTED = 0.04
 SLOW, RESTS = 1.0, 0.05
 #: A column that stands this far back (gravity taken off, worked out, in the earth's axes) is no sensor's reading.
 NO_READING = 9
+#: Files of a folder that are no tables and named one by one.
+MOST_UNREAD = 4
 
 
 @dataclass(frozen=True)
@@ -78,26 +81,27 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     """
     files, failures = _read(raw)
     layout, files, notes = _one_layout(files)
+    notes = [*notes, *_unread(raw, failures)]
     found, left, exchanges = _assigned(files)
     fixes = [file.numbers for file in files if file.numbers.tells_positions]
     clock = _one_clock([triple.numbers for triple, _ in found.values()] or fixes or [file.numbers for file in files])
-    fixes = [numbers for numbers in fixes if _on(clock, numbers)][:1]
     unknown = [triple for triple in left if triple.sensor is None and _on(clock, triple.numbers)]
     missing = [sensor for sensor in ORDER if sensor not in found]
     if unknown and missing:
         seen = by_behaviour(unknown, [seconds(clock, triple.numbers)[triple.rows] for triple in unknown])
         found |= {sensor: (triple, decision) for triple, sensor, decision in seen if sensor in missing}
     found = {s: found[s] for s in ORDER if s in found and _on(clock, found[s][0].numbers)}
-    if not found and not fixes:
+    fixed, said = fixes_of([file.numbers for file in files], clock, [triple.numbers for triple, _ in found.values()])
+    if not found and fixed is None:
         raise _nothing(raw, files, failures)
     found, exchanges = _turned_about(clock, found, exchanges)
     others = _others(found, left)
     own = own_clocks(clock, {sensor: triple for sensor, (triple, _) in found.items()})
     tables = [file.numbers for file in files]
     place = own_place(tables)
-    notes = [*exchanges, *notes, *(note for _, note in others), *own.notes, *([place.note] if place else [])]
+    notes = [*exchanges, *notes, *said, *(note for _, note in others), *own.notes, *([place.note] if place else [])]
     proposal = _on_one_clock(raw, plant, layout, clock, own, found, notes)
-    proposal = replace(proposal, positions=fixes[0] if fixes else None, place=place)
+    proposal = replace(proposal, fixes=fixed, place=place)
     named = [*(triple for triple, _ in found.values()), *(triple for triple, _ in others)]
     return _with_unused(proposal, tables, named, own)
 
@@ -125,6 +129,14 @@ def _read(raw: Path) -> tuple[list[_File], list[InputError]]:
         what = f"no table of numbers in the files there ({names}){also}"
         raise InputError.at(raw, None, f"{what}; expected a logger's export")
     return files, failures
+
+
+def _unread(raw: Path, failures: Sequence[InputError]) -> list[str]:
+    """Return a line for each file of a folder that is no table, but for words to read and pictures."""
+    said = [str(failure).removeprefix(f"{raw}/").removeprefix(f"{raw}\\") for failure in failures]
+    said = [line for line in said if not BESIDE.search(line.partition(":")[0])]
+    more = [f"left out: {len(said) - MOST_UNREAD} more files that are no tables"] * (len(said) > MOST_UNREAD)
+    return [*(f"left out: {line}" for line in said[:MOST_UNREAD]), *more]
 
 
 def _file(path: Path, *, alone: bool) -> _File:
@@ -157,8 +169,13 @@ def _one_layout(files: Sequence[_File]) -> tuple[Layout, list[_File], list[str]]
         encoding=next((one.encoding for one in layouts if one.encoding != "utf-8"), "utf-8"),
         decimal="," if any(one.decimal == "," for one in layouts) else ".",
     )
-    others = [file.numbers.path.name for file in files if file not in best and weight(file)]
-    notes = [f"left out, laid out in another way: {', '.join(others)}"] if others else []
+    others = [
+        file.numbers.path.name for file in files if file not in best and (weight(file) or file.numbers.tells_positions)
+    ]
+    notes = [
+        f"left out, laid out in another way than {best[0].numbers.path.name}: {', '.join(others)}; to have it read, "
+        "save it with the same separator and decimal mark"
+    ] * bool(others)
     words = [remark for file in best[:1] for remark in file.numbers.dialect.remarks]
     return layout, best, notes + ([f"text: {', '.join(words)}"] if words else [])
 
@@ -278,8 +295,8 @@ def _with_unused(proposal: Proposal, tables: Sequence[Numbers], named: Sequence[
         used |= {(numbers.path, name) for name in columns if name in stamps or is_time_name(name)}
         used |= {(numbers.path, name) for name in columns if f"'{name}'" in said}
         used |= {(numbers.path, columns[numbers.ids[0]])} if numbers.ids is not None else set()
-    if proposal.positions is not None:
-        used |= {(proposal.positions.path, name) for name in SENSORS["gps"].columns}
+    if proposal.fixes is not None:
+        used |= {(proposal.fixes.numbers.path, name) for name in proposal.fixes.columns}
     asked = missing_axes(tables, used, {sensor.sensor for sensor in proposal.sensors})
     return replace(proposal, notes=(*asked, *proposal.notes, *unused_columns(tables, used)))
 

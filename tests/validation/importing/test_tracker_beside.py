@@ -1,0 +1,173 @@
+"""A receiver's file beside the disc's own log: the proposed map reads it, or says why it does not."""
+
+from __future__ import annotations
+
+import re
+from functools import reduce
+from operator import xor
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from support.made_logs import made_log
+
+from discsim.errors import InputError
+from discsim.validation.importing.imported_log import import_log
+
+LOG = made_log()
+T = np.arange(0.0, LOG.t[-1], 0.2)
+#: 3 m/s to the north and 1 m/s up; one degree at 47.4 deg north on WGS 84 is 111 178 m
+NORTH, HEIGHT = 3.0 * T, 440.0 + T
+
+
+def folder(tmp_path, name, text):
+    """Write a board's log, its times in ms from its start, and a receiver's file beside it."""
+    raw = tmp_path / "raw"
+    raw.mkdir()
+    cells = np.column_stack([1000 * LOG.t, LOG.gyro, LOG.accel, LOG.mag])
+    rows = [",".join(f"{cell:.6g}" for cell in row) for row in cells]
+    (raw / "disc.csv").write_text("\n".join(["time_ms,gx,gy,gz,ax,ay,az,mx,my,mz", *rows, ""]))
+    (raw / name).write_text(text)
+    return raw
+
+
+def table(head, stamp, height=HEIGHT):
+    rows = [
+        f"{stamp(t)},{47.4 + n / 111178.0:.9f},8.55,{h:.3f},3.0,0.0" for t, n, h in zip(T, NORTH, height, strict=True)
+    ]
+    return "\n".join([head, *rows, ""])
+
+
+def gpx(inside="", head='<?xml version="1.0"?>'):
+    points = [
+        f'<trkpt lat="{47.4 + n / 111178.0:.9f}" lon="8.55"><ele>{h:.3f}</ele>{inside}'
+        f"<time>2026-05-01T12:{int(t // 60):02d}:{t % 60:06.3f}Z</time></trkpt>"
+        for t, n, h in zip(T, NORTH, HEIGHT, strict=True)
+    ]
+    return f'{head}<gpx xmlns="http://www.topografix.com/GPX/1/1"><trk><trkseg>{"".join(points)}</trkseg></trk></gpx>'
+
+
+def nmea():
+    lines = []
+    for t, n, h in zip(T, NORTH, HEIGHT, strict=True):
+        minutes = 60 * (0.4 + n / 111178.0)
+        text = f"GPGGA,1207{t:05.2f},47{minutes:09.6f},N,00833.000000,E,1,11,0.8,{h:.2f},M,47.0,M,,"
+        lines.append(f"${text}*{reduce(xor, text.encode()):02X}")
+    return "\r\n".join([*lines, ""])
+
+
+def assert_flies_north(gps):
+    assert_allclose(gps.value[:, 0], 3.0 * (gps.t - gps.t[0]), atol=0.02)
+    assert_allclose(gps.value[:, 2], -(gps.t - gps.t[0]), atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("head", "stamp", "height", "lines"),
+    [
+        ("time_ms,latitude,longitude,altitude_m,v,w", lambda t: 1000 * t, HEIGHT, []),
+        ("t_s,lat,lon,alt,v,w", lambda t: t, HEIGHT, ['time = "t_s"', 'time_unit = "s"']),
+        (
+            "ts_us,gps_lat,gps_lng,gps_alt_ft,v,w",
+            lambda t: round(1e6 * t),
+            HEIGHT / 0.3048,
+            ['height_unit = "ft"', 'time = "ts_us"', 'time_unit = "us"'],
+        ),
+    ],
+)
+def test_a_table_of_fixes_is_read_by_the_proposed_map(tmp_path, head, stamp, height, lines):
+    raw = folder(tmp_path, "tracker.csv", table(head, stamp, height))
+    log = import_log(raw)
+    proposed = log.map_text.partition("[sensors.gps]")[2]
+    assert 'file = "tracker.csv"' in proposed
+    assert 'unit = "deg"' in proposed
+    assert all(line in proposed for line in lines)
+    gps = log.recordings[0].samples["gps"]
+    assert len(gps) == T.size
+    assert_flies_north(gps)
+    (tmp_path / "map.toml").write_text(log.map_text)
+    again = import_log(raw, str(tmp_path / "map.toml")).recordings[0].samples["gps"]
+    np.testing.assert_array_equal(again.value, gps.value)
+
+
+def test_speed_and_heading_are_left_out_aloud(tmp_path):
+    raw = folder(tmp_path, "gps.csv", table("time_ms,lat,lon,alt,speed_m_s,heading (deg)", lambda t: 1000 * t))
+    (said,) = [note for note in import_log(raw).notes if "velocity north, east and down" in note]
+    assert said.startswith("left out: 'speed_m_s', 'heading (deg)' of gps.csv: ")
+
+
+@pytest.mark.parametrize(("name", "text", "first"), [("t.gpx", gpx(), 830952000.0), ("t.nmea", nmea(), 43620.0)])
+def test_a_track_by_another_clock_stands_in_the_map_as_comments_that_an_offset_makes_lines(tmp_path, name, text, first):
+    if name.endswith("nmea"):
+        pytest.importorskip("pynmeagps")
+    raw = folder(tmp_path, name, text)
+    log = import_log(raw)
+    assert "gps" not in log.recordings[0].samples
+    (said,) = [note for note in log.notes if "its lines stand in the map as comments" in note]
+    assert f"left out: the fixes in {name}: its clock is another one (it runs from {first:.9g} to" in said
+    assert f"time_offset_s = {LOG.t[0] - first:.3f} lets both begin together" in said
+    assert any("velocity" in note and note.startswith(f"{name}: gps") for note in log.notes)
+    before, _, lines = log.map_text.partition("# [sensors.gps]")
+    mended = re.sub(r"(?m)^# ", "", lines).replace("time_offset_s = 0.0", f"time_offset_s = {LOG.t[0] - first:.3f}")
+    (tmp_path / "map.toml").write_text(f"{before}[sensors.gps]{mended}")
+    gps = import_log(raw, str(tmp_path / "map.toml")).recordings[0].samples["gps"]
+    assert len(gps) == T.size
+    assert_flies_north(gps)
+
+
+def test_a_speed_in_a_track_is_left_out_aloud(tmp_path):
+    raw = folder(tmp_path, "t.gpx", gpx("<extensions><speed>3.0</speed><course>0.0</course></extensions>"))
+    assert [note for note in import_log(raw).notes if "gps: course, speed left out" in note]
+
+
+def test_a_track_alone_is_read(tmp_path):
+    (tmp_path / "t.gpx").write_text(gpx())
+    assert_flies_north(import_log(tmp_path / "t.gpx").recordings[0].samples["gps"])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (gpx(head='<!DOCTYPE gpx [<!ENTITY a "aaaa">]>'), "it declares a document type"),
+        (gpx()[:-40], "is a damaged GPX track"),
+        ("<gpx></gpx>", "is a GPX track without readings of motion in it"),
+    ],
+)
+def test_a_track_that_cannot_be_read_is_said(tmp_path, text, said):
+    if text.startswith("<!"):
+        text = '<?xml version="1.0"?>' + text
+    (tmp_path / "t.gpx").write_text(text)
+    with pytest.raises(InputError, match=said):
+        import_log(tmp_path / "t.gpx")
+    raw = folder(tmp_path, "t.gpx", text)
+    assert [note for note in import_log(raw).notes if note.startswith("left out: ") and said in note]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        (
+            "gps.csv",
+            table("time_ms,lat,lon,alt,v,w", lambda t: 1000 * t).replace(",", ";"),
+            "laid out in another way than disc.csv: gps.csv; to have it read, save it with the same separator",
+        ),
+        ("gps.csv", table("time_ms,lat,lon,a,v,w", lambda t: 1000 * t), "no column of a height"),
+        (
+            "gps.csv",
+            table("time_ms,lat,lon,alt,v,w", lambda t: 1000 * t).replace("47.4", "4724.4"),
+            "'lat' goes to 4724.4",
+        ),
+        ("gps.json", '{"lat": 47.4}', "left out: gps.json: is JSON"),
+    ],
+)
+def test_a_track_that_no_map_reads_is_left_out_aloud(tmp_path, name, text, said):
+    log = import_log(folder(tmp_path, name, text))
+    assert [note for note in log.notes if said in note], log.notes
+    assert "gps" not in log.recordings[0].samples
+
+
+def test_the_unit_of_a_sensors_own_time_needs_its_column(tmp_path):
+    raw = folder(tmp_path, "gps.csv", table("t_s,lat,lon,alt,v,w", lambda t: t))
+    text = import_log(raw).map_text.replace('time = "t_s" # its own stamps\n', "")
+    (tmp_path / "map.toml").write_text(text)
+    with pytest.raises(InputError, match="expected 'time' beside it"):
+        import_log(raw, str(tmp_path / "map.toml"))
