@@ -25,7 +25,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from discsim.disc import Disc, Release
     from discsim.effects.catalogue import effect
-    from discsim.engine import fly
     from discsim.environment import Environment
     from discsim.errors import InputError
     from discsim.estimators.plain_arrays import fft
@@ -38,9 +37,9 @@ if TYPE_CHECKING:
     from discsim.sensors.instruments import Instruments, record
     from discsim.sensors.instruments import read_part as load_part
     from discsim.shipped import load_disc, load_site, load_throw
-    from discsim.trajectory import predict
     from discsim.validation.challenge.challenged import blind_test as challenge
     from discsim.validation.checking.checked import check
+    from discsim.validation.checking.flown import fly, predict
     from discsim.validation.diagnosis.diagnosed import diagnose_recordings as diagnose
     from discsim.validation.estimating.spin_estimates import estimate_spin as estimate
     from discsim.validation.importing.imported_log import import_log
@@ -109,14 +108,14 @@ _HOMES = {
     "estimate": "discsim.validation.estimating.spin_estimates:estimate_spin",
     "fft": "discsim.estimators.plain_arrays",
     "fit": "discsim.validation.yaw_damping.fitted:fit_recordings",
-    "fly": "discsim.engine",
+    "fly": "discsim.validation.checking.flown",
     "import_log": "discsim.validation.importing.imported_log",
     "load_disc": "discsim.shipped",
     "load_part": "discsim.sensors.instruments:read_part",
     "load_site": "discsim.shipped",
     "load_throw": "discsim.shipped",
     "plan": "discsim.validation.planning.planned",
-    "predict": "discsim.trajectory",
+    "predict": "discsim.validation.checking.flown",
     "read_dataset": "discsim.recording",
     "read_model": "discsim.model_file",
     "read_recording": "discsim.recording",

@@ -101,7 +101,7 @@ def test_arrays_keep_what_a_sheet_states_and_take_the_rate_from_the_times():
         ({"magnetometer": ([0, 1], [[1, 2]] * 2)}, r"magnetometer: got values \(2, 2\), expected \(n, 3\)"),
         ({"magnetometer": ([0, 0], [[1, 2, 3]] * 2)}, "time runs from 0 to 0 s; expected ascending"),
         ({"magnetometer": ([0], [[1, 2, 3]])}, "1 rows tell no sampling rate; expected two or more"),
-        ({"magnetometer": (["a"], [[1, 2, 3]])}, "magnetometer: could not convert"),
+        ({"magnetometer": (["a"], [[1, 2, 3]])}, "magnetometer: got texts, expected numbers"),
     ],
 )
 def test_arrays_that_are_no_recording_are_refused_in_a_sentence(readings, said):

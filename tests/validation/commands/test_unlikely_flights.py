@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import pickle
+import re
 import sys
 from dataclasses import replace
+from importlib import import_module
+from inspect import signature
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import discsim
 from discsim.disc import Release
 from discsim.files import model_file
 from discsim.recording import Samples, write_recording
@@ -121,3 +126,29 @@ def test_a_standard_deviation_stated_twice_or_by_another_name_is_refused(monkeyp
     code, _, error = run(monkeypatch, capsys, "scatter", "--sd", sd, "--out", str(tmp_path / "out"))
     assert code == 2
     assert expected in error
+
+
+FAST = "it is thrown at 90 m/s; expected up to 45; in km/h?"
+
+
+@pytest.mark.parametrize("engine", ["fly", "predict"])
+def test_python_warns_of_it_in_the_same_words_and_the_engines_are_silent(engine):
+    """Warnings are errors here: the engines' own functions, which searches and workers call, give none."""
+    disc, there = load_disc("driver")
+    fast = replace(load_throw("driver"), velocity=np.array([90.0, 0.0, 0.0]))
+    with pytest.warns(UserWarning, match=re.escape(FAST)) as told:
+        flown = getattr(discsim, engine)(disc, there, release=fast, duration=0.05)
+    assert [Path(one.filename) for one in told] == [Path(__file__)]
+    silent = getattr(import_module({"fly": "discsim.engine", "predict": "discsim.trajectory"}[engine]), engine)
+    again = silent(disc, there, fast, duration=0.05)
+    np.testing.assert_array_equal(flown.t, again.t)
+    assert signature(getattr(discsim, engine)) == signature(silent)
+
+
+@pytest.mark.parametrize("engine", ["fly", "predict"])
+def test_python_says_nothing_of_a_throw_and_refuses_as_the_engines_do(engine):
+    disc, there = load_disc("driver")
+    assert pickle.loads(pickle.dumps(getattr(discsim, engine))) is getattr(discsim, engine)
+    getattr(discsim, engine)(disc, there, load_throw("driver"), duration=0.05)
+    with pytest.raises(discsim.InputError, match="expected"):
+        getattr(discsim, engine)(disc, there, load_throw("driver"), duration=-1.0)
