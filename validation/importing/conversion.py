@@ -154,7 +154,9 @@ def recording_of(read: RawReadings, rows: slice | None = None) -> Imported:
         None,
         release,
         {
-            sensor: _clocked(_sheet(import_map.sensors[sensor], samples[sensor], rates.get(sensor)), import_map)
+            sensor: _clocked(
+                _sheet(import_map.sensors[sensor], samples[sensor], rates.get(sensor)), import_map.time_of(sensor)
+            )
             for sensor in samples
         },
         samples,
@@ -519,12 +521,12 @@ def _cut(read: RawReadings, rows: slice) -> dict[str, Readings]:
     return {sensor: cut[sensor] for sensor in readings if cut[sensor].time.size}
 
 
-def _clocked(sheet: SensorSheet, import_map: ImportMap) -> SensorSheet:
-    """Return a sheet with what its rate may be off by, where the map says that of the step between rows."""
-    time = import_map.time
-    if not time.step or not time.step_sigma:
+def _clocked(sheet: SensorSheet, time: TimeBase) -> SensorSheet:
+    """Return a sheet with what its rate may be off by, where the map says that of the clock."""
+    off = time.step_sigma / time.step if time.step and time.step_sigma else time.off
+    if not off:
         return sheet
-    return replace(sheet, sigma={**sheet.sigma, "rate_hz": float(f"{sheet.rate_hz * time.step_sigma / time.step:.3g}")})
+    return replace(sheet, sigma={**sheet.sigma, "rate_hz": float(f"{sheet.rate_hz * off:.3g}")})
 
 
 def _sheet(sensor_map: SensorMap, samples: Samples, own_rate: float | None) -> SensorSheet:

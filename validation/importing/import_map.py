@@ -52,7 +52,8 @@ BODY_SENSORS = ("magnetometer", "accelerometer", "gyroscope")
 class TimeBase:
     """Time of a row: a column times ``scale`` (s), or the row's number (or its counter) times ``step`` (s).
 
-    ``iso``: the column holds dates and times, or times of the day. ``step_sigma``: what ``step`` may be off by, s.
+    ``iso``: the column holds dates and times, or times of the day. ``step_sigma``: what ``step`` may be off by, s;
+    ``off``: the share of ``scale`` that it may be off by.
     ``spacings``: the column holds what went by since the row before, and is added up.
     """
 
@@ -63,6 +64,7 @@ class TimeBase:
     iso: bool = False
     step_sigma: float | None = None
     spacings: bool = False
+    off: float | None = None
 
 
 @dataclass(frozen=True)
@@ -260,10 +262,15 @@ def _time_base(table: TomlTable) -> TimeBase:
         raise table.error(None, "expected either 'column' (of time stamps) or 'step_s' (of rows at one rate) in [time]")
     if spacings and (column is None or unit == "iso"):
         raise table.error("spacings", "'spacings' is true, expected a 'column' of numbers in s, ms, us, ns, min or d")
+    count = table.number("scale", required=False, positive=True)
+    if count is not None and (column is None or unit == "iso"):
+        raise table.error("scale", "'scale' is the worth of one count of a 'column' of numbers; expected one beside it")
     table.finish()
+    off = None if count is None or "scale" not in table.sigma else float(np.max(table.sigma["scale"])) / count
     sigma = table.sigma.get("step_s")
-    off = None if sigma is None else float(np.max(sigma))
-    return TimeBase(column, TIME_UNITS[unit], step, counter, unit == "iso", off, spacings)
+    step_off = None if sigma is None else float(np.max(sigma))
+    scale = TIME_UNITS[unit] * (count or 1.0)
+    return TimeBase(column, scale, step, counter, unit == "iso", step_off, spacings, off)
 
 
 def _environment(table: TomlTable, *, flying: bool) -> Environment:

@@ -57,8 +57,8 @@ COUNTING = "goes up by one a row: it counts the rows and tells no time"
 class Clock:
     """Time of a row: a column with its unit, or a step (with a counter where there is one), and why.
 
-    ``off`` is the share of a step without stamps that it may be off by (one sigma). ``spacings``: the column holds
-    what went by since the row before.
+    ``off`` is the share of a step, or of ``scale``, that it may be off by (one sigma). ``spacings``: the column holds
+    what went by since the row before. ``scale``: what one count of the column is worth in ``unit``.
     """
 
     column: str | None
@@ -68,6 +68,7 @@ class Clock:
     decision: Decision
     off: float = 0.0
     spacings: bool = False
+    scale: float = 1.0
 
     def with_step(self, step: float, decision: Decision, off: float) -> Clock:
         """Return the clock with another step, that may be off by that share of it."""
@@ -99,7 +100,9 @@ def seconds(clock: Clock, numbers: Numbers) -> FloatArray:
     value, _ = _as_meant(numbers, k, _stamps(numbers.cells(k)) if clock.unit == "iso" else numbers.values[:, k])
     if clock.unit == "iso":
         return value
-    return (added_up(value, numbers.table.number) if clock.spacings else value) * STATED_SCALES[clock.unit]
+    return (
+        (added_up(value, numbers.table.number) if clock.spacings else value) * clock.scale * STATED_SCALES[clock.unit]
+    )
 
 
 def counter_note(clock: Clock) -> str | None:

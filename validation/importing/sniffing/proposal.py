@@ -107,6 +107,9 @@ def map_text(proposal: Proposal) -> str:
     if clock.column is not None:
         lines += [f"column = {_text(clock.column)}", f"unit = {_text(clock.unit)}"]
         lines += ["spacings = true # of each row from the one before"] * clock.spacings
+        lines += [f"scale = {clock.scale:.9g} # the worth of one count in that unit"] * (clock.scale != 1.0)
+        if clock.off:
+            lines.append(f"scale_sigma = {clock.scale * clock.off:.2g} # leave out where the scale is known")
     else:
         lines += [f"step_s = {clock.step}"]
         if clock.step is not None and clock.off:

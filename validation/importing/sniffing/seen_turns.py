@@ -6,6 +6,7 @@ Takes the readings of both; gives what one reading of the gyroscope is worth, an
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,15 +14,19 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.validation.importing.sniffing.behaviour import TELLING, WORTHS
 from discsim.validation.importing.sniffing.clock import Clock
+from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.groups import Triple
 from discsim.validation.importing.sniffing.magnitudes import Unit, gravity_norm
 from discsim.validation.importing.sniffing.pull import POSSIBLE
 from discsim.validation.importing.sniffing.turning import Fit, best_worth, left_by, steps_between
 
-__all__ = ["SeenTurns", "clock_note", "rate_note", "seen_turns"]
+__all__ = ["OFF_FITTED", "SeenTurns", "clock_note", "rate_note", "seen_turns", "ticking"]
 
 #: A hand holds it where the specific force is gravity to this share: it moves what it turns by less than 1 m/s^2.
 HELD = 0.1
+#: What a step from the gyroscope's rate and the field's turning may be off by, a share (one sigma): a gyroscope's scale
+#: (3 % over parts and temperature), and what was found on four measured logs (1 to 6 %, rms 3 %).
+OFF_FITTED = 0.04
 #: How often too large a step of the stamps may be: a tick of 0.1 ms, 10 ms or 100 us that is taken for another unit.
 TICKS = (10.0, 0.1, 100.0, 0.01, 1000.0, 0.001)
 #: A ratio is a power of ten where it is one to this factor: a clock that is off by 30 % is the worst known.
@@ -104,6 +109,44 @@ def clock_note(clock: Clock, unit: Unit, turns: SeenTurns | None, pull: float | 
         f"WARNING: {turns.by} turns {ratio:.3g} times as fast as the gyroscope says: {rows}, or {scale}; {why}: "
         "mend the column, or every rate from the field, or every time, is wrong by that"
     )
+
+
+def ticking(
+    clock: Clock,
+    unit: Unit,
+    turns: SeenTurns | None,
+    pull: float | None,
+    found: Mapping[str, Triple],
+    times: Mapping[str, FloatArray],
+) -> Clock | None:
+    """Return a clock of ticks whose unit is a guess with what a tick is worth by the field, None where that is open.
+
+    The gyroscope's unit has to be stated, the stamps have to contradict it, and the pull to the centre must not show
+    that they are right. A count that is near a power of ten, or a minute, is taken for it.
+    """
+    if clock.column is None or clock.unit == "iso" or clock.decision.sure != "guess" or unit.decision.sure != "certain":
+        return None
+    if turns is None or turns.by != "the field" or (pull is not None and not POSSIBLE[0] < pull < POSSIBLE[1]):
+        return None
+    stated = unit.factor("rad_s")
+    if 1 / CONTRADICTS_UNIT < turns.worth / stated < CONTRADICTS_UNIT:
+        return None
+    # about powers of ten alone it was looked for: the best may lie between two of them
+    gyro, field = (found[sensor].values for sensor in ("gyroscope", "magnetometer"))
+    steps = steps_between(times["gyroscope"], gyro, times["magnetometer"], field)
+    seen = best_worth(steps, [float(turns.worth * factor) for factor in np.geomspace(10**-0.5, 10**0.5, 9)])
+    if seen is None or seen.ratio > TELLING:
+        return None
+    ratio = seen.worth / stated
+    power = 10.0 ** round(float(np.log10(ratio)))
+    whole = abs(ratio / power - 1) < 2 * OFF_FITTED
+    scale = power if whole else float(f"{ratio:.3g}")
+    why = (
+        f"{clock.decision.why}; but with {scale:g} {clock.unit} a count the field turns as fast as the gyroscope says "
+    )
+    why += f"({unit.unit})" + f", to {100 * OFF_FITTED:.0f} %: write what a count is worth" * (not whole)
+    told = Decision("time", f"'{clock.column}' in counts of {scale:g} {clock.unit}", "likely", why)
+    return replace(clock, scale=scale, decision=told, off=0.0 if whole else OFF_FITTED)
 
 
 def _uncertain_note(clock: Clock, unit: Unit, by: str, ratio: float) -> str | None:

@@ -43,7 +43,14 @@ from discsim.validation.importing.sniffing.own_place import own_place
 from discsim.validation.importing.sniffing.preamble import stated_rate, stated_worths
 from discsim.validation.importing.sniffing.proposal import Proposal, ProposedSensor
 from discsim.validation.importing.sniffing.pull import arm, doubted, unit_by_pull
-from discsim.validation.importing.sniffing.seen_turns import SeenTurns, clock_note, rate_note, seen_turns
+from discsim.validation.importing.sniffing.seen_turns import (
+    OFF_FITTED,
+    SeenTurns,
+    clock_note,
+    rate_note,
+    seen_turns,
+    ticking,
+)
 from discsim.validation.importing.sniffing.spin_axis import Reading3
 from discsim.validation.importing.sniffing.turning import Fit, best_worth, steps_between
 from discsim.validation.importing.sniffing.units import COUNTS, Reading
@@ -53,9 +60,6 @@ __all__ = ["sniff"]
 
 #: In this order they stand in the map; rows are counted in the first one's file.
 ORDER = ("gyroscope", "accelerometer", "magnetometer")
-#: What a step from the gyroscope's rate and the field's turning may be off by, a share (one sigma): a gyroscope's scale
-#: (3 % over parts and temperature), and what was found on four measured logs (1 to 6 %, rms 3 %).
-OFF_FITTED = 0.04
 #: A log rests on gravity where its rate is below this, rad/s, in more than this share of its rows: `gravity_norm` looks
 #: for what most windows share, and a rest of a twentieth of a spin is what `rest_norm` takes.
 SLOW, RESTS = 1.0, 0.05
@@ -400,6 +404,11 @@ def _proposal(
     if "gyroscope" in found and turns is None and found["gyroscope"][0].units:
         peak = float(np.nanmax(np.abs(found["gyroscope"][0].values)))
         units = {**units, "gyroscope": doubted(units["gyroscope"], peak, pull)}
+    if "gyroscope" in found and not own.clocks:
+        triples = {sensor: triple for sensor, (triple, _) in found.items()}
+        ticks = ticking(clock, units["gyroscope"], turns, pull, triples, times)
+        if ticks is not None:
+            return _proposal(raw, plant, layout, ticks, own, found, notes, offsets)
     notes = [*_on_time(clock, found, times, units, turns, pull), *notes]
     if clock.column is None and "gyroscope" in units:
         clock, slower = _fitted(clock, fit, units["gyroscope"])

@@ -1,0 +1,65 @@
+"""Ticks of a timer in the place of a time: what one is worth, the field's turning beside a stated gyroscope tells."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.made_logs import LANDING, RELEASE, made_log
+
+from discsim.errors import InputError
+from discsim.validation.importing.imported_log import ImportedLog, import_log
+
+LOG = made_log()
+HEAD = "Ticks;Gyro X [°/s];Gyro Y [°/s];Gyro Z [°/s];Acc X [g];Acc Y [g];Acc Z [g];Mag X [µT];Mag Y [µT];Mag Z [µT]"
+
+
+def written(tmp_path, tick, head=HEAD):
+    """Write a log with semicolons and decimal commas whose first column counts ticks of so many seconds."""
+    cells = np.column_stack([np.degrees(LOG.gyro), LOG.accel / 9.80665, LOG.mag])
+    rows = [
+        ";".join([f"{round((t + 137.2) / tick)}", *(f"{cell:.5f}".replace(".", ",") for cell in row)])
+        for t, row in zip(LOG.t, cells, strict=True)
+    ]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([head, *rows, ""]), "cp1252")
+    return path
+
+
+def assert_in_time(log: ImportedLog, within):
+    (throw,) = log.throws
+    assert throw.end - throw.start == pytest.approx(LANDING - RELEASE, rel=within, abs=0.15)
+
+
+@pytest.mark.parametrize(("tick", "scale"), [(1e-5, "scale = 10 "), (1e-7, "scale = 0.1 ")])
+def test_round_ticks_are_told(tmp_path, tick, scale):
+    log = import_log(written(tmp_path, tick))
+    assert_in_time(log, 0.0)
+    assert "scale_sigma" not in log.map_text
+    assert scale in log.map_text
+    assert not [note for note in log.notes if "turns" in note and "WARNING" in note]
+
+
+@pytest.mark.parametrize("frequency", [84e6, 32768.0])
+def test_any_other_tick_is_known_as_well_as_the_gyroscope(tmp_path, frequency):
+    log = import_log(written(tmp_path, 1 / frequency))
+    assert_in_time(log, 0.08)
+    assert "scale_sigma = " in log.map_text
+    assert any("write what a count is worth" in decision.text for decision in log.decisions)
+    sheet = log.recordings[0].sheets["magnetometer"]
+    assert float(np.max(sheet.sigma["rate_hz"])) == pytest.approx(0.04 * sheet.rate_hz, rel=0.05)
+    (tmp_path / "map.toml").write_text(log.map_text)
+    again = import_log(tmp_path / "log.csv", str(tmp_path / "map.toml")).recordings[0]
+    np.testing.assert_array_equal(again.samples["gyroscope"].t, log.recordings[0].samples["gyroscope"].t)
+
+
+def test_stamps_in_a_stated_unit_are_taken_as_they_are(tmp_path):
+    log = import_log(written(tmp_path, 1e-5, HEAD.replace("Ticks", "t [ms]")))
+    assert "scale = " not in log.map_text.partition("[environment]")[0]
+    assert [note for note in log.notes if note.startswith("WARNING: the field turns 0.01 times as fast")]
+
+
+@pytest.mark.parametrize("time", ["step_s = 0.01\nscale = 2.0", 'column = "t"\nunit = "iso"\nscale = 2.0'])
+def test_the_worth_of_a_count_needs_a_column_of_numbers(tmp_path, time):
+    (tmp_path / "map.toml").write_text(f'name = "a"\nplant = "free_spin"\n[time]\n{time}\n')
+    with pytest.raises(InputError, match="'scale' is the worth of one count"):
+        import_log(written(tmp_path, 1e-5), str(tmp_path / "map.toml"))
