@@ -36,12 +36,13 @@ def __getattr__(name: str) -> Any:
 def _warning(engine: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(engine)
     def told(*given: Any, **named: Any) -> Any:
-        stated = [*given, *named.values()]  # what is of another type, the engine refuses
+        flown = engine(*given, **named)  # what it refuses needs no warning
+        stated = [*given, *named.values()]
         disc = next((one for one in stated if isinstance(one, Disc)), None)
         there = next((one for one in stated if isinstance(one, Environment)), Environment())
         for note in unlikely_flight(disc, there, *(one for one in stated if isinstance(one, Release))):
             warnings.warn(note, stacklevel=2)
-        return engine(*given, **named)
+        return flown
 
     told.__module__ = __name__
     return told
