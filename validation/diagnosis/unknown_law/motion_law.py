@@ -219,17 +219,19 @@ def _longer_and_longer(fit: Fit, iterations: int, bounds: Mapping[tuple[str, str
     """
     longest = max(float(one.nodes[-1]) for one in fit.trajectories)
     doublings = max(int(np.ceil(np.log2(longest / _FIRST_LOOK))), 0)
-    short: Fit | None = None
-    for look in (*(_FIRST_LOOK * 2.0 ** np.arange(doublings)).tolist(), longest):
+
+    def begun(look: float, known: Fit | None) -> Fit:
         some = [beginning(one, look) if look < one.nodes[-1] else one for one in fit.trajectories]
-        if short is not None:
-            known = zip(some, short.trajectories, strict=True)
-            some = [_carried_on(before, short.values(i), one) for i, (one, before) in enumerate(known)]
-        fit_of_some = replace(fit, trajectories=tuple(some), at=fit.at if short is None else short.at)
-        if look == longest:
-            return fit_of_some
-        short = refit(fit_of_some, iterations=iterations, bounds=bounds)
-    return fit
+        if known is None:
+            return replace(fit, trajectories=tuple(some))
+        pairs = enumerate(zip(known.trajectories, some, strict=True))
+        carried = tuple(_carried_on(before, known.values(i), one) for i, (before, one) in pairs)
+        return replace(fit, trajectories=carried, at=known.at)
+
+    known: Fit | None = None
+    for look in (_FIRST_LOOK * 2.0 ** np.arange(doublings)).tolist():
+        known = refit(begun(look, known), iterations=iterations, bounds=bounds)
+    return begun(longest, known)
 
 
 def _carried_on(before: Trajectory, values: Mapping[tuple[str, str], float], longer: Trajectory) -> Trajectory:
