@@ -27,7 +27,7 @@ def main(files: list[str]) -> None:
         made = []
         for file in files:
             made.append(Path(folder) / Path(file).stem)
-            command = ["discsim", "import", "--throw", "1", file, "--out", str(made[-1])]
+            command = [sys.executable, "-m", "discsim.validation.cli", "import", "--throw", "1", file, "--out", str(made[-1])]
             subprocess.run(command, check=True, capture_output=True)
         recordings = [read_recording(path) for path in made]
     start = time.process_time()
