@@ -27,8 +27,8 @@ def main(files: list[str]) -> None:
         made = []
         for file in files:
             made.append(Path(folder) / Path(file).stem)
-            command = [sys.executable, "-m", "discsim.validation.cli", "import", "--throw", "1", file, "--out", str(made[-1])]
-            subprocess.run(command, check=True, capture_output=True)
+            words = ["import", "--throw", "1", file, "--out", str(made[-1])]
+            subprocess.run([sys.executable, "-m", "discsim.validation.cli", *words], check=True, capture_output=True)
         recordings = [read_recording(path) for path in made]
     start = time.process_time()
     found = diagnose([recordings], ["throws"]).diagnosis
