@@ -155,7 +155,7 @@ def late_sensor(recording: Recording, shortest: float = SHORTEST) -> LateSensor 
         2.0 * slots * float(np.log(found.as_written / max(found.left, 1e-300))),
         alone=found.alone,
     )
-    (other,) = [other for other in lags if other != name] or [""]
+    other = next((one for one in lags if one != name), "")
     if not other:
         return told
     if other in off and abs(off[other].lag - found.lag) < SHORTEST:

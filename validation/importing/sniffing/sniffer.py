@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -87,24 +88,27 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     layout, files, notes = _one_layout(files)
     notes = [*notes, *_unread(raw, failures)]
     found, left, exchanges = _assigned(files)
-    fixes = [file.numbers for file in files if file.numbers.tells_positions]
-    clock = _one_clock([triple.numbers for triple, _ in found.values()] or fixes or [file.numbers for file in files])
+    tables = [file.numbers for file in files]
+    fixes = [numbers for numbers in tables if numbers.tells_positions]
+    clock = _one_clock([triple.numbers for triple, _ in found.values()] or fixes or tables)
     unknown = [triple for triple in left if triple.sensor is None and _on(clock, triple.numbers)]
     missing = [sensor for sensor in ORDER if sensor not in found]
     if unknown and missing:
         seen = by_behaviour(unknown, [seconds(clock, triple.numbers)[triple.rows] for triple in unknown])
         found |= {sensor: (triple, decision) for triple, sensor, decision in seen if sensor in missing}
     found = {s: found[s] for s in ORDER if s in found and _on(clock, found[s][0].numbers)}
-    fixed, said = fixes_of([file.numbers for file in files], clock, [triple.numbers for triple, _ in found.values()])
+    fixed, said = fixes_of(tables, clock, [triple.numbers for triple, _ in found.values()])
     if not found and fixed is None:
         raise _nothing(raw, files, failures)
     found, exchanges = _turned_about(clock, found, exchanges)
     others = _others(found, left)
     own = own_clocks(clock, {sensor: triple for sensor, (triple, _) in found.items()})
-    tables = [file.numbers for file in files]
     place = own_place(tables)
     notes = [*exchanges, *notes, *said, *(note for _, note in others), *own.notes, *([place.note] if place else [])]
-    proposal = _on_one_clock(raw, plant, layout, clock, own, found, notes)
+    propose = partial(_proposal, raw, plant, layout, clock, own, found, notes)
+    proposal = propose({})
+    if offsets := _offsets(proposal, own, found):
+        proposal = propose(offsets)
     proposal = replace(proposal, fixes=fixed, place=place)
     named = [*(triple for triple, _ in found.values()), *(triple for triple, _ in others)]
     return _with_unused(proposal, tables, named, own)
@@ -429,27 +433,22 @@ def _proposal(
     return Proposal(name, raw, plant, layout, clock, tuple(sensors), decisions, (*axes.notes, *notes))
 
 
-def _on_one_clock(
-    raw: Path,
-    plant: Plant,
-    layout: Layout,
-    clock: Clock,
-    own: OwnClocks,
-    found: dict[str, tuple[Triple, Decision]],
-    notes: list[str],
-) -> Proposal:
-    """Return the proposal; where sensors in files or columns of time of their own are on clocks that differ, moved."""
-    proposal = _proposal(raw, plant, layout, clock, own, found, notes, {})
+def _offsets(
+    proposal: Proposal, own: OwnClocks, found: dict[str, tuple[Triple, Decision]]
+) -> dict[str, tuple[float, Decision]]:
+    """Return by how much a sensor's times are to be moved (s) where files or columns of time are on clocks that differ.
+
+    Empty where all is in one file and on its clock, and where nothing tells an offset.
+    """
     files = {sensor: triple.numbers.path for sensor, (triple, _) in found.items()}
     if len(set(files.values())) == 1 and not own.clocks:
-        return proposal
+        return {}
     times = _times(proposal.clock, own, found)
     readings = {one.sensor: _in_si(one.sensor, one.triple, times[one.sensor], one.unit) for one in proposal.sensors}
     late = late_clock(readings, {one.sensor: one.axes for one in proposal.sensors})
     if late is None:
-        return proposal
-    offsets = {late.sensor: moved(late, {sensor: path.name for sensor, path in files.items()})}
-    return _proposal(raw, plant, layout, clock, own, found, notes, offsets)
+        return {}
+    return {late.sensor: moved(late, {sensor: path.name for sensor, path in files.items()})}
 
 
 def _times(clock: Clock, own: OwnClocks, found: dict[str, tuple[Triple, Decision]]) -> dict[str, FloatArray]:
