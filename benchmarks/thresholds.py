@@ -49,7 +49,7 @@ from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate, screened_candidates
 from discsim.validation.diagnosis.selection.search_state import Search, chi2_in, values_of_fit
-from discsim.validation.diagnosis.selection.stepwise import screened
+from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.settings import RELAXED_FIT, SELECTION
 from discsim.validation.identification.noise import robust_noise, stated_noise, whitened
 from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, unmodelled_residuals

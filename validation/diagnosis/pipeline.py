@@ -26,7 +26,8 @@ from discsim.validation.diagnosis.result import Outcome
 from discsim.validation.diagnosis.selection.event_instants import with_instants_weighed
 from discsim.validation.diagnosis.selection.refits import told_to
 from discsim.validation.diagnosis.selection.search_state import Search
-from discsim.validation.diagnosis.selection.stepwise import screened, search
+from discsim.validation.diagnosis.selection.starting_point import screened
+from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.diagnosis.settings import UNKNOWN_LAW
 from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault, with_turned_board
 from discsim.validation.diagnosis.setup_effects import (

@@ -12,7 +12,7 @@ from discsim.rig import default_profile
 from discsim.sensors import Instruments, record
 from discsim.table_drive import TableDrive
 from discsim.validation.diagnosis.command_followed import not_as_commanded
-from discsim.validation.diagnosis.selection.stepwise import screened
+from discsim.validation.diagnosis.selection.starting_point import screened
 
 
 def run(drive: TableDrive) -> Recording:

@@ -10,7 +10,9 @@ from discsim.recording import Recording
 from discsim.validation.challenge.cases.conceal import recordings as concealed
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.diagnosis.relaxed_fit import clock_of_accelerometer, relaxed
-from discsim.validation.diagnosis.selection.stepwise import next_effect, screened, search
+from discsim.validation.diagnosis.selection.next_effect import next_effect
+from discsim.validation.diagnosis.selection.starting_point import screened
+from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.identification.residual_tests import unmodelled_residuals
 from discsim.validation.identification.stated_parameters import stated_parameters
 

@@ -26,8 +26,10 @@ from discsim.validation.diagnosis.selection import stepwise
 from discsim.validation.diagnosis.selection.candidates import free_candidate
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.next_effect import joined
 from discsim.validation.diagnosis.selection.score_tests import hinted
-from discsim.validation.diagnosis.selection.search_state import possible, values_of_fit
+from discsim.validation.diagnosis.selection.search_state import Search, possible, values_of_fit
+from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.identification.gauss_newton import (
     NO_BARS,
     Fit,
@@ -186,10 +188,10 @@ def going(fit: Fit, too_far: float) -> GaussNewtonStep:
 
 
 @cache
-def biased() -> stepwise.Search:
+def biased() -> Search:
     """Return where a search begins in two free spins whose gyroscope has a bias of twenty times its noise."""
     bias = effect("gyro.bias", bx_rad_s=0.05, by_rad_s=-0.03, bz_rad_s=0.02)
-    return stepwise.screened(throws([], [bias], module=BLIND, plant="free_spin"))
+    return screened(throws([], [bias], module=BLIND, plant="free_spin"))
 
 
 def fitted_with(*ids: str) -> ContinuousFit:
@@ -221,7 +223,7 @@ def test_what_gained_only_by_where_the_fit_before_it_stood_is_named_no_more(monk
 @pytest.mark.parametrize(("id", "near"), [("gyro.bias", True), ("mag.hard_iron", False)])
 def test_far_from_the_data_a_refit_begins_with_segments_that_are_joined_and_counts_where_it_comes_near(id, near):
     far_away = hinted(effect(id))
-    fitted = stepwise.joined(biased(), biased().base, far_away, NO_BARS)
+    fitted = joined(biased(), biased().base, far_away, NO_BARS)
     assert (fitted is not None) is near
 
 

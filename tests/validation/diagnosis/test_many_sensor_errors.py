@@ -14,7 +14,7 @@ from discsim.rig import default_profile, turn_table
 from discsim.sensors import Instruments, record
 from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.selection.search_state import chi2_in
-from discsim.validation.diagnosis.selection.stepwise import screened
+from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.uninflated_noise import capped, spoilt_groups, uninflated_noise
 from discsim.validation.identification.noise import GroupNoise
 

@@ -16,7 +16,8 @@ from discsim.validation.diagnosis.answer.named import ParameterValue
 from discsim.validation.diagnosis.answer.partly import PartlyExplained
 from discsim.validation.diagnosis.partly import partly_explained
 from discsim.validation.diagnosis.pipeline import diagnose
-from discsim.validation.diagnosis.selection.stepwise import screened, search
+from discsim.validation.diagnosis.selection.starting_point import screened
+from discsim.validation.diagnosis.selection.stepwise import search
 
 CAMERA = effect("track.camera", height_m=30.0, north_m=10.0, east_m=-8.0)
 SPREAD = {"position_ned_m": 1.0, "velocity_ned_m_s": 0.1, "roll_rad": 0.01, "pitch_rad": 0.01, "body_rate_rad_s": 0.2}

@@ -17,7 +17,7 @@ from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.own_sizes import own_sizes
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
-from discsim.validation.diagnosis.selection.stepwise import screened
+from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.settings import SELECTION
 
 BIAS = "accel.bias"

@@ -37,6 +37,7 @@ __all__ = [
     "possible",
     "steady_noise",
     "values_of_fit",
+    "wobbles",
 ]
 
 #: when a kick changed the spin
@@ -216,3 +217,12 @@ def steady_noise(found: Search) -> NoiseModel:
         not np.isfinite(stated[group]) or noise.sd < SELECTION.short * stated[group] for group, noise in steady.items()
     )
     return steady if well else found.relaxed_noise
+
+
+def wobbles(fit: Fit) -> Start:
+    """Return how the wobble of free spins dies and turns in a fit whose segments go with it.
+
+    What algebra expects of it is far from linear where turning for a second makes a radian.
+    """
+    parameters = zip(fit.parameters, fit.at, strict=True)
+    return {(q.key, q.recordings): float(v) for q, v in parameters if q.key in fit.plant.own_keys}

@@ -21,7 +21,7 @@ from discsim.validation.diagnosis.selection.candidates import free_candidate
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.search_state import values_of_fit
-from discsim.validation.diagnosis.selection.stepwise import screened
+from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.noise import GroupNoise
 from discsim.validation.identification.parameters import Parameter

@@ -12,15 +12,16 @@ from support.made import throws
 from discsim.effects import Effect, effect
 from discsim.validation.diagnosis.design.next_recording import confusions
 from discsim.validation.diagnosis.relaxed_fit import relaxed, unknowns
-from discsim.validation.diagnosis.selection import stepwise as searching
+from discsim.validation.diagnosis.selection import next_effect as searching
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, candidates_for
-from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
+from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.exchange import exchanged, rivals_of
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted_parameters
 from discsim.validation.diagnosis.selection.offers import in_turn
 from discsim.validation.diagnosis.selection.score_tests import Pair, ScreenedCandidate, pairs
 from discsim.validation.diagnosis.selection.screening import normal_equations_of
-from discsim.validation.diagnosis.selection.search_state import Rival, possible
+from discsim.validation.diagnosis.selection.search_state import Rival, Search, possible
+from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.identification.noise import estimate_noise
 from discsim.validation.identification.plants.flight import FLIGHT
 from discsim.validation.identification.stated_parameters import stated_parameters
@@ -42,7 +43,7 @@ def ranked() -> list[Pair]:
 
 def named(hidden: list[Effect], errors: list[Effect]) -> list[str]:
     """Return what a search names in throws."""
-    return sorted(candidate.id for candidate in searching.search(throws(hidden, errors)).final.hypothesis.candidates)
+    return sorted(candidate.id for candidate in search(throws(hidden, errors)).final.hypothesis.candidates)
 
 
 def test_the_first_pair_is_the_right_one_and_starts_near_its_numbers():
@@ -88,9 +89,9 @@ def test_two_at_once_are_not_asked_for_near_the_data(monkeypatch):
 
 
 @cache
-def windy() -> searching.Search:
+def windy() -> Search:
     """Return what is found in throws through a wind that is the same at every height."""
-    return searching.search(throws([effect("air.wind", w_north_m_s=-1.4, w_east_m_s=-1.0)], seconds=2.0))
+    return search(throws([effect("air.wind", w_north_m_s=-1.4, w_east_m_s=-1.0)], seconds=2.0))
 
 
 def of(id: str) -> CandidateEffect:
@@ -100,7 +101,7 @@ def of(id: str) -> CandidateEffect:
 @cache
 def as_shear() -> ContinuousFit:
     """Return the fit of that wind as one that grows with height."""
-    return searching.continuous_fit(
+    return continuous_fit(
         windy().relaxed_fit, Hypothesis((of("air.wind_shear"),)), windy().own, windy().relaxed_noise, {}
     )
 
@@ -137,7 +138,7 @@ def test_a_sensor_far_off_the_disc_is_impossible():
     candidate = of("accel.position_offset")
     places = ((candidate.id, name) for name in ("dx_m", "dy_m", "dz_m"))
     values = dict.fromkeys(((key, None) for key in places), 1e-4)
-    fit = searching.continuous_fit(
+    fit = continuous_fit(
         windy().relaxed_fit,
         Hypothesis((candidate,)),
         windy().own,

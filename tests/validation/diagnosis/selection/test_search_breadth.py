@@ -13,9 +13,9 @@ from support.made import coasts, throws
 
 from discsim.effects.catalogue import CATALOGUE, effect
 from discsim.validation.diagnosis.relaxed_fit import first_trajectory
-from discsim.validation.diagnosis.selection import exchange
+from discsim.validation.diagnosis.selection import exchange, stepwise
+from discsim.validation.diagnosis.selection import next_effect as searching
 from discsim.validation.diagnosis.selection import search_state as finding
-from discsim.validation.diagnosis.selection import stepwise as searching
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, free_candidate
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
 from discsim.validation.diagnosis.selection.evidence import price
@@ -182,7 +182,7 @@ def test_what_recordings_have_in_common_over_time_is_asked_about_in_noise_that_h
         *2 * (None,),
         *UNASKED,
     )
-    quiet = searching.without_swallowed(found, ContinuousFit(Hypothesis(), fit, 0.0, tuple(bent), told))
+    quiet = stepwise.without_swallowed(found, ContinuousFit(Hypothesis(), fit, 0.0, tuple(bent), told))
     assert quiet is not None
     assert quiet.fit.noise == stated_noise(linears)
 
@@ -326,8 +326,8 @@ def test_the_search_ends_where_all_further_effects_cannot_take_what_is_left(monk
     def chi2(fitted: ContinuousFit, noise: object) -> float:
         return (was if fitted is before else left) * fit.count
 
-    monkeypatch.setattr(searching, "chi2_in", chi2)
-    assert searching.past_hope(found, before, after, further) is stops
+    monkeypatch.setattr(stepwise, "chi2_in", chi2)
+    assert stepwise.past_hope(found, before, after, further) is stops
 
 
 def test_a_search_that_comes_to_more_effects_than_are_of_use_is_given_up_as_it_stands():
@@ -337,7 +337,7 @@ def test_a_search_that_comes_to_more_effects_than_are_of_use_is_given_up_as_it_s
         effect("mag.hard_iron", bx_uT=2.0, by_uT=-1.0, bz_uT=0.0),
     ]
     recordings = coasts((), errors)
-    whole, given_up, of_use = (searching.search(recordings, of_use=most) for most in (None, 0, 1))
+    whole, given_up, of_use = (stepwise.search(recordings, of_use=most) for most in (None, 0, 1))
     assert [len(found.final.hypothesis.candidates) for found in (whole, given_up, of_use)] == [2, 2, 2]
     assert whole.rivals
     assert of_use.rivals.keys() == whole.rivals.keys()

@@ -14,7 +14,8 @@ from discsim.sensors import Instruments, record
 from discsim.validation.diagnosis.selection.candidates import free_candidate
 from discsim.validation.diagnosis.selection.evidence import charge
 from discsim.validation.diagnosis.selection.exchange import takes_its_place
-from discsim.validation.diagnosis.selection.stepwise import Search, search
+from discsim.validation.diagnosis.selection.search_state import Search
+from discsim.validation.diagnosis.selection.stepwise import search
 
 
 @pytest.mark.parametrize("sensor", ["mag", "accel", "gyro"])
