@@ -139,8 +139,8 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
         return Tried(ready, contradiction)
     hints = (*ready.supposed, *setup.hints)
 
-    def searched(followed: Fit, of_use: int | None = None) -> Search:
-        return search(ready.fitted, progress, ready.meant, followed, free, hints, question.effects, of_use)
+    def searched(followed: Fit, of_use: int | None = None, before: Search | None = None) -> Search:
+        return search(ready.fitted, progress, ready.meant, followed, free, hints, question.effects, of_use, before)
 
     found = searched(followed)
     if followed.plant.weakly_identified and ready.rows is None:  # else pieces may part, and what is left is known
@@ -152,11 +152,12 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
 _BENDS = 2
 
 
-def _with_bends(found: Search, followed: Fit, searched: Callable[[Fit, int], Search]) -> Search:
+def _with_bends(found: Search, followed: Fit, searched: Callable[[Fit, int, Search | None], Search]) -> Search:
     """Return the search of free spins with segments halved that bend, where one names effects or leaves too much.
 
-    ``searched`` is a search from a relaxed fit for so many effects as are of use. Bends may stand in for what a search
-    named, or hide one thing more: a stack of effects beside them copies what nobody knows.
+    ``searched`` is a search from a relaxed fit for so many effects as are of use, which begins with those of one before
+    where these leave no more than noise. Bends may stand in for what a search named, or hide one thing more: a stack of
+    effects beside them copies what nobody knows.
     """
     for _ in range(_BENDS):
         left, count = leaves_more_than_noise(found), len(found.final.hypothesis.candidates)
@@ -164,7 +165,7 @@ def _with_bends(found: Search, followed: Fit, searched: Callable[[Fit, int], Sea
         if bent is None:
             break
         most = 1 if left else count
-        again = searched(bent, most)
+        again = searched(bent, most, None if left else found)
         if len(again.final.hypothesis.candidates) > most or (leaves_more_than_noise(again) and not left):
             break
         followed, found = bent, again

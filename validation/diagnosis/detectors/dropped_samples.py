@@ -205,6 +205,9 @@ def _own_times(anew: Trajectory, old: Trajectory, lost: Mapping[str, FloatArray]
 
 #: most rounds in which the motion says more of the counts and they of the motion; what share the noise has to fall by
 _ROUNDS, _FALLEN = 4, 0.9
+#: times the stated noise that a motion leaves of a sensor which it follows through its losses, and more: some hundred
+#: readings of noise as stated scatter by 10 % at most. Time alone
+_LOUDER = 1.2
 #: noises that a motion which others tell may leave of a sensor, and more
 _ANY = 100.0
 #: fewest readings of a motion's beginning that tell what was lost: some turns of a disc
@@ -219,9 +222,10 @@ def dropped_accelerometer(fit: Fit, noise: NoiseModel, least: float = DETECTORS.
         return []
     if sensor not in noise:  # all of its readings are beyond its range, and none takes part
         return []
-    if _counted_in_own_noise(fit, sensor, noise)[1] < least:
+    _, gain, left = _counted_in_own_noise(fit, sensor, noise)
+    if gain < least and left < _LOUDER * float(np.max(_stated_sd(fit, sensor, noise))):
         return []
-    # what is lost has bent the motion: once more without the sensor in question
+    # what is lost has bent the motion, to where it shows no loss but more than noise: once more without the sensor
     without = replace(
         fit,
         trajectories=tuple(

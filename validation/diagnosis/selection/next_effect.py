@@ -30,6 +30,7 @@ from discsim.validation.diagnosis.selection.search_state import (
     chi2_in,
     far,
     from_here,
+    hopeless,
     on_the_disc,
     possible,
     steady_noise,
@@ -74,7 +75,7 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
         told = not distant and any(screened is hint for hint in found.hints)
         beside = np.inf if cost or told else merit_now - 0.5 * price(screened.candidate)
         beside_noise = _with_stated(current, screened) if told else current.fit.noise
-        bars = _hopeless(best_chi2, current.fit.count) if distant else Bars(beside)
+        bars = hopeless(best_chi2, current.fit.count) if distant else Bars(beside)
         refitted = joined(found, current, screened, bars) if distant and not cost else None
         if refitted is None:
             refitted = continuous_fit(
@@ -223,12 +224,6 @@ def _with_stated(current: ContinuousFit, hint: ScreenedCandidate) -> NoiseModel:
     """Return a fit's noise with the stated one of the sensor whose own has swallowed what was told of it."""
     own = hint.candidate.row.acts_on
     return {**current.fit.noise, own: stated_noise(current.fit.linears)[own]}
-
-
-def _hopeless(best: float, count: int) -> Bars:
-    """Return the chi-squared above which a refit is of no use beside the best so far, of so many readings."""
-    times = SELECTION.hopeless_near if best < SELECTION.far * count else SELECTION.hopeless
-    return Bars(times * best, SELECTION.hopeless_held * best)
 
 
 def _begun_again(found: Search, current: ContinuousFit, screened: ScreenedCandidate, bar: float) -> ContinuousFit:

@@ -18,7 +18,7 @@ from discsim.validation.diagnosis.selection.hypothesis import Start
 from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate
 from discsim.validation.diagnosis.selection.screening import NormalEquations, normal_equations_of
 from discsim.validation.diagnosis.settings import SELECTION
-from discsim.validation.identification.gauss_newton import Fit
+from discsim.validation.identification.gauss_newton import Bars, Fit
 from discsim.validation.identification.noise import NoiseModel, chi_squared, robust_noise
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.residual_tests import unmodelled_residuals
@@ -30,6 +30,7 @@ __all__ = [
     "chi2_in",
     "far",
     "from_here",
+    "hopeless",
     "lost",
     "misses",
     "no_nearer",
@@ -159,6 +160,12 @@ def no_nearer(found: Search, before: ContinuousFit, after: ContinuousFit) -> boo
 def misses(found: Search, fitted: ContinuousFit) -> bool:
     """Tell whether a fit is far from data that the relaxed fit follows: whatever it holds, something is missing."""
     return far(found, fitted) and found.relaxed_fit.merit < SELECTION.followed * found.relaxed_fit.count
+
+
+def hopeless(best: float, count: int) -> Bars:
+    """Return the chi-squared above which a refit is of no use beside the best so far, of so many readings."""
+    times = SELECTION.hopeless_near if best < SELECTION.far * count else SELECTION.hopeless
+    return Bars(times * best, SELECTION.hopeless_held * best)
 
 
 def on_the_disc(found: Search, start: Start) -> bool:

@@ -17,10 +17,10 @@ from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit,
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, Start, fitted_parameters
 from discsim.validation.diagnosis.selection.score_tests import hinted, pictured_from_above, start_of
 from discsim.validation.diagnosis.selection.screening import NormalEquations, normal_equations_of
-from discsim.validation.diagnosis.selection.search_state import Search, chi2_in, values_of_fit, wobbles
+from discsim.validation.diagnosis.selection.search_state import Search, chi2_in, hopeless, values_of_fit, wobbles
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.competing_effects import CATALOGUED, Competing
-from discsim.validation.identification.gauss_newton import Bars, Fit, merit_of
+from discsim.validation.identification.gauss_newton import NO_BARS, Bars, Fit, merit_of
 from discsim.validation.identification.noise import NoiseModel, estimate_noise
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.stated_parameters import stated_parameters
@@ -42,13 +42,15 @@ def screened(
     free: Sequence[Parameter] = (),
     hints: Sequence[Effect] = (),
     effects: Competing = CATALOGUED,
+    before: Search | None = None,
 ) -> Search:
     """Return where the search begins: the relaxed fit with all candidates asked about it, and the baseline's fit.
 
     ``as_stated`` are the same with nothing that stands in for what they do not state, ``followed`` their relaxed fit
     where it is known already; ``free`` are numbers that every fit may move. ``hints`` are effects of about the right
     size that sensors asked of one another before any fit: algebra from far away finds no clock by whose error phases
-    run away. ``effects`` are those that compete.
+    run away. ``effects`` are those that compete. ``before`` is a search of the same recordings in other segments, whose
+    baseline stands where this one would be hopeless beside what was found.
     """
     known = (*stated_parameters(recordings), *free)
     own = (*known, *unknowns(recordings))
@@ -67,7 +69,10 @@ def screened(
     asked_in = relaxed_fit.noise if relaxed_fit.from_release else noise
     equations = normal_equations_of(relaxed_fit, candidates, asked_in, relaxed_fit.continuous_defects)
     report("fitting the baseline", 2, 4)
-    base = _baseline(relaxed_fit, equations, own, noise)
+    bars = NO_BARS if before is None else hopeless(chi2_in(before.final, noise), before.final.fit.count)
+    base = _baseline(relaxed_fit, equations, own, noise, bars)
+    if before is not None and base.fit.merit > min(bars):
+        base = before.base
     told = clock_of_accelerometer(relaxed_fit)
     hints = hints if told is None else (*hints, told)
     asked = tuple(hinted(hint) for hint in hints if any(candidate.id == hint.id for candidate in candidates))
@@ -97,12 +102,12 @@ def _noise_of(relaxed_fit: Fit) -> NoiseModel:
 
 
 def _baseline(
-    relaxed_fit: Fit, equations: NormalEquations, own: Sequence[Parameter], noise: NoiseModel
+    relaxed_fit: Fit, equations: NormalEquations, own: Sequence[Parameter], noise: NoiseModel, bars: Bars
 ) -> ContinuousFit:
-    """Return the fit without any effect."""
+    """Return the fit without any effect; one that will stay above its ``bars`` is given up."""
     plant = relaxed_fit.plant
     start = {**_start(equations, Hypothesis(), own), **wobbles(relaxed_fit)}
-    base = continuous_fit(relaxed_fit, Hypothesis(), own, noise, start, iterations=plant.base_steps)
+    base = continuous_fit(relaxed_fit, Hypothesis(), own, noise, start, iterations=plant.base_steps, bars=bars)
     if chi2_in(base, noise) < SELECTION.far * base.fit.count and base.fit.iterations >= plant.base_steps:
         # beside the data what the baseline has left to gain would pass for what an effect gains
         again = continuous_fit(

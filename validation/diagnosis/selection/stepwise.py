@@ -14,6 +14,7 @@ import numpy as np
 
 from discsim.effects import Effect
 from discsim.recording import Recording
+from discsim.validation.diagnosis.relaxed_fit import time_ratio
 from discsim.validation.diagnosis.selection.all_at_once import all_at_once
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.event_instants import with_best_instant
@@ -34,6 +35,7 @@ from discsim.validation.diagnosis.selection.search_state import (
     far,
     lost,
     no_nearer,
+    possible,
     values_of_fit,
 )
 from discsim.validation.diagnosis.selection.starting_point import Report, screened
@@ -47,6 +49,9 @@ from discsim.validation.identification.residual_tests import loudest, unmodelled
 
 __all__ = ["past_hope", "search", "settled", "without_swallowed"]
 
+#: effects that are taken over from one search to the next, at most: two may be hidden
+_FEW = 2
+
 
 # a hypothesis far from the data may send a motion beyond all numbers: such a fit is not finite, and is passed over
 @np.errstate(over="ignore", invalid="ignore")
@@ -59,17 +64,41 @@ def search(
     hints: Sequence[Effect] = (),
     effects: Competing = CATALOGUED,
     of_use: int | None = None,
+    before: Search | None = None,
 ) -> Search:
     """Find the effects that explain recordings of one plant; what is given is that of `screened`.
 
     A search that stands by two more than ``of_use`` effects is given up as it stands: who asked takes no such stack.
+    It begins with the effects that one ``before`` found in other segments, where they are worth their price here, too.
     """
-    found = screened(recordings, report, as_stated, followed, free, hints, effects)
+    found = screened(recordings, report, as_stated, followed, free, hints, effects, before)
     report("refitting candidates", 3, 4)
-    found = _selected_forward(found, of_use)
+    found = _selected_forward(found if before is None else _taken_over(found, before), of_use)
     found = found if _of_no_use(found, of_use) else settled(found)
     report("done", 4, 4)
     return found
+
+
+def _taken_over(found: Search, before: Search) -> Search:
+    """Return a search with the effects of one in other segments, where each is worth its price here, too.
+
+    It begins from nothing where they are many, which may be a stack that only together stands for something, where
+    other times or samples that were lost go with them, and where they explain less than that.
+    """
+    known = before.final
+    retimed = any(time_ratio(known.fit.values(i)) != 1.0 for i in range(len(known.fit.trajectories)))
+    told = any(candidate.fixed_values for candidate in known.hypothesis.candidates)
+    if not 1 <= len(known.hypothesis.candidates) <= _FEW or retimed or told or before.at_once:
+        return found
+    cut = known.fit.cut_at([one.nodes for one in found.relaxed_fit.trajectories])
+    pairs = zip(found.relaxed_fit.trajectories, cut.trajectories, strict=True)
+    start = replace(cut, trajectories=tuple(replace(one, states=other.states) for one, other in pairs))
+    fitted = continuous_fit(start, known.hypothesis, found.own, found.relaxed_noise, values_of_fit(known))
+    if not possible(fitted) or far(found, fitted):
+        return found
+    fitted = eliminated_backward(found, fitted)
+    worth = found.base.score - fitted.score > sum(map(price, fitted.hypothesis.candidates))
+    return _with_final(found, fitted) if worth else found
 
 
 def _of_no_use(found: Search, of_use: int | None) -> bool:
