@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from discsim.arrays import BoolArray, runs
+from discsim.arrays import BoolArray, FloatArray, runs
 from discsim.clipping import clipping_notes
 from discsim.disc import Release
 from discsim.errors import InputError
@@ -22,11 +22,12 @@ from discsim.recording import SENSORS, Recording, Samples, SensorSheet
 from discsim.validation.importing.apart import apart
 from discsim.validation.importing.cleaning import Readings, cleaned, without_glitches
 from discsim.validation.importing.failed import dead_axis, failed_at_once, failed_on_one_axis, on_all_axes
+from discsim.validation.importing.fixes_once import fixes_once
 from discsim.validation.importing.import_map import ImportMap, SensorMap, TimeBase
 from discsim.validation.importing.overflow import without_overflow
 from discsim.validation.importing.raw_table import RawTable, Repair, RepairList, read_raw
 from discsim.validation.importing.row_clock import RowClock, row_clock
-from discsim.validation.importing.sensor_rows import chosen_rows, sensor_rows
+from discsim.validation.importing.sensor_rows import chosen_rows, hollow_rows, sensor_rows
 from discsim.validation.importing.timing import row_timing
 
 __all__ = [
@@ -101,6 +102,8 @@ def read_readings(raw: Path, import_map: ImportMap, rows: slice | None = None) -
     repairs = RepairList(import_map.repairs)
     tables = _read_tables(raw, import_map, repairs)
     readings, notes = _read_sensors(raw, tables, import_map, rows, repairs)
+    readings, said = fixes_once(readings, tables, import_map, repairs)
+    notes += said
     readings, said = _without_failed(readings, import_map, tables, repairs)
     notes += said
     readings, said = _without_glitches(readings, tables, repairs)
@@ -136,8 +139,15 @@ def recording_of(read: RawReadings, rows: slice | None = None) -> Imported:
     repairs = RepairList(import_map.repairs)
     readings, rates, said = _fresh(raw, readings, import_map, read.tables, repairs)
     notes += said
+    lone = [sensor for sensor, found in readings.items() if found.time.size == 1]
+    unknown = [sensor for sensor in lone if len(lone) < len(readings) and not _has_rate(read, sensor)]
+    notes += [f"no {sensor}: one row of it, which shows no rate; it is left out" for sensor in unknown]
+    readings = {sensor: found for sensor, found in readings.items() if sensor not in unknown}
     zero = min(found.time[0] for found in readings.values())
     samples = {sensor: _samples(sensor, found, zero, read.tables[sensor].path) for sensor, found in readings.items()}
+    # of a throw with one fix in it, the rate is that of the whole log
+    alone = all(len(one) == 1 for one in samples.values())
+    shown = {s: one.t if alone or len(one) > 1 else read.readings[s].time for s, one in samples.items()}
     release = _release(raw, import_map, readings)
     if release is None and (import_map.release is not None or import_map.throws):
         notes.append("no release conditions: the map has none for this file, or the first row is not used")
@@ -155,7 +165,8 @@ def recording_of(read: RawReadings, rows: slice | None = None) -> Imported:
         release,
         {
             sensor: _clocked(
-                _sheet(import_map.sensors[sensor], samples[sensor], rates.get(sensor)), import_map.time_of(sensor)
+                _sheet(import_map.sensors[sensor], shown[sensor], rates.get(sensor)),
+                import_map.time_of(sensor),
             )
             for sensor in samples
         },
@@ -204,8 +215,12 @@ def _read_sensors(
             clocks[key] = row_clock(table, import_map, base, repairs)
             notes += _stretches(table, clocks[key], cut)
         clock = clocks[key]
+        hollow = hollow_rows(table, names, sensor_map, import_map.layout.decimal)
+        if hollow.any():
+            clock = replace(clock, time=np.where(hollow, np.nan, clock.time))
         found = sensor_rows(table, sensor, names, sensor_map, import_map, clock, cut, repairs)
-        chosen = chosen_rows(table, sensor_map)
+        notes += _slower(sensor, hollow)
+        chosen = chosen_rows(table, sensor_map, hollow)
         lost = chosen - found.time.size
         if found.time.size == 0:
             raise InputError.at(table.path, None, f"no usable row of the {sensor}; expected numbers in {names}")
@@ -332,6 +347,13 @@ def _own_rows(table: RawTable, names: Sequence[str]) -> RawTable:
     columns = [table.column(name) for name in names]
     table = table.select(~np.all([column.equal("") for column in columns], axis=0))
     return table.select(~np.all([table.column(name).repeated() for name in names], axis=0))
+
+
+def _slower(sensor: str, hollow: BoolArray) -> list[str]:
+    """Say that a sensor's cells are empty in most rows (n,) of the log."""
+    count = np.count_nonzero(hollow)
+    what = f"{sensor}: its cells are empty in {count} of {hollow.size} rows: it is slower than the log"
+    return [f"{what}; these rows are none of it"] * bool(count)
 
 
 def _no_time(sensor: str, rows: int, base: TimeBase, clock: RowClock) -> str:
@@ -529,13 +551,18 @@ def _clocked(sheet: SensorSheet, time: TimeBase) -> SensorSheet:
     return replace(sheet, sigma={**sheet.sigma, "rate_hz": float(f"{sheet.rate_hz * off:.3g}")})
 
 
-def _sheet(sensor_map: SensorMap, samples: Samples, own_rate: float | None) -> SensorSheet:
-    """Return what the map states, with the sensor's own rate where its readings stood on several rows."""
+def _has_rate(read: RawReadings, sensor: str) -> bool:
+    """Tell whether a sensor's rate is stated, or shown by the whole log."""
+    return bool(np.isfinite(read.import_map.sensors[sensor].sheet.rate_hz)) or read.readings[sensor].time.size > 1
+
+
+def _sheet(sensor_map: SensorMap, t: FloatArray, own_rate: float | None) -> SensorSheet:
+    """Return what the map states, with the rate of times (n,) s, or its own where readings stood on several rows."""
     if own_rate is not None:
         return replace(sensor_map.sheet, rate_hz=float(f"{own_rate:.5g}"))
     if np.isfinite(sensor_map.sheet.rate_hz):
         return sensor_map.sheet
-    interval = row_timing(samples.t).interval
+    interval = row_timing(t).interval
     if not interval > 0:
         raise InputError("one sample and no rate_hz in the map; expected a rate or at least two samples")
     return replace(sensor_map.sheet, rate_hz=float(f"{1 / interval:.4g}"))

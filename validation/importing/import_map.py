@@ -27,7 +27,7 @@ from discsim.toml_table import TomlTable, read_toml
 from discsim.validation.importing.raw_table import REPAIRS, Layout
 from discsim.validation.importing.throw import MeasuredThrow
 
-__all__ = ["UNITS", "ImportMap", "SensorMap", "TimeBase", "find_map", "read_map"]
+__all__ = ["SPEEDS", "UNITS", "ImportMap", "SensorMap", "TimeBase", "find_map", "read_map"]
 
 G0 = 9.80665  # standard gravity, the "g" of data sheets
 UNITS: Mapping[str, Mapping[str, float]] = MappingProxyType(
@@ -40,6 +40,13 @@ UNITS: Mapping[str, Mapping[str, float]] = MappingProxyType(
         },
         "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048},
         "": {"SI": 1.0, "deg": 1.0},
+    }
+)
+#: Metres per second in one of a receiver's velocity (a knot is 1852 m an hour, a mile 1609.344 m).
+SPEEDS: Mapping[str, float] = MappingProxyType(
+    {
+        **{"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "km/h": 1 / 3.6},
+        **{"ft/s": 0.3048, "mph": 1609.344 / 3600, "kn": 1852 / 3600},
     }
 )
 TIME_UNITS = {"d": 86400.0, "min": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "iso": 1.0}
@@ -96,6 +103,8 @@ class SensorMap:
         Whether a GPS's first columns are latitude and longitude in degrees and a height.
     height : float or None
         Metres in one of that height; None where the map does not state its unit (then m).
+    speed : float
+        Metres per second in one of a GPS's velocity.
     offset : float
         What is added to the sensor's times, s: its clock is behind the main one's by so much.
     """
@@ -112,6 +121,7 @@ class SensorMap:
     height: float | None = None
     offset: float = 0.0
     time_unit: str | None = None
+    speed: float = 1.0
 
     def written(self, value: FloatArray) -> FloatArray:
         """Return readings (n, 3) of a recording as the log has them, but for the order of the axes."""
@@ -364,11 +374,17 @@ def _sensor(table: TomlTable, sensor: str, *, strict: bool) -> SensorMap:
     if height is not None and (sensor != "gps" or unit != "deg"):
         raise table.error("height_unit", "'height_unit' is for a gps with unit = \"deg\"; expected it there alone")
     metres = None if height is None else UNITS["m"][height]
+    velocity = table.text("velocity_unit", required=False, choices=tuple(SPEEDS))
+    if velocity is not None and (sensor != "gps" or len(columns[0]) < 6):
+        raise table.error("velocity_unit", "'velocity_unit' is for a gps with six columns; expected it there alone")
     offset = table.number("time_offset", "s", required=False, limit=_OFFSET) or 0.0
     # a rate that the map does not state comes from the time stamps
     sheet = read_sheet(table, sensor, strict=strict, rate_required=False)
     factor, degrees = choices[unit] * (scale or 1.0), sensor == "gps" and unit == "deg"
-    return SensorMap(file, columns, factor, axes, chosen, optional, sheet, time, degrees, metres, offset, time_unit)
+    worth = SPEEDS[velocity or "m/s"]
+    return SensorMap(
+        *(file, columns, factor, axes, chosen, optional, sheet, time, degrees, metres, offset, time_unit, worth)
+    )
 
 
 def _columns(table: TomlTable, sensor: str) -> tuple[tuple[str, ...], ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -19,19 +20,36 @@ from discsim.validation.importing.raw_table import RawTable, RepairList
 from discsim.validation.importing.row_clock import RowClock
 from discsim.validation.importing.unsigned import signed
 
-__all__ = ["chosen_rows", "sensor_rows"]
+__all__ = ["chosen_rows", "hollow_rows", "sensor_rows"]
 
 #: A name that says feet: altitude (ft), alt_ft, GPS Alt [feet].
 _FEET = re.compile(r"(?<![a-z])(?:ft|feet|foot)(?![a-z])", re.IGNORECASE)
 
 
-def chosen_rows(table: RawTable, sensor_map: SensorMap) -> int:
-    """Return how many rows of a table are a sensor's."""
+def chosen_rows(table: RawTable, sensor_map: SensorMap, hollow: BoolArray) -> int:
+    """Return how many rows of a table are a sensor's; in ``hollow`` ones (n,) nothing of it stands."""
     if sensor_map.time is not None:
         return len(table)
     if sensor_map.where is None:
-        return table.total
-    return int(np.count_nonzero(table.column(sensor_map.where[0]).equal(sensor_map.where[1])))
+        return table.total - int(np.count_nonzero(hollow))
+    return int(np.count_nonzero(table.column(sensor_map.where[0]).equal(sensor_map.where[1]) & ~hollow))
+
+
+def hollow_rows(table: RawTable, names: Sequence[str], sensor_map: SensorMap, decimal: str) -> BoolArray:
+    """Tell the rows (n,) of a faster log in which all cells of a slower sensor are empty.
+
+    A sensor is slower where that is so in most of its rows; gaps of one that is as fast as the log are no such rows.
+    """
+    here = np.ones(len(table), dtype=np.bool_)
+    if sensor_map.where is not None:
+        here &= table.column(sensor_map.where[0]).equal(sensor_map.where[1])
+    hollow, all_of_it = here.copy(), np.count_nonzero(here)
+    for name in names:
+        value, wrong = table.column(name).numbers(decimal)
+        hollow &= np.isnan(value) & ~wrong
+        if np.count_nonzero(hollow) <= all_of_it / 2:
+            return np.zeros_like(here)
+    return hollow if np.count_nonzero(hollow) < all_of_it else np.zeros_like(here)
 
 
 def sensor_rows(
@@ -92,6 +110,7 @@ def _fixes(read: FloatArray, sensor_map: SensorMap) -> FloatArray:
     Of degrees the place is that from the first fix; zeros in all of latitude, longitude and height are no fix.
     """
     fixes = np.column_stack([read, np.full((len(read), 6 - read.shape[1]), np.nan)])
+    fixes[:, 3:] *= sensor_map.speed
     if not sensor_map.degrees:
         return np.asarray(fixes)
     fixes[:, 2] *= sensor_map.height or 1.0

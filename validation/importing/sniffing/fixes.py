@@ -1,7 +1,8 @@
-"""A receiver's fixes beside the disc's own log. Takes the tables; gives the lines of a map that read them."""
+"""A receiver's fixes, beside the disc's own log or in it. Takes the tables; gives the lines of a map that read them."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -10,11 +11,12 @@ import numpy as np
 from discsim.recording import SENSORS
 from discsim.validation.importing.apart import apart
 from discsim.validation.importing.cleaning import Readings
-from discsim.validation.importing.import_map import UNITS
+from discsim.validation.importing.import_map import SPEEDS, UNITS
 from discsim.validation.importing.sniffing.clock import Clock, clocks_of, seconds
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.groups import Numbers
 from discsim.validation.importing.sniffing.names import last_word, read_name, words_of
+from discsim.validation.importing.sniffing.units import readings_of, split_unit
 
 __all__ = ["ProposedFixes", "fixes_of"]
 
@@ -23,13 +25,18 @@ _HEIGHT = {"alt", "altitude", "ele", "elevation", "height", "hmsl", "msl", "hgt"
 _MOTION = {"speed", "spd", "sog", "gspeed", "groundspeed", "velocity", "vel"} | {
     *("heading", "hdg", "course", "cog", "bearing")
 }
+#: Names of a velocity's parts, without blanks and unit: vn, vel_n, velN, velocity north, north velocity, velD, velU.
+_PART = re.compile(
+    r"(?:gps)?(?:v|vel|velocity)(n|e|d|u|north|east|down|up)|(?:gps)?(north|east|down|up)(?:vel|velocity)"
+)
 
 
 class ProposedFixes(NamedTuple):
     """A receiver's table and its columns.
 
-    ``unit`` and ``height_unit`` are a map's, empty where it states none; ``clock`` that of its own column of time, None
-    where it has the log's. ``apart`` says why its clock is another one: the lines then stand in the map as comments.
+    ``unit``, ``height_unit`` and ``velocity_unit`` are a map's, empty where it states none; ``clock`` that of its own
+    column of time, None where it has the log's. ``apart`` says why its clock is another one: the lines then stand in
+    the map as comments.
     """
 
     numbers: Numbers
@@ -39,6 +46,7 @@ class ProposedFixes(NamedTuple):
     clock: Clock | None
     decision: Decision
     apart: str = ""
+    velocity_unit: str = ""
 
 
 def fixes_of(
@@ -46,13 +54,13 @@ def fixes_of(
 ) -> tuple[ProposedFixes | None, tuple[str, ...]]:
     """Return the first receiver's fixes among the tables, and what to say of them.
 
-    ``clock`` is the log's and ``read`` the tables of its other sensors, none where fixes are all there is: fixes in
-    these are not looked for.
+    ``clock`` is the log's and ``read`` the tables of its other sensors, none where fixes are all there is. A receiver's
+    own table comes before these; one on another clock is taken where nothing else is there.
     """
     notes: list[str] = []
-    for numbers in tables:
-        if any(numbers is one for one in read):
-            continue
+    aside: ProposedFixes | None = None
+    inside = [numbers for numbers in tables if any(numbers is one for one in read)]
+    for numbers in [*(one for one in tables if not any(one is other for other in inside)), *inside]:
         found, why = _columns(numbers)
         if why:
             notes.append(f"left out: the fixes in {numbers.path.name}: {why}")
@@ -61,9 +69,10 @@ def fixes_of(
         timed, why = _timed(found, clock, read[0] if read else None)
         if why:
             notes.append(f"left out: the fixes in {numbers.path.name}: {why}")
-        if timed is not None:
+        if timed is not None and not timed.apart:
             return timed, (*notes, *_no_velocity(timed))
-    return None, tuple(notes)
+        aside = aside or timed
+    return aside, (*notes, *(_no_velocity(aside) if aside is not None else ()))
 
 
 def _columns(numbers: Numbers) -> tuple[ProposedFixes | None, str]:
@@ -82,17 +91,47 @@ def _columns(numbers: Numbers) -> tuple[ProposedFixes | None, str]:
     if most[0] > 90.0 or most[1] > 180.0:
         what = f"'{columns[place[0]]}' goes to {most[0]:.9g} and '{columns[place[1]]}' to {most[1]:.9g}"
         return None, f"{what}, no degrees; write them in degrees"
-    three = tuple(columns[k] for k in (*place, height))
+    fixes = numbers.values[:, [*place, height]]
+    fixes = fixes[np.isfinite(fixes).all(axis=1) & np.any(fixes[:, :2] != 0.0, axis=1)]  # zeros: no fix yet
+    if not np.any(fixes != fixes[:1]):
+        return None, "the same fix stands in every row" if len(fixes) else "no row of it holds a fix"
     unit = read_name(numbers.names[height]).unit.lower()
     unit = "ft" if unit in ("feet", "foot") else unit if unit in UNITS["m"] else ""
     why = f"by their names, in degrees and {unit or 'm, as receivers write it'}"
-    told = Decision("gps", ", ".join(three), "likely", why)
-    return ProposedFixes(numbers, three, "deg", "" if unit == "m" else unit, None, told), ""
+    velocity, speed = _velocity(numbers)
+    why += f", the velocity in {speed or 'm/s, as most receivers write it'}" * bool(velocity)
+    names = tuple(columns[k] for k in (*place, height, *velocity))
+    told = Decision("gps", ", ".join(names), "likely", why)
+    units = ("" if unit == "m" else unit, "" if speed == "m/s" else speed)
+    return ProposedFixes(numbers, names, "deg", units[0], None, told, velocity_unit=units[1]), ""
+
+
+def _velocity(numbers: Numbers) -> tuple[tuple[int, ...], str]:
+    """Return the columns of the velocity north, east and down and their unit, where all three are there."""
+    parts: dict[str, int] = {}
+    for k, name in enumerate(numbers.names):
+        if part := _part(name):
+            parts.setdefault(part, k)
+    if not {"n", "e", "d"} <= set(parts):
+        return (), ""
+    three = (parts["n"], parts["e"], parts["d"])
+    stated = {reading.unit for k in three for reading in readings_of(split_unit(numbers.names[k])[1])}
+    return three, stated.pop() if len(stated) == 1 and stated <= set(SPEEDS) else ""
+
+
+def _part(name: str) -> str:
+    """Return which part of a velocity a column is called after: n, e, d or u; empty where it is none.
+
+    >>> [_part(name) for name in ("vel_n_m_s", "velE (mm/s)", "vd", "gps_vel_d", "vx", "north velocity", "even")]
+    ['n', 'e', 'd', 'd', '', 'n', '']
+    """
+    match = _PART.fullmatch(re.sub(r"[\s_.\-]+", "", split_unit(name.strip())[0].lower()))
+    return "" if match is None else (match[1] or match[2])[0]
 
 
 def _timed(found: ProposedFixes, clock: Clock, main: Numbers | None) -> tuple[ProposedFixes | None, str]:
     """Return the fixes with the column of their time, or why that cannot stand beside the log's."""
-    if main is None:
+    if main is None or found.numbers is main:
         return found, ""
     own = clocks_of(found.numbers)[0]
     if own.column is None:
@@ -124,10 +163,10 @@ def _times(clock: Clock, numbers: Numbers) -> Readings:
 
 
 def _no_velocity(found: ProposedFixes) -> list[str]:
-    """Say of columns of speed and heading why they are left out."""
+    """Say of columns of speed and heading, or of parts of a velocity, why they are left out."""
     names = zip(found.numbers.table.columns, found.numbers.names, strict=True)
-    left = [f"'{column}'" for column, name in names if words_of(name) & _MOTION]
-    if not left:
+    left = [f"'{column}'" for column, name in names if words_of(name) & _MOTION or _part(name)]
+    if not left or len(found.columns) > 3:
         return []
     what = f"left out: {', '.join(left)} of {found.numbers.path.name}"
-    return [f"{what}: a recording's gps has the velocity north, east and down, and none of these is one of them"]
+    return [f"{what}: a recording's gps has the velocity north, east and down, and these are not those three"]

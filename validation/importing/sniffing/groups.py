@@ -55,6 +55,10 @@ class Numbers:
         """The columns that are called a latitude and a longitude; None where there are none."""
         words = [last_word(name) for name in self.names]
         latitude, longitude = (next((k for k, word in enumerate(words) if word in own), None) for own in _PLACE)
+        if latitude is None and longitude is None:  # GPS_coord[0] and [1], as Betaflight's log decoder calls them
+            read = [read_name(name) for name in self.names]
+            pair = [k for k, word in enumerate(words) if word == "coord" and read[k].axis in (0, 1)]
+            latitude, longitude = pair if len(pair) == 2 else (None, None)
         return None if latitude is None or longitude is None else (latitude, longitude)
 
     @cached_property

@@ -193,6 +193,7 @@ def _fixes(proposal: Proposal, fixes: ProposedFixes) -> list[str]:
     lines += [_remark(fixes.decision), f"columns = {_texts(fixes.columns)}"]
     lines += [f"unit = {_text(fixes.unit)}"] * bool(fixes.unit)
     lines += [f"height_unit = {_text(fixes.height_unit)}"] * bool(fixes.height_unit)
+    lines += [f"velocity_unit = {_text(fixes.velocity_unit)}"] * bool(fixes.velocity_unit)
     if fixes.clock is not None and fixes.clock.column is not None:
         lines += [f"time = {_text(fixes.clock.column)} # its own stamps", f"time_unit = {_text(fixes.clock.unit)}"]
     if fixes.apart:

@@ -46,7 +46,17 @@ _CASED = {
     "T": [Reading("magnetometer", "uT", 1e6)],
 }
 _COUNTS = "lsb raw count counts digit digits adc int16 bits"
-_OTHER = "deg rad degc c k v mv a ma m km cm mm m/s km/h ft pa hpa kpa mbar bar % db mah h °c degrees utc v/v lx lux"
+_OTHER = "deg rad degc c k v mv a ma m km cm mm ft pa hpa kpa mbar bar % db mah h °c degrees utc v/v lx lux"
+#: A velocity's units, by the map's word.
+_SPEED = {
+    "m/s": "m/s m_s mps m/sec meterpersecond meter/second meters/second",
+    "cm/s": "cm/s cm_s",
+    "mm/s": "mm/s mm_s",
+    "km/h": "km/h km_h kmh kph",
+    "ft/s": "ft/s ft_s fps",
+    "mph": "mph",
+    "kn": "kn kt kts knot knots",
+}
 _TIME_SPELLINGS = {
     "min": "min mins minute minutes minuten minuti minutos мин 分",
     "s": "s sec secs second seconds sekunde sekunden seconde secondes segundos secondi sekundy с сек 秒 초",
@@ -65,6 +75,9 @@ for _spelling in _COUNTS.split():
     _TABLE[_spelling] = [Reading(COUNTS, COUNTS)]
 for _spelling in _OTHER.split():
     _TABLE.setdefault(_spelling, []).append(Reading(OTHER, _spelling))
+for _unit, _spellings in _SPEED.items():
+    for _spelling in _spellings.split():
+        _TABLE.setdefault(_spelling, []).append(Reading(OTHER, _unit))
 _TIME = {spelling: unit for unit, spellings in _TIME_SPELLINGS.items() for spelling in spellings.split()}
 #: A unit in brackets at the end, or behind a slash as German textbooks write it ("t / s").
 _BRACKETED = re.compile(r"^(.*?)[\s_]*[(\[{<]\s*([^()\[\]{}<>]*[^\W\d_][^()\[\]{}<>]*|[°%])\s*[)\]}>]\s*(.*)$")
