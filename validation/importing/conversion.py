@@ -25,7 +25,7 @@ from discsim.validation.importing.failed import dead_axis, failed_at_once, faile
 from discsim.validation.importing.fixes_once import fixes_once
 from discsim.validation.importing.import_map import ImportMap, SensorMap, TimeBase
 from discsim.validation.importing.overflow import without_overflow
-from discsim.validation.importing.raw_table import RawTable, Repair, RepairList, read_raw
+from discsim.validation.importing.raw_table import Layout, RawTable, Repair, RepairList, read_raw
 from discsim.validation.importing.row_clock import RowClock, row_clock
 from discsim.validation.importing.sensor_rows import chosen_rows, hollow_rows, sensor_rows
 from discsim.validation.importing.timing import row_timing
@@ -205,20 +205,20 @@ def _read_sensors(
         if table is None or names is None:
             notes.append(f"no {sensor} in it")
             continue
-        base = import_map.time_of(sensor)
+        base, its = import_map.time_of(sensor), import_map.laid_out(sensor)
         if sensor_map.time is not None:
             table = _own_rows(table, [*names, sensor_map.time])
         first = first or (table.path, sensor_map.time)
         cut = rows if first == (table.path, sensor_map.time) else None
         key = (table.path, sensor_map.time, "" if sensor_map.time is None else sensor)
         if key not in clocks:
-            clocks[key] = row_clock(table, import_map, base, repairs)
+            clocks[key] = row_clock(table, its, base, repairs)
             notes += _stretches(table, clocks[key], cut)
         clock = clocks[key]
-        hollow = hollow_rows(table, names, sensor_map, import_map.layout.decimal)
+        hollow = hollow_rows(table, names, sensor_map, its.layout.decimal)
         if hollow.any():
             clock = replace(clock, time=np.where(hollow, np.nan, clock.time))
-        found = sensor_rows(table, sensor, names, sensor_map, import_map, clock, cut, repairs)
+        found = sensor_rows(table, sensor, names, sensor_map, its, clock, cut, repairs)
         notes += _slower(sensor, hollow)
         chosen = chosen_rows(table, sensor_map, hollow)
         lost = chosen - found.time.size
@@ -455,15 +455,16 @@ def _read_tables(raw: Path, import_map: ImportMap, repairs: RepairList) -> dict[
     """Read each file once; a sensor whose file is absent has no table (which must be allowed)."""
     if not raw.exists():
         raise InputError.at(raw, None, "no such file or folder; expected what a logger wrote")
-    read: dict[Path, RawTable] = {}
+    read: dict[tuple[Path, Layout], RawTable] = {}
     tables = {}
     for sensor, sensor_map in import_map.sensors.items():
         path = _file(raw, sensor, sensor_map)
         if path is None:
             continue
-        if path not in read:
-            read[path] = read_raw(path, import_map.layout, repairs)
-        tables[sensor] = read[path]
+        key = (path, import_map.laid_out(sensor).layout)
+        if key not in read:
+            read[key] = read_raw(*key, repairs)
+        tables[sensor] = read[key]
     return tables
 
 

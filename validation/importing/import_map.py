@@ -105,6 +105,8 @@ class SensorMap:
         Metres in one of that height; None where the map does not state its unit (then m).
     speed : float
         Metres per second in one of a GPS's velocity.
+    layout : Layout or None
+        How its file is laid out, where that is otherwise than the map's.
     offset : float
         What is added to the sensor's times, s: its clock is behind the main one's by so much.
     """
@@ -122,6 +124,7 @@ class SensorMap:
     offset: float = 0.0
     time_unit: str | None = None
     speed: float = 1.0
+    layout: Layout | None = None
 
     def written(self, value: FloatArray) -> FloatArray:
         """Return readings (n, 3) of a recording as the log has them, but for the order of the axes."""
@@ -149,6 +152,11 @@ class ImportMap:
     throws: Mapping[str, MeasuredThrow]
     sensors: Mapping[str, SensorMap]
     recognised_by: tuple[str, ...] | None = None
+
+    def laid_out(self, sensor: str) -> ImportMap:
+        """Return the map with the layout of a sensor's file."""
+        own = self.sensors[sensor].layout
+        return self if own is None else replace(self, layout=own)
 
     def time_of(self, sensor: str) -> TimeBase:
         """Return the clock of a sensor's rows: its own column of time stamps, or the file's."""
@@ -377,13 +385,16 @@ def _sensor(table: TomlTable, sensor: str, *, strict: bool) -> SensorMap:
     velocity = table.text("velocity_unit", required=False, choices=tuple(SPEEDS))
     if velocity is not None and (sensor != "gps" or len(columns[0]) < 6):
         raise table.error("velocity_unit", "'velocity_unit' is for a gps with six columns; expected it there alone")
+    own_layout = table.table("layout")
+    layout = None if own_layout is None else _layout(own_layout)
     offset = table.number("time_offset", "s", required=False, limit=_OFFSET) or 0.0
     # a rate that the map does not state comes from the time stamps
     sheet = read_sheet(table, sensor, strict=strict, rate_required=False)
     factor, degrees = choices[unit] * (scale or 1.0), sensor == "gps" and unit == "deg"
     worth = SPEEDS[velocity or "m/s"]
     return SensorMap(
-        *(file, columns, factor, axes, chosen, optional, sheet, time, degrees, metres, offset, time_unit, worth)
+        *(file, columns, factor, axes, chosen, optional, sheet, time, degrees, metres, offset, time_unit, worth),
+        layout=layout,
     )
 
 

@@ -95,11 +95,39 @@ def test_speed_and_heading_are_left_out_aloud(tmp_path):
     assert said.startswith("left out: 'speed_m_s', 'heading (deg)' of gps.csv: ")
 
 
+@pytest.mark.parametrize("ours", [(",", "."), (";", ","), ("\t", ".")])
+@pytest.mark.parametrize("theirs", [(",", "."), (";", "."), (";", ","), ("\t", ",")])
+def test_a_table_that_is_laid_out_in_another_way_is_read(tmp_path, ours, theirs):
+    """It was named, with the request to save it with the same separator."""
+
+    def written(text, separator, decimal):
+        return text.replace(",", "\0").replace(".", decimal).replace("\0", separator)
+
+    text = table("t_s,lat,lon,alt,v,w", lambda t: f"{t:.3f}")
+    raw = folder(tmp_path, "tracker.csv", written(text, *theirs))
+    board = (raw / "disc.csv").read_text()
+    (raw / "disc.csv").write_text(written(board, *ours))
+    log = import_log(raw)
+    assert ("[sensors.gps.layout]" in log.map_text) == (ours[0] != theirs[0])
+    assert not [note for note in log.notes if "another way" in note]
+    gps = log.recordings[0].samples["gps"]
+    assert len(gps) == T.size
+    assert_flies_north(gps)
+    (tmp_path / "map.toml").write_text(log.map_text)
+    again = import_log(raw, str(tmp_path / "map.toml")).recordings[0].samples["gps"]
+    np.testing.assert_array_equal(again.value, gps.value)
+
+
+@pytest.mark.parametrize("semicolons", [False, True])
 @pytest.mark.parametrize(("name", "text", "first"), [("t.gpx", gpx(), 830952000.0), ("t.nmea", nmea(), 43620.0)])
-def test_a_track_by_another_clock_stands_in_the_map_as_comments_that_an_offset_makes_lines(tmp_path, name, text, first):
+def test_a_track_by_another_clock_stands_in_the_map_as_comments_that_an_offset_makes_lines(
+    tmp_path, name, text, first, semicolons
+):
     if name.endswith("nmea"):
         pytest.importorskip("pynmeagps")
     raw = folder(tmp_path, name, text)
+    if semicolons:
+        (raw / "disc.csv").write_text((raw / "disc.csv").read_text().replace(",", ";").replace(".", ","))
     log = import_log(raw)
     assert "gps" not in log.recordings[0].samples
     (said,) = [note for note in log.notes if "its lines stand in the map as comments" in note]
@@ -145,11 +173,6 @@ def test_a_track_that_cannot_be_read_is_said(tmp_path, text, said):
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
-        (
-            "gps.csv",
-            table("time_ms,lat,lon,alt,v,w", lambda t: 1000 * t).replace(",", ";"),
-            "laid out in another way than disc.csv: gps.csv; to have it read, save it with the same separator",
-        ),
         ("gps.csv", table("time_ms,lat,lon,a,v,w", lambda t: 1000 * t), "no column of a height"),
         (
             "gps.csv",

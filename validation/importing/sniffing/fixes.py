@@ -12,6 +12,7 @@ from discsim.recording import SENSORS
 from discsim.validation.importing.apart import apart
 from discsim.validation.importing.cleaning import Readings
 from discsim.validation.importing.import_map import SPEEDS, UNITS
+from discsim.validation.importing.raw_table import Layout
 from discsim.validation.importing.sniffing.clock import Clock, clocks_of, seconds
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.groups import Numbers
@@ -36,7 +37,7 @@ class ProposedFixes(NamedTuple):
 
     ``unit``, ``height_unit`` and ``velocity_unit`` are a map's, empty where it states none; ``clock`` that of its own
     column of time, None where it has the log's. ``apart`` says why its clock is another one: the lines then stand in
-    the map as comments.
+    the map as comments. ``layout`` is that of its file, where it is laid out otherwise than the log.
     """
 
     numbers: Numbers
@@ -47,6 +48,7 @@ class ProposedFixes(NamedTuple):
     decision: Decision
     apart: str = ""
     velocity_unit: str = ""
+    layout: Layout | None = None
 
 
 def fixes_of(

@@ -21,6 +21,7 @@ from discsim.validation.importing.sniffing.own_place import OwnPlace
 
 __all__ = ["Proposal", "ProposedSensor", "map_text"]
 
+_COMMA = 'separator = ","'
 MIRRORED = -0.5  # a signed permutation's determinant is 1 or -1
 
 
@@ -99,7 +100,7 @@ def map_text(proposal: Proposal) -> str:
         f"name = {_text(proposal.name)}",
         f"plant = {_text(proposal.plant)}",
         f"repairs = {_texts(repairs)}",
-        *_layout(layout),
+        *(["", "[layout]", *keys] if (keys := _layout(layout)) else []),
         "",
         "[time]",
         _remark(clock.decision),
@@ -155,7 +156,7 @@ def _layout(layout: Layout) -> list[str]:
     lines += [f"columns = {_texts(layout.columns)}"] * bool(layout.columns)
     lines += ["lists = true"] * layout.lists
     lines += ["labelled = true"] * layout.labelled
-    return ["", "[layout]", *lines] if lines else []
+    return lines
 
 
 def _file(proposal: Proposal, numbers: Numbers) -> list[str]:
@@ -198,6 +199,8 @@ def _fixes(proposal: Proposal, fixes: ProposedFixes) -> list[str]:
         lines += [f"time = {_text(fixes.clock.column)} # its own stamps", f"time_unit = {_text(fixes.clock.unit)}"]
     if fixes.apart:
         lines.append("time_offset_s = 0.0 # what is to be added to its times")
+    if fixes.layout is not None:
+        lines += ["[sensors.gps.layout] # its file is laid out in another way", *(_layout(fixes.layout) or [_COMMA])]
     return [f"# {line}" for line in (fixes.apart, *lines)] if fixes.apart else lines
 
 

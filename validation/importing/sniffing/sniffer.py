@@ -85,7 +85,7 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     Raises `InputError` where nothing can be read or no three columns look like a sensor of motion.
     """
     files, failures = _read(raw)
-    layout, files, notes = _one_layout(files)
+    layout, files, aside, notes = _one_layout(files)
     notes = [*notes, *_unread(raw, failures)]
     found, left, exchanges = _assigned(files)
     tables = [file.numbers for file in files]
@@ -97,7 +97,10 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
         seen = by_behaviour(unknown, [seconds(clock, triple.numbers)[triple.rows] for triple in unknown])
         found |= {sensor: (triple, decision) for triple, sensor, decision in seen if sensor in missing}
     found = {s: found[s] for s in ORDER if s in found and _on(clock, found[s][0].numbers)}
+    tables += aside
     fixed, said = fixes_of(tables, clock, [triple.numbers for triple, _ in found.values()])
+    if fixed is not None and any(fixed.numbers is numbers for numbers in aside):
+        fixed = fixed._replace(layout=fixed.numbers.dialect.layout)
     if not found and fixed is None:
         raise _nothing(raw, files, failures)
     found, exchanges = _turned_about(clock, found, exchanges)
@@ -157,8 +160,8 @@ def _file(path: Path, *, alone: bool) -> _File:
     return _File(numbers, tuple(clocks), tuple(triples_of(numbers, taken)))
 
 
-def _one_layout(files: Sequence[_File]) -> tuple[Layout, list[_File], list[str]]:
-    """Return the layout that most sensors' files share (a map has one), those files, and what was left out."""
+def _one_layout(files: Sequence[_File]) -> tuple[Layout, list[_File], list[Numbers], list[str]]:
+    """Return the layout that most sensors' files share, those files, receivers' tables in others, what was left out."""
 
     def key(file: _File) -> Layout:
         return replace(file.numbers.dialect.layout, comment="", encoding="", decimal=".")
@@ -177,15 +180,15 @@ def _one_layout(files: Sequence[_File]) -> tuple[Layout, list[_File], list[str]]
         encoding=next((one.encoding for one in layouts if one.encoding != "utf-8"), "utf-8"),
         decimal="," if any(one.decimal == "," for one in layouts) else ".",
     )
-    others = [
-        file.numbers.path.name for file in files if file not in best and (weight(file) or file.numbers.tells_positions)
-    ]
+    apart = [file for file in files if file not in best]
+    aside = [file.numbers for file in apart if file.numbers.tells_positions]
+    others = [file.numbers.path.name for file in apart if weight(file) and not file.numbers.tells_positions]
     notes = [
         f"left out, laid out in another way than {best[0].numbers.path.name}: {', '.join(others)}; to have it read, "
         "save it with the same separator and decimal mark"
     ] * bool(others)
     words = [remark for file in best[:1] for remark in file.numbers.dialect.remarks]
-    return layout, best, notes + ([f"text: {', '.join(words)}"] if words else [])
+    return layout, best, aside, notes + ([f"text: {', '.join(words)}"] if words else [])
 
 
 # --------------------------------------------------------------------------------------------------- sensors
