@@ -17,7 +17,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 
-__all__ = ["Break", "Clock", "is_stamp", "iso_seconds", "mended"]
+__all__ = ["EPOCH", "Break", "Clock", "is_stamp", "iso_seconds", "mended"]
 
 #: widths of counters, in counts, and what they are called
 WIDTHS = {

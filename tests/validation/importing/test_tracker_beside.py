@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from datetime import UTC, datetime, timedelta
 from functools import reduce
 from operator import xor
 
@@ -53,6 +54,23 @@ def nmea():
         minutes = 60 * (0.4 + n / 111178.0)
         text = f"GPGGA,1207{t:05.2f},47{minutes:09.6f},N,00833.000000,E,1,11,0.8,{h:.2f},M,47.0,M,,"
         lines.append(f"${text}*{reduce(xor, text.encode()):02X}")
+    return "\r\n".join([*lines, ""])
+
+
+def dated_nmea(start, kinds=("RMC", "GGA")):
+    """Return the sentences from a date and time on."""
+    lines = []
+    for t, n, h in zip(T, NORTH, HEIGHT, strict=True):
+        now = start + timedelta(seconds=round(float(t), 3))
+        time, place = (
+            f"{now:%H%M%S}.{now.microsecond // 10000:02d}",
+            f"47{60 * (0.4 + n / 111178.0):09.6f},N,00833.000000,E",
+        )
+        texts = {
+            "RMC": f"GPRMC,{time},A,{place},5.83,0.0,{now:%d%m%y},,,A",
+            "GGA": f"GPGGA,{time},{place},1,11,0.8,{h:.2f},M,47.0,M,,",
+        }
+        lines += [f"${texts[kind]}*{reduce(xor, texts[kind].encode()):02X}" for kind in kinds]
     return "\r\n".join([*lines, ""])
 
 
@@ -140,6 +158,57 @@ def test_a_track_by_another_clock_stands_in_the_map_as_comments_that_an_offset_m
     gps = import_log(raw, str(tmp_path / "map.toml")).recordings[0].samples["gps"]
     assert len(gps) == T.size
     assert_flies_north(gps)
+
+
+START = datetime(2026, 4, 30, 23, 59, 57, tzinfo=UTC)
+
+
+@pytest.mark.parametrize("written", ["GPX", ("RMC", "GGA"), ("GGA", "RMC"), ("GGA",)])
+@pytest.mark.parametrize("stamps", ["iso", "unix_s", "unix_ms"])
+def test_a_track_over_midnight_is_laid_beside_a_log_with_dates(tmp_path, written, stamps):
+    """NMEA's times were of the day alone, and a log since 1970 was another clock: the track was left out."""
+    if written != "GPX":
+        pytest.importorskip("pynmeagps")
+    text = dated_nmea(START, written) if written != "GPX" else None
+    name = "t.nmea"
+    if text is None:
+        text, name = gpx(), "t.gpx"
+        for t in T:
+            now = START + timedelta(seconds=round(float(t), 3))
+            old = f"2026-05-01T12:{int(t // 60):02d}:{t % 60:06.3f}Z"
+            text = text.replace(old, f"{now:%Y-%m-%dT%H:%M:%S}.{now.microsecond // 1000:03d}Z")
+    raw = folder(tmp_path, name, text)
+    lines = (raw / "disc.csv").read_text().splitlines()
+    began = START + timedelta(seconds=1)
+    cells = []
+    for t in LOG.t.tolist():
+        now = began + timedelta(seconds=round(t, 3))
+        unix = now.timestamp()
+        cells.append({"iso": f"{now.isoformat()}", "unix_s": f"{unix:.3f}", "unix_ms": f"{1000 * unix:.0f}"}[stamps])
+    rows = [",".join([cell, *row.split(",")[1:]]) for cell, row in zip(cells, lines[1:], strict=True)]
+    (raw / "disc.csv").write_text("\n".join(["time,gx,gy,gz,ax,ay,az,mx,my,mz", *rows, ""]))
+    log = import_log(raw)
+    (recording,) = log.recordings
+    gps = recording.samples["gps"]
+    assert_allclose(gps.t, T - 1.0 - min(0.0, T[0] - 1.0), atol=1e-5)
+    assert recording.samples["gyroscope"].t[0] == pytest.approx(1.0, abs=1e-5)
+    assert_flies_north(gps)
+    since = 946684800 if stamps != "iso" else 0
+    today = 9616 * 86400 if written == ("GGA",) else 0  # 30 April 2026, days after 2000
+    offset = f"time_offset_s = {since + today} # added to its times"
+    assert (offset in log.map_text) == bool(since + today)
+    (tmp_path / "map.toml").write_text(log.map_text)
+    assert_allclose(import_log(raw, str(tmp_path / "map.toml")).recordings[0].samples["gps"].t, gps.t)
+
+
+def test_a_track_in_utc_beside_a_log_of_local_time_since_1970_says_the_zones(tmp_path):
+    raw = folder(tmp_path, "t.gpx", gpx())
+    local = 1777636800.0 + 7200.0  # 2026-05-01 12:00 UTC, two hours ahead
+    lines = (raw / "disc.csv").read_text().splitlines()
+    rows = [",".join([f"{local + t:.3f}", *row.split(",")[1:]]) for t, row in zip(LOG.t, lines[1:], strict=True)]
+    (raw / "disc.csv").write_text("\n".join(["time,gx,gy,gz,ax,ay,az,mx,my,mz", *rows, ""]))
+    said = " ".join(import_log(raw).notes)
+    assert "2 h apart, as clocks of two time zones differ: time_offset_s = 946692000 lets both begin together" in said
 
 
 def test_a_speed_in_a_track_is_left_out_aloud(tmp_path):

@@ -81,5 +81,5 @@ def write_tables(raw: Path, kind: Kind, folder: Path) -> tuple[str, ...]:
         raise InputError.at(raw, None, f"is {name} without readings of motion in it{said}; expected {kind.holds}")
     notes = tuple(f"{raw.name}: {note}" for note in log.notes)
     for sensor, table in log.tables.items():
-        write_table(folder / f"{sensor}.csv", sensor, table, notes)
+        write_table(folder / f"{sensor}.csv", sensor, table, notes, dated=log.dated)
     return notes

@@ -48,7 +48,7 @@ def read(raw: Path) -> Log:
     notes += ["gps: a track of GPX holds no velocity north, east and down; it is a gap"] * bool(tables)
     left = f"gps: {', '.join(sorted(others))} left out: a recording holds the velocity north, east and down"
     notes += [left] * bool(others)
-    return Log(tables, tuple(notes))
+    return Log(tables, tuple(notes), dated=True)
 
 
 def _points(raw: Path) -> Iterator[Element]:

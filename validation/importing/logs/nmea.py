@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from datetime import date as Date
 from datetime import time as TimeOfDay
 from functools import reduce
 from operator import xor
@@ -17,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from discsim.validation.importing.clock import EPOCH
 from discsim.validation.importing.logs.tables import Log, Rows, chosen, course_velocity
 
 __all__ = ["SENTENCES", "begins", "read", "read_sentences"]
@@ -47,10 +49,14 @@ def read(raw: Path) -> Log:
 
 
 def read_sentences(content: bytes) -> Log:
-    """Return the fixes of the sentences in ``content``, among which other bytes may stand; times are of the day."""
+    """Return the fixes of the sentences in ``content``, among which other bytes may stand.
+
+    Times are those since 2000 where an RMC with a fix tells the date, else of the first day.
+    """
     epochs: dict[float, dict[str, Any]] = {}
     wrong = total = 0
     day = 0.0
+    date: float | None = None  # midnight of the first day, s since 2000
     now: float | None = None
     for sentence in _parsed(content):
         total += 1
@@ -63,17 +69,29 @@ def read_sentences(content: bytes) -> Log:
         time = _seconds(sentence.time)
         if now is not None and time + day < now - DAY / 2:  # past midnight
             day += DAY
+        if (told := _midnight(sentence)) is not None:
+            date = told - day if date is None else date
+            day = max(day, told - date)  # a receiver that was off for days
         now = time + day
         epochs.setdefault(now, {})[kind] = sentence
     rows = Rows()
     for time, sentences in epochs.items():
         fix = _fix(sentences)
         if fix is not None:
-            rows.add("NMEA", "gps", 1e6 * time, fix)
+            rows.add("NMEA", "gps", 1e6 * (time + (date or 0.0)), fix)
     tables, _ = chosen(rows.sources())
     notes = [f"{wrong} of {total} NMEA sentences have a wrong checksum or break off; they are left out"] * (wrong > 0)
     notes += ["gps: NMEA sentences hold no velocity downwards; it is a gap"] * bool(tables)
-    return Log(tables, tuple(notes), wrong > 0)
+    notes += ["gps: no RMC sentence tells the date; times are of the day alone"] * (bool(tables) and date is None)
+    return Log(tables, tuple(notes), wrong > 0, date is not None)
+
+
+def _midnight(sentence: Any) -> float | None:
+    """Return the beginning of the day that an RMC with a fix tells, s since 2000; None for any other sentence."""
+    date = getattr(sentence, "date", None)
+    if sentence.msgID != "RMC" or sentence.status != "A" or not isinstance(date, Date):
+        return None
+    return DAY * (date - EPOCH.date()).days
 
 
 def _parsed(content: bytes) -> Iterator[Any]:

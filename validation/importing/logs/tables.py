@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from datetime import timedelta
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.recording import SENSORS
+from discsim.validation.importing.clock import EPOCH
 
 __all__ = ["Log", "Rows", "Table", "chosen", "course_velocity", "positions", "write_table"]
 
@@ -36,11 +38,15 @@ class Table(NamedTuple):
 
 
 class Log(NamedTuple):
-    """What a log holds: tables by sensor, and what to say of it. ``damaged``: some of its bytes are no message."""
+    """What a log holds: tables by sensor, and what to say of it.
+
+    ``damaged``: some of its bytes are no message. ``dated``: its times are those since 2000, UTC.
+    """
 
     tables: Mapping[str, Table]
     notes: tuple[str, ...] = ()
     damaged: bool = False
+    dated: bool = False
 
 
 class Rows:
@@ -136,15 +142,26 @@ def course_velocity(speed: float, course: float) -> tuple[float, float]:
     return float(speed * np.cos(angle)), float(speed * np.sin(angle))
 
 
-def write_table(path: Path, sensor: str, table: Table, remarks: Sequence[str]) -> None:
+def _date(time: float) -> str:
+    """Return the date and time of microseconds since 2000.
+
+    >>> _date(60.5e6)
+    '2000-01-01T00:01:00.500000Z'
+    """
+    moment = EPOCH + timedelta(microseconds=round(time))
+    return f"{moment.replace(tzinfo=None).isoformat(timespec='microseconds')}Z"
+
+
+def write_table(path: Path, sensor: str, table: Table, remarks: Sequence[str], *, dated: bool = False) -> None:
     """Write a table as text, with the remarks in lines of comment above it.
 
     Times keep three decimals of a microsecond, values the nine digits that a float of 32 bits has. A gap is empty.
+    Times since 2000 (``dated``) are written as dates.
     """
     unit = f" ({table.unit})" if table.unit else ""
     lines = [f"# {remark}".replace(",", ";") for remark in remarks]  # a comma would be taken for a record glued to it
-    lines.append(",".join(["timestamp_us", *(f"{name}{unit}" for name in COLUMNS[sensor])]))
+    lines.append(",".join(["time_utc" if dated else "timestamp_us", *(f"{name}{unit}" for name in COLUMNS[sensor])]))
     for time, row in zip(table.time, table.value, strict=True):
         cells = ("" if np.isnan(value) else f"{value:.9g}" for value in row)
-        lines.append(f"{time:.3f},{','.join(cells)}")
+        lines.append(f"{_date(time) if dated else f'{time:.3f}'},{','.join(cells)}")
     path.write_text("\n".join([*lines, ""]), encoding="utf-8")

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from typing import NamedTuple
 
 import numpy as np
 
+from discsim.arrays import FloatArray
 from discsim.recording import SENSORS
-from discsim.validation.importing.apart import apart
+from discsim.validation.importing.apart import apart, zones
 from discsim.validation.importing.cleaning import Readings
+from discsim.validation.importing.clock import EPOCH
 from discsim.validation.importing.import_map import SPEEDS, UNITS
 from discsim.validation.importing.raw_table import Layout
 from discsim.validation.importing.sniffing.clock import Clock, clocks_of, seconds
@@ -31,13 +34,19 @@ _PART = re.compile(
     r"(?:gps)?(?:v|vel|velocity)(n|e|d|u|north|east|down|up)|(?:gps)?(north|east|down|up)(?:vel|velocity)"
 )
 
+DAY = 86400.0
+#: Dates are read as seconds since 2000; other clocks count from 1970, s. Stamps above a year are a date's.
+_FROM_1970 = (EPOCH - datetime(1970, 1, 1, tzinfo=UTC)).total_seconds()
+_DATED = 365 * DAY
+
 
 class ProposedFixes(NamedTuple):
     """A receiver's table and its columns.
 
     ``unit``, ``height_unit`` and ``velocity_unit`` are a map's, empty where it states none; ``clock`` that of its own
     column of time, None where it has the log's. ``apart`` says why its clock is another one: the lines then stand in
-    the map as comments. ``layout`` is that of its file, where it is laid out otherwise than the log.
+    the map as comments. ``layout`` is that of its file, where it is laid out otherwise than the log, ``offset`` what is
+    to be added to its times, s.
     """
 
     numbers: Numbers
@@ -49,6 +58,7 @@ class ProposedFixes(NamedTuple):
     apart: str = ""
     velocity_unit: str = ""
     layout: Layout | None = None
+    offset: float = 0.0
 
 
 def fixes_of(
@@ -146,12 +156,32 @@ def _timed(found: ProposedFixes, clock: Clock, main: Numbers | None) -> tuple[Pr
     late = apart({"log": log, "gps": gps})
     if not late:
         return found, ""
+    for offset, why in _counted_otherwise(log.time):
+        if not apart({"log": log, "gps": gps._replace(time=gps.time + offset)}):
+            said = f"{found.decision.why}; {offset:+.0f} s are added to its times: {why}"
+            return found._replace(offset=offset, decision=found.decision._replace(why=said)), ""
+        if between := zones(float(gps.time[0] + offset - log.time[0])):
+            hours = f"{abs(between) / 3600:g} h apart, as clocks of two time zones differ"
+            told = f"its clock is another one, {hours}: time_offset_s = {offset - between:.0f} lets both begin together"
+            return found._replace(apart=told), f"{told}; its lines stand in the map as comments"
     told = late[0].removeprefix("WARNING: ")
     if clock.unit != "iso":  # a clock that counts from its start is in no zone
         spans = f"it runs from {_span(gps)} s, the log's from {_span(log)} s"
         together = f"time_offset_s = {log.time[0] - gps.time[0]:.3f} lets both begin together"
         told = f"its clock is another one ({spans}): state by how much its times are to be moved ({together})"
     return found._replace(apart=told), f"{told}; its lines stand in the map as comments"
+
+
+def _counted_otherwise(log: FloatArray) -> list[tuple[float, str]]:
+    """Return what turns times of another origin, s, into those of a log (n,), each with why.
+
+    Dates are read as seconds since 2000, and a log may have those since 1970; times of the day lack the log's day.
+    """
+    counted = [(sign * _FROM_1970, "one clock counts from 1970, and dates are read from 2000") for sign in (1, -1)]
+    if log[0] < _DATED:
+        return counted
+    today, why = DAY * (log[0] // DAY), "its times are of the day alone, and the log has the date"
+    return [*counted, (today, why), (today - DAY, why)]
 
 
 def _span(read: Readings) -> str:

@@ -197,6 +197,8 @@ def _fixes(proposal: Proposal, fixes: ProposedFixes) -> list[str]:
     lines += [f"velocity_unit = {_text(fixes.velocity_unit)}"] * bool(fixes.velocity_unit)
     if fixes.clock is not None and fixes.clock.column is not None:
         lines += [f"time = {_text(fixes.clock.column)} # its own stamps", f"time_unit = {_text(fixes.clock.unit)}"]
+    if fixes.offset:
+        lines.append(f"time_offset_s = {fixes.offset:.0f} # added to its times")
     if fixes.apart:
         lines.append("time_offset_s = 0.0 # what is to be added to its times")
     if fixes.layout is not None:
