@@ -52,6 +52,41 @@ def test_any_other_tick_is_known_as_well_as_the_gyroscope(tmp_path, frequency):
     np.testing.assert_array_equal(again.samples["gyroscope"].t, log.recordings[0].samples["gyroscope"].t)
 
 
+TIMED = HEAD.replace("Ticks", "time")
+
+
+@pytest.mark.parametrize(
+    ("tick", "scale"), [(1e-4, "scale = 0.1 "), (5e-5, "scale = 0.0"), (2.5e-6, "scale = 2."), (64e-6, "scale = 0.06")]
+)
+def test_ticks_under_a_name_of_time_with_a_usual_rate_are_told_by_the_pull_to_the_centre(tmp_path, tick, scale):
+    """Taken for ms of 20 rows a second they were "likely": a throw of three seconds was one of thirty."""
+    log = import_log(written(tmp_path, tick, TIMED))
+    assert_in_time(log, 0.08)
+    assert scale in log.map_text
+    assert not [note for note in log.notes if "turns" in note and "WARNING" in note]
+
+
+@pytest.mark.parametrize(
+    "head", [TIMED.replace("time", "time (ms)"), TIMED.replace("Acc", "Tmp").replace("[g]", "[C]")]
+)
+def test_such_a_column_is_believed_where_it_states_its_unit_or_nothing_pulls(tmp_path, head):
+    log = import_log(written(tmp_path, 1e-4, head))
+    assert "scale = 0.1" not in log.map_text
+    assert [note for note in log.notes if note.startswith("WARNING: the field turns 0.1 times as fast")]
+
+
+def test_a_gyroscope_whose_header_is_wrong_leaves_the_stamps_as_they_are(tmp_path):
+    """Counts of 16.4 per deg/s below a header of deg/s: the pull shows which of the two is wrong."""
+    path = written(tmp_path, 1e-3, TIMED)
+    head, *rows = path.read_text("cp1252").splitlines()
+    cells = [row.replace(",", ".").split(";") for row in rows]
+    counted = [[c[0], *(f"{16.384 * float(x):.0f}" for x in c[1:4]), *c[4:]] for c in cells]
+    path.write_text("\n".join([head, *(";".join(row).replace(".", ",") for row in counted), ""]), "cp1252")
+    log = import_log(path)
+    assert log.decisions[0].text.startswith("time: 'time' in ms (likely")
+    assert "scale" not in log.map_text.partition("[time]")[2].partition("[environment]")[0]
+
+
 def test_stamps_in_a_stated_unit_are_taken_as_they_are(tmp_path):
     log = import_log(written(tmp_path, 1e-5, HEAD.replace("Ticks", "t [ms]")))
     assert "scale = " not in log.map_text.partition("[environment]")[0]

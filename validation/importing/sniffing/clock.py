@@ -20,7 +20,7 @@ from discsim.validation.importing.sniffing.preamble import stated_rate
 from discsim.validation.importing.sniffing.units import readings_of, split_unit
 from discsim.validation.importing.unpadded import unpadded
 
-__all__ = ["Clock", "clocks_of", "counter_note", "seconds"]
+__all__ = ["Clock", "clocks_of", "counter_note", "seconds", "written_unit"]
 
 SCALES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 #: A unit that is taken where the header states it, and never guessed.
@@ -211,7 +211,7 @@ def _unit(
     step = float(np.mean(apart[np.abs(apart / usual - 1) <= ROUNDED]))  # whole milliseconds at 80 Hz are 12 or 13 apart
     largest = float(np.nanmax(value))
     fits = [unit for unit, scale in SCALES.items() if SPACING[0] <= step * scale <= slowest]
-    written = _written(name)
+    written = written_unit(name)
     if written is not None:
         spacing = step * STATED_SCALES[written]
         if SPACING[0] <= spacing <= slowest:
@@ -257,7 +257,7 @@ def _counts_rows(steps: FloatArray) -> bool:
     return steps.size > 1 and bool(np.mean(steps == 1) > ASCENDING and np.all(steps >= 1))
 
 
-def _written(name: str) -> str | None:
+def written_unit(name: str) -> str | None:
     """Return the unit that a column's name states, or None."""
     rest, unit = split_unit(name.strip())
     for spelling in (unit, rest if not unit else ""):
@@ -353,7 +353,9 @@ def _coarse(numbers: Numbers) -> tuple[str, Counted] | None:
 def _in_seconds(value: FloatArray, name: str) -> bool:
     """Tell whole seconds, since 1970 or by the name's unit, from a count of anything else."""
     largest = float(np.nanmax(value, initial=0.0))
-    return bool(np.all(value[np.isfinite(value)] % 1 == 0)) and (_written(name) == "s" or EPOCH[0] < largest < EPOCH[1])
+    return bool(np.all(value[np.isfinite(value)] % 1 == 0)) and (
+        written_unit(name) == "s" or EPOCH[0] < largest < EPOCH[1]
+    )
 
 
 def _sure(sureness: Sureness) -> Sureness:

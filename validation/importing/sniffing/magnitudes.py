@@ -16,6 +16,7 @@ from discsim.validation.importing.sniffing.decision import Decision, Sureness
 from discsim.validation.importing.sniffing.units import COUNTS, Reading
 
 __all__ = [
+    "PER_DEG_S",
     "Unit",
     "accelerometer_unit",
     "field_size",

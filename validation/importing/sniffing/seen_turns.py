@@ -12,11 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.validation.importing.import_map import UNITS
 from discsim.validation.importing.sniffing.behaviour import TELLING, WORTHS
-from discsim.validation.importing.sniffing.clock import Clock
+from discsim.validation.importing.sniffing.clock import Clock, written_unit
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.groups import Triple
-from discsim.validation.importing.sniffing.magnitudes import Unit, gravity_norm
+from discsim.validation.importing.sniffing.magnitudes import PER_DEG_S, Unit, gravity_norm
 from discsim.validation.importing.sniffing.pull import POSSIBLE
 from discsim.validation.importing.sniffing.turning import Fit, best_worth, left_by, steps_between
 
@@ -122,9 +123,12 @@ def ticking(
     """Return a clock of ticks whose unit is a guess with what a tick is worth by the field, None where that is open.
 
     The gyroscope's unit has to be stated, the stamps have to contradict it, and the pull to the centre must not show
-    that they are right. A count that is near a power of ten, or a minute, is taken for it.
+    that they are right. Where the unit is likely, as that of whole numbers under a name of time, the pull must show
+    that the gyroscope is. A count that is near a power of ten, or a minute, is taken for it.
     """
-    if clock.column is None or clock.unit == "iso" or clock.decision.sure != "guess" or unit.decision.sure != "certain":
+    if clock.column is None or clock.unit == "iso" or clock.scale != 1.0 or unit.decision.sure != "certain":
+        return None
+    if clock.decision.sure != "guess" and not _may_count(clock, turns, unit, pull, found["gyroscope"]):
         return None
     if turns is None or turns.by != "the field" or (pull is not None and not POSSIBLE[0] < pull < POSSIBLE[1]):
         return None
@@ -147,6 +151,24 @@ def ticking(
     why += f"({unit.unit})" + f", to {100 * OFF_FITTED:.0f} %: write what a count is worth" * (not whole)
     told = Decision("time", f"'{clock.column}' in counts of {scale:g} {clock.unit}", "likely", why)
     return replace(clock, scale=scale, decision=told, off=0.0 if whole else OFF_FITTED)
+
+
+def _may_count(clock: Clock, turns: SeenTurns | None, unit: Unit, pull: float | None, gyro: Triple) -> bool:
+    """Tell whether whole numbers in no stated unit may be ticks: the pull is that of a gyroscope in its stated unit.
+
+    By any unit as which the field would turn the pull has to be none that a disc can have.
+    """
+    numbers = gyro.numbers
+    if clock.decision.sure != "likely" or turns is None or pull is None or clock.column not in numbers.table.columns:
+        return False
+    k = numbers.table.columns.index(clock.column)
+    stamps, stated = numbers.values[:, k], unit.factor("rad_s")
+    if written_unit(numbers.names[k]) is not None or np.any(stamps[np.isfinite(stamps)] % 1 != 0):
+        return False
+    worths = [*UNITS["rad_s"].values(), *(UNITS["rad_s"]["deg/s"] / per for per in PER_DEG_S)]
+    other = any(1 / CONTRADICTS_UNIT < turns.worth / worth < CONTRADICTS_UNIT for worth in worths)
+    by_it = pull * (stated / turns.worth) ** 2
+    return POSSIBLE[0] < pull < POSSIBLE[1] and not (other and POSSIBLE[0] < by_it < POSSIBLE[1])
 
 
 def _uncertain_note(clock: Clock, unit: Unit, by: str, ratio: float) -> str | None:
