@@ -117,8 +117,14 @@ def _prepared_first(question: Question) -> Prepared:
     if setup.doubts:
         raise InputError(setup.doubts[0])
     turned = with_turned_board(setup)
-    ready = None if turned is None else prepared_under(turned, question)
-    return prepared_under(setup, question) if ready is None or ready.rows is None else ready
+    try:
+        ready = None if turned is None else prepared_under(turned, question)
+        return prepared_under(setup, question) if ready is None or ready.rows is None else ready
+    except InputError as error:
+        if not setup.faults:
+            raise
+        told = "; ".join(fault.sentence for fault in setup.faults)
+        raise InputError(f"{str(error).rstrip('.')}. Found before, and allowed for in this: {told}") from None
 
 
 def tried_with(ready: Prepared, question: Question) -> Tried:

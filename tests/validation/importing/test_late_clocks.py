@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +10,13 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import cumulative_trapezoid
 
+from discsim.errors import InputError
 from discsim.plain_arrays import recording_from_arrays
 from discsim.recording import Samples
 from discsim.validation.checking.checked import check
+from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.setup import find_setup_faults
+from discsim.validation.diagnosis.setup.late_sensor import late_sensor
 from discsim.validation.importing.imported_log import import_log
 
 #: a disc that rests, is spun up, runs down and is stopped, in a field of 48 uT that dips by 66 deg
@@ -109,3 +113,26 @@ def test_recordings_that_are_off_by_different_times_are_told_and_not_moved():
     assert setup.faults == ()
     assert len(setup.contradictions) == 2
     assert all("late against the gyroscope's" in one for one in setup.contradictions)
+
+
+def test_a_sensor_that_shows_the_spin_for_a_short_time_may_be_late_by_more_than_that():
+    """Its rates over 3 s were held against offsets up to 1.5 s, and one that was 3 s late was told by no word."""
+    tg, gyro, tm, field = readings()
+    shown = (tm > 3.6) & (tm < 6.6)
+    arrays = {"gyroscope": (tg, gyro), "magnetometer": (tm[shown] + 3.0, field[shown])}
+    late = late_sensor(recording_from_arrays(arrays))
+    assert late is not None
+    assert late.sensor == "magnetometer"
+    assert_allclose(late.late, 3.0, atol=0.06)
+
+
+def test_a_diagnosis_that_is_refused_tells_the_clock_that_is_another_ones():
+    """It told what drives the body alone, and to what the field would agree with it at the times as written."""
+    recording = recorded(late=3.0)
+    with pytest.raises(InputError) as refused:
+        diagnose([[recording]], ["log"])
+    said = str(refused.value)
+    assert "Something drives this body" in said
+    assert "Found before, and allowed for in this: the magnetometer's times are " in said
+    (line,) = re.findall(r"\[sensors.magnetometer\] time_offset_s = (-[0-9.]+)", said)
+    assert_allclose(float(line), -3.0, atol=0.06)

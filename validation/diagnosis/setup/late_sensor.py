@@ -19,7 +19,7 @@ __all__ = ["LEFT", "SHORTEST", "Lag", "LateSensor", "best_lag", "late_sensor"]
 
 #: a lag is told from this on, s, where it leaves less than this share of the rms without it
 SHORTEST, LEFT = 0.1, 0.25
-#: lags are tried up to this share of the shorter of two spans, s: more than half of both is then seen together
+#: lags are tried at which more than this share of the shorter of two spans, s, is seen together
 _SHARED = 0.5
 #: the step between lags that are tried, s, and how many readings are compared
 _STEP, _VALUES = 0.05, 4000
@@ -91,8 +91,8 @@ class LateSensor:
         return said if self.alone else f"{said}; the spin repeats, and another offset is as likely"
 
 
-def best_lag(one: ShownRate, told: Samples, reach: float) -> Lag:
-    """Return the lag within ``reach`` s at which what is told leaves least beside what a sensor shows."""
+def best_lag(one: ShownRate, told: Samples, lags: tuple[float, float]) -> Lag:
+    """Return the lag from one to another of ``lags``, s, at which what is told leaves least beside what is shown."""
     few = slice(None, None, max(1, one.t.size // _VALUES))
     t, read = one.t[few], one.rate[few]
 
@@ -102,8 +102,7 @@ def best_lag(one: ShownRate, told: Samples, reach: float) -> Lag:
     def rms(lag: float) -> float:
         return float(np.sqrt(np.mean(left(lag) ** 2)))
 
-    steps = np.ceil(reach / _STEP)
-    coarse = np.arange(-steps, steps + 1.0) * _STEP
+    coarse = np.arange(np.floor(lags[0] / _STEP), np.ceil(lags[1] / _STEP) + 1.0) * _STEP
     tried = np.array([rms(lag) for lag in coarse.tolist()])
     near = coarse[int(np.argmin(tried))]
     lag = min((near + np.linspace(-_STEP, _STEP, 41)).tolist(), key=rms)
@@ -174,10 +173,12 @@ def _ranges(rate: FloatArray) -> float:
 
 def _beside(one: ShownRate, known: ShownRate) -> Lag | None:
     """Return the lag of a gyroscope beside another sensor, whichever way that one lies; None of too short ones."""
-    reach = _SHARED * min(float(np.ptp(one.t)), float(np.ptp(known.t)))
-    if reach < SHORTEST:
+    together = _SHARED * min(float(np.ptp(one.t)), float(np.ptp(known.t)))
+    if together < SHORTEST:
         return None
+    # what shows in a part alone may be late by more than that part
+    lags = (float(known.t[0] - one.t[-1]) + together, float(known.t[-1] - one.t[0]) - together)
     told = Samples(known.t, known.rate)
     if not one.signed:
-        return best_lag(one, Samples(known.t, np.abs(known.rate)), reach)
-    return min((best_lag(each, told, reach) for each in (one, replace(one, rate=-one.rate))), key=lambda lag: lag.left)
+        return best_lag(one, Samples(known.t, np.abs(known.rate)), lags)
+    return min((best_lag(each, told, lags) for each in (one, replace(one, rate=-one.rate))), key=lambda lag: lag.left)

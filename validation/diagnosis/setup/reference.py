@@ -291,7 +291,7 @@ def _late(file: str, recording: Recording, shown: Mapping[str, ShownRate], told:
 
 def _lag(one: ShownRate, told: Samples) -> float | None:
     """Return by how much what is told is late beside a sensor, s; None where no lag makes them agree."""
-    found = best_lag(one, told, _LAGS)
+    found = best_lag(one, told, (-_LAGS, _LAGS))
     return found.lag if found.told else None
 
 
