@@ -70,5 +70,5 @@ def command(
         found.report(out, command=f"discsim {' '.join(run.command)}")
     for doubt in found.doubts:
         say_note(doubt)
-    typer.echo(found.summary())
+    typer.echo("\n".join([found.summary(), *found.remedies]))
     typer.echo(f"read {out / 'report.html'}")

@@ -21,7 +21,9 @@ from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.report.figures import draw_overview
 from discsim.validation.diagnosis.report.files import write_outcome
 from discsim.validation.diagnosis.report.page import verdict_sentence
+from discsim.validation.diagnosis.report.wording import name_of
 from discsim.validation.diagnosis.result import Diagnosis, NamedEffect, Outcome
+from discsim.validation.diagnosis.setup.remedy import remedy_of
 from discsim.validation.diagnosis.stages import Progress, silent
 from discsim.validation.identification.plants.plan import Plan
 from discsim.validation.running.given import Given, given_recordings
@@ -70,6 +72,11 @@ class Diagnosed(Result):
     def model(self) -> Model:
         """The improved model, which `discsim.write_model` writes and ``discsim fly --model`` takes."""
         return self.outcome.model
+
+    @property
+    def remedies(self) -> tuple[str, ...]:
+        """For each named effect that is a fault of the setup the line of an import map that mends it."""
+        return tuple(f"{name_of(item.id)}: {line}" for item in self.effects if (line := remedy_of(item)))
 
     def summary(self) -> str:
         """Return the verdict and the sentence that explains it, one line."""

@@ -38,6 +38,7 @@ from discsim.validation.diagnosis.result import (
     Outcome,
     Recalibration,
 )
+from discsim.validation.diagnosis.setup.remedy import remedy_of
 from discsim.validation.reporting.figures import save_figure
 from discsim.validation.reporting.html import write_page
 
@@ -202,6 +203,8 @@ def _effect(item: NamedEffect) -> dict[str, Any]:
     chance = f"{max(evidence.p_value, 1e-300):.0e}" if evidence.p_value < 0.001 else f"{evidence.p_value:.2g}"
     bound = "less than " if evidence.p_value <= 1e-300 else "about "
     sentences.append(f"The chance of such a gain with nothing there is {bound}{chance}.")
+    if line := remedy_of(item):
+        sentences.append(f"{line[0].upper()}{line[1:]}.")
     rows: list[tuple[str, ...]] = [
         (name, plus_minus(value.value, value.sd), unit(item.id, name), everyday(item.id, name, value))
         for name, value in item.parameters.items()

@@ -9,9 +9,10 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects import setup
-from discsim.effects.catalogue import Effect
+from discsim.effects.catalogue import CATALOGUE, Effect, effect
+from discsim.validation.diagnosis.answer.named import NamedEffect
 
-__all__ = ["remedy"]
+__all__ = ["remedy", "remedy_of"]
 
 #: a map's axes: for each body axis the sensor's column and its sign, None where it was not seen
 MapAxes: TypeAlias = tuple[tuple[int, float] | None, ...]
@@ -57,6 +58,18 @@ def remedy(fault: Effect, axes: Mapping[str, MapAxes] | None = None) -> str:
             return f"to mend it, write into the import map: {lines}"
         return "turn the board back, or diagnose with it: the rotation is estimated"
     return "look the field up for the place and the date (--place LAT,LON --date YYYY-MM-DD)"
+
+
+def remedy_of(named: NamedEffect) -> str:
+    """Return the line that mends an effect that an answer names; empty where it is no fault of the setup, or in doubt.
+
+    In doubt is one that is in some recordings, or that these cannot tell from another.
+    """
+    row = CATALOGUE.get(named.id)
+    if row is None or not row.setup or named.recordings is not None or named.confused_with:
+        return ""
+    sizes = {name: found.value for name, found in named.parameters.items()}
+    return remedy(effect(named.id, **sizes, **named.setting))
 
 
 def _axes_line(sensor: str, matrix: FloatArray, axes: Mapping[str, MapAxes] | None) -> str:

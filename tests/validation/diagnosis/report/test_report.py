@@ -12,6 +12,7 @@ import pytest
 from support.outcomes import OUTCOMES, explained, unexplained
 
 from discsim.effects import CATALOGUE
+from discsim.validation.diagnosis.diagnosed import Diagnosed
 from discsim.validation.diagnosis.report.figures import draw_overview, draw_sensor
 from discsim.validation.diagnosis.report.page import draw_figures, verdict_sentence, write_diagnosis_report
 from discsim.validation.diagnosis.report.wording import everyday, form, found, law_text, plus_minus, unit
@@ -96,6 +97,22 @@ def test_a_setting_stands_in_words_and_so_does_its_twin(tmp_path):
     text = page(replace(outcome, diagnosis=replace(outcome.diagnosis, effects=(flipped,))), tmp_path).text
     assert "columns x, y, z hold x −y z of the body" in text
     assert "a gyroscope whose axes are mixed up (axes = x y -z)" in text
+
+
+def test_a_fault_of_the_setup_comes_with_the_line_that_mends_it_unless_it_may_be_another(tmp_path):
+    """ "Times that are shifted (3.000 s)" told neither which way nor where to write what."""
+    outcome = explained()
+    late = NamedEffect("mag.time_offset", {"offset_s": ParameterValue(3.00006, 1e-4)}, Evidence(900.0, None, 0.0))
+    line = "write into the import map: [sensors.magnetometer] time_offset_s = -3 (or add that to what stands there)"
+    told = replace(outcome, diagnosis=replace(outcome.diagnosis, effects=(late,)))
+    assert f"To mend it, {line}" in page(told, tmp_path).text
+    (said,) = Diagnosed(told, {"throws": 2}).remedies
+    assert said.startswith(f"times of the magnetometer that are shifted: to mend it, {line}")
+    doubtful = replace(late, confused_with=(Confusion("mag.lag", 90.0, "Turn the disc by hand."),))
+    unsure = replace(outcome, diagnosis=replace(outcome.diagnosis, effects=(doubtful,)))
+    assert "To mend it" not in page(unsure, tmp_path).text
+    assert Diagnosed(unsure, {"throws": 2}).remedies == ()
+    assert Diagnosed(outcome, {"throws": 2}).remedies == ()
 
 
 def test_a_law_stands_with_its_coefficients(tmp_path):
