@@ -9,15 +9,15 @@ not so (a millisecond of the second, in steps of ten) two steps back by the same
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 import numpy as np
 
-from discsim.arrays import FloatArray
+from discsim.arrays import FloatArray, IntArray
 
-__all__ = ["EPOCH", "Break", "Clock", "is_stamp", "iso_seconds", "mended"]
+__all__ = ["DATED", "DAY", "EPOCH", "Break", "Clock", "is_stamp", "iso_seconds", "mended", "stamp_seconds"]
 
 #: widths of counters, in counts, and what they are called
 WIDTHS = {
@@ -45,6 +45,9 @@ SET = 3600.0
 APART = 5
 #: seconds from 1970 to 2000: stamps count from 2000, so that a double holds them to a tenth of a microsecond
 EPOCH = datetime(2000, 1, 1, tzinfo=UTC)
+DAY = 86400.0
+#: ... and stamps above a year are a date's: no log counts from its start for so long
+DATED = 365 * DAY
 #: A time of day: the fraction stands behind a point, a comma, or (as milliseconds) behind a third colon.
 _TIME_OF_DAY = re.compile(
     r"T?(\d{1,2}):(\d{2}):(\d{2})(?:[.,](\d+)|:(\d{1,3}))?\s*([AaPp])?(?(6)\.?[Mm]\.?)\s*(?:Z|[+-]\d{2}:?\d{2})?"
@@ -110,6 +113,26 @@ def iso_seconds(cell: str) -> float | None:
         moment = moment.replace(tzinfo=UTC)
     whole = (moment - EPOCH).total_seconds()
     return whole + (float(f"0.{digits.group()}") if dot and digits else 0.0)
+
+
+def stamp_seconds(cells: Iterable[str]) -> tuple[FloatArray, IntArray]:
+    """Return the seconds (n,) of dates and times as `iso_seconds` does, NaN where one is neither.
+
+    Of times of the day among dates the day is that of the dated cell before (the first: behind) that is nearest; the
+    second array are their rows.
+
+    >>> stamp_seconds(["2000-06-01 23:59:59", "00:00:01", "x"])[0] - 152 * 86400
+    array([86399., 86401.,    nan])
+    """
+    found = [iso_seconds(cell) for cell in cells]
+    time = np.array([np.nan if one is None else one for one in found], dtype=np.float64)
+    dated = np.flatnonzero(np.abs(time) > DATED)
+    bare = np.flatnonzero((time >= 0.0) & (time <= DAY))
+    if not dated.size or not bare.size:
+        return time, bare[:0]
+    beside = time[dated[np.maximum(np.searchsorted(dated, bare) - 1, 0)]]
+    time[bare] += DAY * np.round((beside - time[bare]) / DAY)
+    return time, bare
 
 
 def is_stamp(cell: str) -> bool:

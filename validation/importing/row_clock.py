@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from discsim.arrays import BoolArray, FloatArray, IntArray
-from discsim.validation.importing.clock import Break, iso_seconds, mended
+from discsim.validation.importing.clock import Break, mended, stamp_seconds
 from discsim.validation.importing.import_map import ImportMap, TimeBase
 from discsim.validation.importing.raw_table import RawTable, RepairList
 from discsim.validation.importing.unpadded import unpadded
@@ -100,8 +100,12 @@ def _times(table: RawTable, counters: FloatArray, base: TimeBase, decimal: str, 
         return np.asarray(counters * base.step)
     column = table.column(base.column)
     if base.iso:
-        found = [iso_seconds(cell) for cell in column]
-        time = np.array([np.nan if one is None else one for one in found], dtype=np.float64)
+        time, bare = stamp_seconds(column)
+        if bare.size:
+            what = f"'{base.column}' is a time of the day among dates, in {bare.size} rows"
+            repairs.add(
+                "time", table.path, int(table.line[bare[0]]), what, "they take the date of the rows beside them"
+            )
     else:
         time, _ = column.numbers(decimal)
         time = added_up(time, table.number) if base.spacings else time

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime, timedelta
+
 import numpy as np
 import pytest
 from support.made_logs import LANDING, RATE, RELEASE, made_log, three, write_table
@@ -59,3 +61,19 @@ def test_an_index_without_a_name_is_called_by_its_place(tmp_path):
     assert "not used: column 1 (no name)" in said.splitlines()
     name = tmp_path / f"log_{RATE:.0f}Hz.csv"
     assert "; column 1 (no name) counts the rows" in import_log(write_table(name, [index, *READINGS])).summary()
+
+
+@pytest.mark.parametrize("bare", [slice(None, 900), slice(900, None), slice(300, 700), slice(None, None, 2)])
+def test_times_of_the_day_among_dates_take_their_date(tmp_path, bare):
+    """A log over midnight, written as a time of the day in a part of its rows: it was two logs."""
+    start = datetime(2026, 5, 1, 23, 59, 56, tzinfo=UTC)
+    times = [start + timedelta(seconds=round(float(at), 3)) for at in LOG.t]
+    cells = [f"{now:%d.%m.%Y %H:%M:%S}.{now.microsecond // 1000:03d}" for now in times]
+    without = [cell.partition(" ")[2] for cell in cells]
+    cells[bare] = without[bare]
+    done = import_log(write_table(tmp_path / "log.csv", [("timestamp", cells), *READINGS]))
+    (recording,) = done.recordings
+    np.testing.assert_allclose(recording.samples["gyroscope"].t, LOG.t, atol=1e-6)
+    (repair,) = done.imported[0].repairs
+    assert repair.what == f"'timestamp' is a time of the day among dates, in {len(cells[bare])} rows"
+    assert repair.action == "they take the date of the rows beside them"

@@ -10,7 +10,7 @@ from itertools import islice
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.validation.importing.clock import is_stamp, iso_seconds
+from discsim.validation.importing.clock import is_stamp, stamp_seconds
 from discsim.validation.importing.row_clock import added_up
 from discsim.validation.importing.sniffing.coarse_stamps import Counted, counted_rows
 from discsim.validation.importing.sniffing.decision import Decision, Sureness
@@ -281,8 +281,7 @@ def _are_stamps(cells: Iterable[str]) -> bool:
 
 def _stamps(cells: Iterable[str]) -> FloatArray:
     """Return dates with a time (or times of day) as seconds; NaN where one is neither."""
-    found = [iso_seconds(cell) for cell in cells]
-    return np.array([np.nan if time is None else time for time in found])
+    return stamp_seconds(cells)[0]
 
 
 def _without(numbers: Numbers) -> Clock:

@@ -13,7 +13,7 @@ from discsim.arrays import FloatArray
 from discsim.recording import SENSORS
 from discsim.validation.importing.apart import apart, zones
 from discsim.validation.importing.cleaning import Readings
-from discsim.validation.importing.clock import EPOCH
+from discsim.validation.importing.clock import DATED, DAY, EPOCH
 from discsim.validation.importing.import_map import SPEEDS, UNITS
 from discsim.validation.importing.raw_table import Layout
 from discsim.validation.importing.sniffing.clock import Clock, clocks_of, seconds
@@ -34,10 +34,8 @@ _PART = re.compile(
     r"(?:gps)?(?:v|vel|velocity)(n|e|d|u|north|east|down|up)|(?:gps)?(north|east|down|up)(?:vel|velocity)"
 )
 
-DAY = 86400.0
-#: Dates are read as seconds since 2000; other clocks count from 1970, s. Stamps above a year are a date's.
+#: Dates are read as seconds since 2000; other clocks count from 1970, s.
 _FROM_1970 = (EPOCH - datetime(1970, 1, 1, tzinfo=UTC)).total_seconds()
-_DATED = 365 * DAY
 
 
 class ProposedFixes(NamedTuple):
@@ -178,7 +176,7 @@ def _counted_otherwise(log: FloatArray) -> list[tuple[float, str]]:
     Dates are read as seconds since 2000, and a log may have those since 1970; times of the day lack the log's day.
     """
     counted = [(sign * _FROM_1970, "one clock counts from 1970, and dates are read from 2000") for sign in (1, -1)]
-    if log[0] < _DATED:
+    if log[0] < DATED:
         return counted
     today, why = DAY * (log[0] // DAY), "its times are of the day alone, and the log has the date"
     return [*counted, (today, why), (today - DAY, why)]
