@@ -121,7 +121,7 @@ def stamp_seconds(cells: Iterable[str]) -> tuple[FloatArray, IntArray]:
     Of times of the day among dates the day is that of the dated cell before (the first: behind) that is nearest; the
     second array are their rows.
 
-    >>> stamp_seconds(["2000-06-01 23:59:59", "00:00:01", "x"])[0] - 152 * 86400
+    >>> stamp_seconds(["2001-06-01 23:59:59", "00:00:01", "x"])[0] - 517 * 86400
     array([86399., 86401.,    nan])
     """
     found = [iso_seconds(cell) for cell in cells]
