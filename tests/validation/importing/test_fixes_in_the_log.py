@@ -71,10 +71,18 @@ def test_a_place_that_never_changes_is_left_out_aloud(tmp_path):
     assert "left out: the fixes in log.csv: the same fix stands in every row" in done.notes
 
 
-def test_a_flight_controllers_names_of_the_place_are_known(tmp_path):
-    head = "GPS_coord[0],GPS_coord[1],GPS_altitude,GPS_speed (m/s),GPS_ground_course"
-    raw = log(tmp_path, lambda k: fix(LOG.t[k // 40 * 40]), head)
-    assert_flies_north(import_log(raw).recordings[0].samples["gps"])
+@pytest.mark.parametrize(
+    "head",
+    [
+        "GPS_coord[0],GPS_coord[1],GPS_altitude,GPS_speed (m/s),GPS_ground_course",
+        "locationLatitude(WGS84),locationLongitude(WGS84),locationAltitude(m),locationSpeed(m/s),locationCourse(°)",
+    ],
+)
+def test_names_of_the_place_by_flight_controllers_and_phones_are_known(tmp_path, head):
+    done = import_log(log(tmp_path, lambda k: fix(LOG.t[k // 40 * 40]), head))
+    assert_flies_north(done.recordings[0].samples["gps"])
+    speed, course = head.split(",")[3:]
+    assert [note for note in done.notes if note.startswith(f"left out: '{speed}', '{course}'")]
 
 
 @pytest.mark.parametrize(

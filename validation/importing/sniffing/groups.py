@@ -17,7 +17,15 @@ from discsim.validation.importing.failed import failed_on_one_axis, failed_rows
 from discsim.validation.importing.overflow import continued
 from discsim.validation.importing.raw_table import RawTable
 from discsim.validation.importing.sniffing.dialect import Dialect
-from discsim.validation.importing.sniffing.names import Name, last_word, penalty_of, read_name, says_nothing, sensor_of
+from discsim.validation.importing.sniffing.names import (
+    Name,
+    is_of_mavlink,
+    last_word,
+    penalty_of,
+    read_name,
+    says_nothing,
+    sensor_of,
+)
 from discsim.validation.importing.sniffing.units import COUNTS, OTHER, Reading, readings_of
 from discsim.validation.importing.unsigned import signed
 
@@ -27,6 +35,8 @@ __all__ = ["FEWEST_ROWS", "Numbers", "Triple", "triples_of"]
 MAX_IDS = 20
 #: Rows without which a triple is no sensor: three say nothing of a unit or an axis, and a line of text may hold them.
 FEWEST_ROWS = 4
+#: What SCALED_IMU counts in whole numbers (MAVLink, common messages); ArduPilot's RAW_IMU counts the same.
+_MAVLINK = {"gyroscope": "mrad/s", "accelerometer": "mg", "magnetometer": "mgauss"}
 _PLACE = ({"lat", "latitude"}, {"lon", "lng", "long", "longitude"})
 _ID_NAMES = ("id", "sensor", "sensorname", "sensor_name", "sensor_id", "sensorid", "type", "name", "source", "device",
              "kind", "topic", "imu")  # fmt: skip
@@ -189,6 +199,10 @@ def _named(
         by_name, source = sensor_of(where[1]), f"the id {where[1]}"
     if by_name is None and says_nothing(name.base) and not (units and units[0].sensor != COUNTS):
         by_name, source = sensor_of(numbers.path.stem), "the file's name"
+    if by_name in _MAVLINK and not units and all(is_of_mavlink(numbers.names[k]) for k in columns):
+        value = numbers.values[:, list(columns)]
+        whole = not np.any(value[np.isfinite(value)] % 1)
+        units = [Reading(by_name, _MAVLINK[by_name])] if whole else units
     if by_name is not None:
         if by_name == "gyroscope" and units and units[0].unit == "rad":  # PX4's gyro_rad is in rad/s
             units = [Reading("gyroscope", "rad/s")]

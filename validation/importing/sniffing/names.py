@@ -11,6 +11,7 @@ from discsim.validation.importing.sniffing.units import readings_of, split_unit
 __all__ = [
     "Name",
     "foreign_words",
+    "is_of_mavlink",
     "is_spacing_name",
     "is_time_name",
     "last_word",
@@ -116,6 +117,7 @@ def _without_axis(name: str) -> tuple[str, int | None]:
         (r"^()([xyzXYZ])(?:[\s_\-.]+|(?=[A-Z]))(.*)$", (3, 2)),
         (r"^(.+?[\s_\-.])([xyzXYZ])[\s_\-.](.+)$", (1, 2)),
         (r"^(.+?[a-z])([XYZ])[\s_\-]?([A-Za-z]+)$", (1, 2)),
+        (r"^((?:.+[\s_.])?)([xyz])((?:acc|gyr|mag)[a-z]*\d?)$", (1, 2)),  # xacc, as MAVLink has it
     )
     for pattern, (base, axis) in patterns:
         match = re.match(pattern, name)
@@ -140,23 +142,32 @@ def read_name(name: str) -> Name:
 def last_word(name: str) -> str:
     """Return the last word of a name without its unit.
 
-    >>> last_word("gps_lat [deg]"), last_word("GPS Altitude (ft)"), last_word("gpsLon")
-    ('lat', 'altitude', 'lon')
+    >>> last_word("gps_lat [deg]"), last_word("GPS Altitude (ft)"), last_word("gpsLon"), last_word("locationLongitude")
+    ('lat', 'altitude', 'lon', 'longitude')
     """
     return _split(read_name(name).base)[-1].removeprefix("gps")
 
 
 def words_of(name: str) -> set[str]:
-    """Return the words of a name.
+    """Return the words of a name without its unit.
 
-    >>> sorted(words_of("ground speed (m/s)"))
-    ['ground', 'm', 's', 'speed']
+    >>> sorted(words_of("ground speed (m/s)")), sorted(words_of("locationSpeed(m/s)"))
+    (['ground', 'speed'], ['location', 'speed'])
     """
-    return {word.strip("()[]") for word in _split(name)} - {""}
+    return {word.strip("()[]") for word in _split(split_unit(name.strip())[0])} - {""}
+
+
+def is_of_mavlink(name: str) -> bool:
+    """Tell a sensor's column that is called as MAVLink's messages of an IMU have it.
+
+    >>> [is_of_mavlink(name) for name in ("xacc", "RAW_IMU.zmag", "ygyro2", "acc_x", "xaccel")]
+    [True, True, True, False, False]
+    """
+    return re.fullmatch(r"(?:.+[\s_.])?[xyz](?:acc|gyro|mag)\d?", name.strip()) is not None
 
 
 def _split(name: str) -> list[str]:
-    return re.split(r"[\s_.\-:/]+", name.strip().lower())
+    return re.split(r"[\s_.\-:/]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.strip()).lower())
 
 
 def sensor_of(base: str) -> str | None:
