@@ -34,6 +34,8 @@ _PATHS = {
     0.01: "the velocity in cm/s",
     0.001: "the velocity in mm/s, or the position in km",
 }
+#: ... and how an import map says the unit of a velocity
+_LINES = {0.514: "kn", 0.447: "mph", 0.305: "ft/s", 0.278: "km/h", 0.01: "cm/s", 0.001: "mm/s"}
 #: that ratio is believed where position and velocity correlate so, and is of another unit beyond these: a velocity
 #: that a receiver smooths, or positions that are off by metres, move it by some per cent
 _GO_TOGETHER, _ONE = 0.9, (0.7, 1.4)
@@ -207,13 +209,15 @@ def _path_unit(moved: FloatArray, told: FloatArray) -> Finding | None:
     if _ONE[0] <= ratio <= _ONE[1]:
         return None
     near = min(_PATHS, key=lambda known: abs(np.log(ratio / known)))
+    told_near = abs(np.log(ratio / near)) < np.log(1.1)
+    line = f'; then write velocity_unit = "{_LINES.get(near)}" below [sensors.gps] of the import map' * (near in _LINES)
     return Finding(
         "gps.unit",
         "error",
         "gps",
         f"its position changes {ratio:.3g} times as fast as its velocity says",
         "metres and m/s, once as fast",
-        f"{_PATHS[near]}?" if abs(np.log(ratio / near)) < np.log(1.1) else "one of the two is in another unit",
+        f"{_PATHS[near]}?{line}" if told_near else "one of the two is in another unit",
     )
 
 

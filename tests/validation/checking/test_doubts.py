@@ -68,8 +68,8 @@ def test_east_and_north_exchanged_are_put_right_aloud(throws):
     [
         (POSITION, 100.0, "the position in cm?"),
         (POSITION, 1 / 0.3048, "the position in feet?"),
-        (VELOCITY, 3.6, "the velocity in km/h?"),
-        (VELOCITY, 1 / 0.514444, "the velocity in knots?"),
+        (VELOCITY, 3.6, 'the velocity in km/h?; then write velocity_unit = "km/h" below [sensors.gps]'),
+        (VELOCITY, 1 / 0.514444, 'the velocity in knots?; then write velocity_unit = "kn" below'),
         (VELOCITY, 1000.0, "the velocity in mm/s"),
         (POSITION, 9.0, "one of the two is in another unit"),
     ],
