@@ -39,7 +39,7 @@ UNITS: Mapping[str, Mapping[str, float]] = MappingProxyType(
             **{"rpm": np.pi / 30, "Hz": 2 * np.pi},
         },
         "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048},
-        "": {"SI": 1.0, "deg": 1.0},
+        "": {"SI": 1.0, "deg": 1.0, "degE7": 1.0},
     }
 )
 #: Metres per second in one of a receiver's velocity (a knot is 1852 m an hour, a mile 1609.344 m).
@@ -50,6 +50,8 @@ SPEEDS: Mapping[str, float] = MappingProxyType(
     }
 )
 TIME_UNITS = {"d": 86400.0, "min": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "iso": 1.0}
+#: Degrees in one of a receiver's latitude: whole numbers of u-blox and MAVLink count ten millionths.
+_DEGREES = {"deg": 1.0, "degE7": 1e-7}
 #: How far two devices' clocks are apart: one may count from its start, the other from 1900, as NTP's do.
 _OFFSET = Limit(1e-9, 5e9, "the finest unit of loggers' clocks; the seconds from 1900 to 2058")
 BODY_SENSORS = ("magnetometer", "accelerometer", "gyroscope")
@@ -99,8 +101,8 @@ class SensorMap:
         The unit of that column, where it is another one.
     sheet : SensorSheet
         What the data sheet states; a rate of NaN is taken from the time stamps.
-    degrees : bool
-        Whether a GPS's first columns are latitude and longitude in degrees and a height.
+    degrees : float
+        Degrees in one of a GPS's first two columns, latitude and longitude beside a height; 0 where they are metres.
     height : float or None
         Metres in one of that height; None where the map does not state its unit (then m).
     speed : float
@@ -119,7 +121,7 @@ class SensorMap:
     optional: bool
     sheet: SensorSheet
     time: str | None = None
-    degrees: bool = False
+    degrees: float = 0.0
     height: float | None = None
     offset: float = 0.0
     time_unit: str | None = None
@@ -379,7 +381,8 @@ def _sensor(table: TomlTable, sensor: str, *, strict: bool) -> SensorMap:
             "axis of the spin: write position_m = [x, y, z] there, and import with this map (--map FILE)",
         )
     height = table.text("height_unit", required=False, choices=tuple(UNITS["m"]))
-    if height is not None and (sensor != "gps" or unit != "deg"):
+    place = _DEGREES.get(unit, 0.0) if sensor == "gps" else 0.0
+    if height is not None and not place:
         raise table.error("height_unit", "'height_unit' is for a gps with unit = \"deg\"; expected it there alone")
     metres = None if height is None else UNITS["m"][height]
     velocity = table.text("velocity_unit", required=False, choices=tuple(SPEEDS))
@@ -390,10 +393,10 @@ def _sensor(table: TomlTable, sensor: str, *, strict: bool) -> SensorMap:
     offset = table.number("time_offset", "s", required=False, limit=_OFFSET) or 0.0
     # a rate that the map does not state comes from the time stamps
     sheet = read_sheet(table, sensor, strict=strict, rate_required=False)
-    factor, degrees = choices[unit] * (scale or 1.0), sensor == "gps" and unit == "deg"
+    factor = choices[unit] * (scale or 1.0)
     worth = SPEEDS[velocity or "m/s"]
     return SensorMap(
-        *(file, columns, factor, axes, chosen, optional, sheet, time, degrees, metres, offset, time_unit, worth),
+        *(file, columns, factor, axes, chosen, optional, sheet, time, place, metres, offset, time_unit, worth),
         layout=layout,
     )
 

@@ -113,6 +113,7 @@ def _fixes(read: FloatArray, sensor_map: SensorMap) -> FloatArray:
     fixes[:, 3:] *= sensor_map.speed
     if not sensor_map.degrees:
         return np.asarray(fixes)
+    fixes[:, :2] *= sensor_map.degrees
     fixes[:, 2] *= sensor_map.height or 1.0
     fixes[np.all(fixes[:, :2] == 0.0, axis=1)] = np.nan
     return positions(fixes)

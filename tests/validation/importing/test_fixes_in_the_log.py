@@ -109,6 +109,25 @@ def test_a_velocity_north_east_and_down_is_read_with_its_unit(tmp_path, names, w
     assert_array_equal(again.value, done.recordings[0].samples["gps"].value)
 
 
+@pytest.mark.parametrize(("unit", "read"), [("", False), (" (cm/s)", True)])
+def test_whole_numbers_of_a_receivers_protocol_are_degrees_and_mm(tmp_path, unit, read):
+    """Ten millionths of a degree were refused with the request to write degrees."""
+
+    def cells(k):
+        t = LOG.t[k // 40 * 40]
+        return f"{round(1e7 * (47.4 + 3.0 * t / 111178.0))},85500000,{round(1e3 * (440 + t))},300,0,-100"
+
+    done = import_log(log(tmp_path, cells, ",".join(["lat", "lon", "alt", *(f"v{axis}{unit}" for axis in "ned")])))
+    proposed = done.map_text.partition("[sensors.gps]")[2]
+    assert 'unit = "degE7"\nheight_unit = "mm"' in proposed
+    gps = done.recordings[0].samples["gps"]
+    assert_flies_north(gps)
+    assert np.isfinite(gps.value[:, 3:]).all() == read
+    assert bool([note for note in done.notes if "their unit is not in their names" in note]) != read
+    if read:
+        assert_allclose(gps.value[:, 3:], [[3.0, 0.0, -1.0]] * 50)
+
+
 @pytest.mark.parametrize("names", ["vn,ve", "vel_e,vel_n,vel_u"])
 def test_a_velocity_that_is_not_of_those_three_is_left_out_in_a_sentence(tmp_path, names):
     raw = log(tmp_path, lambda k: fix(LOG.t[k // 40 * 40], (1.0,) * (names.count(",") + 1)), f"lat,lon,alt,{names}")

@@ -98,7 +98,8 @@ def _columns(numbers: Numbers) -> tuple[ProposedFixes | None, str]:
     if height is None:
         return None, "it has a latitude and a longitude, and no column of a height that a map needs beside them"
     most = np.nanmax(np.abs(numbers.values[:, list(place)]), axis=0, initial=0.0)
-    if most[0] > 90.0 or most[1] > 180.0:
+    counted = _counts(numbers.values[:, list(place)])
+    if not counted and (most[0] > 90.0 or most[1] > 180.0):
         what = f"'{columns[place[0]]}' goes to {most[0]:.9g} and '{columns[place[1]]}' to {most[1]:.9g}"
         return None, f"{what}, no degrees; write them in degrees"
     fixes = numbers.values[:, [*place, height]]
@@ -107,13 +108,24 @@ def _columns(numbers: Numbers) -> tuple[ProposedFixes | None, str]:
         return None, "the same fix stands in every row" if len(fixes) else "no row of it holds a fix"
     unit = read_name(numbers.names[height]).unit.lower()
     unit = "ft" if unit in ("feet", "foot") else unit if unit in UNITS["m"] else ""
-    why = f"by their names, in degrees and {unit or 'm, as receivers write it'}"
+    unit = unit or "mm" * counted  # so count u-blox (NAV-PVT) and MAVLink (GPS_RAW_INT), which count degrees so
+    why = f"by their names, in degrees{' E7' * counted} and {unit or 'm, as receivers write it'}"
     velocity, speed = _velocity(numbers)
+    velocity = velocity if speed or not counted else ()  # mm/s of the one, cm/s of the other
     why += f", the velocity in {speed or 'm/s, as most receivers write it'}" * bool(velocity)
     names = tuple(columns[k] for k in (*place, height, *velocity))
     told = Decision("gps", ", ".join(names), "likely", why)
     units = ("" if unit == "m" else unit, "" if speed == "m/s" else speed)
-    return ProposedFixes(numbers, names, "deg", units[0], None, told, velocity_unit=units[1]), ""
+    return ProposedFixes(
+        numbers, names, "degE7" if counted else "deg", units[0], None, told, velocity_unit=units[1]
+    ), ""
+
+
+def _counts(place: FloatArray) -> bool:
+    """Tell latitudes and longitudes (n, 2) in whole ten millionths of a degree, as protocols of receivers count."""
+    known = place[np.isfinite(place).all(axis=1) & np.any(place != 0.0, axis=1)]
+    size = np.max(np.abs(known), axis=0, initial=0.0)
+    return bool(np.all(known % 1 == 0) and size.max() > 1e4 and size[0] <= 90e7 and size[1] <= 180e7)
 
 
 def _velocity(numbers: Numbers) -> tuple[tuple[int, ...], str]:
@@ -199,4 +211,6 @@ def _no_velocity(found: ProposedFixes) -> list[str]:
     if not left or len(found.columns) > 3:
         return []
     what = f"left out: {', '.join(left)} of {found.numbers.path.name}"
+    if found.unit == "degE7" and _velocity(found.numbers)[0]:
+        return [f"{what}: their unit is not in their names; write it there, as vn (cm/s) or vn (mm/s)"]
     return [f"{what}: a recording's gps has the velocity north, east and down, and these are not those three"]
