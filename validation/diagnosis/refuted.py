@@ -18,6 +18,7 @@ from discsim.validation.diagnosis.selection.own_sizes import own_sizes
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.diagnosis.verdict import leaves_more_than_noise
+from discsim.validation.identification.gauss_newton import penalty_of
 
 __all__ = ["without_refuted"]
 
@@ -27,9 +28,10 @@ def without_refuted(found: Search) -> Search:
 
     Recordings set aside speak against one: each wants another number of it, and the others' makes it worse. Or each
     wants another by more than its error. Or it is of a sensor whose samples were lost, told as a slow clock: losses
-    come at random, and it takes up what the clock leaves of them. It stays where more than noise is left without it.
+    come at random, and it takes up what the clock leaves of them. Or it gains by what a model of the air is spared, and
+    not by readings. It stays where more than noise is left without it.
     """
-    for refuted in (_refuted, _of_many_sizes, _left_by_losses):
+    for refuted in (_refuted, _of_many_sizes, _left_by_losses, _sparing_the_air):
         while (less := refuted(found)) is not None:
             bare = replace(found.with_step(less), final=less).about(less.fit)
             if leaves_more_than_noise(bare):
@@ -86,6 +88,27 @@ def _of_many_sizes(found: Search) -> ContinuousFit | None:
     chances = [(own_sizes(found.final.fit, t).chance, t) for t in _of_little_gain(found) if t.recordings is None]
     unlike = [(chance, t) for chance, t in chances if chance < SELECTION.unlike]
     return tried_without(found, min(unlike, key=lambda item: item[0])[1]) if unlike else None
+
+
+def _sparing_the_air(found: Search) -> ContinuousFit | None:
+    """Return the fit without an effect on a free spin's motion of which the readings gain least; None for none.
+
+    Nobody knows the air's moments there: a fit is charged for how they wander, by ordinary sizes, and the true ones may
+    go together as an effect would have them. What an effect gains of these charges is no evidence; its price must be
+    gained by the readings themselves.
+    """
+    if not found.final.fit.plant.weakly_identified or found.at_once:
+        return None
+    on_motion = [t for t in found.final.hypothesis.candidates if t.row.acts_on == "motion" and not t.row.event]
+    less = [(t, tried_without(found, t)) for t in on_motion]
+    gains = [(_by_readings(one) - _by_readings(found.final) - price(t), one) for t, one in less]
+    least = min(gains, key=lambda item: item[0], default=None)
+    return None if least is None or least[0] > 0.0 else least[1]
+
+
+def _by_readings(fitted: ContinuousFit) -> float:
+    """Return the score of a fit without what it is charged beside its readings."""
+    return fitted.score - penalty_of(fitted.fit, fitted.fit.linears)
 
 
 def _of_little_gain(found: Search) -> list[CandidateEffect]:

@@ -10,7 +10,10 @@ from support.made import FIELD as SITE
 from support.made import RIG, coasting
 
 from discsim.effects import effect
+from discsim.effects.body import InertiaAsymmetry
 from discsim.rig import spin_down
+from discsim.validation.challenge.cases.conceal import recordings
+from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.diagnosis import refuted
 from discsim.validation.diagnosis.refuted import without_refuted
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
@@ -18,6 +21,7 @@ from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.own_sizes import own_sizes
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.diagnosis.selection.starting_point import screened
+from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.diagnosis.settings import SELECTION
 
 BIAS = "accel.bias"
@@ -71,3 +75,10 @@ def test_what_each_recording_wants_in_another_size_is_left_out(monkeypatch: pyte
 def test_it_stays_where_more_than_noise_is_left_without_it(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(refuted, "leaves_more_than_noise", lambda found: not found.final.hypothesis.candidates)
     assert named(without_refuted(with_bias(0.03, 0.03, -0.03))) == [BIAS]
+
+
+def test_what_readings_do_not_tell_but_what_the_air_is_charged_for_names_no_inertia():
+    """It gained 87, of which 60 were charges that the air's stiffness changes from segment to segment."""
+    found = search(recordings(draw_case(627033)))
+    assert [candidate.row.type for candidate in found.final.hypothesis.candidates] == [InertiaAsymmetry]
+    assert without_refuted(found).final.hypothesis.candidates == ()

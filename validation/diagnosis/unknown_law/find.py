@@ -207,7 +207,7 @@ def _likeliest(
             fitted = fitted_sensor_law(start, own, own_at, [term])
         else:
             fitted = fitted_law(start, own, own_at, [term], [coefficient], at)
-        if fitted is None:
+        if fitted is None or not np.isfinite(fitted.score):
             continue
         if found is None or _priced(fitted) < _priced(found[0]):
             found = fitted, term
