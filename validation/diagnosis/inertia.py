@@ -64,8 +64,8 @@ def _ratio(recordings: Sequence[Recording]) -> tuple[float, float, str]:
         raise InputError(
             f"{recordings[0].path or recordings[0].name}: a free spin without [disc] whose transverse rates "
             f"({100.0 * float(np.median(tumbling)):.0f} % of the spin) are not the wobble of one symmetric body; add "
-            "[disc] with Ixx_kg_m2 and Izz_kg_m2 to recording.toml, or import the rows of the free spin alone"
-            + "".join(f". {sentence.rstrip('.')}" for sentence in turning)
+            "[disc] with Ixx_kg_m2 and Izz_kg_m2 to recording.toml, or import the rows of the free spin alone "
+            "(--throw N, or --rows A:B)" + "".join(f". {sentence.rstrip('.')}" for sentence in turning)
         )
     if told:
         ratio, air = (float(x) for x in np.median(told, axis=0))
