@@ -44,4 +44,6 @@ def main(files: list[str]) -> None:
 
 
 if __name__ == "__main__":
+    if not sys.argv[1:]:
+        raise SystemExit("no log was given; expected: python benchmarks/disc_throws.py FILE...")
     main(sys.argv[1:])

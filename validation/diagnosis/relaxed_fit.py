@@ -24,7 +24,7 @@ from discsim.validation.diagnosis.consistency.followed import true_noise
 from discsim.validation.diagnosis.consistency.spin_agreement import Comparison, compared, written_ratios
 from discsim.validation.diagnosis.settings import CONSISTENCY, RELAXED_FIT
 from discsim.validation.identification.from_afar import fitted_from_afar
-from discsim.validation.identification.gauss_newton import Bars, Fit, linearised, merit_of, refit
+from discsim.validation.identification.gauss_newton import Fit, linearised, merit_of, refit
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.noise import channel_of, estimate_noise, robust_noise, stated_noise, whitened
 from discsim.validation.identification.ordinary_errors import ordinary_errors
@@ -227,10 +227,8 @@ def from_other_initial_states(fit: Fit) -> Fit:
         alone = replace(alone, merit=merit_of(alone, alone.linears))
         for states in _other_states(fit.trajectories[i], ratio):
             candidate = replace(alone, trajectories=(replace(fit.trajectories[i], states=states),))
-            least = RELAXED_FIT.rescued * alone.merit
-            # what held steps expect of the end is within a tenth of it
-            candidate = refit(candidate, iterations=6, tolerance=1e-3 * fit.count, bars=Bars(1.1 * least))
-            if candidate.merit < least:
+            candidate = refit(candidate, iterations=6, tolerance=1e-3 * fit.count)
+            if candidate.merit < RELAXED_FIT.rescued * alone.merit:
                 alone, better[i] = candidate, candidate.trajectories[0]
     if not better:
         return fit
