@@ -27,7 +27,7 @@ from discsim.validation.diagnosis.selection.event_instants import with_instants_
 from discsim.validation.diagnosis.selection.refits import told_to
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.selection.starting_point import screened
-from discsim.validation.diagnosis.selection.stepwise import search
+from discsim.validation.diagnosis.selection.stepwise import Anew, search
 from discsim.validation.diagnosis.settings import UNKNOWN_LAW
 from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault, with_turned_board
 from discsim.validation.diagnosis.setup_effects import (
@@ -145,8 +145,8 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
         return Tried(ready, contradiction)
     hints = (*ready.supposed, *setup.hints)
 
-    def searched(followed: Fit, of_use: int | None = None, before: Search | None = None) -> Search:
-        return search(ready.fitted, progress, ready.meant, followed, free, hints, question.effects, of_use, before)
+    def searched(followed: Fit, anew: Anew | None = None) -> Search:
+        return search(ready.fitted, progress, ready.meant, followed, free, hints, question.effects, anew)
 
     found = searched(followed)
     if followed.plant.weakly_identified and ready.rows is None:  # else pieces may part, and what is left is known
@@ -158,7 +158,7 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
 _BENDS = 2
 
 
-def _with_bends(found: Search, followed: Fit, searched: Callable[[Fit, int, Search | None], Search]) -> Search:
+def _with_bends(found: Search, followed: Fit, searched: Callable[[Fit, Anew], Search]) -> Search:
     """Return the search of free spins with segments halved that bend, where one names effects or leaves too much.
 
     ``searched`` is a search from a relaxed fit for so many effects as are of use, which begins with those of one before
@@ -171,7 +171,7 @@ def _with_bends(found: Search, followed: Fit, searched: Callable[[Fit, int, Sear
         if bent is None:
             break
         most = 1 if left else count
-        again = searched(bent, most, None if left else found)
+        again = searched(bent, Anew(most, None if left else found))
         if len(again.final.hypothesis.candidates) > most or (leaves_more_than_noise(again) and not left):
             break
         followed, found = bent, again

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -47,10 +48,20 @@ from discsim.validation.identification.noise import stated_noise
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.residual_tests import loudest, unmodelled_residuals
 
-__all__ = ["past_hope", "search", "settled", "without_swallowed"]
+__all__ = ["Anew", "past_hope", "search", "settled", "without_swallowed"]
 
 #: effects that are taken over from one search to the next, at most: two may be hidden
 _FEW = 2
+
+
+class Anew(NamedTuple):
+    """How recordings are searched anew in other segments: how many effects are of use, and what was found ``before``.
+
+    Who asks takes no stack of more than are of use; None where any number is.
+    """
+
+    of_use: int | None = None
+    before: Search | None = None
 
 
 # a hypothesis far from the data may send a motion beyond all numbers: such a fit is not finite, and is passed over
@@ -63,14 +74,14 @@ def search(
     free: Sequence[Parameter] = (),
     hints: Sequence[Effect] = (),
     effects: Competing = CATALOGUED,
-    of_use: int | None = None,
-    before: Search | None = None,
+    anew: Anew | None = None,
 ) -> Search:
     """Find the effects that explain recordings of one plant; what is given is that of `screened`.
 
-    A search that stands by two more than ``of_use`` effects is given up as it stands: who asked takes no such stack.
-    It begins with the effects that one ``before`` found in other segments, where they are worth their price here, too.
+    A search that is asked ``anew`` is given up as it stands where it stands by two more effects than are of use, and
+    begins with those that one before it found, where they are worth their price here, too.
     """
+    of_use, before = anew or Anew()
     found = screened(recordings, report, as_stated, followed, free, hints, effects, before)
     report("refitting candidates", 3, 4)
     found = _selected_forward(found if before is None else _taken_over(found, before), of_use)

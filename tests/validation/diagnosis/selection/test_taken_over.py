@@ -17,7 +17,7 @@ from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.diagnosis.selection.starting_point import screened
-from discsim.validation.diagnosis.selection.stepwise import search
+from discsim.validation.diagnosis.selection.stepwise import Anew, search
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.plants.free_spin import FREE_SPIN
 
@@ -46,7 +46,7 @@ def ids(one: Search) -> list[str]:
 
 
 def test_what_was_found_is_taken_over_without_asking_for_it_again():
-    again = search(spins(BIAS), followed=in_halves(spins(BIAS)), before=found())
+    again = search(spins(BIAS), followed=in_halves(spins(BIAS)), anew=Anew(before=found()))
     assert ids(found()) == ids(again) == ["gyro.bias"]
     assert "gyro.bias" not in {one.candidate.id for one in again.considered}
     bias = dict(zip([q.key for q in again.final.fit.parameters], again.final.fit.at, strict=True))
@@ -62,5 +62,5 @@ def test_an_effect_that_is_worth_nothing_is_not_taken_over():
     begun = screened(spins())
     useless = Hypothesis((free_candidate("accel.bias"),))
     final = continuous_fit(begun.base.fit, useless, begun.own, begun.relaxed_noise, values_of_fit(begun.base))
-    again = search(spins(), followed=in_halves(spins()), before=replace(begun, final=final))
+    again = search(spins(), followed=in_halves(spins()), anew=Anew(before=replace(begun, final=final)))
     assert ids(again) == []
