@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import sys
+from datetime import date, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support.made_logs import made_log
 
+from discsim.environment import world_magnetic_field
 from discsim.validation.cli import main
 from discsim.validation.importing.imported_log import import_log
 
@@ -56,3 +58,29 @@ def test_another_place_is_doubted(tmp_path, monkeypatch, capsys, place, doubted)
     assert stop.value.code == 0
     said = capsys.readouterr()
     assert ("km from where the log says that it was made, 47.4000,8.5000" in said.out + said.err) == doubted
+
+
+@pytest.mark.parametrize(
+    ("first", "day"),
+    [("2026-05-01T12:00:00.000", "2026-05-01"), ("1777629600.000", "2026-05-01"), ("2041-05-01T12:00:00.000", "")],
+)
+def test_a_log_that_tells_its_place_and_its_day_has_the_field_where_a_model_does(tmp_path, first, day):
+    raw = written(tmp_path, "lat,lon", (47.4, 8.5))
+    head, *rows = raw.read_text().splitlines()
+    begins = datetime.fromisoformat(first) if "T" in first else float(first)
+
+    def stamp(row: str) -> str:
+        t, _, rest = row.partition(",")
+        at = begins + (timedelta(seconds=float(t)) if isinstance(begins, datetime) else float(t))
+        return f"{at.isoformat(timespec='milliseconds') if isinstance(at, datetime) else f'{at:.3f}'},{rest}"
+
+    raw.write_text("\n".join([head.replace("time_s", "time"), *map(stamp, rows), ""]))
+    log = import_log(raw)
+    (said,) = [note for note in log.notes if note.startswith("made at")]
+    field = log.recordings[0].environment.magnetic_field
+    assert ("latitude_deg = 47.40000\nlongitude_deg = 8.50000\ndate = 2026-05-01\n" in log.map_text) is bool(day)
+    if day:
+        assert said.endswith("on 2026-05-01 by its stamps: the field is that of the model")
+        np.testing.assert_allclose(field, world_magnetic_field(47.4, 8.5, date(2026, 5, 1)), atol=1e-6)
+    else:
+        assert not np.any(field)

@@ -10,7 +10,8 @@ from itertools import islice
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.validation.importing.clock import is_stamp, stamp_seconds
+from discsim.validation.importing.clock import DATED, is_stamp, stamp_seconds
+from discsim.validation.importing.clock import EPOCH as YEAR_2000
 from discsim.validation.importing.row_clock import added_up
 from discsim.validation.importing.sniffing.coarse_stamps import Counted, counted_rows
 from discsim.validation.importing.sniffing.decision import Decision, Sureness
@@ -20,7 +21,7 @@ from discsim.validation.importing.sniffing.preamble import stated_rate
 from discsim.validation.importing.sniffing.units import readings_of, split_unit
 from discsim.validation.importing.unpadded import unpadded
 
-__all__ = ["Clock", "clocks_of", "counter_note", "seconds", "written_unit"]
+__all__ = ["Clock", "clocks_of", "counter_note", "moment_of", "seconds", "written_unit"]
 
 SCALES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 #: A unit that is taken where the header states it, and never guessed.
@@ -103,6 +104,17 @@ def seconds(clock: Clock, numbers: Numbers) -> FloatArray:
     return (
         (added_up(value, numbers.table.number) if clock.spacings else value) * clock.scale * STATED_SCALES[clock.unit]
     )
+
+
+def moment_of(clock: Clock, numbers: Numbers) -> float | None:
+    """Return when a log began, s since 1970, where its stamps are dates or count from then; else None."""
+    if clock.column not in numbers.table.columns:
+        return None
+    t = seconds(clock, numbers)
+    began = float(t[np.isfinite(t)][0]) if np.isfinite(t).any() else 0.0
+    if clock.unit == "iso":
+        return YEAR_2000.timestamp() + began if began > DATED else None
+    return began if EPOCH[0] < began < EPOCH[1] else None
 
 
 def counter_note(clock: Clock) -> str | None:

@@ -1,17 +1,21 @@
-"""Where a log says that it was made. Takes the tables; gives latitude and longitude, and what to say of them.
+"""Where and when a log says that it was made. Takes the tables; gives the place and the day, and what to say of them.
 
-The magnetic field of a place is asked for (``--place``), and a log with a receiver's columns knows the place itself.
+The magnetic field of a place is asked for (``--place``, ``--date``), and a log with a receiver's columns knows the
+place itself, one whose stamps are dates also the day.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from datetime import UTC, date, datetime, timedelta
 from math import cos, hypot, radians
 from typing import NamedTuple
 
 import numpy as np
 
 from discsim.arrays import FloatArray
+from discsim.environment import world_magnetic_field
+from discsim.errors import InputError
 from discsim.validation.importing.sniffing.groups import Numbers
 
 __all__ = ["OwnPlace", "own_place"]
@@ -23,22 +27,42 @@ _COUNTS = 1e-7
 _DEGREE_KM, _APART_KM = 111.1, 20.0
 
 
+#: what clocks of dates count from
+_FIRST = datetime(1970, 1, 1, tzinfo=UTC)
+
+
 class OwnPlace(NamedTuple):
-    """Latitude and longitude, degrees north and east, and the names of their columns."""
+    """Latitude and longitude, degrees north and east, and the names of their columns; the day where that is known.
+
+    It is the day of a log whose stamps are dates, where a model tells the field of that day.
+    """
 
     latitude: float
     longitude: float
     names: tuple[str, str]
+    day: date | None = None
 
     @property
     def text(self) -> str:
         """The place as ``--place`` takes it."""
         return f"{self.latitude:.4f},{self.longitude:.4f}"
 
+    def on(self, moment: float | None) -> OwnPlace:
+        """Return the place on the day of a moment, s since 1970; without it where no model tells that day's field."""
+        if moment is None:
+            return self
+        day = (_FIRST + timedelta(seconds=moment)).date()
+        try:
+            world_magnetic_field(self.latitude, self.longitude, day)
+        except InputError:
+            return self
+        return self._replace(day=day)
+
     @property
     def note(self) -> str:
         """Where the log was made, in a sentence."""
-        return f"made at {self.text} (degrees north, east) by its own '{self.names[0]}', '{self.names[1]}'"
+        said = f"made at {self.text} (degrees north, east) by its own '{self.names[0]}', '{self.names[1]}'"
+        return said if self.day is None else f"{said}, on {self.day} by its stamps: the field is that of the model"
 
     def doubt(self, place: str) -> str | None:
         """Return what to say of a ``--place`` that is well formed and another one; None where it is this."""

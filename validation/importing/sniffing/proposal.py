@@ -134,6 +134,13 @@ def _place(place: OwnPlace | None) -> list[str]:
         return [
             "# The field of the place is not known: add latitude_deg, longitude_deg and date, or magnetic_field_ned_uT."
         ]
+    if place.day is not None:
+        return [
+            "# By its own columns and stamps the log was made here and then, which tells the field.",
+            f"latitude_deg = {place.latitude:.5f}",
+            f"longitude_deg = {place.longitude:.5f}",
+            f"date = {place.day}",
+        ]
     return [
         "# By its own columns the log was made at the place below; with the date it tells the field.",
         f"# latitude_deg = {place.latitude:.5f}",

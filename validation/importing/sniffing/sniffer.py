@@ -19,7 +19,7 @@ from discsim.validation.importing.raw_table import REPAIRS, Layout, RepairList, 
 from discsim.validation.importing.sniffing.archive import BESIDE, MAX_FILES
 from discsim.validation.importing.sniffing.axes import body_axes
 from discsim.validation.importing.sniffing.behaviour import TELLING, WORTHS, by_behaviour
-from discsim.validation.importing.sniffing.clock import SPACING, Clock, clocks_of, counter_note, seconds
+from discsim.validation.importing.sniffing.clock import SPACING, Clock, clocks_of, counter_note, moment_of, seconds
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.dialect import dialect_of
 from discsim.validation.importing.sniffing.exchanged import exchanged
@@ -107,6 +107,7 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     others = _others(found, left)
     own = own_clocks(clock, {sensor: triple for sensor, (triple, _) in found.items()})
     place = own_place(tables)
+    place = place and place.on(moment_of(clock, files[0].numbers))
     notes = [*exchanges, *notes, *said, *(note for _, note in others), *own.notes, *([place.note] if place else [])]
     propose = partial(_proposal, raw, plant, layout, clock, own, found, notes)
     proposal = propose({})
