@@ -12,6 +12,7 @@ from scipy.stats import chi2 as chi2_law
 from discsim.arrays import FloatArray
 from discsim.disc import Aero, aero_key
 from discsim.effects.catalogue import effect as catalogued
+from discsim.effects.rig import AxisTilt
 from discsim.model_file import Model, ModelEffect
 from discsim.recording import Recording
 from discsim.validation.diagnosis.command_followed import not_as_commanded
@@ -395,11 +396,22 @@ def outcome_of(judged: Judged, question: Question) -> Outcome:
         turning = turning_of(question.recordings, question.names)
     if found is not None:
         told = () if turning is None else turning.sentences
-        told += not_as_commanded(found, question.names) if judged.verdict == "unexplained" else ()
+        told += not_as_commanded(found, question.names) if judged.verdict == "unexplained" else _leaning(found)
         return _outcome_of_search(judged, question, found, setup, (*told, *warnings), agreement)
     assert tried.contradiction is not None
     datasets, names, seed = question.datasets, question.names, question.seed
     return contradicted_outcome(tried.contradiction, ready.meant, datasets, names, seed, warnings, agreement, turning)
+
+
+def _leaning(found: Search) -> tuple[str, ...]:
+    """Return what to say of an axis that leans where no magnetometer tells which way."""
+    leans = any(candidate.row.type is AxisTilt for candidate in found.final.hypothesis.candidates)
+    if not leans or any("magnetometer" in one.samples for one in found.recordings):
+        return ()
+    return (
+        "no magnetometer tells where north is: the rig's axis leans by the size of what is named, and nobody knows "
+        "which way.",
+    )
 
 
 def _speed_searched_for(recordings: Sequence[Recording]) -> tuple[str, ...]:

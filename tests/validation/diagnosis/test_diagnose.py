@@ -21,6 +21,8 @@ from discsim.effects import Effect, effect
 from discsim.motion import Motion
 from discsim.recording import Recording, Samples, read_dataset
 from discsim.sensors.sampling import Noise
+from discsim.validation.challenge.cases.conceal import recordings
+from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.result import Diagnosis
 
@@ -298,3 +300,15 @@ def test_a_bias_beside_a_board_that_is_turned_far_is_along_the_axes_of_the_board
     diagnosis = answer_of(tables(errors=hidden))
     assert {item.id for item in diagnosis.effects} == {item.id for item in hidden}
     assert_found(diagnosis, hidden[1])
+
+
+def test_an_axis_that_leans_is_named_once_where_no_magnetometer_tells_north():
+    """Each run had a yaw of its own then, and its own lean by it: four runs named four."""
+    case = draw_case(633022)
+    (lean,) = [item.effect.value for item in case.concealed]
+    outcome = diagnose([recordings(case)], ["tables"]).diagnosis
+    (named,) = outcome.effects
+    assert (named.id, named.recordings) == ("rig.axis_tilt", None)
+    size = np.hypot(*(named.parameters[f"tilt_{way}_rad"].value for way in ("north", "east")))
+    assert size == pytest.approx(np.hypot(lean.tilt_north_rad, lean.tilt_east_rad), abs=1e-3)
+    assert any("nobody knows which way" in warning for warning in outcome.warnings)

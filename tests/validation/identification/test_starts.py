@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_trapezoid
 from support.places import PRACTICE
 
 from discsim.disc import Release, Rig
@@ -334,6 +335,33 @@ def test_a_rig_that_runs_down_shows_its_angle(initial, iron):
     np.testing.assert_allclose(r, truth.rate[:, 2], rtol=RATE)
     # unwrapped: it turns by what the rate says
     np.testing.assert_allclose(np.diff(psi), 0.25 * (r[1:] + r[:-1]), rtol=0.02)
+
+
+def turned(profile: Samples, t: np.ndarray) -> np.ndarray:
+    """Return the angle (k,) that a commanded rate has turned at t (k,), rad."""
+    grid = np.linspace(0.0, profile.t[-1], 6001)
+    rate = np.interp(grid, profile.t, profile.value)
+    return np.interp(t, grid, cumulative_trapezoid(rate, grid, initial=0))
+
+
+@pytest.mark.parametrize("leans", [True, False])
+def test_without_a_magnetometer_all_runs_of_a_leaning_table_start_where_it_leans(leans):
+    """Else a lean that all share is another one in each, and each was named."""
+    tilt = [effect("rig.axis_tilt", tilt_north_rad=-0.013, tilt_east_rad=0.04)] * leans
+    profile = Samples(np.array([0.0, 1.0, 2.0, 6.0]), np.array([0.0, 0.0, 20.0, 20.0]))
+    module = MODULE.without("gps", "magnetometer")
+    t = np.arange(0.0, 5.9, 0.25)
+    apart = []
+    for seed, yaw in enumerate((0.3, 1.9)):
+        motion = turn_table(profile, FIELD, tilt, yaw=yaw)
+        rng = np.random.default_rng(seed)
+        recording = record(motion, module, rng, plant="rate_table", name="table", command=profile)
+        psi, _ = rig_initial_states(recording, t)
+        apart.append(np.exp(1j * (psi - turned(profile, t) - yaw)))
+    if leans:
+        np.testing.assert_allclose(np.angle(apart[0] * np.conj(apart[1])), 0.0, atol=0.05)
+    else:
+        np.testing.assert_allclose(np.angle(apart[0] * np.conj(apart[1])), 1.6, atol=0.05)
 
 
 def test_a_table_that_stands_still_and_turns_both_ways_shows_its_angle():

@@ -84,7 +84,8 @@ class Spin(NamedTuple):
 def rig_initial_states(recording: Recording, t: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the yaw angle psi (k,) rad, unwrapped, and the rate r (k,) rad/s, at instants t (k,) s of a rig run.
 
-    The axis points straight down. Without magnetometer psi counts from zero at the recording's start.
+    The axis points straight down. Without magnetometer psi counts from zero at the recording's start, or from where an
+    axis that leans shows on board: all recordings of a rig lean the same way.
     """
     t = np.asarray(t, dtype=float)
     expected = expected_rate(recording)
@@ -93,11 +94,33 @@ def rig_initial_states(recording: Recording, t: FloatArray) -> tuple[FloatArray,
         grid = np.arange(0.0, max(recording.end, float(np.max(t, initial=0.0))) + 0.02, 0.01)
         r = np.zeros(grid.size) if expected is None else expected(grid)
         psi = cumulative_trapezoid(r, grid, initial=0)
+        psi = psi - _lean(recording, grid, psi, r)
         return np.interp(t, grid, psi), np.interp(t, grid, r)
     north, east, _ = recording.environment.magnetic_field
     # m_B = C3(psi) B: the complex field in B is that in N times exp(-i psi)
     psi = np.arctan2(east, north) - spin.phase_at(t)
     return psi, -np.interp(t, spin.grid, spin.turning)
+
+
+#: standard errors from which gravity that goes round on board is one; noise alone would turn where a run starts, which
+#: nothing tells
+_LEANS = 5.0
+
+
+def _lean(recording: Recording, grid: FloatArray, psi: FloatArray, r: FloatArray) -> float:
+    """Return the direction, rad, of the gravity that goes round on board of a rig whose axis leans; 0 without any.
+
+    It is told from what stays on board: a bias, the pull to the axis and what changes of the rate give.
+    """
+    readings = readings_for(recording, "accelerometer", slice(0, 2))
+    if readings is None or np.ptp(psi) < 2.0 * np.pi:
+        return 0.0
+    z = readings.value[:, 0] + 1j * readings.value[:, 1]
+    rate, angle, slope = (np.interp(readings.t, grid, each) for each in (r, psi, np.gradient(r, grid)))
+    columns = np.column_stack([np.ones_like(z), rate**2, slope, np.exp(-1j * angle)])
+    found, *_ = np.linalg.lstsq(columns, z, rcond=None)
+    scatter = float(np.sqrt(np.mean(np.abs(z - columns @ found) ** 2) / z.size))
+    return float(np.angle(found[-1])) if abs(found[-1]) > _LEANS * scatter else 0.0
 
 
 def field_spin(recording: Recording, *, steady: bool) -> Spin | None:
