@@ -15,6 +15,7 @@ from discsim.validation.checking.path_points import out_of_reach, rows_in_words,
 from discsim.validation.checking.statements import FASTEST
 from discsim.validation.diagnosis.track_ends import scatter_of
 from discsim.validation.importing.held import find_held
+from discsim.validation.importing.import_map import SPEEDS
 
 __all__ = ["FARTHEST", "elsewhere", "gps_findings"]
 
@@ -35,7 +36,7 @@ _PATHS = {
     0.001: "the velocity in mm/s, or the position in km",
 }
 #: ... and how an import map says the unit of a velocity
-_LINES = {0.514: "kn", 0.447: "mph", 0.305: "ft/s", 0.278: "km/h", 0.01: "cm/s", 0.001: "mm/s"}
+_LINES = {float(f"{worth:.3g}"): unit for unit, worth in SPEEDS.items()}
 #: that ratio is believed where position and velocity correlate so, and is of another unit beyond these: a velocity
 #: that a receiver smooths, or positions that are off by metres, move it by some per cent
 _GO_TOGETHER, _ONE = 0.9, (0.7, 1.4)

@@ -98,7 +98,7 @@ def iso_seconds(cell: str) -> float | None:
         return 60.0 * int(minutes[1]) + float(f"{minutes[2]}.{minutes[3]}") if int(minutes[2]) < 60 else None
     if days := _DAYS.fullmatch(text):
         time = _time_of_day(days[2])
-        return None if time is None else 86400.0 * int(days[1]) + time
+        return None if time is None else DAY * int(days[1]) + time
     # the fraction is taken by itself: datetime drops what is below a microsecond
     head, dot, tail = text.replace(",", ".").partition(".")
     digits = re.match(r"\d+", tail)

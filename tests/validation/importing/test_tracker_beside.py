@@ -79,6 +79,16 @@ def assert_flies_north(gps):
     assert_allclose(gps.value[:, 2], -(gps.t - gps.t[0]), atol=0.02)
 
 
+def assert_whole_by_its_map(tmp_path, raw, log):
+    """Every fix is there, and the proposed map brings the same again."""
+    gps = log.recordings[0].samples["gps"]
+    assert len(gps) == T.size
+    assert_flies_north(gps)
+    (tmp_path / "map.toml").write_text(log.map_text)
+    again = import_log(raw, str(tmp_path / "map.toml")).recordings[0].samples["gps"]
+    np.testing.assert_array_equal(again.value, gps.value)
+
+
 @pytest.mark.parametrize(
     ("head", "stamp", "height", "lines"),
     [
@@ -99,12 +109,7 @@ def test_a_table_of_fixes_is_read_by_the_proposed_map(tmp_path, head, stamp, hei
     assert 'file = "tracker.csv"' in proposed
     assert 'unit = "deg"' in proposed
     assert all(line in proposed for line in lines)
-    gps = log.recordings[0].samples["gps"]
-    assert len(gps) == T.size
-    assert_flies_north(gps)
-    (tmp_path / "map.toml").write_text(log.map_text)
-    again = import_log(raw, str(tmp_path / "map.toml")).recordings[0].samples["gps"]
-    np.testing.assert_array_equal(again.value, gps.value)
+    assert_whole_by_its_map(tmp_path, raw, log)
 
 
 def test_speed_and_heading_are_left_out_aloud(tmp_path):
@@ -128,12 +133,7 @@ def test_a_table_that_is_laid_out_in_another_way_is_read(tmp_path, ours, theirs)
     log = import_log(raw)
     assert ("[sensors.gps.layout]" in log.map_text) == (ours[0] != theirs[0])
     assert not [note for note in log.notes if "another way" in note]
-    gps = log.recordings[0].samples["gps"]
-    assert len(gps) == T.size
-    assert_flies_north(gps)
-    (tmp_path / "map.toml").write_text(log.map_text)
-    again = import_log(raw, str(tmp_path / "map.toml")).recordings[0].samples["gps"]
-    np.testing.assert_array_equal(again.value, gps.value)
+    assert_whole_by_its_map(tmp_path, raw, log)
 
 
 @pytest.mark.parametrize("semicolons", [False, True])

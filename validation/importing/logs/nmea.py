@@ -18,14 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from discsim.validation.importing.clock import EPOCH
+from discsim.validation.importing.clock import DAY, EPOCH
 from discsim.validation.importing.logs.tables import Log, Rows, chosen, course_velocity
 
 __all__ = ["SENTENCES", "begins", "read", "read_sentences"]
 
 SENTENCES = ("GGA", "RMC", "VTG")
 KNOT = 1852.0 / 3600.0
-DAY = 86400.0
 #: A sentence: what the checksum is of, and the checksum, which one that breaks off has not. Those of VectorNav's units
 #: (VN) are no receiver's.
 _SENTENCE = re.compile(rb"\$((?!VN)(?:P[A-Z]{3}|[A-Z]{2}[A-Z0-9]{3}),[ -#%-)+-~]*)(?:\*([0-9A-Fa-f]{2}))?")
