@@ -21,7 +21,7 @@ from discsim.validation.diagnosis.detectors.row_times import row_times
 from discsim.validation.diagnosis.inertia import with_inertia
 from discsim.validation.diagnosis.prepared import prepared
 from discsim.validation.diagnosis.refuted import without_refuted
-from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.relaxed_fit import moves_out, relaxed
 from discsim.validation.diagnosis.result import Outcome
 from discsim.validation.diagnosis.selection.event_instants import with_instants_weighed
 from discsim.validation.diagnosis.selection.refits import told_to
@@ -144,6 +144,9 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
     if contradiction is not None:
         return Tried(ready, contradiction)
     hints = (*ready.supposed, *setup.hints)
+    told = _law_of_what_moves_out(ready, followed, question) if moves_out(followed) else None
+    if told is not None:
+        return told
 
     def searched(followed: Fit, anew: Anew | None = None) -> Search:
         return search(ready.fitted, progress, ready.meant, followed, free, hints, question.effects, anew)
@@ -152,6 +155,15 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
     if followed.plant.weakly_identified and ready.rows is None:  # else pieces may part, and what is left is known
         found = _with_bends(found, followed, searched)
     return Tried(ready, None, found)
+
+
+def _law_of_what_moves_out(ready: Prepared, followed: Fit, question: Question) -> Tried | None:
+    """Return what was tried with the law by which something moves in a body, asked before any effect: none does."""
+    question.progress("looking for a law", 4, 5)
+    free = free_parameters(ready.setup)
+    begun = screened(ready.fitted, as_stated=ready.meant, followed=followed, free=free, effects=question.effects)
+    law = find_law(begun.relaxed_fit, begun.base, begun.own, begun.relaxed_noise, ready.fitted, sensor="accelerometer")
+    return None if law is None else Tried(ready, None, begun, law)
 
 
 #: times that segments are halved where the air's moment bends within them

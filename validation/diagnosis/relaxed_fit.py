@@ -16,7 +16,7 @@ import numpy as np
 from discsim.arrays import FloatArray, sd_by_median
 from discsim.effects.catalogue import CATALOGUE, Effect, catalogued
 from discsim.effects.catalogue import effect as made
-from discsim.effects.sensors import ClockRate
+from discsim.effects.sensors import ClockRate, GSensitivity
 from discsim.effects.setup import TimeOffset
 from discsim.frames import conjugate, multiply
 from discsim.recording import Recording
@@ -40,6 +40,7 @@ __all__ = [
     "clock_of_accelerometer",
     "first_trajectory",
     "from_other_initial_states",
+    "moves_out",
     "relaxed",
     "time_ratio",
     "trajectory_in_true_time",
@@ -152,7 +153,7 @@ def relaxed(
     if fit.from_release:
         return fitted_from_afar(fit)
     fit = _reweighted(fit, iterations, few) if supposed else refit(fit, iterations=iterations, tolerance=few)
-    fit = from_other_initial_states(fit)
+    fit = from_other_initial_states(_out_of_balance(fit))
     if not plant.airborne:
         fit = _with_own_clock(fit)
     if ratio == 1.0:
@@ -319,21 +320,69 @@ def _led_by_others(fit: Fit) -> Fit:
         if _astray(led):
             continue
         ratio = _clock_read(led, [one.readings for one in fit.trajectories], sensor, clock)
-        trajectories = tuple(
-            replace(new, recording=old.recording, readings=old.readings)
-            for new, old in zip(led.trajectories, fit.trajectories, strict=True)
-        )
+        trajectories = _with_readings(led, fit)
         free = Parameter(*clock, 1.0, 1e-6, RELAXED_FIT.clock_sigma)
         both = replace(led, trajectories=trajectories, parameters=(*fit.parameters, free), at=np.append(led.at, ratio))
         both = refit(both, iterations=12, tolerance=few)
-        if not _astray(both):
-            return both
-        kept = replace(led, trajectories=trajectories)
-        linears = linearised(kept)
-        level = estimate_noise(linears, [linear.residual for linear in linears], coloured=False)[sensor]
-        kept = replace(kept, linears=linears, noise={**kept.noise, sensor: level})
-        return replace(kept, merit=merit_of(kept, linears))
+        return _beside(replace(led, trajectories=trajectories), sensor) if _astray(both) else both
     return fit
+
+
+def _with_readings(led: Fit, fit: Fit) -> tuple[Trajectory, ...]:
+    """Return the motions of a fit that was led by some sensors with the readings of all."""
+    pairs = zip(led.trajectories, fit.trajectories, strict=True)
+    return tuple(replace(new, recording=old.recording, readings=old.readings) for new, old in pairs)
+
+
+def _beside(led: Fit, sensor: str) -> Fit:
+    """Return a fit that the others lead with a sensor in the noise that this motion leaves of it."""
+    linears = linearised(led)
+    level = estimate_noise(linears, [linear.residual for linear in linears], coloured=False)[sensor]
+    led = replace(led, linears=linears, noise={**led.noise, sensor: level})
+    return replace(led, merit=merit_of(led, linears))
+
+
+#: what else writes into x and y of a gyroscope what goes with the spin
+_BY_PULL = tuple((catalogued(GSensitivity, "gyroscope").id, name) for name in ("kx", "ky"))
+
+
+def _out_of_balance(fit: Fit) -> Fit:
+    """Follow free spins as of bodies out of balance where a gyroscope shows that they are.
+
+    The air's force about a centre of mass beside the middle is a moment fixed in the body: its rates lean as the force
+    comes and goes, otherwise in each throw, as no error of a gyroscope does. What has moved out so far may move on: the
+    pull on the accelerometer is then no measure of the spin, and the motion is left as the others tell it.
+    """
+    if fit.plant.unbalanced is None or not _left_across(fit) > RELAXED_FIT.across:
+        return fit
+    few, sensor = 1e-4 * fit.count, "accelerometer"
+    led = replace(_without(fit, sensor, few), merit=np.inf) if _astray(fit) else fit
+    moved = tuple(replace(one, unbalanced=True) for one in led.trajectories)
+    turned = refit(replace(led, trajectories=moved, defects=moved[0].plant.sizes.relaxed), iterations=12, tolerance=few)
+    if _astray(turned) or not _left_across(turned) < RELAXED_FIT.reconciled * _left_across(fit):
+        return fit
+    if led is not fit:
+        return _beside(replace(turned, trajectories=_with_readings(turned, fit)), sensor)
+    free = tuple(Parameter(*key, 0.0, 1e-6, 1e-2) for key in _BY_PULL)
+    pulled = replace(fit, parameters=(*fit.parameters, *free), at=np.append(fit.at, [0.0, 0.0]))
+    pulled = refit(pulled, iterations=12, tolerance=few)
+    return turned if _left_across(turned) < RELAXED_FIT.reconciled * _left_across(pulled) else fit
+
+
+def moves_out(fit: Fit) -> bool:
+    """Tell whether what is out of balance in a body moves: its accelerometer is far from the motion of the others."""
+    return all(one.unbalanced for one in fit.trajectories) and _misfit(fit, "accelerometer") > RELAXED_FIT.lost
+
+
+def _left_across(fit: Fit) -> float:
+    """Return what a fit leaves of a gyroscope's x and y, mean square in its noise; NaN without one."""
+    left = [
+        linear.residual[c.rows] / fit.noise[c.group].sd
+        for linear in fit.linears
+        for c in linear.channels
+        if c.sensor == "gyroscope" and c.axis[0] in "xy"
+    ]
+    return float(np.mean(np.concatenate(left) ** 2)) if left else np.nan
 
 
 def _with_own_clock(fit: Fit) -> Fit:

@@ -94,10 +94,14 @@ class RelaxedFit:
         Length of the beginning that tells the clocks, s: until then one that is 2 % off has turned the phase of a spin
         of 80 rad/s by 2 rad, less than half a turn.
     lost : float
-        A gyroscope on a rig whose residual is this many times its stated noise may have a clock far from right: no
-        noise of the blind test is more than three times as loud as stated.
+        A gyroscope on a rig whose residual is this many times its stated noise may have a clock far from right, an
+        accelerometer in a body out of balance a place that moves: no noise of the blind test is more than three times
+        as loud as stated.
     reconciled : float
-        Its clock is taken up where it leaves less than this share: from ten times the noise back to twice.
+        What else is supposed is taken up where it leaves less than this share: from ten times the noise back to twice.
+    across : float
+        Mean square of what is left of a gyroscope's x and y in a free spin, in its noise, above which its body may be
+        out of balance: others leave 0.9 to 1.1.
     outlier, neighbour : float
         A reading this many robust standard deviations off, its neighbours within the second number, is left out:
         normal noise has the one once in 4e18 readings, the other once in 1.5e5.
@@ -113,6 +117,7 @@ class RelaxedFit:
     first_look: float = 1.3
     lost: float = 10.0
     reconciled: float = 0.2
+    across: float = 1.5
     outlier: float = 9.0
     neighbour: float = 4.5
     most_outliers: float = 0.03

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -54,11 +54,24 @@ class Bars(NamedTuple):
 NO_BARS = Bars()
 
 
+class Beside(Protocol):
+    """The last ``count`` parameters of a fit, which stand in readings alone."""
+
+    @property
+    def count(self) -> int:
+        """Number of parameters."""
+
+    def __call__(self, fit: Fit, recording: int, linear: Linear) -> Linear:
+        """Return a linearisation less what they do, with columns for them."""
+
+
 @dataclass(frozen=True)
 class Fit:
     """Where a fit stands: the trajectories, the shared parameters and their values (p,), the last linearisations.
 
-    ``fixed`` are values that take part without being fitted.
+    ``fixed`` are values that take part without being fitted. ``beside`` widens a linearisation of a recording (the
+    second argument, its place) by the last parameters, which stand in its readings and in no motion; its first are
+    linearised as ever.
     """
 
     trajectories: tuple[Trajectory, ...]
@@ -67,6 +80,7 @@ class Fit:
     defects: AllowedDefects
     noise: NoiseModel
     fixed: Values = field(default_factory=dict)
+    beside: Beside | None = None
     linears: tuple[Linear, ...] = ()
     merit: float = np.inf
     covariance: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
@@ -141,7 +155,9 @@ def linearised(
 
     One-sided differences cost half and do for steps; ``central`` ones for what is told of a fit.
     """
+    beside = fit.beside if parameters is None else None
     chosen = fit.parameters if parameters is None else parameters
+    chosen = chosen if beside is None else chosen[: len(chosen) - beside.count]
     which = range(len(fit.trajectories)) if only is None else only
 
     def one(index: int) -> Linear:
@@ -151,13 +167,15 @@ def linearised(
         linear = linearise(trajectory, values, active, fit.defects.allowed, central=central, threads=_spare(len(which)))
         if len(active) < len(columns):
             linear = linear.spread([j for j, column in enumerate(columns) if column.step > 0], len(columns))
-        return linear
+        return linear if beside is None else beside(fit, index, linear)
 
     return tuple(mapped(one, which))
 
 
 def repredicted(fit: Fit) -> tuple[Linear, ...] | None:
     """Return linearisations with residuals where a fit's trajectories stand and slopes as they were, if known."""
+    if fit.beside is not None:
+        return None  # what stands beside a motion in readings turns with it
 
     def one(index: int) -> Linear | None:
         return reread(fit.trajectories[index], fit.values(index), fit.linears[index], _spare(len(fit.trajectories)))

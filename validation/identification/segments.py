@@ -35,11 +35,14 @@ class Trajectory:
     effects: Competing = CATALOGUED
     #: one sigma (d,) of what a step may move the first state by, where it is not the plant's
     trust_radius: FloatArray | None = None
+    #: whether moments fixed in the body turn it, of which nothing is stated
+    unbalanced: bool = False
 
     @property
     def plant(self) -> Plant:
         """What kind of experiment it is."""
-        return plant_of(self.recording)
+        plant = plant_of(self.recording)
+        return plant.unbalanced if self.unbalanced and plant.unbalanced is not None else plant
 
     def segment_of(self, t: FloatArray) -> IntArray:
         """Return the places (n,) of the segments that tell the motion at instants t (n,) s: at a node the later one."""

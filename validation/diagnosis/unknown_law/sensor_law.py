@@ -16,7 +16,7 @@ from discsim.validation.diagnosis.selection.screening import NormalEquations, co
 from discsim.validation.diagnosis.selection.to_stated import to_baseline
 from discsim.validation.diagnosis.unknown_law.terms import SENSORS, SHAPES, SensorTerm
 from discsim.validation.identification.dynamics import FASTEST
-from discsim.validation.identification.gauss_newton import Fit, linearised, mapped, whole_step
+from discsim.validation.identification.gauss_newton import Fit, linearised, mapped, reduced_each, refit, whole_step
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.noise import chi_squared
 from discsim.validation.identification.normal_equations import common_step, reduce
@@ -44,6 +44,14 @@ _PLAY_STEP = 0.03
 
 #: rounds after which the noise is that which a term leaves; a fit ends in that noise
 _SETTLED = 3
+
+
+#: one sigma of a coefficient, so wide that it holds none but one that no reading tells
+_ANY = 1e6
+
+
+#: times that a fit in held steps finds its noise anew, and its first steps
+_LEVELS, _STEPS = 3, 16
 
 
 #: orders of the spin that are looked at, peaks of the spectrum that are tried
@@ -277,9 +285,9 @@ def _coefficients(trajectories: Sequence[Trajectory], term: SensorTerm, number: 
     axes = max((_axes(trajectory, term.sensor) for trajectory in trajectories), key=len)
     names = [f"{number}.{axis}.{j}" for axis in axes for j in range(term.size)]
     if not term.own:
-        return [Parameter("term", name, 0.0, 1.0) for name in names]
+        return [Parameter("term", name, 0.0, 1.0, _ANY) for name in names]
     return [
-        Parameter("term", f"{name}.{k}", 0.0, 1.0, recordings=frozenset({k}))
+        Parameter("term", f"{name}.{k}", 0.0, 1.0, _ANY, recordings=frozenset({k}))
         for k in range(len(trajectories))
         for name in names
     ]
@@ -304,6 +312,27 @@ def _beside_terms(
         slopes.append(((above - below) @ one.coefficients) / (2.0 * h))
         less += here @ one.coefficients
     return _widened(replace(linear, raw=linear.raw - less), np.column_stack([*columns, *slopes]))
+
+
+@dataclass(frozen=True)
+class TermsBeside:
+    """The last parameters of a fit, those of sensor terms: ``widths`` coefficients of each, then their shapes."""
+
+    terms: tuple[SensorTerm, ...]
+    widths: tuple[int, ...]
+
+    @property
+    def count(self) -> int:
+        """Number of parameters."""
+        return sum(self.widths) + len(self.terms)
+
+    def __call__(self, fit: Fit, recording: int, linear: Linear) -> Linear:
+        """Return a recording's linearisation less what the terms do, with columns for their numbers."""
+        first, shapes = len(fit.at) - self.count, fit.at[len(fit.at) - len(self.terms) :]
+        parts = np.split(fit.at[first : first + sum(self.widths)], np.cumsum(self.widths)[:-1])
+        here = zip(self.terms, shapes.tolist(), parts, strict=True)
+        settled = [SettledTerm(replace(term, shape=shape), c) for term, shape, c in here]
+        return _beside_terms(linear, fit.trajectories[recording], settled, self.widths, recording)
 
 
 def asked_of_sensors(
@@ -380,39 +409,50 @@ def fitted_sensor_law(
         mine = _coefficients(start.trajectories, term, i)
         numbers += mine
         widths.append(len(mine))
-    p, count = len(own), len(numbers)
-    parameters = (
-        *own,
-        *numbers,
-        *(
-            Parameter("term", f"{i}.shape", t.shape, _shape_step(t) * t.shape, _shape_sd(t))
-            for i, t in enumerate(terms)
-        ),
+    shapes = tuple(
+        Parameter("term", f"{i}.shape", t.shape, _shape_step(t) * t.shape, _shape_sd(t)) for i, t in enumerate(terms)
     )
-    shapes = np.array([term.shape for term in terms])
-    at = np.concatenate([own_at, np.zeros(count), shapes])
-    fit = Fit(start.trajectories, parameters, at, start.plant.sizes.continuous, start.noise)
+    at = np.concatenate([own_at, np.zeros(len(numbers)), [term.shape for term in terms]])
+    beside = TermsBeside(tuple(terms), tuple(widths))
+    defects = start.plant.sizes.continuous
+    fit = Fit(start.trajectories, (*own, *numbers, *shapes), at, defects, start.noise, beside=beside)
+    fit = _in_held_steps(fit) if fit.plant.weakly_identified else _in_whole_steps(fit, len(numbers), len(shapes))
+    if not np.all(np.isfinite(fit.at)) or not fit.covariance.size or not _are_plays(fit, terms):
+        return None
+    return scored(Hypothesis(), fit)
+
+
+def _in_held_steps(fit: Fit) -> Fit:
+    """Return a fit of terms after steps held short where readings say little of a motion: whole ones hop about."""
+    for done in range(_LEVELS):
+        fit = refit(fit, iterations=_STEPS if done == 0 else 2, relinearise=done == 0)
+        if not np.isfinite(fit.merit):
+            break
+        fit = replace(fit, noise={**fit.noise, **noise_of(fit)})
+    return fit
+
+
+def _in_whole_steps(fit: Fit, count: int, ends: int) -> Fit:
+    """Return a fit of terms, ``count`` coefficients and last ``ends`` shapes, after whole steps that settle."""
+    width = len(fit.parameters)
     for round in range(12):
-        bare = linearised(replace(fit, parameters=tuple(own), at=fit.at[:p]))
-        shapes, parts = fit.at[p + count :], np.split(fit.at[p : p + count], np.cumsum(widths)[:-1])
-        here = zip(terms, shapes.tolist(), parts, strict=True)
-        settled = [SettledTerm(replace(term, shape=shape), c) for term, shape, c in here]
-        each = enumerate(zip(bare, fit.trajectories, strict=True))
-        linears = [_beside_terms(a, b, settled, widths, k) for k, (a, b) in each]
-        fit = replace(fit, linears=tuple(linears))
+        linears = linearised(fit)
+        fit = replace(fit, linears=linears)
         merit = sum(chi_squared(linear, fit.noise, linear.residual) for linear in linears)
-        reduced = mapped(
-            lambda linear, trajectory, f=fit: reduce(linear, trajectory, f.noise, f.defects), linears, fit.trajectories
-        )
+        reduced = reduced_each(fit)
         gram = np.sum([r.gram for r in reduced], axis=0)
-        free = [*range(p + count)] if not np.any(fit.at[p : p + count]) else [*range(len(parameters))]
-        some = [*free, len(parameters)]
-        step, covariance, expected = common_step(gram[np.ix_(some, some)], [parameters[j] for j in free], fit.at[free])
-        full = np.zeros(len(parameters))
+        told = np.any(fit.at[width - ends - count : width - ends])  # else no shape shows
+        free = [*range(width if told else width - ends)]
+        some = [*free, width]
+        step, covariance, expected = common_step(
+            gram[np.ix_(some, some)], [fit.parameters[j] for j in free], fit.at[free]
+        )
+        full = np.zeros(width)
         full[free] = step
-        if len(free) == len(parameters):
+        if told:
             # a shape moves by a third of itself at most, an order of the spin by less than its line is wide
-            full[p + count :] = np.clip(full[p + count :], -0.3 * shapes, 0.3 * shapes)
+            most = 0.3 * fit.at[-ends:]
+            full[-ends:] = np.clip(full[-ends:], -most, most)
             fit = replace(fit, covariance=covariance)
         if round > _SETTLED and fit.merit - merit < 1e-3 * abs(fit.merit - expected) + 0.05 and merit - expected < 0.5:
             break
@@ -420,9 +460,7 @@ def fitted_sensor_law(
             break
         fit = replace(fit, merit=merit, noise=noise_of(fit) if round >= _SETTLED else fit.noise)
         fit = whole_step(fit, reduced, full)
-    if not np.all(np.isfinite(fit.at)) or not fit.covariance.size or not _are_plays(fit, terms):
-        return None
-    return scored(Hypothesis(), fit)
+    return fit
 
 
 def _are_plays(fit: Fit, terms: Sequence[SensorTerm]) -> bool:

@@ -63,8 +63,12 @@ def _spinning(
     the angle of attack, which need not be smooth: state[13] is what that adds in this segment, rad/s. A moment about
     one axis turns the wobble as much as it tells that axis from the other.
 
-    How that moment bends with the angle of attack drives the wobble at twice its own frequency, by the square of the
-    rates: m = (w_x + i w_y)^2 (state[14] + i state[15]), 1/rad, where psi is zero, and its mirror image at that axis.
+    A moment that is fixed in the body, as the lift's about a centre of mass beside the middle, adds state[16] and
+    state[17], rad/s^2.
+
+    How the air's moment bends with the angle of attack drives the wobble at twice its own frequency, by the square of
+    the rates: m = (w_x + i w_y)^2 (state[14] + i state[15]), 1/rad, where psi is zero, and its mirror image at that
+    axis.
     """
     Ixx, Izz = p.disc.Ixx, p.disc.Izz
     Iyy = transverse_inertia(p.body_inertia_asymmetry, Ixx)
@@ -87,9 +91,9 @@ def _spinning(
     bx, by = c * state[14] - s * state[15], s * state[14] + c * state[15]
     wx, wy = w[0] * w[0] - w[1] * w[1], 2.0 * w[0] * w[1]
     px, py = bx * wx - by * wy, bx * wy + by * wx
-    dw[0] = (Iyy - Izz) / Ixx * w[1] * w[2] + c * mx + s * my - decay * w[0] - faster * w[1]
+    dw[0] = (Iyy - Izz) / Ixx * w[1] * w[2] + c * mx + s * my + state[16] - decay * w[0] - faster * w[1]
     dw[0] += a * w[0] + b * w[1]
-    dw[1] = (Izz - Ixx) / Iyy * w[2] * w[0] + c * my - s * mx - decay * w[1] + faster * w[0]
+    dw[1] = (Izz - Ixx) / Iyy * w[2] * w[0] + c * my - s * mx + state[17] - decay * w[1] + faster * w[0]
     dw[1] += b * w[0] - a * w[1]
     dw[0] += px + ux * px + uy * py
     dw[1] += py + uy * px - ux * py
@@ -108,7 +112,7 @@ def free_spin_segments(
     rows: FloatArray,
     ends: FloatArray,
 ) -> None:
-    """Spin freely from states (c, 16); wobbles (c, 10) as for `_spinning`. Else as `flight_segments`.
+    """Spin freely from states (c, 18); wobbles (c, 10) as for `_spinning`. Else as `flight_segments`.
 
     Neighbours of the first part from it as in long steps: to some thousandths of how far they part.
     """
@@ -120,7 +124,7 @@ def free_spin_segments(
         for c in range(1, states.shape[0]):
             _run(flats[c], wobbles[c], states[c], times, last, out, rows[c], ends[c])
         return
-    row, there = np.empty((out.size, 19)), np.empty(16)
+    row, there = np.empty((out.size, 19)), np.empty(18)
     _run(flats[0], wobbles[0], states[0], steps, end, out, row, there)
     for c in range(1, states.shape[0]):
         _run(flats[c], wobbles[c], states[c], steps, end, out, rows[c], ends[c])
@@ -128,7 +132,7 @@ def free_spin_segments(
             _apart(rows[0, j], row[j], 9, rows[c, j])
             for i in range(13, 19):
                 rows[c, j, i] += rows[0, j, i] - row[j, i]
-        for i in range(16):
+        for i in range(18):
             if i < 6 or i > 9:
                 ends[c, i] += ends[0, i] - there[i]
         _apart(ends[0], there, 6, ends[c])
@@ -187,7 +191,7 @@ def _run(
     rows: FloatArray,
     end: FloatArray,
 ) -> None:
-    """Spin from one state (16,) and write its rows (m, 19) at instants out (m,) and its end (16,)."""
+    """Spin from one state (18,) and write its rows (m, 19) at instants out (m,) and its end (18,)."""
     n = times.size
     rate, slope, attitude, psis = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 4)), np.empty(n)
     k1, k2, k3, k4, w = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
@@ -252,6 +256,7 @@ def _run(
     end[4], end[5] = state[4] + span * state[5], state[5]
     end[6:10], end[10:13], end[13] = attitude[last], rate[last], state[13]
     end[14], end[15] = cosine * state[14] - sine * state[15], sine * state[14] + cosine * state[15]
+    end[16], end[17] = state[16], state[17]
 
 
 @compiled

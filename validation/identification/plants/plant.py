@@ -50,9 +50,9 @@ class Layout:
     A state has ``size`` numbers and moves in ``directions``: the four numbers of an attitude (quaternion from B to N)
     by small turns in B, each other number by itself. Without an attitude the columns of ``moves`` (s, d) say which
     numbers a direction moves; where it is not given each moves its own, and numbers behind the last direction follow
-    from the others and do not move. ``position`` and ``velocity`` are in N, m and m/s, ``rate`` in B, rad/s; ``spin``
-    is the rate about the spin axis, ``yaw`` a rig's angle about its own, rad. ``per_time`` are the numbers that come
-    out smaller by a ratio where all times are written larger by it.
+    from the others, or stay, and do not move. ``position`` and ``velocity`` are in N, m and m/s, ``rate`` in B, rad/s;
+    ``spin`` is the rate about the spin axis, ``yaw`` a rig's angle about its own, rad. ``per_time`` are the numbers
+    that come out smaller by a ratio where all times are written larger by it.
     """
 
     size: int
@@ -67,10 +67,10 @@ class Layout:
     moves: tuple[tuple[float, ...], ...] | None = None
 
     def __post_init__(self) -> None:
-        if self.attitude is not None and self.directions != self.size - 1:
+        if self.attitude is not None and not self.attitude.stop - 1 <= self.directions <= self.size - 1:
             raise ValueError(
                 f"a state of {self.size} numbers, an attitude among them, moves in {self.directions} directions; "
-                f"expected {self.size - 1}"
+                f"expected {self.attitude.stop - 1} to {self.size - 1}"
             )
 
     def moved(self, states: FloatArray, tangents: FloatArray) -> FloatArray:
@@ -82,10 +82,10 @@ class Layout:
         if self.attitude is None:
             new[..., : self.directions] += tangents
             return new
-        first, last = self.attitude.start, self.attitude.stop
+        first, last, end = self.attitude.start, self.attitude.stop, self.directions + 1
         new[..., :first] += tangents[..., :first]
         new[..., first:last] = multiply(new[..., first:last], turn(tangents[..., first : last - 1]))
-        new[..., last:] += tangents[..., last - 1 :]
+        new[..., last:end] += tangents[..., last - 1 :]
         return new
 
     def difference(self, a: FloatArray, b: FloatArray) -> FloatArray:
@@ -94,9 +94,10 @@ class Layout:
             return np.asarray((a - b) @ np.linalg.inv(np.array(self.moves)).T)
         if self.attitude is None:
             return np.asarray(a[..., : self.directions] - b[..., : self.directions])
-        first, last = self.attitude.start, self.attitude.stop
+        first, last, end = self.attitude.start, self.attitude.stop, self.directions + 1
         turned = rotation_vector(multiply(conjugate(b[..., first:last]), a[..., first:last]))
-        return np.concatenate([a[..., :first] - b[..., :first], turned, a[..., last:] - b[..., last:]], axis=-1)
+        before, after = a[..., :first] - b[..., :first], a[..., last:end] - b[..., last:end]
+        return np.concatenate([before, turned, after], axis=-1)
 
     def directions_of(self, places: slice | int) -> tuple[int, ...]:
         """Return the directions in which the numbers at some places of a state alone move, or those of its attitude."""
@@ -400,6 +401,9 @@ class Plant:
     laws : MotionLaws
     design : Design or None
         None where no next recording can be proposed.
+    unbalanced : Plant or None
+        The same of a body that moments fixed in it turn, such as of the air's force about a centre of mass beside the
+        middle; None where the plant's effects tell of them, or where its motion has no room for one.
     """
 
     name: str
@@ -424,6 +428,7 @@ class Plant:
     grows_with: Callable[[FloatArray, FloatArray], Mapping[str, FloatArray]] = _against_time
     laws: MotionLaws = field(default_factory=MotionLaws)
     design: Design | None = None
+    unbalanced: Plant | None = None
 
     @property
     def airborne(self) -> bool:
