@@ -25,6 +25,7 @@ from discsim.validation.diagnosis.held_out import Choice, choices_without_each, 
 from discsim.validation.diagnosis.leftovers import pure_noise
 from discsim.validation.diagnosis.localisation import located_effect, located_unmodelled
 from discsim.validation.diagnosis.partly import partly_explained
+from discsim.validation.diagnosis.relaxed_fit import moves_out
 from discsim.validation.diagnosis.report.wording import telling_apart
 from discsim.validation.diagnosis.result import (
     SMALLEST_P_VALUE,
@@ -397,6 +398,7 @@ def outcome_of(judged: Judged, question: Question) -> Outcome:
     if found is not None:
         told = () if turning is None else turning.sentences
         told += not_as_commanded(found, question.names) if judged.verdict == "unexplained" else _leaning(found)
+        told += _out_of_balance(found)
         return _outcome_of_search(judged, question, found, setup, (*told, *warnings), agreement)
     assert tried.contradiction is not None
     datasets, names, seed = question.datasets, question.names, question.seed
@@ -411,6 +413,18 @@ def _leaning(found: Search) -> tuple[str, ...]:
     return (
         "no magnetometer tells where north is: the rig's axis leans by the size of what is named, and nobody knows "
         "which way.",
+    )
+
+
+def _out_of_balance(found: Search) -> tuple[str, ...]:
+    """Return what to say of a body that moments fixed in it turn, about which the catalogue of its plant is silent."""
+    if not all(one.unbalanced for one in found.relaxed_fit.trajectories):
+        return ()
+    moves = " and moves" if moves_out(found.relaxed_fit) else ""
+    return (
+        "the gyroscope's x and y lean as only a body out of balance does, otherwise in each throw: its centre of mass "
+        f"lies beside the middle{moves}. Moments fixed in the body are followed and have no name here; look for a "
+        "battery or a board that is off the middle or loose, and compare accel.position_offset.",
     )
 
 

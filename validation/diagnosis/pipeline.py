@@ -162,7 +162,7 @@ def _law_of_what_moves_out(ready: Prepared, followed: Fit, question: Question) -
     question.progress("looking for a law", 4, 5)
     free = free_parameters(ready.setup)
     begun = screened(ready.fitted, as_stated=ready.meant, followed=followed, free=free, effects=question.effects)
-    law = find_law(begun.relaxed_fit, begun.base, begun.own, begun.relaxed_noise, ready.fitted, sensor="accelerometer")
+    law = find_law(begun.relaxed_fit, begun.base, begun.own, begun.relaxed_noise, ready.fitted, moves_out=True)
     return None if law is None else Tried(ready, None, begun, law)
 
 

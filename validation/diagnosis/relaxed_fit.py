@@ -355,18 +355,17 @@ def _out_of_balance(fit: Fit) -> Fit:
     """
     if fit.plant.unbalanced is None or not _left_across(fit) > RELAXED_FIT.across:
         return fit
-    few, sensor = 1e-4 * fit.count, "accelerometer"
+    few, sensor, least = 1e-4 * fit.count, "accelerometer", RELAXED_FIT.reconciled * _left_across(fit)
+    free = tuple(Parameter(*key, 0.0, 1e-6, 1e-2) for key in _BY_PULL)
+    pulled = replace(fit, parameters=(*fit.parameters, *free), at=np.append(fit.at, [0.0, 0.0]))
+    if _left_across(refit(pulled, iterations=12, tolerance=few)) < least:
+        return fit
     led = replace(_without(fit, sensor, few), merit=np.inf) if _astray(fit) else fit
     moved = tuple(replace(one, unbalanced=True) for one in led.trajectories)
     turned = refit(replace(led, trajectories=moved, defects=moved[0].plant.sizes.relaxed), iterations=12, tolerance=few)
-    if _astray(turned) or not _left_across(turned) < RELAXED_FIT.reconciled * _left_across(fit):
+    if _astray(turned) or not _left_across(turned) < least:
         return fit
-    if led is not fit:
-        return _beside(replace(turned, trajectories=_with_readings(turned, fit)), sensor)
-    free = tuple(Parameter(*key, 0.0, 1e-6, 1e-2) for key in _BY_PULL)
-    pulled = replace(fit, parameters=(*fit.parameters, *free), at=np.append(fit.at, [0.0, 0.0]))
-    pulled = refit(pulled, iterations=12, tolerance=few)
-    return turned if _left_across(turned) < RELAXED_FIT.reconciled * _left_across(pulled) else fit
+    return turned if led is fit else _beside(replace(turned, trajectories=_with_readings(turned, fit)), sensor)
 
 
 def moves_out(fit: Fit) -> bool:

@@ -259,3 +259,10 @@ def test_lift_that_changes_within_the_first_turn_moves_no_accelerometer():
     """It left five times the noise in the first mean of one throw: a place of 0.1 mm was named."""
     case = draw_case(597283, "free_spin", (), "nothing")
     assert stepwise.search(recordings(case)).final.hypothesis.candidates == ()
+
+
+def test_a_gyroscope_that_leans_with_the_pull_is_no_body_out_of_balance():
+    """What goes with the pull is the same in all throws, and its own effect."""
+    hidden = [effect("gyro.g_sensitivity", kx=2e-3, ky=-3e-3, kz=0.0)]
+    made = throws(errors=hidden, module=BLIND, plant="free_spin")
+    assert not any(one.unbalanced for one in relaxed(made).trajectories)

@@ -16,17 +16,18 @@ SHOWN = {"q": (slice(9, 13), 0.01), "w": (slice(13, 16), 0.01), "dw": (slice(16,
 #: how the wobble dies and turns
 WOBBLE = np.array([1.5, -0.5, -4.0, 1.0, 0.5, 0.2, -0.3, 0.1, 0.2, 0.3])
 #: differences in each number of a state
-SIZES = [1e-2, 1e-2, 1e-2, 1e-2, 1e-4, 1e-4, 0.0, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-3, 3e-3, 3e-3]
+SIZES = [1e-2, 1e-2, 1e-2, 1e-2, 1e-4, 1e-4, 0.0, 1e-5, 1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-3, 3e-3, 3e-3, 1e-2, 1e-2]
 
 
 def neighbours(spin: float, kick_s: float | None = None):
     """Return flats, wobbles and states of a spin and its neighbours: in each number of its state and of its wobble."""
     disc, environment = load_disc("ultrastar")
-    state = np.array([3.0, -2, 20, -10, -0.1, 0.01, 0.93, 0.1, 0.05, 0.34, 4.0, -2.0, spin, 0.3, 0.02, 0.05])
-    count = 1 + 16 + WOBBLE.size
+    state = np.array([3.0, -2, 20, -10, -0.1, 0.01, 0.93, 0.1, 0.05, 0.34, 4.0, -2.0, spin, 0.3, 0.02, 0.05, 2.0, -1.5])
+    size = state.size
+    count = 1 + size + WOBBLE.size
     states, wobbles = np.repeat(state[None], count, axis=0), np.repeat(WOBBLE[None], count, axis=0)
-    states[1:17] += np.diag(SIZES)
-    wobbles[17:] += 1e-3 * np.eye(WOBBLE.size)
+    states[1 : 1 + size] += np.diag(SIZES)
+    wobbles[1 + size :] += 1e-3 * np.eye(WOBBLE.size)
     states[:, 6:10] /= np.linalg.norm(states[:, 6:10], axis=1)[:, None]
     flats = np.repeat(np.array(flight_parameters(disc, environment))[None], count, axis=0)
     if kick_s is not None:
@@ -55,7 +56,7 @@ def test_neighbours_part_from_a_spin_as_spins_of_their_own(spin):
     (rows, ends), (truly, true_ends) = (run(*neighbours(spin), spin) for run in (spun, alone))
     np.testing.assert_array_equal(rows[0], truly[0])
     np.testing.assert_array_equal(ends[0], true_ends[0])
-    scale = np.array([1.0] * 4 + [1e-2] * 2 + [1e-3] * 4 + [1e-2] * 3 + [1e-1] * 3)
+    scale = np.array([1.0] * 4 + [1e-2] * 2 + [1e-3] * 4 + [1e-2] * 3 + [1e-1] * 3 + [1.0] * 2)
     for c in [c for c in range(1, len(rows)) if c != 7]:
         for name, (some, bar) in SHOWN.items():
             parted, wanted = rows[c][:, some] - rows[0][:, some], truly[c][:, some] - truly[0][:, some]

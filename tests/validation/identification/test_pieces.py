@@ -500,30 +500,36 @@ def test_columns_of_a_rig_are_those_of_the_whole_run(recording, state, keys):  #
         assert_column(linear, linear.common[:, j], slope_of(one, values, key, h), 1e-3, key)
 
 
-def test_columns_of_a_free_spin_are_those_of_the_whole_motion():
+@pytest.mark.parametrize("unbalanced", [False, True])
+def test_columns_of_a_free_spin_are_those_of_the_whole_motion(unbalanced: bool):
     motion = flight(seconds=0.6)
     module = Instruments.from_parts("mpu9250").without("accelerometer")
     recording = record(motion, module, np.random.default_rng(1), plant="free_spin", name="spin", disc=DRIVER)
-    state = np.zeros((1, 16))
-    state[0, 14:] = 0.3, -0.2
+    state = np.zeros((1, FREE_SPIN.layout.size))
+    state[0, 14:16] = 0.3, -0.2
     state[0, :6] = [1.0, -2.0, 3.0, 1.0, -0.05, 0.01]
     state[0, 6:10], state[0, 10:13] = motion.attitude[0], motion.rate[0]
     # the wind's direction in the disc's plane is told by the segment, and so differs by the square of the tilt
     values = {key: 0.3 for key in FREE_SPIN.own_keys[:4]}
-    one = trajectory_of(recording, np.array([0.0, 0.6]), state)
+    if unbalanced:
+        state[0, 16:] = 2.0, -1.0
+    one = replace(trajectory_of(recording, np.array([0.0, 0.6]), state), unbalanced=unbalanced)
+    plant = one.plant
+    d = plant.layout.directions
+    assert d == (17 if unbalanced else 15)
     three = resegmented(one, values, np.array([0.0, 0.2, 0.4, 0.6]))
     columns = [
         Column(*FREE_SPIN.own_keys[0], 1e-3),
         Column(*FREE_SPIN.own_keys[3], 1e-3),
         Column("body.inertia_asymmetry", "dIyy_kg_m2", 1e-7),
     ]
-    linear = linearise(three, values, columns, np.zeros(15, dtype=np.bool_))
+    linear = linearise(three, values, columns, np.zeros(d, dtype=np.bool_))
     # what wanders is told by the segment: its slope goes on, so that three segments are the same motion as one
     assert predictions(three, values) == pytest.approx(predictions(one, values), abs=1e-3)
-    for k in (0, 2, 4, 6, 9, 11, 12, 13, 14):
-        h = FREE_SPIN.sizes.differences[k]
+    for k in (0, 2, 4, 6, 9, 11, 12, 13, 14, 15, 16)[: 11 if unbalanced else 9]:
+        h = plant.sizes.differences[k]
         moved = [
-            predictions(replace(one, states=FREE_SPIN.layout.moved(one.states, s * h * np.eye(15)[k])), values)
+            predictions(replace(one, states=plant.layout.moved(one.states, s * h * np.eye(d)[k])), values)
             for s in (1.0, -1.0)
         ]
         assert_column(linear, linear.nuisance[:, k], (moved[1] - moved[0]) / (2.0 * h), 1e-3, k)

@@ -138,6 +138,10 @@ def _quick(e: FloatArray) -> float:
     return float(np.sqrt(0.5 * np.mean(np.diff(e) ** 2))) if e.size > 1 else 0.0
 
 
+#: terms of an accelerometer to which something moves, or from which
+_OF_WHAT_MOVES = frozenset([("accelerometer", "settling"), ("accelerometer", "warming"), ("accelerometer", "drift")])
+
+
 def find_law(
     relaxed_fit: Fit,
     best: ContinuousFit,
@@ -146,14 +150,14 @@ def find_law(
     recordings: Sequence[Recording],
     *,
     instead: bool = True,
-    sensor: str | None = None,
+    moves_out: bool = False,
 ) -> FoundLaw | None:
     """Return the law that explains what the catalogue does not, or None where none holds on held-out recordings.
 
     ``relaxed_fit`` is the relaxed fit, ``best`` the best fit with effects of the catalogue (or without any), ``own``
     the parameters that the recordings leave open without any effect, ``noise`` that of the relaxed fit. ``instead``
-    asks for a law that does better than the effects of the best fit, which then would explain the recordings; with
-    ``sensor`` it begins with a term of that one.
+    asks for a law that does better than the effects of the best fit, which then would explain the recordings;
+    ``moves_out`` for one of what moves in a body, by the pull that it changes.
     """
     plant = relaxed_fit.plant
     if relaxed_fit.from_release:
@@ -170,13 +174,14 @@ def find_law(
     states = [state_of(trajectory, start.values(i)) for i, trajectory in enumerate(start.trajectories)]
     at = reference_of(states)
     # what a free spin does not model takes up any further moment
-    motion = () if plant.weakly_identified or sensor else plant.laws.terms
+    motion = () if plant.weakly_identified or moves_out else plant.laws.terms
     about = sensor_library(start)
+    if moves_out:
+        about = [term for term in about if (term.sensor, term.kind) in _OF_WHAT_MOVES]
     ranked: list[tuple[float, float, Term | SensorTerm]] = []
     if motion:
         ranked += candidate_laws(start, own, motion, at)
-    first = [term for term in about if sensor in (None, term.sensor)]
-    ranked += _worth(start, first, asked_of_sensors(start, own, first))
+    ranked += _worth(start, about, asked_of_sensors(start, own, about))
     ranked.sort(key=lambda item: -item[0])
     places = plant.laws.places(states)
     # where a wind blows shows in what it does to all of a path after it, which jumps between segments would take up
