@@ -519,7 +519,7 @@ def _with_clocks(fit: Fit) -> Fit:
     if len(_astray(look)) == len(look.trajectories):
         return fit
     ratio = look.values(0).get((catalogued(ClockRate, "magnetometer").id, "ratio"), 1.0)
-    trajectories = tuple(first_trajectory(one.recording, ratio) for one in fit.trajectories)
+    trajectories = tuple(_begun(one, ratio) for one in fit.trajectories)
     # what the first look says of the rest is little: only the clocks are taken over
     known = {q.key for q in clocks}
     at = np.array([v if q.key in known else q.stated for q, v in zip(parameters, look.at, strict=True)])
@@ -529,9 +529,14 @@ def _with_clocks(fit: Fit) -> Fit:
     return whole if whole.merit < RELAXED_FIT.rescued * fit.merit else fit
 
 
+def _begun(current: Trajectory, ratio: float = 1.0) -> Trajectory:
+    """Return a trajectory started from the data once more, of a body that is as it was supposed to be."""
+    return replace(first_trajectory(current.recording, ratio), unbalanced=current.unbalanced)
+
+
 def _first_look(fit: Fit) -> Fit:
     """Return a fit to the beginnings of recordings alone, from the start."""
-    short = tuple(beginning(first_trajectory(one.recording), RELAXED_FIT.first_look) for one in fit.trajectories)
+    short = tuple(beginning(_begun(one), RELAXED_FIT.first_look) for one in fit.trajectories)
     return refit(replace(fit, trajectories=short), iterations=10)
 
 

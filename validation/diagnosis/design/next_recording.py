@@ -212,7 +212,8 @@ def _recorded(found: Search, plan: Plan, own: Sequence[Parameter], like: int) ->
     sheets = dict(bare.sheets)
     if "accelerometer" in sheets:  # readings that stand still for want of noise are no limit
         sheets["accelerometer"] = replace(sheets["accelerometer"], noise_rms=0.0)
-    return trajectory_of(replace(bare, samples=samples, sheets=sheets), cut.nodes, cut.states, old.effects)
+    planned = trajectory_of(replace(bare, samples=samples, sheets=sheets), cut.nodes, cut.states, old.effects)
+    return replace(planned, unbalanced=old.unbalanced)
 
 
 def _landing(whole: Trajectory, values: Values) -> float:

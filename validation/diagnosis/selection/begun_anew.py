@@ -113,7 +113,8 @@ def _starts(fit: Fit, i: int, stands: Fit, first: Trajectory) -> Iterator[Fit]:
     yield begun(first, others)
     ratio = time_ratio(fit.values(i))
     if ratio != 1.0:
-        yield begun(trajectory_in_true_time(first.recording, ratio), others)
+        timed = trajectory_in_true_time(first.recording, ratio)
+        yield begun(replace(timed, unbalanced=first.unbalanced), others)
     else:
         yield begun(replace(first, states=first_trajectory(first.recording, nodes=first.nodes).states), none)
     if none:
