@@ -144,7 +144,8 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
     if contradiction is not None:
         return Tried(ready, contradiction)
     hints = (*ready.supposed, *setup.hints)
-    told = _law_of_what_moves_out(ready, followed, question) if moves_out(followed) else None
+    moving = ready.rows is None and moves_out(followed)
+    told = _law_of_what_moves_out(ready, followed, question) if moving else None
     if told is not None:
         return told
 
