@@ -22,13 +22,20 @@ from discsim.frames import conjugate, multiply
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.followed import true_noise
 from discsim.validation.diagnosis.consistency.spin_agreement import Comparison, compared, written_ratios
+from discsim.validation.diagnosis.first_trajectory import (
+    CLOCK,
+    beginning,
+    begun_again,
+    first_trajectory,
+    nodes_of,
+    trajectory_in_true_time,
+    within_range,
+)
 from discsim.validation.diagnosis.settings import CONSISTENCY, RELAXED_FIT
 from discsim.validation.identification.from_afar import fitted_from_afar
 from discsim.validation.identification.gauss_newton import Fit, linearised, merit_of, refit
-from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.noise import (
     NoiseModel,
-    channel_of,
     estimate_noise,
     robust_noise,
     stated_noise,
@@ -39,57 +46,19 @@ from discsim.validation.identification.parameters import Parameter, Values
 from discsim.validation.identification.plants import plant_of
 from discsim.validation.identification.prediction import shown
 from discsim.validation.identification.readings import Readings
-from discsim.validation.identification.segments import Trajectory, trajectory_of
+from discsim.validation.identification.segments import Trajectory
 from discsim.validation.identification.sensor_model import delay
 
 __all__ = [
-    "beginning",
     "clock_of_accelerometer",
-    "first_trajectory",
     "from_other_initial_states",
     "moves_out",
     "relaxed",
-    "time_ratio",
-    "trajectory_in_true_time",
     "without_outliers",
 ]
 
-#: the clock of all sensors
-_CLOCK = (catalogued(ClockRate, "clock").id, "ratio")
-#: clocks by which the motion of a relaxed fit goes: it follows the magnetometer's phase
-_LEADING = (_CLOCK, (catalogued(ClockRate, "magnetometer").id, "ratio"))
 #: times of one sensor that are off by as much all along
 _OFFSETS = frozenset(row.id for row in CATALOGUE.values() if row.type is TimeOffset)
-
-
-def nodes_of(recording: Recording) -> FloatArray:
-    """Return the nodes of a recording's segments, s."""
-    plant = plant_of(recording)
-    return plant.nodes(recording, plant.durations.segment)
-
-
-def time_ratio(values: Values) -> float:
-    """Return what the times by which a motion is followed are written as, in true ones, by a recording's values."""
-    return float(np.prod([values.get(key, 1.0) for key in _LEADING]))
-
-
-def trajectory_in_true_time(recording: Recording, ratio: float) -> Trajectory:
-    """Return the first trajectory of a recording all of whose times are written as ``ratio`` times the true ones."""
-    first = first_trajectory(recording)
-    states = first.states.copy()
-    states[:, list(first.plant.layout.per_time)] *= ratio
-    return replace(first, nodes=first.nodes / ratio, states=states)
-
-
-def first_trajectory(recording: Recording, ratio: float = 1.0, nodes: FloatArray | None = None) -> Trajectory:
-    """Return a recording's trajectory, started from the data; ``ratio`` is that of the magnetometer's clock.
-
-    Starts stand in the time that the magnetometer writes. ``nodes`` (k + 1,) are the boundaries of the segments, s,
-    where they are not those that `nodes_of` a recording takes.
-    """
-    nodes, plant = nodes_of(recording) if nodes is None else nodes, plant_of(recording)
-    found = trajectory_of(recording, nodes, plant.initial.states(recording, nodes[:-1], ratio))
-    return replace(found, trust_radius=plant.sizes.of_path) if plant.from_release(recording) else found
 
 
 def ordinary(sensors: set[str], plant: str, *, small: bool = False) -> tuple[Parameter, ...]:
@@ -145,13 +114,13 @@ def relaxed(
         first_trajectory(one) if ratio == 1.0 else trajectory_in_true_time(one, ratio) for one in recordings
     )
     sensors = {readings.sensor for one in trajectories for readings in one.readings}
-    clock = () if ratio == 1.0 else (Parameter(*_CLOCK, 1.0, 1e-6, RELAXED_FIT.time_sigma),)
+    clock = () if ratio == 1.0 else (Parameter(*CLOCK, 1.0, 1e-6, RELAXED_FIT.time_sigma),)
     ordinary_ones = relaxed_parameters(recordings, sensors, small=bool(supposed))
     if any(q.group in _OFFSETS for q in known):
         # two sensors' times beside a third's: one of them is known to be open
         ordinary_ones = tuple(q for q in ordinary_ones if q.group not in _OFFSETS)
     parameters = (*known, *ordinary_ones, *clock, *_supposed(supposed))
-    at = np.array([ratio if q.key == _CLOCK else q.stated for q in parameters])
+    at = np.array([ratio if q.key == CLOCK else q.stated for q in parameters])
     fit = Fit(trajectories, parameters, at, plant.sizes.relaxed, {})
     bare = linearised(fit, ())
     seen = true_noise([readings for trajectory in trajectories for readings in trajectory.readings])
@@ -233,7 +202,7 @@ def from_other_initial_states(fit: Fit) -> Fit:
         return fit
     better = dict[int, Trajectory]()
     for i in _astray(fit)[: CONSISTENCY.few]:
-        ratio = fit.values(i).get(_CLOCK, 1.0)
+        ratio = fit.values(i).get(CLOCK, 1.0)
         alone = part_of(fit, [i])
         alone = replace(alone, merit=merit_of(alone, alone.linears))
         for states in _other_states(fit.trajectories[i], ratio):
@@ -547,7 +516,7 @@ def _with_clocks(fit: Fit) -> Fit:
     if len(_astray(look)) == len(look.trajectories):
         return fit
     ratio = look.values(0).get((catalogued(ClockRate, "magnetometer").id, "ratio"), 1.0)
-    trajectories = tuple(_begun(one, ratio) for one in fit.trajectories)
+    trajectories = tuple(begun_again(one, ratio) for one in fit.trajectories)
     # what the first look says of the rest is little: only the clocks are taken over
     known = {q.key for q in clocks}
     at = np.array([v if q.key in known else q.stated for q, v in zip(parameters, look.at, strict=True)])
@@ -557,28 +526,10 @@ def _with_clocks(fit: Fit) -> Fit:
     return whole if whole.merit < RELAXED_FIT.rescued * fit.merit else fit
 
 
-def _begun(current: Trajectory, ratio: float = 1.0) -> Trajectory:
-    """Return a trajectory started from the data once more, of a body that is as it was supposed to be."""
-    return replace(first_trajectory(current.recording, ratio), unbalanced=current.unbalanced)
-
-
 def _first_look(fit: Fit) -> Fit:
     """Return a fit to the beginnings of recordings alone, from the start."""
-    short = tuple(beginning(_begun(one), RELAXED_FIT.first_look) for one in fit.trajectories)
+    short = tuple(beginning(begun_again(one), RELAXED_FIT.first_look) for one in fit.trajectories)
     return refit(replace(fit, trajectories=short), iterations=10)
-
-
-def beginning(current: Trajectory, length: float) -> Trajectory:
-    """Return the segments of a trajectory's first ``length`` s and the readings within them."""
-    count = min(max(1, int(np.searchsorted(current.nodes, length))), len(current.states))
-    within = {r.sensor: r.t < float(current.nodes[count]) - 0.03 for r in current.readings}
-    lost = {
-        sensor: counts[within[sensor]] if counts.size == within[sensor].size else counts
-        for sensor, counts in current.lost.items()
-    }
-    readings = tuple(r.at(within[r.sensor]) for r in current.readings)
-    nodes, states = current.nodes[: count + 1], current.states[:count]
-    return replace(current, nodes=nodes, states=states, readings=readings, lost=lost)
 
 
 def without_outliers(fit: Fit) -> tuple[Fit, list[tuple[int, str, str, float, float]]]:
@@ -611,23 +562,3 @@ def without_outliers(fit: Fit) -> tuple[Fit, list[tuple[int, str, str, float, fl
     if not found:
         return fit, found
     return refit(replace(fit, trajectories=tuple(trajectories)), iterations=4, tolerance=1e-4 * fit.count), found
-
-
-def within_range(current: Trajectory, linear: Linear) -> Trajectory:
-    """Return the trajectory without readings whose noise a range may have cut off, by what the fit expects of them.
-
-    Leaving out readings by their own value would bias what remains.
-    """
-    kept = []
-    for readings in current.readings:
-        limit = readings.limit
-        good = readings.good.copy()
-        if limit is not None:
-            for axis, name in enumerate(readings.axes):
-                channel = channel_of(linear, readings.sensor, name)
-                if channel is not None:
-                    expected = readings.value[channel.index, axis] - linear.raw[channel.rows]
-                    near = np.abs(expected) > limit - 6.0 * np.nan_to_num(linear.sd[channel.rows])
-                    good[channel.index[near], axis] = False
-        kept.append(replace(readings, good=good))
-    return replace(current, readings=tuple(kept))

@@ -12,7 +12,7 @@ from discsim.environment import Environment
 from discsim.errors import InputError
 from discsim.recording import SENSORS, Plant, Recording, Samples, SensorSheet
 from discsim.sensors import Instruments
-from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.identification.parameters import Values
 from discsim.validation.identification.plants import PLANTS
 from discsim.validation.identification.plants.plan import Plan

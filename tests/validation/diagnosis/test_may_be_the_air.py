@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.made import MODULE, throws
 
-from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.diagnosis.verdict import may_be_the_air
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.noise import GroupNoise

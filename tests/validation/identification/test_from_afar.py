@@ -11,7 +11,7 @@ from support.made import DRIVER, flight, release_of
 from discsim.effects import effect
 from discsim.recording import Recording
 from discsim.sensors import Instruments, Noise, Sampling, Tracker, record
-from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.identification.from_afar import fitted_from_afar
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.noise import GroupNoise

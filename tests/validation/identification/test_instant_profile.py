@@ -13,7 +13,7 @@ from discsim.effects import Effect, effect
 from discsim.motion import Motion
 from discsim.rig import spin_down
 from discsim.sensors import record
-from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.identification.gauss_newton import Fit, linearised, merit_of, refit
 from discsim.validation.identification.instant_profile import instant_profile, instants_of, with_errors_of_instants
 from discsim.validation.identification.linearisation import linearise

@@ -10,7 +10,7 @@ from discsim.arrays import FloatArray
 from discsim.recording import Samples
 from discsim.rig import turn_table
 from discsim.sensors import Instruments, record
-from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.identification.linearisation import linearise
 from discsim.validation.identification.plants.rate_table import RATE_TABLE
 from discsim.validation.identification.prediction import read

@@ -12,7 +12,7 @@ from support.made import RIG, coasts, flight, release_of, states_of, tables, thr
 
 from discsim.arrays import FloatArray
 from discsim.effects import effect
-from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.identification import gauss_newton, normal_equations
 from discsim.validation.identification.gauss_newton import (
     Bars,

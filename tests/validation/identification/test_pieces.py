@@ -34,7 +34,7 @@ from discsim.recording import Recording, Samples
 from discsim.rig import spin_down, turn_table
 from discsim.sensors import Instruments, record
 from discsim.trajectory import predict
-from discsim.validation.diagnosis.relaxed_fit import beginning
+from discsim.validation.diagnosis.first_trajectory import beginning
 from discsim.validation.identification import linearisation
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.linearisation import linearise

@@ -8,7 +8,7 @@ import numpy as np
 from support.made import throws
 
 from discsim.recording import Samples
-from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.identification.linearisation import linearise
 from discsim.validation.identification.observations import readings_of
 from discsim.validation.identification.propagation import Column

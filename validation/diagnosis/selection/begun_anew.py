@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from discsim.validation.diagnosis.relaxed_fit import first_trajectory, time_ratio, trajectory_in_true_time
+from discsim.validation.diagnosis.first_trajectory import first_trajectory, time_ratio, trajectory_in_true_time
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Fit, discontinuous, merit_of, refit

@@ -13,7 +13,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.effects.sensors import Lag
-from discsim.validation.diagnosis.relaxed_fit import beginning, time_ratio
+from discsim.validation.diagnosis.first_trajectory import beginning, time_ratio
 from discsim.validation.diagnosis.selection.begun_anew import begun_anew
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from discsim.validation.diagnosis.selection.evidence import BOUNDS, charge

@@ -15,7 +15,7 @@ import numpy as np
 
 from discsim.effects import Effect
 from discsim.recording import Recording
-from discsim.validation.diagnosis.relaxed_fit import time_ratio
+from discsim.validation.diagnosis.first_trajectory import time_ratio
 from discsim.validation.diagnosis.selection.all_at_once import all_at_once
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.event_instants import with_best_instant

@@ -9,7 +9,7 @@ import numpy as np
 
 from discsim.arrays import FloatArray
 from discsim.law import MOTION_TARGETS, WIND_TARGETS
-from discsim.validation.diagnosis.relaxed_fit import beginning
+from discsim.validation.diagnosis.first_trajectory import beginning
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, noise_of, scored
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis

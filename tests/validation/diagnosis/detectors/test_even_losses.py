@@ -15,8 +15,8 @@ from discsim.recording import Recording
 from discsim.rig import spin_down
 from discsim.sensors import Instruments, record
 from discsim.validation.diagnosis.detectors.even_losses import lost_as_well, rather_lost
+from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.diagnosis.pipeline import diagnose
-from discsim.validation.diagnosis.relaxed_fit import first_trajectory
 from discsim.validation.diagnosis.selection.candidates import free_candidate
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis

@@ -39,7 +39,8 @@ from discsim.validation.diagnosis.detectors.sample_alignment import (
 from discsim.validation.diagnosis.detectors.saturation import saturation
 from discsim.validation.diagnosis.detectors.speed_ripple import ripple
 from discsim.validation.diagnosis.detectors.time_offsets import time_offsets
-from discsim.validation.diagnosis.relaxed_fit import first_trajectory, relaxed
+from discsim.validation.diagnosis.first_trajectory import first_trajectory
+from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.identification.clipping import clipping_level_of, equal_beyond_chance

@@ -12,7 +12,7 @@ from support.made import RIG, coasts
 
 from discsim.arrays import FloatArray
 from discsim.effects import effect
-from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.diagnosis.selection.candidates import candidates_for
 from discsim.validation.diagnosis.selection.screening import (
     NormalEquations,

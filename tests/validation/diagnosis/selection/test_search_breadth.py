@@ -12,7 +12,7 @@ import pytest
 from support.made import coasts, throws
 
 from discsim.effects.catalogue import CATALOGUE, effect
-from discsim.validation.diagnosis.relaxed_fit import first_trajectory
+from discsim.validation.diagnosis.first_trajectory import first_trajectory
 from discsim.validation.diagnosis.selection import exchange, stepwise
 from discsim.validation.diagnosis.selection import next_effect as searching
 from discsim.validation.diagnosis.selection import search_state as finding

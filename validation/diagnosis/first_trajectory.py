@@ -1,0 +1,101 @@
+"""A trajectory as a fit starts it: from the data alone, in the time that a clock means, or of its beginning."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from discsim.arrays import FloatArray
+from discsim.effects.catalogue import catalogued
+from discsim.effects.sensors import ClockRate
+from discsim.recording import Recording
+from discsim.validation.identification.linear import Linear
+from discsim.validation.identification.noise import channel_of
+from discsim.validation.identification.parameters import Values
+from discsim.validation.identification.plants import plant_of
+from discsim.validation.identification.segments import Trajectory, trajectory_of
+
+__all__ = [
+    "CLOCK",
+    "beginning",
+    "begun_again",
+    "first_trajectory",
+    "nodes_of",
+    "time_ratio",
+    "trajectory_in_true_time",
+    "within_range",
+]
+
+#: the clock of all sensors
+CLOCK = (catalogued(ClockRate, "clock").id, "ratio")
+#: clocks by which the motion of a relaxed fit goes: it follows the magnetometer's phase
+_LEADING = (CLOCK, (catalogued(ClockRate, "magnetometer").id, "ratio"))
+
+
+def nodes_of(recording: Recording) -> FloatArray:
+    """Return the nodes of a recording's segments, s."""
+    plant = plant_of(recording)
+    return plant.nodes(recording, plant.durations.segment)
+
+
+def time_ratio(values: Values) -> float:
+    """Return what the times by which a motion is followed are written as, in true ones, by a recording's values."""
+    return float(np.prod([values.get(key, 1.0) for key in _LEADING]))
+
+
+def trajectory_in_true_time(recording: Recording, ratio: float) -> Trajectory:
+    """Return the first trajectory of a recording all of whose times are written as ``ratio`` times the true ones."""
+    first = first_trajectory(recording)
+    states = first.states.copy()
+    states[:, list(first.plant.layout.per_time)] *= ratio
+    return replace(first, nodes=first.nodes / ratio, states=states)
+
+
+def first_trajectory(recording: Recording, ratio: float = 1.0, nodes: FloatArray | None = None) -> Trajectory:
+    """Return a recording's trajectory, started from the data; ``ratio`` is that of the magnetometer's clock.
+
+    Starts stand in the time that the magnetometer writes. ``nodes`` (k + 1,) are the boundaries of the segments, s,
+    where they are not those that `nodes_of` a recording takes.
+    """
+    nodes, plant = nodes_of(recording) if nodes is None else nodes, plant_of(recording)
+    found = trajectory_of(recording, nodes, plant.initial.states(recording, nodes[:-1], ratio))
+    return replace(found, trust_radius=plant.sizes.of_path) if plant.from_release(recording) else found
+
+
+def begun_again(current: Trajectory, ratio: float = 1.0) -> Trajectory:
+    """Return a trajectory started from the data once more, of a body that is as it was supposed to be."""
+    return replace(first_trajectory(current.recording, ratio), unbalanced=current.unbalanced)
+
+
+def beginning(current: Trajectory, length: float) -> Trajectory:
+    """Return the segments of a trajectory's first ``length`` s and the readings within them."""
+    count = min(max(1, int(np.searchsorted(current.nodes, length))), len(current.states))
+    within = {r.sensor: r.t < float(current.nodes[count]) - 0.03 for r in current.readings}
+    lost = {
+        sensor: counts[within[sensor]] if counts.size == within[sensor].size else counts
+        for sensor, counts in current.lost.items()
+    }
+    readings = tuple(r.at(within[r.sensor]) for r in current.readings)
+    nodes, states = current.nodes[: count + 1], current.states[:count]
+    return replace(current, nodes=nodes, states=states, readings=readings, lost=lost)
+
+
+def within_range(current: Trajectory, linear: Linear) -> Trajectory:
+    """Return the trajectory without readings whose noise a range may have cut off, by what the fit expects of them.
+
+    Leaving out readings by their own value would bias what remains.
+    """
+    kept = []
+    for readings in current.readings:
+        limit = readings.limit
+        good = readings.good.copy()
+        if limit is not None:
+            for axis, name in enumerate(readings.axes):
+                channel = channel_of(linear, readings.sensor, name)
+                if channel is not None:
+                    expected = readings.value[channel.index, axis] - linear.raw[channel.rows]
+                    near = np.abs(expected) > limit - 6.0 * np.nan_to_num(linear.sd[channel.rows])
+                    good[channel.index[near], axis] = False
+        kept.append(replace(readings, good=good))
+    return replace(current, readings=tuple(kept))
