@@ -418,7 +418,7 @@ def _leaning(found: Search) -> tuple[str, ...]:
 
 def _out_of_balance(found: Search) -> tuple[str, ...]:
     """Return what to say of a body that moments fixed in it turn, about which the catalogue of its plant is silent."""
-    if not all(one.unbalanced for one in found.relaxed_fit.trajectories):
+    if not all(one.unbalanced for one in found.final.fit.trajectories):
         return ()
     moves = " and moves" if moves_out(found.relaxed_fit) else ""
     return (

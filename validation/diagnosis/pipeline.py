@@ -19,6 +19,7 @@ from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of
 from discsim.validation.diagnosis.datasets import recording_names, recordings_of
 from discsim.validation.diagnosis.detectors.row_times import row_times
 from discsim.validation.diagnosis.inertia import with_inertia
+from discsim.validation.diagnosis.leaning import out_of_balance
 from discsim.validation.diagnosis.prepared import prepared
 from discsim.validation.diagnosis.refuted import without_refuted
 from discsim.validation.diagnosis.relaxed_fit import moves_out, relaxed
@@ -153,6 +154,8 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
         return search(ready.fitted, progress, ready.meant, followed, free, hints, question.effects, anew)
 
     found = searched(followed)
+    if ready.rows is not None:
+        found = out_of_balance(found)
     if followed.plant.weakly_identified and ready.rows is None:  # else pieces may part, and what is left is known
         found = _with_bends(found, followed, searched)
     return Tried(ready, None, found)

@@ -35,7 +35,6 @@ from discsim.validation.diagnosis.settings import CONSISTENCY, RELAXED_FIT
 from discsim.validation.identification.from_afar import fitted_from_afar
 from discsim.validation.identification.gauss_newton import Fit, linearised, merit_of, refit
 from discsim.validation.identification.noise import (
-    NoiseModel,
     estimate_noise,
     robust_noise,
     stated_noise,
@@ -52,8 +51,10 @@ from discsim.validation.identification.sensor_model import delay
 __all__ = [
     "clock_of_accelerometer",
     "from_other_initial_states",
+    "left_across",
     "moves_out",
     "relaxed",
+    "unbalanced",
     "without_outliers",
 ]
 
@@ -128,11 +129,8 @@ def relaxed(
     few = 1e-4 * sum(linear.raw.size for linear in bare)
     if fit.from_release:
         return fitted_from_afar(fit)
-    if supposed:
-        fit = _leaning(_reweighted(fit, iterations, few), fit.noise, few)
-    else:
-        fit = _out_of_balance(refit(fit, iterations=iterations, tolerance=few))
-    fit = from_other_initial_states(fit)
+    fit = _reweighted(fit, iterations, few) if supposed else refit(fit, iterations=iterations, tolerance=few)
+    fit = from_other_initial_states(fit if supposed else _out_of_balance(fit))
     if not plant.airborne:
         fit = _with_own_clock(fit)
     if ratio == 1.0:
@@ -332,37 +330,24 @@ def _out_of_balance(fit: Fit) -> Fit:
     comes and goes, otherwise in each throw, as no error of a gyroscope does. What has moved out so far may move on: the
     pull on the accelerometer is then no measure of the spin, and the motion is left as the others tell it.
     """
-    if fit.plant.unbalanced is None or not _left_across(fit) > RELAXED_FIT.across:
+    if fit.plant.unbalanced is None or not left_across(fit) > RELAXED_FIT.across:
         return fit
-    few, sensor, least = 1e-4 * fit.count, "accelerometer", RELAXED_FIT.reconciled * _left_across(fit)
+    few, sensor, least = 1e-4 * fit.count, "accelerometer", RELAXED_FIT.reconciled * left_across(fit)
     free = tuple(Parameter(*key, 0.0, 1e-6, 1e-2) for key in _BY_PULL)
     pulled = replace(fit, parameters=(*fit.parameters, *free), at=np.append(fit.at, [0.0, 0.0]))
-    if _left_across(refit(pulled, iterations=12, tolerance=few)) < least:
+    if left_across(refit(pulled, iterations=12, tolerance=few)) < least:
         return fit
     led = replace(_without(fit, sensor, few), merit=np.inf) if _astray(fit) else fit
-    turned = refit(_unbalanced(led), iterations=12, tolerance=few)
-    if _astray(turned) or not _left_across(turned) < least:
+    moved = unbalanced(led)
+    turned = refit(replace(led, trajectories=moved, defects=moved[0].plant.sizes.relaxed), iterations=12, tolerance=few)
+    if _astray(turned) or not left_across(turned) < least:
         return fit
     return turned if led is fit else _beside(replace(turned, trajectories=_with_readings(turned, fit)), sensor)
 
 
-def _unbalanced(fit: Fit) -> Fit:
-    """Return a fit of the same bodies out of balance, from where it stands."""
-    moved = tuple(replace(one, unbalanced=True) for one in fit.trajectories)
-    return replace(fit, trajectories=moved, defects=moved[0].plant.sizes.relaxed)
-
-
-def _leaning(fit: Fit, stated: NoiseModel, tolerance: float) -> Fit:
-    """Follow free spins of measured discs as of bodies out of balance where a gyroscope's x and y are nearer then.
-
-    Errors of their parts are free already, those that lean its rates among them, and rows are told to well below a
-    millisecond: what is left there is what turns the body.
-    """
-    if fit.plant.unbalanced is None:
-        return fit
-    turned = _reweighted(replace(_unbalanced(fit), noise=stated), _EACH, tolerance)
-    nearer = _left_across(replace(turned, noise=fit.noise)) < RELAXED_FIT.rescued * _left_across(fit)
-    return turned if nearer else fit
+def unbalanced(fit: Fit) -> tuple[Trajectory, ...]:
+    """Return the trajectories of a fit as of bodies out of balance."""
+    return tuple(replace(one, unbalanced=True) for one in fit.trajectories)
 
 
 def moves_out(fit: Fit) -> bool:
@@ -370,7 +355,7 @@ def moves_out(fit: Fit) -> bool:
     return all(one.unbalanced for one in fit.trajectories) and _misfit(fit, "accelerometer") > RELAXED_FIT.lost
 
 
-def _left_across(fit: Fit) -> float:
+def left_across(fit: Fit) -> float:
     """Return what a fit leaves of a gyroscope's x and y, mean square in its noise; NaN without one."""
     left = [
         linear.residual[c.rows] / fit.noise[c.group].sd

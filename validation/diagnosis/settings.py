@@ -102,6 +102,9 @@ class RelaxedFit:
     across : float
         Mean square of what is left of a gyroscope's x and y in a free spin, in its noise, above which its body may be
         out of balance: others leave 0.9 to 1.1.
+    leaning : float
+        Measured discs are out of balance where that leaves less than this share of the mean square of their
+        gyroscope's x and y: four throws of one keep 0.3, simulated ones in balance 0.9 and more.
     outlier, neighbour : float
         A reading this many robust standard deviations off, its neighbours within the second number, is left out:
         normal noise has the one once in 4e18 readings, the other once in 1.5e5.
@@ -118,6 +121,7 @@ class RelaxedFit:
     lost: float = 10.0
     reconciled: float = 0.2
     across: float = 1.5
+    leaning: float = 0.5
     outlier: float = 9.0
     neighbour: float = 4.5
     most_outliers: float = 0.03
@@ -292,7 +296,8 @@ class UnknownLaw:
     Attributes
     ----------
     stack : int
-        So many effects on the motion may be a bad copy of something that is none of them: a law competes then.
+        So many effects on the motion, or in a free spin on one sensor, may be a bad copy of something that is none of
+        them: a law competes then.
     worth : float
         Share of the best candidate's gain below which another is not fitted: time alone.
     fitted : int

@@ -18,9 +18,9 @@ from discsim.validation.diagnosis.result import (
 )
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
 from discsim.validation.diagnosis.selection.search_state import Search, misses
-from discsim.validation.diagnosis.settings import UNKNOWN_LAW
+from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
 from discsim.validation.diagnosis.stages import Judged, Progress, Tried
-from discsim.validation.diagnosis.unknown_law.find import find_law
+from discsim.validation.diagnosis.unknown_law.find import find_law, left_to_gain
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, UnmodelledResidual, unmodelled_residuals
 
@@ -67,7 +67,7 @@ def judged(tried: Tried, progress: Progress) -> Judged:
         set_aside = tuple(heldout_fits(found.final))
         leftovers = leftovers_of(found, set_aside, rows.names, agreement)
     left = leaves_more_than_noise(found) and not nothing_but_pure_error(leftovers)
-    if left or _stacked(found):
+    if left or _may_be_a_copy(found):
         progress("looking for a law", 4, 5)
         law = find_law(
             found.relaxed_fit,
@@ -111,17 +111,22 @@ def may_be_the_air(item: UnmodelledResidual, fit: Fit) -> bool:
     return excess < share * float(np.max(wobble[about], initial=0.0))
 
 
-def _stacked(found: Search) -> bool:
-    """Tell whether several effects on the motion, or on one sensor, were found, so that one law is worth comparing.
+def _may_be_a_copy(found: Search) -> bool:
+    """Tell whether what was found may copy something that is none of it, so that one law is worth comparing.
 
-    Those on a sensor count in a free spin, where much that nobody knows stands in for what a wrong effect leaves: a
-    bias that settles passes for a bias beside a sensitivity to what dies away, too. Where all ordinary errors are
-    fitted at once, several of a sensor are no stack; nor are lost samples, without which no law would be fitted.
+    Several effects on the motion may, and one of which a law has more to gain than an effect costs: a disc that dries
+    passes for thin air. Of those on a sensor several do in a free spin, where much that nobody knows stands in for what
+    a wrong effect leaves: a bias that settles passes for a bias beside a sensitivity to what dies away, too. Where all
+    ordinary errors are fitted at once, several of a sensor are no stack; nor are lost samples, without which no law
+    would be fitted.
     """
     lasting = [c.row for c in found.final.hypothesis.candidates if not c.row.brief and not c.fixed_values]
-    sensors = BOARD if found.relaxed_fit.plant.weakly_identified and not found.at_once else frozenset()
+    weak = found.relaxed_fit.plant.weakly_identified
+    sensors = BOARD if weak and not found.at_once else frozenset()
     acted_on = Counter(row.acts_on for row in lasting if row.acts_on == "motion" or row.acts_on in sensors)
-    return max(acted_on.values(), default=0) >= UNKNOWN_LAW.stack
+    if max(acted_on.values(), default=0) >= UNKNOWN_LAW.stack:
+        return True
+    return bool(acted_on) and not weak and left_to_gain(found.final.fit) > SELECTION.entry
 
 
 def recalibrations(found: Search) -> dict[str, Recalibration]:

@@ -376,3 +376,12 @@ def test_what_slides_out_in_free_spins_has_its_law_and_a_body_out_of_balance_is_
     c, tau = (found.law.coefficients[name].value for name in ("c", "tau"))
     assert 5e-4 < c * (1.0 - np.exp(-min(one.end for one in slides) / tau)) < 1.6e-3
     assert any("out of balance" in line for line in found.warnings)
+
+
+def test_a_disc_that_dries_is_not_explained_by_thin_air():
+    """One effect on the motion leaves no more than noise, and a law gains 170 more."""
+    found = diagnose([recordings(Request(636024).draw())], ["throws"]).diagnosis
+    assert found.verdict == "unexplained"
+    assert found.law is not None
+    assert (found.law.target, found.law.text) == ("air_share", "c * exp(-t/tau)")
+    assert found.law.coefficients["tau"].value == pytest.approx(0.70, abs=0.3)
