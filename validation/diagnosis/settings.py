@@ -104,7 +104,7 @@ class RelaxedFit:
         out of balance: others leave 0.9 to 1.1.
     leaning : float
         Measured discs are out of balance where that leaves less than this share of the mean square of their
-        gyroscope's x and y: four throws of one keep 0.3, simulated ones in balance 0.9 and more.
+        gyroscope's x and y: four throws of one keep 0.3, simulated ones in balance 0.76 to 0.90.
     outlier, neighbour : float
         A reading this many robust standard deviations off, its neighbours within the second number, is left out:
         normal noise has the one once in 4e18 readings, the other once in 1.5e5.

@@ -115,18 +115,20 @@ def _may_be_a_copy(found: Search) -> bool:
     """Tell whether what was found may copy something that is none of it, so that one law is worth comparing.
 
     Several effects on the motion may, and one of which a law has more to gain than an effect costs: a disc that dries
-    passes for thin air. Of those on a sensor several do in a free spin, where much that nobody knows stands in for what
+    passes for thin air. (Beside samples that were lost a motion ends beside its best.) Of those on a sensor several do in a free spin, where much that nobody knows stands in for what
     a wrong effect leaves: a bias that settles passes for a bias beside a sensitivity to what dies away, too. Where all
     ordinary errors are fitted at once, several of a sensor are no stack; nor are lost samples, without which no law
     would be fitted.
     """
-    lasting = [c.row for c in found.final.hypothesis.candidates if not c.row.brief and not c.fixed_values]
+    candidates = found.final.hypothesis.candidates
+    lasting = [c.row for c in candidates if not c.row.brief and not c.fixed_values]
     weak = found.relaxed_fit.plant.weakly_identified
     sensors = BOARD if weak and not found.at_once else frozenset()
     acted_on = Counter(row.acts_on for row in lasting if row.acts_on == "motion" or row.acts_on in sensors)
     if max(acted_on.values(), default=0) >= UNKNOWN_LAW.stack:
         return True
-    return bool(acted_on) and not weak and left_to_gain(found.final.fit) > SELECTION.entry
+    alone = not weak and not any(c.fixed_values for c in candidates)
+    return bool(acted_on) and alone and left_to_gain(found.final.fit) > SELECTION.entry
 
 
 def recalibrations(found: Search) -> dict[str, Recalibration]:
