@@ -115,10 +115,10 @@ def _may_be_a_copy(found: Search) -> bool:
     """Tell whether what was found may copy something that is none of it, so that one law is worth comparing.
 
     Several effects on the motion may, and one of which a law has more to gain than an effect costs: a disc that dries
-    passes for thin air. (Beside samples that were lost a motion ends beside its best.) Of those on a sensor several do in a free spin, where much that nobody knows stands in for what
-    a wrong effect leaves: a bias that settles passes for a bias beside a sensitivity to what dies away, too. Where all
-    ordinary errors are fitted at once, several of a sensor are no stack; nor are lost samples, without which no law
-    would be fitted.
+    passes for thin air. (Beside samples that were lost a motion ends beside its best.) Of those on a sensor several do
+    in a free spin, where much that nobody knows stands in for what a wrong effect leaves: a bias that settles passes
+    for a bias beside a sensitivity to what dies away, too. Where all ordinary errors are fitted at once, several of a
+    sensor are no stack; nor are lost samples, without which no law would be fitted.
     """
     candidates = found.final.hypothesis.candidates
     lasting = [c.row for c in candidates if not c.row.brief and not c.fixed_values]
