@@ -19,7 +19,7 @@ from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of
 from discsim.validation.diagnosis.datasets import recording_names, recordings_of
 from discsim.validation.diagnosis.detectors.row_times import row_times
 from discsim.validation.diagnosis.inertia import with_inertia
-from discsim.validation.diagnosis.leaning import out_of_balance
+from discsim.validation.diagnosis.out_of_balance import out_of_balance
 from discsim.validation.diagnosis.prepared import prepared
 from discsim.validation.diagnosis.refuted import without_refuted
 from discsim.validation.diagnosis.relaxed_fit import moves_out, relaxed
@@ -38,7 +38,7 @@ from discsim.validation.diagnosis.setup_effects import (
     without_offsets,
 )
 from discsim.validation.diagnosis.stages import Prepared, Progress, Question, Tried, silent
-from discsim.validation.diagnosis.unknown_law.find import find_law
+from discsim.validation.diagnosis.unknown_law.find import FoundLaw, find_law
 from discsim.validation.diagnosis.verdict import judged, leaves_more_than_noise
 from discsim.validation.identification.competing_effects import Competing
 from discsim.validation.identification.gauss_newton import Fit
@@ -97,10 +97,7 @@ def _with_law_of_one(tried: Tried, question: Question) -> Tried:
     contradiction, ready = tried.contradiction, tried.prepared
     if contradiction is None or contradiction.lost or len(contradiction.against) != 1:
         return tried
-    question.progress("looking for a law", 4, 5)
-    free = free_parameters(ready.setup)
-    begun = screened(ready.fitted, as_stated=ready.meant, free=free, effects=question.effects)
-    law = find_law(begun.relaxed_fit, begun.base, begun.own, begun.relaxed_noise, ready.fitted)
+    begun, law = _law_before_effects(ready, question)
     if law is None or law.law.target.partition(".")[0] not in contradiction.against:
         return tried
     fit, residuals = law.fitted.fit, law.fitted.residuals
@@ -145,29 +142,34 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
     if contradiction is not None:
         return Tried(ready, contradiction)
     hints = (*ready.supposed, *setup.hints)
-    moving = ready.rows is None and moves_out(followed)
-    told = _law_of_what_moves_out(ready, followed, question) if moving else None
-    if told is not None:
-        return told
+    if ready.rows is None and moves_out(followed):
+        begun, law = _law_before_effects(ready, question, followed)
+        if law is not None:
+            return Tried(ready, None, begun, law)
 
     def searched(followed: Fit, anew: Anew | None = None) -> Search:
         return search(ready.fitted, progress, ready.meant, followed, free, hints, question.effects, anew)
 
     found = searched(followed)
-    if ready.rows is not None:
+    if ready.rows is not None:  # pieces may part there, and what is left is known
         found = out_of_balance(found)
-    if followed.plant.weakly_identified and ready.rows is None:  # else pieces may part, and what is left is known
+    elif followed.plant.weakly_identified:
         found = _with_bends(found, followed, searched)
     return Tried(ready, None, found)
 
 
-def _law_of_what_moves_out(ready: Prepared, followed: Fit, question: Question) -> Tried | None:
-    """Return what was tried with the law by which something moves in a body, asked before any effect: none does."""
+def _law_before_effects(
+    ready: Prepared, question: Question, moving: Fit | None = None
+) -> tuple[Search, FoundLaw | None]:
+    """Return where a search would begin, and the law that is asked for without one; None where none holds.
+
+    ``moving`` is the relaxed fit of bodies in which something moves out: no effect of the catalogue does.
+    """
     question.progress("looking for a law", 4, 5)
     free = free_parameters(ready.setup)
-    begun = screened(ready.fitted, as_stated=ready.meant, followed=followed, free=free, effects=question.effects)
-    law = find_law(begun.relaxed_fit, begun.base, begun.own, begun.relaxed_noise, ready.fitted, moves_out=True)
-    return None if law is None else Tried(ready, None, begun, law)
+    begun = screened(ready.fitted, as_stated=ready.meant, followed=moving, free=free, effects=question.effects)
+    base, own, noise = begun.base, begun.own, begun.relaxed_noise
+    return begun, find_law(begun.relaxed_fit, base, own, noise, ready.fitted, moves_out=moving is not None)
 
 
 #: times that segments are halved where the air's moment bends within them

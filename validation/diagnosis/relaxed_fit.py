@@ -34,12 +34,7 @@ from discsim.validation.diagnosis.first_trajectory import (
 from discsim.validation.diagnosis.settings import CONSISTENCY, RELAXED_FIT
 from discsim.validation.identification.from_afar import fitted_from_afar
 from discsim.validation.identification.gauss_newton import Fit, linearised, merit_of, refit
-from discsim.validation.identification.noise import (
-    estimate_noise,
-    robust_noise,
-    stated_noise,
-    whitened,
-)
+from discsim.validation.identification.noise import estimate_noise, robust_noise, stated_noise, whitened
 from discsim.validation.identification.ordinary_errors import ordinary_errors
 from discsim.validation.identification.parameters import Parameter, Values
 from discsim.validation.identification.plants import plant_of
@@ -337,7 +332,7 @@ def _out_of_balance(fit: Fit) -> Fit:
     pulled = replace(fit, parameters=(*fit.parameters, *free), at=np.append(fit.at, [0.0, 0.0]))
     if left_across(refit(pulled, iterations=12, tolerance=few)) < least:
         return fit
-    led = replace(_without(fit, sensor, few), merit=np.inf) if _astray(fit) else fit
+    led = _without(fit, sensor, few) if _astray(fit) else fit
     moved = unbalanced(led)
     turned = refit(replace(led, trajectories=moved, defects=moved[0].plant.sizes.relaxed), iterations=12, tolerance=few)
     if _astray(turned) or not left_across(turned) < least:

@@ -101,10 +101,12 @@ class RelaxedFit:
         What else is supposed is taken up where it leaves less than this share: from ten times the noise back to twice.
     across : float
         Mean square of what is left of a gyroscope's x and y in a free spin, in its noise, above which its body may be
-        out of balance: others leave 0.9 to 1.1.
-    leaning : float
+        out of balance: four with a part that slides leave 24 to 1820 (seeds 627064, 635033, 633010, 635023), and
+        followed as such 0.8 to 0.9, one 7.
+    unbalanced : float
         Measured discs are out of balance where that leaves less than this share of the mean square of their
-        gyroscope's x and y: four throws of one keep 0.3, simulated ones in balance 0.76 to 0.90.
+        gyroscope's x and y: four throws of one keep 0.27 to 0.38 with the
+        numbers of the others, three simulated ones in balance 0.76 to 0.90 (like_real, seeds 650002, 650003, 650005).
     outlier, neighbour : float
         A reading this many robust standard deviations off, its neighbours within the second number, is left out:
         normal noise has the one once in 4e18 readings, the other once in 1.5e5.
@@ -121,7 +123,7 @@ class RelaxedFit:
     lost: float = 10.0
     reconciled: float = 0.2
     across: float = 1.5
-    leaning: float = 0.5
+    unbalanced: float = 0.5
     outlier: float = 9.0
     neighbour: float = 4.5
     most_outliers: float = 0.03

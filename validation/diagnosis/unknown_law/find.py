@@ -174,7 +174,7 @@ def find_law(
     states = [state_of(trajectory, start.values(i)) for i, trajectory in enumerate(start.trajectories)]
     at = reference_of(states)
     # what a free spin does not model takes up any further moment
-    motion = () if plant.weakly_identified or moves_out else plant.laws.terms
+    motion = () if plant.weakly_identified else plant.laws.terms
     about = sensor_library(start)
     if moves_out:
         about = [term for term in about if (term.sensor, term.kind) in _OF_WHAT_MOVES]

@@ -416,7 +416,7 @@ def fitted_sensor_law(
     beside = TermsBeside(tuple(terms), tuple(widths))
     defects = start.plant.sizes.continuous
     fit = Fit(start.trajectories, (*own, *numbers, *shapes), at, defects, start.noise, beside=beside)
-    fit = _in_held_steps(fit) if fit.plant.weakly_identified else _in_whole_steps(fit, len(numbers), len(shapes))
+    fit = _in_held_steps(fit) if fit.plant.weakly_identified else _in_whole_steps(fit, beside)
     if not np.all(np.isfinite(fit.at)) or not fit.covariance.size or not _are_plays(fit, terms):
         return None
     return scored(Hypothesis(), fit)
@@ -432,16 +432,16 @@ def _in_held_steps(fit: Fit) -> Fit:
     return fit
 
 
-def _in_whole_steps(fit: Fit, count: int, ends: int) -> Fit:
-    """Return a fit of terms, ``count`` coefficients and last ``ends`` shapes, after whole steps that settle."""
-    width = len(fit.parameters)
+def _in_whole_steps(fit: Fit, beside: TermsBeside) -> Fit:
+    """Return a fit of terms, which are its last parameters, after whole steps that settle."""
+    width, ends = len(fit.parameters), len(beside.terms)
     for round in range(12):
         linears = linearised(fit)
         fit = replace(fit, linears=linears)
         merit = sum(chi_squared(linear, fit.noise, linear.residual) for linear in linears)
         reduced = reduced_each(fit)
         gram = np.sum([r.gram for r in reduced], axis=0)
-        told = np.any(fit.at[width - ends - count : width - ends])  # else no shape shows
+        told = np.any(fit.at[width - beside.count : width - ends])  # else no shape shows
         free = [*range(width if told else width - ends)]
         some = [*free, width]
         step, covariance, expected = common_step(

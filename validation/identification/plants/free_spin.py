@@ -250,7 +250,7 @@ _SLOWED = 0.2
 _BALANCED = Plant(
     name=_NAME,
     motion="free spin",
-    layout=Layout(_SIZE, 15, attitude=_ATTITUDE, rate=_RATE, spin=_SPIN, per_time=(_DECAY, _SPIN)),
+    layout=Layout(_SIZE, _SIZE - 3, attitude=_ATTITUDE, rate=_RATE, spin=_SPIN, per_time=(_DECAY, _SPIN)),
     dynamics=Dynamics(propagated_by(free_spin_segments, lambda given, own: own), _longest_step),
     initial=Initial(_states, _other_attitudes),
     sizes=Sizes(
@@ -304,7 +304,7 @@ FREE_SPIN = replace(
     _BALANCED,
     unbalanced=replace(
         _BALANCED,
-        layout=replace(_BALANCED.layout, directions=17),
+        layout=replace(_BALANCED.layout, directions=_SIZE - 1),
         sizes=replace(
             _BALANCED.sizes,
             differences=_and_in_body(_DIFFERENCES, 1e-2),

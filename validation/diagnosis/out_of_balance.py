@@ -23,5 +23,5 @@ def out_of_balance(found: Search) -> Search:
         return found
     start = replace(fit, trajectories=unbalanced(fit))
     final = continuous_fit(start, found.final.hypothesis, found.own, fit.noise, values_of_fit(found.final))
-    nearer = left_across(replace(final.fit, noise=fit.noise)) < RELAXED_FIT.leaning * left_across(fit)
+    nearer = left_across(replace(final.fit, noise=fit.noise)) < RELAXED_FIT.unbalanced * left_across(fit)
     return replace(found, final=final) if nearer else found
