@@ -100,3 +100,22 @@ def test_a_law_and_tables_reach_the_neighbours():
             alone[c][:, SHOWN["dw"]] - alone[0][:, SHOWN["dw"]],
         )
         assert np.linalg.norm(parted - truly) <= 0.08 * np.linalg.norm(truly), change
+
+
+@pytest.mark.parametrize("spin", [56.0, -31.0])
+def test_steps_end_on_the_corners_of_a_table(spin):
+    """Whatever the steps: across corners they left up to some mrad/s, as loud as a good gyroscope's noise."""
+    disc, environment = load_disc("cd1")
+    assert disc.aero_table is not None
+    state = released(wobble=2.5)
+    state[12] = spin
+    flats, states = np.array(flight_parameters(disc, environment))[None], state[None]
+    out = np.linspace(0.0, 0.5, 101)
+    flights = []
+    for count in (51, 5001):
+        rows, ends = np.empty((1, out.size, ROW)), np.empty((1, 13))
+        flight_segments(flats, tables(disc), states, np.linspace(0.0, 0.5, count), count - 1, out, rows, ends)
+        np.testing.assert_allclose(ends[0, 10:13], rows[0, -1, SHOWN["w"]], atol=1e-9)
+        flights.append(rows[0])
+    coarse, fine = flights
+    np.testing.assert_allclose(coarse[:, SHOWN["w"]], fine[:, SHOWN["w"]], atol=1e-5)

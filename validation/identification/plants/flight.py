@@ -13,18 +13,19 @@ from math import asin, atan2, cos, degrees, radians, sin
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.compiled import compiled_nogil
+from discsim.compiled import compiled, compiled_nogil
 from discsim.disc import Release
 from discsim.dormand_prince import evaluate, interpolant, step
 from discsim.effects.air import Wind
 from discsim.effects.catalogue import catalogued
 from discsim.effects.kind import BOARD
 from discsim.errors import InputError
-from discsim.flight_equations import derivative, in_body
+from discsim.flight_equations import copied, derivative, in_body, incidence
 from discsim.frames import body_to_ned, multiply, quaternion_from_matrix, to_body, turn
 from discsim.law import AIR_SHARE, WRENCH_TARGETS
 from discsim.parameters import PARAMETERS, Tables
 from discsim.recording import Recording
+from discsim.step_ends import share_to_kink
 from discsim.toml_table import TomlTable
 from discsim.validation.identification.dynamics import FASTEST, SIZE, acting_tables
 from discsim.validation.identification.initial.flight import InitialStates, flight_initial_states, flight_starts
@@ -57,10 +58,10 @@ _POSITION, _VELOCITY, _ATTITUDE, _RATE, _SPIN = slice(0, 3), slice(3, 6), slice(
 _STEP, _NUTATION = 0.01, 1.2
 #: and where an uneven body makes the motion follow the spin
 _UNEVEN = 0.6
-#: and where coefficients come from a table, whose corners a step may not leap over; and in s, for a disc that spins
-#: slowly wobbles across many of them: 0.9 rad/s at 31 rad/s left up to 5.5 mrad/s of rate with steps of 8 ms, twice the
-#: noise of a gyroscope, and 0.5 with these
-_CORNERED, _CORNER_STEP = 0.5, 0.004
+#: parts that a step is cut into at kinks of the coefficients at most, and tries to have a part end on its kink
+_PARTS, _TRIES = 24, 8
+#: a step this short, s, is not cut
+_SHORTEST = 1e-7
 
 
 def _longest_step(given: Given, state: FloatArray, start: float, stop: float) -> float:
@@ -72,9 +73,63 @@ def _longest_step(given: Given, state: FloatArray, start: float, stop: float) ->
     # a path shows no nutation: 0.04 mm off after 2.5 s at 138 rad/s, by tables and with a wobble of 2 rad/s
     if BOARD.isdisjoint(given.recording.samples):
         return min(_STEP, _NUTATION / nutation)
-    if disc.aero_table is not None:
-        return min(_CORNER_STEP, _CORNERED / nutation)
     return min(_STEP, (_UNEVEN if given.uneven else _NUTATION) / nutation)
+
+
+@compiled
+def _begun(state: FloatArray, y: FloatArray) -> None:
+    """Write a state of a segment (13,) as one of the equations of motion (14,), its angle turned being zero."""
+    for i in range(13):
+        y[i] = state[i]
+    y[13] = 0.0
+
+
+@compiled
+def _ending_on_kinks(
+    flat: FloatArray, given: Tables, state: FloatArray, times: FloatArray, last: int
+) -> tuple[FloatArray, int]:
+    """Return steps (m,) like ``times`` (n,) that also end on the kinks of the coefficients, and the place of ``last``.
+
+    Where there are none, as without a table, the steps are those given.
+    """
+    p = flat[:SIZE].copy().view(PARAMETERS)[0]
+    tabulated = given.static.columns.shape[1] > 0 or given.static.rolling.shape[1] > 1
+    if not tabulated and p.aero_stall.k == 0.0:
+        return times, last
+    tables = acting_tables(given, flat)
+    y, new, work = np.empty(14), np.empty(14), np.empty(14)
+    F, K = np.empty((7, 14)), np.empty((16, 14))
+    found, count, place = np.empty(times.size * (_PARTS + 1)), 1, 0
+    found[0] = t = times[0]
+    _begun(state, y)
+    derivative(p, tables, t, y, K[0])
+    alpha = incidence(p, tables, t, y)
+    for k in range(1, times.size):
+        h, parts, tries = times[k] - t, 0, 0
+        while True:
+            step(p, tables, t, y, h, K, new)
+            derivative(p, tables, t + h, new, K[12])
+            alpha_new = incidence(p, tables, t + h, new)
+            if parts < _PARTS and tries < _TRIES:
+                interpolant(p, tables, t, y, h, K, new, F)
+                share = share_to_kink(p, tables, t, y, h, F, alpha, alpha_new, work)
+                if share < 1.0 and share * h > _SHORTEST:
+                    h *= share
+                    tries += 1
+                    continue
+            whole = h >= times[k] - t - _SHORTEST
+            t = times[k] if whole else t + h
+            found[count] = t
+            count += 1
+            copied(new, y)
+            copied(K[12], K[0])
+            alpha = alpha_new
+            if whole:
+                break
+            h, parts, tries = times[k] - t, parts + 1, 0
+        if k == last:
+            place = count - 1
+    return found[:count].copy(), place
 
 
 @compiled_nogil
@@ -91,20 +146,20 @@ def flight_segments(
     """Fly from states (c, 13), each with its row of flats (c, k), in the steps ``times`` (n,).
 
     Writes rows (c, m, 19) at instants out (m,) and ends (c, 13), the states at ``times[last]``. All states but the
-    first are its neighbours, which count by how they part from it.
+    first are its neighbours, which count by how they part from it. Steps are cut where the first meets a kink of the
+    coefficients, as at the corners of a table: a step across one is in error by up to twice a good gyroscope's noise.
     """
+    given = tables
+    times, last = _ending_on_kinks(flats[0], given, states[0], times, last)
     n = times.size
     path, dense, K = np.empty((n, 14)), np.empty((n - 1, 7, 14)), np.empty((16, 14))
-    given = tables
     disc = flats[0, :SIZE].copy().view(PARAMETERS)[0].disc
     turning = abs(states[0, _SPIN]) * disc.Izz / disc.Ixx > SLOWEST
     for c in range(1 if turning else states.shape[0]):
         flat = flats[c, :SIZE].copy()
         p = flat.view(PARAMETERS)[0]
         tables = acting_tables(given, flats[c])
-        path[0, :10] = states[c, :10]
-        path[0, 10:13] = states[c, 10:13]
-        path[0, 13] = 0.0
+        _begun(states[c], path[0])
         derivative(p, tables, times[0], path[0], K[0])
         for k in range(n - 1):
             h = times[k + 1] - times[k]
