@@ -13,8 +13,9 @@ from discsim.validation.importing.vectornav import BEGINS, sentence_cells
 
 __all__ = ["MONITOR", "RecordLines", "labelled_cells", "names_of_records"]
 
-#: What Arduino's serial monitor puts before a line.
-MONITOR = re.compile(r"^(\d\d?:\d\d:\d\d(?:\.\d+)?) -> ")
+#: What serial monitors put before a line: "12:01:33.456 -> " (Arduino), "12:01:33.456 > " (PlatformIO), and a stamp in
+#: brackets, with or without the date (Tera Term).
+MONITOR = re.compile(r"^\[?((?:\d{4}-\d\d-\d\d )?\d\d?:\d\d:\d\d(?:\.\d+)?)(?:\] ?| -?> )")
 
 _NAME = r"([^\W\d][^:=,;|\t\[]*?)"
 #: a number, or what stands for none
