@@ -125,6 +125,7 @@ def _each(asked: _Asked, logs: Sequence[Path], out: Path) -> list[Path]:
 
 def _import(asked: _Asked, logged: Path, name: str, out: Path, said: list[str]) -> None:
     """Import one log that is `opened` into ``out``; ``said`` are notes on how it was read."""
+    from discsim.environment import Environment
     from discsim.validation.importing.imported_log import take
     from discsim.validation.importing.resting import dip_at_rest
     from discsim.validation.importing.sniffing import recognised, sniff
@@ -135,6 +136,8 @@ def _import(asked: _Asked, logged: Path, name: str, out: Path, said: list[str]) 
     place, date = asked.place, asked.date
     known = recognised(logged) if asked.map_ == "auto" else asked.named
     proposal = sniff(logged, asked.plant) if known is None else None
+    if proposal is not None and place is not None:
+        proposal = proposal.in_field(at_place(Environment(), place, date).field_strength)
     if known is not None and asked.named is None:
         said.append(f"taken: the shipped map '{known.name}', made for these columns (--map sniff asks anew)")
     with start_run(out, None, [asked.raw, *([known.path] if known else [])]) as run:

@@ -227,6 +227,7 @@ def import_log(
         notes: tuple[str, ...] = ()
         if known is None:
             screened = sniff(logged, plant)
+            screened = screened if environment is None else screened.in_field(environment.field_strength)
             text, decisions, notes = map_text(screened), tuple(screened.all_decisions), tuple(screened.notes)
             write_text(Path(place) / "map.toml", text)
             known = read_map(Path(place) / "map.toml")

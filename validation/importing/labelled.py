@@ -11,10 +11,16 @@ from collections.abc import Sequence
 
 from discsim.validation.importing.vectornav import BEGINS, sentence_cells
 
-__all__ = ["MONITOR", "RecordLines", "labelled_cells", "names_of_records"]
+__all__ = ["RecordLines", "labelled_cells", "names_of_records", "stamped"]
 
-#: What Arduino's serial monitor puts before a line.
-MONITOR = re.compile(r"^(\d\d?:\d\d:\d\d(?:\.\d+)?) -> ")
+#: What serial monitors put before a line: "12:01:33.456 -> " (Arduino), "12:01:33.456 > " (PlatformIO), and a stamp in
+#: brackets, with or without the date (Tera Term).
+_MONITOR = re.compile(r"^\[?((?:\d{4}-\d\d-\d\d )?\d\d?:\d\d:\d\d(?:\.\d+)?)(?:\] ?| -?> )")
+#: What ESP-IDF's log puts there: level, milliseconds since the start, and a tag ("I (412) imu: ").
+_ESP_IDF = re.compile(r"^[EWIDV] \((\d+)\) [\w.-]+: ")
+_COLOUR = re.compile(r"\x1b\[[\d;]*m")
+#: How the time of such a stamp is called.
+_TIMES = ("time", "time_ms")
 
 _NAME = r"([^\W\d][^:=,;|\t\[]*?)"
 #: a number, or what stands for none
@@ -32,6 +38,22 @@ _UNIT = re.compile(r" \([^()]*\)$")
 _AXIS = re.compile(r"(.*?)[\s_.]*\b([xyzXYZ])")
 
 
+def stamped(line: str) -> tuple[str, str, str] | None:
+    """Return what a serial monitor or ESP-IDF's log put before a line: the time's name, the stamp, and what follows.
+
+    None where there is none. A date is joined to its time.
+
+    >>> stamped("12:01:33.456 -> 1,2"), stamped("I (412) imu: 1 2"), stamped("1,2")
+    (('time', '12:01:33.456', '1,2'), ('time_ms', '412', '1 2'), None)
+    """
+    line = _COLOUR.sub("", line) if "\x1b" in line else line
+    if (monitor := _MONITOR.match(line)) is not None:
+        return _TIMES[0], monitor[1].replace(" ", "T"), line[monitor.end() :]
+    if (logged := _ESP_IDF.match(line)) is not None:
+        return _TIMES[1], logged[1], line[logged.end() :]
+    return None
+
+
 def labelled_cells(line: str) -> list[tuple[str, str]]:
     """Return the names and cells of a line whose cells have their names before them; empty where it is none.
 
@@ -47,9 +69,9 @@ def labelled_cells(line: str) -> list[tuple[str, str]]:
     """
     if line.startswith(BEGINS):
         return sentence_cells(line)
-    monitor = MONITOR.match(line)
-    found = [] if monitor is None else [("time", monitor[1])]
-    text = _WORD.sub("", (line if monitor is None else line[monitor.end() :]).strip())
+    begun = stamped(line)
+    found = [] if begun is None else [begun[:2]]
+    text = _WORD.sub("", (line if begun is None else begun[2]).strip())
     if not text:
         return []
     at, owner, units = 0, "", dict[str, str]()
@@ -95,7 +117,7 @@ def names_of_records(lines: Sequence[str]) -> tuple[tuple[str, ...], int, int]:
             after_blank[names] += blank
             blank = False
         else:
-            blank = blank or not MONITOR.sub("", line).strip()
+            blank = blank or not (line if (begun := stamped(line)) is None else begun[2]).strip()
     if not named:
         return (), 0, 0
     alone, count = Counter(named).most_common(1)[0]
@@ -115,7 +137,7 @@ def names_of_records(lines: Sequence[str]) -> tuple[tuple[str, ...], int, int]:
 
 
 def _timeless(names: tuple[str, ...]) -> tuple[str, ...]:
-    return names[1:] if names[:1] == ("time",) else names
+    return names[1:] if names and names[0] in _TIMES else names
 
 
 class RecordLines:
@@ -139,7 +161,7 @@ class RecordLines:
             return None, []
         broken = []
         if self._cells:
-            more = pairs[1:] if pairs[0][0] == "time" else pairs
+            more = pairs[1:] if pairs[0][0] in _TIMES else pairs
             if self._fits(more):
                 pairs, self._several = more, True
             else:

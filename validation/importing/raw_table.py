@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from discsim.arrays import BoolArray, IntArray
 from discsim.errors import InputError, printable
 from discsim.validation.importing.cell_texts import CellTexts, number, packed
-from discsim.validation.importing.labelled import MONITOR, RecordLines, labelled_cells
+from discsim.validation.importing.labelled import RecordLines, labelled_cells, stamped
 from discsim.validation.importing.text_lines import TextLines
 
 __all__ = ["REPAIRS", "Layout", "RawTable", "Repair", "RepairList", "read_raw"]
@@ -116,8 +116,8 @@ class Layout:
         """Return the cells of one line, without the blanks around them."""
         if self.labelled:
             return [cell for _, cell in labelled_cells(line)]
-        if "-> " in line:
-            line = MONITOR.sub(rf"\1{' ' if self.separator == 'blank' else self.separator}", line)
+        if (begun := stamped(line)) is not None:
+            line = f"{begun[1]}{' ' if self.separator == 'blank' else self.separator}{begun[2]}"
         if self.separator == "blank":
             return line.split()
         try:
@@ -244,7 +244,7 @@ class _Rows:
     def _even(self, lines: list[str]) -> list[list[str]] | None:
         """Return the cells of lines that are all sound rows, plainly written; None where one may be otherwise."""
         layout, text = self.layout, "\n".join(lines)
-        marks = ('"', "-> ", *([layout.comment] if layout.comment else []))
+        marks = ('"', "> ", "]", ": ", *([layout.comment] if layout.comment else []))
         if self.width < 2 or layout.lists or layout.thousands or layout.labelled or any(mark in text for mark in marks):
             return None
         if layout.separator == "blank":

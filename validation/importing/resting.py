@@ -104,6 +104,7 @@ def _sign(means: Mapping[str, FloatArray], environment: Environment) -> list[str
     return [
         f"WARNING: accelerometer and magnetometer contradict one another while the log lies still: the field dips by "
         f"{seen:.0f} deg; expected {dip:.0f} deg at this place: the accelerometer's sign is that of gravity (then turn "
-        "the sign of its scale in the map, and up and down of all axes), or the magnetometer's is reversed; the spin "
-        "may be of the other sense"
+        "the sign of its scale in the map, and up and down of all axes), or the magnetometer's is reversed, and the "
+        "spin may be of the other sense; or the place is on the other side of the equator: southern latitudes are "
+        "negative"
     ]

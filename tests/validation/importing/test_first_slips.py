@@ -124,6 +124,15 @@ def test_an_accelerometer_that_shows_gravity_with_its_own_sign_is_told_where_the
     assert not any("lies still" in one for one in right.remarks)
 
 
+def test_a_place_whose_latitude_lost_its_sign_is_asked_about_beside_the_sensors(tmp_path):
+    """The sensors alone were blamed, with a remedy that reverses every spin."""
+    place = Environment(magnetic_field=FIELD * [1.0, 1.0, -1.0])
+    log = import_log(both(tmp_path / "log.csv", LOG.gyro / DEG, LOG.accel, mag=LOG.mag), environment=place)
+    (line,) = [one for one in log.remarks if "contradict one another while" in one]
+    assert "the field dips by 67 deg; expected -67 deg" in line
+    assert "southern latitudes are negative" in line
+
+
 def test_rows_that_run_backwards_are_told(tmp_path):
     columns = [("t_s", LOG.t), *three(named("g{}"), LOG.gyro / DEG)]
     raw = write_table(tmp_path / "log.csv", [(name, values[::-1]) for name, values in columns])

@@ -45,6 +45,24 @@ def test_the_stamps_of_the_serial_monitor_are_the_time(tmp_path):
     assert_allclose(import_log(raw).recordings[0].samples["gyroscope"].t, LOG.t, atol=1e-6)
 
 
+@pytest.mark.parametrize(("begin", "end"), [("", ""), ("\x1b[0;32m", "\x1b[0m")])
+@pytest.mark.parametrize("names", [True, False])
+def test_what_esp_idf_s_log_puts_before_a_line_is_the_time(tmp_path, begin, end, names):
+    """Such a log had "no rows of numbers in it"."""
+    cells = [
+        " ".join(f"{n}={c:.4f}" if names else f"{c:.4f}" for n, c in zip(SHORT[1:], row[1:], strict=True))
+        for row in CELLS
+    ]
+    lines = [f"{begin}I ({1e3 * t + 412:.0f}) imu: {text}{end}" for t, text in zip(LOG.t, cells, strict=True)]
+    raw = tmp_path / "esp.log"
+    raw.write_text(
+        "\n".join(["ESP-ROM:esp32c3", "I (29) boot: ESP-IDF v5.1", *lines[:9], "I (460) wifi: up", *lines[9:], ""])
+    )
+    read = import_log(raw).recordings[0].samples["gyroscope"]
+    assert_allclose(read.t, LOG.t, atol=1e-6)
+    assert_allclose(read.value[:, 2], LOG.gyro[:, 2], atol=1e-3)
+
+
 def test_what_ros_prints_of_a_topic_is_refused_with_what_to_do(tmp_path):
     message = "header:\n  stamp:\n    sec: 1\nangular_velocity:\n  x: 0.1\n  y: 0.2\n  z: 0.3\n---\n"
     (tmp_path / "imu.yaml").write_text(message * 50)

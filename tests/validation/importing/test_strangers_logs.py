@@ -146,10 +146,22 @@ def test_a_decimal_comma_in_quotes_with_three_digits_is_no_mark_between_thousand
     assert_allclose(recording.samples["gyroscope"].t, LOG.t, atol=1e-6)
 
 
-def test_what_a_serial_monitor_puts_before_a_line_is_a_column_of_its_own(tmp_path):
+@pytest.mark.parametrize(
+    ("form", "between"),
+    [
+        ("{} -> ", ","),
+        ("{} > ", ","),
+        ("{} > ", "\t"),
+        ("[{}] ", ";"),
+        ("[2024-05-03 {}] ", ","),
+        ("[2024-05-03 {}] ", " "),
+    ],
+)
+def test_what_a_serial_monitor_puts_before_a_line_is_a_column_of_its_own(tmp_path, form, between):
+    """With PlatformIO's and Tera Term's the first column and the time were lost: rows were taken as 0.01 s apart."""
     stamps = counted(lambda h, m, s, ms: f"{h}:{m:02d}:{s:02d}.{ms:03d}")
     rows = [
-        f"{stamp} -> {a[0]:.3f},{a[1]:.3f},{a[2]:.3f},{w[0]:.2f},{w[1]:.2f},{w[2]:.2f}"
+        form.format(stamp) + between.join([*(f"{x:.3f}" for x in a), *(f"{x:.2f}" for x in w)])
         for stamp, a, w in zip(stamps, LOG.accel / G0, LOG.gyro / DEG, strict=True)
     ]
     (tmp_path / "log.txt").write_text("\n".join([*rows, ""]))

@@ -98,3 +98,21 @@ def test_the_worth_of_a_count_needs_a_column_of_numbers(tmp_path, time):
     (tmp_path / "map.toml").write_text(f'name = "a"\nplant = "free_spin"\n[time]\n{time}\n')
     with pytest.raises(InputError, match="'scale' is the worth of one count"):
         import_log(written(tmp_path, 1e-5), str(tmp_path / "map.toml"))
+
+
+@pytest.mark.parametrize(("tick", "said"), [(1e-4, "Update Rate: 200.0Hz"), (1e-5, "Sampling rate: 200")])
+def test_a_rate_that_the_log_states_tells_what_a_count_is_worth(tmp_path, tick, said):
+    """Nothing pulls here: counts of 0.1 ms were taken for ms, a throw of three seconds was one of thirty."""
+    head = TIMED.replace("Acc", "Tmp").replace("[g]", "[C]")
+    log = import_log(written(tmp_path, tick, f"// {said}\n{head}"))
+    assert_in_time(log, 0.0)
+    (clock,) = [one for one in log.decisions if one.what == "time"]
+    assert clock.choice == f"'time' in counts of {1e3 * tick:g} ms"
+    assert said in clock.why
+    assert not [note for note in log.notes if "WARNING" in note and "time" in note]
+
+
+def test_a_stated_rate_that_makes_no_round_count_is_a_warning(tmp_path):
+    log = import_log(written(tmp_path, 1e-3, "// Sampling rate: 50 Hz\n" + TIMED))
+    assert_in_time(log, 0.0)
+    assert [note for note in log.notes if "makes 200 rows a second, but" in note]

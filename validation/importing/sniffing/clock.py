@@ -160,8 +160,36 @@ def _clock(numbers: Numbers, k: int, name: str) -> Clock | None:
     if not named and numbers.dialect.has_header:
         sure, why_unit = "guess", f"its name says nothing known here, but it ascends as a clock does: {why_unit}"
     sure = "likely" if joined and sure == "certain" else sure
+    if sure != "certain" and (ticks := _counted_by_rate(numbers, value, spoken)) is not None:
+        scale, why_unit = ticks
+        said = Decision("time", f"'{name}' in counts of {scale:g} ms", "likely", f"{why_unit}{joined}")
+        return Clock(name, "ms", None, None, said, scale=scale)
     said = Decision("time", f"'{name}' in {unit}", sure, f"{why_unit}{joined}")
     return Clock(name, unit, None, None, said)
+
+
+def _counted_by_rate(numbers: Numbers, value: FloatArray, name: str) -> tuple[float, str] | None:
+    """Return what a count (n,) in no stated unit is worth, ms, and why, by the rows a second that the log states.
+
+    None where that makes no power of ten of counts a second, or those of a unit that is tried anyway.
+    """
+    stated = stated_rate((*numbers.dialect.preamble, numbers.path.stem))
+    sound = value[np.isfinite(value)]
+    if stated is None or written_unit(name) is not None or np.any(sound % 1 != 0):
+        return None
+    step = _usual_step(_of_one_sensor(numbers, value))
+    power = 10.0 ** round(float(np.log10(step * stated[0])))
+    if abs(step * stated[0] / power - 1) > OFF_STATED or 1 / power in SCALES.values():
+        return None
+    why = f"whole numbers {step:.4g} apart, and '{stated[1][:60]}' says {stated[0]:.6g} rows a second"
+    return 1e3 / power, f"{why}: {power:g} counts a second"
+
+
+def _usual_step(value: FloatArray) -> float:
+    """Return the mean of the steps of stamps (n,) that are the usual one: whole ms at 80 Hz are 12 or 13 apart."""
+    steps = np.diff(value[np.isfinite(value)])
+    usual = float(np.median(steps[steps > 0]))
+    return float(np.mean(steps[np.abs(steps / usual - 1) <= ROUNDED]))
 
 
 def _added_up(numbers: Numbers, k: int) -> Clock | None:
@@ -218,9 +246,7 @@ def _unit(
     ``own`` are the stamps of one sensor's rows, by whose spacing the unit is judged.
     """
     steps = np.diff(value[np.isfinite(value)])
-    apart = steps if own is None else np.diff(own[np.isfinite(own)])
-    usual = float(np.median(apart[apart > 0]))
-    step = float(np.mean(apart[np.abs(apart / usual - 1) <= ROUNDED]))  # whole milliseconds at 80 Hz are 12 or 13 apart
+    step = _usual_step(value if own is None else own)
     largest = float(np.nanmax(value))
     fits = [unit for unit, scale in SCALES.items() if SPACING[0] <= step * scale <= slowest]
     written = written_unit(name)

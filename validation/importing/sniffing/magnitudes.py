@@ -22,6 +22,7 @@ __all__ = [
     "field_size",
     "gravity_norm",
     "gyroscope_unit",
+    "in_shares",
     "magnetometer_unit",
     "rest_norm",
 ]
@@ -33,6 +34,9 @@ FIELD = (22.0, 67.0)
 FIELD_WITH_IRON = (10.0, 150.0)
 #: About the middle of the earth's field, uT: from it sizes are counted on a logarithmic scale.
 MIDDLE = 45.0
+#: Readings without a unit are shares of the field (Xsens, x-io and Shimmer calibrate so) where their size is nearer to
+#: one than to the largest field in gauss, 0.67, on a logarithmic scale.
+SHARES = (0.67**0.5, 0.67**-0.5)
 #: Counts per g of usual parts: 16 bits over 2, 4, 8, 16 g; 12, 10 and 8 bits of older parts. A factor of 2 apart.
 PER_G = (16384.0, 8192.0, 4096.0, 2048.0, 1024.0, 512.0, 256.0, 64.0)
 #: Counts per deg/s over 250, 500, 1000, 2000 deg/s (InvenSense, Bosch) and 245 to 4000 deg/s (ST).
@@ -61,12 +65,23 @@ ASKED_FOR = {"rpm", "Hz"}
 _RAD = np.pi / 180
 
 
+class Shares(NamedTuple):
+    """Readings that are shares of the field: their size, and what was taken for it."""
+
+    size: float
+    what: str
+
+
 class Unit(NamedTuple):
-    """A unit of the map and the worth of one reading in it, as `[sensors.NAME]` writes them, and the decision."""
+    """A unit of the map and the worth of one reading in it, as `[sensors.NAME]` writes them, and the decision.
+
+    ``shares`` are a magnetometer's readings that are shares of the field, None for any other.
+    """
 
     unit: str
     scale: float
     decision: Decision
+    shares: Shares | None = None
 
     def factor(self, sensor_unit: str) -> float:
         """Return what turns a reading into the recording's unit."""
@@ -197,9 +212,28 @@ def magnetometer_unit(value: FloatArray, stated: Reading | None, *, counts: bool
         return Unit("nT", 1.0, _said(name, "nT", "likely", why))
     if _whole(value):
         return _magnetometer_counts(size, what)
+    if SHARES[0] <= size <= SHARES[1] and not counted:
+        return in_shares(Shares(size, what))
     unit = min(factors, key=lambda unit: abs(np.log(max(size, 1e-12) * factors[unit] / MIDDLE)))
     why = f"no unit in the header; {size:.4g} ({what}) is nearest to the earth's field in it"
     return Unit(unit, 1.0, _said(name, unit, "guess", why))
+
+
+def in_shares(shares: Shares, field: float | None = None) -> Unit:
+    """Return the unit of a magnetometer whose readings are shares of a ``field``, uT; None where that is not known."""
+    why = (
+        f"no unit in the header; {shares.size:.4g} ({shares.what}) is the earth's field in none, but that of readings "
+        "which were calibrated to the field's size"
+    )
+    if field is not None:
+        sure: Sureness = "likely"
+        why = f"{why}: that of the place is taken"
+    else:
+        sure = "guess"
+        why = f"{why}; how large that was is open: give --place and --date, or write it as scale"
+    scale = float(f"{field or MIDDLE:.4g}")
+    told = _said("magnetometer", f"shares of a field of {scale:g} uT", sure, why)
+    return Unit("uT", scale, told, shares)
 
 
 def _parts_of(size: float) -> dict[str, float]:

@@ -44,7 +44,8 @@ _STEMS = {
         "specificforce gforce adxl"
     ),
 }
-#: The same as whole names, once the axis is off: ax, gx, mx; wx and Bx as physics writes them; gFx of Physics Toolbox.
+#: The same as whole names, once the axis is off: ax, gx, mx; wx, Bx and Hx as physics writes them; gFx of Physics
+#: Toolbox.
 _LETTERS = {
     "a": "accelerometer",
     "gf": "accelerometer",
@@ -53,6 +54,7 @@ _LETTERS = {
     "ω": "gyroscope",
     "m": "magnetometer",
     "b": "magnetometer",
+    "h": "magnetometer",
 }
 #: Words of columns that are worked out from a sensor, or are another thing: a fused attitude, an acceleration
 #: without gravity or in the earth's axes, errors, set points. The number is how far such a column stands back.
@@ -79,6 +81,8 @@ _SPACINGS = (
 #: Words for time beside the name of a sensor.
 _TIME_WORDS = ("t", "ts")
 _TIME_NAMES = "t ts ms us ns sec secs s msec usec tms tus"
+#: A word of a name: GPS TOW, iTOW (time of week).
+_TIME_OF_WEEK = "tow"
 
 
 def _plain(text: str) -> str:
@@ -209,6 +213,7 @@ def is_time_name(name: str) -> bool:
     return (
         any(stem in plain for stem in _PLAIN_TIME_STEMS)
         or plain in _TIME_NAMES.split()
+        or _TIME_OF_WEEK in re.split(r"[\s_\-.]+", plain)
         or (timeless(rest) != "" and sensor_of(timeless(rest)) is not None)  # t_gyro
         or (unit != "" and any(r.sensor == "time" for r in readings_of(unit)) and sensor_of(rest) is None)
     )

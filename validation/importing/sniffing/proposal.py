@@ -5,7 +5,7 @@ from __future__ import annotations
 import glob
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from discsim.arrays import FloatArray
@@ -16,7 +16,7 @@ from discsim.validation.importing.sniffing.clock import Clock
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.fixes import ProposedFixes
 from discsim.validation.importing.sniffing.groups import Numbers, Triple
-from discsim.validation.importing.sniffing.magnitudes import Unit
+from discsim.validation.importing.sniffing.magnitudes import Unit, in_shares
 from discsim.validation.importing.sniffing.own_place import OwnPlace
 
 __all__ = ["Proposal", "ProposedSensor", "map_text"]
@@ -74,6 +74,14 @@ class Proposal:
             *self.decisions,
             *([self.fixes.decision] if self.fixes is not None and not self.fixes.apart else []),
         ]
+
+    def in_field(self, size: float | None) -> Proposal:
+        """Return it with what a magnetometer reads as shares of the field worth a field of ``size`` uT; None: open."""
+        sensors = tuple(
+            one if one.unit.shares is None else replace(one, unit=in_shares(one.unit.shares, size))
+            for one in self.sensors
+        )
+        return replace(self, sensors=sensors)
 
 
 def _text(value: str) -> str:
