@@ -25,7 +25,7 @@ from discsim.validation.diagnosis.held_out import Choice, choices_without_each, 
 from discsim.validation.diagnosis.leftovers import pure_noise
 from discsim.validation.diagnosis.localisation import located_effect, located_unmodelled
 from discsim.validation.diagnosis.partly import partly_explained
-from discsim.validation.diagnosis.relaxed_fit import moves_out
+from discsim.validation.diagnosis.relaxed_fit.out_of_balance import moves_out
 from discsim.validation.diagnosis.report.wording import telling_apart
 from discsim.validation.diagnosis.result import (
     SMALLEST_P_VALUE,

@@ -19,13 +19,14 @@ from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of
 from discsim.validation.diagnosis.datasets import recording_names, recordings_of
 from discsim.validation.diagnosis.detectors.row_times import row_times
 from discsim.validation.diagnosis.inertia import with_inertia
-from discsim.validation.diagnosis.out_of_balance import out_of_balance
 from discsim.validation.diagnosis.prepared import prepared
 from discsim.validation.diagnosis.refuted import without_refuted
-from discsim.validation.diagnosis.relaxed_fit import moves_out, relaxed
+from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.relaxed_fit.out_of_balance import moves_out
 from discsim.validation.diagnosis.result import Outcome
 from discsim.validation.diagnosis.selection.event_instants import with_instants_weighed
 from discsim.validation.diagnosis.selection.refits import told_to
+from discsim.validation.diagnosis.selection.refitted_out_of_balance import refitted_out_of_balance
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.selection.stepwise import Anew, search
@@ -152,7 +153,7 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
 
     found = searched(followed)
     if ready.rows is not None:  # pieces may part there, and what is left is known
-        found = out_of_balance(found)
+        found = refitted_out_of_balance(found)
     elif followed.plant.weakly_identified:
         found = _with_bends(found, followed, searched)
     return Tried(ready, None, found)

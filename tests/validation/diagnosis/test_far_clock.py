@@ -9,7 +9,8 @@ from discsim.effects import effect
 from discsim.recording import Recording
 from discsim.validation.challenge.cases.conceal import recordings as concealed
 from discsim.validation.challenge.cases.draw import draw_case
-from discsim.validation.diagnosis.relaxed_fit import clock_of_accelerometer, relaxed
+from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.relaxed_fit.clocks import clock_of_accelerometer
 from discsim.validation.diagnosis.selection.next_effect import next_effect
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.selection.stepwise import search

@@ -22,7 +22,8 @@ from discsim.validation.diagnosis.detectors.dropped_samples import dropped_magne
 from discsim.validation.diagnosis.detectors.events import events
 from discsim.validation.diagnosis.detectors.local_problem import local_problems
 from discsim.validation.diagnosis.first_trajectory import first_trajectory
-from discsim.validation.diagnosis.relaxed_fit import relaxed, unknowns
+from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
 from discsim.validation.diagnosis.selection import stepwise
 from discsim.validation.diagnosis.selection.candidates import free_candidate
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit

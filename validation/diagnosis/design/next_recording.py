@@ -20,7 +20,7 @@ from discsim.effects.catalogue import CATALOGUE, catalogued
 from discsim.effects.rig import AxisTilt
 from discsim.recording import SENSORS, Recording, Samples
 from discsim.validation.diagnosis.design.plans import plans_about
-from discsim.validation.diagnosis.relaxed_fit import unknowns
+from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
 from discsim.validation.diagnosis.result import Advice, Separation
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from discsim.validation.diagnosis.selection.evidence import BOUNDS

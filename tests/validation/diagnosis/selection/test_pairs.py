@@ -11,7 +11,8 @@ from support.made import throws
 
 from discsim.effects import Effect, effect
 from discsim.validation.diagnosis.design.next_recording import confusions
-from discsim.validation.diagnosis.relaxed_fit import relaxed, unknowns
+from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
 from discsim.validation.diagnosis.selection import next_effect as searching
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, candidates_for
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
