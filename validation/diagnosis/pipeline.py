@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from discsim.validation.diagnosis.datasets import recording_names, recordings_of
 from discsim.validation.diagnosis.detectors.row_times import row_times
 from discsim.validation.diagnosis.inertia import with_inertia
 from discsim.validation.diagnosis.prepared import prepared
+from discsim.validation.diagnosis.progress import Progress, silent
 from discsim.validation.diagnosis.refuted import without_refuted
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.relaxed_fit.out_of_balance import moves_out
@@ -27,6 +28,7 @@ from discsim.validation.diagnosis.result import Outcome
 from discsim.validation.diagnosis.selection.event_instants import with_instants_weighed
 from discsim.validation.diagnosis.selection.refits import told_to
 from discsim.validation.diagnosis.selection.refitted_out_of_balance import refitted_out_of_balance
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.selection.stepwise import Anew, search
@@ -38,7 +40,7 @@ from discsim.validation.diagnosis.setup_effects import (
     with_those_borne_out,
     without_offsets,
 )
-from discsim.validation.diagnosis.stages import Prepared, Progress, Question, Tried, silent
+from discsim.validation.diagnosis.stages import Prepared, Question, Tried
 from discsim.validation.diagnosis.unknown_law.find import FoundLaw, find_law
 from discsim.validation.diagnosis.verdict import judged, leaves_more_than_noise
 from discsim.validation.identification.competing_effects import Competing
@@ -148,14 +150,20 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
         if law is not None:
             return Tried(ready, None, begun, law)
 
-    def searched(followed: Fit, anew: Anew | None = None) -> Search:
-        return search(ready.fitted, progress, ready.meant, followed, free, hints, question.effects, anew)
-
-    found = searched(followed)
+    problem = SearchProblem(
+        ready.fitted,
+        as_stated=ready.meant,
+        followed=followed,
+        free=free,
+        hints=hints,
+        effects=question.effects,
+        progress=progress,
+    )
+    found = search(problem)
     if ready.rows is not None:  # pieces may part there, and what is left is known
         found = refitted_out_of_balance(found)
     elif followed.plant.weakly_identified:
-        found = _with_bends(found, followed, searched)
+        found = _with_bends(found, followed, problem)
     return Tried(ready, None, found)
 
 
@@ -168,7 +176,9 @@ def _law_before_effects(
     """
     question.progress("looking for a law", 4, 5)
     free = free_parameters(ready.setup)
-    begun = screened(ready.fitted, as_stated=ready.meant, followed=moving, free=free, effects=question.effects)
+    begun = screened(
+        SearchProblem(ready.fitted, as_stated=ready.meant, followed=moving, free=free, effects=question.effects)
+    )
     base, own, noise = begun.base, begun.own, begun.relaxed_noise
     return begun, find_law(begun.relaxed_fit, base, own, noise, ready.fitted, moves_out=moving is not None)
 
@@ -177,12 +187,12 @@ def _law_before_effects(
 _BENDS = 2
 
 
-def _with_bends(found: Search, followed: Fit, searched: Callable[[Fit, Anew], Search]) -> Search:
-    """Return the search of free spins with segments halved that bend, where one names effects or leaves too much.
+def _with_bends(found: Search, followed: Fit, problem: SearchProblem) -> Search:
+    """Return the search of free spins with bent segments halved, where it named effects or leaves more than noise.
 
-    ``searched`` is a search from a relaxed fit for so many effects as are of use, which begins with those of one before
-    where these leave no more than noise. Bends may stand in for what a search named, or hide one thing more: a stack of
-    effects beside them copies what nobody knows.
+    ``followed`` is the relaxed fit that it began with. A search in halved segments begins with the effects of the one
+    before, where these leave no more than noise. Bends may stand in for what a search named, or hide one thing more: a
+    stack of effects beside them copies what nobody knows.
     """
     for _ in range(_BENDS):
         left, count = leaves_more_than_noise(found), len(found.final.hypothesis.candidates)
@@ -190,7 +200,7 @@ def _with_bends(found: Search, followed: Fit, searched: Callable[[Fit, Anew], Se
         if bent is None:
             break
         most = 1 if left else count
-        again = searched(bent, Anew(most, None if left else found))
+        again = search(replace(problem, followed=bent), Anew(most, None if left else found))
         if len(again.final.hypothesis.candidates) > most or (leaves_more_than_noise(again) and not left):
             break
         followed, found = bent, again

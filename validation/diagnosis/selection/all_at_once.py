@@ -78,7 +78,7 @@ def _leaves_noise(fitted: ContinuousFit) -> bool:
 
 def _many(found: Search, every: Sequence[CandidateEffect], told: Collection[str]) -> list[ContinuousFit]:
     """Return the fit of all effects that the relaxed fit cannot do without, less those that it then can."""
-    asked = _held_out(found, _pruned(found, found.loose_board, every, told), told)
+    asked = _held_out(found, _pruned(found, found.relaxed_equations, every, told), told)
     fitted = _fitted(found, asked)
     if fitted is None:
         return []

@@ -114,7 +114,7 @@ def next_two(found: Search) -> tuple[Search, ContinuousFit | None]:
     """
     base, noise = found.base, found.relaxed_noise
     before = base.score, chi2_in(base, noise)
-    ranked = pairs(found.loose_board, found.candidates, found.own)
+    ranked = pairs(found.relaxed_equations, found.candidates, found.own)
     sensible = [pair for pair in ranked if on_the_disc(found, pair.start)]
     chosen = sensible[: SELECTION.pairs_refitted]
     for number, pair in enumerate(chosen):
@@ -145,7 +145,9 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
     there: list[Offer] = []
     here: list[Offer] = []
     if distant or step == 0:
-        ranked = one_per_effect(screened_candidates(found.loose_board, found.candidates, current.hypothesis, found.own))
+        ranked = one_per_effect(
+            screened_candidates(found.relaxed_equations, found.candidates, current.hypothesis, found.own)
+        )
         # beside the data a refit goes on from the present fit: from the segments it would have to be tied again
         there += [(p, found.relaxed_fit, 0.0) if distant else (from_here(p, current), current.fit, 0.0) for p in ranked]
     if not distant or step > 0:

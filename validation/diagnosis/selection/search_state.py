@@ -72,14 +72,15 @@ class Search:
     ----------
     recordings, own
         The recordings as they are stated, and the parameters that they leave open without any effect.
-    loose, loose_noise, loose_board
-        The relaxed fit, its noise, and what every effect would do to it.
+    relaxed_fit, relaxed_noise, relaxed_equations
+        The relaxed fit, its noise, and the normal equations of all candidates about it.
     candidates
         The effects that compete, at each of their shapes.
     base, final
         The fits of the baseline and of the effects so far.
-    board, asked
-        What every effect would do to a fit, in its own noise, and which fit that is: in the end the final one.
+    equations, asked
+        The normal equations of all candidates about a fit, in its own noise, and which fit that is: in the end the
+        final one.
     steps, considered, rivals
         Fits on the way; candidates that were refitted; what could stand in for a named effect, by its name.
     outliers
@@ -90,8 +91,8 @@ class Search:
         What choosing the samples that were lost has cost, in twice the log likelihood.
     at_once : bool
         Whether the effects were found together, each weighed against the others by the normal equations.
-    slips
-        What the magnetometer's phase told of lost samples.
+    lost_samples
+        What was found of lost samples about the relaxed fit.
     """
 
     recordings: tuple[Recording, ...]
@@ -101,7 +102,7 @@ class Search:
     candidates: tuple[CandidateEffect, ...]
     base: ContinuousFit
     final: ContinuousFit
-    loose_board: NormalEquations
+    relaxed_equations: NormalEquations
     equations: NormalEquations
     asked: Fit
     steps: tuple[ContinuousFit, ...] = ()
@@ -114,7 +115,7 @@ class Search:
     at_once: bool = False
 
     def about(self, fit: Fit) -> Search:
-        """Return the search with its board about a fit, which is worked out once."""
+        """Return the search with its normal equations about a fit, which are worked out once."""
         if self.asked is fit:
             return self
         equations = normal_equations_of(fit, self.candidates, fit.noise, fit.continuous_defects)

@@ -7,14 +7,11 @@ noise estimated anew (stepwise regression: Efroymson, 1960).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from discsim.effects import Effect
-from discsim.recording import Recording
 from discsim.validation.diagnosis.first_trajectory import time_ratio
 from discsim.validation.diagnosis.selection.all_at_once import all_at_once
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
@@ -30,6 +27,7 @@ from discsim.validation.diagnosis.selection.exchange import (
 from discsim.validation.diagnosis.selection.next_effect import next_effect, next_two
 from discsim.validation.diagnosis.selection.recounting import with_losses_recounted
 from discsim.validation.diagnosis.selection.score_tests import plans_alone
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import (
     Search,
     chi2_in,
@@ -39,13 +37,10 @@ from discsim.validation.diagnosis.selection.search_state import (
     possible,
     values_of_fit,
 )
-from discsim.validation.diagnosis.selection.starting_point import Report, screened
+from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
 from discsim.validation.diagnosis.uninflated_noise import uninflated_noise
-from discsim.validation.identification.competing_effects import CATALOGUED, Competing
-from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.noise import stated_noise
-from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.residual_tests import loudest, unmodelled_residuals
 
 __all__ = ["Anew", "past_hope", "search", "settled", "without_swallowed"]
@@ -55,38 +50,32 @@ _FEW = 2
 
 
 class Anew(NamedTuple):
-    """How recordings are searched anew in other segments: how many effects are of use, and what was found ``before``.
+    """How recordings are searched anew in other segments: what was found ``before``, how many effects are ``of_use``.
 
-    Who asks takes no stack of more than are of use; None where any number is.
+    The caller takes no stack of more effects than that; None where any number will do.
     """
 
     of_use: int | None = None
     before: Search | None = None
 
 
+_FROM_NOTHING = Anew()
+
+
 # a hypothesis far from the data may send a motion beyond all numbers: such a fit is not finite, and is passed over
 @np.errstate(over="ignore", invalid="ignore")
-def search(
-    recordings: Sequence[Recording],
-    report: Report = lambda stage, done, total: None,
-    as_stated: Sequence[Recording] | None = None,
-    followed: Fit | None = None,
-    free: Sequence[Parameter] = (),
-    hints: Sequence[Effect] = (),
-    effects: Competing = CATALOGUED,
-    anew: Anew | None = None,
-) -> Search:
-    """Find the effects that explain recordings of one plant; what is given is that of `screened`.
+def search(problem: SearchProblem, anew: Anew = _FROM_NOTHING) -> Search:
+    """Find the effects that explain recordings of one plant.
 
-    A search that is asked ``anew`` is given up as it stands where it stands by two more effects than are of use, and
-    begins with those that one before it found, where they are worth their price here, too.
+    A search ``anew`` begins with the effects that one before it found, where they are worth their price here, too. It
+    is given up as it stands once it has come to two effects more than are of use.
     """
-    of_use, before = anew or Anew()
-    found = screened(recordings, report, as_stated, followed, free, hints, effects, before)
-    report("refitting candidates", 3, 4)
+    of_use, before = anew
+    found = screened(problem, before)
+    problem.progress("refitting candidates", 3, 4)
     found = _selected_forward(found if before is None else _taken_over(found, before), of_use)
     found = found if _of_no_use(found, of_use) else settled(found)
-    report("done", 4, 4)
+    problem.progress("done", 4, 4)
     return found
 
 
