@@ -212,8 +212,8 @@ def _recorded(found: Search, plan: Plan, own: Sequence[Parameter], like: int) ->
     sheets = dict(bare.sheets)
     if "accelerometer" in sheets:  # readings that stand still for want of noise are no limit
         sheets["accelerometer"] = replace(sheets["accelerometer"], noise_rms=0.0)
-    planned = trajectory_of(replace(bare, samples=samples, sheets=sheets), cut.nodes, cut.states, old.effects)
-    return replace(planned, unbalanced=old.unbalanced)
+    planned = replace(bare, samples=samples, sheets=sheets)
+    return trajectory_of(planned, cut.nodes, cut.states, old.effects, unbalanced=old.unbalanced)
 
 
 def _landing(whole: Trajectory, values: Values) -> float:

@@ -18,7 +18,7 @@ from discsim.effects.setup import TimeOffset
 from discsim.recording import Recording
 from discsim.validation.diagnosis.consistency.followed import true_noise
 from discsim.validation.diagnosis.consistency.spin_agreement import Comparison, compared, written_ratios
-from discsim.validation.diagnosis.first_trajectory import CLOCK, first_trajectory, trajectory_in_true_time, within_range
+from discsim.validation.diagnosis.first_trajectory import CLOCK, trajectory_in_true_time, within_range
 from discsim.validation.diagnosis.relaxed_fit.astray import from_other_initial_states
 from discsim.validation.diagnosis.relaxed_fit.clocks import (
     led_by_other_sensors,
@@ -58,9 +58,7 @@ def relaxed(
     """
     plant = plant_of(recordings[0])
     ratio = _wrong_time(recordings, agreeing)
-    trajectories = tuple(
-        first_trajectory(one) if ratio == 1.0 else trajectory_in_true_time(one, ratio) for one in recordings
-    )
+    trajectories = tuple(trajectory_in_true_time(one, ratio) for one in recordings)
     sensors = {readings.sensor for one in trajectories for readings in one.readings}
     clock = () if ratio == 1.0 else (Parameter(*CLOCK, 1.0, 1e-6, RELAXED_FIT.time_sigma),)
     loose = relaxed_parameters(recordings, sensors, free_running=bool(supposed))

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from discsim.validation.diagnosis.first_trajectory import first_trajectory, time_ratio, trajectory_in_true_time
+from discsim.validation.diagnosis.first_trajectory import begun_again_in_true_time, first_trajectory, time_ratio
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Fit, discontinuous, merit_of, refit
@@ -113,8 +113,7 @@ def _starts(fit: Fit, i: int, stands: Fit, first: Trajectory) -> Iterator[Fit]:
     yield begun(first, others)
     ratio = time_ratio(fit.values(i))
     if ratio != 1.0:
-        timed = trajectory_in_true_time(first.recording, ratio)
-        yield begun(replace(timed, unbalanced=first.unbalanced), others)
+        yield begun(begun_again_in_true_time(first, ratio), others)
     else:
         yield begun(replace(first, states=first_trajectory(first.recording, nodes=first.nodes).states), none)
     if none:

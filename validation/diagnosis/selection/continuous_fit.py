@@ -135,7 +135,7 @@ def continuous_fit(
     plant = relaxed_fit.plant
     fit = Fit(_retimed(relaxed_fit, parameters, at), parameters, at, relaxed_fit.continuous_defects, noise)
     if not plant.airborne and any(q.group in CLOCKS for q in parameters):
-        fit = replace(fit, at=_longer_and_longer(fit))
+        fit = replace(fit, at=_clocks_of_longer_beginnings(fit))
     begun = fit
     if fit.from_release:
         return scored(hypothesis, fitted_from_afar(fit, bounds=BOUNDS))
@@ -194,8 +194,8 @@ def _retimed(relaxed_fit: Fit, parameters: Sequence[Parameter], at: FloatArray) 
 _LOOKS = (5.0, 10.0, 20.0)
 
 
-def _longer_and_longer(fit: Fit) -> FloatArray:
-    """Return parameters (p,) fitted to longer and longer beginnings: a wrong clock's phase never slips by a turn."""
+def _clocks_of_longer_beginnings(fit: Fit) -> FloatArray:
+    """Return parameters (p,) fitted to longer and longer beginnings, so that no wrong clock's phase slips by a turn."""
     at = fit.at
     for look in _LOOKS:
         if look < 0.8 * max(float(trajectory.nodes[-1]) for trajectory in fit.trajectories):
