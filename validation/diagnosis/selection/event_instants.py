@@ -50,8 +50,7 @@ def _in_the_deepest_dip(found: Search, current: ContinuousFit) -> ContinuousFit:
         fitted = continuous_fit(
             moved, current.hypothesis, found.own, fit.noise, start, iterations=_STEPS, polish=0, bars=bars
         )
-        fitted = replace(fitted, score=fitted.score + found.cost)
-        return min(current, fitted, key=lambda one: one.score)
+        return min(current, found.with_cost(fitted), key=lambda one: one.score)
     return current
 
 
@@ -79,7 +78,7 @@ def _at_the_best_turn(found: Search, current: ContinuousFit) -> ContinuousFit:
             continue
         moved = {**start, key: instant}
         fitted = continuous_fit(current.fit, current.hypothesis, found.own, current.fit.noise, moved, bars=bars)
-        best = min(best, replace(fitted, score=fitted.score + found.cost), key=lambda one: one.score)
+        best = min(best, found.with_cost(fitted), key=lambda one: one.score)
     return best
 
 

@@ -88,7 +88,7 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
             )
         if not distant and not cost and refitted.score > current.score + SELECTION.worse:
             refitted = _begun_again(found, current, screened, beside)
-        refitted = replace(refitted, score=refitted.score + found.cost + cost)
+        refitted = found.with_cost(refitted, cost)
         found = _considering(found, (current.score, chi2_now), refitted, screened.candidate)
         gain, chi2 = found.considered[-1].gain, chi2_in(refitted, noise)
         if gain > price(screened.candidate) and possible(refitted):
@@ -129,7 +129,7 @@ def next_two(found: Search) -> tuple[Search, ContinuousFit | None]:
             start,
             bars=Bars(SELECTION.hopeless * SELECTION.far * found.base.fit.count),
         )
-        both = replace(both, score=both.score + found.cost)
+        both = found.with_cost(both)
         for candidate in pair.hypothesis.candidates:
             found = _considering(found, before, both, candidate)
         worth = base.score - both.score > sum(map(price, pair.hypothesis.candidates))

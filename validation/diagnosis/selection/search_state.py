@@ -125,6 +125,10 @@ class Search:
         """Return the search with one more fit on the way."""
         return replace(self, steps=(*self.steps, fitted))
 
+    def with_cost(self, fitted: ContinuousFit, further: float = 0.0) -> ContinuousFit:
+        """Return a fit whose score holds what choosing lost samples has cost so far, and ``further`` cost."""
+        return replace(fitted, score=fitted.score + self.cost + further)
+
     def at_base(self) -> Search:
         """Return the search as if nothing had been found."""
         return replace(self, final=self.base)

@@ -260,6 +260,5 @@ def _from_there(found: Search, current: ContinuousFit, better: ContinuousFit) ->
     if not doubted and better.squared_sizes(candidate) > SELECTION.borne_out * gain:
         return None
     start = values_of_fit(better)
-    again = continuous_fit(better.fit, current.hypothesis, found.own, better.fit.noise, start)
-    again = replace(again, score=again.score + found.cost)
+    again = found.with_cost(continuous_fit(better.fit, current.hypothesis, found.own, better.fit.noise, start))
     return again if again.score - better.score < price(candidate) else None
