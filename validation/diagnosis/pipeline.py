@@ -46,7 +46,6 @@ from discsim.validation.diagnosis.verdict import judged, leaves_more_than_noise
 from discsim.validation.identification.competing_effects import Competing
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.plants.plan import Plan
-from discsim.validation.identification.residual_tests import unmodelled_residuals
 from discsim.validation.identification.stated_parameters import stated_parameters
 
 __all__ = ["diagnose"]
@@ -103,8 +102,7 @@ def _with_law_of_one(tried: Tried, question: Question) -> Tried:
     begun, law = _law_before_effects(ready, question)
     if law is None or law.law.target.partition(".")[0] not in contradiction.against:
         return tried
-    fit, residuals = law.fitted.fit, law.fitted.residuals
-    alone = law.share > UNKNOWN_LAW.all and not unmodelled_residuals(fit.linears, residuals, fit.noise)
+    alone = law.share > UNKNOWN_LAW.all and not law.fitted.unmodelled()
     return Tried(ready, None, begun, law) if alone else tried
 
 
@@ -160,7 +158,7 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
         progress=progress,
     )
     found = search(problem)
-    if ready.rows is not None:  # pieces may part there, and what is left is known
+    if ready.rows is not None:  # no bent segments there: defects of continuity are wide, and the pure error is known
         found = refitted_out_of_balance(found)
     elif followed.plant.weakly_identified:
         found = _with_bends(found, followed, problem)

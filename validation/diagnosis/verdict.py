@@ -23,7 +23,7 @@ from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
 from discsim.validation.diagnosis.stages import Judged, Tried
 from discsim.validation.diagnosis.unknown_law.find import find_law, left_to_gain
 from discsim.validation.identification.gauss_newton import Fit
-from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, UnmodelledResidual, unmodelled_residuals
+from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, UnmodelledResidual
 
 __all__ = [
     "RECALIBRATED_NAMES",
@@ -92,8 +92,7 @@ def judged(tried: Tried, progress: Progress) -> Judged:
 def leaves_more_than_noise(found: Search) -> bool:
     """Tell whether what was found leaves residuals that no noise has, or is far from data that a motion follows."""
     final, settled = found.final, found.relaxed_fit.plant.durations.settled
-    left = unmodelled_residuals(final.fit.linears, final.residuals, final.fit.noise, settled=settled)
-    left = [item for item in left if not may_be_the_air(item, final.fit)]
+    left = [item for item in final.unmodelled(settled) if not may_be_the_air(item, final.fit)]
     return bool(left) or misses(found, final)
 
 

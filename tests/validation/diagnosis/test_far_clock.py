@@ -15,7 +15,6 @@ from discsim.validation.diagnosis.selection.next_effect import next_effect
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.selection.stepwise import search
-from discsim.validation.identification.residual_tests import unmodelled_residuals
 from discsim.validation.identification.stated_parameters import stated_parameters
 
 FAST = effect("gyro.clock_rate", ratio=1.017)
@@ -84,4 +83,4 @@ def test_what_was_told_is_fitted_in_stated_noise():
     _, best = next_effect(found, found.base, 0)
     assert best is not None
     assert [candidate.id for candidate in best.hypothesis.candidates] == ["accel.clock_rate"]
-    assert not unmodelled_residuals(best.fit.linears, best.residuals, best.fit.noise)
+    assert not best.unmodelled()

@@ -29,6 +29,7 @@ from discsim.validation.identification.noise import (
 )
 from discsim.validation.identification.ordinary_errors import ordinary_errors
 from discsim.validation.identification.parameters import Parameter, values_of
+from discsim.validation.identification.residual_tests import UnmodelledResidual, unmodelled_residuals
 from discsim.validation.identification.segments import Trajectory
 from discsim.validation.identification.sensor_model import CLOCKS
 
@@ -48,11 +49,15 @@ class ContinuousFit:
     residuals: tuple[FloatArray, ...] = field(default_factory=tuple)
     scored_in: NoiseModel = field(default_factory=dict)
 
-    def squared_sizes(self, candidate: CandidateEffect) -> float:
-        """Return how far a candidate's numbers are from where they act not, squared, in the fit's covariance (Wald).
+    def unmodelled(self, settled: float = -np.inf) -> list[UnmodelledResidual]:
+        """Return what its residuals hold beside noise, strongest first; ``settled`` as in `unmodelled_residuals`."""
+        return unmodelled_residuals(self.fit.linears, self.residuals, self.fit.noise, settled=settled)
 
-        About what it gains by, where a fit is at its optimum with it and without it; without end where that is not
-        known.
+    def squared_sizes(self, candidate: CandidateEffect) -> float:
+        """Return how far a candidate's numbers are from those of no effect, squared, in the fit's covariance (Wald).
+
+        This is about what the effect gains, where a fit is at its optimum with it and without it. It is infinite where
+        the covariance is not known.
         """
         if self.fit.covariance.shape[0] != len(self.fit.parameters):
             return np.inf

@@ -15,7 +15,14 @@ from discsim.validation.diagnosis.selection.hypothesis import fitted_parameters
 from discsim.validation.diagnosis.selection.refits import refitting
 from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate, scope_price, start_of
 from discsim.validation.diagnosis.selection.screening import free_columns
-from discsim.validation.diagnosis.selection.search_state import Rival, Search, from_here, lost, possible, values_of_fit
+from discsim.validation.diagnosis.selection.search_state import (
+    Rival,
+    Search,
+    from_here,
+    possible,
+    unreliable,
+    values_of_fit,
+)
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Bars, merit_of
 
@@ -41,7 +48,7 @@ def widened(found: Search, final: ContinuousFit) -> ContinuousFit:
     Recordings share their hardware and their air. Algebra at a shape that is not the true one, as a stall's angle, may
     see an effect in the one recording that shows it and something else in the others.
     """
-    if lost(found, final):
+    if unreliable(found, final):
         return final
     for candidate in final.hypothesis.candidates:
         if candidate.recordings is None or candidate.fixed_values or candidate.row.event:

@@ -41,7 +41,7 @@ from discsim.validation.diagnosis.selection.starting_point import HELD
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Bars, merit_of
 from discsim.validation.identification.noise import NoiseModel, stated_noise
-from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, unmodelled_residuals
+from discsim.validation.identification.residual_tests import RESIDUAL_TESTS
 
 __all__ = ["joined", "next_effect", "next_two"]
 
@@ -196,7 +196,7 @@ def _most_refitted(current: ContinuousFit, near_data: bool, gained: bool) -> int
     loud a small effect is near the data, and many promise more than it.
     """
     if near_data and not gained:
-        near_data = not unmodelled_residuals(current.fit.linears, current.residuals, current.fit.noise)
+        near_data = not current.unmodelled()
     if not near_data:
         return SELECTION.refitted_at_most
     return SELECTION.refitted if gained else 2 * SELECTION.refitted

@@ -21,7 +21,6 @@ from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Bars, Fit
 from discsim.validation.identification.noise import NoiseModel, chi_squared, robust_noise
 from discsim.validation.identification.parameters import Parameter
-from discsim.validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = [
     "Considered",
@@ -31,12 +30,12 @@ __all__ = [
     "far",
     "from_here",
     "hopeless",
-    "lost",
     "misses",
     "no_nearer",
     "on_the_disc",
     "possible",
     "steady_noise",
+    "unreliable",
     "values_of_fit",
     "wobbles",
 ]
@@ -152,9 +151,9 @@ def far(found: Search, fitted: ContinuousFit) -> bool:
     return chi2_in(fitted, found.relaxed_noise) > SELECTION.far * fitted.fit.count
 
 
-def lost(found: Search, fitted: ContinuousFit) -> bool:
-    """Tell whether a fit is far from the data and leaves what is no noise: no answer rests on it."""
-    return far(found, fitted) and bool(unmodelled_residuals(fitted.fit.linears, fitted.residuals, fitted.fit.noise))
+def unreliable(found: Search, fitted: ContinuousFit) -> bool:
+    """Tell whether a fit is far from the data and leaves more than noise, so that no answer may rest on it."""
+    return far(found, fitted) and bool(fitted.unmodelled())
 
 
 def no_nearer(found: Search, before: ContinuousFit, after: ContinuousFit) -> bool:
@@ -163,7 +162,7 @@ def no_nearer(found: Search, before: ContinuousFit, after: ContinuousFit) -> boo
 
 
 def misses(found: Search, fitted: ContinuousFit) -> bool:
-    """Tell whether a fit is far from data that the relaxed fit follows: whatever it holds, something is missing."""
+    """Tell whether a fit is far from data that the relaxed fit follows: something is missing in its hypothesis."""
     return far(found, fitted) and found.relaxed_fit.merit < SELECTION.followed * found.relaxed_fit.count
 
 
@@ -174,10 +173,10 @@ def hopeless(best: float, count: int) -> Bars:
 
 
 def on_the_disc(found: Search, start: Start) -> bool:
-    """Tell whether a start has no centre of mass off the disc.
+    """Tell whether a start has its centre of mass on the disc.
 
-    Of recordings in which that hardly shows algebra asks for any number, under which no motion lasts. A sensor's place
-    that nothing shows, as along the axis of a table, does no harm.
+    Where recordings hardly show it, algebra may ask for any number, under which no motion lasts. A sensor's place that
+    nothing shows, as along the axis of a table, does no harm.
     """
     radius = _radius(found.recordings[0])
     return all(abs(number) <= radius for (key, _), number in start.items() if _is_place(key[0], "motion"))
@@ -215,13 +214,16 @@ def possible(fitted: ContinuousFit) -> bool:
 
 
 def from_here(screened: ScreenedCandidate, current: ContinuousFit) -> ScreenedCandidate:
-    """Return a screened candidate whose start keeps what the fit has found for everything else."""
+    """Return a screened candidate that starts from the present fit: only its own values are those of algebra."""
     own = {key: value for key, value in screened.start.items() if key[0][0] == screened.candidate.id}
     return replace(screened, start={**values_of_fit(current), **own})
 
 
 def steady_noise(found: Search) -> NoiseModel:
-    """Return the noise in which events are looked for: without what a short one adds, where most readings are well."""
+    """Return the noise in which events are looked for.
+
+    It is that of most readings, to which a short event adds nothing, unless that is much louder than stated.
+    """
     linears = found.relaxed_fit.linears
     steady = robust_noise(linears, [linear.residual for linear in linears])
     stated = {c.group: float(linear.sd[c.rows][0]) for linear in linears for c in linear.channels}
@@ -232,9 +234,9 @@ def steady_noise(found: Search) -> NoiseModel:
 
 
 def wobbles(fit: Fit) -> Start:
-    """Return how the wobble of free spins dies and turns in a fit whose segments go with it.
+    """Return how the wobble of free spins dies and turns in a fit, as a start for a fit from its segments.
 
-    What algebra expects of it is far from linear where turning for a second makes a radian.
+    What algebra expects of it is no use: turning for a second makes a radian, which is far from linear.
     """
     parameters = zip(fit.parameters, fit.at, strict=True)
     return {(q.key, q.recordings): float(v) for q, v in parameters if q.key in fit.plant.own_keys}

@@ -32,16 +32,16 @@ from discsim.validation.diagnosis.selection.search_state import (
     Search,
     chi2_in,
     far,
-    lost,
     no_nearer,
     possible,
+    unreliable,
     values_of_fit,
 )
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
 from discsim.validation.diagnosis.uninflated_noise import uninflated_noise
 from discsim.validation.identification.noise import stated_noise
-from discsim.validation.identification.residual_tests import loudest, unmodelled_residuals
+from discsim.validation.identification.residual_tests import loudest
 
 __all__ = ["Anew", "past_hope", "search", "settled", "without_swallowed"]
 
@@ -183,7 +183,7 @@ def without_swallowed(found: Search, fitted: ContinuousFit) -> ContinuousFit | N
     more than itself: such a group's is as stated. Where recordings have a course in common it is as the relaxed fit
     shows it, which follows the data.
     """
-    left = unmodelled_residuals(fitted.fit.linears, fitted.residuals, fitted.fit.noise)
+    left = fitted.unmodelled()
     stated = stated_noise(fitted.fit.linears)
     noise = {item.group: found.relaxed_noise[item.group] for item in left if item.kind == "course"}
     noise |= {
@@ -219,12 +219,12 @@ def settled(found: Search) -> Search:
     for exchanges in range(SELECTION.exchanges + 1):
         if (wide := widened(found, found.final)) is not found.final:
             found = _with_final(found, wide)
-        if found.relaxed_fit.plant.weakly_identified and not lost(found, found.final):
+        if found.relaxed_fit.plant.weakly_identified and not unreliable(found, found.final):
             # what an effect gained upon a fit that stood beside its optimum, others gain without it
             found = without_superfluous(replace(found, final=eliminated_backward(found, found.final)))
         found = found.about(found.final.fit)
         # where the fit is far from the data nothing is named, and nothing need be told apart
-        found = replace(found, rivals={} if lost(found, found.final) else rivals_of(found))
+        found = replace(found, rivals={} if unreliable(found, found.final) else rivals_of(found))
         better = exchanged(found)
         if better is None or exchanges == SELECTION.exchanges:
             break
