@@ -561,8 +561,3 @@ def _part(
     """Return the trajectory after a share of a step, the closing of gaps included."""
     tangents = fraction * (linear.sensitivities @ np.concatenate([nuisance, common]) + linear.matching)
     return stepped(trajectory, tangents)
-
-
-def residuals_after(fit: Fit, reduced: Sequence[Reduced], step: FloatArray) -> list[FloatArray]:
-    """Return the residuals (n,) of each recording that a step of the shared parameters is expected to leave."""
-    return [linear.after(nuisance_step(r, step), step) for linear, r in zip(fit.linears, reduced, strict=True)]

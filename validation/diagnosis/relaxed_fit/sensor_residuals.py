@@ -12,11 +12,11 @@ from discsim.validation.identification.linear import Channel, Linear
 __all__ = ["left_across", "misfit"]
 
 
-def _channels(fit: Fit, sensor: str, axes: str = "xyz") -> Iterator[tuple[Linear, Channel]]:
-    """Yield the channels of a sensor along some axes, in all recordings, each with its linearisation."""
+def _channels(fit: Fit, sensor: str) -> Iterator[tuple[Linear, Channel]]:
+    """Yield the channels of a sensor in all recordings, each with its linearisation."""
     for linear in fit.linears:
         for channel in linear.channels:
-            if channel.sensor == sensor and channel.axis[0] in axes:
+            if channel.sensor == sensor:
                 yield linear, channel
 
 
@@ -28,5 +28,6 @@ def misfit(fit: Fit, sensor: str) -> float:
 
 def left_across(fit: Fit) -> float:
     """Return the mean square of the residuals of a gyroscope's x and y over the fit's noise; NaN without one."""
-    left = [linear.residual[c.rows] / fit.noise[c.group].sd for linear, c in _channels(fit, "gyroscope", "xy")]
+    across = [(linear, c) for linear, c in _channels(fit, "gyroscope") if c.axis[0] in "xy"]
+    left = [linear.residual[c.rows] / fit.noise[c.group].sd for linear, c in across]
     return float(np.mean(np.concatenate(left) ** 2)) if left else np.nan

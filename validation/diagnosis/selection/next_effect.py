@@ -89,7 +89,7 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
         if not distant and not cost and refitted.score > current.score + SELECTION.worse:
             refitted = _begun_again(found, current, screened, beside)
         refitted = found.with_cost(refitted, cost)
-        found = _considering(found, (current.score, chi2_now), refitted, screened.candidate)
+        found = _considering(found, current.score, refitted, screened.candidate)
         gain, chi2 = found.considered[-1].gain, chi2_in(refitted, noise)
         if gain > price(screened.candidate) and possible(refitted):
             charged = refitted.charged + refitted.prior_penalty
@@ -113,7 +113,6 @@ def next_two(found: Search) -> tuple[Search, ContinuousFit | None]:
     better than either; algebra about the fit that follows the data tells both at once.
     """
     base, noise = found.base, found.relaxed_noise
-    before = base.score, chi2_in(base, noise)
     ranked = pairs(found.relaxed_equations, found.candidates, found.own)
     sensible = [pair for pair in ranked if on_the_disc(found, pair.start)]
     chosen = sensible[: SELECTION.pairs_refitted]
@@ -131,7 +130,7 @@ def next_two(found: Search) -> tuple[Search, ContinuousFit | None]:
         )
         both = found.with_cost(both)
         for candidate in pair.hypothesis.candidates:
-            found = _considering(found, before, both, candidate)
+            found = _considering(found, base.score, both, candidate)
         worth = base.score - both.score > sum(map(price, pair.hypothesis.candidates))
         if worth and possible(both) and not far(found, both):
             return found, both
@@ -240,20 +239,15 @@ def _begun_again(found: Search, current: ContinuousFit, screened: ScreenedCandid
     )
 
 
-def _considering(
-    found: Search, before: tuple[float, float], refitted: ContinuousFit, candidate: CandidateEffect
-) -> Search:
-    """Return a search that knows what a candidate gains upon a fit of score and chi-squared ``before``."""
-    score, chi2_before = before
+def _considering(found: Search, before: float, refitted: ContinuousFit, candidate: CandidateEffect) -> Search:
+    """Return a search that knows what a candidate gains upon a fit whose score was ``before``."""
     values = {
         q.name: float(v)
         for q, v in zip(refitted.fit.parameters, refitted.fit.at, strict=True)
         if q.group == candidate.id and q.recordings == candidate.recordings
     }
-    gained = score - refitted.score, chi2_before - chi2_in(refitted, found.relaxed_noise)
-    return replace(
-        found, considered=(*found.considered, Considered(candidate, *gained, in_parameters(candidate.row, values)))
-    )
+    one = Considered(candidate, before - refitted.score, in_parameters(candidate.row, values))
+    return replace(found, considered=(*found.considered, one))
 
 
 def _with_lost_samples(found: Search, current: ContinuousFit) -> Search:

@@ -46,11 +46,10 @@ _KICK = (catalogued(SpinStep).id, "t_s")
 
 @dataclass(frozen=True)
 class Considered:
-    """A candidate that was refitted: what it gained when it was, by the likelihood and in chi-squared."""
+    """A candidate that was refitted: what it gained by the likelihood when it was, and its numbers."""
 
     candidate: CandidateEffect
     gain: float
-    chi2_gain: float
     values: Mapping[str, float]
 
 
