@@ -86,7 +86,7 @@ def diagnose(
 
 
 def tried_under(setup: SetupFindings, question: Question) -> Tried:
-    """Follow recordings as a setup says that they were meant and search effects, unless their sensors contradict."""
+    """Return recordings tried under a setup: effects are searched, unless their sensors contradict one another."""
     return tried_with(prepared_under(setup, question), question)
 
 
@@ -127,7 +127,7 @@ def _prepared_first(question: Question) -> Prepared:
 
 
 def tried_with(ready: Prepared, question: Question) -> Tried:
-    """Follow recordings that are ready for a fit and search effects, unless their sensors contradict."""
+    """Return recordings that are ready for a fit as tried: as `tried_under`, which prepares them."""
     progress, setup = question.progress, ready.setup
     free = free_parameters(setup)
     if ready.rows is not None:
@@ -168,7 +168,7 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
 def _law_before_effects(
     ready: Prepared, question: Question, moving: Fit | None = None
 ) -> tuple[Search, FoundLaw | None]:
-    """Return where a search would begin, and the law that is asked for without one; None where none holds.
+    """Return where a search would begin, and the law found there without searching effects; None where none holds.
 
     ``moving`` is the relaxed fit of bodies in which something moves out: no effect of the catalogue does.
     """
@@ -181,7 +181,7 @@ def _law_before_effects(
     return begun, find_law(begun.relaxed_fit, base, own, noise, ready.fitted, moves_out=moving is not None)
 
 
-#: times that segments are halved where the air's moment bends within them
+#: rounds in which segments are halved where the air's moment bends within them
 _BENDS = 2
 
 
@@ -231,13 +231,16 @@ def _explains(tried: Tried) -> bool:
 
 
 def likeliest_fault(tried: Tried, question: Question) -> SetupFindings | None:
-    """Suppose a fault that other physics hides from the relations between sensors: what follows them tells it then."""
+    """Suppose the likeliest fault where sensors contradict one another: other physics may hide it from relations.
+
+    Whether a motion then follows the sensors tells whether it is there.
+    """
     del question
     return None if tried.contradiction is None else with_likeliest_fault(tried.prepared.setup)
 
 
 def times_as_written(tried: Tried, question: Question) -> SetupFindings | None:
-    """Suppose that no sensor's times are off where, corrected for that, no effects explain the data, or losses do.
+    """Suppose that no sensor's times are off, where corrected times leave more than noise or ask for lost samples.
 
     Samples that were lost shift a sensor's times, and one offset may make up for most of them.
     """
@@ -256,11 +259,11 @@ def reversed_axes(tried: Tried, question: Question) -> SetupFindings | None:
 
 
 def borne_out(tried: Tried, question: Question) -> SetupFindings | None:
-    """Suppose only the faults of a setup that a fit bears out: beside an effect that it found another may be none."""
+    """Suppose only the faults of a setup that a fit bears out: an effect that it found may have looked like others."""
     return None if tried.fit is None else with_those_borne_out(tried.prepared.setup, question.recordings, tried.fit)
 
 
-#: what is supposed once effects were searched, one after the other, and what tells whether it stands
+#: what is supposed of the setup once effects were searched, one after the other, and the test of whether it stands
 _SUPPOSITIONS = (
     (likeliest_fault, _follows),
     (times_as_written, _explains),

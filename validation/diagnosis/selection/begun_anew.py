@@ -35,9 +35,10 @@ _STEPS, _STEPS_OF_ALL = 16, 8
 # far from the data a motion may run beyond all numbers: such a step is not finite, and is not taken
 @np.errstate(over="ignore", invalid="ignore")
 def begun_anew(fit: Fit, first: Sequence[Trajectory]) -> Fit:
-    """Return a fit whose recordings that stand out were begun anew, where that ends lower; ``first`` are its starts.
+    """Return a fit whose recordings that stand out were begun anew, where that ends lower.
 
-    Where the others are far from their data, too, something else is missing, and the fit is returned as it is.
+    ``first`` are the trajectories that the fit began with. Where the others are far from their data, too, something
+    else is missing, and the fit is returned as it is.
     """
     other_time = fit.plant.airborne and any(time_ratio(fit.values(i)) != 1.0 for i in range(len(fit.trajectories)))
     in_doubt = fit.plant.weakly_identified or (other_time and not fit.from_release)
@@ -64,9 +65,10 @@ def begun_anew(fit: Fit, first: Sequence[Trajectory]) -> Fit:
 
 
 def _lower(fit: Fit, i: int, first: Trajectory, level: float) -> Fit | None:
-    """Return the fit of one recording, what is shared held, from the first start that ends below a ``level``.
+    """Return the fit of one recording, shared parameters held, from the first start that ends below a ``level``.
 
-    It is the lowest where none does; None where none ends lower than the recording stands.
+    The level is in chi-squared per reading. Where no start ends below it the lowest end counts; None where none is
+    lower than where the recording stands.
     """
     stands = _alone(fit, i)
     bar = merit_of(stands, (fit.linears[i],)) - _LOWER
@@ -95,9 +97,9 @@ def _alone(fit: Fit, i: int) -> Fit:
 
 
 def _starts(fit: Fit, i: int, stands: Fit, first: Trajectory) -> Iterator[Fit]:
-    """Yield starts of one recording: its first trajectory and that of the data, wobbles of the others and none.
+    """Yield starts of one recording, each with the wobble that the others have or with none.
 
-    That of the data stands in the time that the fit means.
+    They are its first trajectory, and one from the data alone, in true time by the clock that the fit has found.
     """
     none = dict.fromkeys(fit.plant.motion_keys, 0.0)
     known = {

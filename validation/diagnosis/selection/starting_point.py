@@ -86,7 +86,10 @@ def _competing(problem: SearchProblem, plant: Plant) -> tuple[CandidateEffect, .
 
 
 def _noise_of(relaxed_fit: Fit) -> NoiseModel:
-    """Return the noise of readings: what a fit leaves that follows them, else what they show themselves."""
+    """Return the noise of readings: what the relaxed fit leaves of them.
+
+    A flight that only its release tells is not followed so closely: there the readings themselves show their noise.
+    """
     if relaxed_fit.from_release:
         return true_noise([readings for trajectory in relaxed_fit.trajectories for readings in trajectory.readings])
     return estimate_noise(relaxed_fit.linears, [linear.residual for linear in relaxed_fit.linears])

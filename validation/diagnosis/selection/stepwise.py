@@ -80,10 +80,10 @@ def search(problem: SearchProblem, anew: Anew = _FROM_NOTHING) -> Search:
 
 
 def _taken_over(found: Search, before: Search) -> Search:
-    """Return a search with the effects of one in other segments, where each is worth its price here, too.
+    """Return a search that begins with the effects of one in other segments, where each is worth its price here, too.
 
-    It begins from nothing where they are many, which may be a stack that only together stands for something, where
-    other times or samples that were lost go with them, and where they explain less than that.
+    It begins without any where those are many: a stack that only together stands for something. So it does where
+    clocks or lost samples go with them, and where they gain less than their price.
     """
     known = before.final
     retimed = any(time_ratio(known.fit.values(i)) != 1.0 for i in range(len(known.fit.trajectories)))
@@ -165,9 +165,9 @@ def _in_stated_noise(found: Search, current: ContinuousFit, step: int) -> tuple[
 
 
 def past_hope(found: Search, before: ContinuousFit, after: ContinuousFit, further: int) -> bool:
-    """Tell whether so many ``further`` effects could not take away what an effect leaves.
+    """Tell whether so many ``further`` effects are too few to take away what an effect leaves.
 
-    The largest comes first, so each takes about as much as the last at best, in noise that no misfit has inflated.
+    The largest comes first, so that each takes at best about as much as the last, in noise that no misfit has inflated.
     """
     noise = uninflated_noise(found)
     was, left = (chi2_in(fitted, noise) - fitted.fit.count for fitted in (before, after))
@@ -177,11 +177,11 @@ def past_hope(found: Search, before: ContinuousFit, after: ContinuousFit, furthe
 
 
 def without_swallowed(found: Search, fitted: ContinuousFit) -> ContinuousFit | None:
-    """Return a fit in noise that has swallowed no effect; None where what was estimated has swallowed none.
+    """Return a fit in noise that has swallowed no effect; None where its estimated noise has swallowed none.
 
-    A bias is nothing but loud and slow noise: in it no bias is worth its price. Nor is noise that is so loud and leaves
-    more than itself: such a group's is as stated. Where recordings have a course in common it is as the relaxed fit
-    shows it, which follows the data.
+    To a noise model a bias is loud, slow noise, in which no bias is worth its price. The noise of a group that is so
+    loud, or louder than any part's, is taken as stated. Where recordings have a trend in common it is as the relaxed
+    fit shows it, which follows the data.
     """
     left = fitted.unmodelled()
     stated = stated_noise(fitted.fit.linears)
@@ -197,7 +197,7 @@ def without_swallowed(found: Search, fitted: ContinuousFit) -> ContinuousFit | N
 
 
 def _most(found: Search, fitted: ContinuousFit, most: int) -> int:
-    """Return how many effects a search for at most so many may come to from a fit: more of them errors of sensors."""
+    """Return how many effects a search may come to: ``most``, and more where they are errors of several sensors."""
     if len(found.recordings) == 1 and plans_alone(found.recordings):
         # two curves in a plane take any two effects, and no other recording could bear them out
         return 1
@@ -242,15 +242,15 @@ def _nearing(found: Search, before: ContinuousFit, after: ContinuousFit) -> bool
 
 
 def _told(fitted: ContinuousFit | None) -> bool:
-    """Tell whether a fit's last effect was found in the readings themselves and is in its trajectories."""
+    """Tell whether a fit's last effect was found in the readings themselves, so that its trajectories hold it."""
     return fitted is not None and bool(fitted.hypothesis.candidates[-1].fixed_values)
 
 
 def _from_there(found: Search, current: ContinuousFit, better: ContinuousFit) -> ContinuousFit | None:
-    """Return the fit without the last effect from where that with it stands, if then the effect is not worth its price.
+    """Return the fit without the last effect, begun where the fit with it ended, if that makes the effect superfluous.
 
-    None where it is, or where it gains so much that no start could: then its size in its own standard deviations,
-    squared, is of the order of what it gains.
+    None where the effect is still worth its price. Nor is it asked where no better start could explain the gain: where
+    the effect's size in its own standard deviations, squared, is of the order of what it gains.
     """
     candidate = better.hypothesis.candidates[-1]
     if candidate.fixed_values:
