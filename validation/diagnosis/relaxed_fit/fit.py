@@ -1,9 +1,9 @@
 """The fit with relaxed continuity: motion that follows the data whatever physics is missing.
 
-Takes recordings; gives a `Fit`. Segments may part from one another and the sensors may be wrong by anything ordinary,
-each within a wide prior, so that the fit stays beside the truth under any hidden effect (weak-constraint estimation, as
-in data assimilation: Tremolet, 2006). What is learned there is not the effect but a point about which the questions
-that decide are nearly linear.
+Takes recordings; gives a `Fit`. Segments need not be continuous, and each sensor may have any ordinary error, within a
+wide prior. So the fit stays beside the truth under any hidden effect (weak-constraint estimation, as in data
+assimilation: Tremolet, 2006). It does not tell the effect. It gives a point about which the questions that do are
+nearly linear.
 """
 
 from __future__ import annotations

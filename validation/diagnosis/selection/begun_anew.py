@@ -1,10 +1,10 @@
 """Motions that a fit left beside their optimum, begun anew by themselves.
 
 Takes a fit and the trajectories that it began with; gives it with the motion of each recording that stands out begun
-from several starts, where one ends lower. How the wobble of a free spin dies and turns is told by little: a fit of all
-recordings may end where one of them turns by tens of rad/s too fast at first and too slowly later, and what that leaves
-looks like physics. So may a flight whose start was made in the time of a clock that is wrong by percents. One recording
-alone takes a second.
+from several starts, where one ends lower. Readings say little of how the wobble of a free spin dies and turns. In a fit
+of all recordings one may turn by tens of rad/s too fast at first and too slowly later, and what that leaves looks like
+physics. So does a flight that was begun in the time of a clock that is wrong by percents. One recording alone takes a
+second.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Backward elimination and exchange in a stepwise selection by likelihood.
 
-Takes what was found; gives fits in which effects give way: to none where others make them superfluous, to all
-recordings, or to a better rival. Each refit starts from the present fit.
+Takes what was found; gives fits in which an effect is left out where others make it superfluous, acts in all
+recordings instead of one, or gives way to a better rival. Each refit starts from the present fit.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ def _in_reach(fitted: ContinuousFit) -> Bars:
 def widened(found: Search, final: ContinuousFit) -> ContinuousFit:
     """Return a fit with effects that were proposed for one recording in all, where nothing speaks against that.
 
-    Recordings share their hardware and their air. Algebra at a shape that is not the true one, as a stall's angle, may
-    see an effect in the one recording that shows it and something else in the others.
+    Recordings share their hardware and their air. An effect may be asked about at a shape that is not the true one, as
+    a stall's angle. Algebra then may see it in the one recording that shows it, and something else in the others.
     """
     if unreliable(found, final):
         return final

@@ -109,8 +109,8 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
 def next_two(found: Search) -> tuple[Search, ContinuousFit | None]:
     """Return the fit with the best two effects where it comes near the data, else None.
 
-    Far from the data each of two effects alone may be fitted with numbers that serve for both, and a third may do
-    better than either; algebra about the fit that follows the data tells both at once.
+    Far from the data each of two effects alone may be fitted with numbers that serve for both. A third may do better
+    than either. Algebra about the fit that follows the data tells both at once.
     """
     base, noise = found.base, found.relaxed_noise
     ranked = pairs(found.relaxed_equations, found.candidates, found.own)

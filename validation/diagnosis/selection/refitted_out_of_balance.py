@@ -16,9 +16,9 @@ __all__ = ["refitted_out_of_balance"]
 def refitted_out_of_balance(found: Search) -> Search:
     """Return a search of free spins whose rows were counted, its effects refitted as of bodies out of balance.
 
-    It is returned as it is where that brings x and y of the gyroscope not much nearer. Here errors of the sensors are
-    fitted at once, among them those by which its rates lean, and instants are known to well below a millisecond. So
-    what is left of its x and y is what turns the body.
+    It is returned as it is where that brings x and y of the gyroscope not much nearer. Here all errors of the sensors
+    were fitted at once, also those that make its rates lean. Instants are known to well below a millisecond. So what is
+    left of its x and y is what turns the body.
     """
     fit = found.final.fit
     if fit.plant.unbalanced is None or not found.final.hypothesis.candidates:
