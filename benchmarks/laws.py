@@ -29,7 +29,9 @@ from discsim.threads import limited
 from discsim.validation.challenge.cases.conceal import recordings
 from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.challenge.cases.off_catalogue import OFF_CATALOGUE, OffCatalogue
-from discsim.validation.diagnosis.relaxed_fit import relaxed, unknowns, without_outliers
+from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.relaxed_fit.outliers import without_outliers
+from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
 from discsim.validation.diagnosis.result import Law
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis

@@ -48,6 +48,7 @@ from discsim.validation.diagnosis.selection.candidates import parameters_of
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate, screened_candidates
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search, chi2_in, values_of_fit
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.settings import RELAXED_FIT, SELECTION
@@ -127,7 +128,7 @@ def asked(case: Case, recordings: Sequence[Recording]) -> dict[str, str]:
     """Return a set's row: what chance reaches in it."""
     names = [recording.name for recording in recordings]
     fitted, _ = with_inertia(prepared(recordings, names)[0])
-    found = screened(fitted)
+    found = screened(SearchProblem(fitted))
     base = found.base
     near = screened_candidates(found.about(base.fit).equations, found.candidates, Hypothesis(), found.own)
     odd = [p for p in near if p.candidate.recordings is not None and p.candidate.row.in_all]

@@ -25,7 +25,7 @@ from discsim.validation.diagnosis.held_out import Choice, choices_without_each, 
 from discsim.validation.diagnosis.leftovers import pure_noise
 from discsim.validation.diagnosis.localisation import located_effect, located_unmodelled
 from discsim.validation.diagnosis.partly import partly_explained
-from discsim.validation.diagnosis.relaxed_fit import moves_out
+from discsim.validation.diagnosis.relaxed_fit.out_of_balance import moves_out
 from discsim.validation.diagnosis.report.wording import telling_apart
 from discsim.validation.diagnosis.result import (
     SMALLEST_P_VALUE,
@@ -63,7 +63,6 @@ from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.linear import Linear
 from discsim.validation.identification.noise import NoiseModel, chi_squared
 from discsim.validation.identification.plants import plant_of
-from discsim.validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = ["outcome_of", "reason_for"]
 
@@ -203,7 +202,7 @@ def _with_law(found: Search, law: FoundLaw) -> tuple[FitFigures, FitFigures, tup
 
 def _leaves(law: FoundLaw, names: Sequence[str]) -> str:
     """Return in words how often what swings does so, and what is left once a law is in."""
-    left = unmodelled_residuals(law.fitted.fit.linears, law.fitted.residuals, law.fitted.fit.noise)
+    left = law.fitted.unmodelled()
     swinging = f"{law.swinging} " if law.swinging else ""
     if not left:
         return f"{swinging}With it nothing but noise is left."

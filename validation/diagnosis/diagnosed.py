@@ -18,13 +18,13 @@ from discsim.threads import one_thread
 from discsim.validation.checking.doubts import reading_doubts
 from discsim.validation.diagnosis.datasets import need_field, recording_names
 from discsim.validation.diagnosis.pipeline import diagnose
+from discsim.validation.diagnosis.progress import Progress, silent
 from discsim.validation.diagnosis.report.figures import draw_overview
 from discsim.validation.diagnosis.report.files import write_outcome
 from discsim.validation.diagnosis.report.page import verdict_sentence
 from discsim.validation.diagnosis.report.wording import name_of
 from discsim.validation.diagnosis.result import Diagnosis, NamedEffect, Outcome
 from discsim.validation.diagnosis.setup.remedy import remedy_of
-from discsim.validation.diagnosis.stages import Progress, silent
 from discsim.validation.identification.plants.plan import Plan
 from discsim.validation.running.given import Given, given_recordings
 

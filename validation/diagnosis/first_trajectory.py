@@ -1,4 +1,4 @@
-"""A trajectory as a fit starts it: from the data alone, in the time that a clock means, or of its beginning."""
+"""The trajectories that fits start from: of the data alone, in true time by a wrong clock, of a beginning."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ __all__ = [
     "CLOCK",
     "beginning",
     "begun_again",
+    "begun_again_in_true_time",
     "first_trajectory",
     "nodes_of",
     "time_ratio",
@@ -40,7 +41,7 @@ def nodes_of(recording: Recording) -> FloatArray:
 
 
 def time_ratio(values: Values) -> float:
-    """Return what the times by which a motion is followed are written as, in true ones, by a recording's values."""
+    """Return the ratio of written to true time, of the times by which a motion is followed, under some values."""
     return float(np.prod([values.get(key, 1.0) for key in _LEADING]))
 
 
@@ -64,12 +65,25 @@ def first_trajectory(recording: Recording, ratio: float = 1.0, nodes: FloatArray
 
 
 def begun_again(current: Trajectory, ratio: float = 1.0) -> Trajectory:
-    """Return a trajectory started from the data once more, of a body that is as it was supposed to be."""
-    return replace(first_trajectory(current.recording, ratio), unbalanced=current.unbalanced)
+    """Return the first trajectory of a recording that is followed already; ``ratio`` is as in `first_trajectory`.
+
+    Whether its body is out of balance is kept, and nothing else that was found meanwhile: neither which effects
+    compete, nor which readings were left out or lost.
+    """
+    return _of_the_same_body(first_trajectory(current.recording, ratio), current)
+
+
+def begun_again_in_true_time(current: Trajectory, ratio: float) -> Trajectory:
+    """Return the `trajectory_in_true_time` of a recording that is followed already, kept is as in `begun_again`."""
+    return _of_the_same_body(trajectory_in_true_time(current.recording, ratio), current)
+
+
+def _of_the_same_body(first: Trajectory, current: Trajectory) -> Trajectory:
+    return replace(first, unbalanced=current.unbalanced)
 
 
 def beginning(current: Trajectory, length: float) -> Trajectory:
-    """Return the segments of a trajectory's first ``length`` s and the readings within them."""
+    """Return the segments of a trajectory's first ``length`` s, at least one, and the readings within them."""
     count = min(max(1, int(np.searchsorted(current.nodes, length))), len(current.states))
     within = {r.sensor: r.t < float(current.nodes[count]) - 0.03 for r in current.readings}
     lost = {
@@ -82,7 +96,7 @@ def beginning(current: Trajectory, length: float) -> Trajectory:
 
 
 def within_range(current: Trajectory, linear: Linear) -> Trajectory:
-    """Return the trajectory without readings whose noise a range may have cut off, by what the fit expects of them.
+    """Return the trajectory without readings that the sensor's range may have clipped, by what a fit expects of them.
 
     Leaving out readings by their own value would bias what remains.
     """

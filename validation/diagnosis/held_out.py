@@ -35,7 +35,7 @@ def choices_without_each(found: Search, less: Mapping[str, ContinuousFit]) -> li
     """
     final, count = found.final, len(found.recordings)
     choices: list[dict[str, CandidateEffect | None]] = [
-        {t.name: t for t in final.hypothesis.candidates} for _ in range(count)
+        {one.name: one for one in final.hypothesis.candidates} for _ in range(count)
     ]
     if count < 2:
         return list(choices)
@@ -98,21 +98,21 @@ def heldout_chi2(found: Search, hypothesis: Hypothesis, i: int, choice: Choice |
 
     Of the candidates of the ``hypothesis`` those in a ``choice`` give way to what it has in their place.
     """
-    board = found.equations
+    equations = found.equations
     places = [
         (candidate, candidate if choice is None else choice.get(candidate.name, candidate))
         for candidate in hypothesis.candidates
     ]
     kept = Hypothesis(tuple(candidate for candidate, chosen in places if chosen is candidate))
-    own = board.columns_of(fitted_parameters(kept, found.own))
+    own = equations.columns_of(fitted_parameters(kept, found.own))
     for candidate, chosen in places:
         if chosen is not None and chosen is not candidate:
             own += free_columns(chosen)
-    others = [j for j in range(board.recordings) if j != i]
-    answer = board.solve(own, only=others)
-    G = board.grams[i]
+    others = [j for j in range(equations.recordings) if j != i]
+    answer = equations.solve(own, only=others)
+    G = equations.grams[i]
     fixed = [
-        (board.place[column], float(v))
+        (equations.place[column], float(v))
         for (column, q), v in zip(own, answer.value, strict=True)
         if q.acts_in(i) and any(q.acts_in(j) for j in others)
     ]
@@ -125,7 +125,7 @@ def heldout_chi2(found: Search, hypothesis: Hypothesis, i: int, choice: Choice |
         chi2 += float(-2.0 * v @ e[at] + v @ G[np.ix_(at, at)] @ v)
         e[:-1] -= G[:-1][:, at] @ v
     if alone:
-        free = np.array([board.place[column] for column, _ in alone])
+        free = np.array([equations.place[column] for column, _ in alone])
         H = G[np.ix_(free, free)] + np.diag([q.precision for _, q in alone])
         chi2 -= float(e[free] @ np.linalg.solve(H + 1e-12 * np.diag(np.diag(H)), e[free]))
     return chi2

@@ -17,7 +17,6 @@ import numpy as np
 from discsim.arrays import BoolArray, FloatArray
 from discsim.validation.diagnosis.answer.leftover import Leftover
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement
-from discsim.validation.diagnosis.relaxed_fit import part_of
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.selection.search_state import Search
@@ -126,7 +125,7 @@ def heldout_fits(fitted: ContinuousFit) -> list[Fit]:
         alone = np.array([q.recordings == frozenset([i]) for q in fit.parameters], dtype=bool)
         step[alone] = _own_step(own, step, alone, fit)
         start = moved(fit.trajectories[i], fit.linears[i], nuisance_step(own, step), step)
-        begun = part_of(replace(fit, at=fit.at + step), [i])
+        begun = replace(fit, at=fit.at + step).part([i])
         parameters = tuple(
             q if q.recordings is not None else replace(q, stated=float(value), sigma=_FIXED * q.step, offsets=())
             for q, value in zip(begun.parameters, begun.at, strict=True)

@@ -40,9 +40,9 @@ def without(found: Search, candidate: CandidateEffect) -> list[FloatArray]:
 
     What the recordings' own unknowns and the other effects can take over, they do, to first order.
     """
-    board, fit = found.equations, found.final.fit
-    kept = board.columns_of(fitted_parameters(found.final.hypothesis.without(candidate), found.own))
-    value = board.solve(kept).value
+    equations, fit = found.equations, found.final.fit
+    kept = equations.columns_of(fitted_parameters(found.final.hypothesis.without(candidate), found.own))
+    value = equations.solve(kept).value
     elsewhere = {(q.key, q.recordings): float(v) for (_, q), v in zip(kept, value, strict=True)}
     stood = fit.at - np.array([q.stated for q in fit.parameters])
     went = np.array([elsewhere.get((q.key, q.recordings), 0.0) for q in fit.parameters]) - stood

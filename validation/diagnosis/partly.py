@@ -98,18 +98,18 @@ def _heldout_from_release(before: ContinuousFit, fitted: ContinuousFit) -> list[
 
 def _jackknifed(found: Search, fitted: ContinuousFit, candidate: CandidateEffect) -> dict[str, ParameterValue]:
     """Return an effect's parameters as all recordings have them, with standard deviations from leaving each out."""
-    board = found.equations
-    own = board.columns_of(fitted_parameters(fitted.hypothesis, found.own))
-    every = range(board.recordings)
+    equations = found.equations
+    own = equations.columns_of(fitted_parameters(fitted.hypothesis, found.own))
+    every = range(equations.recordings)
 
     def sizes(some: Sequence[int]) -> FloatArray:
-        value = board.solve(own, only=some).value
+        value = equations.solve(own, only=some).value
         numbers = {q.name: q.stated + float(v) for (_, q), v in zip(own, value, strict=True) if q.group == candidate.id}
         return np.array([*in_parameters(candidate.row, numbers).values()])
 
     without = np.stack([sizes([j for j in every if j != i]) for i in every])
     spread = without - without.mean(axis=0)
-    sd = np.sqrt(np.sum(spread**2, axis=0) * (board.recordings - 1.0) / board.recordings)
+    sd = np.sqrt(np.sum(spread**2, axis=0) * (equations.recordings - 1.0) / equations.recordings)
     fit = {
         q.name: float(v) for q, v in zip(fitted.fit.parameters, fitted.fit.at, strict=True) if q.group == candidate.id
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,13 +19,16 @@ from discsim.validation.diagnosis.consistency.spin_agreement import agreement_of
 from discsim.validation.diagnosis.datasets import recording_names, recordings_of
 from discsim.validation.diagnosis.detectors.row_times import row_times
 from discsim.validation.diagnosis.inertia import with_inertia
-from discsim.validation.diagnosis.out_of_balance import out_of_balance
 from discsim.validation.diagnosis.prepared import prepared
+from discsim.validation.diagnosis.progress import Progress, silent
 from discsim.validation.diagnosis.refuted import without_refuted
-from discsim.validation.diagnosis.relaxed_fit import moves_out, relaxed
+from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.relaxed_fit.out_of_balance import moves_out
 from discsim.validation.diagnosis.result import Outcome
 from discsim.validation.diagnosis.selection.event_instants import with_instants_weighed
 from discsim.validation.diagnosis.selection.refits import told_to
+from discsim.validation.diagnosis.selection.refitted_out_of_balance import refitted_out_of_balance
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.selection.stepwise import Anew, search
@@ -37,13 +40,12 @@ from discsim.validation.diagnosis.setup_effects import (
     with_those_borne_out,
     without_offsets,
 )
-from discsim.validation.diagnosis.stages import Prepared, Progress, Question, Tried, silent
+from discsim.validation.diagnosis.stages import Prepared, Question, Tried
 from discsim.validation.diagnosis.unknown_law.find import FoundLaw, find_law
 from discsim.validation.diagnosis.verdict import judged, leaves_more_than_noise
 from discsim.validation.identification.competing_effects import Competing
 from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.plants.plan import Plan
-from discsim.validation.identification.residual_tests import unmodelled_residuals
 from discsim.validation.identification.stated_parameters import stated_parameters
 
 __all__ = ["diagnose"]
@@ -84,7 +86,7 @@ def diagnose(
 
 
 def tried_under(setup: SetupFindings, question: Question) -> Tried:
-    """Follow recordings as a setup says that they were meant and search effects, unless their sensors contradict."""
+    """Return recordings tried under a setup: effects are searched, unless their sensors contradict one another."""
     return tried_with(prepared_under(setup, question), question)
 
 
@@ -100,8 +102,7 @@ def _with_law_of_one(tried: Tried, question: Question) -> Tried:
     begun, law = _law_before_effects(ready, question)
     if law is None or law.law.target.partition(".")[0] not in contradiction.against:
         return tried
-    fit, residuals = law.fitted.fit, law.fitted.residuals
-    alone = law.share > UNKNOWN_LAW.all and not unmodelled_residuals(fit.linears, residuals, fit.noise)
+    alone = law.share > UNKNOWN_LAW.all and not law.fitted.unmodelled()
     return Tried(ready, None, begun, law) if alone else tried
 
 
@@ -126,7 +127,7 @@ def _prepared_first(question: Question) -> Prepared:
 
 
 def tried_with(ready: Prepared, question: Question) -> Tried:
-    """Follow recordings that are ready for a fit and search effects, unless their sensors contradict."""
+    """Return recordings that are ready for a fit as tried: as `tried_under`, which prepares them."""
     progress, setup = question.progress, ready.setup
     free = free_parameters(setup)
     if ready.rows is not None:
@@ -147,41 +148,49 @@ def tried_with(ready: Prepared, question: Question) -> Tried:
         if law is not None:
             return Tried(ready, None, begun, law)
 
-    def searched(followed: Fit, anew: Anew | None = None) -> Search:
-        return search(ready.fitted, progress, ready.meant, followed, free, hints, question.effects, anew)
-
-    found = searched(followed)
-    if ready.rows is not None:  # pieces may part there, and what is left is known
-        found = out_of_balance(found)
+    problem = SearchProblem(
+        ready.fitted,
+        as_stated=ready.meant,
+        followed=followed,
+        free=free,
+        hints=hints,
+        effects=question.effects,
+        progress=progress,
+    )
+    found = search(problem)
+    if ready.rows is not None:  # no bent segments there: defects of continuity are wide, and the pure error is known
+        found = refitted_out_of_balance(found)
     elif followed.plant.weakly_identified:
-        found = _with_bends(found, followed, searched)
+        found = _with_bends(found, followed, problem)
     return Tried(ready, None, found)
 
 
 def _law_before_effects(
     ready: Prepared, question: Question, moving: Fit | None = None
 ) -> tuple[Search, FoundLaw | None]:
-    """Return where a search would begin, and the law that is asked for without one; None where none holds.
+    """Return where a search would begin, and the law found there without searching effects; None where none holds.
 
     ``moving`` is the relaxed fit of bodies in which something moves out: no effect of the catalogue does.
     """
     question.progress("looking for a law", 4, 5)
     free = free_parameters(ready.setup)
-    begun = screened(ready.fitted, as_stated=ready.meant, followed=moving, free=free, effects=question.effects)
+    begun = screened(
+        SearchProblem(ready.fitted, as_stated=ready.meant, followed=moving, free=free, effects=question.effects)
+    )
     base, own, noise = begun.base, begun.own, begun.relaxed_noise
     return begun, find_law(begun.relaxed_fit, base, own, noise, ready.fitted, moves_out=moving is not None)
 
 
-#: times that segments are halved where the air's moment bends within them
+#: rounds in which segments are halved where the air's moment bends within them
 _BENDS = 2
 
 
-def _with_bends(found: Search, followed: Fit, searched: Callable[[Fit, Anew], Search]) -> Search:
-    """Return the search of free spins with segments halved that bend, where one names effects or leaves too much.
+def _with_bends(found: Search, followed: Fit, problem: SearchProblem) -> Search:
+    """Return the search of free spins with bent segments halved, where it named effects or leaves more than noise.
 
-    ``searched`` is a search from a relaxed fit for so many effects as are of use, which begins with those of one before
-    where these leave no more than noise. Bends may stand in for what a search named, or hide one thing more: a stack of
-    effects beside them copies what nobody knows.
+    ``followed`` is the relaxed fit that it began with. A search in halved segments begins with the effects of the one
+    before, where these leave no more than noise. Bends may stand in for what a search named, or hide one thing more: a
+    stack of effects beside them copies what nobody knows.
     """
     for _ in range(_BENDS):
         left, count = leaves_more_than_noise(found), len(found.final.hypothesis.candidates)
@@ -189,7 +198,7 @@ def _with_bends(found: Search, followed: Fit, searched: Callable[[Fit, Anew], Se
         if bent is None:
             break
         most = 1 if left else count
-        again = searched(bent, Anew(most, None if left else found))
+        again = search(replace(problem, followed=bent), Anew(most, None if left else found))
         if len(again.final.hypothesis.candidates) > most or (leaves_more_than_noise(again) and not left):
             break
         followed, found = bent, again
@@ -222,13 +231,16 @@ def _explains(tried: Tried) -> bool:
 
 
 def likeliest_fault(tried: Tried, question: Question) -> SetupFindings | None:
-    """Suppose a fault that other physics hides from the relations between sensors: what follows them tells it then."""
+    """Suppose the likeliest fault where sensors contradict one another: other physics may hide it from relations.
+
+    Whether a motion then follows the sensors tells whether it is there.
+    """
     del question
     return None if tried.contradiction is None else with_likeliest_fault(tried.prepared.setup)
 
 
 def times_as_written(tried: Tried, question: Question) -> SetupFindings | None:
-    """Suppose that no sensor's times are off where, corrected for that, no effects explain the data, or losses do.
+    """Suppose that no sensor's times are off, where corrected times leave more than noise or ask for lost samples.
 
     Samples that were lost shift a sensor's times, and one offset may make up for most of them.
     """
@@ -247,11 +259,11 @@ def reversed_axes(tried: Tried, question: Question) -> SetupFindings | None:
 
 
 def borne_out(tried: Tried, question: Question) -> SetupFindings | None:
-    """Suppose only the faults of a setup that a fit bears out: beside an effect that it found another may be none."""
+    """Suppose only the faults of a setup that a fit bears out: an effect that it found may have looked like others."""
     return None if tried.fit is None else with_those_borne_out(tried.prepared.setup, question.recordings, tried.fit)
 
 
-#: what is supposed once effects were searched, one after the other, and what tells whether it stands
+#: what is supposed of the setup once effects were searched, one after the other, and the test of whether it stands
 _SUPPOSITIONS = (
     (likeliest_fault, _follows),
     (times_as_written, _explains),

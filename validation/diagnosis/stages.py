@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 from discsim.effects.catalogue import Effect, effect_of
 from discsim.effects.sensors import Lag
@@ -13,6 +12,7 @@ from discsim.validation.diagnosis.answer.leftover import Leftover
 from discsim.validation.diagnosis.consistency.early_verdict import Contradiction
 from discsim.validation.diagnosis.consistency.spin_agreement import Agreement, Comparison
 from discsim.validation.diagnosis.detectors.row_times import RowTimes
+from discsim.validation.diagnosis.progress import Progress, silent
 from discsim.validation.diagnosis.result import Verdict
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.setup import SetupFindings
@@ -22,15 +22,7 @@ from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.plants import plant_of
 from discsim.validation.identification.plants.plan import Plan
 
-__all__ = ["Judged", "Prepared", "Progress", "Question", "Tried", "silent"]
-
-#: called with a stage, the steps done, and the steps in all
-Progress: TypeAlias = Callable[[str, int, int], None]
-
-
-def silent(stage: str, done: int, total: int) -> None:
-    """Report no progress."""
-    del stage, done, total
+__all__ = ["Judged", "Prepared", "Question", "Tried"]
 
 
 @dataclass(frozen=True, eq=False)

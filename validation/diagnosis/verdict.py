@@ -12,6 +12,7 @@ from discsim.effects.catalogue import CATALOGUE
 from discsim.effects.kind import BOARD
 from discsim.validation.diagnosis.answer.leftover import Leftover
 from discsim.validation.diagnosis.leftovers import heldout_fits, leftovers_of, nothing_but_pure_error
+from discsim.validation.diagnosis.progress import Progress
 from discsim.validation.diagnosis.result import (
     Recalibration,
     Verdict,
@@ -19,10 +20,10 @@ from discsim.validation.diagnosis.result import (
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
 from discsim.validation.diagnosis.selection.search_state import Search, misses
 from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
-from discsim.validation.diagnosis.stages import Judged, Progress, Tried
+from discsim.validation.diagnosis.stages import Judged, Tried
 from discsim.validation.diagnosis.unknown_law.find import find_law, left_to_gain
 from discsim.validation.identification.gauss_newton import Fit
-from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, UnmodelledResidual, unmodelled_residuals
+from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, UnmodelledResidual
 
 __all__ = [
     "RECALIBRATED_NAMES",
@@ -91,8 +92,7 @@ def judged(tried: Tried, progress: Progress) -> Judged:
 def leaves_more_than_noise(found: Search) -> bool:
     """Tell whether what was found leaves residuals that no noise has, or is far from data that a motion follows."""
     final, settled = found.final, found.relaxed_fit.plant.durations.settled
-    left = unmodelled_residuals(final.fit.linears, final.residuals, final.fit.noise, settled=settled)
-    left = [item for item in left if not may_be_the_air(item, final.fit)]
+    left = [item for item in final.unmodelled(settled) if not may_be_the_air(item, final.fit)]
     return bool(left) or misses(found, final)
 
 

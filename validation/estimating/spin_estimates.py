@@ -144,7 +144,7 @@ def estimate_spin(
     setup = find_setup_faults([without_failed(given[0])])
     data = setup.recordings[0]
     doubts = list(reference_doubts(data)) if method == "best" else []
-    rates, left_out = estimate_all(believed(data, doubts), method, options or Options(), progress)
+    rates, left_out = estimate_all(believed(data, doubts), method, Options.of(options), progress)
     left_out.update(("rate_reference", f"it {one.what}") for one in doubts if one.sure and one.about_reference)
     notes = [
         *(f"{one}; the estimates are of the rest" for one in failed),

@@ -95,6 +95,28 @@ class Fit:
         pairs = enumerate(zip(self.trajectories, nodes, strict=True))
         return replace(self, trajectories=tuple(resegmented(one, self.values(i), edges) for i, (one, edges) in pairs))
 
+    def part(self, chosen: Sequence[int]) -> Fit:
+        """Return the fit of the ``chosen`` recordings alone, with the parameters that act in them where they stand.
+
+        Its merit and covariance are not known before it is fitted.
+        """
+        place = {i: k for k, i in enumerate(chosen)}
+
+        def there(q: Parameter) -> Parameter:
+            own = q.recordings
+            return q if own is None else replace(q, recordings=frozenset(place[i] for i in own if i in place))
+
+        acting = [j for j, q in enumerate(self.parameters) if any(q.acts_in(i) for i in chosen)]
+        return replace(
+            self,
+            trajectories=tuple(self.trajectories[i] for i in chosen),
+            parameters=tuple(there(self.parameters[j]) for j in acting),
+            at=self.at[acting],
+            linears=tuple(self.linears[i] for i in chosen) if self.linears else (),
+            merit=np.inf,
+            covariance=np.empty((0, 0)),
+        )
+
     @property
     def plant(self) -> Plant:
         """The plant of its recordings, which is one for all."""
@@ -539,8 +561,3 @@ def _part(
     """Return the trajectory after a share of a step, the closing of gaps included."""
     tangents = fraction * (linear.sensitivities @ np.concatenate([nuisance, common]) + linear.matching)
     return stepped(trajectory, tangents)
-
-
-def residuals_after(fit: Fit, reduced: Sequence[Reduced], step: FloatArray) -> list[FloatArray]:
-    """Return the residuals (n,) of each recording that a step of the shared parameters is expected to leave."""
-    return [linear.after(nuisance_step(r, step), step) for linear, r in zip(fit.linears, reduced, strict=True)]

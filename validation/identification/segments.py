@@ -21,21 +21,33 @@ __all__ = ["Trajectory", "resegmented", "stepped", "trajectory_of", "undone"]
 
 @dataclass(frozen=True)
 class Trajectory:
-    """The segments of one recording: boundaries (k + 1,) s and the states (k, s) they start from.
+    """The motion of one recording in shooting segments: where they begin, in time and in state, and what is read.
 
-    ``effects`` are those that may act on them.
+    Attributes
+    ----------
+    recording, readings
+        The recording, and those of its readings that take part.
+    nodes : (k + 1,) array
+        Boundaries of the segments, s.
+    states : (k, s) array
+        The states that they start from, as the plant's `Layout` has them.
+    lost : mapping
+        Samples lost before each of a sensor's samples (n,), by sensor, where some were.
+    effects : Competing
+        The effects that may act on the motion and on the sensors.
+    trust_radius : (d,) array or None
+        How far a step may move the first state, one sigma; None for the plant's.
+    unbalanced : bool
+        Whether moments fixed in the body turn it, of which nothing is stated.
     """
 
     recording: Recording
     readings: tuple[Readings, ...]
     nodes: FloatArray
     states: FloatArray
-    #: sensor -> samples lost before each of its samples (n,), where some were
     lost: Mapping[str, FloatArray] = field(default_factory=dict)
     effects: Competing = CATALOGUED
-    #: one sigma (d,) of what a step may move the first state by, where it is not the plant's
     trust_radius: FloatArray | None = None
-    #: whether moments fixed in the body turn it, of which nothing is stated
     unbalanced: bool = False
 
     @property
@@ -50,14 +62,19 @@ class Trajectory:
 
 
 def trajectory_of(
-    recording: Recording, nodes: FloatArray, states: FloatArray, effects: Competing = CATALOGUED
+    recording: Recording,
+    nodes: FloatArray,
+    states: FloatArray,
+    effects: Competing = CATALOGUED,
+    *,
+    unbalanced: bool = False,
 ) -> Trajectory:
-    """Return a recording cut at edges (k + 1,) s with states (k, s) at the starts of its segments."""
-    return Trajectory(recording, readings_of(recording), nodes, states, effects=effects)
+    """Return a recording cut at nodes (k + 1,) s with states (k, s) at the starts of its segments."""
+    return Trajectory(recording, readings_of(recording), nodes, states, effects=effects, unbalanced=unbalanced)
 
 
 def resegmented(current: Trajectory, values: Values, nodes: FloatArray) -> Trajectory:
-    """Return the trajectory cut at other edges (k + 1,), its new segments starting where the old motion was."""
+    """Return the trajectory cut at other nodes (k + 1,) s, its new segments starting where the old motion was."""
     recording = current.recording
     runner = runner_of(recording, values, (), current.effects)
     flat, own = base_flat(recording, values, (), current.effects), current.plant.own_values(values)

@@ -16,7 +16,7 @@ from discsim.arrays import FloatArray
 from discsim.disc import Aero
 from discsim.errors import InputError
 from discsim.recording import Recording
-from discsim.validation.diagnosis.relaxed_fit import unknowns
+from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, available, candidates_for, free_candidate
 from discsim.validation.diagnosis.selection.screening import columns_about
 from discsim.validation.identification.gauss_newton import Fit, linearised, linearised_columns

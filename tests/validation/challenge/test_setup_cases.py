@@ -19,6 +19,7 @@ from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.challenge.cases.setups import draw_fault, equivalents, possible_faults
 from discsim.validation.challenge.cases.sizes import HIDING, ordinary
 from discsim.validation.diagnosis.consistency.early_verdict import contradiction_in
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.diagnosis.setup import SetupFindings, find_setup_faults, with_likeliest_fault
 from discsim.written import corrected
@@ -289,7 +290,7 @@ def test_where_the_field_alone_is_read_a_tilt_of_the_axis_and_another_field_stan
     case = draw_case(93006, kind="setup")
     assert case.concealed[1].effect.id == "rig.axis_tilt"
     made = [corrected(one, [case.concealed[0].effect]) for one in recordings(case)]
-    found = search(made)
+    found = search(SearchProblem(made))
     (candidate,) = found.final.hypothesis.candidates
     assert candidate.id == "rig.axis_tilt"
     assert "site.field" in [rival.candidate.id for rival in found.rivals["rig.axis_tilt"]]

@@ -14,6 +14,7 @@ from discsim.sensors import record
 from discsim.shipped import load_disc
 from discsim.validation.diagnosis.bent_segments import with_bends_followed
 from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.identification.plants.free_spin import FREE_SPIN
 
@@ -36,18 +37,18 @@ def spinning(name: str, seconds: float) -> Recording:
 def test_a_segment_with_a_corner_is_halved_and_its_fit_is_the_better_for_it():
     recordings = [spinning("dd2", 1.8)]
     followed = relaxed(recordings)
-    found = screened(recordings, followed=followed)
+    found = screened(SearchProblem(recordings, followed=followed))
     fit = with_bends_followed(found, followed)
     assert fit is not None
     before, after = followed.trajectories[0].nodes, fit.trajectories[0].nodes
     new = np.setdiff1d(after, before)
     assert 0 < new.size < before.size - 1
     np.testing.assert_allclose(new, [0.5 * (before[k - 1] + before[k]) for k in np.searchsorted(before, new)])
-    again = screened(recordings, followed=fit)
+    again = screened(SearchProblem(recordings, followed=fit))
     assert again.base.score < found.base.score - 20.0 * new.size
 
 
 def test_where_no_moment_bends_no_segment_is_halved():
     recordings = throws(module=BLIND, plant=FREE_SPIN.name)
     followed = relaxed(recordings)
-    assert with_bends_followed(screened(recordings, followed=followed), followed) is None
+    assert with_bends_followed(screened(SearchProblem(recordings, followed=followed)), followed) is None

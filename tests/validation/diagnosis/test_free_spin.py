@@ -22,13 +22,15 @@ from discsim.validation.diagnosis.detectors.dropped_samples import dropped_magne
 from discsim.validation.diagnosis.detectors.events import events
 from discsim.validation.diagnosis.detectors.local_problem import local_problems
 from discsim.validation.diagnosis.first_trajectory import first_trajectory
-from discsim.validation.diagnosis.relaxed_fit import relaxed, unknowns
+from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
 from discsim.validation.diagnosis.selection import stepwise
 from discsim.validation.diagnosis.selection.candidates import free_candidate
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.next_effect import joined
 from discsim.validation.diagnosis.selection.score_tests import hinted
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search, possible, values_of_fit
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.identification.gauss_newton import (
@@ -192,7 +194,7 @@ def going(fit: Fit, too_far: float) -> GaussNewtonStep:
 def biased() -> Search:
     """Return where a search begins in two free spins whose gyroscope has a bias of twenty times its noise."""
     bias = effect("gyro.bias", bx_rad_s=0.05, by_rad_s=-0.03, bz_rad_s=0.02)
-    return screened(throws([], [bias], module=BLIND, plant="free_spin"))
+    return screened(SearchProblem(throws([], [bias], module=BLIND, plant="free_spin")))
 
 
 def fitted_with(*ids: str) -> ContinuousFit:
@@ -259,7 +261,7 @@ def test_a_kick_between_the_boundaries_of_a_wandering_motion_is_found_at_its_ins
 def test_lift_that_changes_within_the_first_turn_moves_no_accelerometer():
     """It left five times the noise in the first mean of one throw: a place of 0.1 mm was named."""
     case = draw_case(597283, "free_spin", (), "nothing")
-    assert stepwise.search(recordings(case)).final.hypothesis.candidates == ()
+    assert stepwise.search(SearchProblem(recordings(case))).final.hypothesis.candidates == ()
 
 
 def test_a_gyroscope_that_leans_with_the_pull_is_no_body_out_of_balance():

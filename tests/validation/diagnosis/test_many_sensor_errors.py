@@ -13,6 +13,7 @@ from discsim.recording import Recording
 from discsim.rig import default_profile, turn_table
 from discsim.sensors import Instruments, record
 from discsim.validation.diagnosis.pipeline import diagnose
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import chi2_in
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.uninflated_noise import capped, spoilt_groups, uninflated_noise
@@ -90,7 +91,7 @@ def test_two_plateaus_tell_three_errors_of_a_module_of_which_two_lead_near_but_n
 
 def test_a_mismatch_is_told_in_noise_that_it_has_not_inflated():
     """The relaxed fit does not follow a strong ripple: what it leaves of the rate reference is no noise of it."""
-    found = screened([run()])
+    found = screened(SearchProblem([run()]))
     assert {"rate_reference", "accelerometer"} <= spoilt_groups(found)
     noise = uninflated_noise(found)
     stated = {c.group: float(linear.sd[c.rows][0]) for linear in found.relaxed_fit.linears for c in linear.channels}

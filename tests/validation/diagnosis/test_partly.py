@@ -16,6 +16,7 @@ from discsim.validation.diagnosis.answer.named import ParameterValue
 from discsim.validation.diagnosis.answer.partly import PartlyExplained
 from discsim.validation.diagnosis.partly import partly_explained
 from discsim.validation.diagnosis.pipeline import diagnose
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.selection.stepwise import search
 
@@ -38,7 +39,7 @@ def plans(*hidden: Effect) -> list[Recording]:
 
 
 def test_a_camera_over_plans_of_throws_is_asked_and_takes_most_away_on_each():
-    found = screened(plans())
+    found = screened(SearchProblem(plans()))
     assert [hint.candidate.id for hint in found.hints] == ["track.camera"]
     (part,) = partly_explained(found, ["throw-0", "throw-1"])
     assert part.id == "track.camera"
@@ -69,4 +70,4 @@ def test_it_is_told_with_what_it_leaves_and_is_plain_json():
 def test_one_plan_alone_bears_out_no_more_than_one_effect():
     """Of a real throw from the air, one of three, a camera and a wind of 12 m/s that grows with height took up all."""
     sheared = effect("air.wind_shear", w_north_m_s=6.0, w_east_m_s=-4.0, exponent=0.3)
-    assert len(search(plans(sheared)[:1]).final.hypothesis.candidates) <= 1
+    assert len(search(SearchProblem(plans(sheared)[:1])).final.hypothesis.candidates) <= 1

@@ -15,7 +15,7 @@ BIAS, IMPULSE = CandidateEffect("gyro.bias", ()), CandidateEffect("event.impulse
 
 
 def considered(candidate: CandidateEffect, gain: float) -> Considered:
-    return Considered(candidate, gain, gain, {})
+    return Considered(candidate, gain, {})
 
 
 @pytest.mark.parametrize("candidate", [BIAS, IMPULSE], ids=lambda candidate: candidate.id)

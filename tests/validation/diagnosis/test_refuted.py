@@ -19,6 +19,7 @@ from discsim.validation.diagnosis.refuted import without_refuted
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.own_sizes import own_sizes
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.selection.stepwise import search
@@ -34,7 +35,7 @@ def with_bias(*biases: float) -> Search:
     for k, bias in enumerate(biases):
         motion = spin_down(RIG, SITE, 40.0 + 5.0 * k, 4.0, yaw=0.5 + k)
         runs.append(coasting(motion, RIG, k, [effect(BIAS, bx_m_s2=0.0, by_m_s2=0.0, bz_m_s2=bias)]))
-    found = screened(runs)
+    found = screened(SearchProblem(runs))
     bias = next(c for c in found.candidates if c.id == BIAS and c.recordings is None)
     final = continuous_fit(
         found.base.fit, Hypothesis((bias,)), found.own, found.base.fit.noise, values_of_fit(found.base)
@@ -79,6 +80,6 @@ def test_it_stays_where_more_than_noise_is_left_without_it(monkeypatch: pytest.M
 
 def test_what_readings_do_not_tell_but_what_the_air_is_charged_for_names_no_inertia():
     """It gained 87, of which 60 were charges that the air's stiffness changes from segment to segment."""
-    found = search(recordings(draw_case(627033)))
+    found = search(SearchProblem(recordings(draw_case(627033))))
     assert [candidate.row.type for candidate in found.final.hypothesis.candidates] == [InertiaAsymmetry]
     assert without_refuted(found).final.hypothesis.candidates == ()

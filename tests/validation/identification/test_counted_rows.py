@@ -10,7 +10,7 @@ from support.made import MODULE, throws
 
 from discsim.recording import Recording
 from discsim.validation.diagnosis.first_trajectory import first_trajectory
-from discsim.validation.diagnosis.relaxed_fit import unknowns
+from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
 from discsim.validation.identification.linearisation import linearise
 from discsim.validation.identification.plants.free_spin import FREE_SPIN
 from discsim.validation.identification.prediction import read

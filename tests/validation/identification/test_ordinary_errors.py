@@ -8,7 +8,7 @@ from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import AccelerometerBias, HardIron
 from discsim.estimators.precession import HARD_IRON_SD
 from discsim.estimators.tracking import TrackingSettings
-from discsim.validation.diagnosis.relaxed_fit import ordinary
+from discsim.validation.diagnosis.relaxed_fit.parameters import ordinary
 from discsim.validation.identification.ordinary_errors import ordinary_errors, ordinary_sigma
 
 IRON = catalogued(HardIron).id

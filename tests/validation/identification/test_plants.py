@@ -149,7 +149,7 @@ def first_states(recording, t, ratio):
 PENDULUM = Plant(
     name="pendulum",
     motion="swing",
-    layout=Layout(2, 2, spin=RATE),
+    layout=Layout(2, spin=RATE),
     dynamics=Dynamics(propagate, lambda given, state, start, stop: 0.02),
     initial=Initial(first_states),
     sizes=Sizes(

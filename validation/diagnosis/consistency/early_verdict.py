@@ -26,7 +26,8 @@ from discsim.validation.diagnosis.consistency.spin_rates import RatesApart, rate
 from discsim.validation.diagnosis.detectors.dropped_samples import loses_samples
 from discsim.validation.diagnosis.detectors.speed_ripple import ripple
 from discsim.validation.diagnosis.first_trajectory import beginning, first_trajectory
-from discsim.validation.diagnosis.relaxed_fit import free_clocks, from_other_initial_states, relaxed_parameters
+from discsim.validation.diagnosis.relaxed_fit.astray import from_other_initial_states
+from discsim.validation.diagnosis.relaxed_fit.parameters import free_clocks, relaxed_parameters
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.settings import CONSISTENCY
 from discsim.validation.identification.gauss_newton import Fit, refit

@@ -20,7 +20,7 @@ from discsim.effects.catalogue import CATALOGUE, catalogued
 from discsim.effects.rig import AxisTilt
 from discsim.recording import SENSORS, Recording, Samples
 from discsim.validation.diagnosis.design.plans import plans_about
-from discsim.validation.diagnosis.relaxed_fit import unknowns
+from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
 from discsim.validation.diagnosis.result import Advice, Separation
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, parameters_of
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
@@ -212,8 +212,8 @@ def _recorded(found: Search, plan: Plan, own: Sequence[Parameter], like: int) ->
     sheets = dict(bare.sheets)
     if "accelerometer" in sheets:  # readings that stand still for want of noise are no limit
         sheets["accelerometer"] = replace(sheets["accelerometer"], noise_rms=0.0)
-    planned = trajectory_of(replace(bare, samples=samples, sheets=sheets), cut.nodes, cut.states, old.effects)
-    return replace(planned, unbalanced=old.unbalanced)
+    planned = replace(bare, samples=samples, sheets=sheets)
+    return trajectory_of(planned, cut.nodes, cut.states, old.effects, unbalanced=old.unbalanced)
 
 
 def _landing(whole: Trajectory, values: Values) -> float:

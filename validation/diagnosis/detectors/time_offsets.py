@@ -58,13 +58,14 @@ def time_offsets(
         gain = float(left[int(np.argmin(np.abs(_TRIED)))] - left[best]) if offset else 0.0
         if abs(offset) < _LEAST or gain < least:
             continue
-        found.append(_proposal(late, "offset_s", offset, gain))
+        found.append(_screened(late, "offset_s", offset, gain))
         if 0.0 < offset <= _LONGEST_LAG:
-            found.append(_proposal(lag, "tau_s", offset, gain))
+            found.append(_screened(lag, "tau_s", offset, gain))
     return found
 
 
-def _proposal(id: str, name: str, value: float, gain: float) -> ScreenedCandidate:
+def _screened(id: str, name: str, value: float, gain: float) -> ScreenedCandidate:
+    """Return an effect as a screened candidate whose one parameter starts at a value."""
     return ScreenedCandidate(free_candidate(id), gain, {((id, name), None): value})
 
 

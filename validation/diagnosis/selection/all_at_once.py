@@ -32,7 +32,6 @@ from discsim.validation.diagnosis.selection.search_state import (
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Fit, penalty_of
 from discsim.validation.identification.parameters import Parameter
-from discsim.validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = ["all_at_once", "turn_of", "worth_of_each"]
 
@@ -62,7 +61,7 @@ def all_at_once(found: Search) -> ContinuousFit | None:
     told = {hint.candidate.id for hint in lags}
     turns = [free_candidate(id) for id in sorted(TURNED & competing) if CATALOGUE[id].type is Mount]
     fits = _few(found, every, turns, told)
-    if not any(_leaves_noise(one) for one in fits):
+    if all(one.unmodelled() for one in fits):
         fits += _many(found, every, told)
     fits = [one for one in fits if possible(one)]
     if not fits:
@@ -71,14 +70,9 @@ def all_at_once(found: Search) -> ContinuousFit | None:
     return fitted if found.base.score - fitted.score > sum(map(price, fitted.hypothesis.candidates)) else None
 
 
-def _leaves_noise(fitted: ContinuousFit) -> bool:
-    """Tell whether nothing but noise is left."""
-    return not unmodelled_residuals(fitted.fit.linears, fitted.residuals, fitted.fit.noise)
-
-
 def _many(found: Search, every: Sequence[CandidateEffect], told: Collection[str]) -> list[ContinuousFit]:
     """Return the fit of all effects that the relaxed fit cannot do without, less those that it then can."""
-    asked = _held_out(found, _pruned(found, found.loose_board, every, told), told)
+    asked = _held_out(found, _pruned(found, found.relaxed_equations, every, told), told)
     fitted = _fitted(found, asked)
     if fitted is None:
         return []

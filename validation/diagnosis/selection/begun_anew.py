@@ -1,10 +1,10 @@
 """Motions that a fit left beside their optimum, begun anew by themselves.
 
 Takes a fit and the trajectories that it began with; gives it with the motion of each recording that stands out begun
-from several starts, where one ends lower. How the wobble of a free spin dies and turns is told by little: a fit of all
-recordings may end where one of them turns by tens of rad/s too fast at first and too slowly later, and what that leaves
-looks like physics. So may a flight whose start was made in the time of a clock that is wrong by percents. One recording
-alone takes a second.
+from several starts, where one ends lower. Readings say little of how the wobble of a free spin dies and turns. In a fit
+of all recordings one may turn by tens of rad/s too fast at first and too slowly later, and what that leaves looks like
+physics. So does a flight that was begun in the time of a clock that is wrong by percents. One recording alone takes a
+second.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from discsim.validation.diagnosis.first_trajectory import first_trajectory, time_ratio, trajectory_in_true_time
+from discsim.validation.diagnosis.first_trajectory import begun_again_in_true_time, first_trajectory, time_ratio
 from discsim.validation.diagnosis.selection.evidence import BOUNDS
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Fit, discontinuous, merit_of, refit
@@ -35,9 +35,10 @@ _STEPS, _STEPS_OF_ALL = 16, 8
 # far from the data a motion may run beyond all numbers: such a step is not finite, and is not taken
 @np.errstate(over="ignore", invalid="ignore")
 def begun_anew(fit: Fit, first: Sequence[Trajectory]) -> Fit:
-    """Return a fit whose recordings that stand out were begun anew, where that ends lower; ``first`` are its starts.
+    """Return a fit whose recordings that stand out were begun anew, where that ends lower.
 
-    Where the others are far from their data, too, something else is missing, and the fit is returned as it is.
+    ``first`` are the trajectories that the fit began with. Where the others are far from their data, too, something
+    else is missing, and the fit is returned as it is.
     """
     other_time = fit.plant.airborne and any(time_ratio(fit.values(i)) != 1.0 for i in range(len(fit.trajectories)))
     in_doubt = fit.plant.weakly_identified or (other_time and not fit.from_release)
@@ -64,9 +65,10 @@ def begun_anew(fit: Fit, first: Sequence[Trajectory]) -> Fit:
 
 
 def _lower(fit: Fit, i: int, first: Trajectory, level: float) -> Fit | None:
-    """Return the fit of one recording, what is shared held, from the first start that ends below a ``level``.
+    """Return the fit of one recording, shared parameters held, from the first start that ends below a ``level``.
 
-    It is the lowest where none does; None where none ends lower than the recording stands.
+    The level is in chi-squared per reading. Where no start ends below it the lowest end counts; None where none is
+    lower than where the recording stands.
     """
     stands = _alone(fit, i)
     bar = merit_of(stands, (fit.linears[i],)) - _LOWER
@@ -95,9 +97,9 @@ def _alone(fit: Fit, i: int) -> Fit:
 
 
 def _starts(fit: Fit, i: int, stands: Fit, first: Trajectory) -> Iterator[Fit]:
-    """Yield starts of one recording: its first trajectory and that of the data, wobbles of the others and none.
+    """Yield starts of one recording, each with the wobble that the others have or with none.
 
-    That of the data stands in the time that the fit means.
+    They are its first trajectory, and one from the data alone, in true time by the clock that the fit has found.
     """
     none = dict.fromkeys(fit.plant.motion_keys, 0.0)
     known = {
@@ -113,8 +115,7 @@ def _starts(fit: Fit, i: int, stands: Fit, first: Trajectory) -> Iterator[Fit]:
     yield begun(first, others)
     ratio = time_ratio(fit.values(i))
     if ratio != 1.0:
-        timed = trajectory_in_true_time(first.recording, ratio)
-        yield begun(replace(timed, unbalanced=first.unbalanced), others)
+        yield begun(begun_again_in_true_time(first, ratio), others)
     else:
         yield begun(replace(first, states=first_trajectory(first.recording, nodes=first.nodes).states), none)
     if none:

@@ -29,6 +29,7 @@ from discsim.validation.identification.noise import (
 )
 from discsim.validation.identification.ordinary_errors import ordinary_errors
 from discsim.validation.identification.parameters import Parameter, values_of
+from discsim.validation.identification.residual_tests import UnmodelledResidual, unmodelled_residuals
 from discsim.validation.identification.segments import Trajectory
 from discsim.validation.identification.sensor_model import CLOCKS
 
@@ -48,11 +49,15 @@ class ContinuousFit:
     residuals: tuple[FloatArray, ...] = field(default_factory=tuple)
     scored_in: NoiseModel = field(default_factory=dict)
 
-    def squared_sizes(self, candidate: CandidateEffect) -> float:
-        """Return how far a candidate's numbers are from where they act not, squared, in the fit's covariance (Wald).
+    def unmodelled(self, settled: float = -np.inf) -> list[UnmodelledResidual]:
+        """Return what its residuals hold beside noise, strongest first; ``settled`` as in `unmodelled_residuals`."""
+        return unmodelled_residuals(self.fit.linears, self.residuals, self.fit.noise, settled=settled)
 
-        About what it gains by, where a fit is at its optimum with it and without it; without end where that is not
-        known.
+    def squared_sizes(self, candidate: CandidateEffect) -> float:
+        """Return how far a candidate's numbers are from those of no effect, squared, in the fit's covariance (Wald).
+
+        This is about what the effect gains, where a fit is at its optimum with it and without it. It is infinite where
+        the covariance is not known.
         """
         if self.fit.covariance.shape[0] != len(self.fit.parameters):
             return np.inf
@@ -135,7 +140,7 @@ def continuous_fit(
     plant = relaxed_fit.plant
     fit = Fit(_retimed(relaxed_fit, parameters, at), parameters, at, relaxed_fit.continuous_defects, noise)
     if not plant.airborne and any(q.group in CLOCKS for q in parameters):
-        fit = replace(fit, at=_longer_and_longer(fit))
+        fit = replace(fit, at=_clocks_of_longer_beginnings(fit))
     begun = fit
     if fit.from_release:
         return scored(hypothesis, fitted_from_afar(fit, bounds=BOUNDS))
@@ -194,8 +199,8 @@ def _retimed(relaxed_fit: Fit, parameters: Sequence[Parameter], at: FloatArray) 
 _LOOKS = (5.0, 10.0, 20.0)
 
 
-def _longer_and_longer(fit: Fit) -> FloatArray:
-    """Return parameters (p,) fitted to longer and longer beginnings: a wrong clock's phase never slips by a turn."""
+def _clocks_of_longer_beginnings(fit: Fit) -> FloatArray:
+    """Return parameters (p,) fitted to longer and longer beginnings, so that no wrong clock's phase slips by a turn."""
     at = fit.at
     for look in _LOOKS:
         if look < 0.8 * max(float(trajectory.nodes[-1]) for trajectory in fit.trajectories):

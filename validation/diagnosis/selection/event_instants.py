@@ -17,7 +17,6 @@ from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit,
 from discsim.validation.diagnosis.selection.search_state import Search, far, values_of_fit
 from discsim.validation.identification.gauss_newton import Bars, merit_of
 from discsim.validation.identification.instant_profile import instant_profile, instants_of, with_errors_of_instants
-from discsim.validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = ["with_best_instant", "with_instants_weighed"]
 
@@ -50,8 +49,7 @@ def _in_the_deepest_dip(found: Search, current: ContinuousFit) -> ContinuousFit:
         fitted = continuous_fit(
             moved, current.hypothesis, found.own, fit.noise, start, iterations=_STEPS, polish=0, bars=bars
         )
-        fitted = replace(fitted, score=fitted.score + found.cost)
-        return min(current, fitted, key=lambda one: one.score)
+        return min(current, found.with_cost(fitted), key=lambda one: one.score)
     return current
 
 
@@ -64,7 +62,7 @@ def _at_the_best_turn(found: Search, current: ContinuousFit) -> ContinuousFit:
     spin = found.relaxed_fit.plant.layout.spin
     if candidate.id != _KICK or candidate.recordings is None or spin is None:
         return current
-    if not unmodelled_residuals(current.fit.linears, current.residuals, current.fit.noise):
+    if not current.unmodelled():
         return current
     (number,) = candidate.recordings
     trajectory = current.fit.trajectories[number]
@@ -79,7 +77,7 @@ def _at_the_best_turn(found: Search, current: ContinuousFit) -> ContinuousFit:
             continue
         moved = {**start, key: instant}
         fitted = continuous_fit(current.fit, current.hypothesis, found.own, current.fit.noise, moved, bars=bars)
-        best = min(best, replace(fitted, score=fitted.score + found.cost), key=lambda one: one.score)
+        best = min(best, found.with_cost(fitted), key=lambda one: one.score)
     return best
 
 

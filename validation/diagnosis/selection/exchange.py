@@ -1,7 +1,7 @@
 """Backward elimination and exchange in a stepwise selection by likelihood.
 
-Takes what was found; gives fits in which effects give way: to none where others make them superfluous, to all
-recordings, or to a better rival. Each refit starts from the present fit.
+Takes what was found; gives fits in which an effect is left out where others make it superfluous, acts in all
+recordings instead of one, or gives way to a better rival. Each refit starts from the present fit.
 """
 
 from __future__ import annotations
@@ -15,7 +15,14 @@ from discsim.validation.diagnosis.selection.hypothesis import fitted_parameters
 from discsim.validation.diagnosis.selection.refits import refitting
 from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate, scope_price, start_of
 from discsim.validation.diagnosis.selection.screening import free_columns
-from discsim.validation.diagnosis.selection.search_state import Rival, Search, from_here, lost, possible, values_of_fit
+from discsim.validation.diagnosis.selection.search_state import (
+    Rival,
+    Search,
+    from_here,
+    possible,
+    unreliable,
+    values_of_fit,
+)
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Bars, merit_of
 
@@ -38,10 +45,10 @@ def _in_reach(fitted: ContinuousFit) -> Bars:
 def widened(found: Search, final: ContinuousFit) -> ContinuousFit:
     """Return a fit with effects that were proposed for one recording in all, where nothing speaks against that.
 
-    Recordings share their hardware and their air. Algebra at a shape that is not the true one, as a stall's angle, may
-    see an effect in the one recording that shows it and something else in the others.
+    Recordings share their hardware and their air. An effect may be asked about at a shape that is not the true one, as
+    a stall's angle. Algebra then may see it in the one recording that shows it, and something else in the others.
     """
-    if lost(found, final):
+    if unreliable(found, final):
         return final
     for candidate in final.hypothesis.candidates:
         if candidate.recordings is None or candidate.fixed_values or candidate.row.event:
@@ -57,20 +64,18 @@ def widened(found: Search, final: ContinuousFit) -> ContinuousFit:
             start,
             bars=_in_reach(final),
         )
-        wide = replace(wide, score=wide.score + found.cost)
+        wide = found.with_cost(wide)
         if wide.score - final.score < scope_price(len(found.recordings)) and possible(wide):
             final = wide
     return final
 
 
 def eliminated_backward(found: Search, current: ContinuousFit, kept: CandidateEffect | None = None) -> ContinuousFit:
-    """Leave out effects that the others have made superfluous, but for one that is ``kept``."""
+    """Return a fit less the effects that the others have made superfluous, but for one that is ``kept``."""
     while len(current.hypothesis.candidates) > 1:
         weakest: ContinuousFit | None = None
         for number, candidate in enumerate(current.hypothesis.candidates):
-            if (
-                candidate.fixed_values or candidate is kept
-            ):  # what is told is kept in the trajectories whatever the hypothesis says
+            if _in_trajectories(candidate) or candidate is kept:
                 continue
             refitting("refitting without", candidate.id, number, len(current.hypothesis.candidates))
             less = continuous_fit(
@@ -81,7 +86,7 @@ def eliminated_backward(found: Search, current: ContinuousFit, kept: CandidateEf
                 values_of_fit(current),
                 bars=_in_reach(current),
             )
-            less = replace(less, score=less.score + found.cost)
+            less = found.with_cost(less)
             if less.score - current.score < price(candidate) and (weakest is None or less.score < weakest.score):
                 weakest = less
         if weakest is None:
@@ -103,11 +108,19 @@ def tried_without(found: Search, candidate: CandidateEffect) -> ContinuousFit:
         found.relaxed_fit, rest, found.own, found.relaxed_noise, values_of_fit(final), iterations=5, polish=1
     )
     # choosing what was found in the readings themselves cost the fit with it, and none without
-    return less if candidate.fixed_values else replace(less, score=less.score + found.cost)
+    return less if _in_trajectories(candidate) else found.with_cost(less)
+
+
+def _in_trajectories(candidate: CandidateEffect) -> bool:
+    """Tell whether an effect was found in the readings themselves, as lost samples are.
+
+    The trajectories hold it whatever the hypothesis says, so that no fit that goes on from them is without it.
+    """
+    return bool(candidate.fixed_values)
 
 
 def without_superfluous(found: Search) -> Search:
-    """Leave out effects without which a fit that is begun anew explains as much.
+    """Return a search less the effects without which a fit that is begun anew explains as much.
 
     A fit that goes on from one with the effect may end beside the optimum, and the effect then seems worth its price.
     """
@@ -115,7 +128,7 @@ def without_superfluous(found: Search) -> Search:
     while not found.cost and len(found.final.hypothesis.candidates) > 1:
         weakest: ContinuousFit | None = None
         for number, candidate in enumerate(found.final.hypothesis.candidates):
-            if candidate.fixed_values:
+            if _in_trajectories(candidate):
                 continue
             refitting("beginning anew without", candidate.id, number, len(found.final.hypothesis.candidates))
             less = tried_without(found, candidate)
@@ -130,55 +143,52 @@ def without_superfluous(found: Search) -> Search:
 
 
 def rivals_of(found: Search) -> dict[str, list[Rival]]:
-    """Return the effects that could stand in for a named one, by its name."""
-    final = found.final
-    equations = found.equations
-    rivals: dict[str, list[Rival]] = {}
-    for candidate in final.hypothesis.candidates:
-        if (
-            candidate.fixed_values
-        ):  # found in the readings themselves, and kept in the trajectories: nothing else could do it from there
+    """Return the effects that could stand in for a named one, refitted in its place, by its name."""
+    named = [one for one in found.final.hypothesis.candidates if not _in_trajectories(one)]
+    return {candidate.name: _rivals(found, candidate) for candidate in named}
+
+
+def _rivals(found: Search, candidate: CandidateEffect) -> list[Rival]:
+    """Return the effects that could stand in for one of the final hypothesis, each refitted in its place."""
+    final, rest = found.final, found.final.hypothesis.without(candidate)
+    rivals: list[Rival] = []
+    seen: set[str] = set()
+    for worse, screened in _by_algebra(found, candidate):
+        other = screened.candidate
+        most = SELECTION.alike if worse < SELECTION.confused else SELECTION.rivals
+        if other.id in seen or len(seen) >= most:
             continue
-        rest = final.hypothesis.without(candidate)
-        taken = equations.columns_of(fitted_parameters(rest, found.own))
-        best = equations.solve(equations.columns_of(fitted_parameters(final.hypothesis, found.own))).chi2
-        # of a large effect algebra knows the last percents badly
-        without = equations.solve(taken).chi2
-        worst = max(SELECTION.worst, SELECTION.worst_share * (without - best))
-        near = []
-        for other in found.candidates:
-            if other.id == candidate.id or any(other.id == t.id for t in rest.candidates):
-                continue
-            scoped = replace(other, recordings=candidate.recordings)
-            asked = [*taken, *free_columns(scoped)]
-            answer = equations.solve(asked)
-            near.append(
-                (
-                    answer.chi2 - best,
-                    ScreenedCandidate(scoped, without - answer.chi2, start_of(asked, answer, (scoped,))),
-                )
-            )
-        near.sort(key=lambda item: item[0])
-        rivals[candidate.name] = []
-        seen: set[str] = set()
-        for worse, screened in near:
-            scoped = screened.candidate
-            most = SELECTION.alike if worse < SELECTION.confused else SELECTION.rivals
-            if scoped.id in seen or worse > worst or len(seen) >= most:
-                continue
-            refitting(f"refitting in place of {candidate.id}", scoped.id, len(seen), most)
-            seen.add(scoped.id)
-            other_fit = continuous_fit(
-                final.fit,
-                rest.plus(scoped),
-                found.own,
-                final.fit.noise,
-                from_here(screened, final).start,
-                bars=_in_reach(final),
-            )
-            other_fit = replace(other_fit, score=other_fit.score + found.cost)
-            rivals[candidate.name].append(Rival(scoped, other_fit.worse_than(final), other_fit))
+        refitting(f"refitting in place of {candidate.id}", other.id, len(seen), most)
+        seen.add(other.id)
+        start = from_here(screened, final).start
+        fitted = continuous_fit(final.fit, rest.plus(other), found.own, final.fit.noise, start, bars=_in_reach(final))
+        fitted = found.with_cost(fitted)
+        rivals.append(Rival(other, fitted.worse_than(final), fitted))
     return rivals
+
+
+def _by_algebra(found: Search, candidate: CandidateEffect) -> list[tuple[float, ScreenedCandidate]]:
+    """Return the candidates that may do about as well in an effect's place, best first, by the normal equations.
+
+    Beside each stands by how much chi-squared is higher with it than with the effect.
+    """
+    equations, rest = found.equations, found.final.hypothesis.without(candidate)
+    taken = equations.columns_of(fitted_parameters(rest, found.own))
+    best = equations.solve(equations.columns_of(fitted_parameters(found.final.hypothesis, found.own))).chi2
+    without = equations.solve(taken).chi2
+    # of a large effect algebra knows the last percents badly
+    worst = max(SELECTION.worst, SELECTION.worst_share * (without - best))
+    near = []
+    for other in found.candidates:
+        if other.id == candidate.id or any(other.id == one.id for one in rest.candidates):
+            continue
+        scoped = replace(other, recordings=candidate.recordings)
+        asked = [*taken, *free_columns(scoped)]
+        answer = equations.solve(asked)
+        screened = ScreenedCandidate(scoped, without - answer.chi2, start_of(asked, answer, (scoped,)))
+        near.append((answer.chi2 - best, screened))
+    near.sort(key=lambda item: item[0])
+    return [(worse, screened) for worse, screened in near if not worse > worst]
 
 
 def _merit(worse: float, rival: Rival, candidate: CandidateEffect, final: ContinuousFit) -> float:

@@ -41,7 +41,7 @@ from discsim.validation.diagnosis.selection.starting_point import HELD
 from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Bars, merit_of
 from discsim.validation.identification.noise import NoiseModel, stated_noise
-from discsim.validation.identification.residual_tests import RESIDUAL_TESTS, unmodelled_residuals
+from discsim.validation.identification.residual_tests import RESIDUAL_TESTS
 
 __all__ = ["joined", "next_effect", "next_two"]
 
@@ -88,8 +88,8 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
             )
         if not distant and not cost and refitted.score > current.score + SELECTION.worse:
             refitted = _begun_again(found, current, screened, beside)
-        refitted = replace(refitted, score=refitted.score + found.cost + cost)
-        found = _considering(found, (current.score, chi2_now), refitted, screened.candidate)
+        refitted = found.with_cost(refitted, cost)
+        found = _considering(found, current.score, refitted, screened.candidate)
         gain, chi2 = found.considered[-1].gain, chi2_in(refitted, noise)
         if gain > price(screened.candidate) and possible(refitted):
             charged = refitted.charged + refitted.prior_penalty
@@ -109,12 +109,11 @@ def next_effect(found: Search, current: ContinuousFit, step: int) -> tuple[Searc
 def next_two(found: Search) -> tuple[Search, ContinuousFit | None]:
     """Return the fit with the best two effects where it comes near the data, else None.
 
-    Far from the data each of two effects alone may be fitted with numbers that serve for both, and a third may do
-    better than either; algebra about the fit that follows the data tells both at once.
+    Far from the data each of two effects alone may be fitted with numbers that serve for both. A third may do better
+    than either. Algebra about the fit that follows the data tells both at once.
     """
     base, noise = found.base, found.relaxed_noise
-    before = base.score, chi2_in(base, noise)
-    ranked = pairs(found.loose_board, found.candidates, found.own)
+    ranked = pairs(found.relaxed_equations, found.candidates, found.own)
     sensible = [pair for pair in ranked if on_the_disc(found, pair.start)]
     chosen = sensible[: SELECTION.pairs_refitted]
     for number, pair in enumerate(chosen):
@@ -129,9 +128,9 @@ def next_two(found: Search) -> tuple[Search, ContinuousFit | None]:
             start,
             bars=Bars(SELECTION.hopeless * SELECTION.far * found.base.fit.count),
         )
-        both = replace(both, score=both.score + found.cost)
+        both = found.with_cost(both)
         for candidate in pair.hypothesis.candidates:
-            found = _considering(found, before, both, candidate)
+            found = _considering(found, base.score, both, candidate)
         worth = base.score - both.score > sum(map(price, pair.hypothesis.candidates))
         if worth and possible(both) and not far(found, both):
             return found, both
@@ -145,7 +144,9 @@ def _offers(found: Search, current: ContinuousFit, step: int) -> tuple[Search, l
     there: list[Offer] = []
     here: list[Offer] = []
     if distant or step == 0:
-        ranked = one_per_effect(screened_candidates(found.loose_board, found.candidates, current.hypothesis, found.own))
+        ranked = one_per_effect(
+            screened_candidates(found.relaxed_equations, found.candidates, current.hypothesis, found.own)
+        )
         # beside the data a refit goes on from the present fit: from the segments it would have to be tied again
         there += [(p, found.relaxed_fit, 0.0) if distant else (from_here(p, current), current.fit, 0.0) for p in ranked]
     if not distant or step > 0:
@@ -194,7 +195,7 @@ def _most_refitted(current: ContinuousFit, near_data: bool, gained: bool) -> int
     loud a small effect is near the data, and many promise more than it.
     """
     if near_data and not gained:
-        near_data = not unmodelled_residuals(current.fit.linears, current.residuals, current.fit.noise)
+        near_data = not current.unmodelled()
     if not near_data:
         return SELECTION.refitted_at_most
     return SELECTION.refitted if gained else 2 * SELECTION.refitted
@@ -238,20 +239,15 @@ def _begun_again(found: Search, current: ContinuousFit, screened: ScreenedCandid
     )
 
 
-def _considering(
-    found: Search, before: tuple[float, float], refitted: ContinuousFit, candidate: CandidateEffect
-) -> Search:
-    """Return a search that knows what a candidate gains upon a fit of score and chi-squared ``before``."""
-    score, chi2_before = before
+def _considering(found: Search, before: float, refitted: ContinuousFit, candidate: CandidateEffect) -> Search:
+    """Return a search that knows what a candidate gains upon a fit whose score was ``before``."""
     values = {
         q.name: float(v)
         for q, v in zip(refitted.fit.parameters, refitted.fit.at, strict=True)
         if q.group == candidate.id and q.recordings == candidate.recordings
     }
-    gained = score - refitted.score, chi2_before - chi2_in(refitted, found.relaxed_noise)
-    return replace(
-        found, considered=(*found.considered, Considered(candidate, *gained, in_parameters(candidate.row, values)))
-    )
+    one = Considered(candidate, before - refitted.score, in_parameters(candidate.row, values))
+    return replace(found, considered=(*found.considered, one))
 
 
 def _with_lost_samples(found: Search, current: ContinuousFit) -> Search:

@@ -41,7 +41,7 @@ def _recounted(found: Search, current: ContinuousFit, sensor: str) -> tuple[Sear
         hypothesis = Hypothesis(tuple(shifted.screened.candidate if c.id == _LOST[sensor] else c for c in candidates))
         start = replace(current.fit, trajectories=shifted.trajectories)
         fitted = continuous_fit(start, hypothesis, found.own, current.fit.noise, values_of_fit(current))
-        fitted = replace(fitted, score=fitted.score + found.cost + dearer)
+        fitted = found.with_cost(fitted, dearer)
         if not fitted.score < current.score:
             break
         trajectories = tuple(

@@ -21,7 +21,6 @@ from discsim.validation.diagnosis.settings import SELECTION
 from discsim.validation.identification.gauss_newton import Bars, Fit
 from discsim.validation.identification.noise import NoiseModel, chi_squared, robust_noise
 from discsim.validation.identification.parameters import Parameter
-from discsim.validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = [
     "Considered",
@@ -31,12 +30,12 @@ __all__ = [
     "far",
     "from_here",
     "hopeless",
-    "lost",
     "misses",
     "no_nearer",
     "on_the_disc",
     "possible",
     "steady_noise",
+    "unreliable",
     "values_of_fit",
     "wobbles",
 ]
@@ -47,11 +46,10 @@ _KICK = (catalogued(SpinStep).id, "t_s")
 
 @dataclass(frozen=True)
 class Considered:
-    """A candidate that was refitted: what it gained when it was, by the likelihood and in chi-squared."""
+    """A candidate that was refitted: what it gained by the likelihood when it was, and its numbers."""
 
     candidate: CandidateEffect
     gain: float
-    chi2_gain: float
     values: Mapping[str, float]
 
 
@@ -72,14 +70,15 @@ class Search:
     ----------
     recordings, own
         The recordings as they are stated, and the parameters that they leave open without any effect.
-    loose, loose_noise, loose_board
-        The relaxed fit, its noise, and what every effect would do to it.
+    relaxed_fit, relaxed_noise, relaxed_equations
+        The relaxed fit, its noise, and the normal equations of all candidates about it.
     candidates
         The effects that compete, at each of their shapes.
     base, final
         The fits of the baseline and of the effects so far.
-    board, asked
-        What every effect would do to a fit, in its own noise, and which fit that is: in the end the final one.
+    equations, asked
+        The normal equations of all candidates about a fit, in its own noise, and which fit that is: in the end the
+        final one.
     steps, considered, rivals
         Fits on the way; candidates that were refitted; what could stand in for a named effect, by its name.
     outliers
@@ -90,8 +89,8 @@ class Search:
         What choosing the samples that were lost has cost, in twice the log likelihood.
     at_once : bool
         Whether the effects were found together, each weighed against the others by the normal equations.
-    slips
-        What the magnetometer's phase told of lost samples.
+    lost_samples
+        What was found of lost samples about the relaxed fit.
     """
 
     recordings: tuple[Recording, ...]
@@ -101,7 +100,7 @@ class Search:
     candidates: tuple[CandidateEffect, ...]
     base: ContinuousFit
     final: ContinuousFit
-    loose_board: NormalEquations
+    relaxed_equations: NormalEquations
     equations: NormalEquations
     asked: Fit
     steps: tuple[ContinuousFit, ...] = ()
@@ -114,7 +113,7 @@ class Search:
     at_once: bool = False
 
     def about(self, fit: Fit) -> Search:
-        """Return the search with its board about a fit, which is worked out once."""
+        """Return the search with its normal equations about a fit, which are worked out once."""
         if self.asked is fit:
             return self
         equations = normal_equations_of(fit, self.candidates, fit.noise, fit.continuous_defects)
@@ -123,6 +122,10 @@ class Search:
     def with_step(self, fitted: ContinuousFit) -> Search:
         """Return the search with one more fit on the way."""
         return replace(self, steps=(*self.steps, fitted))
+
+    def with_cost(self, fitted: ContinuousFit, further: float = 0.0) -> ContinuousFit:
+        """Return a fit whose score holds what choosing lost samples has cost so far, and ``further`` cost."""
+        return replace(fitted, score=fitted.score + self.cost + further)
 
     def at_base(self) -> Search:
         """Return the search as if nothing had been found."""
@@ -147,9 +150,9 @@ def far(found: Search, fitted: ContinuousFit) -> bool:
     return chi2_in(fitted, found.relaxed_noise) > SELECTION.far * fitted.fit.count
 
 
-def lost(found: Search, fitted: ContinuousFit) -> bool:
-    """Tell whether a fit is far from the data and leaves what is no noise: no answer rests on it."""
-    return far(found, fitted) and bool(unmodelled_residuals(fitted.fit.linears, fitted.residuals, fitted.fit.noise))
+def unreliable(found: Search, fitted: ContinuousFit) -> bool:
+    """Tell whether a fit is far from the data and leaves more than noise, so that no answer may rest on it."""
+    return far(found, fitted) and bool(fitted.unmodelled())
 
 
 def no_nearer(found: Search, before: ContinuousFit, after: ContinuousFit) -> bool:
@@ -158,7 +161,7 @@ def no_nearer(found: Search, before: ContinuousFit, after: ContinuousFit) -> boo
 
 
 def misses(found: Search, fitted: ContinuousFit) -> bool:
-    """Tell whether a fit is far from data that the relaxed fit follows: whatever it holds, something is missing."""
+    """Tell whether a fit is far from data that the relaxed fit follows: something is missing in its hypothesis."""
     return far(found, fitted) and found.relaxed_fit.merit < SELECTION.followed * found.relaxed_fit.count
 
 
@@ -169,10 +172,10 @@ def hopeless(best: float, count: int) -> Bars:
 
 
 def on_the_disc(found: Search, start: Start) -> bool:
-    """Tell whether a start has no centre of mass off the disc.
+    """Tell whether a start has its centre of mass on the disc.
 
-    Of recordings in which that hardly shows algebra asks for any number, under which no motion lasts. A sensor's place
-    that nothing shows, as along the axis of a table, does no harm.
+    Where recordings hardly show it, algebra may ask for any number, under which no motion lasts. A sensor's place that
+    nothing shows, as along the axis of a table, does no harm.
     """
     radius = _radius(found.recordings[0])
     return all(abs(number) <= radius for (key, _), number in start.items() if _is_place(key[0], "motion"))
@@ -210,13 +213,16 @@ def possible(fitted: ContinuousFit) -> bool:
 
 
 def from_here(screened: ScreenedCandidate, current: ContinuousFit) -> ScreenedCandidate:
-    """Return a screened candidate whose start keeps what the fit has found for everything else."""
+    """Return a screened candidate that starts from the present fit: only its own values are those of algebra."""
     own = {key: value for key, value in screened.start.items() if key[0][0] == screened.candidate.id}
     return replace(screened, start={**values_of_fit(current), **own})
 
 
 def steady_noise(found: Search) -> NoiseModel:
-    """Return the noise in which events are looked for: without what a short one adds, where most readings are well."""
+    """Return the noise in which events are looked for.
+
+    It is that of most readings, to which a short event adds nothing, unless that is much louder than stated.
+    """
     linears = found.relaxed_fit.linears
     steady = robust_noise(linears, [linear.residual for linear in linears])
     stated = {c.group: float(linear.sd[c.rows][0]) for linear in linears for c in linear.channels}
@@ -227,9 +233,9 @@ def steady_noise(found: Search) -> NoiseModel:
 
 
 def wobbles(fit: Fit) -> Start:
-    """Return how the wobble of free spins dies and turns in a fit whose segments go with it.
+    """Return how the wobble of free spins dies and turns in a fit, as a start for a fit from its segments.
 
-    What algebra expects of it is far from linear where turning for a second makes a radian.
+    What algebra expects of it is no use: turning for a second makes a radian, which is far from linear.
     """
     parameters = zip(fit.parameters, fit.at, strict=True)
     return {(q.key, q.recordings): float(v) for q, v in parameters if q.key in fit.plant.own_keys}

@@ -7,14 +7,11 @@ noise estimated anew (stepwise regression: Efroymson, 1960).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from discsim.effects import Effect
-from discsim.recording import Recording
 from discsim.validation.diagnosis.first_trajectory import time_ratio
 from discsim.validation.diagnosis.selection.all_at_once import all_at_once
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
@@ -30,23 +27,21 @@ from discsim.validation.diagnosis.selection.exchange import (
 from discsim.validation.diagnosis.selection.next_effect import next_effect, next_two
 from discsim.validation.diagnosis.selection.recounting import with_losses_recounted
 from discsim.validation.diagnosis.selection.score_tests import plans_alone
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import (
     Search,
     chi2_in,
     far,
-    lost,
     no_nearer,
     possible,
+    unreliable,
     values_of_fit,
 )
-from discsim.validation.diagnosis.selection.starting_point import Report, screened
+from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.settings import SELECTION, UNKNOWN_LAW
 from discsim.validation.diagnosis.uninflated_noise import uninflated_noise
-from discsim.validation.identification.competing_effects import CATALOGUED, Competing
-from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.noise import stated_noise
-from discsim.validation.identification.parameters import Parameter
-from discsim.validation.identification.residual_tests import loudest, unmodelled_residuals
+from discsim.validation.identification.residual_tests import loudest
 
 __all__ = ["Anew", "past_hope", "search", "settled", "without_swallowed"]
 
@@ -55,46 +50,40 @@ _FEW = 2
 
 
 class Anew(NamedTuple):
-    """How recordings are searched anew in other segments: how many effects are of use, and what was found ``before``.
+    """How recordings are searched anew in other segments: what was found ``before``, how many effects are ``of_use``.
 
-    Who asks takes no stack of more than are of use; None where any number is.
+    The caller takes no stack of more effects than that; None where any number will do.
     """
 
     of_use: int | None = None
     before: Search | None = None
 
 
+_FROM_NOTHING = Anew()
+
+
 # a hypothesis far from the data may send a motion beyond all numbers: such a fit is not finite, and is passed over
 @np.errstate(over="ignore", invalid="ignore")
-def search(
-    recordings: Sequence[Recording],
-    report: Report = lambda stage, done, total: None,
-    as_stated: Sequence[Recording] | None = None,
-    followed: Fit | None = None,
-    free: Sequence[Parameter] = (),
-    hints: Sequence[Effect] = (),
-    effects: Competing = CATALOGUED,
-    anew: Anew | None = None,
-) -> Search:
-    """Find the effects that explain recordings of one plant; what is given is that of `screened`.
+def search(problem: SearchProblem, anew: Anew = _FROM_NOTHING) -> Search:
+    """Find the effects that explain recordings of one plant.
 
-    A search that is asked ``anew`` is given up as it stands where it stands by two more effects than are of use, and
-    begins with those that one before it found, where they are worth their price here, too.
+    A search ``anew`` begins with the effects that one before it found, where they are worth their price here, too. It
+    is given up as it stands once it has come to two effects more than are of use.
     """
-    of_use, before = anew or Anew()
-    found = screened(recordings, report, as_stated, followed, free, hints, effects, before)
-    report("refitting candidates", 3, 4)
+    of_use, before = anew
+    found = screened(problem, before)
+    problem.progress("refitting candidates", 3, 4)
     found = _selected_forward(found if before is None else _taken_over(found, before), of_use)
     found = found if _of_no_use(found, of_use) else settled(found)
-    report("done", 4, 4)
+    problem.progress("done", 4, 4)
     return found
 
 
 def _taken_over(found: Search, before: Search) -> Search:
-    """Return a search with the effects of one in other segments, where each is worth its price here, too.
+    """Return a search that begins with the effects of one in other segments, where each is worth its price here, too.
 
-    It begins from nothing where they are many, which may be a stack that only together stands for something, where
-    other times or samples that were lost go with them, and where they explain less than that.
+    It begins without any where those are many: a stack that only together stands for something. So it does where
+    clocks or lost samples go with them, and where they gain less than their price.
     """
     known = before.final
     retimed = any(time_ratio(known.fit.values(i)) != 1.0 for i in range(len(known.fit.trajectories)))
@@ -176,9 +165,9 @@ def _in_stated_noise(found: Search, current: ContinuousFit, step: int) -> tuple[
 
 
 def past_hope(found: Search, before: ContinuousFit, after: ContinuousFit, further: int) -> bool:
-    """Tell whether so many ``further`` effects could not take away what an effect leaves.
+    """Tell whether so many ``further`` effects are too few to take away what an effect leaves.
 
-    The largest comes first, so each takes about as much as the last at best, in noise that no misfit has inflated.
+    The largest comes first, so that each takes at best about as much as the last, in noise that no misfit has inflated.
     """
     noise = uninflated_noise(found)
     was, left = (chi2_in(fitted, noise) - fitted.fit.count for fitted in (before, after))
@@ -188,13 +177,13 @@ def past_hope(found: Search, before: ContinuousFit, after: ContinuousFit, furthe
 
 
 def without_swallowed(found: Search, fitted: ContinuousFit) -> ContinuousFit | None:
-    """Return a fit in noise that has swallowed no effect; None where what was estimated has swallowed none.
+    """Return a fit in noise that has swallowed no effect; None where its estimated noise has swallowed none.
 
-    A bias is nothing but loud and slow noise: in it no bias is worth its price. Nor is noise that is so loud and leaves
-    more than itself: such a group's is as stated. Where recordings have a course in common it is as the relaxed fit
-    shows it, which follows the data.
+    To a noise model a bias is loud, slow noise, in which no bias is worth its price. The noise of a group that is so
+    loud, or louder than any part's, is taken as stated. Where recordings have a trend in common it is as the relaxed
+    fit shows it, which follows the data.
     """
-    left = unmodelled_residuals(fitted.fit.linears, fitted.residuals, fitted.fit.noise)
+    left = fitted.unmodelled()
     stated = stated_noise(fitted.fit.linears)
     noise = {item.group: found.relaxed_noise[item.group] for item in left if item.kind == "course"}
     noise |= {
@@ -208,7 +197,7 @@ def without_swallowed(found: Search, fitted: ContinuousFit) -> ContinuousFit | N
 
 
 def _most(found: Search, fitted: ContinuousFit, most: int) -> int:
-    """Return how many effects a search for at most so many may come to from a fit: more of them errors of sensors."""
+    """Return how many effects a search may come to: ``most``, and more where they are errors of several sensors."""
     if len(found.recordings) == 1 and plans_alone(found.recordings):
         # two curves in a plane take any two effects, and no other recording could bear them out
         return 1
@@ -230,12 +219,12 @@ def settled(found: Search) -> Search:
     for exchanges in range(SELECTION.exchanges + 1):
         if (wide := widened(found, found.final)) is not found.final:
             found = _with_final(found, wide)
-        if found.relaxed_fit.plant.weakly_identified and not lost(found, found.final):
+        if found.relaxed_fit.plant.weakly_identified and not unreliable(found, found.final):
             # what an effect gained upon a fit that stood beside its optimum, others gain without it
             found = without_superfluous(replace(found, final=eliminated_backward(found, found.final)))
         found = found.about(found.final.fit)
         # where the fit is far from the data nothing is named, and nothing need be told apart
-        found = replace(found, rivals={} if lost(found, found.final) else rivals_of(found))
+        found = replace(found, rivals={} if unreliable(found, found.final) else rivals_of(found))
         better = exchanged(found)
         if better is None or exchanges == SELECTION.exchanges:
             break
@@ -253,15 +242,15 @@ def _nearing(found: Search, before: ContinuousFit, after: ContinuousFit) -> bool
 
 
 def _told(fitted: ContinuousFit | None) -> bool:
-    """Tell whether a fit's last effect was found in the readings themselves and is in its trajectories."""
+    """Tell whether a fit's last effect was found in the readings themselves, so that its trajectories hold it."""
     return fitted is not None and bool(fitted.hypothesis.candidates[-1].fixed_values)
 
 
 def _from_there(found: Search, current: ContinuousFit, better: ContinuousFit) -> ContinuousFit | None:
-    """Return the fit without the last effect from where that with it stands, if then the effect is not worth its price.
+    """Return the fit without the last effect, begun where the fit with it ended, if that makes the effect superfluous.
 
-    None where it is, or where it gains so much that no start could: then its size in its own standard deviations,
-    squared, is of the order of what it gains.
+    None where the effect is still worth its price. Nor is it asked where no better start could explain the gain: where
+    the effect's size in its own standard deviations, squared, is of the order of what it gains.
     """
     candidate = better.hypothesis.candidates[-1]
     if candidate.fixed_values:
@@ -271,6 +260,5 @@ def _from_there(found: Search, current: ContinuousFit, better: ContinuousFit) ->
     if not doubted and better.squared_sizes(candidate) > SELECTION.borne_out * gain:
         return None
     start = values_of_fit(better)
-    again = continuous_fit(better.fit, current.hypothesis, found.own, better.fit.noise, start)
-    again = replace(again, score=again.score + found.cost)
+    again = found.with_cost(continuous_fit(better.fit, current.hypothesis, found.own, better.fit.noise, start))
     return again if again.score - better.score < price(candidate) else None

@@ -14,7 +14,7 @@ import numpy as np
 
 from discsim.recording import Recording
 from discsim.validation.diagnosis.first_trajectory import beginning, first_trajectory
-from discsim.validation.diagnosis.relaxed_fit import ordinary, unknowns
+from discsim.validation.diagnosis.relaxed_fit.parameters import ordinary, unknowns
 from discsim.validation.identification.gauss_newton import Fit, linearised, refit
 from discsim.validation.identification.noise import stated_noise
 from discsim.validation.identification.stated_parameters import stated_parameters

@@ -387,7 +387,7 @@ def _release_state(table: TomlTable, release: Release) -> FloatArray:
 FLIGHT = Plant(
     name="flight",
     motion="flight",
-    layout=Layout(13, 12, _POSITION, _VELOCITY, _ATTITUDE, _RATE, _SPIN, per_time=(_SPIN,)),
+    layout=Layout(13, _POSITION, _VELOCITY, _ATTITUDE, _RATE, _SPIN, per_time=(_SPIN,)),
     dynamics=Dynamics(propagated_by(flight_segments), _longest_step),
     initial=Initial(_states, _other_attitudes, _other_states),
     sizes=Sizes(  # m, m/s, rad, rad/s

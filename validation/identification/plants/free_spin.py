@@ -48,7 +48,7 @@ from discsim.validation.identification.readings import Readings
 __all__ = ["FREE_SPIN"]
 
 _NAME = "free_spin"
-#: where the numbers of a state stand
+#: where the numbers of a state stand; the last two are a moment fixed in the body, which only one out of balance has
 _DECAY, _ATTITUDE, _RATE, _SPIN = 4, slice(6, 10), slice(10, 13), 12
 _SIZE = 18
 
@@ -250,7 +250,7 @@ _SLOWED = 0.2
 _BALANCED = Plant(
     name=_NAME,
     motion="free spin",
-    layout=Layout(_SIZE, _SIZE - 3, attitude=_ATTITUDE, rate=_RATE, spin=_SPIN, per_time=(_DECAY, _SPIN)),
+    layout=Layout(_SIZE, attitude=_ATTITUDE, rate=_RATE, spin=_SPIN, per_time=(_DECAY, _SPIN), still=2),
     dynamics=Dynamics(propagated_by(free_spin_segments, lambda given, own: own), _longest_step),
     initial=Initial(_states, _other_attitudes),
     sizes=Sizes(
@@ -304,7 +304,7 @@ FREE_SPIN = replace(
     _BALANCED,
     unbalanced=replace(
         _BALANCED,
-        layout=replace(_BALANCED.layout, directions=_SIZE - 1),
+        layout=replace(_BALANCED.layout, still=0),
         sizes=replace(
             _BALANCED.sizes,
             differences=_and_in_body(_DIFFERENCES, 1e-2),

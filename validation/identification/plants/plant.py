@@ -47,16 +47,15 @@ __all__ = [
 class Layout:
     """Where the numbers of a state stand that others ask for by name; None for what a state does not hold.
 
-    A state has ``size`` numbers and moves in ``directions``: the four numbers of an attitude (quaternion from B to N)
-    by small turns in B, each other number by itself. Without an attitude the columns of ``moves`` (s, d) say which
-    numbers a direction moves; where it is not given each moves its own, and numbers behind the last direction follow
-    from the others, or stay, and do not move. ``position`` and ``velocity`` are in N, m and m/s, ``rate`` in B, rad/s;
-    ``spin`` is the rate about the spin axis, ``yaw`` a rig's angle about its own, rad. ``per_time`` are the numbers
-    that come out smaller by a ratio where all times are written larger by it.
+    A state has ``size`` numbers. The four of an attitude (quaternion from B to N) move by small turns in B, in three
+    directions; each other number moves by itself. The last ``still`` numbers do not move: they follow from the others,
+    or stay. Of a state without an attitude the columns of ``moves`` (s, d) may say which numbers a direction moves.
+    ``position`` and ``velocity`` are in N, m and m/s, ``rate`` in B, rad/s; ``spin`` is the rate about the spin axis,
+    ``yaw`` a rig's angle about its own, rad. ``per_time`` are the numbers that come out smaller by a ratio where all
+    times are written larger by it.
     """
 
     size: int
-    directions: int
     position: slice | None = None
     velocity: slice | None = None
     attitude: slice | None = None
@@ -64,14 +63,22 @@ class Layout:
     spin: int | None = None
     yaw: int | None = None
     per_time: tuple[int, ...] = ()
+    still: int = 0
     moves: tuple[tuple[float, ...], ...] | None = None
 
     def __post_init__(self) -> None:
-        if self.attitude is not None and not self.attitude.stop - 1 <= self.directions <= self.size - 1:
+        if self.attitude is not None and self.still > self.size - self.attitude.stop:
             raise ValueError(
-                f"a state of {self.size} numbers, an attitude among them, moves in {self.directions} directions; "
-                f"expected {self.attitude.stop - 1} to {self.size - 1}"
+                f"the last {self.still} of a state's {self.size} numbers do not move, some of its attitude among them; "
+                f"expected at most {self.size - self.attitude.stop}"
             )
+
+    @property
+    def directions(self) -> int:
+        """Number of directions in which a state moves, d."""
+        if self.moves is not None:
+            return len(self.moves[0])
+        return self.size - self.still - (self.attitude is not None)
 
     def moved(self, states: FloatArray, tangents: FloatArray) -> FloatArray:
         """Return states (..., s) moved by tangents (..., d)."""
@@ -100,7 +107,7 @@ class Layout:
         return np.concatenate([before, turned, after], axis=-1)
 
     def directions_of(self, places: slice | int) -> tuple[int, ...]:
-        """Return the directions in which the numbers at some places of a state alone move, or those of its attitude."""
+        """Return the directions that move the numbers at some places of a state, or its attitude, and no others."""
         numbers = range(places, places + 1) if isinstance(places, int) else range(places.start, places.stop)
         if self.moves is not None:
             columns = zip(*self.moves, strict=True)

@@ -229,7 +229,7 @@ def _knots(table: TomlTable) -> tuple[FloatArray, FloatArray]:
 RATE_TABLE = Plant(
     name="rate_table",
     motion="run of the table",
-    layout=Layout(2, 2, yaw=_YAW, moves=_MOVES),
+    layout=Layout(2, yaw=_YAW, moves=_MOVES),
     dynamics=Dynamics(
         propagated_by(table_segments, lambda given, own: given.knots), _longest_step, _corners, _consistent
     ),

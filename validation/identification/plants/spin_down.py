@@ -169,7 +169,7 @@ def _read(table: TomlTable) -> Plan:
 SPIN_DOWN = Plant(
     name="spin_down",
     motion="run",
-    layout=Layout(2, 2, spin=_SPIN, yaw=_YAW),
+    layout=Layout(2, spin=_SPIN, yaw=_YAW),
     dynamics=Dynamics(propagated_by(spin_down_segments), _longest_step),
     initial=Initial(_states),
     sizes=Sizes(  # rad, rad/s

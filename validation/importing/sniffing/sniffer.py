@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -109,10 +108,10 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
     place = own_place(tables)
     place = place and place.on(moment_of(clock, files[0].numbers))
     notes = [*exchanges, *notes, *said, *(note for _, note in others), *own.notes, *([place.note] if place else [])]
-    propose = partial(_proposal, raw, plant, layout, clock, own, found, notes)
-    proposal = propose({})
+    sniffed = _Sniffed(raw, plant, layout, own, found, notes)
+    proposal = _proposal(sniffed, clock, {})
     if offsets := _offsets(proposal, own, found):
-        proposal = propose(offsets)
+        proposal = _proposal(sniffed, clock, offsets)
     proposal = replace(proposal, fixes=fixed, place=place)
     named = [*(triple for triple, _ in found.values()), *(triple for triple, _ in others)]
     return _with_unused(proposal, tables, named, own)
@@ -375,16 +374,21 @@ def _fitted(clock: Clock, fit: Fit | None, unit: Unit) -> tuple[Clock, float]:
 # -------------------------------------------------------------------------------------------------- proposal
 
 
-def _proposal(
-    raw: Path,
-    plant: Plant,
-    layout: Layout,
-    clock: Clock,
-    own: OwnClocks,
-    found: dict[str, tuple[Triple, Decision]],
-    notes: list[str],
-    offsets: Mapping[str, tuple[float, Decision]],
-) -> Proposal:
+@dataclass(frozen=True)
+class _Sniffed:
+    """What a raw log holds, before its times, units and axes are decided: its sensors, and clocks of their own."""
+
+    raw: Path
+    plant: Plant
+    layout: Layout
+    own: OwnClocks
+    found: dict[str, tuple[Triple, Decision]]
+    notes: list[str]
+
+
+def _proposal(sniffed: _Sniffed, clock: Clock, offsets: Mapping[str, tuple[float, Decision]]) -> Proposal:
+    """Return the map of a log by a clock, its sensors' times moved by ``offsets``, s."""
+    own, found = sniffed.own, sniffed.found
     times = _times(clock, own, found)
     times |= {sensor: times[sensor] + offset for sensor, (offset, _) in offsets.items()}
     fit = _turned(found, times)
@@ -416,8 +420,8 @@ def _proposal(
         triples = {sensor: triple for sensor, (triple, _) in found.items()}
         ticks = ticking(clock, units["gyroscope"], turns, pull, triples, times)
         if ticks is not None:
-            return _proposal(raw, plant, layout, ticks, own, found, notes, offsets)
-    notes = [*_on_time(clock, found, times, units, turns, pull), *notes]
+            return _proposal(sniffed, ticks, offsets)
+    notes = [*_on_time(clock, found, times, units, turns, pull), *sniffed.notes]
     if clock.column is None and "gyroscope" in units:
         clock, slower = _fitted(clock, fit, units["gyroscope"])
         times = {sensor: slower * time for sensor, time in times.items()}
@@ -425,16 +429,22 @@ def _proposal(
     readings = {sensor: _in_si(sensor, triple, times[sensor], units[sensor]) for sensor, (triple, _) in found.items()}
     axes = body_axes(readings)
     # a table may be told to turn at just such a rate
-    limits = {"gyroscope": full_scale(readings["gyroscope"])} if "gyroscope" in found and plant != "rate_table" else {}
+    limits = (
+        {"gyroscope": full_scale(readings["gyroscope"])}
+        if "gyroscope" in found and sniffed.plant != "rate_table"
+        else {}
+    )
     sensors = [
         ProposedSensor(s, triple, decision, units[s], axes.matrix[s], own.clocks.get(s), limits.get(s))
         for s, (triple, decision) in found.items()
     ]
     sensors = [replace(one, time_offset=offsets[one.sensor][0]) if one.sensor in offsets else one for one in sensors]
-    name = re.sub(r"[^\w.-]+", "-", raw.resolve().stem).strip("-") or "log"
+    name = re.sub(r"[^\w.-]+", "-", sniffed.raw.resolve().stem).strip("-") or "log"
     decided = (*own.decisions, *(told for _, told in offsets.values()), *axes.decisions)
     decisions = decided if found else ()  # positions alone have no axes of a board
-    return Proposal(name, raw, plant, layout, clock, tuple(sensors), decisions, (*axes.notes, *notes))
+    return Proposal(
+        name, sniffed.raw, sniffed.plant, sniffed.layout, clock, tuple(sensors), decisions, (*axes.notes, *notes)
+    )
 
 
 def _offsets(

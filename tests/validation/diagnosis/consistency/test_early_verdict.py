@@ -18,7 +18,7 @@ from discsim.validation.challenge.cases.draw import draw_case
 from discsim.validation.diagnosis.consistency.early_verdict import contradiction_in
 from discsim.validation.diagnosis.consistency.followed import left_of, left_when_shifted, true_noise
 from discsim.validation.diagnosis.contradicted import contradicted_outcome
-from discsim.validation.diagnosis.relaxed_fit import part_of, relaxed
+from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.settings import CONSISTENCY
 from discsim.validation.identification.observations import readings_of
 
@@ -91,7 +91,7 @@ def test_noise_is_seen_below_a_signal_that_turns_where_none_is_stated(sound):
 def test_a_part_of_a_fit_leaves_what_the_whole_left_of_it(sound):
     fit = relaxed(sound)
     noise = true_noise(readings_of(sound[0]))
-    assert left_of(part_of(fit, [1]), noise)[0] == left_of(fit, noise)[1]
+    assert left_of(fit.part([1]), noise)[0] == left_of(fit, noise)[1]
 
 
 @pytest.mark.parametrize("sensor", ["magnetometer", "accelerometer"])

@@ -15,15 +15,17 @@ from discsim.rig import spin_down
 from discsim.validation.diagnosis.assemble import outcome_of
 from discsim.validation.diagnosis.design.next_recording import ENOUGH, advise, confusions, expected_evidence, in_words
 from discsim.validation.diagnosis.design.plans import plans_about, read_plans
+from discsim.validation.diagnosis.progress import silent
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.result import Advice, Diagnosis, Separation
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, candidates_for
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Rival, Search, values_of_fit
 from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.diagnosis.setup import SetupFindings
-from discsim.validation.diagnosis.stages import Prepared, Question, Tried, silent
+from discsim.validation.diagnosis.stages import Prepared, Question, Tried
 from discsim.validation.diagnosis.verdict import judged
 from discsim.validation.identification.plants import PLANTS
 from discsim.validation.identification.plants.plan import Plan
@@ -35,7 +37,7 @@ STRETCHED = effect("accel.scale", sx=0.02, sy=0.02, sz=0.0)
 @cache
 def stretched() -> Search:
     """Two run-downs with an accelerometer that reads 2 % too much: as if it sat 2 % further out."""
-    return search(coasts((), [STRETCHED]))
+    return search(SearchProblem(coasts((), [STRETCHED])))
 
 
 def answer_of(found: Search) -> Diagnosis:
@@ -129,7 +131,7 @@ def test_the_answer_says_what_to_record_next():
 
 
 def test_where_nothing_is_confused_the_answer_says_so():
-    found = search(coasts([effect("rig.coulomb_friction", torque_N_m=1e-4)]))
+    found = search(SearchProblem(coasts([effect("rig.coulomb_friction", torque_N_m=1e-4)])))
     assert advise(found, ["01", "02"]) == {}
     (sentence,) = answer_of(found).next_recordings
     assert sentence.startswith("Nothing more is needed")
@@ -155,7 +157,7 @@ def test_what_happened_once_has_no_next_recording():
 )
 def test_every_built_in_recording_can_be_simulated(make, hidden, rival):  # type: ignore[no-untyped-def]
     recordings = make([hidden])
-    found = search(recordings)
+    found = search(SearchProblem(recordings))
     (candidate,) = found.final.hypothesis.candidates
     other = next(item for item in found.candidates if item.id == rival)
     fitted = continuous_fit(
@@ -172,7 +174,7 @@ def test_every_built_in_recording_can_be_simulated(make, hidden, rival):  # type
 
 
 def test_a_throw_that_starts_on_the_ground_has_no_evidence():
-    found = search(throws([effect("air.wind", w_north_m_s=1.0, w_east_m_s=-0.5)]))
+    found = search(SearchProblem(throws([effect("air.wind", w_north_m_s=1.0, w_east_m_s=-0.5)])))
     state = found.final.fit.trajectories[0].states[0].copy()
     state[2] = 0.1
     rival = Rival(found.final.hypothesis.candidates[0], 0.0, found.final)

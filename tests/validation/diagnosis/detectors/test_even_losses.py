@@ -20,6 +20,7 @@ from discsim.validation.diagnosis.pipeline import diagnose
 from discsim.validation.diagnosis.selection.candidates import free_candidate
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import values_of_fit
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.identification.gauss_newton import Fit
@@ -94,7 +95,7 @@ def test_a_clock_that_differs_between_recordings_is_told_as_lost_samples(ratios,
     for k, ratio in enumerate(ratios):
         motion = spin_down(RIG, FIELD, 60.0 - 10.0 * k, 10.0, yaw=0.5 + k)
         runs.append(made.coasting(motion, RIG, k, [effect("accel.clock_rate", ratio=ratio)]))
-    found = screened(runs)
+    found = screened(SearchProblem(runs))
     clock = next(c for c in found.candidates if c.id == "accel.clock_rate" and c.recordings is None)
     fitted = continuous_fit(
         found.base.fit, Hypothesis((clock,)), found.own, found.base.fit.noise, values_of_fit(found.base)

@@ -16,7 +16,8 @@ from discsim.environment import Environment
 from discsim.recording import Plant, Recording
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
-from discsim.validation.diagnosis.relaxed_fit import relaxed, unknowns
+from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
 from discsim.validation.diagnosis.selection.begun_anew import begun_anew
 from discsim.validation.identification.gauss_newton import Fit, refit
 from discsim.validation.identification.parameters import Parameter

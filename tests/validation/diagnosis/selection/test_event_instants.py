@@ -14,13 +14,14 @@ from discsim.sensors import record
 from discsim.validation.diagnosis.localisation import located_effect
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.event_instants import with_best_instant, with_instants_weighed
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import chi2_in, values_of_fit
 from discsim.validation.diagnosis.selection.stepwise import search
 
 
 def test_a_kick_a_turn_beside_its_instant_is_moved_there_and_one_at_its_instant_stays():
     hidden = effect("event.impulse", t_s=0.81, dv_north_m_s=-0.5, dv_east_m_s=-0.6, dv_down_m_s=0.1)
-    found = search(throws([hidden], only=1))
+    found = search(SearchProblem(throws([hidden], only=1)))
     final = found.final
     assert [candidate.id for candidate in final.hypothesis.candidates] == ["event.impulse"]
     key = (("event.impulse", "t_s"), frozenset({1}))
@@ -47,7 +48,7 @@ def test_a_small_step_of_the_spin_in_the_wrong_dip_is_moved_and_has_the_error_of
             ("still", 20.0, [], np.random.default_rng(1)),
         )
     ]
-    found = search(recordings)
+    found = search(SearchProblem(recordings))
     final = found.final
     assert [candidate.id for candidate in final.hypothesis.candidates] == ["event.spin_step"]
     key, when = (("event.spin_step", "t_s"), frozenset({0})), [q.name for q in final.fit.parameters].index("t_s")

@@ -11,7 +11,8 @@ from support.made import throws
 
 from discsim.effects import Effect, effect
 from discsim.validation.diagnosis.design.next_recording import confusions
-from discsim.validation.diagnosis.relaxed_fit import relaxed, unknowns
+from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
 from discsim.validation.diagnosis.selection import next_effect as searching
 from discsim.validation.diagnosis.selection.candidates import CandidateEffect, candidates_for
 from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit, continuous_fit
@@ -20,6 +21,7 @@ from discsim.validation.diagnosis.selection.hypothesis import Hypothesis, fitted
 from discsim.validation.diagnosis.selection.offers import in_turn
 from discsim.validation.diagnosis.selection.score_tests import Pair, ScreenedCandidate, pairs
 from discsim.validation.diagnosis.selection.screening import normal_equations_of
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Rival, Search, possible
 from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.identification.noise import estimate_noise
@@ -43,7 +45,9 @@ def ranked() -> list[Pair]:
 
 def named(hidden: list[Effect], errors: list[Effect]) -> list[str]:
     """Return what a search names in throws."""
-    return sorted(candidate.id for candidate in search(throws(hidden, errors)).final.hypothesis.candidates)
+    return sorted(
+        candidate.id for candidate in search(SearchProblem(throws(hidden, errors))).final.hypothesis.candidates
+    )
 
 
 def test_the_first_pair_is_the_right_one_and_starts_near_its_numbers():
@@ -91,7 +95,7 @@ def test_two_at_once_are_not_asked_for_near_the_data(monkeypatch):
 @cache
 def windy() -> Search:
     """Return what is found in throws through a wind that is the same at every height."""
-    return search(throws([effect("air.wind", w_north_m_s=-1.4, w_east_m_s=-1.0)], seconds=2.0))
+    return search(SearchProblem(throws([effect("air.wind", w_north_m_s=-1.4, w_east_m_s=-1.0)], seconds=2.0)))
 
 
 def of(id: str) -> CandidateEffect:

@@ -269,7 +269,7 @@ def scope(monkeypatch: pytest.MonkeyPatch, everywhere: float) -> frozenset[int] 
         exchange, "continuous_fit", lambda fit, hypothesis, *_, bars: ContinuousFit(hypothesis, fit, everywhere)
     )
     monkeypatch.setattr(exchange, "possible", lambda _: True)
-    monkeypatch.setattr(exchange, "lost", lambda *_: False)
+    monkeypatch.setattr(exchange, "unreliable", lambda *_: False)
     base, final = ContinuousFit(Hypothesis(), fit, 1e6), ContinuousFit(Hypothesis((stall,)), fit, 40.0)
     found = finding.Search(tuple(recordings), (), fit, fit.noise, (), base, final, *UNASKED)
     (candidate,) = exchange.widened(found, final).hypothesis.candidates

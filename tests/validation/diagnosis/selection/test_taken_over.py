@@ -15,6 +15,7 @@ from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.selection.candidates import free_candidate
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.diagnosis.selection.starting_point import screened
 from discsim.validation.diagnosis.selection.stepwise import Anew, search
@@ -32,7 +33,7 @@ def spins(*errors) -> tuple[Recording, ...]:
 
 @cache
 def found() -> Search:
-    return search(spins(BIAS))
+    return search(SearchProblem(spins(BIAS)))
 
 
 def in_halves(recordings: tuple[Recording, ...]) -> Fit:
@@ -46,7 +47,7 @@ def ids(one: Search) -> list[str]:
 
 
 def test_what_was_found_is_taken_over_without_asking_for_it_again():
-    again = search(spins(BIAS), followed=in_halves(spins(BIAS)), anew=Anew(before=found()))
+    again = search(SearchProblem(spins(BIAS), followed=in_halves(spins(BIAS))), anew=Anew(before=found()))
     assert ids(found()) == ids(again) == ["gyro.bias"]
     assert "gyro.bias" not in {one.candidate.id for one in again.considered}
     bias = dict(zip([q.key for q in again.final.fit.parameters], again.final.fit.at, strict=True))
@@ -54,13 +55,13 @@ def test_what_was_found_is_taken_over_without_asking_for_it_again():
 
 
 def test_a_baseline_that_is_hopeless_beside_what_was_found_is_that_of_the_search_before():
-    again = screened(spins(BIAS), followed=in_halves(spins(BIAS)), before=found())
+    again = screened(SearchProblem(spins(BIAS), followed=in_halves(spins(BIAS))), before=found())
     assert again.base is found().base
 
 
 def test_an_effect_that_is_worth_nothing_is_not_taken_over():
-    begun = screened(spins())
+    begun = screened(SearchProblem(spins()))
     useless = Hypothesis((free_candidate("accel.bias"),))
     final = continuous_fit(begun.base.fit, useless, begun.own, begun.relaxed_noise, values_of_fit(begun.base))
-    again = search(spins(), followed=in_halves(spins()), anew=Anew(before=replace(begun, final=final)))
+    again = search(SearchProblem(spins(), followed=in_halves(spins())), anew=Anew(before=replace(begun, final=final)))
     assert ids(again) == []

@@ -14,6 +14,7 @@ from discsim.sensors import Instruments, record
 from discsim.validation.diagnosis.selection.candidates import free_candidate
 from discsim.validation.diagnosis.selection.evidence import charge
 from discsim.validation.diagnosis.selection.exchange import takes_its_place
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search
 from discsim.validation.diagnosis.selection.stepwise import search
 
@@ -48,7 +49,7 @@ def coasts_with_gyroscope(*errors: Effect) -> list[Recording]:
 @cache
 def coasted() -> Search:
     """Return what is found where a gyroscope reads 0.3 % too little."""
-    return search(coasts_with_gyroscope(effect("gyro.scale", sz=-0.003)))
+    return search(SearchProblem(coasts_with_gyroscope(effect("gyro.scale", sz=-0.003))))
 
 
 def test_what_decays_in_proportion_to_itself_is_read_at_a_wrong_scale_rather_than_late():
@@ -70,7 +71,7 @@ def test_what_decays_in_proportion_to_itself_is_named_late_where_a_part_can_be_s
     A lag leaves out the first readings of its sensor. Their chance alone had made it 23 worse than a scale; what they
     say of a motion is worth a parameter or two.
     """
-    found = search(coasts_with_gyroscope(error))
+    found = search(SearchProblem(coasts_with_gyroscope(error)))
     (named,) = found.final.hypothesis.candidates
     assert named.id == error.id
     alike = {rival.candidate.id: rival.worse for rival in found.rivals[named.name]}

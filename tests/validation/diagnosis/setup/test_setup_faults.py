@@ -17,6 +17,7 @@ from discsim.shipped import load_disc, load_site
 from discsim.trajectory import predict
 from discsim.validation.checking.checked import check
 from discsim.validation.diagnosis.selection.candidates import available, candidates_for, parameters_of
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.stepwise import search
 from discsim.validation.diagnosis.setup import SetupFault, SetupFindings, find_setup_faults, suspected_fault
 from discsim.validation.diagnosis.setup.find import may_be_physics
@@ -65,7 +66,7 @@ def test_what_needs_a_sensor_that_is_not_there_is_not_tried():
     ids=lambda item: item.id if isinstance(item, Effect) else "",
 )
 def test_a_small_fault_on_a_rate_table_is_named_alone_with_its_size(fault: Effect, sd: dict[str, float]):
-    final = search(tables(errors=[fault])).final
+    final = search(SearchProblem(tables(errors=[fault]))).final
     assert [candidate.id for candidate in final.hypothesis.candidates] == [fault.id]
     errors = np.sqrt(np.diag(final.fit.covariance))
     found = {q.name: (v, e) for q, v, e in zip(final.fit.parameters, final.fit.at, errors, strict=True)}
@@ -81,7 +82,7 @@ def test_an_offset_of_time_beside_a_place_is_not_told_as_a_turned_board_and_a_sc
         effect("accel.time_offset", offset_s=-0.018),
         effect("accel.position_offset", dx_m=4e-5, dy_m=-3.6e-4),
     ]
-    final = search(tables(errors=errors)).final
+    final = search(SearchProblem(tables(errors=errors))).final
     assert {candidate.id for candidate in final.hypothesis.candidates} == {error.id for error in errors}
     found = {q.name: v for q, v in zip(final.fit.parameters, final.fit.at, strict=True)}
     assert found["offset_s"] == pytest.approx(-0.018, abs=5e-4)
@@ -91,7 +92,7 @@ def test_an_offset_of_time_beside_a_place_is_not_told_as_a_turned_board_and_a_sc
 def test_an_axis_that_the_fit_finds_scaled_by_minus_one_is_a_reversed_column():
     fault = effect("gyro.axes", axes="x y -z")
     written = tuple(as_written(one, [fault]) for one in tables())
-    fit = search(written).final.fit
+    fit = search(SearchProblem(written)).final.fit
     findings = with_reversed_axes(SetupFindings((), written), fit)
     assert findings is not None
     assert findings.effects == (fault,)
@@ -102,7 +103,7 @@ def test_an_axis_that_the_fit_finds_scaled_by_minus_one_is_a_reversed_column():
 
 def test_a_small_scale_is_no_reversed_column():
     made = tuple(tables(errors=[effect("gyro.scale", sx=0.0, sy=0.0, sz=0.03)]))
-    assert with_reversed_axes(SetupFindings((), made), search(made).final.fit) is None
+    assert with_reversed_axes(SetupFindings((), made), search(SearchProblem(made)).final.fit) is None
 
 
 def test_a_throw_whose_gyroscope_clips_all_through_leaves_the_others_to_be_looked_at():
@@ -125,7 +126,7 @@ def test_a_fault_that_the_fit_brings_back_to_nothing_is_none(there):
     written = tuple(tables(errors=[fault] if there else []))
     meant = tuple(corrected(one, [fault]) for one in written)
     findings = SetupFindings((SetupFault(fault, 100.0, None),), meant)
-    fit = search(meant, free=free_parameters(findings)).final.fit
+    fit = search(SearchProblem(meant, free=free_parameters(findings))).final.fit
     left = with_those_borne_out(findings, written, fit)
     if there:
         assert left is None

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from discsim.validation.diagnosis.relaxed_fit import left_across, unbalanced
+from discsim.validation.diagnosis.relaxed_fit.out_of_balance import unbalanced
+from discsim.validation.diagnosis.relaxed_fit.sensor_residuals import left_across
 from discsim.validation.diagnosis.selection.continuous_fit import continuous_fit
 from discsim.validation.diagnosis.selection.search_state import Search, values_of_fit
 from discsim.validation.diagnosis.settings import RELAXED_FIT
 
-__all__ = ["out_of_balance"]
+__all__ = ["refitted_out_of_balance"]
 
 
-def out_of_balance(found: Search) -> Search:
-    """Return what was found of free spins whose rows were counted, as of bodies out of balance where a gyroscope asks.
+def refitted_out_of_balance(found: Search) -> Search:
+    """Return a search of free spins whose rows were counted, its effects refitted as of bodies out of balance.
 
-    Errors of its parts are fitted at once there, those that lean its rates among them, and instants are known to well
-    below a millisecond: what its x and y still keep is what turns the body.
+    It is returned as it is where that brings x and y of the gyroscope not much nearer. Here all errors of the sensors
+    were fitted at once, also those that make its rates lean. Instants are known to well below a millisecond. So what is
+    left of its x and y is what turns the body.
     """
     fit = found.final.fit
     if fit.plant.unbalanced is None or not found.final.hypothesis.candidates:
