@@ -1,0 +1,46 @@
+"""Where a search begins: a relaxed fit at a wrong minimum is begun again from the baseline."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from support.made import throws
+
+from discsim.frames import multiply, turn
+from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
+from discsim.validation.diagnosis.selection.starting_point import screened
+from discsim.validation.identification.gauss_newton import Fit, linearised, merit_of
+from discsim.validation.identification.segments import Trajectory
+
+
+def astray(fit: Fit) -> Fit:
+    """Return a relaxed fit whose segments after the first stand half a radian about z from where they are."""
+
+    def turned(one: Trajectory) -> Trajectory:
+        states, attitude = one.states.copy(), one.plant.layout.attitude
+        about_z = np.broadcast_to(turn(np.array([0.0, 0.0, 0.5])), (len(states) - 1, 4))
+        states[1:, attitude] = multiply(states[1:, attitude], about_z)
+        return replace(one, states=states)
+
+    there = replace(fit, trajectories=tuple(turned(one) for one in fit.trajectories))
+    there = replace(there, linears=linearised(there))
+    return replace(there, merit=merit_of(there, there.linears))
+
+
+def test_a_relaxed_fit_that_leaves_more_than_the_baseline_is_begun_again_from_there():
+    recordings = throws([], [])
+    right = relaxed(recordings)
+    wrong = astray(right)
+    assert wrong.merit > 3.0 * right.merit
+    found = screened(SearchProblem(recordings, followed=wrong))
+    assert merit_of(right, found.relaxed_fit.linears) < 1.02 * right.merit
+
+
+def test_a_relaxed_fit_at_its_best_stays():
+    recordings = throws([], [])
+    right = relaxed(recordings)
+    found = screened(SearchProblem(recordings, followed=right))
+    for mine, given in zip(found.relaxed_fit.trajectories, right.trajectories, strict=True):
+        np.testing.assert_array_equal(mine.states, given.states)
