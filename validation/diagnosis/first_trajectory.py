@@ -70,16 +70,13 @@ def begun_again(current: Trajectory, ratio: float = 1.0) -> Trajectory:
     Whether its body is out of balance is kept, and nothing else that was found meanwhile: neither which effects
     compete, nor which readings were left out or lost.
     """
-    return _of_the_same_body(first_trajectory(current.recording, ratio), current)
+    return replace(first_trajectory(current.recording, ratio), unbalanced=current.unbalanced)
 
 
 def begun_again_in_true_time(current: Trajectory, ratio: float) -> Trajectory:
-    """Return the `trajectory_in_true_time` of a recording that is followed already, kept is as in `begun_again`."""
-    return _of_the_same_body(trajectory_in_true_time(current.recording, ratio), current)
-
-
-def _of_the_same_body(first: Trajectory, current: Trajectory) -> Trajectory:
-    return replace(first, unbalanced=current.unbalanced)
+    """Return a trajectory with the segments and states of `trajectory_in_true_time`; all else of it stays."""
+    timed = trajectory_in_true_time(current.recording, ratio)
+    return replace(current, nodes=timed.nodes, states=timed.states)
 
 
 def beginning(current: Trajectory, length: float) -> Trajectory:

@@ -16,9 +16,11 @@ from discsim.environment import Environment
 from discsim.recording import Plant, Recording
 from discsim.sensors import Instruments, record
 from discsim.shipped import load_disc
+from discsim.validation.diagnosis.first_trajectory import begun_again_in_true_time, first_trajectory
 from discsim.validation.diagnosis.relaxed_fit import relaxed
 from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
 from discsim.validation.diagnosis.selection.begun_anew import begun_anew
+from discsim.validation.identification.competing_effects import Competing
 from discsim.validation.identification.gauss_newton import Fit, refit
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.plants.free_spin import FREE_SPIN
@@ -107,4 +109,18 @@ def test_a_flight_begun_in_the_time_of_a_wrong_clock_is_brought_to_its_data():
     begun = (first.trajectories[0], astray, first.trajectories[2])
     stuck = refit(replace(fit, trajectories=(fit.trajectories[0], astray, fit.trajectories[2])), iterations=1)
     assert stuck.merit > 10.0 * fit.merit
-    assert begun_anew(stuck, begun).merit < 1.01 * fit.merit
+    found = begun_anew(stuck, begun)
+    assert found.merit < 1.01 * fit.merit
+
+
+def test_a_flight_that_is_begun_in_true_time_keeps_what_was_found_of_its_readings():
+    """Those that were left out, which effects compete, and samples that were lost."""
+    one = flights(0.98)[0].trajectories[0]
+    kept = tuple(readings for readings in one.readings if readings.sensor != "gyroscope")
+    competing = Competing()
+    known = replace(one, readings=kept, effects=competing, lost={"accelerometer": np.ones(3)})
+    again = begun_again_in_true_time(known, 0.98)
+    assert again.readings is known.readings
+    assert again.effects is competing
+    assert again.lost is known.lost
+    assert_array_equal(again.nodes, first_trajectory(one.recording).nodes / 0.98)
