@@ -337,7 +337,9 @@ def test_a_search_that_comes_to_more_effects_than_are_of_use_is_given_up_as_it_s
         effect("mag.hard_iron", bx_uT=2.0, by_uT=-1.0, bz_uT=0.0),
     ]
     recordings = coasts((), errors)
-    whole, given_up, of_use = (stepwise.search(recordings, anew=stepwise.Anew(most)) for most in (None, 0, 1))
+    whole, given_up, of_use = (
+        stepwise.search(SearchProblem(recordings), anew=stepwise.Anew(most)) for most in (None, 0, 1)
+    )
     assert [len(found.final.hypothesis.candidates) for found in (whole, given_up, of_use)] == [2, 2, 2]
     assert whole.rivals
     assert of_use.rivals.keys() == whole.rivals.keys()
