@@ -21,6 +21,7 @@ from discsim.validation.diagnosis.selection.continuous_fit import ContinuousFit
 from discsim.validation.diagnosis.selection.evidence import price
 from discsim.validation.diagnosis.selection.hypothesis import Hypothesis
 from discsim.validation.diagnosis.selection.score_tests import ScreenedCandidate, hinted
+from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import on_the_disc
 from discsim.validation.identification.gauss_newton import Bars, Fit, linearised, merit_of
 from discsim.validation.identification.noise import stated_noise
