@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice, product
 from math import asin, atan2, cos, degrees, radians, sin
+from typing import Any
 
 import numpy as np
 
@@ -59,7 +60,7 @@ _STEP, _NUTATION = 0.01, 1.2
 #: and where an uneven body makes the motion follow the spin
 _UNEVEN = 0.6
 #: parts that a step is cut into at kinks of the coefficients at most, and tries to have a part end on its kink
-_PARTS, _TRIES = 24, 8
+_PARTS, _TRIES = 25, 8
 #: a step this short, s, is not cut
 _SHORTEST = 1e-7
 
@@ -85,51 +86,52 @@ def _begun(state: FloatArray, y: FloatArray) -> None:
 
 
 @compiled
-def _ending_on_kinks(
-    flat: FloatArray, given: Tables, state: FloatArray, times: FloatArray, last: int
-) -> tuple[FloatArray, int]:
-    """Return steps (m,) like ``times`` (n,) that also end on the kinks of the coefficients, and the place of ``last``.
+def _flown_to_kinks(
+    p: Any, tables: Tables, state: FloatArray, times: FloatArray, last: int
+) -> tuple[FloatArray, int, FloatArray, FloatArray]:
+    """Fly from a state (13,) in the steps ``times`` (n,), each cut where the coefficients have a kink.
 
-    Where there are none, as without a table, the steps are those given.
+    Returns the steps as they were taken (m,), the place of ``last`` in them, the states there (m, 14) and their dense
+    output (m - 1, 7, 14). Where there is no kink, as without a table, the steps are those given.
     """
-    p = flat[:SIZE].copy().view(PARAMETERS)[0]
-    tabulated = given.static.columns.shape[1] > 0 or given.static.rolling.shape[1] > 1
-    if not tabulated and p.aero_stall.k == 0.0:
-        return times, last
-    tables = acting_tables(given, flat)
-    y, new, work = np.empty(14), np.empty(14), np.empty(14)
-    F, K = np.empty((7, 14)), np.empty((16, 14))
-    found, count, place = np.empty(times.size * (_PARTS + 1)), 1, 0
-    found[0] = t = times[0]
-    _begun(state, y)
-    derivative(p, tables, t, y, K[0])
-    alpha = incidence(p, tables, t, y)
+    kinked = tables.static.columns.shape[1] > 0 or tables.static.rolling.shape[1] > 1 or p.aero_stall.k != 0.0
+    parts = _PARTS if kinked else 1
+    most = (times.size - 1) * parts + 1
+    ends, path, dense = np.empty(most), np.empty((most, 14)), np.empty((most - 1, 7, 14))
+    K, work = np.empty((16, 14)), np.empty(14)
+    n, place, alpha = 0, 0, 0.0
+    ends[0] = times[0]
+    _begun(state, path[0])
+    derivative(p, tables, times[0], path[0], K[0])
+    if kinked:
+        alpha = incidence(p, tables, times[0], path[0])
     for k in range(1, times.size):
-        h, parts, tries = times[k] - t, 0, 0
+        h, part, tries = times[k] - ends[n], 1, 0
         while True:
-            step(p, tables, t, y, h, K, new)
-            derivative(p, tables, t + h, new, K[12])
-            alpha_new = incidence(p, tables, t + h, new)
-            if parts < _PARTS and tries < _TRIES:
-                interpolant(p, tables, t, y, h, K, new, F)
-                share = share_to_kink(p, tables, t, y, h, F, alpha, alpha_new, work)
-                if share < 1.0 and share * h > _SHORTEST:
-                    h *= share
-                    tries += 1
-                    continue
+            t, y, new = ends[n], path[n], path[n + 1]
             whole = h >= times[k] - t - _SHORTEST
-            t = times[k] if whole else t + h
-            found[count] = t
-            count += 1
-            copied(new, y)
+            end = times[k] if whole else t + h
+            step(p, tables, t, y, h, K, new)
+            derivative(p, tables, end, new, K[12])
+            interpolant(p, tables, t, y, h, K, new, dense[n])
+            if kinked:
+                alpha_new = incidence(p, tables, end, new)
+                if part < parts and tries < _TRIES:
+                    share = share_to_kink(p, tables, t, y, h, dense[n], alpha, alpha_new, work)
+                    if share < 1.0 and share * h > _SHORTEST:
+                        h *= share
+                        tries += 1
+                        continue
+                alpha = alpha_new
             copied(K[12], K[0])
-            alpha = alpha_new
+            n += 1
+            ends[n] = end
             if whole:
                 break
-            h, parts, tries = times[k] - t, parts + 1, 0
+            h, part, tries = times[k] - end, part + 1, 0
         if k == last:
-            place = count - 1
-    return found[:count].copy(), place
+            place = n
+    return ends[: n + 1], place, path[: n + 1], dense[:n]
 
 
 @compiled_nogil
@@ -150,30 +152,30 @@ def flight_segments(
     coefficients, as at the corners of a table: a step across one is in error by up to twice a good gyroscope's noise.
     """
     given = tables
-    times, last = _ending_on_kinks(flats[0], given, states[0], times, last)
-    n = times.size
-    path, dense, K = np.empty((n, 14)), np.empty((n - 1, 7, 14)), np.empty((16, 14))
-    disc = flats[0, :SIZE].copy().view(PARAMETERS)[0].disc
-    turning = abs(states[0, _SPIN]) * disc.Izz / disc.Ixx > SLOWEST
+    p = flats[0, :SIZE].copy().view(PARAMETERS)[0]
+    turning = abs(states[0, _SPIN]) * p.disc.Izz / p.disc.Ixx > SLOWEST
+    times, last, path, dense = _flown_to_kinks(p, acting_tables(given, flats[0]), states[0], times, last)
+    K = np.empty((16, 14))
     for c in range(1 if turning else states.shape[0]):
         flat = flats[c, :SIZE].copy()
-        p = flat.view(PARAMETERS)[0]
         tables = acting_tables(given, flats[c])
-        _begun(states[c], path[0])
-        derivative(p, tables, times[0], path[0], K[0])
-        for k in range(n - 1):
-            h = times[k + 1] - times[k]
-            step(p, tables, times[k], path[k], h, K, path[k + 1])
-            derivative(p, tables, times[k + 1], path[k + 1], K[12])
-            interpolant(p, tables, times[k], path[k], h, K, path[k + 1], dense[k])
-            K[0] = K[12]
+        if c > 0:
+            p = flat.view(PARAMETERS)[0]
+            _begun(states[c], path[0])
+            derivative(p, tables, times[0], path[0], K[0])
+            for k in range(times.size - 1):
+                h = times[k + 1] - times[k]
+                step(p, tables, times[k], path[k], h, K, path[k + 1])
+                derivative(p, tables, times[k + 1], path[k + 1], K[12])
+                interpolant(p, tables, times[k], path[k], h, K, path[k + 1], dense[k])
+                copied(K[12], K[0])
         rows[c] = in_body(flat, tables, out, evaluate(times, path, dense, out))
         end = in_body(flat, tables, times[last : last + 1], path[last : last + 1])[0]
         ends[c, :6] = end[:6]
         ends[c, 6:10] = end[9:13]
         ends[c, 10:13] = end[13:16]
     if turning and states.shape[0] > 1:
-        add_neighbours(flats, given, states, times[0], times[last], times[n - 1], out, rows, ends)
+        add_neighbours(flats, given, states, times[0], times[last], times[-1], out, rows, ends)
 
 
 def _states(recording: Recording, t: FloatArray, ratio: float) -> FloatArray:
