@@ -36,7 +36,6 @@ from discsim.validation.identification.noise import GroupNoise, NoiseModel, chi_
 from discsim.validation.identification.normal_equations import common_step, nuisance_step
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.plants.law_terms import Term
-from discsim.validation.identification.residual_tests import unmodelled_residuals
 
 __all__ = ["FoundLaw", "find_law", "left_to_gain"]
 
@@ -255,7 +254,7 @@ def _more_terms(
     held-out likelihood over the law without it.
     """
     terms: tuple[Term, ...] = (first,)
-    if len(start.trajectories) < 2 or not unmodelled_residuals(fitted.fit.linears, fitted.residuals, fitted.fit.noise):
+    if len(start.trajectories) < 2 or not fitted.unmodelled():
         return fitted, terms  # and where no other recording could bear a further term out
     held = tuple(q for q in fitted.fit.parameters if q.group == "law")
     beside = Fit(start.trajectories, (*own, *held), fitted.fit.at, start.defects, start.noise, fitted.fit.fixed)
@@ -293,7 +292,7 @@ def _more_sensor_terms(
     As for motion, the further term must gain its price and held-out likelihood over the law without it.
     """
     terms: tuple[SensorTerm, ...] = (first,)
-    if len(start.trajectories) < 2 or not unmodelled_residuals(fitted.fit.linears, fitted.residuals, fitted.fit.noise):
+    if len(start.trajectories) < 2 or not fitted.unmodelled():
         return fitted, terms
     settled = settled_terms(fitted, terms)
     others = further_sensor_terms(library, settled)
