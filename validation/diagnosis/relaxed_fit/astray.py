@@ -1,4 +1,4 @@
-"""Recordings whose relaxed fit went astray, far from their data, and other initial states that may bring it there."""
+"""Recordings whose relaxed fit went astray, far from their data, and other starts that may bring it there."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.frames import conjugate, multiply
 from discsim.validation.diagnosis.first_trajectory import CLOCK, first_trajectory, trajectory_in_true_time
+from discsim.validation.diagnosis.relaxed_fit.further_steps import fitted_further
 from discsim.validation.diagnosis.settings import CONSISTENCY, RELAXED_FIT
 from discsim.validation.identification.gauss_newton import Fit, merit_of, refit
 from discsim.validation.identification.noise import whitened
 from discsim.validation.identification.segments import Trajectory
 
-__all__ = ["astray", "from_other_initial_states"]
+__all__ = ["astray", "from_nearer_motion", "from_other_initial_states"]
 
 
 def astray(fit: Fit) -> list[int]:
@@ -52,6 +53,19 @@ def from_other_initial_states(fit: Fit) -> Fit:
     together = replace(fit, trajectories=tuple(better.get(i, one) for i, one in enumerate(fit.trajectories)))
     together = refit(together, iterations=6, tolerance=1e-3 * fit.count)
     return together if together.merit < fit.merit else fit
+
+
+def from_nearer_motion(fit: Fit, other: Fit) -> Fit | None:
+    """Return a relaxed fit from the motion of another fit; None where that is no nearer to the data.
+
+    The relaxed fit leaves less than any other at its best. Where it leaves more it stands at another minimum, as where
+    a field that turns beside the spin leads each segment astray by itself.
+    """
+    bar = RELAXED_FIT.rescued * fit.merit
+    if merit_of(fit, other.linears) > bar:
+        return None
+    nearer = fitted_further(replace(fit, trajectories=other.trajectories, linears=()), fit.count)
+    return nearer if nearer.merit < bar else None
 
 
 def _other_states(trajectory: Trajectory, ratio: float) -> list[FloatArray]:

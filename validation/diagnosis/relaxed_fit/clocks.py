@@ -15,6 +15,7 @@ from discsim.effects.catalogue import CATALOGUE, Effect
 from discsim.effects.catalogue import effect as made
 from discsim.validation.diagnosis.first_trajectory import beginning, begun_again
 from discsim.validation.diagnosis.relaxed_fit.astray import astray
+from discsim.validation.diagnosis.relaxed_fit.further_steps import TOLERANCE, fitted_further
 from discsim.validation.diagnosis.relaxed_fit.left_out import fitted_without, in_noise_left, with_all_readings
 from discsim.validation.diagnosis.relaxed_fit.parameters import free_clock, free_clocks
 from discsim.validation.diagnosis.relaxed_fit.sensor_residuals import misfit
@@ -53,18 +54,17 @@ def led_by_other_sensors(fit: Fit) -> Fit:
     there = {readings.sensor for one in fit.trajectories for readings in one.readings}
     if not fit.plant.follows_path or not astray(fit):
         return fit
-    tolerance = 1e-4 * fit.count
     for sensor in _DISPENSABLE:
         if sensor not in there or not (there - {sensor}) & {"magnetometer", "gyroscope"}:
             continue
         some = fit.part(astray(fit)[: CONSISTENCY.few])
-        if len(some.trajectories) < len(fit.trajectories) and astray(fitted_without(some, sensor, tolerance)):
+        if len(some.trajectories) < len(fit.trajectories) and astray(fitted_without(some, sensor, fit.count)):
             continue
-        led = fitted_without(fit, sensor, tolerance)
+        led = fitted_without(fit, sensor, fit.count)
         if astray(led):
             continue
         whole = replace(led, trajectories=with_all_readings(led, fit))
-        timed = refit(_with_clock(whole, sensor, _clock_by_trial(whole, sensor)), iterations=12, tolerance=tolerance)
+        timed = fitted_further(_with_clock(whole, sensor, _clock_by_trial(whole, sensor)), fit.count)
         return in_noise_left(whole, sensor) if astray(timed) else timed
     return fit
 
@@ -80,7 +80,7 @@ def with_clock_of_gyroscope(fit: Fit) -> Fit:
     if not before > RELAXED_FIT.lost:
         return fit
     timed = _with_clock(fit, sensor, _clock_by_trial(fit, sensor))
-    timed = refit(timed, iterations=8, tolerance=1e-4 * fit.count)
+    timed = refit(timed, iterations=8, tolerance=TOLERANCE * fit.count)
     return timed if misfit(timed, sensor) < RELAXED_FIT.reconciled * before else fit
 
 
@@ -132,9 +132,7 @@ def with_free_clocks(fit: Fit) -> Fit:
     # what the first look says of the rest is little: only the clocks are taken over
     known = {q.key for q in clocks}
     at = np.array([v if q.key in known else q.stated for q, v in zip(parameters, look.at, strict=True)])
-    whole = refit(
-        replace(fit, trajectories=trajectories, parameters=parameters, at=at), iterations=12, tolerance=1e-4 * fit.count
-    )
+    whole = fitted_further(replace(fit, trajectories=trajectories, parameters=parameters, at=at), fit.count)
     return whole if whole.merit < RELAXED_FIT.rescued * fit.merit else fit
 
 

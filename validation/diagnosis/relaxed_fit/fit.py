@@ -25,6 +25,7 @@ from discsim.validation.diagnosis.relaxed_fit.clocks import (
     with_clock_of_gyroscope,
     with_free_clocks,
 )
+from discsim.validation.diagnosis.relaxed_fit.further_steps import STEPS, TOLERANCE, fitted_further
 from discsim.validation.diagnosis.relaxed_fit.out_of_balance import followed_out_of_balance
 from discsim.validation.diagnosis.relaxed_fit.parameters import relaxed_parameters, supposed_parameters
 from discsim.validation.diagnosis.settings import RELAXED_FIT
@@ -36,8 +37,6 @@ from discsim.validation.identification.plants import plant_of
 
 __all__ = ["relaxed"]
 
-#: most Gauss-Newton steps
-_STEPS = 12
 #: offsets of one sensor's times, the same all along
 _OFFSETS = frozenset(row.id for row in CATALOGUE.values() if row.type is TimeOffset)
 
@@ -73,8 +72,8 @@ def relaxed(
     fit = replace(fit, noise=stated_noise(bare, {group: level.sd for group, level in seen.items()}))
     if fit.from_release:
         return fitted_from_afar(fit)
-    tolerance = 1e-4 * sum(linear.raw.size for linear in bare)
-    fit = _reweighted(fit, tolerance) if supposed else refit(fit, iterations=_STEPS, tolerance=tolerance)
+    count = sum(linear.raw.size for linear in bare)
+    fit = _reweighted(fit, count) if supposed else fitted_further(fit, count)
     fit = from_other_initial_states(fit if supposed else followed_out_of_balance(fit))
     if not plant.airborne:
         fit = with_clock_of_gyroscope(fit)
@@ -101,15 +100,15 @@ def _wrong_time(recordings: Sequence[Recording], agreeing: Sequence[Sequence[Com
 _ROUNDS, _STEPS_OF_ROUND = 3, 5
 
 
-def _reweighted(fit: Fit, tolerance: float) -> Fit:
+def _reweighted(fit: Fit, count: int) -> Fit:
     """Fit in rounds, each in the noise that the one before has left, where that is above what is stated.
 
     Where sensors have many errors, the one with the least noise would otherwise bend the motion towards itself until
-    the others are far from it.
+    the others are far from it. ``count`` is as in `fitted_further`.
     """
     stated = fit.noise
     for k in range(_ROUNDS):
-        fit = refit(fit, iterations=_STEPS if k == 0 else _STEPS_OF_ROUND, tolerance=tolerance)
+        fit = refit(fit, iterations=STEPS if k == 0 else _STEPS_OF_ROUND, tolerance=TOLERANCE * count)
         left = robust_noise(fit.linears, [linear.residual for linear in fit.linears])
         fit = replace(fit, noise={g: level if level.sd > stated[g].sd else stated[g] for g, level in left.items()})
     return replace(fit, merit=merit_of(fit, fit.linears))

@@ -11,18 +11,22 @@ import numpy as np
 
 from discsim.recording import Recording
 from discsim.validation.diagnosis.first_trajectory import first_trajectory, nodes_of
-from discsim.validation.identification.gauss_newton import Fit, linearised, merit_of, refit
+from discsim.validation.diagnosis.relaxed_fit.further_steps import fitted_further
+from discsim.validation.identification.gauss_newton import Fit, linearised, merit_of
 from discsim.validation.identification.noise import estimate_noise
 from discsim.validation.identification.segments import Trajectory
 
 __all__ = ["fitted_without", "in_noise_left", "with_all_readings"]
 
 
-def fitted_without(fit: Fit, sensor: str, tolerance: float) -> Fit:
-    """Return a fit, begun anew from the data, to recordings as if they had no such sensor."""
+def fitted_without(fit: Fit, sensor: str, count: int) -> Fit:
+    """Return a fit, begun anew from the data, to recordings as if they had no such sensor.
+
+    ``count`` is as in `fitted_further`.
+    """
     trajectories = tuple(_trajectory_without(one.recording, sensor) for one in fit.trajectories)
     at = np.array([q.stated for q in fit.parameters])
-    return refit(replace(fit, trajectories=trajectories, at=at), iterations=12, tolerance=tolerance)
+    return fitted_further(replace(fit, trajectories=trajectories, at=at), count)
 
 
 def _trajectory_without(recording: Recording, sensor: str) -> Trajectory:

@@ -12,10 +12,11 @@ import numpy as np
 from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import GSensitivity
 from discsim.validation.diagnosis.relaxed_fit.astray import astray
+from discsim.validation.diagnosis.relaxed_fit.further_steps import fitted_further
 from discsim.validation.diagnosis.relaxed_fit.left_out import fitted_without, in_noise_left, with_all_readings
 from discsim.validation.diagnosis.relaxed_fit.sensor_residuals import left_across, misfit
 from discsim.validation.diagnosis.settings import RELAXED_FIT
-from discsim.validation.identification.gauss_newton import Fit, refit
+from discsim.validation.identification.gauss_newton import Fit
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.segments import Trajectory
 
@@ -34,15 +35,14 @@ def followed_out_of_balance(fit: Fit) -> Fit:
     """
     if fit.plant.unbalanced is None or not left_across(fit) > RELAXED_FIT.across:
         return fit
-    sensor, tolerance, wanted = "accelerometer", 1e-4 * fit.count, RELAXED_FIT.reconciled * left_across(fit)
+    sensor, count, wanted = "accelerometer", fit.count, RELAXED_FIT.reconciled * left_across(fit)
     free = tuple(Parameter(*key, 0.0, 1e-6, 1e-2) for key in _G_SENSITIVITY)
     pulled = replace(fit, parameters=(*fit.parameters, *free), at=np.append(fit.at, [0.0, 0.0]))
-    if left_across(refit(pulled, iterations=12, tolerance=tolerance)) < wanted:
+    if left_across(fitted_further(pulled, count)) < wanted:
         return fit
-    led = fitted_without(fit, sensor, tolerance) if astray(fit) else fit
+    led = fitted_without(fit, sensor, count) if astray(fit) else fit
     moved = unbalanced(led)
-    turned = replace(led, trajectories=moved, defects=moved[0].plant.sizes.relaxed)
-    turned = refit(turned, iterations=12, tolerance=tolerance)
+    turned = fitted_further(replace(led, trajectories=moved, defects=moved[0].plant.sizes.relaxed), count)
     if astray(turned) or not left_across(turned) < wanted:
         return fit
     return turned if led is fit else in_noise_left(replace(turned, trajectories=with_all_readings(turned, fit)), sensor)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from discsim.arrays import sd_by_median
+from discsim.validation.diagnosis.relaxed_fit.further_steps import TOLERANCE
 from discsim.validation.diagnosis.settings import RELAXED_FIT
 from discsim.validation.identification.gauss_newton import Fit, refit
 
@@ -42,4 +43,4 @@ def without_outliers(fit: Fit) -> tuple[Fit, list[tuple[int, str, str, float, fl
         trajectories.append(replace(current, readings=tuple(replace(r, good=kept[r.sensor]) for r in current.readings)))
     if not found:
         return fit, found
-    return refit(replace(fit, trajectories=tuple(trajectories)), iterations=4, tolerance=1e-4 * fit.count), found
+    return refit(replace(fit, trajectories=tuple(trajectories)), iterations=4, tolerance=TOLERANCE * fit.count), found

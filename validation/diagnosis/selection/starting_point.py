@@ -9,6 +9,7 @@ from discsim.effects.catalogue import catalogued
 from discsim.effects.sensors import Lag
 from discsim.validation.diagnosis.consistency.followed import true_noise
 from discsim.validation.diagnosis.relaxed_fit import relaxed
+from discsim.validation.diagnosis.relaxed_fit.astray import from_nearer_motion
 from discsim.validation.diagnosis.relaxed_fit.clocks import clock_of_accelerometer
 from discsim.validation.diagnosis.relaxed_fit.outliers import without_outliers
 from discsim.validation.diagnosis.relaxed_fit.parameters import unknowns
@@ -19,8 +20,8 @@ from discsim.validation.diagnosis.selection.score_tests import hinted, pictured_
 from discsim.validation.diagnosis.selection.screening import NormalEquations, normal_equations_of
 from discsim.validation.diagnosis.selection.search_problem import SearchProblem
 from discsim.validation.diagnosis.selection.search_state import Search, chi2_in, hopeless, values_of_fit, wobbles
-from discsim.validation.diagnosis.settings import RELAXED_FIT, SELECTION
-from discsim.validation.identification.gauss_newton import NO_BARS, Bars, Fit, merit_of, refit
+from discsim.validation.diagnosis.settings import SELECTION
+from discsim.validation.identification.gauss_newton import NO_BARS, Bars, Fit, merit_of
 from discsim.validation.identification.noise import NoiseModel, estimate_noise
 from discsim.validation.identification.parameters import Parameter
 from discsim.validation.identification.plants import Plant
@@ -30,8 +31,6 @@ __all__ = ["HELD", "screened"]
 
 #: the lag that holds what was there before a recording began
 HELD = catalogued(Lag, "accelerometer").id
-#: steps of a relaxed fit that is begun again, and the share of a reading's chi-squared below which a step gains nothing
-_STEPS, _FEW = 12, 1e-4
 
 
 def screened(problem: SearchProblem, before: Search | None = None) -> Search:
@@ -56,7 +55,7 @@ def screened(problem: SearchProblem, before: Search | None = None) -> Search:
     problem.progress("fitting the baseline", 2, 4)
     bars = NO_BARS if before is None else hopeless(chi2_in(before.final, noise), before.final.fit.count)
     base = _baseline(relaxed_fit, equations, own, noise, bars)
-    if (nearer := _from_baseline(relaxed_fit, base)) is not None:
+    if (nearer := from_nearer_motion(relaxed_fit, base.fit)) is not None:
         return screened(replace(problem, followed=nearer), before)
     if before is not None and base.fit.merit > min(bars):
         base = before.base
@@ -119,19 +118,6 @@ def _baseline(
         )
         base = min(base, again, key=lambda one: one.score)
     return base
-
-
-def _from_baseline(relaxed_fit: Fit, base: ContinuousFit) -> Fit | None:
-    """Return the relaxed fit from where the baseline's stands; None where that has come no nearer to the data.
-
-    The relaxed fit leaves less than any other at its best. Where it leaves more it stands at another minimum, as where
-    a field that turns beside the spin leads each segment astray by itself.
-    """
-    if merit_of(relaxed_fit, base.fit.linears) > RELAXED_FIT.rescued * merit_of(relaxed_fit, relaxed_fit.linears):
-        return None
-    there = replace(relaxed_fit, trajectories=base.fit.trajectories, linears=())
-    nearer = refit(there, iterations=_STEPS, tolerance=_FEW * relaxed_fit.count)
-    return nearer if nearer.merit < RELAXED_FIT.rescued * relaxed_fit.merit else None
 
 
 def _start(equations: NormalEquations, hypothesis: Hypothesis, own: Sequence[Parameter]) -> Start:
