@@ -7,14 +7,16 @@ own effects, then the terms of a law.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from discsim.arrays import FloatArray
-from discsim.compiled import compiled
+from discsim.compiled import compiled, inlined
 from discsim.law import LAW_WIDTH, SYMBOLS
 from discsim.parameters import PARAMETERS, Tables
 
-__all__ = ["FASTEST", "LAW_PLACES", "ROW", "SIZE", "acting_tables"]
+__all__ = ["FASTEST", "LAW_PLACES", "ROW", "SIZE", "acting_tables", "physics_of"]
 
 #: numbers of a row of motion
 ROW = 19
@@ -39,6 +41,16 @@ LAW_PLACES = (
     *(f"at_{symbol}" for symbol in SYMBOLS),
 )
 _PLACES, _COUNT = len(LAW_PLACES), len(SYMBOLS)
+
+
+@inlined
+def physics_of(flat: FloatArray) -> Any:
+    """Return the parameters of the physics that a row of flats (k,) holds, as a record.
+
+    Compiled code frees an array after its last use, and a record does not keep the array that it lies in: of a copy it
+    would soon read what something else has written there. So it lies in the row itself, which the caller keeps.
+    """
+    return flat[:SIZE].view(PARAMETERS)[0]
 
 
 @compiled

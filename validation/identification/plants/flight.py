@@ -24,11 +24,11 @@ from discsim.errors import InputError
 from discsim.flight_equations import copied, derivative, in_body, incidence
 from discsim.frames import body_to_ned, multiply, quaternion_from_matrix, to_body, turn
 from discsim.law import AIR_SHARE, WRENCH_TARGETS
-from discsim.parameters import PARAMETERS, Tables
+from discsim.parameters import Tables
 from discsim.recording import Recording
 from discsim.step_ends import share_to_kink
 from discsim.toml_table import TomlTable
-from discsim.validation.identification.dynamics import FASTEST, SIZE, acting_tables
+from discsim.validation.identification.dynamics import FASTEST, SIZE, acting_tables, physics_of
 from discsim.validation.identification.initial.flight import InitialStates, flight_initial_states, flight_starts
 from discsim.validation.identification.parameters import AllowedDefects, Values
 from discsim.validation.identification.plants.flight_neighbours import SLOWEST, add_neighbours
@@ -152,15 +152,14 @@ def flight_segments(
     coefficients, as at the corners of a table: a step across one is in error by up to twice a good gyroscope's noise.
     """
     given = tables
-    p = flats[0, :SIZE].copy().view(PARAMETERS)[0]
+    p = physics_of(flats[0])
     turning = abs(states[0, _SPIN]) * p.disc.Izz / p.disc.Ixx > SLOWEST
     times, last, path, dense = _flown_to_kinks(p, acting_tables(given, flats[0]), states[0], times, last)
     K = np.empty((16, 14))
     for c in range(1 if turning else states.shape[0]):
-        flat = flats[c, :SIZE].copy()
         tables = acting_tables(given, flats[c])
         if c > 0:
-            p = flat.view(PARAMETERS)[0]
+            p = physics_of(flats[c])
             _begun(states[c], path[0])
             derivative(p, tables, times[0], path[0], K[0])
             for k in range(times.size - 1):
@@ -169,8 +168,8 @@ def flight_segments(
                 derivative(p, tables, times[k + 1], path[k + 1], K[12])
                 interpolant(p, tables, times[k], path[k], h, K, path[k + 1], dense[k])
                 copied(K[12], K[0])
-        rows[c] = in_body(flat, tables, out, evaluate(times, path, dense, out))
-        end = in_body(flat, tables, times[last : last + 1], path[last : last + 1])[0]
+        rows[c] = in_body(flats[c][:SIZE], tables, out, evaluate(times, path, dense, out))
+        end = in_body(flats[c][:SIZE], tables, times[last : last + 1], path[last : last + 1])[0]
         ends[c, :6] = end[:6]
         ends[c, 6:10] = end[9:13]
         ends[c, 10:13] = end[13:16]

@@ -23,8 +23,8 @@ from discsim.compiled import compiled, inlined
 from discsim.effects.events import EVENT_WIDTH_S
 from discsim.flight_equations import body_row, derivative
 from discsim.frames import rotate_by_quaternion
-from discsim.parameters import PARAMETERS, Tables
-from discsim.validation.identification.dynamics import FASTEST, ROW, SIZE, acting_tables
+from discsim.parameters import Tables
+from discsim.validation.identification.dynamics import FASTEST, ROW, acting_tables, physics_of
 
 __all__ = ["SLOWEST", "add_neighbours"]
 
@@ -54,14 +54,14 @@ def add_neighbours(
 
     ``end`` is where the segment ends and ``stop`` (s) where its motion may; else as `flight_segments`.
     """
-    p = flats[0, :SIZE].copy().view(PARAMETERS)[0]
+    p = physics_of(flats[0])
     # a step of a fit may lead to any spin and inertia; no body has Izz above 2 Ixx, and none that is looked for spins
     # faster
     nutation = min(abs(states[0, 12]) * p.disc.Izz / p.disc.Ixx, 2.0 * FASTEST)
     longest = _NUTATION if given.static.columns.shape[1] == 0 else _CORNERED
     longest = min(_STEP, longest / nutation)
     for c in range(flats.shape[0]):
-        if _knocked(flats[c, :SIZE].copy().view(PARAMETERS)[0], start, stop):
+        if _knocked(physics_of(flats[c]), start, stop):
             longest = min(longest, 0.5 * EVENT_WIDTH_S)
     steps = max(3, ceil((end - start) / longest))
     h = (end - start) / steps
@@ -70,7 +70,7 @@ def add_neighbours(
     places, weights = _between(out, start, 0.5 * h, 2 * more + 1)
     between, work = np.empty(ROW), np.zeros((12, 14))
     for c in range(states.shape[0]):
-        p = flats[c, :SIZE].copy().view(PARAMETERS)[0]
+        p = physics_of(flats[c])
         _fly(p, acting_tables(given, flats[c]), states[c], start, h, work, other if c else first)
         if c == 0:
             continue

@@ -20,8 +20,7 @@ from discsim.arrays import FloatArray
 from discsim.compiled import compiled, compiled_nogil
 from discsim.effects.body import transverse_inertia
 from discsim.effects.events import EVENT_WIDTH_S, spin_step
-from discsim.parameters import PARAMETERS
-from discsim.validation.identification.dynamics import SIZE
+from discsim.validation.identification.dynamics import physics_of
 
 __all__ = ["free_spin_segments"]
 
@@ -150,7 +149,7 @@ def _long_steps(flats: FloatArray, times: FloatArray, last: int, spin: float) ->
     """
     reach = 6.0 * EVENT_WIDTH_S
     for c in range(flats.shape[0]):
-        kick = flats[c, :SIZE].copy().view(PARAMETERS)[0].event_spin_step
+        kick = physics_of(flats[c]).event_spin_step
         if kick.dr_rad_s != 0.0 and times[0] - reach < kick.t_s < times[-1] + reach:
             return times, last
     longest = min(_LONG_STEP, _LONG_NUTATION / max(2.0 * abs(spin), 1.0))
@@ -195,7 +194,7 @@ def _run(
     n = times.size
     rate, slope, attitude, psis = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 4)), np.empty(n)
     k1, k2, k3, k4, w = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    p = flat[:SIZE].copy().view(PARAMETERS)[0]
+    p = physics_of(flat)
     nutation = (p.disc.Izz - p.disc.Ixx) / p.disc.Ixx
     attitude[0], rate[0], psis[0] = state[6:10], state[10:13], 0.0
     heading = atan2(

@@ -11,10 +11,9 @@ import numpy as np
 from discsim.arrays import FloatArray
 from discsim.compiled import compiled, compiled_nogil
 from discsim.effects.rig import speed_ripple
-from discsim.parameters import PARAMETERS
 from discsim.recording import Recording, Samples
 from discsim.toml_table import TomlTable
-from discsim.validation.identification.dynamics import SIZE
+from discsim.validation.identification.dynamics import physics_of
 from discsim.validation.identification.initial.spin_phase import rig_initial_states
 from discsim.validation.identification.parameters import AllowedDefects
 from discsim.validation.identification.plants.plan import Plan, turns
@@ -102,8 +101,7 @@ def table_segments(
     n = times.size
     turned, r, slope = np.empty(n), np.empty(n), np.empty(n)
     for c in range(states.shape[0]):
-        flat = flats[c, :SIZE].copy()
-        p = flat.view(PARAMETERS)[0]
+        p = physics_of(flats[c])
         turned[0] = states[c, 1]
         yaw = states[c, 0] - states[c, 1]
         for k in range(n - 1):

@@ -10,10 +10,10 @@ from discsim.arrays import FloatArray
 from discsim.bearing import bearing_torque
 from discsim.compiled import compiled, compiled_nogil
 from discsim.effects.events import spin_step
-from discsim.parameters import PARAMETERS, Tables
+from discsim.parameters import Tables
 from discsim.recording import Recording
 from discsim.toml_table import TomlTable
-from discsim.validation.identification.dynamics import SIZE, acting_tables
+from discsim.validation.identification.dynamics import acting_tables, physics_of
 from discsim.validation.identification.initial.spin_phase import rig_initial_states
 from discsim.validation.identification.parameters import AllowedDefects, Values
 from discsim.validation.identification.plants.law_terms import Term
@@ -70,8 +70,7 @@ def spin_down_segments(
     n = times.size
     psi, r, slope = np.empty(n), np.empty(n), np.empty(n)
     for c in range(states.shape[0]):
-        flat = flats[c, :SIZE].copy()
-        p, acting = flat.view(PARAMETERS)[0], acting_tables(tables, flats[c])
+        p, acting = physics_of(flats[c]), acting_tables(tables, flats[c])
         psi[0], r[0] = states[c, 0], states[c, 1]
         slope[0] = _friction(p, acting, times[0], psi[0], r[0])
         for k in range(n - 1):
