@@ -114,21 +114,23 @@ def may_be_the_air(item: UnmodelledResidual, fit: Fit) -> bool:
 def _may_be_a_copy(found: Search) -> bool:
     """Tell whether what was found may copy something that is none of it, so that one law is worth comparing.
 
-    Several effects on the motion may, and one of which a law has more to gain than an effect costs: a disc that dries
-    passes for thin air. (Beside samples that were lost a motion ends beside its best.) Of those on a sensor several do
-    in a free spin, where much that nobody knows stands in for what a wrong effect leaves: a bias that settles passes
-    for a bias beside a sensitivity to what dies away, too. Where all ordinary errors are fitted at once, several of a
-    sensor are no stack; nor are lost samples, without which no law would be fitted.
+    Several effects on the motion may, and any beside which a law about the same has more to gain than an effect costs:
+    a disc that dries passes for thin air, a bias that settles for one that drifts. (Beside samples that were lost a
+    motion ends beside its best.) Of those on a sensor several do in a free spin, where much that nobody knows stands in
+    for what a wrong effect leaves: a bias that settles passes for a bias beside a sensitivity to what dies away, too.
+    Where all ordinary errors are fitted at once, several of a sensor are no stack; nor are lost samples, without which
+    no law would be fitted.
     """
     candidates = found.final.hypothesis.candidates
     lasting = [c.row for c in candidates if not c.row.brief and not c.fixed_values]
     weak = found.relaxed_fit.plant.weakly_identified
-    sensors = BOARD if weak and not found.at_once else frozenset()
-    acted_on = Counter(row.acts_on for row in lasting if row.acts_on == "motion" or row.acts_on in sensors)
-    if max(acted_on.values(), default=0) >= UNKNOWN_LAW.stack:
+    acted_on = Counter(row.acts_on for row in lasting)
+    stacked = {"motion", *BOARD} if weak and not found.at_once else {"motion"}
+    if any(acted_on[about] >= UNKNOWN_LAW.stack for about in stacked):
         return True
-    alone = not weak and not any(c.fixed_values for c in candidates)
-    return bool(acted_on) and alone and left_to_gain(found.final.fit) > SELECTION.entry
+    if weak or any(c.fixed_values for c in candidates):
+        return False
+    return left_to_gain(found.final.fit, acted_on) > SELECTION.entry
 
 
 def recalibrations(found: Search) -> dict[str, Recalibration]:

@@ -8,7 +8,7 @@ recordings that took no part are explained by them, too.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -198,12 +198,20 @@ def find_law(
     return law
 
 
-def left_to_gain(fit: Fit) -> float:
-    """Return what the best term on the motion would gain in chi2 beside a fit, effects and all; 0 without any."""
-    if fit.from_release or not fit.plant.laws.terms:
+def left_to_gain(fit: Fit, about: Collection[str]) -> float:
+    """Return what the best term would gain in chi2 beside a fit, effects and all; 0 where no term is asked.
+
+    ``about`` is what terms may stand on: "motion", or sensors. Of those on a sensor their coefficients are paid.
+    """
+    if fit.from_release:
         return 0.0
-    at = reference_of([state_of(trajectory, fit.values(i)) for i, trajectory in enumerate(fit.trajectories)])
-    return max((gain for gain, _, _ in candidate_laws(fit, fit.parameters, fit.plant.laws.terms, at)), default=0.0)
+    gains = [0.0]
+    if "motion" in about and fit.plant.laws.terms:
+        at = reference_of([state_of(trajectory, fit.values(i)) for i, trajectory in enumerate(fit.trajectories)])
+        gains += [gain for gain, _, _ in candidate_laws(fit, fit.parameters, fit.plant.laws.terms, at)]
+    terms = sensor_library(fit, about)
+    gains += [gain for gain, _, _ in _worth(fit, terms, asked_of_sensors(fit, fit.parameters, terms))]
+    return max(gains)
 
 
 def _likeliest(

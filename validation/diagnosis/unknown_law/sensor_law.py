@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -242,12 +242,12 @@ def swings(fit: Fit, sensor: str) -> list[float]:
     return _peaks(tried, power, 12.0 * step, _STANDS_OUT * float(np.median(power)))
 
 
-def sensor_library(fit: Fit) -> list[SensorTerm]:
-    """Return the terms about sensors that are asked for first."""
+def sensor_library(fit: Fit, about: Collection[str] = tuple(SENSORS)) -> list[SensorTerm]:
+    """Return the terms about sensors, or some of them, that are asked for first."""
     terms = []
     length = 0.5 * max(float(trajectory.nodes[-1]) for trajectory in fit.trajectories)
     spin = max(float(np.max(np.abs(turned(trajectory).rate(trajectory.nodes[:-1])))) for trajectory in fit.trajectories)
-    for sensor in SENSORS:
+    for sensor in filter(about.__contains__, SENSORS):
         values = [r.value[r.good] for trajectory in fit.trajectories for r in trajectory.readings if r.sensor == sensor]
         if not values or not any(v.size for v in values):
             continue

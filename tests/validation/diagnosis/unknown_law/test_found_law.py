@@ -364,6 +364,15 @@ def test_a_bias_that_settles_in_a_throw_is_no_bias_beside_a_sensitivity_to_force
     assert found.law.coefficients["tau"].value == pytest.approx(0.683, abs=2.0 * found.law.coefficients["tau"].sd)
 
 
+def test_a_bias_that_settles_in_flight_is_no_drift_beside_other_errors_of_its_sensor():
+    """Three of them leave no more than noise, and the law explains more with less."""
+    found = diagnose([recordings(Request(641024).draw())[:2]], ["throws"]).diagnosis
+    assert found.verdict == "unexplained"
+    assert found.law is not None
+    assert found.law.text == "c - c * exp(-t/tau)"
+    assert found.law.coefficients["tau"].value == pytest.approx(0.658, abs=2.0 * found.law.coefficients["tau"].sd)
+
+
 def test_what_slides_out_in_free_spins_has_its_law_and_a_body_out_of_balance_is_told():
     """The pull on the accelerometer changes by a per cent while lift turns the body by what is fixed in it."""
     slides = recordings(Request(633010).draw())[:3]
