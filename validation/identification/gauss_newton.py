@@ -428,16 +428,33 @@ class GaussNewtonStep:
                 for trajectory, linear, r in zip(fit.trajectories, fit.linears, self.reduced, strict=True)
             )
             trial = replace(fit, trajectories=trajectories, at=at)
-            if _finite(trajectories):
-                short = fraction == 1.0 and fit.merit - self.expected < CHORD and not discontinuous(fit)
-                new = (self._by_chord(trial) if short else None) or linearised(trial)
-                merit = merit_of(trial, new)
-                # while gaps are open the merit is that of the closed trajectory to first order only: too good
-                bar = fit.merit * (1.0 + 1e-9) if not discontinuous(fit) else 1.5 * fit.merit + 10.0 * fit.count
-                if np.isfinite(merit) and merit < bar:
-                    return replace(trial, linears=new, merit=merit, iterations=fit.iterations + 1)
+            new = self._tried(trial, fraction) if _finite(trajectories) else None
+            if new is not None:
+                return replace(trial, linears=new, merit=merit_of(trial, new), iterations=fit.iterations + 1)
             fraction *= _SHORTER
         return None
+
+    def _tried(self, trial: Fit, fraction: float) -> tuple[Linear, ...] | None:
+        """Return the linearisations of a trial that improves the fit; None for one that does not.
+
+        After a step that leads astray its shorter ones do, too, more often than not. They are asked first with slopes
+        by the states of segments alone, which tell the same merit for a quarter to half of the cost.
+        """
+        fit = self.fit
+        short = fraction == 1.0 and fit.merit - self.expected < CHORD and not discontinuous(fit)
+        new = self._by_chord(trial) if short else None
+        doubted = new is None and (short or fraction < 1.0) and fit.beside is None
+        if doubted and not self._improves(trial, linearised(trial, ())):
+            return None
+        new = new or linearised(trial)
+        return new if self._improves(trial, new) else None
+
+    def _improves(self, trial: Fit, new: Sequence[Linear]) -> bool:
+        """Tell whether a trial with these linearisations is better than the fit."""
+        fit, merit = self.fit, merit_of(trial, new)
+        # while gaps are open the merit is that of the closed trajectory to first order only: too good
+        bar = fit.merit * (1.0 + 1e-9) if not discontinuous(fit) else 1.5 * fit.merit + 10.0 * fit.count
+        return bool(np.isfinite(merit) and merit < bar)
 
     def _by_chord(self, trial: Fit) -> tuple[Linear, ...] | None:
         """Return the linearisations after a short step with slopes as they were; None where it does not gain as much.
