@@ -232,7 +232,7 @@ def _read_sensors(
             coarse = sensor_map.where is None and times < (1 - MUCH_LOST) * stamps.size
             why = (
                 f"the file has {times} different times in {stamps.size} rows: rows stand twice, or the stamps are "
-                "coarser than the rows (then take another column, or step_s)"
+                "coarser than the rows (then write shared = true, or take another column, or step_s)"
                 if coarse
                 else repairs.told(table.path, sensor)
             )

@@ -63,7 +63,8 @@ class TimeBase:
 
     ``iso``: the column holds dates and times, or times of the day. ``step_sigma``: what ``step`` may be off by, s;
     ``off``: the share of ``scale`` that it may be off by.
-    ``spacings``: the column holds what went by since the row before, and is added up.
+    ``spacings``: the column holds what went by since the row before, and is added up. ``shared``: several rows share a
+    stamp of a coarse clock, and are even between stamps.
     """
 
     column: str | None = None
@@ -74,6 +75,7 @@ class TimeBase:
     step_sigma: float | None = None
     spacings: bool = False
     off: float | None = None
+    shared: bool = False
 
 
 @dataclass(frozen=True)
@@ -166,7 +168,7 @@ class ImportMap:
         if own.time is None:
             return self.time
         if own.time_unit is None:
-            return replace(self.time, column=own.time)
+            return replace(self.time, column=own.time, shared=False)
         return TimeBase(own.time, TIME_UNITS[own.time_unit], iso=own.time_unit == "iso")
 
 
@@ -282,6 +284,9 @@ def _time_base(table: TomlTable) -> TimeBase:
         raise table.error(None, "expected either 'column' (of time stamps) or 'step_s' (of rows at one rate) in [time]")
     if spacings and (column is None or unit == "iso"):
         raise table.error("spacings", "'spacings' is true, expected a 'column' of numbers in s, ms, us, ns, min or d")
+    shared = table.flag("shared")
+    if shared and column is None:
+        raise table.error("shared", "'shared' is true, expected a 'column' of stamps that several rows share")
     count = table.number("scale", required=False, positive=True)
     if count is not None and (column is None or unit == "iso"):
         raise table.error("scale", "'scale' is the worth of one count of a 'column' of numbers; expected one beside it")
@@ -290,7 +295,7 @@ def _time_base(table: TomlTable) -> TimeBase:
     sigma = table.sigma.get("step_s")
     step_off = None if sigma is None else float(np.max(sigma))
     scale = TIME_UNITS[unit] * (count or 1.0)
-    return TimeBase(column, scale, step, counter, unit == "iso", step_off, spacings, off)
+    return TimeBase(column, scale, step, counter, unit == "iso", step_off, spacings, off, shared)
 
 
 def _environment(table: TomlTable, *, flying: bool) -> Environment:

@@ -10,6 +10,7 @@ from discsim.arrays import BoolArray, FloatArray, IntArray
 from discsim.validation.importing.clock import Break, mended, stamp_seconds
 from discsim.validation.importing.import_map import ImportMap, TimeBase
 from discsim.validation.importing.raw_table import RawTable, RepairList
+from discsim.validation.importing.shared_stamps import evened
 from discsim.validation.importing.unpadded import unpadded
 
 __all__ = ["RowClock", "added_up", "row_clock"]
@@ -52,7 +53,7 @@ def row_clock(table: RawTable, import_map: ImportMap, base: TimeBase, repairs: R
         if not found.shift:
             starts.append((line, found.what))
     stretch = np.zeros(len(table))
-    time[known], stretch[known] = clock.time, clock.stretch
+    time[known], stretch[known] = evened(clock.time) if base.shared else clock.time, clock.stretch
     return RowClock(time, stretch, tuple(starts))
 
 

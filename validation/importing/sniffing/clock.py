@@ -13,6 +13,7 @@ from discsim.arrays import FloatArray
 from discsim.validation.importing.clock import DATED, is_stamp, stamp_seconds
 from discsim.validation.importing.clock import EPOCH as YEAR_2000
 from discsim.validation.importing.row_clock import added_up
+from discsim.validation.importing.shared_stamps import evened, repeats
 from discsim.validation.importing.sniffing.coarse_stamps import Counted, counted_rows
 from discsim.validation.importing.sniffing.decision import Decision, Sureness
 from discsim.validation.importing.sniffing.groups import Numbers
@@ -21,7 +22,7 @@ from discsim.validation.importing.sniffing.preamble import stated_rate
 from discsim.validation.importing.sniffing.units import readings_of, split_unit
 from discsim.validation.importing.unpadded import unpadded
 
-__all__ = ["Clock", "clocks_of", "counter_note", "moment_of", "seconds", "written_unit"]
+__all__ = ["Clock", "clocks_of", "counter_note", "moment_of", "seconds", "with_shared_stamps", "written_unit"]
 
 SCALES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 #: A unit that is taken where the header states it, and never guessed.
@@ -50,6 +51,9 @@ LEAST_EVEN = 100
 #: What a step without stamps may be off by: a guess by a factor of two either way (loggers write 25 to 400 rows a
 #: second), a stated rate by what oscillators in sensors are (1 % to several per cent over parts and temperature).
 OFF_GUESSED, OFF_STATED = 0.7, 0.03
+#: Share of a sensor's rows at the stamp of its row before, with other readings, above which its clock is coarser than
+#: its rows: as many as are left out by themselves without a warning.
+SHARED = 0.05
 #: What is said of a counter under a name of time.
 COUNTING = "goes up by one a row: it counts the rows and tells no time"
 
@@ -59,7 +63,8 @@ class Clock:
     """Time of a row: a column with its unit, or a step (with a counter where there is one), and why.
 
     ``off`` is the share of a step, or of ``scale``, that it may be off by (one sigma). ``spacings``: the column holds
-    what went by since the row before. ``scale``: what one count of the column is worth in ``unit``.
+    what went by since the row before. ``scale``: what one count of the column is worth in ``unit``. ``shared``: several
+    rows share a stamp, and are even between stamps.
     """
 
     column: str | None
@@ -70,6 +75,7 @@ class Clock:
     off: float = 0.0
     spacings: bool = False
     scale: float = 1.0
+    shared: bool = False
 
     def with_step(self, step: float, decision: Decision, off: float) -> Clock:
         """Return the clock with another step, that may be off by that share of it."""
@@ -78,7 +84,7 @@ class Clock:
 
 def clocks_of(numbers: Numbers) -> list[Clock]:
     """Return the possible clocks of a table, the best first; the last is a step that is guessed."""
-    found = []
+    found: list[tuple[float, int, Clock]] = []
     for k, name in enumerate(numbers.table.columns):
         clock = _clock(numbers, k, name)
         if clock is not None:
@@ -86,7 +92,14 @@ def clocks_of(numbers: Numbers) -> list[Clock]:
     if not found:
         steps = [clock for k in range(len(numbers.names)) if (clock := _added_up(numbers, k)) is not None]
         found += [(0, k, clock) for k, clock in enumerate(steps)]
+    if len(found) > 1:  # of columns that are as sure the one that tells more rows apart
+        found = [(rank + 0.5 * _repeats(clock, numbers), k, clock) for rank, k, clock in found]
     return [clock for *_, clock in sorted(found, key=lambda item: item[:2])] + [_without(numbers)]
+
+
+def _repeats(clock: Clock, numbers: Numbers) -> bool:
+    """Tell a column of time that stands at many rows where it stood."""
+    return float(np.mean(repeats(seconds(clock, numbers)))) > SHARED
 
 
 def seconds(clock: Clock, numbers: Numbers) -> FloatArray:
@@ -99,11 +112,28 @@ def seconds(clock: Clock, numbers: Numbers) -> FloatArray:
         return count * clock.step
     k = numbers.table.columns.index(clock.column)
     value, _ = _as_meant(numbers, k, _stamps(numbers.cells(k)) if clock.unit == "iso" else numbers.values[:, k])
-    if clock.unit == "iso":
-        return value
-    return (
-        (added_up(value, numbers.table.number) if clock.spacings else value) * clock.scale * STATED_SCALES[clock.unit]
-    )
+    if clock.unit != "iso":
+        value = added_up(value, numbers.table.number) if clock.spacings else value
+        value = value * clock.scale * STATED_SCALES[clock.unit]
+    return evened(value) if clock.shared else value
+
+
+def with_shared_stamps(clock: Clock, readings: Iterable[tuple[Numbers, FloatArray]]) -> Clock:
+    """Return a clock that several rows of one sensor share a stamp of as such; one whose rows have their own as it is.
+
+    ``readings`` are the table and the values (n, k) of each sensor that is read in all of its rows. Rows that stand
+    twice hold the same readings.
+    """
+    if clock.column is None:
+        return clock
+    for numbers, value in readings:
+        again = repeats(seconds(clock, numbers))
+        fresh = again & np.any(np.abs(np.diff(value, axis=0, prepend=np.nan)) > 0.0, axis=1)
+        if np.mean(fresh) > SHARED and np.sum(fresh) > 0.5 * np.sum(again):
+            each = 1.0 / (1.0 - float(np.mean(again)))
+            why = f"{clock.decision.why}; {each:.3g} rows SHARE a stamp, and are taken as even between stamps"
+            return replace(clock, shared=True, decision=clock.decision._replace(why=why))
+    return clock
 
 
 def moment_of(clock: Clock, numbers: Numbers) -> float | None:

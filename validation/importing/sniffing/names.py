@@ -41,7 +41,7 @@ _STEMS = {
     "magnetometer": "mag compass kompass boussole bussola магн 磁 자기 manyetik hmc58 qmc58 lis3m mmc5 ak8963",
     "accelerometer": (
         "acc acel beschl versnell przysp zrychl akseler kiihty gyorsul ускор акселе 加速 가속 ivme "
-        "specificforce gforce adxl"
+        "specificforce gforce adxl highg lowg"
     ),
 }
 #: The same as whole names, once the axis is off: ax, gx, mx; wx, Bx and Hx as physics writes them; gFx of Physics
@@ -56,6 +56,8 @@ _LETTERS = {
     "b": "magnetometer",
     "h": "magnetometer",
 }
+#: Words before a g that is none of a gyroscope: high_g_x is an accelerometer's of wide range.
+_RANGES = ("high", "low")
 #: Words of columns that are worked out from a sensor, or are another thing: a fused attitude, an acceleration
 #: without gravity or in the earth's axes, errors, set points. The number is how far such a column stands back.
 _STAND_BACK = {
@@ -178,7 +180,7 @@ def sensor_of(base: str) -> str | None:
     """Return the sensor that a name (of a column without axis and unit, of a file, of an id) speaks of, or None."""
     words = re.split(r"[\s_\-.]+", _plain(base))
     letter = re.sub(r"\d+$", "", words[-1])
-    if letter in _LETTERS:
+    if letter in _LETTERS and not (letter == "g" and words[:-1] and words[-2] in _RANGES):
         return _LETTERS[letter]
     squeezed = "".join(words).replace("magnitude", "")
     return next((sensor for sensor, stems in _PLAIN_STEMS.items() if any(stem in squeezed for stem in stems)), None)

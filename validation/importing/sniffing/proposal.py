@@ -116,6 +116,7 @@ def map_text(proposal: Proposal) -> str:
     if clock.column is not None:
         lines += [f"column = {_text(clock.column)}", f"unit = {_text(clock.unit)}"]
         lines += ["spacings = true # of each row from the one before"] * clock.spacings
+        lines += ["shared = true # several rows share a stamp, and are even between stamps"] * clock.shared
         lines += [f"scale = {clock.scale:.9g} # the worth of one count in that unit"] * (clock.scale != 1.0)
         if clock.off:
             lines.append(f"scale_sigma = {clock.scale * clock.off:.2g} # leave out where the scale is known")

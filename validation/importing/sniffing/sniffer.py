@@ -18,7 +18,15 @@ from discsim.validation.importing.raw_table import REPAIRS, Layout, RepairList, 
 from discsim.validation.importing.sniffing.archive import BESIDE, MAX_FILES
 from discsim.validation.importing.sniffing.axes import body_axes
 from discsim.validation.importing.sniffing.behaviour import TELLING, WORTHS, by_behaviour
-from discsim.validation.importing.sniffing.clock import SPACING, Clock, clocks_of, counter_note, moment_of, seconds
+from discsim.validation.importing.sniffing.clock import (
+    SPACING,
+    Clock,
+    clocks_of,
+    counter_note,
+    moment_of,
+    seconds,
+    with_shared_stamps,
+)
 from discsim.validation.importing.sniffing.decision import Decision
 from discsim.validation.importing.sniffing.dialect import dialect_of
 from discsim.validation.importing.sniffing.exchanged import exchanged
@@ -55,6 +63,7 @@ from discsim.validation.importing.sniffing.spin_axis import Reading3
 from discsim.validation.importing.sniffing.turning import Fit, best_worth, steps_between
 from discsim.validation.importing.sniffing.units import COUNTS, Reading
 from discsim.validation.importing.sniffing.unused import missing_axes, one_axis_rate, unused_columns
+from discsim.validation.importing.sniffing.wider_range import wider_range
 
 __all__ = ["sniff"]
 
@@ -96,6 +105,8 @@ def sniff(raw: Path, plant: Plant = "free_spin") -> Proposal:
         seen = by_behaviour(unknown, [seconds(clock, triple.numbers)[triple.rows] for triple in unknown])
         found |= {sensor: (triple, decision) for triple, sensor, decision in seen if sensor in missing}
     found = {s: found[s] for s in ORDER if s in found and _on(clock, found[s][0].numbers)}
+    sensors = [triple for triple, _ in found.values() if triple.where is None]
+    clock = with_shared_stamps(clock, [(triple.numbers, triple.values) for triple in sensors])
     tables += aside
     fixed, said = fixes_of(tables, clock, [triple.numbers for triple, _ in found.values()])
     if fixed is not None and any(fixed.numbers is numbers for numbers in aside):
@@ -207,8 +218,11 @@ def _assigned(files: Sequence[_File]) -> tuple[dict[str, tuple[Triple, Decision]
         named[sensor] = min(
             mine, key=lambda t: (sensor == "accelerometer" and _weightless(t), t.penalty, triples.index(t))
         )
+    wider = {sensor: wider_range(first, _like(first, alive)) for sensor, first in named.items()}
+    named |= {sensor: item[0] for sensor, item in wider.items() if item is not None}
     meant, decisions, notes = exchanged(named)
-    said = {decision.what: decision for decision in decisions}
+    said = {item[1].what: item[1] for item in wider.values() if item is not None}
+    said |= {decision.what: decision for decision in decisions}
     accel = meant.get("accelerometer")
     several = sum(t.sensor == "accelerometer" and t.penalty < NO_READING for t in triples) > 1
     if accel is not None and _weightless(accel) and (several or not _rests(accel)):
@@ -218,6 +232,12 @@ def _assigned(files: Sequence[_File]) -> tuple[dict[str, tuple[Triple, Decision]
         for sensor, triple in meant.items()
     }
     return found, [triple for triple in triples if triple not in named.values()], notes
+
+
+def _like(first: Triple, triples: Sequence[Triple]) -> list[Triple]:
+    """Return the others of a triple's kind that are a sensor's readings."""
+    alike = [t for t in triples if t is not first and t.sensor == first.sensor and t.penalty < NO_READING]
+    return [t for t in alike if t.sensor != "accelerometer" or not _weightless(t)]
 
 
 def _turned_about(

@@ -157,7 +157,8 @@ def best_worth(steps: Sequence[Steps], worths: Sequence[float]) -> Fit | None:
 def left_by(steps: Sequence[Steps], worth: float) -> float | None:
     """Return what turning by a worth leaves of a vector's changes (a ratio of medians), its axes as the gyroscope's.
 
-    It has no offset: one that is free makes up for a worth that is wrong, where turns are small. None of too few steps.
+    It has no offset: one that is free makes up for a worth that is wrong, where turns are small. None of too few steps,
+    and where most change nothing.
     """
     left, change = [], []
     for one in steps:
@@ -166,7 +167,8 @@ def left_by(steps: Sequence[Steps], worth: float) -> float | None:
             before, after, turn = chosen
             left.append(np.linalg.norm(after - np.einsum("nij,nj->ni", _rotations(turn * worth), before), axis=1))
             change.append(np.linalg.norm(after - before, axis=1))
-    return float(np.median(np.concatenate(left)) / np.median(np.concatenate(change))) if left else None
+    usual = float(np.median(np.concatenate(change))) if left else 0.0
+    return float(np.median(np.concatenate(left))) / usual if usual > 0.0 else None
 
 
 def best_axes(steps: Sequence[Steps], worth: float) -> list[Fit]:
