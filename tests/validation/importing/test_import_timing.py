@@ -162,6 +162,21 @@ def test_an_import_takes_repeats_out_and_writes_the_sensors_own_rate_and_times(t
     assert_allclose(np.diff(field.t), 0.01, atol=2e-5)
 
 
+def test_a_sensor_that_the_loop_reads_every_second_row_has_the_time_of_that_row(tmp_path):
+    """Half a row before it was taken for a gyroscope that lags."""
+    t = np.arange(800) / 200.0
+    angle = 35.0 * t
+    mag = np.column_stack((20.0 * np.cos(angle), -20.0 * np.sin(angle), np.full(t.size, 43.0)))
+    mag += 0.3 * np.random.default_rng(2).standard_normal(mag.shape)
+    result = imported(tmp_path, [f"{1000 * x:.0f}" for x in t], mag[np.arange(800) // 2 * 2], turning(t.size))
+    field, gyro = (result.recording.samples[s] for s in ("magnetometer", "gyroscope"))
+    assert_allclose(field.t, gyro.t[::2], atol=1e-6)
+    assert any("read every second row, in step with the log" in note for note in result.notes)
+    # cut within a reading, it stands since the row before
+    cut = imported(tmp_path, [f"{1000 * x:.0f}" for x in t], mag[(np.arange(800) + 1) // 2 * 2 % 800], turning(t.size))
+    assert cut.recording.samples["magnetometer"].t[0] == pytest.approx(cut.recording.samples["gyroscope"].t[0] - 0.005)
+
+
 @pytest.mark.parametrize(("sensor_hz", "log_hz"), [(100.0, 104.0), (100.0, 250.0), (75.0, 100.0), (20.0, 200.0)])
 def test_rows_lost_from_a_held_log_leave_its_sensors_clock_whole(tmp_path, sensor_hz, log_hz):
     t, mag = held_log(sensor_hz, log_hz, seconds=20.0)
